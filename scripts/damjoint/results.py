@@ -1,0 +1,152 @@
+"""Results of a run: from the engine's tables to joint.csv, history.csv and run.json."""
+
+from __future__ import annotations
+
+import csv
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from .parameters import Case
+
+JOINT = ("time", "level", "x", "y", "z", "delta_n", "delta_t1", "delta_t2", "sigma_n", "tau_1", "tau_2", "p", "damage", "slip")
+HISTORY = ("time", "level", "load_factor", "iterations", "cuts", "residual", "crack_length", "slip_length", "max_opening",
+           "crest_ux", "N", "T", "M", "flux")
+
+
+@dataclass
+class Results:
+    """What a run has found: tables as {column: array}."""
+
+    case: Case
+    #: a row per converged step, columns HISTORY
+    history: dict[str, np.ndarray]
+    #: a row per joint node and requested level, columns JOINT
+    joint: dict[str, np.ndarray]
+    #: the same rows with delta_* and the stresses extrapolated from element means, as published codes print them
+    extrapolated: dict[str, np.ndarray]
+    #: empty, or why the run stopped and at which level
+    stopped: str = ""
+    info: dict = field(default_factory=dict)
+
+    def at(self, time: float | None = None) -> dict[str, np.ndarray]:
+        """The joint rows of a requested time, the last one by default, sorted by x and z."""
+        return rows_at(self.joint, time)
+
+    def at_extrapolated(self, time: float | None = None) -> dict[str, np.ndarray]:
+        """As `at`, with jump and stress extrapolated from the integration points."""
+        return rows_at(self.extrapolated, time)
+
+
+def rows_at(table: dict[str, np.ndarray], time: float | None = None) -> dict[str, np.ndarray]:
+    """The rows of one time (the last one by default), sorted by x, then z."""
+    time = table["time"].max() if time is None else time
+    rows = np.flatnonzero(np.isclose(table["time"], time))
+    rows = rows[np.lexsort((table["z"][rows], table["x"][rows]))]
+    return {name: column[rows] for name, column in table.items()}
+
+
+def read_simple_table(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """GetDP's SimpleTable of a vector on elements: points (elements x nodes, 3) and values (same shape)."""
+    table = np.loadtxt(path, ndmin=2)
+    half = table.shape[1] // 2
+    return table[:, :half].reshape(-1, 3), table[:, half:].reshape(-1, 3)
+
+
+def nodes_of(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Distinct points, sorted by x, then z, and for each given point the row of its node."""
+    rounded = np.round(points / max(1e-300, np.abs(points).max()), 9)
+    _, first, inverse = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
+    return points[first], inverse.ravel()
+
+
+def node_means(rows: np.ndarray, values: np.ndarray, number: int) -> np.ndarray:
+    """Mean of the values that fall on each of `number` nodes; rows: the node of each value."""
+    total = np.zeros((number, values.shape[1]))
+    np.add.at(total, rows, values)
+    return total / np.bincount(rows, minlength=number)[:, None]
+
+
+def read(case: Case, folder: Path) -> Results:
+    """Read what an engine has left in a folder, complete or not: everything up to the last converged step."""
+    history_file = folder / "history.txt"
+    steps = np.array([line.split()[1:] for line in history_file.read_text().splitlines()], float) if history_file.exists() else np.zeros((0, 12))
+    time, level, iterations, cuts, residual, crack, slid, opening, crest, n, t, m = steps.T
+    scheduled = np.array([case.level_at(v) for v in time])
+    factor = np.divide(level, scheduled, out=np.ones_like(level), where=scheduled > 0)
+    history = dict(zip(HISTORY, (time, level, factor, iterations, cuts, residual, crack, slid, opening, crest, n, t, m,
+                                 np.zeros_like(time)), strict=True))
+
+    reached = [(i + 1, t) for i, t in enumerate(case.times) if t in case.requested and t in time]
+    status = folder / "status.txt"
+    stopped = ""
+    if status.exists() and status.read_text().strip() != "0":
+        stopped = why_stopped(case, history)
+        if len(time) and time[-1] not in case.times:
+            reached.append((int(np.sum(np.isin(case.times, time))) + 1, time[-1]))
+    joint, extrapolated = [], []
+    for index, t in reached:
+        read_table = lambda name: read_simple_table(folder / f"{name}_{index}.txt")  # noqa: B023, E731
+        points, jump = read_table("jump")
+        nodes, rows = nodes_of(points)
+        jump, traction, state = (node_means(rows, v, len(nodes)) for v in (jump, read_table("traction")[1], read_table("state")[1]))
+        when = np.tile([t, history["level"][np.flatnonzero(time == t)[0]]], (len(nodes), 1))
+        order = [1, 0, 2]  # y, x, z: normal, tangent 1, tangent 2
+        joint.append(np.hstack([when, nodes, jump[:, order], traction[:, order], state]))
+        corners, mean_jump = read_table("mean_jump")
+        _, corner_rows = nodes_of(np.vstack([nodes, corners]))
+        extra = joint[-1].copy()
+        corner_rows = corner_rows[len(nodes):]
+        present = np.unique(corner_rows)
+        for columns, values in ((slice(5, 8), mean_jump), (slice(8, 11), read_table("mean_traction")[1])):
+            with np.errstate(invalid="ignore"):
+                extra[present, columns] = node_means(corner_rows, values[:, order], len(nodes))[present]
+        extrapolated.append(extra)
+    columns = lambda blocks: dict(zip(JOINT, (np.vstack(blocks) if blocks else np.zeros((0, len(JOINT)))).T, strict=True))  # noqa: E731
+    return Results(case, history, columns(joint), columns(extrapolated), stopped)
+
+
+def why_stopped(case: Case, history: dict[str, np.ndarray]) -> str:
+    """In words, from the last converged state: the level, and whether the dam slides or turns over.
+
+    Sliding when the shear is within 2 % of what friction and adhesion hold (or the whole joint has let go),
+    overturning when the crack has crossed most of the base.
+    """
+    if not len(history["time"]):
+        return "no equilibrium even at the first step"
+    last = {name: column[-1] for name, column in history.items()}
+    base = case["dam_base"]
+    holds = case["mu"] * last["N"] + case["adhesion"] * (base - last["crack_length"])
+    if case["law"] == "friction" and last["T"] > 0.98 * holds:
+        reason = "sliding"
+    elif last["crack_length"] > 0.9 * base or last["M"] < 0.05 * last["N"] * base:
+        reason = "overturning"
+    elif last["slip_length"] > 0.98 * base:
+        reason = "sliding"
+    else:
+        reason = "no convergence"
+    return f"{reason}: no equilibrium beyond level {last['level']:.6g} m (t = {last['time']:.6g}); the last converged state is saved"
+
+
+def write_csv(path: Path, table: dict[str, np.ndarray]) -> None:
+    """Write a table with its column names; numbers with twelve digits."""
+    with path.open("w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(table)
+        writer.writerows([f"{v:.12g}" for v in row] for row in zip(*table.values(), strict=True))
+
+
+def write(results: Results, folder: Path) -> None:
+    """Write joint.csv, history.csv and run.json into a folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    joint = dict(results.joint)
+    for axis in "xyz":  # the mesh generator's last digits
+        joint[axis] = np.round(joint[axis], 9) + 0.0
+    write_csv(folder / "joint.csv", joint)
+    write_csv(folder / "history.csv", results.history)
+    case = results.case
+    (folder / "run.json").write_text(json.dumps(
+        {"case": case.name, "title": case.title, "parameters": case.values, "levels": case.levels, "tail_levels": case.tail_levels,
+         "times": case.times, "stopped": results.stopped, **results.info}, indent=2) + "\n")
