@@ -6,6 +6,7 @@ import csv
 import json
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
 
@@ -130,12 +131,14 @@ def why_stopped(case: Case, history: dict[str, np.ndarray]) -> str:
     return f"{reason}: no equilibrium beyond level {last['level']:.6g} m (t = {last['time']:.6g}); the last converged state is saved"
 
 
-def write_csv(path: Path, table: dict[str, np.ndarray]) -> None:
-    """Write a table with its column names; numbers with twelve digits."""
-    with path.open("w", newline="") as file:
-        writer = csv.writer(file)
-        writer.writerow(table)
-        writer.writerows([f"{v:.12g}" for v in row] for row in zip(*table.values(), strict=True))
+def write_csv(target: Path | TextIO, table: dict[str, np.ndarray]) -> None:
+    """Write a table with its column names to a path or an open file; numbers with twelve digits."""
+    if isinstance(target, Path):
+        with target.open("w", newline="") as file:
+            return write_csv(file, table)
+    writer = csv.writer(target, lineterminator="\n")
+    writer.writerow(table)
+    writer.writerows([f"{v:.12g}" for v in row] for row in zip(*table.values(), strict=True))
 
 
 def write(results: Results, folder: Path) -> None:

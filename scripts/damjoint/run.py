@@ -65,6 +65,10 @@ def run(case: Case, out: Path, fields: bool = True, picture: bool = True, progre
     try:
         with ThreadPoolExecutor(2) as pool:
             told = [pool.submit(one, i) for i in range(len(scenes))]
+            if picture:  # matplotlib loads while GetDP works
+                from .picture import draw
+            if fields:
+                from .fields import write_fields
     finally:
         bar.close()
         solved = time.perf_counter()
@@ -85,10 +89,8 @@ def run(case: Case, out: Path, fields: bool = True, picture: bool = True, progre
         raise failure
     for result, folder in zip(found, folders, strict=True):
         if fields:
-            from .fields import write_fields
             write_fields(result, mesh_file, folder)
         if picture:
-            from .picture import draw
             draw(result, mesh_file, folder)
         result.info["wall_seconds"]["post"] = time.perf_counter() - solved
         results.write(result, folder)
