@@ -162,8 +162,9 @@ class Case:
 
     @property
     def requested(self) -> tuple[float, ...]:
-        """The times at which a level of the list is reached."""
-        return tuple(t for t in self.times if t == round(t)) or self.times[-1:]
+        """The times at which a level of the list, or the end of a prescribed displacement, is reached."""
+        ends = {self["drive_end"]} if self["drive"] != "level" else set()
+        return tuple(t for t in self.times if t == round(t) or t in ends) or self.times[-1:]
 
     def level_at(self, time: float) -> float:
         """Reservoir level [m] at a time, linear between the levels, from 0 at t = 0."""

@@ -30,6 +30,8 @@ class Results:
     extrapolated: dict[str, np.ndarray]
     #: empty, or why the run stopped and at which level
     stopped: str = ""
+    #: opening of the heel [m] at each row of history
+    heel: np.ndarray = field(default_factory=lambda: np.zeros(0))
     info: dict = field(default_factory=dict)
 
     def at(self, time: float | None = None) -> dict[str, np.ndarray]:
@@ -73,8 +75,8 @@ def node_means(rows: np.ndarray, values: np.ndarray, number: int) -> np.ndarray:
 def read(case: Case, folder: Path) -> Results:
     """Read what an engine has left in a folder, complete or not: everything up to the last converged step."""
     history_file = folder / "history.txt"
-    steps = np.array([line.split()[1:] for line in history_file.read_text().splitlines()], float) if history_file.exists() else np.zeros((0, 12))
-    time, level, iterations, cuts, residual, crack, slid, opening, crest, n, t, m = steps.T
+    steps = np.array([line.split()[1:] for line in history_file.read_text().splitlines()], float) if history_file.exists() else np.zeros((0, 13))
+    time, level, iterations, cuts, residual, crack, slid, opening, crest, n, t, m, heel = steps.T
     scheduled = np.array([case.level_at(v) for v in time])
     factor = np.divide(level, scheduled, out=np.ones_like(level), where=scheduled > 0)
     history = dict(zip(HISTORY, (time, level, factor, iterations, cuts, residual, crack, slid, opening, crest, n, t, m,
@@ -106,7 +108,7 @@ def read(case: Case, folder: Path) -> Results:
                 extra[present, columns] = node_means(corner_rows, values[:, order], len(nodes))[present]
         extrapolated.append(extra)
     columns = lambda blocks: dict(zip(JOINT, (np.vstack(blocks) if blocks else np.zeros((0, len(JOINT)))).T, strict=True))  # noqa: E731
-    return Results(case, history, columns(joint), columns(extrapolated), stopped)
+    return Results(case, history, columns(joint), columns(extrapolated), stopped, heel)
 
 
 def why_stopped(case: Case, history: dict[str, np.ndarray]) -> str:

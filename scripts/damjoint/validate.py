@@ -73,10 +73,15 @@ def modelings() -> list[str]:
 
 
 def compare(result: Results) -> list[Comparison]:
-    """Every reference row of the scene beside the computed value: at the node of the same x, mean over z."""
+    """Every reference row of the scene beside the computed value: at the node of the same x, mean over z.
+
+    Read at the last level, or at the end of the prescribed displacement.
+    """
     found = []
-    for reference in references(result.case):
-        rows = result.at() if reference.read_as == "node" else result.at_extrapolated()
+    case = result.case
+    time = None if case["drive"] == "level" else case["drive_end"]
+    for reference in references(case):
+        rows = result.at(time) if reference.read_as == "node" else result.at_extrapolated(time)
         near = np.abs(rows["x"] - reference.x)
         found.append(Comparison(reference, float(rows[reference.quantity][near < near.min() + 1e-6].mean())))
     return found
