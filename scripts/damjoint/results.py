@@ -24,7 +24,7 @@ class Results:
     case: Case
     #: a row per converged step, columns HISTORY
     history: dict[str, np.ndarray]
-    #: a row per joint node and requested level, columns JOINT
+    #: a row per joint node and requested level, columns JOINT, and flux (mass flux along x) where water flows
     joint: dict[str, np.ndarray]
     #: the same rows with delta_* and the stresses extrapolated from element means, as published codes print them
     extrapolated: dict[str, np.ndarray]
@@ -51,11 +51,11 @@ def rows_at(table: dict[str, np.ndarray], time: float | None = None) -> dict[str
     return {name: column[rows] for name, column in table.items()}
 
 
-def read_simple_table(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """GetDP's SimpleTable of a vector on elements: points (elements x nodes, 3) and values (same shape)."""
+def read_simple_table(path: Path, components: int = 3) -> tuple[np.ndarray, np.ndarray]:
+    """GetDP's SimpleTable on elements: points (elements x nodes, 3) and values (elements x nodes, components)."""
     table = np.loadtxt(path, ndmin=2)
-    half = table.shape[1] // 2
-    return table[:, :half].reshape(-1, 3), table[:, half:].reshape(-1, 3)
+    points = 3 * table.shape[1] // (3 + components)
+    return table[:, :points].reshape(-1, 3), table[:, points:].reshape(-1, components)
 
 
 def nodes_of(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -75,12 +75,12 @@ def node_means(rows: np.ndarray, values: np.ndarray, number: int) -> np.ndarray:
 def read(case: Case, folder: Path) -> Results:
     """Read what an engine has left in a folder, complete or not: everything up to the last converged step."""
     history_file = folder / "history.txt"
-    steps = np.array([line.split()[1:] for line in history_file.read_text().splitlines()], float) if history_file.exists() else np.zeros((0, 13))
-    time, level, iterations, cuts, residual, crack, slid, opening, crest, n, t, m, heel = steps.T
+    steps = np.array([line.split()[1:] for line in history_file.read_text().splitlines()], float) if history_file.exists() else np.zeros((0, 15))
+    time, level, iterations, cuts, residual, crack, slid, opening, crest, n, t, m, heel, flux_in, flux_out = steps.T
     scheduled = np.array([case.level_at(v) for v in time])
     factor = np.divide(level, scheduled, out=np.ones_like(level), where=scheduled > 0)
     history = dict(zip(HISTORY, (time, level, factor, iterations, cuts, residual, crack, slid, opening, crest, n, t, m,
-                                 np.zeros_like(time)), strict=True))
+                                 flux_out), strict=True))
 
     reached = [(i + 1, t) for i, t in enumerate(case.times) if t in case.requested and t in time]
     status = folder / "status.txt"
@@ -91,13 +91,14 @@ def read(case: Case, folder: Path) -> Results:
             reached.append((int(np.sum(np.isin(case.times, time))) + 1, time[-1]))
     joint, extrapolated = [], []
     for index, t in reached:
-        read_table = lambda name: read_simple_table(folder / f"{name}_{index}.txt")  # noqa: B023, E731
+        read_table = lambda name, n=3: read_simple_table(folder / f"{name}_{index}.txt", n)  # noqa: B023, E731
         points, jump = read_table("jump")
         nodes, rows = nodes_of(points)
         jump, traction, state = (node_means(rows, v, len(nodes)) for v in (jump, read_table("traction")[1], read_table("state")[1]))
+        flux = [node_means(rows, read_table("flux", 1)[1], len(nodes))] if case["uplift"] == "flow" else []
         when = np.tile([t, history["level"][np.flatnonzero(time == t)[0]]], (len(nodes), 1))
         order = [1, 0, 2]  # y, x, z: normal, tangent 1, tangent 2
-        joint.append(np.hstack([when, nodes, jump[:, order], traction[:, order], state]))
+        joint.append(np.hstack([when, nodes, jump[:, order], traction[:, order], state, *flux]))
         corners, mean_jump = read_table("mean_jump")
         _, corner_rows = nodes_of(np.vstack([nodes, corners]))
         extra = joint[-1].copy()
@@ -107,7 +108,8 @@ def read(case: Case, folder: Path) -> Results:
             with np.errstate(invalid="ignore"):
                 extra[present, columns] = node_means(corner_rows, values[:, order], len(nodes))[present]
         extrapolated.append(extra)
-    columns = lambda blocks: dict(zip(JOINT, (np.vstack(blocks) if blocks else np.zeros((0, len(JOINT)))).T, strict=True))  # noqa: E731
+    names = JOINT + ("flux",) * (case["uplift"] == "flow")
+    columns = lambda blocks: dict(zip(names, (np.vstack(blocks) if blocks else np.zeros((0, len(names)))).T, strict=True))  # noqa: E731
     return Results(case, history, columns(joint), columns(extrapolated), stopped, heel)
 
 
