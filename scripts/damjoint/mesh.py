@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tempfile
+from dataclasses import dataclass
 from pathlib import Path
 
 import gmsh
@@ -14,10 +16,12 @@ from .parameters import Case, start_gmsh
 GEOMETRY = ("dim", "mesh_pattern", "n_joint", "n_layers", "h_dam", "h_found", "dam_base", "dam_crest", "dam_height",
             "found_side", "found_depth", "thickness")
 
+#: Physical regions of geo/*.geo and the codimension of each.
+REGIONS = {"dam": (1, 0), "foundation": (2, 0), "joint": (3, 1), "upstream": (4, 1), "downstream": (5, 1), "fixed": (6, 1),
+           "sides": (10, 1)}
 
-def key(case: Case) -> tuple:
-    """What the mesh depends on: equal keys, equal meshes."""
-    return tuple(case[name] for name in GEOMETRY)
+#: Gmsh element types of order 1 by their VTK name.
+SHAPES = {1: "line", 2: "triangle", 3: "quad", 4: "tetra", 5: "hexahedron", 6: "wedge"}
 
 
 def assignments(values: dict) -> str:
@@ -25,34 +29,77 @@ def assignments(values: dict) -> str:
     return "".join(f'default_{n} = "{v}";\n' if isinstance(v, str) else f"default_{n} = {v!r};\n" for n, v in values.items())
 
 
-def write_mesh(case: Case, path: Path) -> dict[str, int]:
-    """Mesh the case and write it to path (MSH 2.2, binary).
+@dataclass
+class Body:
+    """One region of the mesh: points (n, 3), their node tags, cells by shape, element tags in that order."""
 
-    Returns element and node counts: nodes, elements (of the bulk), joint_elements. Raises RunError with
-    Gmsh's message.
+    points: np.ndarray
+    node_tags: np.ndarray
+    cells: list[tuple[str, np.ndarray]]
+    element_tags: np.ndarray
+
+
+class Mesh:
+    """The mesh of a case: its bodies by the names of REGIONS, and its size.
+
+    Raises RunError with Gmsh's message if there is no mesh for the parameters.
     """
-    start_gmsh()
-    gmsh.clear()
-    gmsh.parser.clear()
-    gmsh.onelab.clear()
-    dim = int(case["dim"])
-    geometry = path.with_suffix(".geo")
-    geometry.write_text(assignments({n: case[n] for n in GEOMETRY}) + f'Include "{ROOT}/geo/dam{dim}d.geo";\n')
-    try:
-        gmsh.open(str(geometry))
-        gmsh.model.mesh.generate(dim)
+
+    def __init__(self, case: Case) -> None:
+        start_gmsh()
+        gmsh.clear()
+        gmsh.parser.clear()
+        gmsh.onelab.clear()
+        dim = int(case["dim"])
+        with tempfile.NamedTemporaryFile("w", suffix=".geo") as file:
+            file.write(assignments({n: case[n] for n in GEOMETRY}) + f'Include "{ROOT}/geo/dam{dim}d.geo";\n')
+            file.flush()
+            try:
+                gmsh.open(file.name)
+                gmsh.model.mesh.generate(dim)
+            except Exception as error:  # what gmsh raises
+                raise RunError(f"mesh: {error}") from None
+        tags, coordinates, _ = gmsh.model.mesh.getNodes()
+        self.dim, self.nodes = dim, len(tags)
+        self._place = np.zeros(int(tags.max()) + 1, int)
+        self._place[tags] = np.arange(len(tags))
+        self._coordinates = coordinates.reshape(-1, 3)
+        self.bodies = {name: self._body(dim - co, tag) for name, (tag, co) in REGIONS.items()
+                       if dim == 3 or name != "sides"}
+        joint = self.bodies["joint"].element_tags
+        if joint.max() >= 1_000_000:  # the keys of the joint's memory in GetDP hold six digits
+            raise RunError(f"mesh: joint element tag {joint.max()}: must be below 1000000; use a coarser mesh")
+
+    def _body(self, dimension: int, group: int) -> Body:
+        blocks, numbers = {}, {}
+        for entity in gmsh.model.getEntitiesForPhysicalGroup(dimension, group):
+            for kind, elements, nodes in zip(*gmsh.model.mesh.getElements(dimension, entity), strict=True):
+                blocks.setdefault(kind, []).append(nodes.reshape(len(elements), -1))
+                numbers.setdefault(kind, []).append(elements)
+        flat = np.concatenate([b.ravel() for block in blocks.values() for b in block])
+        used, cells = np.unique(flat, return_inverse=True)
+        shapes, start = [], 0
+        for kind, block in blocks.items():
+            table = np.vstack(block)
+            shapes.append((SHAPES[kind], cells[start : start + table.size].reshape(table.shape)))
+            start += table.size
+        return Body(self._coordinates[self._place[used]], used, shapes, np.concatenate([t for n in numbers.values() for t in n]))
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Nodes, elements (of dam and foundation) and joint_elements."""
+        size = {name: len(body.element_tags) for name, body in self.bodies.items()}
+        return {"nodes": self.nodes, "elements": size["dam"] + size["foundation"], "joint_elements": size["joint"]}
+
+    def write(self, path: Path) -> None:
+        """Write the mesh for GetDP (MSH 2.2, binary); only while it is Gmsh's current one."""
         gmsh.option.setNumber("Mesh.MshFileVersion", 2.2)
         gmsh.option.setNumber("Mesh.Binary", 1)
         gmsh.write(str(path))
-    except Exception as error:  # what gmsh raises
-        raise RunError(f"mesh: {error}") from None
 
-    def tags(dimension: int, group: int) -> np.ndarray:
-        entities = gmsh.model.getEntitiesForPhysicalGroup(dimension, group)
-        return np.concatenate([t for e in entities for t in gmsh.model.mesh.getElements(dimension, e)[1]])
 
-    joint = tags(dim - 1, 3)
-    if joint.max() >= 1_000_000:  # GetDP's memory keys hold six digits
-        raise RunError(f"mesh: joint element tag {joint.max()}: must be below 1000000; use a coarser mesh")
-    return {"nodes": len(gmsh.model.mesh.getNodes()[0]), "elements": len(tags(dim, 1)) + len(tags(dim, 2)),
-            "joint_elements": len(joint)}
+def write_mesh(case: Case, path: Path) -> dict[str, int]:
+    """Mesh the case, write it to path and return its counts. Raises RunError."""
+    mesh = Mesh(case)
+    mesh.write(path)
+    return mesh.counts

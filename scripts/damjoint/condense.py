@@ -1,0 +1,287 @@
+"""The bulk, eliminated exactly: what dam and foundation do to the joint.
+
+Both bodies are linear elastic and do not change with the level, the law or the water. With their unknowns away
+from the joint eliminated (Schur complements), the joint sees the dam (floating, S_d) and the foundation (F = S_f^-1):
+
+    S_d u_d + t = f_d,    u_f = F (f_f + t),    delta = u_d - u_f
+
+(t: nodal forces of the joint's total traction on its upper lip). Eliminating u_d and u_f too leaves the jump alone:
+
+    t = t_0 - S delta,    B = (1 + S_d F)^-1,    S = B S_d,    t_0 = B f_d - S F f_f.
+
+S is symmetric; the dam's rigid motions are its null space. Why not GetDP for the bulk: its start alone takes as
+long as a whole 2D loading here, and an independent assembly checks the problem definition (tests compare both).
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import pickle
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy import linalg, sparse
+
+from . import __version__, fem
+from .mesh import GEOMETRY, Body, Mesh
+from .parameters import Case
+
+#: What the condensed bodies depend on besides the mesh.
+MATERIAL = ("order", "hold_z", "E_dam", "E_found", "nu_dam", "nu_found")
+
+#: The cache is kept below this size [bytes]; the files longest unused go first.
+CACHE_LIMIT = 2_000_000_000
+
+
+def schur_complement(matrix: sparse.csr_matrix, keep: np.ndarray) -> np.ndarray:
+    """Dense Schur complement (k, k) of a symmetric matrix on the k unknowns `keep`.
+
+    By MUMPS where python-mumps is installed; else by scipy's SuperLU, ten times slower in 3D.
+    """
+    try:
+        import mumps
+    except ImportError:
+        return schur_by_superlu(matrix, keep)
+    result = np.zeros((len(keep), len(keep)))
+    with mumps.Context() as context:
+        context.set_matrix(sparse.triu(matrix, format="coo"), symmetric=True)
+        context.mumps_instance.icntl[19] = 1  # Schur complement on the host
+        context.mumps_instance.icntl[31] = 1  # factors not kept
+        indices = keep.astype(np.int32) + 1  # Fortran's; MUMPS keeps the address
+        context.mumps_instance.set_schur(result, indices)
+        context.analyze(ordering="metis" if matrix.shape[0] > 15000 else "scotch")
+        context.factor(reuse_analysis=True, pivot_tol=0.0)
+    return np.tril(result) + np.tril(result, -1).T  # a symmetric factorisation leaves the lower triangle
+
+
+def schur_by_superlu(matrix: sparse.csr_matrix, keep: np.ndarray) -> np.ndarray:
+    """The same by a factorisation of the interior and one solve per kept unknown."""
+    inside = np.setdiff1d(np.arange(matrix.shape[0]), keep)
+    matrix = matrix.tocsc()
+    factor = sparse.linalg.splu(matrix[inside][:, inside], permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
+                                options={"SymmetricMode": True})
+    coupling = matrix[inside][:, keep]
+    return matrix[keep][:, keep].toarray() - coupling.T @ factor.solve(coupling.toarray())
+
+
+def solve_interior(matrix: sparse.csr_matrix, keep: np.ndarray, values: np.ndarray, load: np.ndarray) -> np.ndarray:
+    """The whole solution (n,) of a symmetric system with the unknowns `keep` given."""
+    solution = np.zeros(matrix.shape[0])
+    solution[keep] = values
+    inside = np.setdiff1d(np.arange(matrix.shape[0]), keep)
+    right = (load - matrix @ solution)[inside]
+    interior = matrix[inside][:, inside]
+    try:
+        import mumps
+    except ImportError:
+        solution[inside] = sparse.linalg.spsolve(interior.tocsc(), right)
+    else:
+        with mumps.Context() as context:
+            context.set_matrix(sparse.triu(interior, format="coo"), symmetric=True)
+            context.factor(pivot_tol=0.0)
+            solution[inside] = context.solve(right)
+    return solution
+
+
+def unknowns(functions: np.ndarray, dim: int, components: list[int] | None = None) -> np.ndarray:
+    """Unknowns of functions, function by function, all components or some."""
+    return (dim * functions[:, None] + np.array(range(dim) if components is None else components)).ravel()
+
+
+@dataclass
+class Bodies:
+    """Dam and foundation with their stiffness, before elimination."""
+
+    dim: int
+    dam: fem.Space
+    foundation: fem.Space
+    #: functions of the joint, and of the faces, in the dam's numbering; of the joint in the foundation's
+    joint_dam: np.ndarray
+    joint_foundation: np.ndarray
+    faces: dict[str, np.ndarray]
+    #: unknowns that are held
+    held_dam: np.ndarray
+    held_foundation: np.ndarray
+
+    @staticmethod
+    def of(case: Case, mesh: Mesh) -> Bodies:
+        """Number the unknowns of a mesh."""
+        dim, order = mesh.dim, int(case["order"])
+        space = {name: fem.Space(body, order) for name, body in mesh.bodies.items()}
+        dam, foundation = space["dam"], space["foundation"]
+        held = {"dam": [], "foundation": [unknowns(foundation.find(space["fixed"]), dim)]}
+        if dim == 3 and case["hold_z"]:
+            for name, body in (("dam", dam), ("foundation", foundation)):
+                held[name].append(unknowns(on_sides(body, case["thickness"]), dim, [2]))
+        joined = {name: np.unique(np.concatenate(h)) if h else np.zeros(0, int) for name, h in held.items()}
+        return Bodies(dim, dam, foundation, dam.find(space["joint"]), foundation.find(space["joint"]),
+                      {name: dam.find(space[name]) for name in ("upstream", "downstream")}, joined["dam"], joined["foundation"])
+
+    def stiffness(self, case: Case) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
+        """Stiffness matrices of dam and foundation, all unknowns [N/m]."""
+        return (fem.elasticity(self.dam, self.dim, case["E_dam"], case["nu_dam"]),
+                fem.elasticity(self.foundation, self.dim, case["E_found"], case["nu_found"]))
+
+
+def on_sides(space: fem.Space, thickness: float) -> np.ndarray:
+    """Functions that do not vanish on the z faces: nodes there, and edges that lie in a face."""
+    at = [np.abs(space.body.points[:, 2] - z) < 1e-9 * thickness for z in (0, thickness)]
+    edges = [face[space.edges].all(axis=1) if len(space.edges) else np.zeros(0, bool) for face in at]
+    return np.flatnonzero(np.concatenate([at[0] | at[1], edges[0] | edges[1]]))
+
+
+@dataclass
+class Condensed:
+    """The condensed bodies: matrices on the free jump unknowns (j of them) and the responses to loads."""
+
+    counts: dict[str, int]
+    unknowns: int
+    joint: Body
+    faces: dict[str, Body]
+    #: jump unknowns, dim * joint function + component, that are not held
+    free: np.ndarray
+    #: S (j, j) and F (j, j), see above
+    stiffness: np.ndarray
+    flexibility: np.ndarray
+    #: t_0 per unit of: weight density of dam and of foundation [N/m3] along -y, (j,); force on each function of a
+    #: face along the outward pressure, (j, functions)
+    weight_dam: np.ndarray
+    weight_foundation: np.ndarray
+    pressure: dict[str, np.ndarray]
+    #: the crest's displacement along x: per lip displacement u_d (j,), weight of the dam, force on a face's functions
+    crest_lip: np.ndarray
+    crest_weight: float
+    crest_pressure: dict[str, np.ndarray]
+    #: displacement of the lower lip per weight density of the foundation (j,)
+    lip_weight_foundation: np.ndarray
+
+
+def condense(case: Case, mesh: Mesh, downstream: bool) -> Condensed:
+    """Eliminate the bulk of a case; downstream: prepare for water on the downstream face, too."""
+    bodies = Bodies.of(case, mesh)
+    dim = bodies.dim
+    stiff_dam, stiff_foundation = bodies.stiffness(case)
+
+    joint = unknowns(bodies.joint_dam, dim)
+    free_mask = ~np.isin(joint, bodies.held_dam)
+    free = np.flatnonzero(free_mask)
+    joint_dam, joint_foundation = joint[free_mask], unknowns(bodies.joint_foundation, dim)[free_mask]
+
+    # Loaded unknowns of the dam besides the joint's: x on the upstream face, x and y on the downstream face
+    slope = np.hypot(case["dam_height"], case["dam_base"] - case["dam_crest"])
+    push = {"upstream": {0: 1.0}}  # direction of the water's force
+    if downstream:
+        push["downstream"] = {0: -case["dam_height"] / slope, 1: -(case["dam_base"] - case["dam_crest"]) / slope}
+    wanted = np.concatenate([unknowns(bodies.faces[name], dim, list(c)) for name, c in push.items()])
+    loaded = np.setdiff1d(wanted, np.concatenate([joint, bodies.held_dam]))
+
+    # The dam: joint, loaded unknowns, and the weight as one more column
+    weight = -fem.body_force(bodies.dam, dim, 1)
+    kept = np.setdiff1d(np.arange(stiff_dam.shape[0]), bodies.held_dam)
+    place = np.full(stiff_dam.shape[0], -1)
+    place[kept] = np.arange(len(kept))
+    column = sparse.csr_matrix(weight[kept][:, None])
+    bordered = sparse.bmat([[stiff_dam[kept][:, kept], column], [column.T, None]], format="csr")
+    schur = schur_complement(bordered, np.concatenate([place[joint_dam], place[loaded], [len(kept)]]))
+    nj, nl = len(joint_dam), len(loaded)
+    jj, jl, ll = schur[:nj, :nj], schur[:nj, nj : nj + nl], schur[nj : nj + nl, nj : nj + nl]
+    weight_j, weight_l = schur[:nj, -1], schur[nj : nj + nl, -1]
+    spread = linalg.solve(ll, jl.T, assume_a="pos").T  # (j, loaded)
+    dam = jj - spread @ jl.T
+    dam = (dam + dam.T) / 2
+    force_weight = weight_j - spread @ weight_l
+
+    # The foundation
+    kept = np.setdiff1d(np.arange(stiff_foundation.shape[0]), bodies.held_foundation)
+    place = np.full(stiff_foundation.shape[0], -1)
+    place[kept] = np.arange(len(kept))
+    column = sparse.csr_matrix(-fem.body_force(bodies.foundation, dim, 1)[kept][:, None])
+    bordered = sparse.bmat([[stiff_foundation[kept][:, kept], column], [column.T, None]], format="csr")
+    schur = schur_complement(bordered, np.concatenate([place[joint_foundation], [len(kept)]]))
+    flexibility = linalg.inv(schur[:-1, :-1])
+    flexibility = (flexibility + flexibility.T) / 2
+    force_weight_foundation = schur[:-1, -1]
+
+    series = linalg.lu_factor(np.eye(nj) + dam @ flexibility)
+    stiffness = linalg.lu_solve(series, dam)
+    stiffness = (stiffness + stiffness.T) / 2
+
+    # Water on the faces: a force on a function is one on unknowns of the joint or on loaded ones
+    row_of = {u: i for i, u in enumerate(loaded)}
+    column_of = {u: i for i, u in enumerate(joint_dam)}
+    crest = row_of[dim * int(np.argmin(np.abs(bodies.dam.body.points - [0, case["dam_height"], 0]).sum(axis=1)))]
+    unit = np.zeros(nl)
+    unit[crest] = 1
+    crest_row = linalg.solve(ll, unit, assume_a="pos")
+    pressure, crest_pressure = {}, {}
+    for name, components in push.items():
+        on_joint = np.zeros((nj, len(bodies.faces[name])))
+        on_loaded = np.zeros((nl, len(bodies.faces[name])))
+        for i, function in enumerate(bodies.faces[name]):
+            for component, share in components.items():
+                u = dim * function + component
+                if u in row_of:
+                    on_loaded[row_of[u], i] += share
+                elif u in column_of:
+                    on_joint[column_of[u], i] += share
+        pressure[name] = linalg.lu_solve(series, on_joint - spread @ on_loaded)
+        crest_pressure[name] = crest_row @ on_loaded
+    lip = flexibility @ force_weight_foundation
+    return Condensed(
+        mesh.counts, stiff_dam.shape[0] + stiff_foundation.shape[0] - len(bodies.held_dam) - len(bodies.held_foundation),
+        mesh.bodies["joint"], {name: mesh.bodies[name] for name in push}, free, stiffness, flexibility,
+        linalg.lu_solve(series, force_weight), -stiffness @ lip, pressure,
+        -(crest_row @ jl.T), float(crest_row @ weight_l), crest_pressure, lip)
+
+
+def cache_folder() -> Path | None:
+    """Where condensed bodies are kept: $DAMJOINT_CACHE (empty: nowhere), else the user's cache folder."""
+    named = os.environ.get("DAMJOINT_CACHE")
+    if named is not None:
+        return Path(named) if named else None
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "damjoint"
+
+
+def cached(case: Case) -> tuple[Condensed, Mesh | None, bool]:
+    """The condensed bodies of a case, from the cache or made and kept there.
+
+    Returns them, the mesh if one was made, and whether they were found. Raises RunError (mesh).
+    """
+    downstream = max(case.tail_levels) > 0
+    key = [(n, case[n]) for n in GEOMETRY + MATERIAL] + [downstream, __version__]
+    folder = cache_folder()
+    path = folder / f"{hashlib.sha256(repr(key).encode()).hexdigest()[:24]}.pickle" if folder else None
+    if path and path.exists():
+        try:
+            with path.open("rb") as file:
+                found = pickle.load(file)
+            path.touch()
+            return found, None, True
+        except (OSError, EOFError, pickle.UnpicklingError, AttributeError):
+            path.unlink(missing_ok=True)  # an unfinished or foreign file
+    mesh = Mesh(case)
+    made = condense(case, mesh, downstream)
+    if path:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            part = path.with_suffix(f".{os.getpid()}")
+            with part.open("wb") as file:
+                pickle.dump(made, file, protocol=5)
+            part.replace(path)
+            prune(folder)
+        except OSError:
+            pass  # a cache that can not be written costs time only
+    return made, mesh, False
+
+
+def prune(folder: Path) -> None:
+    """Delete the files longest unused until the cache is below its limit."""
+    files = sorted(folder.glob("*.pickle"), key=lambda f: f.stat().st_mtime)
+    total = sum(f.stat().st_size for f in files)
+    for file in files:
+        if total <= CACHE_LIMIT:
+            break
+        total -= file.stat().st_size
+        file.unlink(missing_ok=True)

@@ -1,0 +1,417 @@
+"""The condensed engine: the loading followed on the joint alone (see condense.py), with the strategy of pro/strategy.pro.
+
+Unknown: the jump. Residual R = N^T W t(jump) - (water in the joint) + S jump - t_0(level) = 0; the pressure of
+flowing water is solved for the jump at hand before every residual, and its derivative enters the tangent.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import linalg, sparse
+
+from . import fem
+from .condense import Condensed
+from .laws import LAWS, Memory
+from .parameters import Case
+from .results import HISTORY, JOINT, Results, why_stopped
+
+TOLERANCE = 1e-9
+GROWTH = 3.0  # a correction is halved only when the residual grows more than this
+MAX_ITERATIONS = 30
+MAX_HALVINGS = 6
+CUT = 0.25
+SMALLEST_STEP = 1 / 1024  # in t
+
+
+@dataclass
+class State:
+    """A converged state: what the next step starts from."""
+
+    time: float
+    level: float
+    jump: np.ndarray
+    memory: Memory
+    nodes: Memory
+
+
+class Joint:
+    """The joint of a case with the condensed bodies around it: residual, tangent and what is read from them."""
+
+    def __init__(self, case: Case, bulk: Condensed) -> None:
+        self.case, self.bulk = case, bulk
+        self.dim, self.order = int(case["dim"]), int(case["order"])
+        self.wet, self.flowing = case["uplift"] != "none", case["uplift"] == "flow"
+        self.unit_weight = case["rho_water"] * case["g"]
+        self.base = case["dam_base"]
+        self.width = case["thickness"] if self.dim == 3 else 1.0
+        self.law = LAWS[case["law"]](case)
+
+        space = fem.Space(bulk.joint, self.order)
+        self.space = space
+        self.points = fem.points_of(space, fem.JOINT[self.order])
+        water = fem.points_of(space, fem.WATER)
+        components = (1, 0, 2)[: self.dim]  # normal, tangent 1, tangent 2
+        functions, parts = np.divmod(bulk.free, self.dim)
+        select = [sparse.csr_matrix((np.ones((parts == c).sum()), (functions[parts == c], np.flatnonzero(parts == c))),
+                                    (len(space.place), len(bulk.free))) for c in components]
+        #: jump components at the law's points and at the nodes, from the unknowns
+        self.at_points = [(self.points.values @ s).tocsr() for s in select]
+        middles = sparse.eye(len(space.place), format="lil")
+        nodes = len(bulk.joint.points)
+        for i, (a, b) in enumerate(space.edges):  # the middle of an edge: mean of its ends and a quarter of its function
+            middles[nodes + i, nodes + i] = 0.25
+            middles[nodes + i, a] = middles[nodes + i, b] = 0.5
+        self.at_nodes = [(middles.tocsr() @ s).tocsr() for s in select]
+        self.water = (water.values @ select[0]).tocsr()
+        self.water_points = water
+        if self.flowing:
+            self._prepare_flow()
+        self.faces = {name: fem.points_of(fem.Space(body, self.order), fem.WATER) for name, body in bulk.faces.items()}
+        self.opening_of_heel = self._heel_row()
+
+    def _heel_row(self) -> np.ndarray:
+        """The heel's opening, mean over z, from the unknowns."""
+        x = np.abs(self.space.body.points[:, 0]) < 1e-9 * self.base
+        weights = np.zeros(len(self.space.place))
+        if self.dim == 2:
+            weights[np.flatnonzero(x)] = 1
+        else:
+            heel = np.flatnonzero(x)
+            heel = heel[np.argsort(self.space.body.points[heel, 2])]
+            lengths = np.diff(self.space.body.points[heel, 2]) / self.width
+            np.add.at(weights, heel[:-1], lengths / 2)
+            np.add.at(weights, heel[1:], lengths / 2)
+            for i, (a, b) in enumerate(self.space.edges):
+                if x[a] and x[b]:
+                    weights[len(x) + i] = abs(self.space.body.points[a, 2] - self.space.body.points[b, 2]) / self.width / 6
+        functions, parts = np.divmod(self.bulk.free, self.dim)
+        return np.where(parts == 1, weights[functions], 0)
+
+    # -- loads ---------------------------------------------------------------------------------------------
+
+    def face_forces(self, name: str, level: float) -> tuple[np.ndarray, np.ndarray]:
+        """Forces of the water on the functions of a face [N] and their derivative with its level.
+
+        With the factor a + b y of pro/loads.pro: exact resultant and moment in spite of the waterline's kink.
+        """
+        points, height = self.faces[name], self.case["dam_height"]
+        y = points.positions[:, 1]
+        stretch = 1.0 if name == "upstream" else np.hypot(height, self.base - self.case["dam_crest"]) / height
+        if self.case["face_load"] == "uniform":
+            pressure, slope = np.full_like(y, level), np.ones_like(y)
+            force, moment = level * height, level * height**2 / 2
+        else:
+            pressure, slope, under = np.maximum(level - y, 0), (level > y).astype(float), min(level, height)
+            force, moment = level * under - under**2 / 2, level * under**2 / 2 - under**3 / 3
+        force, moment = force * stretch * self.width, moment * stretch * self.width
+        m0, m1, m2 = (points.weights @ (pressure * y**k) for k in range(3))
+        det = m0 * m2 - m1**2
+        b = (m0 * moment - m1 * force) / det if det > 1e-3 * m1**2 else 0.0
+        a = (force - b * m1) / m0 if m0 > 0 else 1.0
+        factor = self.unit_weight * points.weights * (a + b * y)
+        return points.values.T @ (factor * pressure), points.values.T @ (factor * slope)
+
+    def linear_pressure(self, x: np.ndarray, level: float, tail: float) -> np.ndarray:
+        """Pressure linear from heel to toe [Pa]."""
+        return self.unit_weight * (level + (tail - level) * x / self.base)
+
+    def loads(self, level: float, tail: float) -> tuple[np.ndarray, np.ndarray]:
+        """t_0 and the imposed part of the water in the joint together (j,), and their derivative with the level."""
+        case, bulk = self.case, self.bulk
+        force, slope = self.face_forces("upstream", level)
+        total = case["g"] * (case["rho_dam"] * bulk.weight_dam + case["rho_found"] * bulk.weight_foundation)
+        total = total + bulk.pressure["upstream"] @ force
+        rate = bulk.pressure["upstream"] @ slope
+        if tail > 0:
+            total = total + bulk.pressure["downstream"] @ self.face_forces("downstream", tail)[0]
+        if self.wet:
+            w, x = self.water_points.weights, self.water_points.positions[:, 0]
+            total = total + self.water.T @ (w * self.linear_pressure(x, level, tail))
+            rate = rate + self.water.T @ (w * self.unit_weight * (1 - x / self.base))
+        return total, rate
+
+    # -- flow ----------------------------------------------------------------------------------------------
+
+    def _prepare_flow(self) -> None:
+        pressure = fem.Space(self.bulk.joint, 1)
+        at = fem.points_of(pressure, fem.JOINT[self.order], gradients=True)
+        x = self.bulk.joint.points[:, 0]
+        inside = np.flatnonzero((x > 1e-9 * self.base) & (x < self.base * (1 - 1e-9)))
+        self.inside = inside
+        self.slopes = [g[:, inside] for g in at.gradients[: self.dim - 1]]
+        self.lift = (self.water.T @ sparse.diags(self.water_points.weights)
+                     @ fem.points_of(pressure, fem.WATER).values[:, inside]).toarray()
+        self.pressure_slopes = at.gradients[: self.dim - 1]
+        self.pressure_middles = np.vstack([np.eye(len(x)), *(np.eye(len(x))[[a]] / 2 + np.eye(len(x))[[b]] / 2
+                                                             for a, b in self.space.edges)]) if self.order == 2 else np.eye(len(x))
+
+    def solve_flow(self, jump: np.ndarray, level: float, tail: float, sensitivity: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Pressure beyond the linear one at the inner nodes for an opening, and its derivatives with jump and level.
+
+        The conductivity w^3 is scaled by aperture_min^-3. Symmetric positive definite, solved directly.
+        """
+        opening = self.at_points[0] @ jump
+        aperture = self.case["aperture_min"] + np.maximum(opening, 0)
+        scale = self.case["aperture_min"] ** -3.0
+        conductivity = scale * aperture**3 * self.points.weights
+        steepness = self.unit_weight * (tail - level) / self.base
+        matrix = sum((g.T @ sparse.diags(conductivity) @ g) for g in self.slopes).toarray()
+        factor = linalg.cho_factor(matrix)
+        pressure = linalg.cho_solve(factor, -(self.slopes[0].T @ (conductivity * steepness)))
+        if not sensitivity:
+            return pressure, np.zeros(0), np.zeros(0)
+        rate = np.where(opening > 0, 3 * scale * aperture**2, 0) * self.points.weights
+        gradient = [g @ pressure for g in self.slopes]
+        gradient[0] = gradient[0] + steepness
+        coupling = sum((g.T @ sparse.diags(rate * d) @ self.at_points[0]) for g, d in zip(self.slopes, gradient, strict=True))
+        by_level = self.slopes[0].T @ (conductivity * self.unit_weight / self.base)
+        return pressure, -linalg.cho_solve(factor, coupling.toarray()), linalg.cho_solve(factor, by_level)
+
+    # -- residual ------------------------------------------------------------------------------------------
+
+    def jumps(self, rows: list, unknowns: np.ndarray) -> np.ndarray:
+        """delta_n, delta_t1, delta_t2 (q, 3) at points or nodes."""
+        return np.column_stack([r @ unknowns for r in rows] + [np.zeros(rows[0].shape[0])] * (3 - len(rows)))
+
+    def residual(self, jump: np.ndarray, memory: Memory, level: float, tail: float, secant: bool = False
+                 ) -> tuple[np.ndarray, Callable[[], tuple[np.ndarray, np.ndarray]]]:
+        """The residual (j,), and a function that gives its derivatives with jump (j, j) and level (j,)."""
+        traction, tangent = self.law.respond(self.jumps(self.at_points, jump), memory, secant)
+        load, rate = self.loads(level, tail)
+        weights = self.points.weights
+        value = self.bulk.stiffness @ jump - load
+        for rows, t in zip(self.at_points, traction.T, strict=False):
+            value = value + rows.T @ (weights * t)
+        pressure = by_jump = by_level = None
+        if self.flowing:
+            pressure, by_jump, by_level = self.solve_flow(jump, level, tail, True)
+            value = value - self.lift @ pressure
+
+        def derivatives() -> tuple[np.ndarray, np.ndarray]:
+            joint = sum(a.T @ sparse.diags(weights * tangent[:, i, k]) @ b for i, a in enumerate(self.at_points)
+                        for k, b in enumerate(self.at_points) if tangent[:, i, k].any())
+            matrix = self.bulk.stiffness + joint
+            slope = -rate
+            if self.flowing:
+                matrix = matrix - self.lift @ by_jump
+                slope = slope - self.lift @ by_level
+            return np.asarray(matrix), slope
+
+        return value, derivatives
+
+    def crest(self, jump: np.ndarray, level: float, tail: float) -> tuple[float, np.ndarray, float]:
+        """The crest's displacement along x [m], and its derivatives with jump and level."""
+        case, bulk = self.case, self.bulk
+        force, slope = self.face_forces("upstream", level)
+        dam, foundation = case["g"] * case["rho_dam"], case["g"] * case["rho_found"]
+        traction = dam * bulk.weight_dam + foundation * bulk.weight_foundation + bulk.pressure["upstream"] @ force
+        value = dam * bulk.crest_weight + bulk.crest_pressure["upstream"] @ force
+        if tail > 0:
+            down = self.face_forces("downstream", tail)[0]
+            traction = traction + bulk.pressure["downstream"] @ down
+            value += bulk.crest_pressure["downstream"] @ down
+        lip = self.lip(jump, traction) + jump
+        seen = self.bulk.flexibility @ bulk.crest_lip
+        row = bulk.crest_lip - bulk.stiffness @ seen
+        return (float(value + bulk.crest_lip @ lip), row,
+                float(bulk.crest_pressure["upstream"] @ slope + seen @ (bulk.pressure["upstream"] @ slope)))
+
+    def lip(self, jump: np.ndarray, traction: np.ndarray) -> np.ndarray:
+        """Displacement of the lower lip (j,); traction: t_0."""
+        own = self.case["g"] * self.case["rho_found"] * self.bulk.lip_weight_foundation
+        return own + self.bulk.flexibility @ (traction - self.bulk.stiffness @ jump)
+
+
+class Filling:
+    """The loading of a case followed step by step; the converged steps are rows, the requested levels tables."""
+
+    def __init__(self, case: Case, bulk: Condensed, on_step: Callable[[float], None] = lambda time: None) -> None:
+        self.case, self.joint, self.on_step = case, Joint(case, bulk), on_step
+        self.driven = case["drive"] != "level"
+        highest, highest_tail = max(case.levels), max(case.tail_levels)
+        start = np.zeros(len(bulk.free))
+        law, points = self.joint.law, self.joint.points
+        self.state = State(0.0, 0.0, start, law.start(len(points.weights)), law.start(len(self.joint.space.place)))
+        self.reference = np.linalg.norm(self.joint.residual(start, self.state.memory, highest, highest_tail)[0])
+        self.rows, self.tables, self.heel, self.saved = [], [], [], []
+        self.displacement = self.left = 0.0
+
+    def run(self) -> Results:
+        """Follow all the times of the case."""
+        stopped, cuts, secant, dt = False, 0, False, np.inf
+        for target in self.case.times:
+            while self.state.time < target and not stopped:
+                time = min(self.state.time + dt, target)
+                time = target if target - time < 1e-9 else time
+                found = self.solve(time, secant)
+                if found is None and not secant:
+                    secant = True
+                elif found is None:
+                    secant, dt, cuts = False, CUT * (time - self.state.time), cuts + 1
+                    stopped = dt < SMALLEST_STEP
+                else:
+                    dt, secant = 2 * (time - self.state.time), False
+                    self.accept(time, cuts, *found)
+                    cuts = 0
+            if stopped:
+                break
+            dt = np.inf
+            if target in self.case.requested:
+                self.save()
+        if stopped and self.state.time > 0 and (not self.saved or self.saved[-1][0] < self.state.time):
+            self.save()
+        return self.results(stopped)
+
+    def water_at(self, time: float) -> tuple[float, float, bool, float]:
+        """Reservoir and tailwater level, whether a displacement is prescribed instead, and how much."""
+        case = self.case
+        level, tail = case.level_at(time), np.interp(time, range(len(case.levels) + 1), (0.0, *case.tail_levels))
+        if not self.driven:
+            return level, tail, False, 0.0
+        begin, end, last = case["drive_begin"], case["drive_end"], case.times[-1]
+        if time > end + 1e-9:  # the level goes on from where it was left
+            level = self.left + (case.level_at(last) - self.left) * (time - end) / (last - end)
+        target = self.displacement + case["drive_by"] * (time - begin) / (end - begin)
+        return level, tail, begin + 1e-9 < time < end + 1e-9, target
+
+    def solve(self, time: float, secant: bool) -> tuple | None:
+        """Newton from the last state: (jump, level, tail, iterations, residual), or None."""
+        joint, memory = self.joint, self.state.memory
+        level, tail, prescribed, target = self.water_at(time)
+        level = self.state.level if prescribed else level
+        jump, limit = self.state.jump, TOLERANCE * self.reference
+        stiff = joint.case["K_N"] * joint.width
+
+        def evaluate(jump: np.ndarray, level: float) -> tuple:
+            value, derivatives = joint.residual(jump, memory, level, tail, secant)
+            if not prescribed:
+                return np.linalg.norm(value), value, derivatives, None
+            if self.case["drive"] == "heel":
+                row, rate, gap = joint.opening_of_heel, 0.0, joint.opening_of_heel @ jump - target
+            else:
+                found, row, rate = joint.crest(jump, level, tail)
+                gap = found - target
+            return np.hypot(np.linalg.norm(value), stiff * gap), value, derivatives, (row, rate, gap)
+
+        size, value, derivatives, border = evaluate(jump, level)
+        iterations = 0
+        while not size <= limit:
+            if iterations == MAX_ITERATIONS or not np.isfinite(size):
+                return None
+            matrix, slope = derivatives()
+            try:
+                if border is None:
+                    step, rise = linalg.solve(matrix, -value, check_finite=False, overwrite_a=True), 0.0
+                else:
+                    row, rate, gap = border
+                    whole = np.block([[matrix, slope[:, None]], [stiff * row[None, :], np.array([[stiff * rate]])]])
+                    solution = linalg.solve(whole, -np.append(value, stiff * gap), check_finite=False)
+                    step, rise = solution[:-1], solution[-1]
+            except (linalg.LinAlgError, ValueError):
+                return None
+            iterations += 1
+            fraction, old = 1.0, size
+            for _ in range(MAX_HALVINGS + 1):
+                size, value, derivatives, border = evaluate(jump + fraction * step, level + fraction * rise)
+                if size <= GROWTH * old:
+                    break
+                fraction /= 2
+            else:
+                fraction *= 2
+            jump, level = jump + fraction * step, level + fraction * rise
+        return jump, level, tail, iterations, size / self.reference
+
+    def accept(self, time: float, cuts: int, jump: np.ndarray, level: float, tail: float, iterations: int, residual: float) -> None:
+        """Commit a converged step and write its row of history."""
+        joint, law = self.joint, self.joint.law
+        at_points, at_nodes = joint.jumps(joint.at_points, jump), joint.jumps(joint.at_nodes, jump)
+        memory, nodes = law.remember(at_points, self.state.memory), law.remember(at_nodes, self.state.nodes)
+        self.state = State(time, level, jump, memory, nodes)
+        self.tail = tail
+        traction, _ = law.respond(at_points, memory)
+        weights, x = joint.points.weights / joint.width, joint.points.positions[:, 0]
+        heel = float(joint.opening_of_heel @ jump)
+        crest = joint.crest(jump, level, tail)[0]
+        self.pressure = joint.solve_flow(jump, level, tail, False)[0] if joint.flowing else None
+        flux = self.flux()[1] if joint.flowing else 0.0
+        scheduled = self.case.level_at(time)
+        self.rows.append((time, level, level / scheduled if scheduled else 1.0, iterations, cuts, residual,
+                          weights @ law.open(at_points, memory), weights @ law.slid(at_points, memory), at_nodes[:, 0].max(), crest,
+                          -weights @ traction[:, 0], weights @ traction[:, 1], -weights @ (traction[:, 0] * (joint.base - x)), flux))
+        self.heel.append(heel)
+        if self.driven:
+            if time < self.case["drive_begin"] + 1e-9:
+                self.displacement = heel if self.case["drive"] == "heel" else crest
+            if time < self.case["drive_end"] + 1e-9:
+                self.left = level
+        self.on_step(time)
+
+    def flux(self) -> tuple[np.ndarray, float]:
+        """Mass flux along x: mean of each joint element [kg/(m s)], and out of the toe per metre of thickness."""
+        joint, case = self.joint, self.case
+        whole = np.zeros(len(joint.bulk.joint.points))
+        whole[joint.inside] = self.pressure
+        steepness = joint.unit_weight * (self.tail - self.state.level) / joint.base
+        aperture = case["aperture_min"] + np.maximum(joint.at_points[0] @ self.state.jump, 0)
+        q = -case["rho_water"] * aperture**3 / (12 * case["visc"]) * (joint.pressure_slopes[0] @ whole + steepness)
+        weights, elements = joint.points.weights, joint.points.elements
+        means = np.bincount(elements, weights * q) / np.bincount(elements, weights)
+        column = joint.base / case["n_joint"]
+        last = joint.points.positions[:, 0] > joint.base - column
+        return means, float(np.sum((weights * q)[last]) / column / joint.width)
+
+    def save(self) -> None:
+        """The joint at the current state, node by node; and with jump and stress made from element means."""
+        joint, law, state = self.joint, self.joint.law, self.state
+        place, corners = joint.space.place, len(joint.bulk.joint.points)
+        jump = joint.jumps(joint.at_nodes, state.jump)
+        traction, _ = law.respond(jump, state.nodes)
+        pressure = joint.linear_pressure(place[:, 0], state.level, self.tail) if joint.wet else np.zeros(len(place))
+        at_points = joint.jumps(joint.at_points, state.jump)
+        stress, _ = law.respond(at_points, state.memory)
+        x = joint.points.positions[:, 0]
+        beyond = np.zeros(len(x))
+        if joint.flowing:
+            whole = np.zeros(corners)
+            whole[joint.inside] = self.pressure
+            pressure = pressure + joint.pressure_middles @ whole
+            beyond = fem.points_of(fem.Space(joint.bulk.joint, 1), fem.JOINT[joint.order]).values @ whole
+        if joint.wet:
+            stress[:, 0] -= joint.linear_pressure(x, state.level, self.tail) + beyond
+        traction[:, 0] -= pressure
+        columns = [np.full((len(place), 2), (state.time, state.level)), place, jump, traction, pressure[:, None],
+                   law.damage(jump, state.nodes)[:, None], np.linalg.norm(state.nodes.vector, axis=1)[:, None]]
+        if joint.flowing:
+            columns.append(self.node_means(self.flux()[0][:, None], True))
+        table = np.hstack(columns)
+        weights, elements = joint.points.weights, joint.points.elements
+        total = np.bincount(elements, weights)
+        means = np.column_stack([np.bincount(elements, weights * v) / total for v in (*at_points.T, *stress.T)])
+        extra = table.copy()
+        extra[:corners, 5:11] = self.node_means(means, False)
+        self.saved.append((state.time, state.jump, state.level, self.tail))
+        self.tables.append((table, extra))
+
+    def node_means(self, values: np.ndarray, middles: bool) -> np.ndarray:
+        """Mean over the joint elements around each node (and each middle of an edge) of element values (e, m)."""
+        space = self.joint.space
+        number = len(space.place) if middles else len(space.body.points)
+        total, count, start = np.zeros((number, values.shape[1])), np.zeros(number), 0
+        for (_, whole), (_, cells) in zip(space.connectivity, space.body.cells, strict=True):
+            table = whole if middles else cells
+            rows = np.repeat(np.arange(start, start + len(table)), table.shape[1])
+            np.add.at(total, table.ravel(), values[rows])
+            np.add.at(count, table.ravel(), 1)
+            start += len(table)
+        return total / count[:, None]
+
+    def results(self, stopped: bool) -> Results:
+        """All tables so far."""
+        names = JOINT + ("flux",) * self.joint.flowing
+        history = dict(zip(HISTORY, np.array(self.rows, float).reshape(-1, len(HISTORY)).T, strict=True))
+        stack = lambda k: np.vstack([t[k] for t in self.tables]) if self.tables else np.zeros((0, len(names)))  # noqa: E731
+        tables = [dict(zip(names, stack(k).T, strict=True)) for k in (0, 1)]
+        return Results(self.case, history, *tables, why_stopped(self.case, history) if stopped else "", np.array(self.heel))
