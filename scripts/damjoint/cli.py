@@ -25,11 +25,13 @@ def parser() -> argparse.ArgumentParser:
     run.add_argument("--out", type=Path, help="output folder (default out/CASE)")
     run.add_argument("--no-fields", action="store_true", help="no displacement and stress fields")
     run.add_argument("--no-picture", action="store_true", help="no PNG")
+    run.add_argument("--engine", default="auto", help="auto, condensed (the bulk eliminated once) or getdp (the plain problem definition)")
     run.set_defaults(call=do_run)
 
     check = commands.add_parser("validate", help="compare with the published numbers; exit code 1 if a row fails")
     check.add_argument("cases", nargs="*", metavar="CASE", help="letters; default: all")
     check.add_argument("--out", type=Path, default=Path("out"), help="folder of the cases' output folders (default out)")
+    check.add_argument("--engine", default="auto", help="as in run")
     check.set_defaults(call=do_validate)
 
     law = commands.add_parser("law", parents=[settings], help="evaluate a joint law along a path of jumps")
@@ -48,7 +50,7 @@ def do_run(arguments: argparse.Namespace) -> int:
     case = parameters.load(arguments.case, parameters.settings(arguments.settings), arguments.levels, arguments.tail_levels, arguments.steps)
     out = arguments.out or Path("out") / case.name
     code = 0
-    for result in run(case, out, not arguments.no_fields, not arguments.no_picture):
+    for result in run(case, out, not arguments.no_fields, not arguments.no_picture, engine=arguments.engine):
         history = result.history
         print(f"{case.name}, uplift {result.case['uplift']}: {len(history['time'])} steps, {history['iterations'].sum():.0f} iterations, "
               f"{history['cuts'].sum():.0f} cuts; level {history['level'][-1] if len(history['level']) else 0:g} m, "
@@ -69,7 +71,7 @@ def do_validate(arguments: argparse.Namespace) -> int:
     for case in cases:
         if not validate.references(case):
             raise InputError(f"case {case.name}: has no reference values; allowed: {', '.join(validate.modelings())}")
-        for result in run(case, arguments.out / case.name):
+        for result in run(case, arguments.out / case.name, engine=arguments.engine):
             comparisons += validate.compare(result)
             if result.stopped:
                 raise RunError(f"{case.name}: {result.stopped}")

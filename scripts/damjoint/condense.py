@@ -1,13 +1,13 @@
 """The bulk, eliminated exactly: what dam and foundation do to the joint.
 
 Both bodies are linear elastic and do not change with the level, the law or the water. With their unknowns away
-from the joint eliminated (Schur complements), the joint sees the dam (floating, S_d) and the foundation (F = S_f^-1):
+from the joint eliminated (Schur complements), the joint sees the dam (floating, S_d) and the foundation (S_f):
 
-    S_d u_d + t = f_d,    u_f = F (f_f + t),    delta = u_d - u_f
+    S_d u_d + t = f_d,    S_f u_f - t = f_f,    delta = u_d - u_f
 
 (t: nodal forces of the joint's total traction on its upper lip). Eliminating u_d and u_f too leaves the jump alone:
 
-    t = t_0 - S delta,    B = (1 + S_d F)^-1,    S = B S_d,    t_0 = B f_d - S F f_f.
+    t = t_0 - S delta,    M = S_d + S_f,    S = S_d - S_d M^-1 S_d,    t_0 = f_d - S_d M^-1 (f_d + f_f).
 
 S is symmetric; the dam's rigid motions are its null space. Why not GetDP for the bulk: its start alone takes as
 long as a whole 2D loading here, and an independent assembly checks the problem definition (tests compare both).
@@ -22,6 +22,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import scipy.sparse.linalg  # noqa: F401 (sparse.linalg)
 from scipy import linalg, sparse
 
 from . import __version__, fem
@@ -66,22 +67,21 @@ def schur_by_superlu(matrix: sparse.csr_matrix, keep: np.ndarray) -> np.ndarray:
     return matrix[keep][:, keep].toarray() - coupling.T @ factor.solve(coupling.toarray())
 
 
-def solve_interior(matrix: sparse.csr_matrix, keep: np.ndarray, values: np.ndarray, load: np.ndarray) -> np.ndarray:
-    """The whole solution (n,) of a symmetric system with the unknowns `keep` given."""
-    solution = np.zeros(matrix.shape[0])
-    solution[keep] = values
-    inside = np.setdiff1d(np.arange(matrix.shape[0]), keep)
-    right = (load - matrix @ solution)[inside]
-    interior = matrix[inside][:, inside]
+def solve_symmetric(matrix: sparse.csr_matrix, right: np.ndarray) -> np.ndarray:
+    """Solution (n, m) of a symmetric positive definite system, by the solver of schur_complement."""
     try:
         import mumps
     except ImportError:
-        solution[inside] = sparse.linalg.spsolve(interior.tocsc(), right)
-    else:
-        with mumps.Context() as context:
-            context.set_matrix(sparse.triu(interior, format="coo"), symmetric=True)
-            context.factor(pivot_tol=0.0)
-            solution[inside] = context.solve(right)
+        return sparse.linalg.splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}).solve(right)
+    with mumps.Context() as context:
+        context.set_matrix(sparse.triu(matrix, format="coo"), symmetric=True)
+        context.factor(pivot_tol=0.0)
+        # python-mumps 0.0.2 writes to the right-hand side once more when the context ends: own it until then
+        work = np.array(right, order="F")
+        context.mumps_instance.set_dense_rhs(work)
+        context.mumps_instance.job = 3
+        context.call()
+        solution = work.copy()
     return solution
 
 
@@ -142,20 +142,18 @@ class Condensed:
     faces: dict[str, Body]
     #: jump unknowns, dim * joint function + component, that are not held
     free: np.ndarray
-    #: S (j, j) and F (j, j), see above
+    #: S (j, j), see above
     stiffness: np.ndarray
-    flexibility: np.ndarray
     #: t_0 per unit of: weight density of dam and of foundation [N/m3] along -y, (j,); force on each function of a
     #: face along the outward pressure, (j, functions)
     weight_dam: np.ndarray
     weight_foundation: np.ndarray
     pressure: dict[str, np.ndarray]
-    #: the crest's displacement along x: per lip displacement u_d (j,), weight of the dam, force on a face's functions
-    crest_lip: np.ndarray
-    crest_weight: float
+    #: the crest's displacement along x: per jump (j,), weight densities, force on a face's functions
+    crest_jump: np.ndarray
+    crest_weight_dam: float
+    crest_weight_foundation: float
     crest_pressure: dict[str, np.ndarray]
-    #: displacement of the lower lip per weight density of the foundation (j,)
-    lip_weight_foundation: np.ndarray
 
 
 def condense(case: Case, mesh: Mesh, downstream: bool) -> Condensed:
@@ -200,21 +198,24 @@ def condense(case: Case, mesh: Mesh, downstream: bool) -> Condensed:
     column = sparse.csr_matrix(-fem.body_force(bodies.foundation, dim, 1)[kept][:, None])
     bordered = sparse.bmat([[stiff_foundation[kept][:, kept], column], [column.T, None]], format="csr")
     schur = schur_complement(bordered, np.concatenate([place[joint_foundation], [len(kept)]]))
-    flexibility = linalg.inv(schur[:-1, :-1])
-    flexibility = (flexibility + flexibility.T) / 2
-    force_weight_foundation = schur[:-1, -1]
+    force_weight_foundation = schur[:-1, -1].copy()
 
-    series = linalg.lu_factor(np.eye(nj) + dam @ flexibility)
-    stiffness = linalg.lu_solve(series, dam)
-    stiffness = (stiffness + stiffness.T) / 2
+    both = linalg.cholesky(schur[:-1, :-1] + dam, lower=True, overwrite_a=True)
+    half = linalg.solve_triangular(both, dam, lower=True)  # L^-1 S_d
+    stiffness = dam - half.T @ half
+
+    def transmitted(force_dam: np.ndarray, force_foundation: np.ndarray | float = 0.0) -> np.ndarray:
+        """t_0 of forces on the two lips."""
+        return force_dam - half.T @ linalg.solve_triangular(both, force_dam + force_foundation, lower=True)
 
     # Water on the faces: a force on a function is one on unknowns of the joint or on loaded ones
     row_of = {u: i for i, u in enumerate(loaded)}
     column_of = {u: i for i, u in enumerate(joint_dam)}
     crest = row_of[dim * int(np.argmin(np.abs(bodies.dam.body.points - [0, case["dam_height"], 0]).sum(axis=1)))]
-    unit = np.zeros(nl)
-    unit[crest] = 1
-    crest_row = linalg.solve(ll, unit, assume_a="pos")
+    crest_row = linalg.solve(ll, np.eye(nl)[crest], assume_a="pos")
+    # crest = crest_row (forces - jl^T u_d),  u_d = delta + M^-1 (f_d + f_f - S_d delta)
+    crest_lip = -(jl @ crest_row)
+    crest_both = linalg.cho_solve((both, True), crest_lip)
     pressure, crest_pressure = {}, {}
     for name, components in push.items():
         on_joint = np.zeros((nj, len(bodies.faces[name])))
@@ -226,14 +227,15 @@ def condense(case: Case, mesh: Mesh, downstream: bool) -> Condensed:
                     on_loaded[row_of[u], i] += share
                 elif u in column_of:
                     on_joint[column_of[u], i] += share
-        pressure[name] = linalg.lu_solve(series, on_joint - spread @ on_loaded)
-        crest_pressure[name] = crest_row @ on_loaded
-    lip = flexibility @ force_weight_foundation
+        force = on_joint - spread @ on_loaded
+        pressure[name] = transmitted(force)
+        crest_pressure[name] = crest_row @ on_loaded + crest_both @ force
     return Condensed(
         mesh.counts, stiff_dam.shape[0] + stiff_foundation.shape[0] - len(bodies.held_dam) - len(bodies.held_foundation),
-        mesh.bodies["joint"], {name: mesh.bodies[name] for name in push}, free, stiffness, flexibility,
-        linalg.lu_solve(series, force_weight), -stiffness @ lip, pressure,
-        -(crest_row @ jl.T), float(crest_row @ weight_l), crest_pressure, lip)
+        mesh.bodies["joint"], {name: mesh.bodies[name] for name in push}, free, stiffness,
+        transmitted(force_weight), transmitted(np.zeros(nj), force_weight_foundation), pressure,
+        crest_lip - dam @ crest_both, float(crest_row @ weight_l + crest_both @ force_weight),
+        float(crest_both @ force_weight_foundation), crest_pressure)
 
 
 def cache_folder() -> Path | None:

@@ -7,7 +7,7 @@ flowing water is solved for the jump at hand before every residual, and its deri
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import linalg, sparse
@@ -24,6 +24,14 @@ MAX_ITERATIONS = 30
 MAX_HALVINGS = 6
 CUT = 0.25
 SMALLEST_STEP = 1 / 1024  # in t
+
+
+def solve(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Dense LU, the matrix overwritten. Raises LinAlgError if it is singular."""
+    factors, pivots, info = linalg.lapack.dgetrf(matrix.T, overwrite_a=True)
+    if info:
+        raise linalg.LinAlgError("singular matrix")
+    return linalg.lapack.dgetrs(factors, pivots, right, trans=1)[0]
 
 
 @dataclass
@@ -141,6 +149,8 @@ class Joint:
         x = self.bulk.joint.points[:, 0]
         inside = np.flatnonzero((x > 1e-9 * self.base) & (x < self.base * (1 - 1e-9)))
         self.inside = inside
+        self.normal = np.flatnonzero(self.bulk.free % self.dim == 1)
+        self.opening = self.at_points[0][:, self.normal]
         self.slopes = [g[:, inside] for g in at.gradients[: self.dim - 1]]
         self.lift = (self.water.T @ sparse.diags(self.water_points.weights)
                      @ fem.points_of(pressure, fem.WATER).values[:, inside]).toarray()
@@ -149,7 +159,8 @@ class Joint:
                                                              for a, b in self.space.edges)]) if self.order == 2 else np.eye(len(x))
 
     def solve_flow(self, jump: np.ndarray, level: float, tail: float, sensitivity: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Pressure beyond the linear one at the inner nodes for an opening, and its derivatives with jump and level.
+        """Pressure beyond the linear one at the inner nodes for an opening, and its derivatives with the normal
+        jump unknowns and the level.
 
         The conductivity w^3 is scaled by aperture_min^-3. Symmetric positive definite, solved directly.
         """
@@ -166,7 +177,7 @@ class Joint:
         rate = np.where(opening > 0, 3 * scale * aperture**2, 0) * self.points.weights
         gradient = [g @ pressure for g in self.slopes]
         gradient[0] = gradient[0] + steepness
-        coupling = sum((g.T @ sparse.diags(rate * d) @ self.at_points[0]) for g, d in zip(self.slopes, gradient, strict=True))
+        coupling = sum((g.T @ sparse.diags(rate * d) @ self.opening) for g, d in zip(self.slopes, gradient, strict=True))
         by_level = self.slopes[0].T @ (conductivity * self.unit_weight / self.base)
         return pressure, -linalg.cho_solve(factor, coupling.toarray()), linalg.cho_solve(factor, by_level)
 
@@ -195,10 +206,12 @@ class Joint:
                         for k, b in enumerate(self.at_points) if tangent[:, i, k].any())
             matrix = self.bulk.stiffness + joint
             slope = -rate
+            matrix = np.asarray(matrix)
             if self.flowing:
-                matrix = matrix - self.lift @ by_jump
+                n = self.normal
+                matrix[np.ix_(n, n)] -= self.lift[n] @ by_jump
                 slope = slope - self.lift @ by_level
-            return np.asarray(matrix), slope
+            return matrix, slope
 
         return value, derivatives
 
@@ -206,23 +219,11 @@ class Joint:
         """The crest's displacement along x [m], and its derivatives with jump and level."""
         case, bulk = self.case, self.bulk
         force, slope = self.face_forces("upstream", level)
-        dam, foundation = case["g"] * case["rho_dam"], case["g"] * case["rho_found"]
-        traction = dam * bulk.weight_dam + foundation * bulk.weight_foundation + bulk.pressure["upstream"] @ force
-        value = dam * bulk.crest_weight + bulk.crest_pressure["upstream"] @ force
+        value = case["g"] * (case["rho_dam"] * bulk.crest_weight_dam + case["rho_found"] * bulk.crest_weight_foundation)
+        value += bulk.crest_pressure["upstream"] @ force + bulk.crest_jump @ jump
         if tail > 0:
-            down = self.face_forces("downstream", tail)[0]
-            traction = traction + bulk.pressure["downstream"] @ down
-            value += bulk.crest_pressure["downstream"] @ down
-        lip = self.lip(jump, traction) + jump
-        seen = self.bulk.flexibility @ bulk.crest_lip
-        row = bulk.crest_lip - bulk.stiffness @ seen
-        return (float(value + bulk.crest_lip @ lip), row,
-                float(bulk.crest_pressure["upstream"] @ slope + seen @ (bulk.pressure["upstream"] @ slope)))
-
-    def lip(self, jump: np.ndarray, traction: np.ndarray) -> np.ndarray:
-        """Displacement of the lower lip (j,); traction: t_0."""
-        own = self.case["g"] * self.case["rho_found"] * self.bulk.lip_weight_foundation
-        return own + self.bulk.flexibility @ (traction - self.bulk.stiffness @ jump)
+            value += bulk.crest_pressure["downstream"] @ self.face_forces("downstream", tail)[0]
+        return float(value), bulk.crest_jump, float(bulk.crest_pressure["upstream"] @ slope)
 
 
 class Filling:
@@ -304,11 +305,11 @@ class Filling:
             matrix, slope = derivatives()
             try:
                 if border is None:
-                    step, rise = linalg.solve(matrix, -value, check_finite=False, overwrite_a=True), 0.0
+                    step, rise = solve(matrix, -value), 0.0
                 else:
                     row, rate, gap = border
                     whole = np.block([[matrix, slope[:, None]], [stiff * row[None, :], np.array([[stiff * rate]])]])
-                    solution = linalg.solve(whole, -np.append(value, stiff * gap), check_finite=False)
+                    solution = solve(whole, -np.append(value, stiff * gap))
                     step, rise = solution[:-1], solution[-1]
             except (linalg.LinAlgError, ValueError):
                 return None
@@ -414,4 +415,5 @@ class Filling:
         history = dict(zip(HISTORY, np.array(self.rows, float).reshape(-1, len(HISTORY)).T, strict=True))
         stack = lambda k: np.vstack([t[k] for t in self.tables]) if self.tables else np.zeros((0, len(names)))  # noqa: E731
         tables = [dict(zip(names, stack(k).T, strict=True)) for k in (0, 1)]
-        return Results(self.case, history, *tables, why_stopped(self.case, history) if stopped else "", np.array(self.heel))
+        return Results(self.case, history, *tables, why_stopped(self.case, history) if stopped else "", np.array(self.heel),
+                       self.saved)

@@ -238,3 +238,24 @@ def body_force(space: Space, dim: int, component: int) -> np.ndarray:
     load = np.zeros((len(space.place), dim))
     load[:, component] = points.values.T @ points.weights
     return load.ravel()
+
+
+#: The middle of each reference element.
+MIDDLE = {"triangle": (1 / 3, 1 / 3), "quad": (0, 0), "tetra": (0.25,) * 3, "wedge": (1 / 3, 1 / 3, 0), "hexahedron": (0, 0, 0)}
+
+
+def stress(space: Space, displacement: np.ndarray, young: float, poisson: float) -> np.ndarray:
+    """Stress xx, yy, zz, xy, yz, xz (elements, 6) at the middle of each element; displacement (functions, 2 or 3)."""
+    lam, mu = young * poisson / ((1 + poisson) * (1 - 2 * poisson)), young / (2 * (1 + poisson))
+    dim, found = displacement.shape[1], []
+    for shape, table in space.connectivity:
+        middle = np.array(MIDDLE[shape], float)
+        _, gradients = basis(shape, space.order, middle)
+        dn = nodal(shape, middle)[1]
+        _, inverse = geometry(space.body.points[:, :dim], table[:, : len(dn)], dn)
+        gradient = np.zeros((len(table), 3, 3))
+        gradient[:, :dim, :dim] = np.einsum("enl,enk->elk", gradients @ inverse, displacement[table])
+        strain = (gradient + gradient.transpose(0, 2, 1)) / 2
+        full = lam * np.trace(strain, axis1=1, axis2=2)[:, None, None] * np.eye(3) + 2 * mu * strain
+        found.append(np.column_stack([full[:, i, k] for i, k in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))]))
+    return np.vstack(found)

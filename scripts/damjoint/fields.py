@@ -1,4 +1,4 @@
-"""Fields of a run for ParaView (.vtu, .pvd) and, as GetDP has written them, for Gmsh (.pos)."""
+"""Fields of a run: displacement and stress in the bodies, jump, stress and state on the joint; for ParaView and Gmsh."""
 
 from __future__ import annotations
 
@@ -8,49 +8,27 @@ from pathlib import Path
 import gmsh
 import meshio
 import numpy as np
+from scipy import sparse
 
-from .parameters import start_gmsh
+from . import fem
+from .condense import Bodies, solve_symmetric, unknowns
+from .condensed import Joint
+from .mesh import Body, Mesh
+from .parameters import Case, start_gmsh
 from .results import Results, rows_at
 
-#: Gmsh element types of order 1 by their VTK name.
-SHAPES = {1: "line", 2: "triangle", 3: "quad", 4: "tetra", 5: "hexahedron", 6: "wedge"}
-DAM, FOUNDATION, JOINT = 1, 2, 3
+BODIES = ("dam", "foundation")
 
 
 @dataclass
-class Body:
-    """One body of the mesh: points (n, 3), their node tags, cells by shape, element tags in that order."""
+class Field:
+    """The bulk at one time: displacement (nodes, 3) [m] and stress (elements, 6) [Pa] by body.
 
-    points: np.ndarray
-    node_tags: np.ndarray
-    cells: list[tuple[str, np.ndarray]]
-    element_tags: np.ndarray
+    Stress: xx, yy, zz, xy, yz, xz at the middle of each element.
+    """
 
-
-def read_bodies(mesh_file: Path, dim: int) -> dict[int, Body]:
-    """The dam, the foundation (dimension dim) and the joint (dim - 1) of a mesh file, by physical tag."""
-    start_gmsh()
-    gmsh.clear()
-    gmsh.open(str(mesh_file))
-    tags, coordinates, _ = gmsh.model.mesh.getNodes()
-    place = np.zeros(int(tags.max()) + 1, int)
-    place[tags] = np.arange(len(tags))
-    coordinates = coordinates.reshape(-1, 3)
-    bodies = {}
-    for group, dimension in ((DAM, dim), (FOUNDATION, dim), (JOINT, dim - 1)):
-        blocks, numbers = {}, {}
-        for entity in gmsh.model.getEntitiesForPhysicalGroup(dimension, group):
-            for kind, elements, nodes in zip(*gmsh.model.mesh.getElements(dimension, entity), strict=True):
-                blocks.setdefault(kind, []).append(nodes.reshape(len(elements), -1))
-                numbers.setdefault(kind, []).append(elements)
-        used, cells = np.unique(np.concatenate([b.ravel() for block in blocks.values() for b in block]), return_inverse=True)
-        shapes, start = [], 0
-        for kind, block in blocks.items():
-            table = np.vstack(block)
-            shapes.append((SHAPES[kind], cells[start : start + table.size].reshape(table.shape)))
-            start += table.size
-        bodies[group] = Body(coordinates[place[used]], used, shapes, np.concatenate([t for n in numbers.values() for t in n]))
-    return bodies
+    displacement: dict[str, np.ndarray]
+    stress: dict[str, np.ndarray]
 
 
 def read_table(path: Path) -> tuple[np.ndarray, np.ndarray]:
@@ -65,43 +43,123 @@ def pick(numbers: np.ndarray, values: np.ndarray, wanted: np.ndarray) -> np.ndar
     return values[order[np.searchsorted(numbers, wanted, sorter=order)]]
 
 
-def displacement(bodies: dict[int, Body], work: Path, index: int) -> dict[int, np.ndarray]:
-    """Displacement [m] at the points of dam and foundation, by physical tag."""
-    names = {DAM: "u_dam", FOUNDATION: "u_foundation"}
-    return {g: pick(*read_table(work / f"{n}_{index}.txt"), bodies[g].node_tags) for g, n in names.items()}
-
-
-def write_fields(result: Results, mesh_file: Path, folder: Path) -> None:
-    """Write fields/: bulk_*.vtu (displacement, stress) and joint_*.vtu per requested time, fields.pvd, and keep GetDP's .pos views.
-
-    Dam and foundation have their own points on the joint, so that the opening shows. Stress: xx, yy, zz, xy,
-    yz, xz at the middle of each element [Pa].
-    """
-    case, work, target = result.case, folder / "work", folder / "fields"
-    target.mkdir(exist_ok=True)
-    bodies = read_bodies(mesh_file, int(case["dim"]))
-    offset = len(bodies[DAM].points)
-    points = np.vstack([bodies[DAM].points, bodies[FOUNDATION].points])
-    cells = bodies[DAM].cells + [(shape, c + offset) for shape, c in bodies[FOUNDATION].cells]
-    elements = np.concatenate([bodies[DAM].element_tags, bodies[FOUNDATION].element_tags])
-    cuts = np.cumsum([len(c) for _, c in cells])[:-1]
-    sets = []
-    for index, time in enumerate(case.times, 1):
+def from_getdp(result: Results, mesh: Mesh, work: Path) -> dict[float, Field]:
+    """The fields that GetDP has left in its folder, by time."""
+    found = {}
+    for index, time in enumerate(result.case.times, 1):
         if not (work / f"u_dam_{index}.txt").exists():
             continue
-        moved = displacement(bodies, work, index)
         numbers, stress = read_table(work / f"stress_{index}.txt")
-        stress = pick(numbers, stress, elements)[:, [0, 3, 5, 1, 4, 2]]
-        meshio.Mesh(points, cells, point_data={"displacement": np.vstack([moved[DAM], moved[FOUNDATION]])},
-                    cell_data={"stress": np.split(stress, cuts)}).write(target / f"bulk_t{time:g}.vtu")
-        joint, rows = bodies[JOINT], rows_at(result.joint, time)
-        nearest = np.argmin((joint.points[:, None, 0] - rows["x"]) ** 2 + (joint.points[:, None, 2] - rows["z"]) ** 2, axis=1)
-        data = {"jump": ("delta_t1", "delta_n", "delta_t2"), "traction": ("tau_1", "sigma_n", "tau_2")}
-        point_data = {name: np.column_stack([rows[c][nearest] for c in columns]) for name, columns in data.items()}
-        point_data |= {name: rows[name][nearest] for name in ("p", "damage", "slip")}
-        meshio.Mesh(joint.points, joint.cells, point_data=point_data).write(target / f"joint_t{time:g}.vtu")
-        sets += [(time, 0, f"bulk_t{time:g}.vtu"), (time, 1, f"joint_t{time:g}.vtu")]
-        for view in work.glob(f"*_{index}.pos"):
-            view.replace(target / f"{view.name.rsplit('_', 1)[0]}_t{time:g}.pos")
-    lines = "".join(f'<DataSet timestep="{t!r}" part="{part}" file="{name}"/>\n' for t, part, name in sets)
-    (target / "fields.pvd").write_text(f'<VTKFile type="Collection" version="0.1">\n<Collection>\n{lines}</Collection>\n</VTKFile>\n')
+        stress = stress[:, [0, 3, 5, 1, 4, 2]]
+        found[time] = Field({n: pick(*read_table(work / f"u_{n}_{index}.txt"), mesh.bodies[n].node_tags) for n in BODIES},
+                            {n: pick(numbers, stress, mesh.bodies[n].element_tags) for n in BODIES})
+    return found
+
+
+def recover(result: Results, mesh: Mesh, joint: Joint) -> dict[float, Field]:
+    """The fields of the condensed engine by time: the bulk solved once more, the jump given.
+
+    Dam and foundation glued at the joint are one elastic body, loaded besides by the forces that the jump
+    needs in the dam, -K_dam jump; the water in the joint acts on both lips and cancels.
+    """
+    case, dim = result.case, mesh.dim
+    bodies = Bodies.of(case, mesh)
+    stiff_dam, stiff_foundation = bodies.stiffness(case)
+    sizes = stiff_dam.shape[0], stiff_foundation.shape[0]
+    # glue: each unknown of the dam in the numbering of the whole, the foundation's first
+    glue = np.full(sizes[0], -1)
+    glue[unknowns(bodies.joint_dam, dim)] = unknowns(bodies.joint_foundation, dim)
+    own = np.flatnonzero(glue < 0)
+    glue[own] = sizes[1] + np.arange(len(own))
+    total = sizes[1] + len(own)
+    spread = sparse.csr_matrix((np.ones(sizes[0]), (np.arange(sizes[0]), glue)), (sizes[0], total))
+    whole = sparse.block_diag([stiff_foundation, sparse.csr_matrix((len(own), len(own)))]) + spread.T @ stiff_dam @ spread
+    held = np.union1d(bodies.held_foundation, glue[bodies.held_dam])
+    free = np.setdiff1d(np.arange(total), held)
+    weight = [-case["g"] * case[f"rho_{short}"] * fem.body_force(space, dim, 1)
+              for short, space in (("dam", bodies.dam), ("found", bodies.foundation))]
+    slope = np.hypot(case["dam_height"], case["dam_base"] - case["dam_crest"])
+    push = {"upstream": np.array([1.0, 0]), "downstream": -np.array([case["dam_height"], case["dam_base"] - case["dam_crest"]]) / slope}
+    jumps, rights = [], []
+    for _, jump, level, tail in result.states:
+        whole_jump = np.zeros(sizes[0])
+        whole_jump[unknowns(bodies.joint_dam, dim)[joint.bulk.free]] = jump
+        load = weight[0] - stiff_dam @ whole_jump
+        for name, water in (("upstream", level), ("downstream", tail)):
+            if name in joint.faces:
+                force = joint.face_forces(name, water)[0]
+                for component in (0, 1):
+                    np.add.at(load, dim * bodies.faces[name] + component, push[name][component] * force)
+        rights.append((spread.T @ load + np.concatenate([weight[1], np.zeros(len(own))]))[free])
+        jumps.append(whole_jump)
+    solution = np.zeros((total, len(rights)))
+    if rights:
+        solution[free] = solve_symmetric(whole.tocsr()[free][:, free], np.column_stack(rights))
+    found = {}
+    for (time, *_), jump, u in zip(result.states, jumps, solution.T, strict=True):
+        moved = {"dam": (u[glue] + jump).reshape(-1, dim), "foundation": u[: sizes[1]].reshape(-1, dim)}
+        spaces = {"dam": bodies.dam, "foundation": bodies.foundation}
+        material = {"dam": (case["E_dam"], case["nu_dam"]), "foundation": (case["E_found"], case["nu_found"])}
+        found[time] = Field(
+            {n: np.pad(v[: len(spaces[n].body.points)], ((0, 0), (0, 3 - dim))) for n, v in moved.items()},
+            {n: fem.stress(spaces[n], v, *material[n]) for n, v in moved.items()})
+    return found
+
+
+def joint_data(result: Results, body: Body, time: float) -> dict[str, np.ndarray]:
+    """The joint's table at its mesh nodes: jump and traction as vectors along x, y, z, and pressure, damage, slip."""
+    rows = rows_at(result.joint, time)
+    nearest = np.argmin((body.points[:, None, 0] - rows["x"]) ** 2 + (body.points[:, None, 2] - rows["z"]) ** 2, axis=1)
+    vectors = {"jump": ("delta_t1", "delta_n", "delta_t2"), "traction": ("tau_1", "sigma_n", "tau_2")}
+    data = {name: np.column_stack([rows[c][nearest] for c in columns]) for name, columns in vectors.items()}
+    return data | {name: rows[name][nearest] for name in ("p", "damage", "slip")}
+
+
+def write_fields(result: Results, mesh: Mesh, fields: dict[float, Field], folder: Path) -> None:
+    """Write fields/: bulk_*.vtu and joint_*.vtu per requested time with fields.pvd, and *.pos views for Gmsh.
+
+    Dam and foundation have their own points on the joint, so that the opening shows.
+    """
+    folder.mkdir(exist_ok=True)
+    dam, foundation, joint = (mesh.bodies[n] for n in (*BODIES, "joint"))
+    points = np.vstack([dam.points, foundation.points])
+    cells = dam.cells + [(shape, c + len(dam.points)) for shape, c in foundation.cells]
+    cuts = np.cumsum([len(c) for _, c in cells])[:-1]
+    entries, joints = [], {}
+    for time, field in fields.items():
+        joints[time] = joint_data(result, joint, time)
+        stress = np.vstack([field.stress[n] for n in BODIES])
+        meshio.Mesh(points, cells, point_data={"displacement": np.vstack([field.displacement[n] for n in BODIES])},
+                    cell_data={"stress": np.split(stress, cuts)}).write(folder / f"bulk_t{time:g}.vtu")
+        meshio.Mesh(joint.points, joint.cells, point_data=joints[time]).write(folder / f"joint_t{time:g}.vtu")
+        entries += [(time, 0, f"bulk_t{time:g}.vtu"), (time, 1, f"joint_t{time:g}.vtu")]
+    lines = "".join(f'<DataSet timestep="{t!r}" part="{part}" file="{name}"/>\n' for t, part, name in entries)
+    (folder / "fields.pvd").write_text(f'<VTKFile type="Collection" version="0.1">\n<Collection>\n{lines}</Collection>\n</VTKFile>\n')
+    if not fields:
+        return
+    moved = [np.vstack([f.displacement[n] for n in BODIES]) for f in fields.values()]
+    write_view("displacement", points, cells, [[u[c] for _, c in cells] for u in moved], folder)
+    tensors = [np.split(np.vstack([f.stress[n] for n in BODIES])[:, [0, 3, 5, 3, 1, 4, 5, 4, 2]], cuts) for f in fields.values()]
+    write_view("stress", points, cells, [[np.repeat(s[:, None], c.shape[1], 1) for s, (_, c) in zip(t, cells, strict=True)]
+                                         for t in tensors], folder)
+    for name in next(iter(joints.values())):
+        columns = [d[name] if d[name].ndim > 1 else d[name][:, None] for d in joints.values()]
+        write_view(name, joint.points, joint.cells, [[v[c] for _, c in joint.cells] for v in columns], folder)
+
+
+#: Letters of Gmsh's list data: shape, and kind by number of components.
+LETTERS = {"line": "L", "triangle": "T", "quad": "Q", "tetra": "S", "wedge": "I", "hexahedron": "H"}
+KINDS = {1: "S", 3: "V", 9: "T"}
+
+
+def write_view(name: str, points: np.ndarray, cells: list, steps: list[list[np.ndarray]], folder: Path) -> None:
+    """One Gmsh view with a step per time: name.pos. steps: per time, per block of cells, values (e, nodes, components)."""
+    start_gmsh()
+    view = gmsh.view.add(name)
+    for block, (shape, table) in enumerate(cells):
+        place = points[table].transpose(0, 2, 1).reshape(len(table), -1)
+        values = [s[block].reshape(len(table), -1) for s in steps]
+        data = np.hstack([place, *values])
+        gmsh.view.addListData(view, KINDS[steps[0][block].shape[2]] + LETTERS[shape], len(table), data.ravel())
+    gmsh.view.write(view, str(folder / f"{name}.pos"))
+    gmsh.view.remove(view)

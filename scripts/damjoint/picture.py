@@ -12,7 +12,8 @@ import numpy as np  # noqa: E402
 from matplotlib.collections import PolyCollection  # noqa: E402
 
 from . import validate  # noqa: E402
-from .fields import DAM, FOUNDATION, displacement, read_bodies  # noqa: E402
+from .fields import Field  # noqa: E402
+from .mesh import Mesh  # noqa: E402
 from .results import Results, rows_at  # noqa: E402
 
 
@@ -28,8 +29,8 @@ def outline(points: np.ndarray, cells: list[tuple[str, np.ndarray]]) -> list[np.
     return found
 
 
-def draw(result: Results, mesh_file: Path, folder: Path) -> Path:
-    """Draw the last state to folder/<case>.png and return its path.
+def draw(result: Results, mesh: Mesh, fields: dict[float, Field], folder: Path) -> Path:
+    """Draw the last state to folder/<case>.png and return its path; fields: at least the last one.
 
     Left: the deformed bodies, displacement exaggerated so that it shows. Right: opening and slip, normal and
     shear stress along the joint (mean over z in 3D), with the reference values of the case.
@@ -43,16 +44,13 @@ def draw(result: Results, mesh_file: Path, folder: Path) -> Path:
     _.remove()
     left = figure.add_subplot(figure.axes[0].get_gridspec()[:, 0])
 
-    work = folder / "work"
-    index = max((int(p.stem.rsplit("_", 1)[1]) for p in work.glob("u_dam_*.txt")), default=None)
-    if index is not None:
-        bodies = read_bodies(mesh_file, int(case["dim"]))
-        moved = displacement(bodies, work, index)
+    if fields:
+        moved = fields[max(fields)].displacement
         largest = max(np.abs(u).max() for u in moved.values())
         scale = 0.06 * case["dam_height"] / largest if largest > 0 else 1.0
-        for group, color in ((FOUNDATION, "#d8c9ae"), (DAM, "#c3ccd6")):
-            body = bodies[group]
-            place = (body.points + scale * moved[group])[:, :2]
+        for name, color in (("foundation", "#d8c9ae"), ("dam", "#c3ccd6")):
+            body = mesh.bodies[name]
+            place = (body.points + scale * moved[name])[:, :2]
             for faces in outline(body.points, body.cells):
                 left.add_collection(PolyCollection(place[faces], facecolor=color, edgecolor="#5a5a5a", linewidth=0.15))
         level = rows["level"][0]

@@ -32,6 +32,8 @@ class Results:
     stopped: str = ""
     #: opening of the heel [m] at each row of history
     heel: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    #: condensed engine: (time, jump unknowns, level, tailwater) of the requested times
+    states: list = field(default_factory=list)
     info: dict = field(default_factory=dict)
 
     def at(self, time: float | None = None) -> dict[str, np.ndarray]:
