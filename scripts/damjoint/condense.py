@@ -29,6 +29,11 @@ from . import __version__, fem
 from .mesh import GEOMETRY, Body, Mesh
 from .parameters import Case
 
+try:
+    import mumps
+except ImportError:  # no wheel for this Python
+    mumps = None
+
 #: What the condensed bodies depend on besides the mesh.
 MATERIAL = ("order", "hold_z", "E_dam", "E_found", "nu_dam", "nu_found")
 
@@ -41,9 +46,7 @@ def schur_complement(matrix: sparse.csr_matrix, keep: np.ndarray) -> np.ndarray:
 
     By MUMPS where python-mumps is installed; else by scipy's SuperLU, ten times slower in 3D.
     """
-    try:
-        import mumps
-    except ImportError:
+    if mumps is None:
         return schur_by_superlu(matrix, keep)
     result = np.zeros((len(keep), len(keep)))
     with mumps.Context() as context:
@@ -69,9 +72,7 @@ def schur_by_superlu(matrix: sparse.csr_matrix, keep: np.ndarray) -> np.ndarray:
 
 def solve_symmetric(matrix: sparse.csr_matrix, right: np.ndarray) -> np.ndarray:
     """Solution (n, m) of a symmetric positive definite system, by the solver of schur_complement."""
-    try:
-        import mumps
-    except ImportError:
+    if mumps is None:
         return sparse.linalg.splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}).solve(right)
     with mumps.Context() as context:
         context.set_matrix(sparse.triu(matrix, format="coo"), symmetric=True)

@@ -65,7 +65,11 @@ def run(case: Case, out: Path, fields: bool = True, picture: bool = True, progre
     check_writable(out)
     if engine == "getdp":
         return run_getdp(case, out, fields, picture, progress)
-    return run_condensed(case, out, fields, picture, progress)
+    from threadpoolctl import threadpool_limits
+
+    from . import condensed  # noqa: F401 (its BLAS libraries are loaded, and limited, from here on)
+    with threadpool_limits(1 if case["dim"] == 2 else None):  # small matrices: a second thread only waits
+        return run_condensed(case, out, fields, picture, progress)
 
 
 def describe(result: results.Results, engine: str, counts: dict, unknowns: int | None, seconds: dict, getdp_version: str = "",
