@@ -1,4 +1,4 @@
-"""The command line: damjoint run | validate | law."""
+"""The command line: damjoint run | validate | sweep | bench | law."""
 
 from __future__ import annotations
 
@@ -33,6 +33,14 @@ def parser() -> argparse.ArgumentParser:
     check.add_argument("--out", type=Path, default=Path("out"), help="folder of the cases' output folders (default out)")
     check.add_argument("--engine", default="auto", help="as in run")
     check.set_defaults(call=do_validate)
+
+    vary = commands.add_parser("sweep", parents=[settings], help="one row per combination of parameters and levels")
+    vary.add_argument("case", help="as in run")
+    vary.add_argument("--vary", action="append", default=[], metavar="NAME=VALUES", help="NAME=V1,V2,... or NAME=FIRST:LAST:STEP; NAME may be level")
+    vary.add_argument("--jobs", type=int, help="processes (default: all cores)")
+    vary.add_argument("--scheduler", metavar="ADDRESS", help="a dask.distributed scheduler instead")
+    vary.add_argument("--out", type=Path, help="result file, resumed if it exists (default CASE_sweep.csv)")
+    vary.set_defaults(call=do_sweep)
 
     law = commands.add_parser("law", parents=[settings], help="evaluate a joint law along a path of jumps")
     law.add_argument("law", help="rupture or friction")
@@ -77,6 +85,17 @@ def do_validate(arguments: argparse.Namespace) -> int:
                 raise RunError(f"{case.name}: {result.stopped}")
     print(validate.report(comparisons))
     return int(any(c.verdict == "fail" for c in comparisons))
+
+
+def do_sweep(arguments: argparse.Namespace) -> int:
+    """damjoint sweep."""
+    from . import parameters
+    from .sweep import sweep
+
+    out = arguments.out or Path(f"{Path(arguments.case).stem}_sweep.csv")
+    count = sweep(arguments.case, arguments.vary, parameters.settings(arguments.settings), out, arguments.jobs, arguments.scheduler)
+    print(f"{count} rows computed; {out}")
+    return 0
 
 
 def do_law(arguments: argparse.Namespace) -> int:

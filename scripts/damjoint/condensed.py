@@ -34,6 +34,16 @@ def solve(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
     return linalg.lapack.dgetrs(factors, pivots, right, trans=1)[0]
 
 
+def rows(matrix: sparse.csr_matrix) -> np.ndarray | sparse.csr_matrix:
+    """Small matrices are faster dense."""
+    return matrix.toarray() if matrix.shape[0] * matrix.shape[1] < 400_000 else matrix.tocsr()
+
+
+def weighted(weights: np.ndarray, matrix: np.ndarray | sparse.csr_matrix) -> np.ndarray | sparse.csr_matrix:
+    """diag(weights) matrix."""
+    return weights[:, None] * matrix if isinstance(matrix, np.ndarray) else sparse.diags(weights) @ matrix
+
+
 @dataclass
 class State:
     """A converged state: what the next step starts from."""
@@ -66,14 +76,14 @@ class Joint:
         select = [sparse.csr_matrix((np.ones((parts == c).sum()), (functions[parts == c], np.flatnonzero(parts == c))),
                                     (len(space.place), len(bulk.free))) for c in components]
         #: jump components at the law's points and at the nodes, from the unknowns
-        self.at_points = [(self.points.values @ s).tocsr() for s in select]
+        self.at_points = [rows(self.points.values @ s) for s in select]
         middles = sparse.eye(len(space.place), format="lil")
         nodes = len(bulk.joint.points)
         for i, (a, b) in enumerate(space.edges):  # the middle of an edge: mean of its ends and a quarter of its function
             middles[nodes + i, nodes + i] = 0.25
             middles[nodes + i, a] = middles[nodes + i, b] = 0.5
-        self.at_nodes = [(middles.tocsr() @ s).tocsr() for s in select]
-        self.water = (water.values @ select[0]).tocsr()
+        self.at_nodes = [rows(middles.tocsr() @ s) for s in select]
+        self.water = rows(water.values @ select[0])
         self.water_points = water
         if self.flowing:
             self._prepare_flow()
@@ -151,9 +161,9 @@ class Joint:
         self.inside = inside
         self.normal = np.flatnonzero(self.bulk.free % self.dim == 1)
         self.opening = self.at_points[0][:, self.normal]
-        self.slopes = [g[:, inside] for g in at.gradients[: self.dim - 1]]
-        self.lift = (self.water.T @ sparse.diags(self.water_points.weights)
-                     @ fem.points_of(pressure, fem.WATER).values[:, inside]).toarray()
+        self.slopes = [rows(g[:, inside]) for g in at.gradients[: self.dim - 1]]
+        at_water = fem.points_of(pressure, fem.WATER).values[:, inside].toarray()
+        self.lift = self.water.T @ weighted(self.water_points.weights, at_water)
         self.pressure_slopes = at.gradients[: self.dim - 1]
         self.pressure_middles = np.vstack([np.eye(len(x)), *(np.eye(len(x))[[a]] / 2 + np.eye(len(x))[[b]] / 2
                                                              for a, b in self.space.edges)]) if self.order == 2 else np.eye(len(x))
@@ -169,23 +179,27 @@ class Joint:
         scale = self.case["aperture_min"] ** -3.0
         conductivity = scale * aperture**3 * self.points.weights
         steepness = self.unit_weight * (tail - level) / self.base
-        matrix = sum((g.T @ sparse.diags(conductivity) @ g) for g in self.slopes).toarray()
-        factor = linalg.cho_factor(matrix)
+        matrix = sum(g.T @ weighted(conductivity, g) for g in self.slopes)
+        factor = linalg.cho_factor(matrix if isinstance(matrix, np.ndarray) else matrix.toarray())
         pressure = linalg.cho_solve(factor, -(self.slopes[0].T @ (conductivity * steepness)))
         if not sensitivity:
             return pressure, np.zeros(0), np.zeros(0)
         rate = np.where(opening > 0, 3 * scale * aperture**2, 0) * self.points.weights
         gradient = [g @ pressure for g in self.slopes]
         gradient[0] = gradient[0] + steepness
-        coupling = sum((g.T @ sparse.diags(rate * d) @ self.opening) for g, d in zip(self.slopes, gradient, strict=True))
+        coupling = sum(g.T @ weighted(rate * d, self.opening) for g, d in zip(self.slopes, gradient, strict=True))
+        coupling = coupling if isinstance(coupling, np.ndarray) else coupling.toarray()
         by_level = self.slopes[0].T @ (conductivity * self.unit_weight / self.base)
-        return pressure, -linalg.cho_solve(factor, coupling.toarray()), linalg.cho_solve(factor, by_level)
+        return pressure, -linalg.cho_solve(factor, coupling), linalg.cho_solve(factor, by_level)
 
     # -- residual ------------------------------------------------------------------------------------------
 
-    def jumps(self, rows: list, unknowns: np.ndarray) -> np.ndarray:
+    def jumps(self, matrices: list, unknowns: np.ndarray) -> np.ndarray:
         """delta_n, delta_t1, delta_t2 (q, 3) at points or nodes."""
-        return np.column_stack([r @ unknowns for r in rows] + [np.zeros(rows[0].shape[0])] * (3 - len(rows)))
+        jump = np.zeros((matrices[0].shape[0], 3))
+        for i, matrix in enumerate(matrices):
+            jump[:, i] = matrix @ unknowns
+        return jump
 
     def residual(self, jump: np.ndarray, memory: Memory, level: float, tail: float, secant: bool = False
                  ) -> tuple[np.ndarray, Callable[[], tuple[np.ndarray, np.ndarray]]]:
@@ -194,15 +208,15 @@ class Joint:
         load, rate = self.loads(level, tail)
         weights = self.points.weights
         value = self.bulk.stiffness @ jump - load
-        for rows, t in zip(self.at_points, traction.T, strict=False):
-            value = value + rows.T @ (weights * t)
+        for matrix, t in zip(self.at_points, traction.T, strict=False):
+            value = value + matrix.T @ (weights * t)
         pressure = by_jump = by_level = None
         if self.flowing:
             pressure, by_jump, by_level = self.solve_flow(jump, level, tail, True)
             value = value - self.lift @ pressure
 
         def derivatives() -> tuple[np.ndarray, np.ndarray]:
-            joint = sum(a.T @ sparse.diags(weights * tangent[:, i, k]) @ b for i, a in enumerate(self.at_points)
+            joint = sum(a.T @ weighted(weights * tangent[:, i, k], b) for i, a in enumerate(self.at_points)
                         for k, b in enumerate(self.at_points) if tangent[:, i, k].any())
             matrix = self.bulk.stiffness + joint
             slope = -rate
