@@ -159,6 +159,11 @@ class Joint:
         x = self.bulk.joint.points[:, 0]
         inside = np.flatnonzero((x > 1e-9 * self.base) & (x < self.base * (1 - 1e-9)))
         self.inside = inside
+        if self.dim == 2:
+            order = np.argsort(x[inside])
+            self.inside_x = x[inside][order]
+            self.back = np.argsort(order)  # from the order of x to that of `inside`
+            self.along = np.argsort(x[self.bulk.joint.cells[0][1]].mean(axis=1))
         self.normal = np.flatnonzero(self.bulk.free % self.dim == 1)
         self.opening = self.at_points[0][:, self.normal]
         self.slopes = [rows(g[:, inside]) for g in at.gradients[: self.dim - 1]]
@@ -170,21 +175,51 @@ class Joint:
 
     def solve_flow(self, jump: np.ndarray, level: float, tail: float, sensitivity: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Pressure beyond the linear one at the inner nodes for an opening, and its derivatives with the normal
-        jump unknowns and the level.
-
-        The conductivity w^3 is scaled by aperture_min^-3. Symmetric positive definite, solved directly.
+        jump unknowns and the level. The conductivity w^3 is scaled by aperture_min^-3.
         """
         opening = self.at_points[0] @ jump
         aperture = self.case["aperture_min"] + np.maximum(opening, 0)
         scale = self.case["aperture_min"] ** -3.0
         conductivity = scale * aperture**3 * self.points.weights
+        rate = np.where(opening > 0, 3 * scale * aperture**2, 0) * self.points.weights
+        return (self._in_series if self.dim == 2 else self._in_the_plane)(conductivity, rate, level, tail, sensitivity)
+
+    def _in_series(self, conductivity: np.ndarray, rate: np.ndarray, level: float, tail: float, sensitivity: bool) -> tuple:
+        """2D: the elements are resistances in series. No differences of nearly equal numbers, however far the
+        conductivities lie apart (a factorised matrix loses the closed joint beside the open one).
+        """
+        lengths = np.bincount(self.points.elements, self.points.weights)
+        resistance = lengths**2 / np.bincount(self.points.elements, conductivity)
+        ahead = np.zeros(len(resistance) + 1)  # from the heel to each node, in order of x
+        np.cumsum(resistance[self.along], out=ahead[1:])
+        behind = np.zeros_like(ahead)
+        behind[:-1] = np.cumsum(resistance[self.along][::-1])[::-1]
+        total = ahead[-1]
+        heel, toe = self.unit_weight * level, self.unit_weight * tail
+        x = self.inside_x
+        left, right = ahead[1:-1], behind[1:-1]
+        pressure = (heel * right + toe * left) / total - self.linear_pressure(x, level, tail)
+        if not sensitivity:
+            return pressure[self.back], np.zeros(0), np.zeros(0)
+        gradient = ((toe - heel) / total * resistance / lengths)[self.points.elements]
+        coupling = self.slopes[0].T @ weighted(rate * gradient, self.opening)
+        coupling = coupling if isinstance(coupling, np.ndarray) else coupling.toarray()
+        green = np.minimum.outer(left, left) * np.minimum.outer(right, right) / total  # the inverse of the flow matrix
+        by_level = self.unit_weight * (right / total - (1 - x / self.base))
+        return pressure[self.back], -green[np.ix_(self.back, self.back)] @ coupling, by_level[self.back]
+
+    def _in_the_plane(self, conductivity: np.ndarray, rate: np.ndarray, level: float, tail: float, sensitivity: bool) -> tuple:
+        """3D: one symmetric positive definite system; not a number where the conductivities lie too far apart for it."""
         steepness = self.unit_weight * (tail - level) / self.base
         matrix = sum(g.T @ weighted(conductivity, g) for g in self.slopes)
-        factor = linalg.cho_factor(matrix if isinstance(matrix, np.ndarray) else matrix.toarray())
+        try:
+            factor = linalg.cho_factor(matrix if isinstance(matrix, np.ndarray) else matrix.toarray())
+        except (linalg.LinAlgError, ValueError):
+            nothing = np.full(len(self.inside), np.nan)
+            return nothing, np.full((len(nothing), len(self.normal)), np.nan), nothing
         pressure = linalg.cho_solve(factor, -(self.slopes[0].T @ (conductivity * steepness)))
         if not sensitivity:
             return pressure, np.zeros(0), np.zeros(0)
-        rate = np.where(opening > 0, 3 * scale * aperture**2, 0) * self.points.weights
         gradient = [g @ pressure for g in self.slopes]
         gradient[0] = gradient[0] + steepness
         coupling = sum(g.T @ weighted(rate * d, self.opening) for g, d in zip(self.slopes, gradient, strict=True))
@@ -371,8 +406,14 @@ class Filling:
         whole[joint.inside] = self.pressure
         steepness = joint.unit_weight * (self.tail - self.state.level) / joint.base
         aperture = case["aperture_min"] + np.maximum(joint.at_points[0] @ self.state.jump, 0)
-        q = -case["rho_water"] * aperture**3 / (12 * case["visc"]) * (joint.pressure_slopes[0] @ whole + steepness)
         weights, elements = joint.points.weights, joint.points.elements
+        conductivity = case["rho_water"] * aperture**3 / (12 * case["visc"])
+        if joint.dim == 2:  # the same in every element: the drop over the resistances in series
+            lengths = np.bincount(elements, weights)
+            total = np.sum(lengths**2 / np.bincount(elements, weights * conductivity))
+            flux = -steepness * joint.base / total
+            return np.full(len(lengths), flux), flux
+        q = -conductivity * (joint.pressure_slopes[0] @ whole + steepness)
         means = np.bincount(elements, weights * q) / np.bincount(elements, weights)
         column = joint.base / case["n_joint"]
         last = joint.points.positions[:, 0] > joint.base - column
