@@ -53,6 +53,7 @@ def parser() -> argparse.ArgumentParser:
 def do_run(arguments: argparse.Namespace) -> int:
     """damjoint run; 0, or 1 if the run stopped before its last level."""
     from . import parameters
+    from .results import path_statement
     from .run import run
 
     case = parameters.load(arguments.case, parameters.settings(arguments.settings), arguments.levels, arguments.tail_levels, arguments.steps)
@@ -63,6 +64,8 @@ def do_run(arguments: argparse.Namespace) -> int:
         print(f"{case.name}, uplift {result.case['uplift']}: {len(history['time'])} steps, {history['iterations'].sum():.0f} iterations, "
               f"{history['cuts'].sum():.0f} cuts; level {history['level'][-1] if len(history['level']) else 0:g} m, "
               f"largest opening {history['max_opening'][-1] if len(history['level']) else 0:.4g} m; {out}")
+        if case["drive"] != "level":
+            print(path_statement(result))
         if result.stopped:
             print(result.stopped)
             code = 1

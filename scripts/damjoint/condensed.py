@@ -19,7 +19,9 @@ from .parameters import Case
 from .results import HISTORY, JOINT, Results, why_stopped
 
 TOLERANCE = 1e-9
-GROWTH = 3.0  # a correction is halved only when the residual grows more than this
+#: Attempts at a step, in this order: how much the residual may grow before a correction is halved, and whether
+#: the law's secant stiffness takes the place of the tangent.
+ATTEMPTS = ((3.0, False), (1e9, False), (3.0, True))
 MAX_ITERATIONS = 30
 MAX_HALVINGS = 6
 CUT = 0.25
@@ -291,19 +293,17 @@ class Filling:
 
     def run(self) -> Results:
         """Follow all the times of the case."""
-        stopped, cuts, secant, dt = False, 0, False, np.inf
+        stopped, cuts, dt = False, 0, np.inf
         for target in self.case.times:
             while self.state.time < target and not stopped:
                 time = min(self.state.time + dt, target)
                 time = target if target - time < 1e-9 else time
-                found = self.solve(time, secant)
-                if found is None and not secant:
-                    secant = True
-                elif found is None:
-                    secant, dt, cuts = False, CUT * (time - self.state.time), cuts + 1
+                found = next(filter(None, (self.solve(time, *attempt) for attempt in ATTEMPTS)), None)
+                if found is None:
+                    dt, cuts = CUT * (time - self.state.time), cuts + 1
                     stopped = dt < SMALLEST_STEP
                 else:
-                    dt, secant = 2 * (time - self.state.time), False
+                    dt = 2 * (time - self.state.time)
                     self.accept(time, cuts, *found)
                     cuts = 0
             if stopped:
@@ -327,7 +327,7 @@ class Filling:
         target = self.displacement + case["drive_by"] * (time - begin) / (end - begin)
         return level, tail, begin + 1e-9 < time < end + 1e-9, target
 
-    def solve(self, time: float, secant: bool) -> tuple | None:
+    def solve(self, time: float, growth: float, secant: bool) -> tuple | None:
         """Newton from the last state: (jump, level, tail, iterations, residual), or None."""
         joint, memory = self.joint, self.state.memory
         level, tail, prescribed, target = self.water_at(time)
@@ -366,7 +366,7 @@ class Filling:
             fraction, old = 1.0, size
             for _ in range(MAX_HALVINGS + 1):
                 size, value, derivatives, border = evaluate(jump + fraction * step, level + fraction * rise)
-                if size <= GROWTH * old:
+                if size <= growth * old:
                     break
                 fraction /= 2
             else:

@@ -14,6 +14,7 @@ from matplotlib.collections import PolyCollection  # noqa: E402
 from . import validate  # noqa: E402
 from .fields import Field  # noqa: E402
 from .mesh import Mesh  # noqa: E402
+from .parameters import Case  # noqa: E402
 from .results import Results, rows_at  # noqa: E402
 
 
@@ -77,7 +78,36 @@ def draw(result: Results, mesh: Mesh, fields: dict[float, Field], folder: Path) 
         axes.axhline(0, color="black", linewidth=0.5)
         axes.legend(fontsize=8)
         axes.grid(alpha=0.3)
+    if case["drive"] != "level":
+        draw_curve(result, folder / f"{case.name}_curve.png")
     path = folder / f"{case.name}.png"
     figure.savefig(path, dpi=110)
     plt.close(figure)
     return path
+
+
+def draw_curve(result: Results, path: Path) -> None:
+    """Draw the level against the heel's opening; for a uniform pressure also where the rigid dam turns over."""
+    case, history = result.case, result.history
+    figure, axes = plt.subplots(figsize=(7, 4.5), layout="constrained")
+    begin, end = (history["time"] > case[f"drive_{k}"] + e for k, e in (("begin", 1e-9), ("end", 1e-9)))
+    for phase, label, style in ((~begin, "level prescribed", "o-"), (begin & ~end, f"{case['drive']} prescribed", "s-"),
+                                (end, "level prescribed again", "^-")):
+        axes.plot(result.heel[phase] * 1e6, history["level"][phase], style, markersize=4, label=label)
+    if case["face_load"] == "uniform" and case["uplift"] == "none":
+        bound = overturning_level(case)
+        axes.axhline(bound, color="black", linestyle="--", linewidth=0.8, label=f"rigid dam turns over: {bound:.3f} m")
+    axes.set(xlabel="opening of the heel [µm]", ylabel="level [m]", title=case.title)
+    axes.legend(fontsize=8)
+    axes.grid(alpha=0.3)
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+
+
+def overturning_level(case: Case) -> float:
+    """Level [m] of a uniform pressure at which the dry dam without tension turns over about its toe."""
+    base, crest, height = case["dam_base"], case["dam_crest"], case["dam_height"]
+    area = (base + crest) / 2 * height
+    centroid = (base**2 + base * crest + crest**2) / (3 * (base + crest))
+    weight = case["rho_dam"] * case["g"] * area
+    return weight * (base - centroid) / (case["rho_water"] * case["g"] * height**2 / 2)

@@ -134,7 +134,23 @@ def why_stopped(case: Case, history: dict[str, np.ndarray]) -> str:
         reason = "sliding"
     else:
         reason = "no convergence"
+        stiff = case["K_N"] * base / case["n_joint"] / min(case["E_dam"], case["E_found"])
+        if stiff > 100:
+            reason += f" (the joint is too stiff for this mesh: K_N h/E = {stiff:.3g}; refine n_joint or lower K_N)"
     return f"{reason}: no equilibrium beyond level {last['level']:.6g} m (t = {last['time']:.6g}); the last converged state is saved"
+
+
+def path_statement(results: Results) -> str:
+    """In words, what a prescribed displacement has found: the largest level, and whether the path turns back."""
+    history, case = results.history, results.case
+    level, crest = history["level"], history["crest_ux"]
+    driven = (history["time"] > case["drive_begin"] - 1e-9) & (history["time"] < case["drive_end"] + 1e-9)
+    load = case["rho_water"] * case["g"] * level.max() if len(level) else 0
+    said = f"largest load: level {level.max() if len(level) else 0:.5g} m ({load / 1e3:.5g} kPa)"
+    falls = bool((np.diff(level[driven]) < 0).any())
+    back = bool((np.diff(crest[driven]) < 0).any() or (np.diff(results.heel[driven]) < 0).any())
+    said += "; the level falls while the displacement grows" if falls else "; the level rises all along"
+    return said + ("; snap-back met" if back else "; no snap-back")
 
 
 def write_csv(target: Path | TextIO, table: dict[str, np.ndarray]) -> None:
@@ -148,7 +164,7 @@ def write_csv(target: Path | TextIO, table: dict[str, np.ndarray]) -> None:
 
 
 def write(results: Results, folder: Path) -> None:
-    """Write joint.csv, history.csv and run.json into a folder."""
+    """Write joint.csv, history.csv and run.json into a folder; curve.csv (load against opening) of a driven case."""
     folder.mkdir(parents=True, exist_ok=True)
     joint = dict(results.joint)
     for axis in "xyz":  # the mesh generator's last digits
@@ -156,6 +172,11 @@ def write(results: Results, folder: Path) -> None:
     write_csv(folder / "joint.csv", joint)
     write_csv(folder / "history.csv", results.history)
     case = results.case
+    if case["drive"] != "level":
+        history = results.history
+        write_csv(folder / "curve.csv", {
+            "time": history["time"], "level": history["level"], "pressure": case["rho_water"] * case["g"] * history["level"],
+            "heel_opening": results.heel, "crest_ux": history["crest_ux"]})
     (folder / "run.json").write_text(json.dumps(
         {"case": case.name, "title": case.title, "parameters": case.values, "levels": case.levels, "tail_levels": case.tail_levels,
          "times": case.times, "stopped": results.stopped, **results.info}, indent=2) + "\n")
