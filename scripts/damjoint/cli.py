@@ -22,6 +22,7 @@ def parser() -> argparse.ArgumentParser:
     run.add_argument("--levels", help="water levels [m] reached at t = 1, 2, ...: 3,6,8,9; may go down, too")
     run.add_argument("--tail-levels", help="tailwater levels [m], one or as many as levels")
     run.add_argument("--steps", type=int, help="equal steps between two levels (default 1)")
+    run.add_argument("--accuracy", help="coarse (about 3 %%), standard (1 %%) or fine (0.2 %%): chooses mesh, order and steps")
     run.add_argument("--out", type=Path, help="output folder (default out/CASE)")
     run.add_argument("--no-fields", action="store_true", help="no displacement and stress fields")
     run.add_argument("--no-picture", action="store_true", help="no PNG")
@@ -42,6 +43,12 @@ def parser() -> argparse.ArgumentParser:
     vary.add_argument("--out", type=Path, help="result file, resumed if it exists (default CASE_sweep.csv)")
     vary.set_defaults(call=do_sweep)
 
+    speed = commands.add_parser("bench", help="time, error, growth and costs, against the peer")
+    speed.add_argument("--short", action="store_true", help="a minute instead of half an hour")
+    speed.add_argument("--out", type=Path, default=Path("out/bench"), help="folder of tables and picture (default out/bench)")
+    speed.add_argument("--readme", type=Path, help="a page whose benchmark part is to be refreshed")
+    speed.set_defaults(call=do_bench)
+
     law = commands.add_parser("law", parents=[settings], help="evaluate a joint law along a path of jumps")
     law.add_argument("law", help="rupture or friction")
     law.add_argument("--path", type=Path, required=True, help="CSV with delta_n,delta_t1,delta_t2 [m] and optionally p [Pa]")
@@ -56,7 +63,8 @@ def do_run(arguments: argparse.Namespace) -> int:
     from .results import path_statement
     from .run import run
 
-    case = parameters.load(arguments.case, parameters.settings(arguments.settings), arguments.levels, arguments.tail_levels, arguments.steps)
+    case = parameters.load(arguments.case, parameters.settings(arguments.settings), arguments.levels, arguments.tail_levels, arguments.steps,
+                           arguments.accuracy)
     out = arguments.out or Path("out") / case.name
     code = 0
     for result in run(case, out, not arguments.no_fields, not arguments.no_picture, engine=arguments.engine):
@@ -98,6 +106,14 @@ def do_sweep(arguments: argparse.Namespace) -> int:
     out = arguments.out or Path(f"{Path(arguments.case).stem}_sweep.csv")
     count = sweep(arguments.case, arguments.vary, parameters.settings(arguments.settings), out, arguments.jobs, arguments.scheduler)
     print(f"{count} rows computed; {out}")
+    return 0
+
+
+def do_bench(arguments: argparse.Namespace) -> int:
+    """damjoint bench."""
+    from .bench import bench
+
+    bench(arguments.out, arguments.short, arguments.readme)
     return 0
 
 

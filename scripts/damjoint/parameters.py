@@ -186,23 +186,47 @@ def case_file(case: str) -> Path:
     raise InputError(f"case {case}: unknown; allowed: {names}, or the path of a .case file")
 
 
+#: Elements along the joint for an accuracy, of order 2: see `damjoint bench`.
+ACCURACIES = {"coarse": 25, "standard": 50, "fine": 200}
+
+
+def mesh_for(accuracy: str, height: float, three_d: bool) -> dict[str, float | str]:
+    """Mesh and order for an accuracy of about 3 % (coarse), 1 % (standard) or 0.2 % (fine); measured by bench.
+
+    Order 2; in 3D one layer of prisms, since nothing varies along z. Raises InputError.
+    """
+    if accuracy not in ACCURACIES:
+        raise InputError(f"accuracy = {accuracy}: must be one of {', '.join(ACCURACIES)}")
+    n = ACCURACIES[accuracy]
+    return {"order": 2.0, "mesh_pattern": "layers" if three_d else "free", "n_layers": 1.0, "n_joint": float(n),
+            "h_dam": 1.25 * height / n**0.5, "h_found": 2.5 * height / n**0.5}
+
+
 def load(case: str, overrides: Mapping[str, float | str] | None = None, levels: str | None = None,
-         tail_levels: str | None = None, steps: int | None = None) -> Case:
+         tail_levels: str | None = None, steps: int | None = None, accuracy: str | None = None) -> Case:
     """Read a case, apply overrides and check everything.
 
     case: letter, name or path; overrides: {name: value}; levels, tail_levels: 'a,b,c' in metres, reached at
-    t = 1, 2, 3; steps: equal steps between two levels. Raises InputError.
+    t = 1, 2, 3; steps: equal steps between two levels; accuracy: coarse, standard or fine, chooses mesh and
+    order (overrides win) and one step per level. Raises InputError.
     """
     overrides = dict(overrides or {})
     path = case_file(case)
+    if accuracy is not None:
+        plain = load(case, overrides)
+        overrides = mesh_for(accuracy, plain["dam_height"], plain["dim"] == 3) | overrides
+        steps = steps or (1 if plain["drive"] == "level" else None)
     text = path.read_text()
     known = declared()
     for name in re.findall(r"^\s*default_(\w+)\s*=", text, re.M):
         parameter(name)
+    if levels is not None:  # defaults such as drive_begin follow the levels
+        text += f"\nlevels() = {{{', '.join(map(repr, numbers('levels', levels)))}}};"
     found = resolve(text, overrides)
     values = {name: known[name].check(found[name][0]) for name in known}
-    heights = parse_levels("levels", levels, found["levels"], values)
-    tails = parse_levels("tail_levels", tail_levels, found["tail_levels"] if levels is None else [0.0], values)
+    heights = check_levels("levels", found["levels"], values)
+    default_tails = found["tail_levels"] if levels is None else [0.0]
+    tails = check_levels("tail_levels", default_tails if tail_levels is None else numbers("tail_levels", tail_levels), values)
     if len(tails) not in (1, len(heights)):
         raise InputError(f"tail_levels = {','.join(f'{v:g}' for v in tails)}: must be one level or as many as levels ({len(heights)})")
     tails = tails * len(heights) if len(tails) == 1 else tails
@@ -212,20 +236,27 @@ def load(case: str, overrides: Mapping[str, float | str] | None = None, levels: 
         times = tuple(found["times"])
     else:
         times = tuple(i + (k + 1) / (steps or 1) for i in range(len(heights)) for k in range(steps or 1))
+    if values["drive"] != "level":
+        begin, end = values["drive_begin"], values["drive_end"]
+        if not 0 <= begin < end <= len(heights):
+            raise InputError(f"drive_begin, drive_end = {begin:g}, {end:g}: must be 0 <= drive_begin < drive_end <= {len(heights)} (the last t)")
+        times = tuple(sorted({*times, end, *([begin] if begin > 0 else [])}))
     also = tuple(found.get("also_uplift", [""])[0].split()) if "uplift" not in overrides else ()
     title = found.get("title", [path.stem])[0]
     return Case(path.stem, title, values, heights, tails, times, also)
 
 
-def parse_levels(name: str, text: str | None, default: list[float], values: Mapping) -> tuple[float, ...]:
-    """Water levels [m] from 'a,b,c'. Raises InputError if empty, malformed, negative or above the crest."""
-    top = values["dam_height"]
-    allowed = f"must be a list of levels between 0 and the crest ({top:g} m), such as 3,6,8,9"
+def numbers(name: str, text: str) -> list[float]:
+    """Numbers from 'a,b,c'. Raises InputError if empty or malformed."""
     try:
-        levels = tuple(float(v) for v in text.split(",")) if text is not None else tuple(default)
+        return [float(v) for v in text.split(",")]
     except ValueError:
-        raise InputError(f"{name} = {text}: {allowed}") from None
+        raise InputError(f"{name} = {text}: must be a list of levels in metres, such as 3,6,8,9") from None
+
+
+def check_levels(name: str, levels: Iterable[float], values: Mapping) -> tuple[float, ...]:
+    """Water levels [m]. Raises InputError if one is negative or above the crest."""
     for level in levels:
-        if not 0 <= level <= top:
-            raise InputError(f"{name} = {level:g}: {allowed}")
-    return levels
+        if not 0 <= level <= values["dam_height"]:
+            raise InputError(f"{name} = {level:g}: must be between 0 and the crest ({values['dam_height']:g} m)")
+    return tuple(levels)
