@@ -40,7 +40,8 @@ def evaluate(law: str, jumps: np.ndarray, pressure: np.ndarray | None = None, se
         problem = folder / "path.pro"
         problem.write_text(
             assignments(values)
-            + "".join(f"{n}() = {{{', '.join(repr(float(v)) for v in column)}}};\n" for n, column in columns.items())
+            # a number a line: GetDP's parser loses its way in lines of some thousand characters
+            + "".join(f"{n}() = {{\n" + ",\n".join(repr(float(v)) for v in column) + "};\n" for n, column in columns.items())
             + f'out_dir = "{folder}/";\nInclude "{ROOT}/pro/law_path.pro";\n')
         getdp.execute(problem, ["-msh", str(folder / "one.msh"), "-solve", "Path"])
         table = np.loadtxt(folder / "law.txt", ndmin=2)

@@ -1,0 +1,75 @@
+"""The two engines against one another: the laws point by point, and whole loadings."""
+
+import numpy as np
+import pytest
+
+from damjoint import law, parameters, run
+from damjoint.laws import LAWS
+from damjoint.results import JOINT
+
+
+def random_path(law_name: str, seed: int, case: parameters.Case) -> np.ndarray:
+    """A random walk of jumps (n, 3) that closes, opens, softens, breaks and slides in both directions."""
+    rng = np.random.default_rng(seed)
+    size = case["sigma_max"] / case["K_N"] if law_name == "rupture" else case["adhesion"] / (case["mu"] * case["K_N"])
+    walk = np.cumsum(rng.normal(size=(200, 3)), axis=0) * 0.3 * size
+    walk[:, 1:] *= 5
+    return walk
+
+
+@pytest.mark.parametrize("law_name", LAWS)
+@pytest.mark.parametrize("seed", range(3))
+def test_laws_agree_point_by_point(law_name, seed):
+    """The problem definition's law and the condensed engine's, along one path."""
+    changed = {"sigma_max": 1e4, "alpha": [0.0, 1.0, 1.5][seed], "pena_contact": 2.0, "pena_tang": 1e11}
+    case = parameters.load("dam", changed | {"law": law_name})
+    jumps = random_path(law_name, seed, case)
+    expected = law.evaluate(law_name, jumps, settings=changed)
+    model, memory = LAWS[law_name](case), LAWS[law_name](case).start(1)
+    scale = np.abs(expected["sigma_n"]).max()
+    for i, jump in enumerate(jumps[:, None, :]):
+        traction, _ = model.respond(jump, memory)
+        memory = model.remember(jump, memory)
+        found = [*traction[0], *memory.vector[0], memory.scalar[0]]
+        scalar = "kappa" if law_name == "rupture" else "lambda"
+        vector = ("released_1", "released_2") if law_name == "rupture" else ("slip_1", "slip_2")
+        wanted = [expected[n][i] for n in ("sigma_n", "tau_1", "tau_2", *vector, scalar)]
+        assert np.allclose(found[:3], wanted[:3], rtol=1e-9, atol=1e-9 * scale)
+        assert np.allclose(found[3:], wanted[3:], rtol=1e-9, atol=1e-9 * np.abs(jumps).max())
+        assert model.damage(jump, memory)[0] == pytest.approx(expected["damage"][i], abs=1e-9)
+        assert model.open(jump, memory)[0] == expected["open"][i]
+
+
+@pytest.mark.parametrize("law_name", LAWS)
+def test_tangent_is_the_derivative(law_name):
+    """Tangent against central differences, away from the law's corners."""
+    case = parameters.load("dam", {"law": law_name, "sigma_max": 1e4, "pena_tang": 1e11})
+    model = LAWS[law_name](case)
+    jumps = random_path(law_name, 7, case)
+    memory = model.start(len(jumps))
+    memory.vector[:] = 0.1 * jumps[:, 1:]
+    step = 1e-6 * np.abs(jumps).max()
+    _, tangent = model.respond(jumps, memory)
+    agree = np.zeros(len(jumps), bool)
+    for component in range(3):
+        shift = np.eye(3)[component] * step
+        slope = (model.respond(jumps + shift, memory)[0] - model.respond(jumps - shift, memory)[0]) / (2 * step)
+        close = np.abs(slope - tangent[:, :, component]).max(axis=1) < 1e-4 * case["K_T"]
+        agree = close if component == 0 else agree & close
+    assert agree.mean() > 0.98  # a difference may straddle a corner
+
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("letter", "abcdefghijk")
+def test_engines_agree(letter, tmp_path):
+    """Whole loadings: the same joint.csv to 1e-6 of each column's size."""
+    case = parameters.load(letter)
+    plain = run.run(case, tmp_path / "getdp", fields=False, picture=False, progress=False, engine="getdp")
+    fast = run.run(case, tmp_path / "condensed", fields=False, picture=False, progress=False, engine="condensed")
+    for a, b in zip(plain, fast, strict=True):
+        for time in a.case.requested:
+            rows = a.at(time), b.at(time)
+            for column in JOINT:
+                size = np.abs(rows[0][column]).max()
+                assert np.abs(rows[0][column] - rows[1][column]).max() <= 1e-6 * size + 1e-300, (letter, time, column)

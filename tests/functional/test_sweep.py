@@ -1,0 +1,42 @@
+"""Sweeps: each row is the run of its own; a file is resumed."""
+
+import csv
+
+import pytest
+from closed_forms import slide_level
+
+
+def rows(path):
+    with path.open() as file:
+        return list(csv.DictReader(file))
+
+
+def test_rows_are_the_runs(solve, command, tmp_path):
+    words = "sweep", "c", "--vary", "mu=0.35,0.4", "--vary", "level=8,9", "--jobs", "1", "--out", "sweep.csv"
+    assert command(*words)[0] == 0
+    table = rows(tmp_path / "sweep.csv")
+    assert [(row["mu"], row["level_asked"]) for row in table] == [("0.35", "8"), ("0.35", "9"), ("0.4", "8"), ("0.4", "9")]
+    for row in table:
+        levels = "3,6,8" if row["level_asked"] == "8" else "3,6,8,9"
+        history = solve("c", levels, uplift="imposed", mu=float(row["mu"]))[0].history
+        for name in ("level", "max_opening", "crest_ux", "N", "T", "M"):
+            assert float(row[name]) == pytest.approx(history[name][-1], rel=1e-6), name
+
+
+def test_a_sweep_is_resumed(command, tmp_path):
+    """Half of it, then all of it on two processes: the rows already there stay as they are."""
+    sweep = lambda mu: command("sweep", "c", "--vary", f"mu={mu}", "--jobs", "2", "--out", "sweep.csv")  # noqa: E731
+    assert sweep("0.3:0.4:0.1")[0] == 0
+    before = (tmp_path / "sweep.csv").read_text()
+    assert sweep("0.3:0.5:0.1")[0] == 0
+    after = (tmp_path / "sweep.csv").read_text()
+    assert after.startswith(before) and sorted(row["mu"] for row in rows(tmp_path / "sweep.csv")) == ["0.3", "0.4", "0.5"]
+    assert sweep("0.3:0.5:0.1")[0] == 0
+    assert (tmp_path / "sweep.csv").read_text() == after
+
+
+def test_a_dam_that_slides_is_a_row_that_says_so(command, tmp_path):
+    command("sweep", "c", "--set", "pena_tang=0", "--set", "uplift=none", "--vary", "mu=0.25,0.3", "--jobs", "1", "--out", "sweep.csv")
+    for row in rows(tmp_path / "sweep.csv"):
+        assert row["stopped"].startswith("sliding")
+        assert float(row["level"]) == pytest.approx(slide_level(float(row["mu"]), 1000, False), rel=2e-3)
