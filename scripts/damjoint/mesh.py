@@ -52,7 +52,7 @@ class Mesh:
         gmsh.onelab.clear()
         dim = int(case["dim"])
         with tempfile.NamedTemporaryFile("w", suffix=".geo") as file:
-            file.write(assignments({n: case[n] for n in GEOMETRY}) + f'Include "{ROOT}/geo/dam{dim}d.geo";\n')
+            file.write(assignments({n: case[n] for n in GEOMETRY}) + f'Include "{ROOT}/geo/dam.geo";\n')
             file.flush()
             try:
                 gmsh.open(file.name)
@@ -93,7 +93,6 @@ class Mesh:
 
     def write(self, path: Path) -> None:
         """Write the mesh for GetDP (MSH 2.2, binary); only while it is Gmsh's current one."""
-        gmsh.option.setNumber("Mesh.MshFileVersion", 2.2)
         gmsh.option.setNumber("Mesh.Binary", 1)
         gmsh.write(str(path))
 

@@ -1,0 +1,3 @@
+// Mesh of j.case; the differences stand there.
+Include "j.case";
+Include "../geo/dam.geo";
