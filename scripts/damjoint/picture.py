@@ -72,7 +72,10 @@ def draw(result: Results, mesh: Mesh, fields: dict[float, Field], folder: Path) 
             axes, factor, color = marks[row.quantity]
             axes.errorbar(row.x, row.value * factor, yerr=abs(row.value * row.tolerance * factor), fmt="o", markersize=4,
                           color=color, markerfacecolor="white", capsize=2)
-    top.set(ylabel="jump [µm]", title=f"{case.title}, uplift {case['uplift']}")
+    title = f"{case.title}, uplift {case['uplift']}"
+    if case["uplift"] == "flow":
+        title += f", leakage {result.history['flux'][-1]:.3g} kg/(m s)"
+    top.set(ylabel="jump [µm]", title=title)
     bottom.set(ylabel="stress [kPa]", xlabel="x [m], heel to toe")
     for axes in (top, bottom):
         axes.axhline(0, color="black", linewidth=0.5)
