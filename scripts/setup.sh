@@ -8,14 +8,18 @@ PATH=$PATH:/usr/sbin:/sbin
 missing=""
 libraries=$(ldconfig -p 2>/dev/null || true)
 library() { case $libraries in *"$2"*) ;; *) missing="$missing $1" ;; esac; }
-command -v "${GETDP:-getdp}" >/dev/null || missing="$missing getdp"
+if [ -n "${GETDP:-}" ]; then
+  command -v "$GETDP" >/dev/null || { echo "setup: GETDP = $GETDP: no such program; correct or unset it." >&2; exit 1; }
+else
+  command -v getdp >/dev/null || missing="$missing getdp"
+  library libopenblas0-pthread libopenblas.so.0
+fi
 library libglu1-mesa libGLU.so.1
 library libgl1 libGL.so.1
 library libgomp1 libgomp.so.1
 library libxcursor1 libXcursor.so.1
 library libxinerama1 libXinerama.so.1
 library libxft2 libXft.so.2
-[ -n "${GETDP:-}" ] || library libopenblas0-pthread libopenblas.so.0
 [ -x .venv/bin/python ] || python3 -c "import ensurepip" 2>/dev/null || missing="$missing python3 python3-venv"
 
 if [ -n "$missing" ]; then

@@ -4,6 +4,14 @@ import pytest
 from damjoint import parameters, run
 
 
+@pytest.fixture(scope="session", autouse=True)
+def empty_cache(tmp_path_factory):
+    """Nothing from earlier sessions, nothing left in the user's cache."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("DAMJOINT_CACHE", str(tmp_path_factory.mktemp("cache")))
+        yield
+
+
 @pytest.fixture(scope="session")
 def solve(tmp_path_factory):
     """solve(case, levels, tail_levels, steps, **settings): the list of results, one for each uplift of the case."""

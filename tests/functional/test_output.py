@@ -1,0 +1,78 @@
+"""What a run leaves in its folder."""
+
+import csv
+import json
+
+import meshio
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+JOINT = "time,level,x,y,z,delta_n,delta_t1,delta_t2,sigma_n,tau_1,tau_2,p,damage,slip".split(",")
+HISTORY = "time,level,load_factor,iterations,cuts,residual,crack_length,slip_length,max_opening,crest_ux,N,T,M,flux".split(",")
+
+
+def read(path):
+    with path.open() as file:
+        rows = list(csv.DictReader(file))
+    return {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
+
+
+@pytest.fixture
+def folder(command, tmp_path):
+    code, out, err = command("run", "a", "--levels", "6,9", "--steps", "2", "--out", "here/out", "--set", "n_joint=20")
+    assert (code, err) == (0, "")
+    assert "uplift imposed: 4 steps" in out and "uplift none: 4 steps" in out
+    return tmp_path / "here" / "out"
+
+
+def test_files_of_a_run(folder):
+    joint, history = read(folder / "joint.csv"), read(folder / "history.csv")
+    assert list(joint) == JOINT and list(history) == HISTORY
+    assert_allclose(history["time"], [0.5, 1, 1.5, 2])
+    assert_allclose(history["level"], [3, 6, 7.5, 9])
+    assert_allclose(history["load_factor"], 1)
+    assert np.all(history["residual"] <= 1e-9)
+    assert_allclose(np.unique(joint["level"]), [6, 9])
+    assert len(joint["x"]) == 2 * 21
+    assert_allclose(np.unique(joint["x"]), np.linspace(0, 5, 21), atol=1e-9)
+    assert_allclose(joint["p"], 9810 * joint["level"] * (1 - joint["x"] / 5), rtol=1e-9, atol=1e-6)
+    assert joint["damage"].max() == 1  # the heel has opened
+    assert history["max_opening"][-1] == pytest.approx(joint["delta_n"].max(), rel=1e-9)
+    dry = read(folder / "none" / "joint.csv")
+    assert_allclose(dry["p"], 0)
+
+    told = json.loads((folder / "run.json").read_text())
+    assert told["parameters"]["n_joint"] == 20 and told["parameters"]["K_N"] == 1e12
+    assert told["levels"] == [6, 9] and told["stopped"] == ""
+    assert told["mesh"]["joint_elements"] == 20 and told["unknowns"] > 0
+    assert set(told["wall_seconds"]) >= {"solve", "post"}
+
+    assert next(folder.glob("*.png")).read_bytes()[:4] == b"\x89PNG"
+    assert any(folder.rglob("*.pos")) or any(folder.rglob("*.msh"))
+    assert not (folder / "work").exists()
+
+
+def test_fields_for_paraview(folder):
+    """A file per level: the crest moves as in history.csv, the bottom does not; the joint's jumps are those of joint.csv."""
+    fields = folder / "fields"
+    assert "bulk_t1.vtu" in (fields / "fields.pvd").read_text() and "joint_t2.vtu" in (fields / "fields.pvd").read_text()
+    joint, history = read(folder / "joint.csv"), read(folder / "history.csv")
+    for time in (1, 2):
+        bulk, lips = (meshio.read(fields / f"{name}_t{time}.vtu") for name in ("bulk", "joint"))
+        moved, bottom = bulk.point_data["displacement"], np.isclose(bulk.points[:, 1], -5)
+        crest = np.all(np.isclose(bulk.points, (0, 10, 0)), axis=1)
+        assert_allclose(moved[crest, 0], history["crest_ux"][history["time"] == time], rtol=1e-6)
+        assert_allclose(moved[bottom], 0, atol=1e-15)
+        assert_allclose(np.sort(lips.point_data["jump"][:, 1]), np.sort(joint["delta_n"][joint["time"] == time]), rtol=1e-6)
+        assert bulk.cell_data["stress"][0].shape == (918, 6)
+
+
+def test_stress_in_the_dam_carries_its_weight(folder):
+    """At 6 m, over the elements that a horizontal cut meets: the vertical stress near the crest is that of the weight above."""
+    bulk = meshio.read(folder / "none" / "fields" / "bulk_t1.vtu")
+    cells, stress = bulk.cells[0].data, bulk.cell_data["stress"][0]
+    middle = bulk.points[cells].mean(axis=1)
+    high = np.abs(middle[:, 1] - 8) < 1
+    above = 2400 * 9.81 * (10 - middle[high, 1]) * (1.5 + 0.35 * (10 - middle[high, 1]) / 2)  # N per metre, of the trapezoid
+    assert np.mean(stress[high, 1] * (1.5 + 0.35 * (10 - middle[high, 1]))) == pytest.approx(-np.mean(above), rel=0.1)
