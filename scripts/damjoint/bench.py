@@ -9,7 +9,10 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections import Counter
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +26,7 @@ from .condensed import Filling
 from .mesh import Mesh
 from .parameters import Case
 from .results import Results
+from .sweep import bulk_of
 
 #: code_aster 15.2, sequential, on a 2-core machine: seconds of wall time of the whole job without meshing.
 PEER = {"a": 3.9, "b": 44.1, "c": 2.0, "d": 19.1, "e": 25.4, "f": 168, "g": 5.1, "h": 27.6, "i": 4.6, "j": 3.7, "k": 5.2}
@@ -202,6 +206,30 @@ def switches(short: bool) -> dict[str, list]:
     return table
 
 
+def one_of_the_grid(values: tuple) -> tuple:
+    """A combination of the stress grid: values, how it ended, the last level, iterations, cuts, seconds."""
+    law, aperture, stiffness, young = values
+    case = parameters.load("e" if law == "rupture" else "g", settings(2, 50, 1.0, "free", 2) | {
+        "aperture_min": aperture, "K_N": stiffness, "K_T": stiffness, "E": young, "pena_tang": 0.1 * stiffness}, "3,6,8,9,10")
+    with threadpool_limits(1):
+        start = time.perf_counter()
+        result = Filling(case, bulk_of(case)).run()
+        spent = time.perf_counter() - start
+    history = result.history
+    level = history["level"][-1] if len(history["level"]) else 0.0
+    return (*values, result.stopped.split(":")[0] or "converged", level, history["iterations"].sum(), history["cuts"].sum(), spent)
+
+
+def stress(short: bool) -> dict[str, list]:
+    """The flow to its limits: closed aperture, joint and bulk stiffness over many decades, the reservoir filled to the crest."""
+    grid = list(product(("rupture", "friction"), (1e-9, 1e-8, 1e-6, 1e-4), (1e9, 1e12, 1e14), (1e10, 3e11, 3e12)))
+    grid = grid[::18] if short else grid
+    columns = ("law", "aperture_min", "K_N", "E", "end", "level", "iterations", "cuts", "seconds")
+    with ProcessPoolExecutor() as pool:
+        rows = list(tqdm(pool.map(one_of_the_grid, grid), total=len(grid), desc="stress", disable=not sys.stderr.isatty()))
+    return {name: list(column) for name, column in zip(columns, zip(*rows, strict=True), strict=True)}
+
+
 def checks() -> list[str]:
     """What holds to machine precision, on a fine mesh: equilibrium and mass balance."""
     case = parameters.load("g", settings(2, 160, 1.0, "free", 2))
@@ -255,7 +283,8 @@ def bench(out: Path, short: bool, readme: Path | None) -> None:
     the marks <!-- bench --> and <!-- /bench -->.
     """
     out.mkdir(parents=True, exist_ok=True)
-    tables = {"cases": cases(short), "switches": switches(short), "growth": growth(short), "accuracy": accuracy(short)}
+    tables = {"cases": cases(short), "switches": switches(short), "growth": growth(short), "stress": stress(short),
+              "accuracy": accuracy(short)}
     for name, table in tables.items():
         write(table, out / f"{name}.csv")
     draw(tables["accuracy"], out / "accuracy.png")
@@ -271,6 +300,9 @@ def bench(out: Path, short: bool, readme: Path | None) -> None:
     text = "\n\n".join([
         "Modelings, cold start, all scenes, published steps (seconds; peer: code_aster 15.2):", as_text(tables["cases"]),
         "Efficient settings in 2D:", efficient, "What a scene pays for:", as_text(tables["switches"]),
+        "Flow pressed to its limits (aperture_min 1e-9 to 1e-4 m, K_N 1e9 to 1e14 Pa/m, E 1e10 to 3e12 Pa, level to the crest), how the "
+        f"{len(tables['stress']['end'])} combinations end: " + ", ".join(f"{k} {v}" for k, v in Counter(tables["stress"]["end"]).items())
+        + f"; at most {max(tables['stress']['seconds']):.1f} s each.",
         "Growth:", as_text(tables["growth"]), "; ".join(exponents(tables["growth"])), "; ".join(checks())])
     print(text)
     if readme:

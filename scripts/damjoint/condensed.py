@@ -21,7 +21,7 @@ from .results import HISTORY, JOINT, Results, why_stopped
 TOLERANCE = 1e-9
 #: Attempts at a step, in this order: how much the residual may grow before a correction is halved, and whether
 #: the law's secant stiffness takes the place of the tangent.
-ATTEMPTS = ((3.0, False), (1e9, False), (3.0, True))
+ATTEMPTS = ((3.0, False), (1e9, False), (3.0, True), (1.0, False))
 MAX_ITERATIONS = 30
 MAX_HALVINGS = 6
 CUT = 0.25
@@ -349,7 +349,8 @@ class Filling:
         size, value, derivatives, border = evaluate(jump, level)
         iterations = 0
         while not size <= limit:
-            if iterations == MAX_ITERATIONS or not np.isfinite(size):
+            fallen = np.abs(jump).max() > 0.1 * self.case["dam_height"]
+            if iterations == MAX_ITERATIONS or not np.isfinite(size) or fallen:
                 return None
             matrix, slope = derivatives()
             try:

@@ -119,7 +119,7 @@ def why_stopped(case: Case, history: dict[str, np.ndarray]) -> str:
     """In words, from the last converged state: the level, and whether the dam slides or turns over.
 
     Sliding when the shear is within 2 % of what friction and adhesion hold (or the whole joint has let go),
-    overturning when the crack has crossed most of the base.
+    overturning when the crack has crossed most of the base, or the resultant is in its last tenth.
     """
     if not len(history["time"]):
         return "no equilibrium even at the first step"
@@ -128,7 +128,7 @@ def why_stopped(case: Case, history: dict[str, np.ndarray]) -> str:
     holds = case["mu"] * last["N"] + case["adhesion"] * (base - last["crack_length"])
     if case["law"] == "friction" and last["T"] > 0.98 * holds:
         reason = "sliding"
-    elif last["crack_length"] > 0.9 * base or last["M"] < 0.05 * last["N"] * base:
+    elif last["crack_length"] > 0.8 * base or last["M"] < 0.1 * last["N"] * base:
         reason = "overturning"
     elif last["slip_length"] > 0.98 * base:
         reason = "sliding"
