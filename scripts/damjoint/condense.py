@@ -18,6 +18,7 @@ from __future__ import annotations
 import hashlib
 import os
 import pickle
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -25,7 +26,7 @@ import numpy as np
 import scipy.sparse.linalg  # noqa: F401 (sparse.linalg)
 from scipy import linalg, sparse
 
-from . import __version__, fem
+from . import RunError, __version__, fem
 from .mesh import GEOMETRY, Body, Mesh
 from .parameters import Case
 
@@ -41,11 +42,32 @@ MATERIAL = ("order", "hold_z", "E_dam", "E_found", "nu_dam", "nu_found")
 CACHE_LIMIT = 2_000_000_000
 
 
+def check_memory(needed: float, unknowns: int, joint: int) -> None:
+    """Raise RunError if more memory [bytes] is needed than the machine has left."""
+    try:
+        left = float(re.search(r"MemAvailable:\s+(\d+)", Path("/proc/meminfo").read_text())[1]) * 1024
+    except (OSError, TypeError):
+        return
+    if needed > left:
+        raise RunError(f"memory: {unknowns} unknowns, {joint} of them on the joint and the wet faces, need about {needed / 1e9:.1f} GB and "
+                       f"{left / 1e9:.1f} GB are left; use a coarser mesh (n_joint, n_layers, h_dam, h_found)")
+
+
+def check_size(case: Case) -> None:
+    """Raise RunError, before any meshing, if the joint alone asks for more memory than there is."""
+    dim, order = int(case["dim"]), int(case["order"])
+    joint = dim * (order * int(case["n_joint"]) + 1) * (order * int(case["n_layers"]) + 1 if dim == 3 else 1)
+    check_memory(8.0 * joint**2 * 6, joint, joint)
+
+
 def schur_complement(matrix: sparse.csr_matrix, keep: np.ndarray) -> np.ndarray:
     """Dense Schur complement (k, k) of a symmetric matrix on the k unknowns `keep`.
 
-    By MUMPS where python-mumps is installed; else by scipy's SuperLU, ten times slower in 3D.
+    By MUMPS where python-mumps is installed; else by scipy's SuperLU, ten times slower in 3D. Raises RunError
+    before it runs out of memory.
     """
+    dense = 8.0 * len(keep) ** 2 * 6  # this matrix and its factors and products later on
+    check_memory(dense, matrix.shape[0], len(keep))
     if mumps is None:
         return schur_by_superlu(matrix, keep)
     result = np.zeros((len(keep), len(keep)))
@@ -56,6 +78,7 @@ def schur_complement(matrix: sparse.csr_matrix, keep: np.ndarray) -> np.ndarray:
         indices = keep.astype(np.int32) + 1  # Fortran's; MUMPS keeps the address
         context.mumps_instance.set_schur(result, indices)
         context.analyze(ordering="metis" if matrix.shape[0] > 15000 else "scotch")
+        check_memory(dense + 1e6 * context.mumps_instance.infog[16], matrix.shape[0], len(keep))  # MUMPS's estimate in MB
         context.factor(reuse_analysis=True, pivot_tol=0.0)
     return np.tril(result) + np.tril(result, -1).T  # a symmetric factorisation leaves the lower triangle
 
@@ -264,6 +287,7 @@ def cached(case: Case) -> tuple[Condensed, Mesh | None, bool]:
             return found, None, True
         except (OSError, EOFError, pickle.UnpicklingError, AttributeError):
             path.unlink(missing_ok=True)  # an unfinished or foreign file
+    check_size(case)
     mesh = Mesh(case)
     made = condense(case, mesh, downstream)
     if path:
