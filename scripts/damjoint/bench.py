@@ -49,9 +49,10 @@ def cold(arguments: list[str]) -> tuple[float, float]:
 
 
 def cases(short: bool) -> dict[str, list]:
-    """Each modeling, all its scenes, published steps, meshes of the document's size: seconds, MB, ratio to the peer."""
+    """Each modeling, all its scenes, published steps, meshes of the document's size: seconds, MB, ratio to the peer;
+    unless short, the plain engine's seconds too."""
     table = {"case": [], "seconds": [], "memory_mb": [], "peer_seconds": [], "times_faster": [], "getdp_seconds": []}
-    for name in tqdm("ace" if short else PEER, desc="cases", disable=not sys.stderr.isatty()):
+    for name in tqdm(PEER, desc="cases", disable=not sys.stderr.isatty()):
         wall, memory = cold(["run", name, "--no-fields", "--no-picture"])
         plain = float("nan") if short else cold(["run", name, "--no-fields", "--no-picture", "--engine", "getdp"])[0]
         for column, value in zip(table.values(), (name, wall, memory, PEER[name], PEER[name] / wall, plain), strict=True):

@@ -3,25 +3,41 @@
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 from pathlib import Path
 
 from . import InputError, RunError, __version__
 
 
+class Parser(argparse.ArgumentParser):
+    """Bad input gets one line here, too."""
+
+    def error(self, message: str) -> None:
+        """Raises InputError with argparse's message, which names the argument and its value."""
+        raise InputError(re.sub(r"^argument --([\w-]+): (\S+): must", r"\1 = \2: must", message))
+
+
+def whole(text: str) -> int:
+    """An integer of at least 1."""
+    if not text.strip().isdigit() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text}: must be an integer >= 1")
+    return int(text)
+
+
 def parser() -> argparse.ArgumentParser:
     """The argument parser of the command."""
-    top = argparse.ArgumentParser(prog="damjoint", description="Gravity dams on a thin joint that opens, breaks, slides and lets water in.")
+    top = Parser(prog="damjoint", description="Gravity dams on a thin joint that opens, breaks, slides and lets water in.")
     top.add_argument("--version", action="version", version=__version__)
     commands = top.add_subparsers(dest="command", required=True)
-    settings = argparse.ArgumentParser(add_help=False)
+    settings = Parser(add_help=False)
     settings.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", dest="settings", help="change a parameter (repeatable)")
 
     run = commands.add_parser("run", parents=[settings], help="fill the reservoir of a case")
     run.add_argument("case", help="a letter a..k, dam, or the path of a .case file")
     run.add_argument("--levels", help="water levels [m] reached at t = 1, 2, ...: 3,6,8,9; may go down, too")
     run.add_argument("--tail-levels", help="tailwater levels [m], one or as many as levels")
-    run.add_argument("--steps", type=int, help="equal steps between two levels (default 1)")
+    run.add_argument("--steps", type=whole, help="equal steps between two levels (default 1)")
     run.add_argument("--accuracy", help="coarse (about 3 %%), standard (1 %%) or fine (0.2 %%): chooses mesh, order and steps")
     run.add_argument("--out", type=Path, help="output folder (default out/CASE)")
     run.add_argument("--no-fields", action="store_true", help="no displacement and stress fields")
@@ -38,7 +54,7 @@ def parser() -> argparse.ArgumentParser:
     vary = commands.add_parser("sweep", parents=[settings], help="one row per combination of parameters and levels")
     vary.add_argument("case", help="as in run")
     vary.add_argument("--vary", action="append", default=[], metavar="NAME=VALUES", help="NAME=V1,V2,... or NAME=FIRST:LAST:STEP; NAME may be level")
-    vary.add_argument("--jobs", type=int, help="processes (default: all cores)")
+    vary.add_argument("--jobs", type=whole, help="processes (default: all cores)")
     vary.add_argument("--scheduler", metavar="ADDRESS", help="a dask.distributed scheduler instead")
     vary.add_argument("--out", type=Path, help="result file, resumed if it exists (default CASE_sweep.csv)")
     vary.set_defaults(call=do_sweep)
@@ -86,10 +102,11 @@ def do_validate(arguments: argparse.Namespace) -> int:
     from .run import run
 
     cases = [parameters.load(name) for name in arguments.cases or validate.modelings()]
-    comparisons = []
     for case in cases:
         if not validate.references(case):
             raise InputError(f"case {case.name}: has no reference values; allowed: {', '.join(validate.modelings())}")
+    comparisons = []
+    for case in cases:
         for result in run(case, arguments.out / case.name, fields=False, engine=arguments.engine):
             comparisons += validate.compare(result)
             if result.stopped:
@@ -127,8 +144,12 @@ def do_law(arguments: argparse.Namespace) -> int:
 
 def main(argv: list[str] | None = None) -> int:
     """Entry point: 0 done, 1 failed, 2 bad input, 130 interrupted."""
-    arguments = parser().parse_args(argv)
+    words = list(sys.argv[1:] if argv is None else argv)
+    for i in reversed(range(len(words) - 1)):  # a list that begins with a minus sign is a value, not an option
+        if words[i] in ("--levels", "--tail-levels"):
+            words[i : i + 2] = [f"{words[i]}={words[i + 1]}"]
     try:
+        arguments = parser().parse_args(words)
         return arguments.call(arguments)
     except InputError as error:
         print(f"damjoint: {error}", file=sys.stderr)

@@ -106,8 +106,8 @@ def rule(shape: str, points: int) -> tuple[np.ndarray, np.ndarray]:
 #: Points of the rules of pro/spaces.pro, by order and shape.
 BULK = {1: {"triangle": 1, "quad": 4, "tetra": 1, "wedge": 6, "hexahedron": 8},
         2: {"triangle": 3, "quad": 7, "tetra": 4, "wedge": 21, "hexahedron": 27}}
-JOINT = {1: {"line": 2, "triangle": 1, "quad": 4}, 2: {"line": 2, "triangle": 6, "quad": 7}}
-WATER = {"line": 4, "triangle": 6, "quad": 7}
+JOINT = {1: {"line": 2, "triangle": 1, "quad": 4}, 2: {"line": 2, "triangle": 6, "quad": 4}}
+WATER = {"line": 4, "triangle": 6, "quad": 16}
 
 
 @lru_cache(maxsize=None)

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from . import ROOT, InputError, RunError
-from .mesh import assignments
+from .mesh import assignments, listing
 from .parameters import Case
 
 OLDEST = (3, 2)
@@ -33,7 +33,7 @@ def write_problem(case: Case, folder: Path, options: dict[str, float] | None = N
     path = folder / "scene.pro"
     path.write_text(
         f"// {case.title}\n" + assignments(case.values)
-        + "".join(f"{name}() = {{{', '.join(map(repr, values))}}};\n" for name, values in lists.items())
+        + "".join(listing(name, values) for name, values in lists.items())
         + "".join(f"{name} = {value!r};\n" for name, value in (options or {}).items())
         + f'out_dir = "{folder}/";\nInclude "{ROOT}/pro/damjoint.pro";\n')
     return path

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from . import ROOT, InputError, getdp
-from .mesh import assignments
+from .mesh import assignments, listing
 from .parameters import load, parameter
 from .results import write_csv
 
@@ -40,8 +40,7 @@ def evaluate(law: str, jumps: np.ndarray, pressure: np.ndarray | None = None, se
         problem = folder / "path.pro"
         problem.write_text(
             assignments(values)
-            # a number a line: GetDP's parser loses its way in lines of some thousand characters
-            + "".join(f"{n}() = {{\n" + ",\n".join(repr(float(v)) for v in column) + "};\n" for n, column in columns.items())
+            + "".join(listing(n, column) for n, column in columns.items())
             + f'out_dir = "{folder}/";\nInclude "{ROOT}/pro/law_path.pro";\n')
         getdp.execute(problem, ["-msh", str(folder / "one.msh"), "-solve", "Path"])
         table = np.loadtxt(folder / "law.txt", ndmin=2)

@@ -47,7 +47,8 @@ class Rupture:
 
     def tangential(self, opening: np.ndarray) -> np.ndarray:
         """Tangential stiffness [Pa/m]."""
-        return np.where(opening <= 0, self.K_T, self.K_T * np.maximum(1 - opening / self.L_CT, 0))
+        with np.errstate(over="ignore"):  # L_CT may be next to nothing
+            return np.where(opening <= 0, self.K_T, self.K_T * np.maximum(1 - opening / self.L_CT, 0))
 
     def respond(self, jump: np.ndarray, memory: Memory, secant: bool = False) -> tuple[np.ndarray, np.ndarray]:
         """Traction and tangent; secant: the positive stiffness that never softens instead of the tangent."""

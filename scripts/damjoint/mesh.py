@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -27,6 +28,11 @@ SHAPES = {1: "line", 2: "triangle", 3: "quad", 4: "tetra", 5: "hexahedron", 6: "
 def assignments(values: dict) -> str:
     """Lines default_name = value; in the common language of Gmsh and GetDP."""
     return "".join(f'default_{n} = "{v}";\n' if isinstance(v, str) else f"default_{n} = {v!r};\n" for n, v in values.items())
+
+
+def listing(name: str, values: Iterable[float]) -> str:
+    """A list in that language, a number a line: GetDP's parser loses its way in lines of some thousand characters."""
+    return f"{name}() = {{\n" + ",\n".join(repr(float(v)) for v in values) + "};\n"
 
 
 @dataclass

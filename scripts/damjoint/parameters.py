@@ -24,7 +24,7 @@ def start_gmsh() -> None:
     """Start Gmsh once per process, quietly and without reading the user's settings."""
     if not gmsh.isInitialized():
         gmsh.initialize(readConfigFiles=False, interruptible=False)
-        gmsh.option.setNumber("General.Verbosity", 1)
+        gmsh.option.setNumber("General.Verbosity", 0)  # what goes wrong is raised, and told in one line
 
 
 @dataclass(frozen=True)
@@ -76,6 +76,23 @@ class Parameter:
         return number
 
 
+def flush_parser() -> None:
+    """After an error Gmsh's parser goes on with what was left of the text: let it, and forget what it finds."""
+    with tempfile.NamedTemporaryFile("w", suffix=".geo") as file:
+        file.write("nothing = 0;\n")
+        file.flush()
+        for _ in range(20):
+            try:
+                gmsh.parser.parse(file.name)
+                gmsh.parser.clear()
+                gmsh.parser.parse(file.name)
+                if list(gmsh.parser.getNames()) == ["nothing"]:
+                    break
+            except Exception:  # what gmsh raises
+                continue
+    gmsh.parser.clear()
+
+
 def parse(text: str) -> dict[str, list[float] | list[str]]:
     """What Gmsh's parser knows after reading a text: {name: values}.
 
@@ -90,6 +107,7 @@ def parse(text: str) -> dict[str, list[float] | list[str]]:
         try:
             gmsh.parser.parse(file.name)
         except Exception as error:  # what gmsh raises
+            flush_parser()
             raise InputError(str(error).replace(file.name, "input")) from None
     found = {}
     for name in gmsh.parser.getNames():
@@ -249,9 +267,12 @@ def load(case: str, overrides: Mapping[str, float | str] | None = None, levels: 
 def numbers(name: str, text: str) -> list[float]:
     """Numbers from 'a,b,c'. Raises InputError if empty or malformed."""
     try:
-        return [float(v) for v in text.split(",")]
+        found = [float(v) for v in text.split(",")]
     except ValueError:
-        raise InputError(f"{name} = {text}: must be a list of levels in metres, such as 3,6,8,9") from None
+        found = []
+    if not found or not all(map(math.isfinite, found)):
+        raise InputError(f"{name} = {text}: must be a list of levels in metres, such as 3,6,8,9")
+    return found
 
 
 def check_levels(name: str, levels: Iterable[float], values: Mapping) -> tuple[float, ...]:

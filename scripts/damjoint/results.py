@@ -49,7 +49,8 @@ def rows_at(table: dict[str, np.ndarray], time: float | None = None) -> dict[str
     """The rows of one time (the last one by default), sorted by x, then z."""
     time = table["time"].max() if time is None else time
     rows = np.flatnonzero(np.isclose(table["time"], time))
-    rows = rows[np.lexsort((table["z"][rows], table["x"][rows]))]
+    x, z = (np.round(table[n][rows] / max(np.abs(table["x"]).max(), 1e-300), 9) for n in "xz")
+    rows = rows[np.lexsort((z, x))]
     return {name: column[rows] for name, column in table.items()}
 
 

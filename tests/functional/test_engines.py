@@ -59,17 +59,18 @@ def test_tangent_is_the_derivative(law_name):
     assert agree.mean() > 0.98  # a difference may straddle a corner
 
 
-
 @pytest.mark.heavy
 @pytest.mark.parametrize("letter", "abcdefghijk")
 def test_engines_agree(letter, tmp_path):
-    """Whole loadings: the same joint.csv to 1e-5 of each column's size (z components are small)."""
-    case = parameters.load(letter)
+    """Whole loadings: the same joint.csv to 1e-6 of the largest jump, stress, and so on. In 3D on a coarser mesh."""
+    coarse = {"n_joint": 20.0, "n_layers": 4.0 if letter in "bd" else 1.0, "h_dam": 2.0, "h_found": 4.0}
+    case = parameters.load(letter, coarse if letter in "bdfh" else None)
     plain = run.run(case, tmp_path / "getdp", fields=False, picture=False, progress=False, engine="getdp")
     fast = run.run(case, tmp_path / "condensed", fields=False, picture=False, progress=False, engine="condensed")
     for a, b in zip(plain, fast, strict=True):
         for time in a.case.requested:
             rows = a.at(time), b.at(time)
-            for column in JOINT:
-                size = np.abs(rows[0][column]).max()
-                assert np.abs(rows[0][column] - rows[1][column]).max() <= 1e-5 * size + 1e-300, (letter, time, column)
+            for group in (JOINT[:5], JOINT[5:8], JOINT[8:12], JOINT[12:13], JOINT[13:]):
+                size = max(np.abs(rows[0][column]).max() for column in group)
+                for column in group:
+                    assert np.abs(rows[0][column] - rows[1][column]).max() <= 1e-6 * size, (letter, time, column)
