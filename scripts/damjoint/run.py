@@ -69,7 +69,8 @@ def run(case: Case, out: Path, fields: bool = True, picture: bool = True, progre
     from threadpoolctl import threadpool_limits
 
     from . import condensed  # noqa: F401 (its BLAS libraries are loaded, and limited, from here on)
-    with threadpool_limits(1 if case["dim"] == 2 else None):  # small matrices: a second thread only waits
+    alone = case["dim"] == 2 or case["uplift"] == "flow"  # many small matrices: a second thread only waits
+    with threadpool_limits(1 if alone else None):
         return run_condensed(case, out, fields, picture, progress)
 
 
