@@ -180,6 +180,24 @@ class Condensed:
     crest_pressure: dict[str, np.ndarray]
 
 
+def push_of_water(case: Case) -> dict[str, dict[int, float]]:
+    """Direction of the water's force on the dam: {face: {component: share}}."""
+    height, lean = case["dam_height"], case["dam_base"] - case["dam_crest"]
+    slope = np.hypot(height, lean)
+    return {"upstream": {0: 1.0}, "downstream": {0: -height / slope, 1: -lean / slope}}
+
+
+def with_weight(stiffness: sparse.csr_matrix, space: fem.Space, dim: int, held: np.ndarray, keep: np.ndarray) -> np.ndarray:
+    """Schur complement (k + 1, k + 1) of a body on the k unknowns `keep` and, as one more column, the load of a unit
+    weight density along -y."""
+    kept = np.setdiff1d(np.arange(stiffness.shape[0]), held)
+    place = np.full(stiffness.shape[0], -1)
+    place[kept] = np.arange(len(kept))
+    column = sparse.csr_matrix(-fem.body_force(space, dim, 1)[kept][:, None])
+    bordered = sparse.bmat([[stiffness[kept][:, kept], column], [column.T, None]], format="csr")
+    return schur_complement(bordered, np.append(place[keep], len(kept)))
+
+
 def condense(case: Case, mesh: Mesh, downstream: bool) -> Condensed:
     """Eliminate the bulk of a case; downstream: prepare for water on the downstream face, too."""
     bodies = Bodies.of(case, mesh)
@@ -192,21 +210,13 @@ def condense(case: Case, mesh: Mesh, downstream: bool) -> Condensed:
     joint_dam, joint_foundation = joint[free_mask], unknowns(bodies.joint_foundation, dim)[free_mask]
 
     # Loaded unknowns of the dam besides the joint's: x on the upstream face, x and y on the downstream face
-    slope = np.hypot(case["dam_height"], case["dam_base"] - case["dam_crest"])
-    push = {"upstream": {0: 1.0}}  # direction of the water's force
-    if downstream:
-        push["downstream"] = {0: -case["dam_height"] / slope, 1: -(case["dam_base"] - case["dam_crest"]) / slope}
+    push = push_of_water(case)
+    if not downstream:
+        del push["downstream"]
     wanted = np.concatenate([unknowns(bodies.faces[name], dim, list(c)) for name, c in push.items()])
     loaded = np.setdiff1d(wanted, np.concatenate([joint, bodies.held_dam]))
 
-    # The dam: joint, loaded unknowns, and the weight as one more column
-    weight = -fem.body_force(bodies.dam, dim, 1)
-    kept = np.setdiff1d(np.arange(stiff_dam.shape[0]), bodies.held_dam)
-    place = np.full(stiff_dam.shape[0], -1)
-    place[kept] = np.arange(len(kept))
-    column = sparse.csr_matrix(weight[kept][:, None])
-    bordered = sparse.bmat([[stiff_dam[kept][:, kept], column], [column.T, None]], format="csr")
-    schur = schur_complement(bordered, np.concatenate([place[joint_dam], place[loaded], [len(kept)]]))
+    schur = with_weight(stiff_dam, bodies.dam, dim, bodies.held_dam, np.concatenate([joint_dam, loaded]))
     nj, nl = len(joint_dam), len(loaded)
     jj, jl, ll = schur[:nj, :nj], schur[:nj, nj : nj + nl], schur[nj : nj + nl, nj : nj + nl]
     weight_j, weight_l = schur[:nj, -1], schur[nj : nj + nl, -1]
@@ -215,13 +225,7 @@ def condense(case: Case, mesh: Mesh, downstream: bool) -> Condensed:
     dam = (dam + dam.T) / 2
     force_weight = weight_j - spread @ weight_l
 
-    # The foundation
-    kept = np.setdiff1d(np.arange(stiff_foundation.shape[0]), bodies.held_foundation)
-    place = np.full(stiff_foundation.shape[0], -1)
-    place[kept] = np.arange(len(kept))
-    column = sparse.csr_matrix(-fem.body_force(bodies.foundation, dim, 1)[kept][:, None])
-    bordered = sparse.bmat([[stiff_foundation[kept][:, kept], column], [column.T, None]], format="csr")
-    schur = schur_complement(bordered, np.concatenate([place[joint_foundation], [len(kept)]]))
+    schur = with_weight(stiff_foundation, bodies.foundation, dim, bodies.held_foundation, joint_foundation)
     force_weight_foundation = schur[:-1, -1].copy()
 
     both = linalg.cholesky(schur[:-1, :-1] + dam, lower=True, overwrite_a=True)

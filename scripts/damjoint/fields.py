@@ -11,10 +11,10 @@ import numpy as np
 from scipy import sparse
 
 from . import fem
-from .condense import Bodies, solve_symmetric, unknowns
+from .condense import Bodies, push_of_water, solve_symmetric, unknowns
 from .condensed import Joint
 from .mesh import Body, Mesh
-from .parameters import Case, start_gmsh
+from .parameters import start_gmsh
 from .results import Results, rows_at
 
 BODIES = ("dam", "foundation")
@@ -78,8 +78,7 @@ def recover(result: Results, mesh: Mesh, joint: Joint) -> dict[float, Field]:
     free = np.setdiff1d(np.arange(total), held)
     weight = [-case["g"] * case[f"rho_{short}"] * fem.body_force(space, dim, 1)
               for short, space in (("dam", bodies.dam), ("found", bodies.foundation))]
-    slope = np.hypot(case["dam_height"], case["dam_base"] - case["dam_crest"])
-    push = {"upstream": np.array([1.0, 0]), "downstream": -np.array([case["dam_height"], case["dam_base"] - case["dam_crest"]]) / slope}
+    push = push_of_water(case)
     jumps, rights = [], []
     for _, jump, level, tail in result.states:
         whole_jump = np.zeros(sizes[0])
@@ -88,8 +87,8 @@ def recover(result: Results, mesh: Mesh, joint: Joint) -> dict[float, Field]:
         for name, water in (("upstream", level), ("downstream", tail)):
             if name in joint.faces:
                 force = joint.face_forces(name, water)[0]
-                for component in (0, 1):
-                    np.add.at(load, dim * bodies.faces[name] + component, push[name][component] * force)
+                for component, share in push[name].items():
+                    np.add.at(load, dim * bodies.faces[name] + component, share * force)
         rights.append((spread.T @ load + np.concatenate([weight[1], np.zeros(len(own))]))[free])
         jumps.append(whole_jump)
     solution = np.zeros((total, len(rights)))
