@@ -19,8 +19,10 @@ import hashlib
 import os
 import pickle
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse.linalg  # noqa: F401 (sparse.linalg)
@@ -29,6 +31,9 @@ from scipy import linalg, sparse
 from . import RunError, __version__, fem
 from .mesh import GEOMETRY, Body, Mesh
 from .parameters import Case
+
+if TYPE_CHECKING:
+    from .interface import Interface
 
 try:
     import mumps
@@ -160,6 +165,11 @@ def on_sides(space: fem.Space, thickness: float) -> np.ndarray:
 class Condensed:
     """The condensed bodies: matrices on the free jump unknowns (j of them) and the responses to loads."""
 
+    dim: int
+    order: int
+    base: float
+    #: thickness along z [m], 1 in 2D
+    width: float
     counts: dict[str, int]
     unknowns: int
     joint: Body
@@ -178,6 +188,12 @@ class Condensed:
     crest_weight_dam: float
     crest_weight_foundation: float
     crest_pressure: dict[str, np.ndarray]
+
+    @cached_property
+    def interface(self) -> Interface:
+        """The joint's interpolation matrices and linear systems."""
+        from .interface import Interface
+        return Interface(self)
 
 
 def push_of_water(case: Case) -> dict[str, dict[int, float]]:
@@ -259,7 +275,7 @@ def condense(case: Case, mesh: Mesh, downstream: bool) -> Condensed:
         pressure[name] = transmitted(force)
         crest_pressure[name] = crest_row @ on_loaded + crest_both @ force
     return Condensed(
-        mesh.counts, stiff_dam.shape[0] + stiff_foundation.shape[0] - len(bodies.held_dam) - len(bodies.held_foundation),
+        dim, int(case["order"]), case["dam_base"], case["thickness"] if dim == 3 else 1.0, mesh.counts, stiff_dam.shape[0] + stiff_foundation.shape[0] - len(bodies.held_dam) - len(bodies.held_foundation),
         mesh.bodies["joint"], {name: mesh.bodies[name] for name in push}, free, stiffness,
         transmitted(force_weight), transmitted(np.zeros(nj), force_weight_foundation), pressure,
         crest_lip - dam @ crest_both, float(crest_row @ weight_l + crest_both @ force_weight),
@@ -280,7 +296,7 @@ def cached(case: Case) -> tuple[Condensed, Mesh | None, bool]:
     Returns them, the mesh if one was made, and whether they were found. Raises RunError (mesh).
     """
     downstream = max(case.tail_levels) > 0
-    key = [(n, case[n]) for n in GEOMETRY + MATERIAL] + [downstream, __version__]
+    key = [(n, case[n]) for n in GEOMETRY + MATERIAL] + [downstream, __version__, [f.name for f in fields(Condensed)]]
     folder = cache_folder()
     path = folder / f"{hashlib.sha256(repr(key).encode()).hexdigest()[:24]}.pickle" if folder else None
     if path and path.exists():

@@ -85,7 +85,7 @@ def recover(result: Results, mesh: Mesh, joint: Joint) -> dict[float, Field]:
         whole_jump[unknowns(bodies.joint_dam, dim)[joint.bulk.free]] = jump
         load = weight[0] - stiff_dam @ whole_jump
         for name, water in (("upstream", level), ("downstream", tail)):
-            if name in joint.faces:
+            if name in joint.interface.faces:
                 force = joint.face_forces(name, water)[0]
                 for component, share in push[name].items():
                     np.add.at(load, dim * bodies.faces[name] + component, share * force)
