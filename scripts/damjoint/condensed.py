@@ -7,6 +7,7 @@ flowing water is solved for the jump at hand before every residual, and its deri
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,7 +24,7 @@ TOLERANCE = 1e-9
 #: the law's secant stiffness takes the place of the tangent.
 ATTEMPTS = ((3.0, False), (1e9, False), (3.0, True), (1.0, False))
 MAX_ITERATIONS = 30
-MAX_HALVINGS = 6
+MAX_HALVINGS = 10
 CUT = 0.25
 SMALLEST_STEP = 1 / 1024  # in t
 
@@ -121,8 +122,8 @@ class Joint:
             narrowest = self.case["aperture_min"]
             opening = flow.opening @ jump
             growing = np.where(opening > 0, 3 / narrowest * (1 + opening / narrowest) ** 2, 0) * interface.points.weights
-            change = interface.change(tangent, self.virgin, growing > 0)
-            change.pressure, per_drop = flow.sensitivity(solution, growing, change.active)
+            change = interface.change(tangent, self.virgin)
+            change.pressure, change.columns, per_drop = flow.sensitivity(solution, growing)
             return change, -rate - flow.lift @ (self.unit_weight * per_drop)
 
         return value, derivatives
@@ -144,18 +145,34 @@ class Filling:
     def __init__(self, case: Case, bulk: Condensed, on_step: Callable[[float], None] = lambda time: None) -> None:
         self.case, self.joint, self.on_step = case, Joint(case, bulk), on_step
         self.driven = case["drive"] != "level"
-        highest, highest_tail = max(case.levels), max(case.tail_levels)
         start = np.zeros(len(bulk.free))
         law, interface = self.joint.law, bulk.interface
         self.state = State(0.0, 0.0, start, law.start(len(interface.points.weights)), law.start(len(interface.space.place)))
-        self.reference = np.linalg.norm(self.joint.residual(start, self.state.memory, highest, highest_tail)[0])
+        self.reference = self.unbalanced(case)
         self.rows, self.tables, self.heel, self.saved = [], [], [], []
         self.displacement = self.left = 0.0
+        self.stopped = False
+
+    def unbalanced(self, case: Case) -> float:
+        """Norm of the residual of the untouched joint under the highest water: what convergence is measured by."""
+        joint, law = self.joint, self.joint.law
+        virgin = law.start(len(joint.interface.points.weights))
+        return np.linalg.norm(joint.residual(np.zeros(len(joint.bulk.free)), virgin, max(case.levels), max(case.tail_levels))[0])
+
+    def fork(self, case: Case) -> Filling:
+        """Another filling, of a case that agrees with this one's as far as this one has come, to go on from there."""
+        other = copy(self)
+        other.case, other.reference = case, self.unbalanced(case)
+        for name in ("rows", "tables", "heel", "saved"):
+            setattr(other, name, list(getattr(self, name)))
+        return other
 
     def run(self) -> Results:
-        """Follow all the times of the case."""
-        stopped, cuts, dt = False, 0, np.inf
+        """Follow all the times of the case that are still to come."""
+        stopped, cuts, dt = self.stopped, 0, np.inf
         for target in self.case.times:
+            if target <= self.state.time:
+                continue
             while self.state.time < target and not stopped:
                 time = min(self.state.time + dt, target)
                 time = target if target - time < 1e-9 else time
@@ -174,6 +191,7 @@ class Filling:
                 self.save()
         if stopped and self.state.time > 0 and (not self.saved or self.saved[-1][0] < self.state.time):
             self.save()
+        self.stopped = stopped
         return self.results(stopped)
 
     def water_at(self, time: float) -> tuple[float, float, bool, float]:

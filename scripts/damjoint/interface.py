@@ -1,13 +1,14 @@
 """The joint of condensed bodies, whatever its law, its water and its levels: interpolations, flow operators, and the
 linear systems of Newton's method.
 
-The tangent is that of the virgin joint, A_0 = S + K_0, plus a change U at the points that have opened, broken or
-slid, U = L - B p' (L: the law's; B: how the water lifts; p': the pressure's derivative). With C = A_0^-1, made once,
+The tangent is that of the virgin joint, A_0 = S + K_0, plus what has changed where the joint has opened, broken or
+slid: A = A_0 + L - B P (L: the law's change, on few rows; P: the derivative of flowing water's pressures; B: how they
+lift). With C = A_0^-1, made once, A x = r reads
 
-    (A_0 + U) x = r    <=>    (1 + C U) x = C r,
+    x = C (r - f + B p),    f = L x,    p = P x,
 
-of which only the m unknowns that U acts on are coupled: an (m, m) system instead of a (j, j) one (Woodbury), in a
-bordered form that stays regular where the load has its peak and A_0 + U is singular.
+a system of the forces f on the rows of L and the pressures p only (Woodbury). Bordered by one more equation it stays
+regular where the load has its peak and A is singular.
 """
 
 from __future__ import annotations
@@ -24,14 +25,14 @@ from .condense import Condensed
 
 @dataclass
 class Change:
-    """U, without its zero columns: U x = scatter(local y) - lift (pressure y), y = x[active]."""
+    """L and P, without their zero rows and columns."""
 
-    #: (m,) unknowns
-    active: np.ndarray
-    #: the law's change (m, m); its rows are the active unknowns, too
-    local: sparse.csr_matrix
-    #: p', derivative of the inner pressures (p, m), of flowing water
+    #: L (rows, j): the law's
+    law: sparse.csr_matrix
+    rows: np.ndarray
+    #: P (p, columns), if water flows
     pressure: np.ndarray | None = None
+    columns: np.ndarray | None = None
 
 
 class Interface:
@@ -48,7 +49,8 @@ class Interface:
             middles[nodes + i, a] = middles[nodes + i, b] = 0.5
         #: jump at the law's points and at the nodes (dim rows each: normal, tangent 1, tangent 2)
         self.at_points, self.at_nodes = self._components(self.points.values), self._components(middles.tocsr())
-        self.touched = (self.at_points != 0).tocsc()
+        self.from_points = self.at_points.T.tocsr()
+        self.touched = (self.from_points != 0)
         self.water_points = fem.points_of(space, fem.WATER)
         self.water = self.water_points.values @ self._select(1)
         self.faces = {name: fem.points_of(fem.Space(body, bulk.order), fem.WATER) for name, body in bulk.faces.items()}
@@ -72,7 +74,7 @@ class Interface:
 
     def forces(self, traction: np.ndarray) -> np.ndarray:
         """Nodal forces of a traction (q, 3) at the law's points."""
-        return self.at_points.T @ (self.points.weights[:, None] * traction[:, : self.dim]).ravel()
+        return self.from_points @ (self.points.weights[:, None] * traction[:, : self.dim]).ravel()
 
     def _heel_row(self) -> np.ndarray:
         """The heel's opening, mean over z, from the unknowns."""
@@ -101,12 +103,12 @@ class Interface:
 
     # -- linear systems ------------------------------------------------------------------------------------
 
-    def stiffness(self, tangent: np.ndarray, points: np.ndarray, unknowns: np.ndarray) -> sparse.csr_matrix:
-        """Stiffness of the joint at some of the law's points with a tangent (points, 3, 3), for the unknowns they touch."""
+    def stiffness(self, tangent: np.ndarray, points: np.ndarray) -> sparse.csr_matrix:
+        """Stiffness (j, j) of the joint that some of the law's points add with a tangent (points, 3, 3)."""
         number, d = len(points), self.dim
         if not number:
-            return sparse.csr_matrix((len(unknowns), len(unknowns)))
-        here = self.at_points[(d * points[:, None] + np.arange(d)).ravel()][:, unknowns]
+            return sparse.csr_matrix((len(self.bulk.free),) * 2)
+        here = self.at_points[(d * points[:, None] + np.arange(d)).ravel()]
         blocks = self.points.weights[points, None, None] * tangent[:, :d, :d]
         return (here.T @ (sparse.bsr_matrix((blocks, np.arange(number), np.arange(number + 1)), (d * number,) * 2) @ here)).tocsr()
 
@@ -114,8 +116,7 @@ class Interface:
         """C = (S + K_0)^-1 (j, j) for a tangent (3, 3) that all points have; the last one is kept."""
         if self._made_for is None or not np.array_equal(virgin, self._made_for):
             number = len(self.points.weights)
-            everything = self.stiffness(np.broadcast_to(virgin, (number, 3, 3)), np.arange(number), np.arange(len(self.bulk.free)))
-            matrix = self.bulk.stiffness + everything.toarray()
+            matrix = self.bulk.stiffness + self.stiffness(np.broadcast_to(virgin, (number, 3, 3)), np.arange(number)).toarray()
             factor, info = linalg.lapack.dpotrf(matrix.T, lower=True, overwrite_a=True, clean=False)
             if info:
                 raise linalg.LinAlgError("the joint does not hold the dam")
@@ -129,47 +130,52 @@ class Interface:
         """C B (j, p), of the compliance last asked for."""
         return np.ascontiguousarray((self.flow.lift.T @ self._compliance).T)
 
-    def change(self, tangent: np.ndarray, virgin: np.ndarray, also: np.ndarray | None = None) -> tuple[Change, np.ndarray]:
-        """The law's part of U for a tangent (q, 3, 3); the unknowns of the points `also` (q,) are active as well."""
-        differs = (tangent != virgin).any(axis=(1, 2))
-        touching = differs if also is None else differs | also
-        active = np.flatnonzero(self.touched.T @ np.repeat(touching, self.dim))
-        points = np.flatnonzero(differs)
-        return Change(active, self.stiffness(tangent[points] - virgin, points, active))
+    def change(self, tangent: np.ndarray, virgin: np.ndarray) -> Change:
+        """The law's change for a tangent (q, 3, 3)."""
+        differs = (tangent != virgin).any(axis=2)[:, : self.dim]  # rows: components of the traction
+        points, rows = np.flatnonzero(differs.any(axis=1)), np.flatnonzero(self.touched @ differs.ravel())
+        return Change(self.stiffness(tangent[points] - virgin, points)[rows], rows)
 
     def solve(self, virgin: np.ndarray, change: Change, right: np.ndarray, border: tuple | None) -> tuple[np.ndarray, float]:
         """x (j,) and s of A x + slope s = right and, with a border (slope, row, rate, gap), row x + rate s = gap.
 
         Raises LinAlgError if the system is singular.
         """
-        compliance, active, local, p = self.compliance(virgin), change.active, change.local, change.pressure
-        m = len(active)
-        start = compliance @ right
-        small = np.zeros((m + (border is not None),) * 2)
-        small[:m, :m] = (local.T @ compliance[np.ix_(active, active)]).T
-        if p is not None:
-            small[:m, :m] -= self.lifted[active] @ p
-        small[np.arange(m), np.arange(m)] += 1
-        wanted = start[active]
+        compliance, law, rows, columns = self.compliance(virgin), change.law, change.rows, change.columns
+        m, start = len(rows), compliance @ right
+        size = m + (0 if columns is None else len(change.pressure))
+        small = np.zeros((size + (border is not None),) * 2)
+        wanted = np.zeros(len(small))
+        touched = np.unique(law.indices)
+        small[:m, :m] = law[:, touched] @ compliance[np.ix_(touched, rows)]
+        wanted[:m] = law @ start
+        if columns is not None:
+            small[:m, m:size] = -(law @ self.lifted)
+            small[m:size, :m] = change.pressure @ compliance[np.ix_(columns, rows)]
+            small[m:size, m:size] = -(change.pressure @ self.lifted[columns])
+            wanted[m:size] = change.pressure @ start[columns]
+        small[np.arange(size), np.arange(size)] += 1
         if border is not None:
             slope, row, rate, gap = border
             along, across = compliance @ slope, compliance @ row
-            small[:m, m] = along[active]
-            small[m, :m] = -(local.T @ across[active])
-            if p is not None:
-                small[m, :m] += (row @ self.lifted) @ p
-            small[m, m] = rate - row @ along
-            wanted = np.append(wanted, gap - row @ start)
+            small[:m, size], small[size, :m] = law @ along, -across[rows]
+            if columns is not None:
+                small[m:size, size], small[size, m:size] = change.pressure @ along[columns], row @ self.lifted
+            small[size, size], wanted[size] = rate - row @ along, gap - row @ start
         found = lu_solve(small, wanted)
-        y, s = (found, 0.0) if border is None else (found[:-1], found[-1])
         force = np.zeros(len(right))
-        force[active] = local @ y
-        x = start - compliance @ force
-        if p is not None:
-            x += self.lifted @ (p @ y)
+        force[rows] = found[:m]
+        x, s = start - compliance @ force, found[size] if border is not None else 0.0
+        if columns is not None:
+            x += self.lifted @ found[m:size]
         if border is not None:
             x -= s * along
         return x, s
+
+
+def scaled(matrix: sparse.csr_matrix, weights: np.ndarray) -> sparse.csr_matrix:
+    """diag(weights) matrix."""
+    return sparse.csr_matrix((matrix.data * np.repeat(weights, np.diff(matrix.indptr)), matrix.indices, matrix.indptr), matrix.shape)
 
 
 def lu_solve(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
@@ -202,7 +208,7 @@ class Flow:
         self.at_nodes = sparse.vstack([sparse.eye(number), ends], format="csr")
         water = fem.points_of(space, fem.WATER).values[:, self.inside]
         #: nodal forces of the pressure at the inner nodes
-        self.lift = (interface.water.T @ sparse.diags(interface.water_points.weights) @ water).tocsr()
+        self.lift = (interface.water.T @ scaled(water, interface.water_points.weights)).tocsr()
         self.opening = interface.at_points[:: bulk.dim]
         self.inner_slopes = [g[:, self.inside] for g in self.slopes]
         if bulk.dim == 2:
@@ -260,18 +266,19 @@ class Flow:
         gradient[0] = gradient[0] - drop / self.base
         return pressure, (factor, gradient, per_drop)
 
-    def sensitivity(self, solution: object, rate: np.ndarray, active: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The pressure's derivatives: (p, m) with the active unknowns and (p,) with the drop.
+    def sensitivity(self, solution: object, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The pressure's derivatives: with the unknowns that matter (p, m), which these are (m,), and with the drop (p,).
 
         rate (q,): how the conductivities times weights grow with the opening.
         """
         *system, gradients, per_drop = solution
         points = np.flatnonzero(rate)
-        opening = self.opening[points][:, active]
-        coupling = sum(g[points].T @ (sparse.diags(rate[points] * d[points]) @ opening)
-                       for g, d in zip(self.inner_slopes, gradients, strict=True)).toarray()
+        opening = self.opening[points]
+        columns = np.unique(opening.indices)
+        coupling = sum(g[points].T @ scaled(opening, rate[points] * d[points])
+                       for g, d in zip(self.inner_slopes, gradients, strict=True))[:, columns].toarray()
         if self.dim == 2:
             left, right, total = system
             green = np.minimum.outer(left, left) * np.minimum.outer(right, right) / total  # the inverse of the flow matrix
-            return -green[np.ix_(self.back, self.back)] @ coupling, per_drop
-        return -linalg.cho_solve(system[0], coupling), per_drop
+            return -green[np.ix_(self.back, self.back)] @ coupling, columns, per_drop
+        return -linalg.cho_solve(system[0], coupling), columns, per_drop

@@ -16,6 +16,8 @@ from .parameters import Case
 
 #: Artificial stiffness of open or broken points over K, in the tangent only.
 ARTIFICIAL = 1e-8
+#: "At once" [m]: a hundredth of an atom. With a jump of the traction a point may find no equilibrium on either side.
+SUDDEN = 1e-12
 
 
 @dataclass
@@ -35,7 +37,7 @@ class Rupture:
         self.delta_e = case["sigma_max"] / self.K_N
         self.L_C = (1 + p) * self.delta_e
         self.sigma_c = case["sigma_max"] * (1 + p) / p
-        self.L_CT = 1e30 if case["alpha"] >= 2 else max(self.L_C * np.tan(case["alpha"] * np.pi / 4), 1e-300)
+        self.L_CT = 1e30 if case["alpha"] >= 2 else max(self.L_C * np.tan(case["alpha"] * np.pi / 4), SUDDEN)
 
     def start(self, points: int) -> Memory:
         """The virgin joint."""
@@ -47,8 +49,7 @@ class Rupture:
 
     def tangential(self, opening: np.ndarray) -> np.ndarray:
         """Tangential stiffness [Pa/m]."""
-        with np.errstate(over="ignore"):  # L_CT may be next to nothing
-            return np.where(opening <= 0, self.K_T, self.K_T * np.maximum(1 - opening / self.L_CT, 0))
+        return np.where(opening <= 0, self.K_T, self.K_T * np.maximum(1 - opening / self.L_CT, 0))
 
     def respond(self, jump: np.ndarray, memory: Memory, secant: bool = False) -> tuple[np.ndarray, np.ndarray]:
         """Traction and tangent; secant: the positive stiffness that never softens instead of the tangent."""

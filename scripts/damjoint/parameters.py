@@ -190,6 +190,13 @@ class Case:
         i = min(int(time), len(points) - 2)
         return points[i] + (time - i) * (points[i + 1] - points[i])
 
+    def before_last_level(self) -> Case | None:
+        """The case without its last level; None if there is only one, or the level is not what is prescribed."""
+        before = len(self.levels) - 1
+        if not before or self["drive"] != "level":
+            return None
+        return replace(self, levels=self.levels[:-1], tail_levels=self.tail_levels[:-1], times=tuple(t for t in self.times if t <= before))
+
     def scenes(self) -> list[Case]:
         """The case itself, then the other uplift modes it is published with."""
         return [self, *(replace(self, values={**self.values, "uplift": mode}, also_uplift=()) for mode in self.also_uplift)]

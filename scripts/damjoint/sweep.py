@@ -72,6 +72,9 @@ def key_of(case: Case) -> str:
     return hashlib.sha256(repr((sorted(case.values.items()), case.levels, case.tail_levels, case.times, __version__)).encode()).hexdigest()[:16]
 
 
+#: Rows that are computed together at most: they share the steps up to the levels where they part.
+MOST = 8
+
 _LAST: dict[tuple, Condensed] = {}
 
 
@@ -84,15 +87,39 @@ def bulk_of(case: Case) -> Condensed:
     return _LAST[key]
 
 
-def last_row(case: Case) -> dict[str, float | str]:
-    """The columns of history.csv at the last level of a case, and why it stopped, if it did."""
+def filled(case: Case, known: dict[tuple, Filling]) -> Filling:
+    """The filling of a case, gone on with from its last level but one if that is known; known: by levels and times."""
+    key = case.levels, case.tail_levels, case.times
+    if key not in known:
+        before = case.before_last_level()
+        filling = filled(before, known).fork(case) if before else Filling(case, bulk_of(case))
+        filling.run()
+        known[key] = filling
+    return known[key]
+
+
+def last_rows(cases: list[Case]) -> list[dict[str, float | str]]:
+    """For cases that differ in levels only: the columns of history.csv at the last level, and why it stopped, if it did."""
+    found, known = [], {}
     with threadpool_limits(1):
-        try:
-            result = Filling(case, bulk_of(case)).run()
-        except RunError as error:
-            return {**dict.fromkeys(HISTORY, ""), "stopped": str(error)}
-    last = {name: f"{column[-1]:.12g}" if len(column) else "" for name, column in result.history.items()}
-    return {**last, "stopped": result.stopped}
+        for case in cases:
+            try:
+                filling = filled(case, known)
+            except RunError as error:
+                found.append({**dict.fromkeys(HISTORY, ""), "stopped": str(error)})
+                continue
+            result = filling.results(filling.stopped)
+            last = {name: f"{column[-1]:.12g}" if len(column) else "" for name, column in result.history.items()}
+            found.append({**last, "stopped": result.stopped})
+    return found
+
+
+def bundles(cases: dict[str, Case]) -> list[list[str]]:
+    """The keys of cases that differ in levels only, together; at most MOST of them, for rows to come in time."""
+    groups: dict[tuple, list[str]] = {}
+    for key, case in cases.items():
+        groups.setdefault(tuple(sorted(case.values.items())), []).append(key)
+    return [keys[i : i + MOST] for keys in groups.values() for i in range(0, len(keys), MOST)]
 
 
 def read_done(path: Path, columns: list[str]) -> set[str]:
@@ -111,6 +138,8 @@ def read_done(path: Path, columns: list[str]) -> set[str]:
 
 def spread(cases: dict[str, Case], jobs: int, scheduler: str | None) -> Iterator[tuple[str, dict]]:
     """(key, row) of each case as it is done: here, in `jobs` processes, or on a dask scheduler."""
+    work = bundles(cases)
+    chosen = [[cases[key] for key in keys] for keys in work]
     if scheduler:
         try:
             from dask.distributed import Client
@@ -122,18 +151,18 @@ def spread(cases: dict[str, Case], jobs: int, scheduler: str | None) -> Iterator
         except (OSError, ValueError) as error:
             raise InputError(f"--scheduler {scheduler}: no scheduler answers there ({error})") from None
         with client:
-            futures = {client.submit(last_row, case, key=f"damjoint-{key}", pure=True): key for key, case in cases.items()}
+            futures = {client.submit(last_rows, some, key=f"damjoint-{'-'.join(keys)}"): keys for keys, some in zip(work, chosen, strict=True)}
             for future in as_finished(futures):
-                yield futures[future], future.result()
-    elif jobs == 1 or len(cases) == 1:
-        for key, case in cases.items():
-            yield key, last_row(case)
+                yield from zip(futures[future], future.result(), strict=True)
+    elif jobs == 1 or len(work) == 1:
+        for keys, some in zip(work, chosen, strict=True):
+            yield from zip(keys, last_rows(some), strict=True)
     else:
         with ProcessPoolExecutor(jobs) as pool:
-            waiting = {pool.submit(last_row, case): key for key, case in cases.items()}
+            waiting = {pool.submit(last_rows, some): keys for keys, some in zip(work, chosen, strict=True)}
             try:
                 for future in as_completed(waiting):
-                    yield waiting[future], future.result()
+                    yield from zip(waiting[future], future.result(), strict=True)
             except BaseException:
                 pool.shutdown(wait=False, cancel_futures=True)
                 raise

@@ -40,3 +40,10 @@ def test_a_dam_that_slides_is_a_row_that_says_so(command, tmp_path):
     for row in rows(tmp_path / "sweep.csv"):
         assert row["stopped"].startswith("sliding")
         assert float(row["level"]) == pytest.approx(slide_level(float(row["mu"]), 1000, False), rel=2e-3)
+
+
+def test_no_level_without_equilibrium(command, tmp_path):
+    """Without tensile strength the shear goes as soon as a point opens: a jump of the law that no level may fall into."""
+    command("sweep", "a", "--set", "sigma_max=0", "--vary", "level=8:9:0.02", "--jobs", "1", "--out", "sweep.csv")
+    openings = [float(row["max_opening"]) for row in rows(tmp_path / "sweep.csv") if not row["stopped"]]
+    assert len(openings) == 51 and openings == sorted(openings)

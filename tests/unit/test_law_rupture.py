@@ -23,7 +23,7 @@ def closed_form(jumps, sigma_max=S, alpha=1.0, pena_contact=1.0):
     """sigma_n, tau_1, tau_2 along a path, row by row."""
     d_e = sigma_max / K_N
     l_c = (1 + P) * d_e
-    l_ct = {0: 0.0, 2: np.inf}.get(alpha, l_c * np.tan(alpha * np.pi / 4))
+    l_ct = max({0: 0.0, 2: np.inf}.get(alpha, l_c * np.tan(alpha * np.pi / 4)), 1e-12)  # "at once" is 1e-12 m
     kappa, free, rows = d_e, np.zeros(2), []
     for d_n, *d_t in jumps:
         peak = sigma_max * (1 + P) / P
