@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import os
 import re
@@ -10,7 +11,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor
 from itertools import product
 from pathlib import Path
@@ -26,6 +27,8 @@ from .condensed import Filling
 from .mesh import Mesh
 from .parameters import Case
 from .results import Results
+from .results import write as write_results
+from .run import run
 from .sweep import bulk_of
 
 #: code_aster 15.2, sequential, on a 2-core machine: seconds of wall time of the whole job without meshing.
@@ -36,43 +39,76 @@ SCENES = {"rupture": "a", "friction": "c", "flow": "e"}
 QUANTITIES = ("heel_opening", "toe_stress", "crack_tip", "slip", "leakage")
 
 
-def cold(arguments: list[str]) -> tuple[float, float]:
-    """Wall seconds and peak memory [MB] of a damjoint command in a process of its own, with an empty cache."""
+#: Where the seconds of a run go; start: Python, libraries, reading the case.
+PARTS = ("start", "mesh", "assembly", "condensation", "newton", "post")
+
+
+def cold(arguments: list[str]) -> tuple[float, dict]:
+    """Wall seconds and run.json of a damjoint run in a process of its own, with an empty cache, no fields, no picture.
+
+    Raises RunError if it fails.
+    """
     with tempfile.TemporaryDirectory() as folder:
-        command = [sys.executable, "-m", "damjoint.cli", *arguments, "--out", f"{folder}/out"]
+        command = [sys.executable, "-m", "damjoint.cli", "run", *arguments, "--no-fields", "--no-picture", "--out", f"{folder}/out"]
         start = time.perf_counter()
         done = subprocess.run(command, env={**os.environ, "DAMJOINT_CACHE": ""}, stdout=subprocess.DEVNULL, check=False)
         wall = time.perf_counter() - start
         if done.returncode:
-            raise RunError(f"bench: damjoint {' '.join(arguments)} ended with exit code {done.returncode}")
-        return wall, json.loads(Path(folder, "out", "run.json").read_text())["peak_memory_mb"]
+            raise RunError(f"bench: damjoint run {' '.join(arguments)} ended with exit code {done.returncode}")
+        told = json.loads(Path(folder, "out", "run.json").read_text())
+        for further in Path(folder, "out").glob("*/run.json"):  # the other scene
+            seconds = json.loads(further.read_text())["wall_seconds"]
+            for part in ("solve", "post"):
+                told["wall_seconds"][part] += seconds[part]
+        return wall, told
 
 
-def cases(short: bool) -> dict[str, list]:
-    """Each modeling, all its scenes, published steps, meshes of the document's size: seconds, MB, ratio to the peer;
-    unless short, the plain engine's seconds too."""
-    table = {"case": [], "seconds": [], "memory_mb": [], "peer_seconds": [], "times_faster": [], "getdp_seconds": []}
-    for name in tqdm(PEER, desc="cases", disable=not sys.stderr.isatty()):
-        wall, memory = cold(["run", name, "--no-fields", "--no-picture"])
-        plain = float("nan") if short else cold(["run", name, "--no-fields", "--no-picture", "--engine", "getdp"])[0]
-        for column, value in zip(table.values(), (name, wall, memory, PEER[name], PEER[name] / wall, plain), strict=True):
+class Table(dict):
+    """Columns of a table, {name: values}, filled row by row."""
+
+    def __init__(self, *names: str) -> None:
+        super().__init__({name: [] for name in names})
+
+    def add(self, *values: object) -> None:
+        """One more row."""
+        for column, value in zip(self.values(), values, strict=True):
             column.append(value)
-    for column, value in zip(table.values(), ("sum", sum(table["seconds"]), max(table["memory_mb"]), sum(table["peer_seconds"]),
-                                              sum(table["peer_seconds"]) / sum(table["seconds"]), sum(table["getdp_seconds"])), strict=True):
-        column.append(value)
+
+    def rows(self, *where: object) -> np.ndarray:
+        """Indices of the rows whose first columns have these values."""
+        return np.flatnonzero([row[: len(where)] == where for row in zip(*self.values(), strict=True)])
+
+
+def bar(things: list, title: str) -> Iterable:
+    """The things with a progress bar, on a terminal."""
+    return tqdm(things, desc=title, disable=not sys.stderr.isatty())
+
+
+def cases(short: bool) -> Table:
+    """Each modeling, all its scenes, published steps, meshes of the document's size: seconds and where they went, MB,
+    ratio to the peer; unless short, the plain engine's, too.
+    """
+    table = Table("case", "seconds", *PARTS, "MB", "peer", "times faster", "GetDP", "times faster, GetDP")
+    for name in bar(PEER, "cases"):
+        wall, told = cold([name])
+        spent = [told["wall_seconds"][part] for part in ("mesh", "assembly", "condensation", "solve", "post")]
+        plain = float("nan") if short else cold([name, "--engine", "getdp"])[0]
+        table.add(name, wall, wall - sum(spent), *spent, told["peak_memory_mb"], PEER[name], PEER[name] / wall, plain, PEER[name] / plain)
+    total = {n: sum(c) for n, c in table.items() if n != "case"}
+    table.add("sum", *(total[n] for n in ("seconds", *PARTS)), max(table["MB"]), total["peer"], total["peer"] / total["seconds"],
+              total["GetDP"], total["peer"] / total["GetDP"])
     return table
 
 
 def measure(case: Case) -> tuple[Results, dict[str, float]]:
-    """Solve a scene in this process; seconds of mesh, condensation and Newton, and the number of unknowns."""
-    marks = [time.perf_counter()]
-    mesh = Mesh(case)
-    marks.append(time.perf_counter())
-    bulk = condense(case, mesh, max(case.tail_levels) > 0)
-    marks.append(time.perf_counter())
+    """Solve a scene in this process; the seconds of PARTS but the start, and the number of unknowns."""
+    bulk = condense(case, Mesh(case), max(case.tail_levels) > 0)
+    begin = time.perf_counter()
     result = Filling(case, bulk).run()
-    marks.append(time.perf_counter())
-    return result, dict(zip(("mesh_s", "condense_s", "newton_s"), np.diff(marks), strict=True), unknowns=bulk.unknowns)
+    done = time.perf_counter()
+    with tempfile.TemporaryDirectory() as folder:
+        write_results(result, Path(folder))
+    return result, {**bulk.seconds, "newton": done - begin, "post": time.perf_counter() - done, "unknowns": bulk.unknowns}
 
 
 def read_off(result: Results) -> np.ndarray:
@@ -87,6 +123,17 @@ def read_off(result: Results) -> np.ndarray:
     return np.array([result.heel[-1], mean["sigma_n"][-1], tip, slip, result.history["flux"][-1]])
 
 
+def worst(found: np.ndarray, exact: np.ndarray) -> float:
+    """The largest relative difference of QUANTITIES."""
+    return float(np.max(errors(found, exact)))
+
+
+def errors(found: np.ndarray, exact: np.ndarray) -> np.ndarray:
+    """Relative differences; 0 where the exact value is."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(exact == 0, 0, np.abs(found / exact - 1))
+
+
 def settings(order: int, n: int, grading: float, pattern: str, dim: int, height: float = 10.0) -> dict:
     """Mesh parameters of one point of the error-against-time benchmark; grading 1 as --accuracy, smaller finer far away."""
     sizes = {"h_dam": grading * 1.25 * height / n**0.5, "h_found": grading * 2.5 * height / n**0.5}
@@ -94,35 +141,75 @@ def settings(order: int, n: int, grading: float, pattern: str, dim: int, height:
     return {"order": float(order), "n_joint": float(n), "mesh_pattern": pattern, **sizes, **solid}
 
 
-def accuracy(short: bool) -> dict[str, list]:
-    """Error of QUANTITIES against an overkill solution, and the seconds spent.
+def overkill(short: bool) -> tuple[dict[str, np.ndarray], Table]:
+    """QUANTITIES of each modeling's main scene on the finest mesh, {case: values}, and for SCENES how they got there:
+    observed order and remaining error by extrapolation.
 
-    Overkill: order 2, 320 elements along the joint (80 when short); its own remaining error is estimated from the
-    observed order between the two finest meshes before it.
+    Plane strain of order 2, 640 elements along the joint (80 if short), twice finer than --accuracy far away; the 3D
+    modelings are plane, too (nu = 0, nothing varies along z).
     """
-    numbers = (10, 20) if short else (10, 20, 40, 80, 160)
-    table: dict[str, list] = {n: [] for n in ("scene", "dim", "pattern", "order", "n_joint", "grading", "unknowns", "mesh_s", "condense_s",
-                                              "newton_s", "seconds", *(f"error_{q}" for q in QUANTITIES))}
-    with threadpool_limits(1):
-        for scene, name in SCENES.items():
-            finest = 80 if short else 320
-            exact = read_off(measure(parameters.load(name, settings(2, finest, 0.5, "free", 2) | {"uplift": plain_uplift(name)}))[0])
-            runs = [(2, pattern, order, n, grading) for pattern in ("free", "regular") for order in (1, 2) for n in numbers
-                    for grading in ((1.0, 0.5) if pattern == "free" and not short else (1.0,))]
-            runs += [(3, pattern, order, n, 1.0) for pattern in ("layers", "free") for order in (1, 2) for n in numbers if n <= 40]
-            for dim, pattern, order, n, grading in tqdm(runs, desc=scene, disable=not sys.stderr.isatty()):
-                case = parameters.load(name, settings(order, n, grading, pattern, dim) | {"uplift": plain_uplift(name)})
-                result, spent = measure(case)
-                with np.errstate(divide="ignore", invalid="ignore"):
-                    error = np.where(exact == 0, 0, np.abs(read_off(result) / exact - 1))
-                seconds = spent["mesh_s"] + spent["condense_s"] + spent["newton_s"]
-                row = (scene, dim, pattern, order, n, grading, spent["unknowns"], *list(spent.values())[:3], seconds, *error)
-                for column, value in zip(table.values(), row, strict=True):
-                    column.append(value)
+    sizes = (20, 40, 80) if short else (160, 320, 640)
+    exact, table = {}, Table("scene", "quantity", *(f"n = {n}" for n in sizes), "observed order", "remaining error [%]")
+    for name in bar(PEER, "overkill"):
+        wanted = sizes if name in SCENES.values() else sizes[-1:]
+        found = [read_off(measure(parameters.load(name, settings(2, n, 0.5, "free", 2) | {"uplift": main_uplift(name)}))[0]) for n in wanted]
+        exact[name] = found[-1]
+        if len(found) == 1:
+            continue
+        scene = next(s for s, c in SCENES.items() if c == name)
+        for quantity, values in zip(QUANTITIES, np.transpose(found), strict=True):
+            if values[-1]:
+                before, last = np.abs(np.diff(values))
+                order = np.log2(before / last) if last else np.inf
+                # Richardson; where the differences do not shrink as they should, the last of them
+                remaining = last / (2**order - 1) if order > 1 else last
+                table.add(scene, quantity, *values, order, 100 * remaining / abs(values[-1]))
+    return exact, table
+
+
+def accuracy(short: bool, exact: dict[str, np.ndarray], start: float) -> Table:
+    """Error of QUANTITIES against the overkill solution, and the seconds spent: a row per scene and mesh, published
+    steps, and for one mesh other numbers of steps.
+    """
+    table = Table("scene", "dim", "pattern", "order", "n_joint", "grading", "steps", "unknowns", "seconds", *PARTS,
+                  *(f"error_{q}" for q in QUANTITIES), "worst")
+    numbers = (10, 20) if short else (10, 20, 40, 80, 160, 320)
+    gradings = (1.0,) if short else (2.0, 1.0, 0.5)
+    runs = [(2, "free", order, n, grading, None) for order in (1, 2) for n in numbers for grading in gradings]
+    runs += [(2, "regular", order, n, 1.0, None) for order in (1, 2) for n in numbers]
+    runs += [(3, "layers", order, n, 1.0, None) for order in (1, 2) for n in numbers if n <= 160]
+    runs += [(3, "free", order, n, 1.0, None) for order in (1, 2) for n in numbers if n <= 40]
+    runs += [(2, "free", 2, numbers[-2], 1.0, steps) for steps in (1, 2, 4)]
+    for scene, name in SCENES.items():
+        for dim, pattern, order, n, grading, steps in bar(runs, scene):
+            chosen = settings(order, n, grading, pattern, dim) | {"uplift": main_uplift(name)}
+            result, spent = measure(parameters.load(name, chosen, steps=steps))
+            spent["start"] = start
+            off = errors(read_off(result), exact[name])
+            table.add(scene, dim, pattern, order, n, grading, steps or "published", spent["unknowns"], sum(spent[p] for p in PARTS),
+                      *(spent[p] for p in PARTS), *off, max(off))
     return table
 
 
-def plain_uplift(name: str) -> str:
+def recommended(exact: dict[str, np.ndarray]) -> Table:
+    """Each modeling's main scene: worst error of the published mesh and steps, and error and seconds of --accuracy."""
+    table = Table("case", "published: error [%]", "peer",
+                  *(f"{accuracy}: {what}" for accuracy in parameters.ACCURACIES for what in ("error [%]", "seconds", "of these start")))
+    for name in bar(PEER, "accuracy"):
+        main = {"uplift": main_uplift(name)}
+        row = [100 * worst(read_off(measure(parameters.load(name, main))[0]), exact[name]), PEER[name]]
+        for level in parameters.ACCURACIES:
+            case = parameters.load(name, main, accuracy=level)
+            result, _ = measure(case)
+            wall, told = cold([name, "--accuracy", level, "--set", f"uplift={main['uplift']}"])
+            row += [100 * worst(read_off(result), exact[name]), wall, wall - sum(told["wall_seconds"].values())]
+        table.add(name, *row)
+    total = {n: sum(c) for n, c in table.items() if n != "case"}
+    table.add("sum", *(float("nan") if "error" in n else total[n] for n in total))
+    return table
+
+
+def main_uplift(name: str) -> str:
     """The main uplift mode of a case."""
     return str(parameters.load(name)["uplift"])
 
@@ -134,45 +221,44 @@ def front(seconds: np.ndarray, error: np.ndarray) -> np.ndarray:
     return order[np.concatenate([[True], best[1:] < best[:-1]])]
 
 
-def growth(short: bool) -> dict[str, list]:
+def growth(short: bool) -> Table:
     """Seconds and memory against the number of unknowns, each size in a process of its own."""
-    table: dict[str, list] = {n: [] for n in ("dim", "order", "n_joint", "unknowns", "seconds", "memory_mb")}
+    table = Table("dim", "order", "n_joint", "unknowns", "seconds", "MB")
     sizes = [(2, n) for n in ((50, 100) if short else (50, 100, 200, 400))]
     sizes += [(3, n) for n in ((20,) if short else (20, 40, 60, 80))]
-    for dim, n in tqdm(sizes, desc="growth", disable=not sys.stderr.isatty()):
+    for dim, n in bar(sizes, "growth"):
         chosen = {"dim": dim, "order": 2 if dim == 2 else 1, "n_joint": n, "mesh_pattern": "free", "uplift": "imposed"}
         # uniform refinement: every size goes with the joint's
         chosen |= {"h_dam": 15 / n, "h_found": 40 / n} if dim == 2 else {"n_layers": max(1, n // 5), "h_dam": 20 / n, "h_found": 40 / n}
         pairs = [part for k, v in chosen.items() for part in ("--set", f"{k}={v}")]
-        wall, memory = cold(["run", "a", *pairs, "--levels", "9", "--no-fields", "--no-picture"])
-        unknowns = count_unknowns(parameters.load("a", {k: parameters.parameter(k).check(v) for k, v in chosen.items()}))
-        for column, value in zip(table.values(), (dim, chosen["order"], n, unknowns, wall, memory), strict=True):
-            column.append(value)
+        wall, told = cold(["a", *pairs, "--levels", "9"])
+        table.add(dim, chosen["order"], n, told["unknowns"], wall, told["peak_memory_mb"])
     return table
 
 
-def count_unknowns(case: Case) -> int:
-    """Displacement unknowns of a case's mesh."""
-    from .condense import Bodies
+def beyond_memory() -> str:
+    """What a run says whose joint alone needs more than the machine has."""
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            run(parameters.load("b", {"n_joint": 1000.0, "n_layers": 1000.0}), Path(folder), False, False, False)
+        except RunError as error:
+            return str(error)
+    raise RunError("bench: a joint beyond the memory has run")
 
-    bodies = Bodies.of(case, Mesh(case))
-    free = bodies.dim * (len(bodies.dam.place) + len(bodies.foundation.place))
-    return free - len(bodies.held_dam) - len(bodies.held_foundation)
 
-
-def exponents(table: dict[str, list]) -> list[str]:
-    """Fitted exponents of time and memory, from the two largest sizes on."""
+def exponents(table: Table) -> list[str]:
+    """Fitted exponents of time and memory over the three largest sizes."""
     lines = []
     for dim in (2, 3):
         rows = [i for i, d in enumerate(table["dim"]) if d == dim][-3:]
         if len(rows) > 1:
             n = np.log([table["unknowns"][i] for i in rows])
-            fits = [np.polyfit(n, np.log([table[c][i] for i in rows]), 1)[0] for c in ("seconds", "memory_mb")]
+            fits = [np.polyfit(n, np.log([table[c][i] for i in rows]), 1)[0] for c in ("seconds", "MB")]
             lines.append(f"{dim}D: time ~ unknowns^{fits[0]:.2f}, memory ~ unknowns^{fits[1]:.2f}")
     return lines
 
 
-def switches(short: bool) -> dict[str, list]:
+def switches(short: bool) -> Table:
     """What a scene pays for each thing it may need: seconds with and without, in one process, best of three."""
     def best(call: Callable[[], object]) -> float:
         spent = []
@@ -182,28 +268,29 @@ def switches(short: bool) -> dict[str, list]:
             spent.append(time.perf_counter() - start)
         return min(spent)
 
-    with threadpool_limits(1):
-        dry = parameters.load("e", {"uplift": "none"}, "9")
-        wet = parameters.load("e", {}, "9")
-        bulk = condense(dry, Mesh(dry), False)
-        table: dict[str, list] = {"option": [], "with_s": [], "without_s": []}
+    def filling(*about: object) -> Callable[[], object]:
+        return lambda: Filling(parameters.load("e", *about), bulk).run()
 
-        def add(option: str, with_it: Callable, without: Callable) -> None:
-            for column, value in zip(table.values(), (option, best(with_it), best(without)), strict=True):
-                column.append(value)
+    def whole(*about: object) -> Callable[[], object]:
+        return lambda: measure(parameters.load("a", *about))
 
-        fill = lambda case: lambda: Filling(case, bulk).run()  # noqa: E731
-        add("pressure unknowns (flow instead of none)", fill(wet), fill(dry))
-        add("load unknown (drive=heel instead of level)", fill(parameters.load("e", {"uplift": "none", "drive": "heel"}, "8,9")),
-            fill(parameters.load("e", {"uplift": "none"}, "8,9")))
-        add("20 steps instead of 1", fill(parameters.load("e", {"uplift": "none"}, "9", None, 20)), fill(dry))
-        flat, solid = (parameters.load("a", settings(2, 50, 1.0, p, d), "9") for p, d in (("free", 2), ("layers", 3)))
-        add("z (3D layers instead of 2D)", lambda: measure(solid), lambda: measure(flat))
-        add("condensing the bulk anew (instead of keeping it)", lambda: measure(dry), fill(dry))
-        fine = parameters.load("a", {"order": 2.0, "h_dam": 0.1, "h_found": 0.1}, "9")
-        graded = parameters.load("a", {"order": 2.0}, "9")
-        add("fine mesh far from the joint", lambda: measure(fine), lambda: measure(graded))
-    table["ratio"] = [a / b for a, b in zip(table["with_s"], table["without_s"], strict=True)]
+    def written(fields: bool, picture: bool) -> Callable[[], object]:
+        return lambda: run(parameters.load("a"), Path(folder), fields, picture, False)
+
+    table, dry = Table("option", "with", "without", "ratio"), {"uplift": "none"}
+    with threadpool_limits(1), tempfile.TemporaryDirectory() as folder:
+        bulk = condense(parameters.load("e"), Mesh(parameters.load("e")), False)
+        for option, with_it, without in bar([
+                ("pressure unknowns (flow instead of none)", filling({}, "9"), filling(dry, "9")),
+                ("load unknown (drive=heel instead of level)", filling(dry | {"drive": "heel"}, "8,9"), filling(dry, "8,9")),
+                ("20 steps instead of 1", filling(dry, "9", None, 20), filling(dry, "9")),
+                ("z (3D layers instead of 2D)", whole(settings(2, 50, 1.0, "layers", 3), "9"), whole(settings(2, 50, 1.0, "free", 2), "9")),
+                ("the bulk condensed anew (instead of kept)", lambda: measure(parameters.load("e", dry, "9")), filling(dry, "9")),
+                ("a fine mesh far from the joint", whole({"order": 2.0, "h_dam": 0.1, "h_found": 0.1}, "9"), whole({"order": 2.0}, "9")),
+                ("fields for ParaView and Gmsh", written(True, False), written(False, False)),
+                ("the picture", written(False, True), written(False, False))], "switches"):
+            seconds = best(with_it), best(without)
+            table.add(option, *seconds, seconds[0] / seconds[1])
     return table
 
 
@@ -221,62 +308,81 @@ def one_of_the_grid(values: tuple) -> tuple:
     return (*values, result.stopped.split(":")[0] or "converged", level, history["iterations"].sum(), history["cuts"].sum(), spent)
 
 
-def stress(short: bool) -> dict[str, list]:
+def stress(short: bool) -> Table:
     """The flow to its limits: closed aperture, joint and bulk stiffness over many decades, the reservoir filled to the crest."""
     grid = list(product(("rupture", "friction"), (1e-9, 1e-8, 1e-6, 1e-4), (1e9, 1e12, 1e14), (1e10, 3e11, 3e12)))
     grid = grid[::18] if short else grid
-    columns = ("law", "aperture_min", "K_N", "E", "end", "level", "iterations", "cuts", "seconds")
+    table = Table("law", "aperture_min", "K_N", "E", "end", "level", "iterations", "cuts", "seconds")
     with ProcessPoolExecutor() as pool:
-        rows = list(tqdm(pool.map(one_of_the_grid, grid), total=len(grid), desc="stress", disable=not sys.stderr.isatty()))
-    return {name: list(column) for name, column in zip(columns, zip(*rows, strict=True), strict=True)}
+        for row in tqdm(pool.map(one_of_the_grid, grid), total=len(grid), desc="stress", disable=not sys.stderr.isatty()):
+            table.add(*row)
+    return table
 
 
-def checks() -> list[str]:
+def checks(short: bool) -> list[str]:
     """What holds to machine precision, on a fine mesh: equilibrium and mass balance."""
-    case = parameters.load("g", settings(2, 160, 1.0, "free", 2))
-    result, _ = measure(case)
+    case = parameters.load("g", settings(2, 80 if short else 320, 1.0, "free", 2))
+    result, spent = measure(case)
     last = {n: c[-1] for n, c in result.history.items()}
     thrust = case["rho_water"] * case["g"] * last["level"] ** 2 / 2
     rows = result.at()
-    return [f"shear over thrust minus one: {last['T'] / thrust - 1:.1e}",
-            f"flux at the toe over flux at the heel minus one: {rows['flux'][-1] / rows['flux'][0] - 1:.1e}"]
+    return [f"G with {spent['unknowns']} unknowns: shear over thrust minus one {last['T'] / thrust - 1:.1e}",
+            f"flux at the toe over flux at the heel minus one {rows['flux'][-1] / rows['flux'][0] - 1:.1e}"]
 
 
-def draw(table: dict[str, list], path: Path) -> None:
-    """Error (worst of the quantities) against time, log-log, with the efficient front, a panel per scene."""
+def draw(table: Table, path: Path) -> None:
+    """Worst error against time, log-log, with the efficient front; a column per scene, 2D above 3D."""
     import matplotlib
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    columns = {n: np.array(c) for n, c in table.items()}
-    worst = np.max([columns[f"error_{q}"] for q in QUANTITIES], axis=0)
-    figure, panels = plt.subplots(1, len(SCENES), figsize=(13, 4.3), sharey=True, layout="constrained")
-    for axes, scene in zip(panels, SCENES, strict=True):
-        here = columns["scene"] == scene
-        for dim, pattern, marker in ((2, "free", "o"), (2, "regular", "s"), (3, "layers", "^"), (3, "free", "v")):
-            for order, color in ((1, "#cc7a00"), (2, "#0b5394")):
-                rows = here & (columns["dim"] == dim) & (columns["pattern"] == pattern) & (columns["order"] == order)
-                axes.loglog(columns["seconds"][rows], 100 * worst[rows], marker, color=color, markersize=4, alpha=0.7,
-                            label=f"{dim}D {pattern}, order {order}")
-        flat = np.flatnonzero(here & (columns["dim"] == 2))
-        best = flat[front(columns["seconds"][flat], worst[flat])]
-        axes.loglog(columns["seconds"][best], 100 * worst[best], "k-", linewidth=0.8, label="efficient front, 2D")
-        axes.set(title=scene, xlabel="seconds (mesh, condensation, Newton)")
-        axes.grid(alpha=0.3, which="both")
-    panels[0].set_ylabel("worst error [%]")
-    panels[-1].legend(fontsize=6)
-    figure.savefig(path, dpi=110)
+    columns = {n: np.array(c, object) for n, c in table.items()}
+    error, seconds = 100 * columns["worst"].astype(float), columns["seconds"].astype(float)
+    figure, panels = plt.subplots(2, len(SCENES), figsize=(13, 8), sharex=True, sharey=True, layout="constrained")
+    styles = {(2, "free"): ("o", "triangles"), (2, "regular"): ("s", "regular"), (3, "layers"): ("^", "layers"), (3, "free"): ("v", "tetrahedra")}
+    for row, dim in zip(panels, (2, 3), strict=True):
+        for axes, scene in zip(row, SCENES, strict=True):
+            here = (columns["scene"] == scene) & (columns["dim"] == dim)
+            for (d, pattern), (marker, name) in styles.items():
+                for order, color in ((1, "#cc7a00"), (2, "#0b5394")):
+                    some = here & (columns["pattern"] == pattern) & (columns["order"] == order)
+                    if d == dim:
+                        axes.loglog(seconds[some], error[some], marker, color=color, markersize=4, alpha=0.7, label=f"{name}, order {order}")
+            best = np.flatnonzero(here)
+            best = best[front(seconds[best], error[best])]
+            axes.loglog(seconds[best], error[best], "k-", linewidth=0.8, label="efficient front")
+            axes.set(title=f"{scene}, {dim}D")
+            axes.grid(alpha=0.3, which="both")
+        row[0].set_ylabel("worst error [%]")
+        row[-1].legend(fontsize=7)
+    for axes in panels[-1]:
+        axes.set_xlabel("seconds, start and mesh included")
+    figure.savefig(path, dpi=100)
     plt.close(figure)
 
 
-def as_text(table: dict[str, list], digits: str = ".3g") -> str:
-    """A table in Markdown."""
-    return tabulate(table, headers="keys", tablefmt="github", floatfmt=digits)
+def as_text(table: Table, *names: str) -> str:
+    """A table, or some of its columns, in Markdown."""
+    return tabulate({n: table[n] for n in names or table}, headers="keys", tablefmt="github", floatfmt=".3g", missingval="-")
 
 
-def write(table: dict[str, list], path: Path) -> None:
+def write(table: Table, path: Path) -> None:
     """A table as CSV."""
-    path.write_text("\n".join([",".join(table)] + [",".join(str(v) for v in row) for row in zip(*table.values(), strict=True)]) + "\n")
+    with path.open("w", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(table)
+        writer.writerows(zip(*table.values(), strict=True))
+
+
+def efficient(table: Table) -> Table:
+    """The efficient front of each scene and dimension."""
+    chosen = Table(*table)
+    rows = list(zip(*table.values(), strict=True))
+    for scene, dim in product(SCENES, (2, 3)):
+        here = table.rows(scene, dim)
+        for i in here[front(np.array(table["seconds"])[here], np.array(table["worst"])[here])]:
+            chosen.add(*rows[i])
+    return chosen
 
 
 def bench(out: Path, short: bool, readme: Path | None) -> None:
@@ -284,27 +390,34 @@ def bench(out: Path, short: bool, readme: Path | None) -> None:
     the marks <!-- bench --> and <!-- /bench -->.
     """
     out.mkdir(parents=True, exist_ok=True)
-    tables = {"cases": cases(short), "switches": switches(short), "growth": growth(short), "stress": stress(short),
-              "accuracy": accuracy(short)}
+    tables = {"cases": cases(short), "switches": switches(short), "growth": growth(short), "stress": stress(short)}
+    with threadpool_limits(1):
+        exact, tables["overkill"] = overkill(short)
+        tables["accuracy"] = accuracy(short, exact, tables["cases"]["start"][0])
+        tables["recommended"] = recommended(exact)
+        precise = checks(short)
     for name, table in tables.items():
         write(table, out / f"{name}.csv")
     draw(tables["accuracy"], out / "accuracy.png")
-    columns = {n: np.array(c) for n, c in tables["accuracy"].items()}
-    worst = np.max([columns[f"error_{q}"] for q in QUANTITIES], axis=0)
-    rows = []
-    for scene in SCENES:
-        here = np.flatnonzero((columns["scene"] == scene) & (columns["dim"] == 2))
-        for i in here[front(columns["seconds"][here], worst[here])]:
-            rows.append((scene, columns["pattern"][i], columns["order"][i], columns["n_joint"][i], columns["unknowns"][i],
-                         columns["seconds"][i], 100 * worst[i]))
-    efficient = tabulate(rows, ("scene", "pattern", "order", "n_joint", "unknowns", "seconds", "worst error [%]"), "github", floatfmt=".3g")
+    plain = () if short else ("GetDP", "times faster, GetDP")
+    ends = tables["stress"]
     text = "\n\n".join([
-        "Modelings, cold start, all scenes, published steps (seconds; peer: code_aster 15.2):", as_text(tables["cases"]),
-        "Efficient settings in 2D:", efficient, "What a scene pays for:", as_text(tables["switches"]),
-        "Flow pressed to its limits (aperture_min 1e-9 to 1e-4 m, K_N 1e9 to 1e14 Pa/m, E 1e10 to 3e12 Pa, level to the crest), how the "
-        f"{len(tables['stress']['end'])} combinations end: " + ", ".join(f"{k} {v}" for k, v in Counter(tables["stress"]["end"]).items())
-        + f"; at most {max(tables['stress']['seconds']):.1f} s each.",
-        "Growth:", as_text(tables["growth"]), "; ".join(exponents(tables["growth"])), "; ".join(checks())])
+        "**Modelings**: cold start, all scenes, published steps and meshes; seconds and where they went, peak memory, and seconds of "
+        "the peer (code_aster 15.2, without its mesh)" + ("." if short else "; GetDP: the plain engine."),
+        as_text(tables["cases"], "case", "seconds", *PARTS, "MB", "peer", "times faster", *plain),
+        "**To a given accuracy**: error of each modeling's main scene with its published mesh and steps, error and seconds (cold) "
+        "with `--accuracy`.", as_text(tables["recommended"]),
+        "**The overkill solution** these errors are against:", as_text(tables["overkill"]),
+        "**Efficient settings** (of " + str(len(tables["accuracy"]["scene"])) + " in `accuracy.csv`):",
+        as_text(efficient(tables["accuracy"]), "scene", "dim", "pattern", "order", "n_joint", "grading", "steps", "unknowns", "seconds",
+                *(f"error_{q}" for q in QUANTITIES)),
+        "**What a scene pays for** (seconds):", as_text(tables["switches"]),
+        "**Growth** (uniform refinement, cold):", as_text(tables["growth"]),
+        "; ".join(exponents(tables["growth"])) + f". Beyond: `{beyond_memory()}`",
+        "**Precision at scale**: " + "; ".join(precise) + ".",
+        "**Flow pressed to its limits** (aperture_min 1e-9 to 1e-4 m, K_N 1e9 to 1e14 Pa/m, E 1e10 to 3e12 Pa, level to the crest): "
+        f"the {len(ends['end'])} combinations end with " + ", ".join(f"{k} {v}" for k, v in Counter(ends["end"]).items())
+        + f"; at most {max(ends['seconds']):.1f} s each."])
     print(text)
     if readme:
         page = readme.read_text()

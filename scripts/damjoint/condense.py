@@ -19,6 +19,7 @@ import hashlib
 import os
 import pickle
 import re
+import time
 from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
@@ -188,6 +189,8 @@ class Condensed:
     crest_weight_dam: float
     crest_weight_foundation: float
     crest_pressure: dict[str, np.ndarray]
+    #: wall seconds of mesh, assembly and condensation
+    seconds: dict[str, float]
 
     @cached_property
     def interface(self) -> Interface:
@@ -216,9 +219,11 @@ def with_weight(stiffness: sparse.csr_matrix, space: fem.Space, dim: int, held: 
 
 def condense(case: Case, mesh: Mesh, downstream: bool) -> Condensed:
     """Eliminate the bulk of a case; downstream: prepare for water on the downstream face, too."""
+    start = time.perf_counter()
     bodies = Bodies.of(case, mesh)
     dim = bodies.dim
     stiff_dam, stiff_foundation = bodies.stiffness(case)
+    assembled = time.perf_counter()
 
     joint = unknowns(bodies.joint_dam, dim)
     free_mask = ~np.isin(joint, bodies.held_dam)
@@ -279,7 +284,8 @@ def condense(case: Case, mesh: Mesh, downstream: bool) -> Condensed:
         mesh.bodies["joint"], {name: mesh.bodies[name] for name in push}, free, stiffness,
         transmitted(force_weight), transmitted(np.zeros(nj), force_weight_foundation), pressure,
         crest_lip - dam @ crest_both, float(crest_row @ weight_l + crest_both @ force_weight),
-        float(crest_both @ force_weight_foundation), crest_pressure)
+        float(crest_both @ force_weight_foundation), crest_pressure,
+        {"mesh": mesh.seconds, "assembly": assembled - start, "condensation": time.perf_counter() - assembled})
 
 
 def cache_folder() -> Path | None:

@@ -24,6 +24,8 @@ TOLERANCE = 1e-9
 #: the law's secant stiffness takes the place of the tangent.
 ATTEMPTS = ((3.0, False), (1e9, False), (3.0, True), (1.0, False))
 MAX_ITERATIONS = 30
+#: Before giving up, the secant once more for as long as a burst of breaking points may last.
+BURST_ITERATIONS = 300
 MAX_HALVINGS = 10
 CUT = 0.25
 SMALLEST_STEP = 1 / 1024  # in t
@@ -179,8 +181,10 @@ class Filling:
                 found = next(filter(None, (self.solve(time, *attempt) for attempt in ATTEMPTS)), None)
                 if found is None:
                     dt, cuts = CUT * (time - self.state.time), cuts + 1
-                    stopped = dt < SMALLEST_STEP
-                else:
+                    if dt < SMALLEST_STEP:
+                        time, found = target, self.solve(target, 3.0, True, BURST_ITERATIONS)
+                        stopped = found is None
+                if found:
                     dt = 2 * (time - self.state.time)
                     self.accept(time, cuts, *found)
                     cuts = 0
@@ -206,7 +210,7 @@ class Filling:
         target = self.displacement + case["drive_by"] * (time - begin) / (end - begin)
         return level, tail, begin + 1e-9 < time < end + 1e-9, target
 
-    def solve(self, time: float, growth: float, secant: bool) -> tuple | None:
+    def solve(self, time: float, growth: float, secant: bool, most: int = MAX_ITERATIONS) -> tuple | None:
         """Newton from the last state: (jump, level, tail, iterations, residual), or None."""
         joint, memory = self.joint, self.state.memory
         level, tail, prescribed, target = self.water_at(time)
@@ -229,7 +233,7 @@ class Filling:
         iterations = 0
         while not size <= limit:
             fallen = np.abs(jump).max() > 0.1 * self.case["dam_height"]
-            if iterations == MAX_ITERATIONS or not np.isfinite(size) or fallen:
+            if iterations == most or not np.isfinite(size) or fallen:
                 return None
             change, slope = derivatives()
             edge = border and (slope, *border[:2], -border[2])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+import time
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -52,6 +53,7 @@ class Mesh:
     """
 
     def __init__(self, case: Case) -> None:
+        start = time.perf_counter()
         start_gmsh()
         gmsh.clear()
         gmsh.parser.clear()
@@ -75,6 +77,8 @@ class Mesh:
         joint = self.bodies["joint"].element_tags
         if joint.max() >= 1_000_000:  # the keys of the joint's memory in GetDP hold six digits
             raise RunError(f"mesh: joint element tag {joint.max()}: must be below 1000000; use a coarser mesh")
+        #: wall seconds it took
+        self.seconds = time.perf_counter() - start
 
     def _body(self, dimension: int, group: int) -> Body:
         blocks, numbers = {}, {}

@@ -178,6 +178,12 @@ def write(results: Results, folder: Path) -> None:
         write_csv(folder / "curve.csv", {
             "time": history["time"], "level": history["level"], "pressure": case["rho_water"] * case["g"] * history["level"],
             "heel_opening": results.heel, "crest_ux": history["crest_ux"]})
+    write_info(results, folder)
+
+
+def write_info(results: Results, folder: Path) -> None:
+    """Write run.json into a folder: parameters, sizes, versions, seconds, memory."""
+    case = results.case
     (folder / "run.json").write_text(json.dumps(
         {"case": case.name, "title": case.title, "parameters": case.values, "levels": case.levels, "tail_levels": case.tail_levels,
          "times": case.times, "stopped": results.stopped, **results.info}, indent=2) + "\n")

@@ -91,8 +91,15 @@ def describe(result: results.Results, engine: str, counts: dict, unknowns: int |
                    "versions": versions | ({"getdp": getdp_version} if getdp_version else {})}
 
 
+def save(result: results.Results, folder: Path) -> None:
+    """Write the tables of a scene, and take the time."""
+    start = time.perf_counter()
+    results.write(result, folder)
+    result.info["wall_seconds"]["post"] = time.perf_counter() - start
+
+
 def finish(result: results.Results, mesh: Mesh | None, found: Callable, folder: Path, fields: bool, picture: bool) -> None:
-    """Write fields and picture of a scene, and its tables again with the time that took."""
+    """Write fields and picture of a scene, and the time that all writing took."""
     start = time.perf_counter()
     if fields or picture:
         at = found()
@@ -102,8 +109,8 @@ def finish(result: results.Results, mesh: Mesh | None, found: Callable, folder: 
         if picture:
             from .picture import draw
             draw(result, mesh, at, folder)
-    result.info["wall_seconds"]["post"] = time.perf_counter() - start
-    results.write(result, folder)
+    result.info["wall_seconds"]["post"] += time.perf_counter() - start
+    results.write_info(result, folder)
 
 
 def run_condensed(case: Case, out: Path, fields: bool, picture: bool, progress: bool) -> list[results.Results]:
@@ -113,7 +120,7 @@ def run_condensed(case: Case, out: Path, fields: bool, picture: bool, progress: 
 
     start = time.perf_counter()
     bulk, mesh, hit = cached(case)
-    condensed = time.perf_counter()
+    before = {"cache": time.perf_counter() - start} if hit else bulk.seconds
     scenes = case.scenes()
     bar = Progress(case, scenes, progress)
     found = []
@@ -125,9 +132,8 @@ def run_condensed(case: Case, out: Path, fields: bool, picture: bool, progress: 
         except BaseException:
             results.write(filling.results(False), scene_folder(case, scene, out))
             raise
-        seconds = {"condense": condensed - start, "from_cache": hit, "solve": time.perf_counter() - begin}
-        describe(result, "condensed", bulk.counts, bulk.unknowns, seconds)
-        results.write(result, scene_folder(case, scene, out))
+        describe(result, "condensed", bulk.counts, bulk.unknowns, before | {"solve": time.perf_counter() - begin})
+        save(result, scene_folder(case, scene, out))
         found.append((result, filling.joint))
     bar.bar.close()
     if (fields or picture) and mesh is None:
@@ -136,8 +142,7 @@ def run_condensed(case: Case, out: Path, fields: bool, picture: bool, progress: 
         def recovered(result: results.Results = result, joint: object = joint) -> dict:
             from .fields import recover
             return recover(result, mesh, joint)
-        if fields or picture:
-            finish(result, mesh, recovered, scene_folder(case, result.case, out), fields, picture)
+        finish(result, mesh, recovered, scene_folder(case, result.case, out), fields, picture)
     return [result for result, _ in found]
 
 
@@ -167,7 +172,7 @@ def run_getdp(case: Case, out: Path, fields: bool, picture: bool, progress: bool
         engine = {} if future.exception() else future.result()
         seconds = {"mesh": meshed - start, "solve": engine.get("wall")}
         describe(result, "getdp", mesh.counts, engine.get("unknowns"), seconds, engine.get("version", ""), engine.get("memory", 0.0))
-        results.write(result, folder)
+        save(result, folder)
         found.append(result)
     if failure:
         raise failure

@@ -95,9 +95,9 @@ def test_condensed_bodies_from_the_cache(tmp_path, monkeypatch):
     monkeypatch.setenv("DAMJOINT_CACHE", str(tmp_path / "cache"))
     one, again, other = (run.run(parameters.load("c", settings), tmp_path / "out", False, False, False)[0]
                          for settings in ({}, {}, {"mu": 0.4, "rho_dam": 2300}))
-    assert [r.info["wall_seconds"]["from_cache"] for r in (one, again, other)] == [False, True, True]
+    assert ["cache" in r.info["wall_seconds"] for r in (one, again, other)] == [False, True, True]
     assert max(differences(one, again)) == 0
     monkeypatch.setenv("DAMJOINT_CACHE", "")
     fresh, = run.run(parameters.load("c", {"mu": 0.4, "rho_dam": 2300}), tmp_path / "out", False, False, False)
-    assert not fresh.info["wall_seconds"]["from_cache"]
+    assert "cache" not in fresh.info["wall_seconds"]
     assert max(differences(fresh, other)) < 1e-9

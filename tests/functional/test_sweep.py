@@ -4,6 +4,8 @@ import csv
 
 import pytest
 from closed_forms import slide_level
+from damjoint import sweep
+from distributed import LocalCluster
 
 
 def rows(path):
@@ -47,3 +49,16 @@ def test_no_level_without_equilibrium(command, tmp_path):
     command("sweep", "a", "--set", "sigma_max=0", "--vary", "level=8:9:0.02", "--jobs", "1", "--out", "sweep.csv")
     openings = [float(row["max_opening"]) for row in rows(tmp_path / "sweep.csv") if not row["stopped"]]
     assert len(openings) == 51 and openings == sorted(openings)
+
+
+def test_a_scheduler_with_two_workers(tmp_path):
+    """The same rows as in this process, from a dask cluster of two processes."""
+    vary = ["mu=0.35,0.4", "level=8,9"]
+    with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
+        assert sweep.sweep("c", vary, {}, tmp_path / "far.csv", scheduler=cluster.scheduler_address) == 4
+    assert sweep.sweep("c", vary, {}, tmp_path / "near.csv", jobs=1) == 4
+    by_key = lambda name: {row["key"]: row for row in rows(tmp_path / name)}  # noqa: E731
+    far, near = by_key("far.csv"), by_key("near.csv")
+    assert far.keys() == near.keys()
+    for key, row in near.items():
+        assert {k: v for k, v in far[key].items() if k != "residual"} == {k: v for k, v in row.items() if k != "residual"}
