@@ -1,11 +1,13 @@
 // dam3d.geo - the plane scene of dam2d.geo extruded along z over the thickness.
-// mesh_pattern free: tetrahedra; layers: prisms; regular: hexahedra (and a few prisms). The joint itself is
-// always a grid of n_joint x n_layers rectangles, halved where the volume is not made of hexahedra.
+// mesh_pattern free: tetrahedra; layers: prisms; split: layers cut into tetrahedra; regular: hexahedra (and a few
+// prisms). The joint itself is always a grid of n_joint x n_layers rectangles, halved under tetrahedra.
 
 Include "dam2d.geo";
 
 If(!StrCmp(mesh_pattern, "free"))
   Extrude {0, 0, thickness} { Surface{dam(), foundation()}; }
+ElseIf(!StrCmp(mesh_pattern, "split"))
+  Extrude {0, 0, thickness} { Surface{dam(), foundation()}; Layers{n_layers}; }
 Else
   Extrude {0, 0, thickness} { Surface{dam(), foundation()}; Layers{n_layers}; Recombine; }
 EndIf

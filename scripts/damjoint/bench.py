@@ -137,7 +137,7 @@ def errors(found: np.ndarray, exact: np.ndarray) -> np.ndarray:
 def settings(order: int, n: int, grading: float, pattern: str, dim: int, height: float = 10.0) -> dict:
     """Mesh parameters of one point of the error-against-time benchmark; grading 1 as --accuracy, smaller finer far away."""
     sizes = {"h_dam": grading * 1.25 * height / n**0.5, "h_found": grading * 2.5 * height / n**0.5}
-    solid = {"dim": 3.0, "thickness": 5.0 / n if pattern != "free" else 0.2, "n_layers": 1.0, "hold_z": 1.0} if dim == 3 else {"dim": 2.0}
+    solid = {"dim": 3.0, "thickness": 0.2 if pattern == "free" else 1.0, "n_layers": 1.0, "hold_z": 1.0} if dim == 3 else {"dim": 2.0}
     return {"order": float(order), "n_joint": float(n), "mesh_pattern": pattern, **sizes, **solid}
 
 
@@ -150,7 +150,7 @@ def overkill(short: bool) -> tuple[dict[str, np.ndarray], Table]:
     """
     sizes = (20, 40, 80) if short else (160, 320, 640)
     exact, table = {}, Table("scene", "quantity", *(f"n = {n}" for n in sizes), "observed order", "remaining error [%]")
-    for name in bar(PEER, "overkill"):
+    for name in bar(SCENES.values() if short else PEER, "overkill"):
         wanted = sizes if name in SCENES.values() else sizes[-1:]
         found = [read_off(measure(parameters.load(name, settings(2, n, 0.5, "free", 2) | {"uplift": main_uplift(name)}))[0]) for n in wanted]
         exact[name] = found[-1]
@@ -177,8 +177,8 @@ def accuracy(short: bool, exact: dict[str, np.ndarray], start: float) -> Table:
     gradings = (1.0,) if short else (2.0, 1.0, 0.5)
     runs = [(2, "free", order, n, grading, None) for order in (1, 2) for n in numbers for grading in gradings]
     runs += [(2, "regular", order, n, 1.0, None) for order in (1, 2) for n in numbers]
-    runs += [(3, "layers", order, n, 1.0, None) for order in (1, 2) for n in numbers if n <= 160]
-    runs += [(3, "free", order, n, 1.0, None) for order in (1, 2) for n in numbers if n <= 40]
+    runs += [(3, pattern, order, n, 1.0, None) for pattern, most in (("layers", 80), ("split", 160), ("free", 40))
+             for order in (1, 2) for n in numbers if n <= most]
     runs += [(2, "free", 2, numbers[-2], 1.0, steps) for steps in (1, 2, 4)]
     for scene, name in SCENES.items():
         for dim, pattern, order, n, grading, steps in bar(runs, scene):
@@ -191,21 +191,21 @@ def accuracy(short: bool, exact: dict[str, np.ndarray], start: float) -> Table:
     return table
 
 
-def recommended(exact: dict[str, np.ndarray]) -> Table:
+def recommended(short: bool, exact: dict[str, np.ndarray]) -> Table:
     """Each modeling's main scene: worst error of the published mesh and steps, and error and seconds of --accuracy."""
+    levels = list(parameters.ACCURACIES)[: 1 if short else None]
     table = Table("case", "published: error [%]", "peer",
-                  *(f"{accuracy}: {what}" for accuracy in parameters.ACCURACIES for what in ("error [%]", "seconds", "of these start")))
-    for name in bar(PEER, "accuracy"):
+                  *(f"{level}: {what}" for level in levels for what in ("error [%]", "seconds", "of these start")))
+    for name in bar(list(exact), "accuracy"):
         main = {"uplift": main_uplift(name)}
         row = [100 * worst(read_off(measure(parameters.load(name, main))[0]), exact[name]), PEER[name]]
-        for level in parameters.ACCURACIES:
+        for level in levels:
             case = parameters.load(name, main, accuracy=level)
             result, _ = measure(case)
             wall, told = cold([name, "--accuracy", level, "--set", f"uplift={main['uplift']}"])
             row += [100 * worst(read_off(result), exact[name]), wall, wall - sum(told["wall_seconds"].values())]
         table.add(name, *row)
-    total = {n: sum(c) for n, c in table.items() if n != "case"}
-    table.add("sum", *(float("nan") if "error" in n else total[n] for n in total))
+    table.add("sum, worst", *(max(c) if "error" in n else sum(c) for n, c in table.items() if n != "case"))
     return table
 
 
@@ -339,7 +339,8 @@ def draw(table: Table, path: Path) -> None:
     columns = {n: np.array(c, object) for n, c in table.items()}
     error, seconds = 100 * columns["worst"].astype(float), columns["seconds"].astype(float)
     figure, panels = plt.subplots(2, len(SCENES), figsize=(13, 8), sharex=True, sharey=True, layout="constrained")
-    styles = {(2, "free"): ("o", "triangles"), (2, "regular"): ("s", "regular"), (3, "layers"): ("^", "layers"), (3, "free"): ("v", "tetrahedra")}
+    styles = {(2, "free"): ("o", "triangles"), (2, "regular"): ("s", "regular"), (3, "layers"): ("^", "layers"),
+              (3, "split"): ("D", "split layers"), (3, "free"): ("v", "tetrahedra")}
     for row, dim in zip(panels, (2, 3), strict=True):
         for axes, scene in zip(row, SCENES, strict=True):
             here = (columns["scene"] == scene) & (columns["dim"] == dim)
@@ -361,9 +362,9 @@ def draw(table: Table, path: Path) -> None:
     plt.close(figure)
 
 
-def as_text(table: Table, *names: str) -> str:
+def as_text(table: Table, *names: str, digits: str = ".3g") -> str:
     """A table, or some of its columns, in Markdown."""
-    return tabulate({n: table[n] for n in names or table}, headers="keys", tablefmt="github", floatfmt=".3g", missingval="-")
+    return tabulate({n: table[n] for n in names or table}, headers="keys", tablefmt="github", floatfmt=digits, missingval="-")
 
 
 def write(table: Table, path: Path) -> None:
@@ -394,7 +395,7 @@ def bench(out: Path, short: bool, readme: Path | None) -> None:
     with threadpool_limits(1):
         exact, tables["overkill"] = overkill(short)
         tables["accuracy"] = accuracy(short, exact, tables["cases"]["start"][0])
-        tables["recommended"] = recommended(exact)
+        tables["recommended"] = recommended(short, exact)
         precise = checks(short)
     for name, table in tables.items():
         write(table, out / f"{name}.csv")
@@ -407,7 +408,7 @@ def bench(out: Path, short: bool, readme: Path | None) -> None:
         as_text(tables["cases"], "case", "seconds", *PARTS, "MB", "peer", "times faster", *plain),
         "**To a given accuracy**: error of each modeling's main scene with its published mesh and steps, error and seconds (cold) "
         "with `--accuracy`.", as_text(tables["recommended"]),
-        "**The overkill solution** these errors are against:", as_text(tables["overkill"]),
+        "**The overkill solution** these errors are against:", as_text(tables["overkill"], digits=".5g"),
         "**Efficient settings** (of " + str(len(tables["accuracy"]["scene"])) + " in `accuracy.csv`):",
         as_text(efficient(tables["accuracy"]), "scene", "dim", "pattern", "order", "n_joint", "grading", "steps", "unknowns", "seconds",
                 *(f"error_{q}" for q in QUANTITIES)),

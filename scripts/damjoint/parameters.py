@@ -211,20 +211,23 @@ def case_file(case: str) -> Path:
     raise InputError(f"case {case}: unknown; allowed: {names}, or the path of a .case file")
 
 
-#: Elements along the joint for an accuracy, of order 2: see `damjoint bench`.
-ACCURACIES = {"coarse": 25, "standard": 50, "fine": 200}
+#: For an accuracy: elements along the joint, and layers in 3D where something varies along z; see `damjoint bench`.
+ACCURACIES = {"coarse": (40, 1), "standard": (100, 2), "fine": (200, 4)}
 
 
-def mesh_for(accuracy: str, height: float, three_d: bool) -> dict[str, float | str]:
+def mesh_for(accuracy: str, case: Case) -> dict[str, float | str]:
     """Mesh and order for an accuracy of about 3 % (coarse), 1 % (standard) or 0.2 % (fine); measured by bench.
 
-    Order 2; in 3D one layer of prisms, since nothing varies along z. Raises InputError.
+    Order 2, triangles, in 3D extruded and cut into tetrahedra: these contain the plane fields exactly, however thick
+    they are. Raises InputError.
     """
     if accuracy not in ACCURACIES:
         raise InputError(f"accuracy = {accuracy}: must be one of {', '.join(ACCURACIES)}")
-    n = ACCURACIES[accuracy]
-    return {"order": 2.0, "mesh_pattern": "layers" if three_d else "free", "n_layers": 1.0, "n_joint": float(n),
-            "h_dam": 1.25 * height / n**0.5, "h_found": 2.5 * height / n**0.5}
+    (n, layers), solid = ACCURACIES[accuracy], case["dim"] == 3
+    plane = case["hold_z"] or max(case["nu_dam"], case["nu_found"]) == 0
+    size = case["dam_height"] / n**0.5
+    return {"order": 2.0, "mesh_pattern": "split" if solid else "free", "n_layers": 1.0 if plane else float(layers),
+            "n_joint": float(n), "h_dam": 1.25 * size, "h_found": 2.5 * size}
 
 
 def load(case: str, overrides: Mapping[str, float | str] | None = None, levels: str | None = None,
@@ -239,7 +242,7 @@ def load(case: str, overrides: Mapping[str, float | str] | None = None, levels: 
     path = case_file(case)
     if accuracy is not None:
         plain = load(case, overrides)
-        overrides = mesh_for(accuracy, plain["dam_height"], plain["dim"] == 3) | overrides
+        overrides = mesh_for(accuracy, plain) | overrides
         steps = steps or (1 if plain["drive"] == "level" else None)
     text = path.read_text()
     known = declared()

@@ -30,12 +30,21 @@ def test_3d_repeats_2d(solve, name, flat, solid):
     assert_allclose(three.history["crest_ux"], two.history["crest_ux"], rtol=5e-3)
 
 
-@pytest.mark.parametrize("order", [1, 2])
-def test_nothing_varies_along_z(solve, order):
-    """nu = 0: a plane scene in 3D stays plane; with order 2 nearly so, since the products N_a N_b of prisms do not
-    contain the plane quadratic field (lambda_a lambda_b (1 + w^2)/2 is not constant in w)."""
-    bound = {1: 1e-9, 2: 5e-3}[order]
-    result, = solve("a", "3", uplift="none", dim=3, order=order, mesh_pattern="layers", thickness=0.2, n_joint=10, h_dam=2, h_found=3)
+def test_split_layers_contain_the_plane_solution(solve):
+    """Order 2, one layer as thick as the joint is long: as accurate as the plane scene, and near to it."""
+    size = {"n_joint": 20, "h_dam": 2, "h_found": 3, "order": 2, "uplift": "imposed", "nu": 0.25}
+    two, = solve("a", "6,9", **size)
+    three, = solve("a", "6,9", **size, dim=3, mesh_pattern="split", thickness=5, hold_z=1)
+    assert max(differences(two, three)) < 6e-3
+    assert_allclose(three.history["crest_ux"], two.history["crest_ux"], rtol=2e-3)
+
+
+@pytest.mark.parametrize("order, pattern, bound", [(1, "layers", 1e-9), (2, "layers", 5e-3), (2, "split", 5e-3)])
+def test_nothing_varies_along_z(solve, order, pattern, bound):
+    """nu = 0: a plane scene in 3D stays plane. Nearly so with order 2: the products N_a N_b of prisms do not contain the
+    plane quadratic field (lambda_a lambda_b (1 + w^2)/2 is not constant in w); split layers contain more than plane fields.
+    """
+    result, = solve("a", "3", uplift="none", dim=3, order=order, mesh_pattern=pattern, thickness=0.2, n_joint=10, h_dam=2, h_found=3)
     rows = result.at()
     for x in np.unique(rows["x"].round(6)):
         across = rows["delta_n"][np.isclose(rows["x"], x)]

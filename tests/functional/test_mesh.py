@@ -16,7 +16,7 @@ def test_element_counts(name, tmp_path):
 
 
 @pytest.mark.parametrize("settings", [{}, {"mesh_pattern": "regular"}, {"dim": 3, "mesh_pattern": "regular", "n_layers": 2},
-                                      {"dim": 3, "mesh_pattern": "layers"}, {"dim": 3, "h_dam": 3, "h_found": 3}])
+                                      {"dim": 3, "mesh_pattern": "layers"}, {"dim": 3, "mesh_pattern": "split"}, {"dim": 3, "h_dam": 3, "h_found": 3}])
 def test_area_of_dam_and_foundation(tmp_path, settings):
     """32.5 and 15 x 5 m2 (times the thickness), by the sum over the elements."""
     import gmsh

@@ -25,7 +25,7 @@ def refuse(command, tmp_path, words, parts):
     ("alpha=2.1", "<= 2"), ("sigma_max=-1", ">= 0"), ("pena_rupture=0", "> 0"), ("pena_contact=0", "> 0"),
     ("mu=-0.35", "> 0"), ("adhesion=-1", ">= 0"), ("pena_tang=-1", ">= 0"), ("visc=0", "> 0"), ("aperture_min=0", "> 0"),
     ("dim=4", "2, 3"), ("order=3", "1, 2"), ("n_joint=2.5", "integer"), ("n_joint=0", ">= 1"), ("law=glue", "rupture, friction"),
-    ("uplift=some", "none, imposed, flow"), ("mesh_pattern=odd", "free, regular, layers"), ("thickness=-1", "> 0")])
+    ("uplift=some", "none, imposed, flow"), ("mesh_pattern=odd", "free, regular, layers, split"), ("thickness=-1", "> 0")])
 def test_parameter_out_of_range(command, tmp_path, setting, allowed):
     name, value = setting.split("=")
     refuse(command, tmp_path, (*RUN, "--set", setting), (f"{name} = {value}", allowed))
