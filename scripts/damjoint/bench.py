@@ -29,7 +29,7 @@ from .parameters import Case
 from .results import Results
 from .results import write as write_results
 from .run import run
-from .sweep import bulk_of
+from .sweep import bulk_of, filled
 
 #: code_aster 15.2, sequential, on a 2-core machine: seconds of wall time of the whole job without meshing.
 PEER = {"a": 3.9, "b": 44.1, "c": 2.0, "d": 19.1, "e": 25.4, "f": 168, "g": 5.1, "h": 27.6, "i": 4.6, "j": 3.7, "k": 5.2}
@@ -225,7 +225,7 @@ def growth(short: bool) -> Table:
     """Seconds and memory against the number of unknowns, each size in a process of its own."""
     table = Table("dim", "order", "n_joint", "unknowns", "seconds", "MB")
     sizes = [(2, n) for n in ((50, 100) if short else (50, 100, 200, 400))]
-    sizes += [(3, n) for n in ((20,) if short else (20, 40, 60, 80))]
+    sizes += [(3, n) for n in ((20,) if short else (20, 40, 60, 90))]
     for dim, n in bar(sizes, "growth"):
         chosen = {"dim": dim, "order": 2 if dim == 2 else 1, "n_joint": n, "mesh_pattern": "free", "uplift": "imposed"}
         # uniform refinement: every size goes with the joint's
@@ -291,6 +291,33 @@ def switches(short: bool) -> Table:
                 ("the picture", written(False, True), written(False, False))], "switches"):
             seconds = best(with_it), best(without)
             table.add(option, *seconds, seconds[0] / seconds[1])
+    return table
+
+
+def sweeps(short: bool) -> Table:
+    """What a sweep pays for one row more on a mesh that is condensed: a level between the last two (one step per level,
+    as sweeps of levels take), and with published steps a joint that is weaker (sigma_max or mu), one that is stiffer
+    (K_N, K_T); main scenes, published meshes, one thread.
+    """
+    table = Table("case", "dim", "first run", "another level", "steps", "another strength", "another stiffness")
+    for name in bar("ac" if short else PEER, "sweeps"):
+        main = {"uplift": main_uplift(name)}
+        case = parameters.load(name, main)
+        if case["drive"] != "level":
+            continue
+        weaker = {"sigma_max": 0.9 * case["sigma_max"]} if case["law"] == "rupture" else {"mu": 0.9 * case["mu"]}
+        stiffer = {"K_N": 1.1 * case["K_N"], "K_T": 1.1 * case["K_T"]}
+        ends = [",".join(map(str, (*case.levels[:-1], top))) for top in (case.levels[-1], (case.levels[-2] + case.levels[-1]) / 2)]
+        first, above = (parameters.load(name, main, levels) for levels in ends)
+        with threadpool_limits(1):
+            bulk, known, spent = condense(case, Mesh(case), False), {}, []
+            runs = [lambda: filled(first, known, bulk), lambda: filled(above, known, bulk)]  # noqa: B023
+            runs += [lambda settings=s: Filling(parameters.load(name, main | settings), bulk).run() for s in (weaker, stiffer)]  # noqa: B023
+            for run_it in runs:
+                start = time.perf_counter()
+                run_it()
+                spent.append(time.perf_counter() - start)
+        table.add(name, int(case["dim"]), *spent[:2], len(case.times), *spent[2:])
     return table
 
 
@@ -391,7 +418,7 @@ def bench(out: Path, short: bool, readme: Path | None) -> None:
     the marks <!-- bench --> and <!-- /bench -->.
     """
     out.mkdir(parents=True, exist_ok=True)
-    tables = {"cases": cases(short), "switches": switches(short), "growth": growth(short), "stress": stress(short)}
+    tables = {"cases": cases(short), "switches": switches(short), "sweeps": sweeps(short), "growth": growth(short), "stress": stress(short)}
     with threadpool_limits(1):
         exact, tables["overkill"] = overkill(short)
         tables["accuracy"] = accuracy(short, exact, tables["cases"]["start"][0])
@@ -413,6 +440,7 @@ def bench(out: Path, short: bool, readme: Path | None) -> None:
         as_text(efficient(tables["accuracy"]), "scene", "dim", "pattern", "order", "n_joint", "grading", "steps", "unknowns", "seconds",
                 *(f"error_{q}" for q in QUANTITIES)),
         "**What a scene pays for** (seconds):", as_text(tables["switches"]),
+        "**One row more in a sweep** (seconds, main scene):", as_text(tables["sweeps"]),
         "**Growth** (uniform refinement, cold):", as_text(tables["growth"]),
         "; ".join(exponents(tables["growth"])) + f". Beyond: `{beyond_memory()}`",
         "**Precision at scale**: " + "; ".join(precise) + ".",

@@ -179,9 +179,25 @@ def scaled(matrix: sparse.csr_matrix, weights: np.ndarray) -> sparse.csr_matrix:
 
 
 def lu_solve(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Dense LU, the matrix overwritten. Raises LinAlgError if it is singular."""
+    """Solution by LU, the matrix overwritten or not. Raises LinAlgError if it is singular.
+
+    A large matrix is factorised in single precision, twice as fast, and the solution refined; in double precision
+    where that does not converge.
+    """
     if not len(right):
         return right
+    if len(right) > 300:
+        factors, pivots, info = linalg.lapack.sgetrf(matrix.T.astype(np.float32), overwrite_a=True)
+        found, left, size = np.zeros_like(right), right, np.linalg.norm(right)
+        for _ in range(0 if info else 8):
+            correction = linalg.lapack.sgetrs(factors, pivots, left / size, trans=1)[0]
+            found = found + size * correction
+            left, before = right - matrix @ found, size
+            size = np.linalg.norm(left)
+            if size <= 1e-12 * np.linalg.norm(right):
+                return found
+            if not size < 0.1 * before:
+                break
     factors, pivots, info = linalg.lapack.dgetrf(matrix.T, overwrite_a=True)
     if info:
         raise linalg.LinAlgError("singular matrix")

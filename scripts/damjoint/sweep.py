@@ -87,12 +87,12 @@ def bulk_of(case: Case) -> Condensed:
     return _LAST[key]
 
 
-def filled(case: Case, known: dict[tuple, Filling]) -> Filling:
+def filled(case: Case, known: dict[tuple, Filling], bulk: Condensed) -> Filling:
     """The filling of a case, gone on with from its last level but one if that is known; known: by levels and times."""
     key = case.levels, case.tail_levels, case.times
     if key not in known:
         before = case.before_last_level()
-        filling = filled(before, known).fork(case) if before else Filling(case, bulk_of(case))
+        filling = filled(before, known, bulk).fork(case) if before else Filling(case, bulk)
         filling.run()
         known[key] = filling
     return known[key]
@@ -104,7 +104,7 @@ def last_rows(cases: list[Case]) -> list[dict[str, float | str]]:
     with threadpool_limits(1):
         for case in cases:
             try:
-                filling = filled(case, known)
+                filling = filled(case, known, bulk_of(case))
             except RunError as error:
                 found.append({**dict.fromkeys(HISTORY, ""), "stopped": str(error)})
                 continue
