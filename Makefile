@@ -19,7 +19,7 @@ test: setup
 test-all: setup
 	$(BIN)/pytest -q
 
-# Half an hour; refreshes the tables and the picture that README.md shows
+# Twenty minutes; refreshes the tables and the picture that README.md shows
 bench: setup
 	$(BIN)/damjoint bench --readme README.md
 	cp out/bench/accuracy.png reference/pictures/

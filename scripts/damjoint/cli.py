@@ -60,7 +60,7 @@ def parser() -> argparse.ArgumentParser:
     vary.set_defaults(call=do_sweep)
 
     speed = commands.add_parser("bench", help="time, error, growth and costs, against the peer")
-    speed.add_argument("--short", action="store_true", help="a minute instead of half an hour")
+    speed.add_argument("--short", action="store_true", help="a minute instead of twenty")
     speed.add_argument("--out", type=Path, default=Path("out/bench"), help="folder of tables and picture (default out/bench)")
     speed.add_argument("--readme", type=Path, help="a page whose benchmark part is to be refreshed")
     speed.set_defaults(call=do_bench)

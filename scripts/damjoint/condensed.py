@@ -230,8 +230,11 @@ class Filling:
             return np.hypot(np.linalg.norm(value), stiff * gap), value, derivatives, (row, rate, gap)
 
         size, value, derivatives, border = evaluate(jump, level)
-        iterations = 0
+        iterations, sizes = 0, []
         while not size <= limit:
+            if any(abs(size - other) <= 1e-10 * size for other in sizes):
+                return None  # Newton goes round in circles
+            sizes.append(size)
             fallen = np.abs(jump).max() > 0.1 * self.case["dam_height"]
             if iterations == most or not np.isfinite(size) or fallen:
                 return None

@@ -174,17 +174,19 @@ def elasticity(space: Space, dim: int, young: float, poisson: float) -> sparse.c
         _, gradients, nodal_gradients, weights = tabulated(shape, space.order, BULK[space.order][shape])
         cells = table[:, : nodal_gradients.shape[1]]
         n = table.shape[1]
-        block = np.zeros((len(table), n, dim, n, dim))
-        for dg, dn, w in zip(gradients, nodal_gradients, weights, strict=True):
+        products = np.einsum("q,qak,qbl->qabkl", weights, gradients, gradients).reshape(len(weights), n * n, dim * dim)
+        if shape in ("triangle", "tetra"):  # straight: one Jacobian serves all points
+            products, nodal_gradients = products.sum(axis=0, keepdims=True), nodal_gradients[:1]
+        block = np.zeros((n * n, len(table) * dim * dim))
+        for product, dn in zip(products, nodal_gradients, strict=True):
             measure, inverse = geometry(points, cells, dn)
-            g = dg @ inverse  # (e, n, dim)
-            scaled = g * (w * measure)[:, None, None]
-            outer = np.einsum("eai,ebj->eaibj", scaled, g)
-            # lambda div div + mu (grad : grad + grad : grad^T)
-            block += lam * outer + mu * outer.transpose(0, 1, 4, 3, 2)
-            laplace = np.einsum("eaibi->eab", outer)
-            for i in range(dim):
-                block[:, :, i, :, i] += mu * laplace
+            inverse = np.moveaxis(inverse, 1, 0)
+            # lambda div div + mu (grad : grad + grad : grad^T), from reference (k, l) to real gradients (i, j): k, l, e, i, j
+            outer = (measure[:, None] * inverse)[:, None, :, :, None] * inverse[None, :, :, None, :]
+            laplace = np.einsum("kleii->kle", outer)
+            hooke = lam * outer + mu * outer.swapaxes(3, 4) + mu * laplace[..., None, None] * np.eye(dim)
+            block += product @ hooke.reshape(dim * dim, -1)
+        block = block.reshape(n, n, len(table), dim, dim).transpose(2, 0, 3, 1, 4)
         unknowns = (dim * table[:, :, None] + np.arange(dim)).reshape(len(table), -1)
         rows.append(np.repeat(unknowns, n * dim, axis=1).ravel())
         columns.append(np.tile(unknowns, (1, n * dim)).ravel())

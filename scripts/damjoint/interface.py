@@ -184,8 +184,8 @@ def lu_solve(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
     A large matrix is factorised in single precision, twice as fast, and the solution refined; in double precision
     where that does not converge.
     """
-    if not len(right):
-        return right
+    if not right.any():
+        return np.zeros_like(right)
     if len(right) > 300:
         factors, pivots, info = linalg.lapack.sgetrf(matrix.T.astype(np.float32), overwrite_a=True)
         found, left, size = np.zeros_like(right), right, np.linalg.norm(right)

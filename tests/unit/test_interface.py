@@ -1,0 +1,83 @@
+"""The joint's linear systems: the changed points' system is the whole one; flow's derivatives are derivatives."""
+
+import numpy as np
+import pytest
+from damjoint import parameters
+from damjoint.condense import condense
+from damjoint.interface import lu_solve
+from damjoint.mesh import Mesh
+from numpy.testing import assert_allclose
+
+SMALL = {"n_joint": 10.0, "h_dam": 3.0, "h_found": 4.0, "order": 2.0}
+VIRGIN = np.diag([1e12, 2e12, 2e12])
+
+
+@pytest.fixture(scope="module", params=[2, 3])
+def interface(request):
+    solid = {"dim": 3.0, "thickness": 0.5, "n_layers": 1.0, "hold_z": 1.0} if request.param == 3 else {"dim": 2.0}
+    case = parameters.load("e", SMALL | solid)
+    return condense(case, Mesh(case), False).interface
+
+
+@pytest.mark.parametrize("flowing", [False, True])
+@pytest.mark.parametrize("bordered", [False, True])
+def test_the_changed_points_make_the_whole_system(interface, flowing, bordered):
+    """A third of the points with another, unsymmetric tangent; pressures that depend on some of the unknowns."""
+    rng = np.random.default_rng(142)
+    number, size = len(interface.points.weights), len(interface.bulk.free)
+    tangent = np.broadcast_to(VIRGIN, (number, 3, 3)).copy()
+    changed = rng.permutation(number)[: number // 3]
+    tangent[changed] = 1e11 * rng.normal(size=(len(changed), 3, 3)) + np.diag([1e8, 2e12, 1e8])
+    change = interface.change(tangent, VIRGIN)
+    assert 0 < len(change.rows) < size
+    matrix = interface.bulk.stiffness + interface.stiffness(tangent, np.arange(number)).toarray()
+    if flowing:
+        change.columns = np.sort(rng.permutation(size)[: size // 4])
+        change.pressure = 1e10 * rng.normal(size=(interface.flow.lift.shape[1], size // 4))
+        matrix[:, change.columns] -= interface.flow.lift @ change.pressure
+    right, slope, row = rng.normal(size=(3, size))
+    interface.compliance(VIRGIN)
+    x, s = interface.solve(VIRGIN, change, right, (slope, row, 0.3, 0.7) if bordered else None)
+    if bordered:
+        whole = np.block([[matrix, slope[:, None]], [row[None, :], np.array([[0.3]])]])
+        expected = np.linalg.solve(whole, np.append(right, 0.7))
+        assert s == pytest.approx(expected[-1], rel=1e-6)
+        expected = expected[:-1]
+    else:
+        expected = np.linalg.solve(matrix, right)
+        assert s == 0
+    assert_allclose(x, expected, rtol=0, atol=1e-7 * np.abs(expected).max())
+
+
+def test_pressures_derivatives(interface):
+    """With the jump and with the drop, against central differences."""
+    rng = np.random.default_rng(142)
+    flow, weights = interface.flow, interface.points.weights
+    jump, drop = rng.normal(1, 0.3, len(interface.bulk.free)), 9e4
+
+    def pressure(jump, drop):
+        opening = np.maximum(flow.opening @ jump, 0)
+        return flow.solve((1 + opening) ** 3 * weights, drop)
+
+    opening = np.maximum(flow.opening @ jump, 0)
+    by_jump, columns, by_drop = flow.sensitivity(pressure(jump, drop)[1], np.where(opening > 0, 3 * (1 + opening) ** 2, 0) * weights)
+    direction = rng.normal(size=len(jump))
+    for given, along, push in ((by_jump @ direction[columns], direction, 0), (by_drop, 0 * direction, 1)):
+        ahead, behind = (pressure(jump + h * along, drop + h * push)[0] for h in (1e-5, -1e-5))
+        assert_allclose(given, (ahead - behind) / 2e-5, rtol=0, atol=1e-5 * np.abs(given).max())
+
+
+@pytest.mark.parametrize("condition", [1e2, 1e6, 1e11])
+def test_single_precision_is_refined_or_given_up(condition):
+    """Beyond 1e7 single precision has no correct digit: double has to take over."""
+    rng = np.random.default_rng(142)
+    left, right = (np.linalg.qr(rng.normal(size=(400, 400)))[0] for _ in range(2))
+    matrix = left * np.geomspace(1, 1 / condition, 400) @ right
+    expected = rng.normal(size=400)
+    found = lu_solve(matrix.copy(), matrix @ expected)
+    assert_allclose(found, expected, rtol=0, atol=1e-13 * condition)
+
+
+def test_singular():
+    with pytest.raises(np.linalg.LinAlgError):
+        lu_solve(np.zeros((400, 400)), np.ones(400))
