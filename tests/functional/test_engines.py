@@ -60,11 +60,12 @@ def test_tangent_is_the_derivative(law_name):
 
 
 @pytest.mark.heavy
-@pytest.mark.parametrize("letter", "abcdefghijk")
-def test_engines_agree(letter, tmp_path):
+@pytest.mark.parametrize("letter, pattern", [*((letter, None) for letter in "abcdefghijk"), ("f", "split")])
+def test_engines_agree(letter, pattern, tmp_path):
     """Whole loadings: the same joint.csv to 1e-6 of the largest jump, stress, and so on. In 3D on a coarser mesh."""
     coarse = {"n_joint": 20.0, "n_layers": 4.0 if letter in "bd" else 1.0, "h_dam": 2.0, "h_found": 4.0}
-    case = parameters.load(letter, coarse if letter in "bdfh" else None)
+    changed = (coarse if letter in "bdfh" else {}) | ({"mesh_pattern": pattern} if pattern else {})
+    case = parameters.load(letter, changed)
     plain = run.run(case, tmp_path / "getdp", fields=False, picture=False, progress=False, engine="getdp")
     fast = run.run(case, tmp_path / "condensed", fields=False, picture=False, progress=False, engine="condensed")
     for a, b in zip(plain, fast, strict=True):
