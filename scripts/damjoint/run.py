@@ -20,6 +20,8 @@ from .mesh import Mesh
 from .parameters import Case
 
 ENGINES = ("auto", "condensed", "getdp")
+#: Jump unknowns from which on a second thread of the linear algebra pays; below it waits and disturbs.
+MANY = 3000
 
 
 def check_writable(folder: Path) -> None:
@@ -69,8 +71,8 @@ def run(case: Case, out: Path, fields: bool = True, picture: bool = True, progre
     from threadpoolctl import threadpool_limits
 
     from . import condensed  # noqa: F401 (its BLAS libraries are loaded, and limited, from here on)
-    alone = case["dim"] == 2 or case["uplift"] == "flow"  # many small matrices: a second thread only waits
-    with threadpool_limits(1 if alone else None):
+    from .condense import joint_size
+    with threadpool_limits(1 if joint_size(case) < MANY else None):
         return run_condensed(case, out, fields, picture, progress)
 
 
