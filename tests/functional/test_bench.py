@@ -8,10 +8,10 @@ import pytest
 @pytest.mark.heavy
 def test_short_form(command, tmp_path):
     page = tmp_path / "page.md"
-    page.write_text("before\n<!-- bench -->\nold\n<!-- /bench -->\nafter\n")
+    page.write_text("before\n<!-- bench -->\nstale text\n<!-- /bench -->\nafter\n")
     assert command("bench", "--short", "--out", "bench", "--readme", "page.md")[0] == 0
     text = page.read_text()
-    assert text.startswith("before\n<!-- bench -->\n**Modelings**") and text.endswith("<!-- /bench -->\nafter\n") and "old" not in text
+    assert text.startswith("before\n<!-- bench -->\n**Modelings**") and text.endswith("<!-- /bench -->\nafter\n") and "stale text" not in text
     assert (tmp_path / "bench" / "accuracy.png").read_bytes()[:4] == b"\x89PNG"
 
     def table(name):
