@@ -38,7 +38,6 @@ PEER = {"a": 3.9, "b": 44.1, "c": 2.0, "d": 19.1, "e": 25.4, "f": 168, "g": 5.1,
 SCENES = {"rupture": "a", "friction": "c", "flow": "e"}
 QUANTITIES = ("heel_opening", "toe_stress", "crack_tip", "slip", "leakage")
 
-
 #: Where the seconds of a run go; start: Python, libraries, reading the case.
 PARTS = ("start", "mesh", "assembly", "condensation", "newton", "post")
 
@@ -79,9 +78,9 @@ class Table(dict):
         return np.flatnonzero([row[: len(where)] == where for row in zip(*self.values(), strict=True)])
 
 
-def bar(things: list, title: str) -> Iterable:
-    """The things with a progress bar, on a terminal."""
-    return tqdm(things, desc=title, disable=not sys.stderr.isatty())
+def bar(things: Iterable, title: str, total: int | None = None) -> Iterable:
+    """The things with a progress bar, on a terminal; total: their number if they do not know it."""
+    return tqdm(things, desc=title, total=total, disable=not sys.stderr.isatty())
 
 
 def cases(short: bool) -> Table:
@@ -136,7 +135,7 @@ def errors(found: np.ndarray, exact: np.ndarray) -> np.ndarray:
 
 def settings(order: int, n: int, grading: float, pattern: str, dim: int, height: float = 10.0) -> dict:
     """Mesh parameters of one point of the error-against-time benchmark; grading 1 as --accuracy, smaller finer far away."""
-    sizes = {"h_dam": grading * 1.25 * height / n**0.5, "h_found": grading * 2.5 * height / n**0.5}
+    sizes = {name: grading * size for name, size in parameters.far_sizes(height, n).items()}
     solid = {"dim": 3.0, "thickness": 0.2 if pattern == "free" else 1.0, "n_layers": 1.0, "hold_z": 1.0} if dim == 3 else {"dim": 2.0}
     return {"order": float(order), "n_joint": float(n), "mesh_pattern": pattern, **sizes, **solid}
 
@@ -181,8 +180,9 @@ def accuracy(short: bool, exact: dict[str, np.ndarray], start: float) -> Table:
              for order in (1, 2) for n in numbers if n <= most]
     runs += [(2, "free", 2, numbers[-2], 1.0, steps) for steps in (1, 2, 4)]
     for scene, name in SCENES.items():
+        main = {"uplift": main_uplift(name)}
         for dim, pattern, order, n, grading, steps in bar(runs, scene):
-            chosen = settings(order, n, grading, pattern, dim) | {"uplift": main_uplift(name)}
+            chosen = settings(order, n, grading, pattern, dim) | main
             result, spent = measure(parameters.load(name, chosen, steps=steps))
             spent["start"] = start
             off = errors(read_off(result), exact[name])
@@ -344,7 +344,7 @@ def stress(short: bool) -> Table:
     grid = grid[::18] if short else grid
     table = Table("law", "aperture_min", "K_N", "E", "end", "level", "iterations", "cuts", "seconds")
     with ProcessPoolExecutor() as pool:
-        for row in tqdm(pool.map(one_of_the_grid, grid), total=len(grid), desc="stress", disable=not sys.stderr.isatty()):
+        for row in bar(pool.map(one_of_the_grid, grid), "stress", len(grid)):
             table.add(*row)
     return table
 

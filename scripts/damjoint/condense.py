@@ -65,10 +65,15 @@ def joint_size(case: Case) -> int:
     return dim * (order * int(case["n_joint"]) + 1) * (order * int(case["n_layers"]) + 1 if dim == 3 else 1)
 
 
+def dense_memory(joint: int) -> float:
+    """Memory [bytes] of the Schur complement of so many unknowns, its factors and the products made later on."""
+    return 8.0 * joint**2 * 6
+
+
 def check_size(case: Case) -> None:
     """Raise RunError, before any meshing, if the joint alone asks for more memory than there is."""
     joint = joint_size(case)
-    check_memory(8.0 * joint**2 * 6, joint, joint)
+    check_memory(dense_memory(joint), joint, joint)
 
 
 def schur_complement(matrix: sparse.csr_matrix, keep: np.ndarray) -> np.ndarray:
@@ -77,7 +82,7 @@ def schur_complement(matrix: sparse.csr_matrix, keep: np.ndarray) -> np.ndarray:
     By MUMPS where python-mumps is installed; else by scipy's SuperLU, ten times slower in 3D. Raises RunError
     before it runs out of memory.
     """
-    dense = 8.0 * len(keep) ** 2 * 6  # this matrix and its factors and products later on
+    dense = dense_memory(len(keep))
     check_memory(dense, matrix.shape[0], len(keep))
     if mumps is None:
         return schur_by_superlu(matrix, keep)

@@ -20,9 +20,10 @@ from .parameters import Case
 from .results import HISTORY, JOINT, Results, why_stopped
 
 TOLERANCE = 1e-9
+GROWTH = 3.0
 #: Attempts at a step, in this order: how much the residual may grow before a correction is halved, and whether
 #: the law's secant stiffness takes the place of the tangent.
-ATTEMPTS = ((3.0, False), (1e9, False), (3.0, True), (1.0, False))
+ATTEMPTS = ((GROWTH, False), (1e9, False), (GROWTH, True), (1.0, False))
 MAX_ITERATIONS = 30
 #: Before giving up, the secant once more for as long as a burst of breaking points may last.
 BURST_ITERATIONS = 300
@@ -171,32 +172,31 @@ class Filling:
 
     def run(self) -> Results:
         """Follow all the times of the case that are still to come."""
-        stopped, cuts, dt = self.stopped, 0, np.inf
+        cuts, dt = 0, np.inf
         for target in self.case.times:
             if target <= self.state.time:
                 continue
-            while self.state.time < target and not stopped:
+            while self.state.time < target and not self.stopped:
                 time = min(self.state.time + dt, target)
                 time = target if target - time < 1e-9 else time
                 found = next(filter(None, (self.solve(time, *attempt) for attempt in ATTEMPTS)), None)
                 if found is None:
                     dt, cuts = CUT * (time - self.state.time), cuts + 1
                     if dt < SMALLEST_STEP:
-                        time, found = target, self.solve(target, 3.0, True, BURST_ITERATIONS)
-                        stopped = found is None
+                        time, found = target, self.solve(target, GROWTH, True, BURST_ITERATIONS)
+                        self.stopped = found is None
                 if found:
                     dt = 2 * (time - self.state.time)
                     self.accept(time, cuts, *found)
                     cuts = 0
-            if stopped:
+            if self.stopped:
                 break
             dt = np.inf
             if target in self.case.requested:
                 self.save()
-        if stopped and self.state.time > 0 and (not self.saved or self.saved[-1][0] < self.state.time):
+        if self.stopped and self.state.time > 0 and (not self.saved or self.saved[-1][0] < self.state.time):
             self.save()
-        self.stopped = stopped
-        return self.results(stopped)
+        return self.results()
 
     def water_at(self, time: float) -> tuple[float, float, bool, float]:
         """Reservoir and tailwater level, whether a displacement is prescribed instead, and how much."""
@@ -342,11 +342,11 @@ class Filling:
             start += len(table)
         return total / count[:, None]
 
-    def results(self, stopped: bool) -> Results:
+    def results(self) -> Results:
         """All tables so far."""
         names = JOINT + ("flux",) * self.joint.flowing
         history = dict(zip(HISTORY, np.array(self.rows, float).reshape(-1, len(HISTORY)).T, strict=True))
         stack = lambda k: np.vstack([t[k] for t in self.tables]) if self.tables else np.zeros((0, len(names)))  # noqa: E731
         tables = [dict(zip(names, stack(k).T, strict=True)) for k in (0, 1)]
-        return Results(self.case, history, *tables, why_stopped(self.case, history) if stopped else "", np.array(self.heel),
+        return Results(self.case, history, *tables, why_stopped(self.case, history) if self.stopped else "", np.array(self.heel),
                        self.saved)

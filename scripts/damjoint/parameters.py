@@ -215,6 +215,11 @@ def case_file(case: str) -> Path:
 ACCURACIES = {"coarse": (40, 1), "standard": (100, 2), "fine": (200, 4)}
 
 
+def far_sizes(height: float, n: float) -> dict[str, float]:
+    """Element sizes far from a joint of n elements, under a dam of a height [m], that do not spoil its accuracy."""
+    return {"h_dam": 1.25 * height / n**0.5, "h_found": 2.5 * height / n**0.5}
+
+
 def mesh_for(accuracy: str, case: Case) -> dict[str, float | str]:
     """Mesh and order for an accuracy of about 3 % (coarse), 1 % (standard) or 0.2 % (fine); measured by bench.
 
@@ -225,9 +230,8 @@ def mesh_for(accuracy: str, case: Case) -> dict[str, float | str]:
         raise InputError(f"accuracy = {accuracy}: must be one of {', '.join(ACCURACIES)}")
     (n, layers), solid = ACCURACIES[accuracy], case["dim"] == 3
     plane = case["hold_z"] or max(case["nu_dam"], case["nu_found"]) == 0
-    size = case["dam_height"] / n**0.5
     return {"order": 2.0, "mesh_pattern": "split" if solid else "free", "n_layers": 1.0 if plane else float(layers),
-            "n_joint": float(n), "h_dam": 1.25 * size, "h_found": 2.5 * size}
+            "n_joint": float(n), **far_sizes(case["dam_height"], n)}
 
 
 def load(case: str, overrides: Mapping[str, float | str] | None = None, levels: str | None = None,

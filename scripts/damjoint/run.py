@@ -132,7 +132,7 @@ def run_condensed(case: Case, out: Path, fields: bool, picture: bool, progress: 
         try:
             result = filling.run()
         except BaseException:
-            results.write(filling.results(False), scene_folder(case, scene, out))
+            results.write(filling.results(), scene_folder(case, scene, out))
             raise
         describe(result, "condensed", bulk.counts, bulk.unknowns, before | {"solve": time.perf_counter() - begin})
         save(result, scene_folder(case, scene, out))

@@ -108,7 +108,7 @@ def last_rows(cases: list[Case]) -> list[dict[str, float | str]]:
             except RunError as error:
                 found.append({**dict.fromkeys(HISTORY, ""), "stopped": str(error)})
                 continue
-            result = filling.results(filling.stopped)
+            result = filling.results()
             last = {name: f"{column[-1]:.12g}" if len(column) else "" for name, column in result.history.items()}
             found.append({**last, "stopped": result.stopped})
     return found
