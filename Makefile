@@ -1,8 +1,9 @@
-# make setup | run | test | test-all | bench | clean; each of them sets up first whatever is missing.
+# make setup | run | check | test | test-all | bench | pages | clean; each sets up first what is missing.
+# PYTHON=python3.12 make setup chooses the interpreter.
 
 BIN = .venv/bin
 
-.PHONY: setup run test test-all bench clean
+.PHONY: setup run check test test-all bench pages clean
 
 # GetDP and libraries (Debian packages), Python packages in .venv
 setup:
@@ -12,19 +13,28 @@ setup:
 run: setup
 	$(BIN)/damjoint validate a
 
+# Style and what a look at the code can tell
+check: setup
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
 # The tests but for the minutes-long ones; all of them in CI
-test: setup
+test: check
 	$(BIN)/pytest -q $(if $(CI),,-m "not heavy")
 
-test-all: setup
+test-all: check
 	$(BIN)/pytest -q
 
-# Twenty minutes; refreshes the tables and the picture that README.md shows
+# Twenty minutes; refreshes reference/benchmarks.md, its picture and the modelings' table in README.md
 bench: setup
-	$(BIN)/damjoint bench --readme README.md
-	cp out/bench/accuracy.png reference/pictures/
+	$(BIN)/damjoint bench
+	$(BIN)/python -m damjoint.pages bench out/bench
+
+# What is made from the code: reference/parameters.md, results.md; ssnp142.md from a validation of all cases
+pages: setup
+	$(BIN)/python -m damjoint.pages all
 
 # Results and caches
 clean:
-	rm -rf out .pytest_cache
+	rm -rf out .pytest_cache .ruff_cache
 	find scripts tests -name __pycache__ -prune -exec rm -rf {} +

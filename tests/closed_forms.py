@@ -1,4 +1,5 @@
-"""What a rigid reading of the scene gives exactly: weight, thrust, moments; and the comparison of two runs."""
+"""What a rigid reading of the scene gives exactly: weight, thrust, moments; and the comparison of
+two runs."""
 
 import numpy as np
 
@@ -7,7 +8,9 @@ WATER = 1000 * 9.81
 AREA = (BASE + CREST) / 2 * HEIGHT
 WEIGHT = 2400 * 9.81 * AREA
 #: of the trapezoid: rectangle under the crest and the triangle downstream of it
-CENTROID = (CREST * HEIGHT * CREST / 2 + (BASE - CREST) * HEIGHT / 2 * (CREST + (BASE - CREST) / 3)) / AREA
+CENTROID = (
+    CREST * HEIGHT * CREST / 2 + (BASE - CREST) * HEIGHT / 2 * (CREST + (BASE - CREST) / 3)
+) / AREA
 BATTER = (BASE - CREST) / HEIGHT
 
 
@@ -17,14 +20,20 @@ def thrust(level):
 
 
 def resultants(level, tail, wet):
-    """N, T, M over the joint, M of the effective normal force about the toe; wet: linear uplift from heel to toe.
+    """N, T, M over the joint, M of the effective normal force about the toe; wet: linear uplift
+    from heel to toe.
 
-    The tailwater pushes on the inclined downstream face: back (T) and, with BATTER times that, down (N).
+    The tailwater pushes on the inclined downstream face: back (T) and, with BATTER times that, down
+    (N).
     """
     n = WEIGHT - wet * WATER * BASE * (level + tail) / 2 + BATTER * thrust(tail)
     t = thrust(level) - thrust(tail)
-    m = (WEIGHT * (BASE - CENTROID) - thrust(level) * level / 3 - wet * WATER * BASE**2 * (level / 3 + tail / 6)
-         + (1 + BATTER**2) * thrust(tail) * tail / 3)
+    m = (
+        WEIGHT * (BASE - CENTROID)
+        - thrust(level) * level / 3
+        - wet * WATER * BASE**2 * (level / 3 + tail / 6)
+        + (1 + BATTER**2) * thrust(tail) * tail / 3
+    )
     return n, t, m
 
 
@@ -35,7 +44,8 @@ def slide_level(mu, adhesion, wet):
 
 
 def integral(x, *factors):
-    """Over the joint, of products of columns that are linear between the nodes (Simpson: exact up to degree 3)."""
+    """Over the joint, of products of columns that are linear between the nodes (Simpson: exact up
+    to degree 3)."""
     ends = np.prod(factors, axis=0)
     middle = np.prod([(f[1:] + f[:-1]) / 2 for f in factors], axis=0)
     return np.sum(np.diff(x) * (ends[1:] + ends[:-1] + 4 * middle) / 6)
@@ -45,6 +55,11 @@ JUMPS_AND_STRESSES = "delta_n", "delta_t1", "sigma_n", "tau_1"
 
 
 def differences(one, other, time=None, names=JUMPS_AND_STRESSES, factors=()):
-    """Largest difference along the joint over the largest value, for each column; other scaled by factors first."""
+    """Largest difference along the joint over the largest value, for each column; other scaled by
+    factors first."""
     a, b = one.at(time), other.at(time)
-    return [np.abs(a[n] - dict(factors).get(n, 1) * np.interp(a["x"], b["x"], b[n])).max() / np.abs(a[n]).max() for n in names]
+    return [
+        np.abs(a[n] - dict(factors).get(n, 1) * np.interp(a["x"], b["x"], b[n])).max()
+        / np.abs(a[n]).max()
+        for n in names
+    ]

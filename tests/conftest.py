@@ -1,7 +1,8 @@
 """Shared fixtures: a scene is computed once per session, whoever asks for it."""
 
 import pytest
-from damjoint import parameters, run
+from damjoint import run
+from damjoint.scene.case import load
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -14,14 +15,21 @@ def empty_cache(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def solve(tmp_path_factory):
-    """solve(case, levels, tail_levels, steps, **settings): the list of results, one for each uplift of the case."""
+    """solve(case, levels, tail_levels, steps, **settings): the list of results, one for each uplift
+    of the case."""
     done = {}
 
     def once(name, levels=None, tail_levels=None, steps=None, **settings):
         key = name, levels, tail_levels, steps, tuple(sorted(settings.items()))
         if key not in done:
-            case = parameters.load(name, settings, levels, tail_levels, steps)
-            done[key] = run.run(case, tmp_path_factory.mktemp(case.name), fields=False, picture=False, progress=False)
+            case = load(name, settings, levels, tail_levels, steps)
+            done[key] = run.run(
+                case,
+                tmp_path_factory.mktemp(case.name),
+                fields=False,
+                picture=False,
+                progress=False,
+            )
         return done[key]
 
     return once
@@ -29,7 +37,8 @@ def solve(tmp_path_factory):
 
 @pytest.fixture
 def command(capfd, tmp_path, monkeypatch):
-    """command(*words): exit code, standard output and error of the damjoint command, run in an empty folder."""
+    """command(*words): exit code, standard output and error of the damjoint command, run in an
+    empty folder."""
     from damjoint import cli
 
     monkeypatch.chdir(tmp_path)

@@ -1,16 +1,40 @@
-"""Concrete gravity dams on a thin joint that opens, breaks, slides and lets water in (GetDP and Gmsh)."""
+"""
+Concrete gravity dams on a thin joint that opens, breaks, slides and lets water in.
 
+scene/    what is asked: parameters, case files, meshes results/  what comes out: tables, verdict,
+fields, pictures, comparison with published numbers engines/  how it is solved: getdp/ runs the
+problem definition, condensed/ follows the joint alone run.py    one case, solved and written
+studies/  what is done with many runs: sweeps, benchmarks, a law along a path cli.py    the command
+line
+
+Each of them uses only those above it.
+"""
+
+from importlib.resources import files
 from pathlib import Path
 
-__version__ = "0.1.0"
-
-#: The folder with geo/, pro/, cases/ and reference/.
-ROOT = Path(__file__).resolve().parents[2]
+__version__ = "0.2.0"
 
 
 class InputError(ValueError):
-    """Bad input: one line that names the parameter, its value and what is allowed. The command exits with 2."""
+    """
+    Bad input: one line that names the parameter, its value and what is allowed.
+
+    The command exits with 2.
+    """
 
 
 class RunError(RuntimeError):
-    """A computation that failed for another reason than the input. The command exits with 1."""
+    """
+    A computation that failed for another reason than the input.
+
+    The command exits with 1.
+    """
+
+
+def data(folder: str) -> Path:
+    """The folder geo, pro, cases or reference: in the package where it is installed, else in the
+    checkout.
+    """
+    packaged = Path(str(files(__name__))) / folder
+    return packaged if packaged.is_dir() else Path(__file__).resolve().parents[2] / folder

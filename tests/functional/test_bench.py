@@ -1,4 +1,5 @@
-"""The short form of the benchmark: what it writes, and that the numbers are what they say; nothing about speed."""
+"""The short form of the benchmark: what it writes, and that the numbers are what they say; nothing
+about speed."""
 
 import csv
 
@@ -11,7 +12,11 @@ def test_short_form(command, tmp_path):
     page.write_text("before\n<!-- bench -->\nstale text\n<!-- /bench -->\nafter\n")
     assert command("bench", "--short", "--out", "bench", "--readme", "page.md")[0] == 0
     text = page.read_text()
-    assert text.startswith("before\n<!-- bench -->\n**Modelings**") and text.endswith("<!-- /bench -->\nafter\n") and "stale text" not in text
+    assert (
+        text.startswith("before\n<!-- bench -->\n**Modelings**")
+        and text.endswith("<!-- /bench -->\nafter\n")
+        and "stale text" not in text
+    )
     assert (tmp_path / "bench" / "accuracy.png").read_bytes()[:4] == b"\x89PNG"
 
     def table(name):
@@ -21,12 +26,20 @@ def test_short_form(command, tmp_path):
     assert [row["case"] for row in table("cases")] == [*"abcdefghijk", "sum"]
     for row in table("recommended"):
         assert float(row["coarse: error [%]"]) < 3, row
-    errors = {(row["scene"], row["dim"], row["pattern"], row["order"], row["n_joint"], row["steps"]): row for row in table("accuracy")}
+    errors = {
+        (row["scene"], row["dim"], row["pattern"], row["order"], row["n_joint"], row["steps"]): row
+        for row in table("accuracy")
+    }
     for scene in ("rupture", "friction", "flow"):
-        steps = [float(errors[scene, "2", "free", "2", "10", s]["error_heel_opening"]) for s in ("1", "2", "4")]
+        steps = [
+            float(errors[scene, "2", "free", "2", "10", s]["error_heel_opening"])
+            for s in ("1", "2", "4")
+        ]
         assert max(steps) == pytest.approx(min(steps), rel=1e-3)  # monotone filling: one step does
-        plane, split, coarser = (float(errors[scene, dim, pattern, order, "20", "published"]["error_toe_stress"])
-                                 for dim, pattern, order in (("2", "free", "2"), ("3", "split", "2"), ("2", "free", "1")))
+        plane, split, coarser = (
+            float(errors[scene, dim, pattern, order, "20", "published"]["error_toe_stress"])
+            for dim, pattern, order in (("2", "free", "2"), ("3", "split", "2"), ("2", "free", "1"))
+        )
         assert split < 1.2 * plane and plane < coarser
     assert {row["end"] for row in table("stress")} <= {"sliding", "overturning"}
     assert all(float(row["ratio"]) > 0 for row in table("switches"))

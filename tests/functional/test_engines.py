@@ -2,16 +2,22 @@
 
 import numpy as np
 import pytest
+from damjoint import run
+from damjoint.engines.condensed.laws import LAWS
+from damjoint.engines.getdp import law
+from damjoint.results.tables import JOINT
+from damjoint.scene.case import Case, load
 
-from damjoint import law, parameters, run
-from damjoint.laws import LAWS
-from damjoint.results import JOINT
 
-
-def random_path(law_name: str, seed: int, case: parameters.Case) -> np.ndarray:
-    """A random walk of jumps (n, 3) that closes, opens, softens, breaks and slides in both directions."""
+def random_path(law_name: str, seed: int, case: Case) -> np.ndarray:
+    """A random walk of jumps (n, 3) that closes, opens, softens, breaks and slides in both
+    directions."""
     rng = np.random.default_rng(seed)
-    size = case["sigma_max"] / case["K_N"] if law_name == "rupture" else case["adhesion"] / (case["mu"] * case["K_N"])
+    size = (
+        case["sigma_max"] / case["K_N"]
+        if law_name == "rupture"
+        else case["adhesion"] / (case["mu"] * case["K_N"])
+    )
     walk = np.cumsum(rng.normal(size=(200, 3)), axis=0) * 0.3 * size
     walk[:, 1:] *= 5
     return walk
@@ -21,8 +27,18 @@ def random_path(law_name: str, seed: int, case: parameters.Case) -> np.ndarray:
 @pytest.mark.parametrize("seed", range(3))
 def test_laws_agree_point_by_point(law_name, seed):
     """The problem definition's law and the condensed engine's, along one path."""
-    changed = {"sigma_max": 1e4, "alpha": [0.0, 1.0, 1.5][seed], "pena_contact": 2.0, "pena_tang": 1e11}
-    case = parameters.load("dam", changed | {"law": law_name})
+    changed = {
+        "K_N": 1e12,
+        "K_T": 5e11,
+        "mu": 0.35,
+        "adhesion": 1000,
+        "pena_rupture": 0.2,
+        "sigma_max": 1e4,
+        "alpha": [0.0, 1.0, 1.5][seed],
+        "pena_contact": 2.0,
+        "pena_tang": 1e11,
+    }
+    case = load("ssnp142", changed | {"law": law_name})
     jumps = random_path(law_name, seed, case)
     expected = law.evaluate(law_name, jumps, settings=changed)
     model, memory = LAWS[law_name](case), LAWS[law_name](case).start(1)
@@ -43,7 +59,7 @@ def test_laws_agree_point_by_point(law_name, seed):
 @pytest.mark.parametrize("law_name", LAWS)
 def test_tangent_is_the_derivative(law_name):
     """Tangent against central differences, away from the law's corners."""
-    case = parameters.load("dam", {"law": law_name, "sigma_max": 1e4, "pena_tang": 1e11})
+    case = load("ssnp142", {"law": law_name, "sigma_max": 1e4, "pena_tang": 1e11})
     model = LAWS[law_name](case)
     jumps = random_path(law_name, 7, case)
     memory = model.start(len(jumps))
@@ -53,25 +69,48 @@ def test_tangent_is_the_derivative(law_name):
     agree = np.zeros(len(jumps), bool)
     for component in range(3):
         shift = np.eye(3)[component] * step
-        slope = (model.respond(jumps + shift, memory)[0] - model.respond(jumps - shift, memory)[0]) / (2 * step)
+        slope = (
+            model.respond(jumps + shift, memory)[0] - model.respond(jumps - shift, memory)[0]
+        ) / (2 * step)
         close = np.abs(slope - tangent[:, :, component]).max(axis=1) < 1e-4 * case["K_T"]
         agree = close if component == 0 else agree & close
     assert agree.mean() > 0.98  # a difference may straddle a corner
 
 
 @pytest.mark.heavy
-@pytest.mark.parametrize("letter, pattern", [*((letter, None) for letter in "abcdefghijk"), ("f", "split")])
+@pytest.mark.parametrize(
+    "letter, pattern", [*((letter, None) for letter in "abcdefghijk"), ("f", "split")]
+)
 def test_engines_agree(letter, pattern, tmp_path):
-    """Whole loadings: the same joint.csv to 1e-6 of the largest jump, stress, and so on. In 3D on a coarser mesh."""
-    coarse = {"n_joint": 20.0, "n_layers": 4.0 if letter in "bd" else 1.0, "h_dam": 2.0, "h_found": 4.0}
+    """Whole loadings: the same joint.csv to 1e-6 of the largest jump, stress, and so on. In 3D on a
+    coarser mesh."""
+    coarse = {
+        "n_joint": 20.0,
+        "n_layers": 4.0 if letter in "bd" else 1.0,
+        "h_dam": 2.0,
+        "h_found": 4.0,
+    }
     changed = (coarse if letter in "bdfh" else {}) | ({"mesh_pattern": pattern} if pattern else {})
-    case = parameters.load(letter, changed)
-    plain = run.run(case, tmp_path / "getdp", fields=False, picture=False, progress=False, engine="getdp")
-    fast = run.run(case, tmp_path / "condensed", fields=False, picture=False, progress=False, engine="condensed")
+    case = load(letter, changed)
+    plain = run.run(
+        case, tmp_path / "getdp", fields=False, picture=False, progress=False, engine="getdp"
+    )
+    fast = run.run(
+        case,
+        tmp_path / "condensed",
+        fields=False,
+        picture=False,
+        progress=False,
+        engine="condensed",
+    )
     for a, b in zip(plain, fast, strict=True):
         for time in a.case.requested:
             rows = a.at(time), b.at(time)
             for group in (JOINT[:5], JOINT[5:8], JOINT[8:12], JOINT[12:13], JOINT[13:]):
                 size = max(np.abs(rows[0][column]).max() for column in group)
                 for column in group:
-                    assert np.abs(rows[0][column] - rows[1][column]).max() <= 1e-6 * size, (letter, time, column)
+                    assert np.abs(rows[0][column] - rows[1][column]).max() <= 1e-6 * size, (
+                        letter,
+                        time,
+                        column,
+                    )

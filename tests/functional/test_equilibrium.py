@@ -9,15 +9,35 @@ from numpy.testing import assert_allclose
 def test_the_dam_itself():
     """The numbers of the documentation: weight, centroid, sliding levels."""
     assert_allclose([WEIGHT, CENTROID], [765_180, 1.78205], rtol=1e-6)
-    assert_allclose([slide_level(0.35, 1000, False), slide_level(0.35, 1000, True)], [7.45784, 6.63399], rtol=1e-6)
+    assert_allclose(
+        [slide_level(0.35, 1000, False), slide_level(0.35, 1000, True)],
+        [7.45784, 6.63399],
+        rtol=1e-6,
+    )
 
 
-@pytest.mark.parametrize("name, levels, tail_levels, settings", [
-    ("a", None, None, {}), ("i", None, None, {}), ("c", None, None, {}), ("j", None, None, {}),
-    ("a", "0.3,9.9", None, {}), ("c", "6,9,2,8", None, {}),
-    ("c", None, "1,2,3,4", {}), ("a", "5,10", "5,10", {"uplift": "none"}), ("i", None, "2", {"n_joint": 20}),
-    pytest.param("b", None, None, {}, marks=pytest.mark.heavy), pytest.param("d", None, None, {}, marks=pytest.mark.heavy),
-    ("c", "3,8", "3", {"dim": 3, "n_joint": 20, "n_layers": 2, "thickness": 0.4, "h_dam": 2, "h_found": 3})])
+@pytest.mark.parametrize(
+    "name, levels, tail_levels, settings",
+    [
+        ("a", None, None, {}),
+        ("i", None, None, {}),
+        ("c", None, None, {}),
+        ("j", None, None, {}),
+        ("a", "0.3,9.9", None, {}),
+        ("c", "6,9,2,8", None, {}),
+        ("c", None, "1,2,3,4", {}),
+        ("a", "5,10", "5,10", {"uplift": "none"}),
+        ("i", None, "2", {"n_joint": 20}),
+        pytest.param("b", None, None, {}, marks=pytest.mark.heavy),
+        pytest.param("d", None, None, {}, marks=pytest.mark.heavy),
+        (
+            "c",
+            "3,8",
+            "3",
+            {"dim": 3, "n_joint": 20, "n_layers": 2, "thickness": 0.4, "h_dam": 2, "h_found": 3},
+        ),
+    ],
+)
 def test_without_flow(solve, name, levels, tail_levels, settings):
     for result in solve(name, levels, tail_levels, **settings):
         case, history = result.case, result.history
@@ -28,10 +48,13 @@ def test_without_flow(solve, name, levels, tail_levels, settings):
             assert_allclose(history[key], value, rtol=1e-6, atol=1e-9 * scale, err_msg=key)
 
 
-@pytest.mark.parametrize("name", ["e", "g", *(pytest.param(name, marks=pytest.mark.heavy) for name in "fh")])
+@pytest.mark.parametrize(
+    "name", ["e", "g", *(pytest.param(name, marks=pytest.mark.heavy) for name in "fh")]
+)
 def test_with_flow(solve, name):
-    """The uplift is the computed pressure, linear between the nodes (in 3D: nearly so, on the mean over z)."""
-    result, = solve(name)
+    """The uplift is the computed pressure, linear between the nodes (in 3D: nearly so, on the mean
+    over z)."""
+    (result,) = solve(name)
     history = result.history
     accuracy = 1e-6 if result.case["dim"] == 2 else 2e-4
     assert_allclose(history["T"], thrust(history["level"]), rtol=1e-6)
@@ -42,12 +65,15 @@ def test_with_flow(solve, name):
         p, level = np.bincount(place, rows["p"]) / np.bincount(place), history["level"][step]
         assert history["N"][step] == pytest.approx(WEIGHT - integral(x, p), rel=accuracy)
         assert history["M"][step] == pytest.approx(
-            WEIGHT * (BASE - CENTROID) - thrust(level) * level / 3 - integral(x, p, BASE - x), rel=accuracy)
+            WEIGHT * (BASE - CENTROID) - thrust(level) * level / 3 - integral(x, p, BASE - x),
+            rel=accuracy,
+        )
 
 
 def test_uniform_face_load(solve):
-    """K: the level is a uniform pressure WATER level on the whole face; also while it is an unknown."""
-    result, = solve("k")
+    """K: the level is a uniform pressure WATER level on the whole face; also while it is an
+    unknown."""
+    (result,) = solve("k")
     p = WATER * result.history["level"]
     assert_allclose(result.history["N"], WEIGHT, rtol=1e-6)
     assert_allclose(result.history["T"], p * 10, rtol=1e-6)
@@ -56,8 +82,11 @@ def test_uniform_face_load(solve):
 
 @pytest.mark.parametrize("name", ["a", "c"])
 def test_joint_table_carries_the_resultants(solve, name):
-    """joint.csv: the node values, integrated along the base, give N and T but for the singular ends."""
+    """joint.csv: the node values, integrated along the base, give N and T but for the singular
+    ends."""
     result = solve(name)[0]
     rows = result.at()
-    assert integral(rows["x"], -(rows["sigma_n"] + rows["p"])) == pytest.approx(result.history["N"][-1], rel=5e-3)
+    assert integral(rows["x"], -(rows["sigma_n"] + rows["p"])) == pytest.approx(
+        result.history["N"][-1], rel=5e-3
+    )
     assert integral(rows["x"], rows["tau_1"]) == pytest.approx(result.history["T"][-1], rel=3e-2)

@@ -9,19 +9,24 @@ from numpy.testing import assert_allclose
 @pytest.mark.parametrize("name, level, tail", [("e", 2, 0), ("g", 3, 1)])
 def test_closed_joint(solve, name, level, tail):
     """Parallel aperture w: linear pressure, q = rho (p0 - pL) w^3 / (12 visc L)."""
-    result, = solve(name, str(level), str(tail), K_N=1e14, visc=2e-3)
+    (result,) = solve(name, str(level), str(tail), K_N=1e14, visc=2e-3)
     rows, w = result.at(), result.case["aperture_min"]
     assert rows["delta_n"].max() <= 0
-    assert_allclose(rows["p"], WATER * (level + (tail - level) * rows["x"] / BASE), rtol=1e-9, atol=1e-6)
+    assert_allclose(
+        rows["p"], WATER * (level + (tail - level) * rows["x"] / BASE), rtol=1e-9, atol=1e-6
+    )
     q = 1000 * WATER * (level - tail) * w**3 / (12 * 2e-3 * BASE)
     assert result.history["flux"][-1] == pytest.approx(q, rel=1e-9)
     assert_allclose(rows["flux"], q, rtol=1e-9)
 
 
-@pytest.mark.parametrize("name", ["e", "g", *(pytest.param(name, marks=pytest.mark.heavy) for name in "fh")])
+@pytest.mark.parametrize(
+    "name", ["e", "g", *(pytest.param(name, marks=pytest.mark.heavy) for name in "fh")]
+)
 def test_what_goes_in_comes_out(solve, name):
-    """One flux from heel to toe, and in the history; in 3D nearly, the mean over z of element values."""
-    result, = solve(name)
+    """One flux from heel to toe, and in the history; in 3D nearly, the mean over z of element
+    values."""
+    (result,) = solve(name)
     rows = result.at()
     q = result.history["flux"][-1]
     x = np.unique(rows["x"].round(9))
@@ -31,9 +36,11 @@ def test_what_goes_in_comes_out(solve, name):
     assert_allclose(means, q, rtol=1e-6 if flat else 5e-2)
 
 
-@pytest.mark.parametrize("name", ["e", "g", *(pytest.param(name, marks=pytest.mark.heavy) for name in "fh")])
+@pytest.mark.parametrize(
+    "name", ["e", "g", *(pytest.param(name, marks=pytest.mark.heavy) for name in "fh")]
+)
 def test_pressure_falls_from_heel_to_toe(solve, name):
-    result, = solve(name)
+    (result,) = solve(name)
     for time in result.case.requested:
         rows = result.at(time)
         level = result.case.level_at(time)
@@ -44,22 +51,27 @@ def test_pressure_falls_from_heel_to_toe(solve, name):
 
 @pytest.mark.parametrize("name, tolerance", [("e", 0.02), ("g", 0.005)])
 def test_pressure_and_flux_of_the_openings_found(solve, name, tolerance):
-    """p0 - p(x) ~ int_0^x w^-3, q = rho p0 / (12 visc int w^-3), with the openings of joint.csv (trapezoids)."""
-    result, = solve(name)
+    """p0 - p(x) ~ int_0^x w^-3, q = rho p0 / (12 visc int w^-3), with the openings of joint.csv
+    (trapezoids)."""
+    (result,) = solve(name)
     rows = result.at()
     x = rows["x"]
     resistance = (result.case["aperture_min"] + np.maximum(rows["delta_n"], 0)) ** -3
     along = np.r_[0, np.cumsum(np.diff(x) * (resistance[1:] + resistance[:-1]) / 2)]
     p = WATER * 9 * (1 - along / along[-1])
     assert_allclose(rows["p"], p, atol=tolerance * WATER * 9)
-    assert result.history["flux"][-1] == pytest.approx(1000 * WATER * 9 / (12 * 1e-3 * along[-1]), rel=tolerance)
+    assert result.history["flux"][-1] == pytest.approx(
+        1000 * WATER * 9 / (12 * 1e-3 * along[-1]), rel=tolerance
+    )
 
 
 @pytest.mark.parametrize("name", ["e", "g"])
 @pytest.mark.parametrize("steps", [5, 20])
 def test_filling_does_not_depend_on_the_steps(solve, name, steps):
     one, many = solve(name, "9")[0], solve(name, "9", steps=steps)[0]
-    assert max(differences(one, many, names=("delta_n", "delta_t1", "sigma_n", "tau_1", "p"))) < 1e-4
+    assert (
+        max(differences(one, many, names=("delta_n", "delta_t1", "sigma_n", "tau_1", "p"))) < 1e-4
+    )
 
 
 def test_more_aperture_more_flux(solve):

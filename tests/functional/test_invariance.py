@@ -1,14 +1,19 @@
-"""The same physics put differently gives the same answer: order, dimension, scale, steps, engine."""
+"""The same physics put differently gives the same answer: order, dimension, scale, steps,
+engine."""
 
 import numpy as np
 import pytest
 from closed_forms import JUMPS_AND_STRESSES, differences
-from damjoint import law, parameters, run
+from damjoint import run
+from damjoint.engines.getdp import law
+from damjoint.scene.case import load
 from numpy.testing import assert_allclose
+
 
 @pytest.mark.parametrize("name", ["a", "c"])
 def test_order_1_converges_to_order_2(solve, name):
-    """At half the element size the difference is at least halved; well inside the joint it is below 0.3 %."""
+    """At half the element size the difference is at least halved; well inside the joint it is below
+    0.3 %."""
     crest = []
     for n in (25, 50):
         size = {"n_joint": n, "h_dam": 35 / n, "h_found": 70 / n, "uplift": "none"}
@@ -19,32 +24,51 @@ def test_order_1_converges_to_order_2(solve, name):
     assert crest[1] < 0.5 * crest[0]
 
 
-@pytest.mark.parametrize("name, flat, solid", [
-    ("a", {}, {"mesh_pattern": "layers", "n_layers": 2}),  # nu = 0: nothing happens along z
-    ("c", {}, {"n_layers": 1, "hold_z": 1})])  # nu = 0.25, held along z: plane strain
+@pytest.mark.parametrize(
+    "name, flat, solid",
+    [
+        ("a", {}, {"mesh_pattern": "layers", "n_layers": 2}),  # nu = 0: nothing happens along z
+        ("c", {}, {"n_layers": 1, "hold_z": 1}),
+    ],
+)  # nu = 0.25, held along z: plane strain
 def test_3d_repeats_2d(solve, name, flat, solid):
     size = {"n_joint": 20, "h_dam": 2, "h_found": 3}
-    two, = solve(name, "6,9", uplift="imposed", **size, **flat)
-    three, = solve(name, "6,9", uplift="imposed", **size, **solid, dim=3, thickness=0.2)
+    (two,) = solve(name, "6,9", uplift="imposed", **size, **flat)
+    (three,) = solve(name, "6,9", uplift="imposed", **size, **solid, dim=3, thickness=0.2)
     assert max(differences(two, three)) < 1e-3
     assert_allclose(three.history["crest_ux"], two.history["crest_ux"], rtol=5e-3)
 
 
 def test_split_layers_contain_the_plane_solution(solve):
-    """Order 2, one layer as thick as the joint is long: as accurate as the plane scene, and near to it."""
+    """Order 2, one layer as thick as the joint is long: as accurate as the plane scene, and near to
+    it."""
     size = {"n_joint": 20, "h_dam": 2, "h_found": 3, "order": 2, "uplift": "imposed", "nu": 0.25}
-    two, = solve("a", "6,9", **size)
-    three, = solve("a", "6,9", **size, dim=3, mesh_pattern="split", thickness=5, hold_z=1)
+    (two,) = solve("a", "6,9", **size)
+    (three,) = solve("a", "6,9", **size, dim=3, mesh_pattern="split", thickness=5, hold_z=1)
     assert max(differences(two, three)) < 6e-3
     assert_allclose(three.history["crest_ux"], two.history["crest_ux"], rtol=2e-3)
 
 
-@pytest.mark.parametrize("order, pattern, bound", [(1, "layers", 1e-9), (2, "layers", 5e-3), (2, "split", 5e-3)])
+@pytest.mark.parametrize(
+    "order, pattern, bound", [(1, "layers", 1e-9), (2, "layers", 5e-3), (2, "split", 5e-3)]
+)
 def test_nothing_varies_along_z(solve, order, pattern, bound):
-    """nu = 0: a plane scene in 3D stays plane. Nearly so with order 2: the products N_a N_b of prisms do not contain the
-    plane quadratic field (lambda_a lambda_b (1 + w^2)/2 is not constant in w); split layers contain more than plane fields.
+    """nu = 0: a plane scene in 3D stays plane. Nearly so with order 2: the products N_a N_b of
+    prisms do not contain the plane quadratic field (lambda_a lambda_b (1 + w^2)/2 is not constant
+    in w); split layers contain more than plane fields.
     """
-    result, = solve("a", "3", uplift="none", dim=3, order=order, mesh_pattern=pattern, thickness=0.2, n_joint=10, h_dam=2, h_found=3)
+    (result,) = solve(
+        "a",
+        "3",
+        uplift="none",
+        dim=3,
+        order=order,
+        mesh_pattern=pattern,
+        thickness=0.2,
+        n_joint=10,
+        h_dam=2,
+        h_found=3,
+    )
     rows = result.at()
     for x in np.unique(rows["x"].round(6)):
         across = rows["delta_n"][np.isclose(rows["x"], x)]
@@ -55,58 +79,96 @@ def test_nothing_varies_along_z(solve, order, pattern, bound):
 STIFF = {"E": 3e11, "K_N": 1e11}  # a tenth
 
 
-@pytest.mark.parametrize("name, settings", [("a", {"K_T": 1e11}), ("c", {"K_T": 2e11, "pena_tang": 2e10})])
+@pytest.mark.parametrize(
+    "name, settings", [("a", {"K_T": 1e11}), ("c", {"K_T": 2e11, "pena_tang": 2e10})]
+)
 def test_softer_everything(solve, name, settings):
     """All stiffnesses a tenth: the same stresses, ten times the jumps."""
     one, other = solve(name)[0], solve(name, uplift="imposed", **STIFF, **settings)[0]
     assert max(differences(one, other, factors={"delta_n": 0.1, "delta_t1": 0.1})) < 1e-7
 
 
-@pytest.mark.parametrize("name, settings", [("a", {"sigma_max": 1000}), ("c", {"adhesion": 10_000})])
+@pytest.mark.parametrize(
+    "name, settings", [("a", {"sigma_max": 1000}), ("c", {"adhesion": 10_000})]
+)
 def test_heavier_everything(solve, name, settings):
     """Ten times the densities and the strengths: ten times everything."""
-    one, other = solve(name)[0], solve(name, uplift="imposed", rho_dam=24_000, rho_water=10_000, **settings)[0]
+    one, other = (
+        solve(name)[0],
+        solve(name, uplift="imposed", rho_dam=24_000, rho_water=10_000, **settings)[0],
+    )
     assert max(differences(one, other, factors=dict.fromkeys(JUMPS_AND_STRESSES, 0.1))) < 1e-7
 
 
 @pytest.mark.parametrize("name, steps", [("c", 5), ("c", 20), ("a", 4)])
 def test_monotone_filling_does_not_depend_on_the_steps(solve, name, steps):
-    one, other = solve(name, "9", uplift="imposed")[0], solve(name, "9", steps=steps, uplift="imposed")[0]
+    one, other = (
+        solve(name, "9", uplift="imposed")[0],
+        solve(name, "9", steps=steps, uplift="imposed")[0],
+    )
     assert max(differences(one, other)) < 1e-6
 
 
 def test_emptying_depends_little_on_the_steps(solve):
-    """Friction, 6, 9, 2, 8 m: where the heel closes again the slip it keeps is the one of the step before, so that
-    the shear there knows the steps; the openings hardly do."""
+    """Friction, 6, 9, 2, 8 m: where the heel closes again the slip it keeps is the one of the step
+    before, so that the shear there knows the steps; the openings hardly do."""
     one, twenty = (solve("c", "6,9,2,8", steps=steps, uplift="imposed")[0] for steps in (1, 20))
     for time in (1, 2, 3, 4):
         opening, slip, normal, shear = differences(one, twenty, time)
         assert opening < 1e-3 and normal < 1e-3 and slip < 5e-3 and shear < 2e-2
 
 
-@pytest.mark.parametrize("name, levels", [("c", "6,9,2,8"), ("a", "6,9,2,8"), ("i", "9,1,9"), ("g", "9,4,9")])
+@pytest.mark.parametrize(
+    "name, levels", [("c", "6,9,2,8"), ("a", "6,9,2,8"), ("i", "9,1,9"), ("g", "9,4,9")]
+)
 def test_every_row_of_the_joint_table_obeys_the_law(solve, name, levels):
     """Each node's jumps, level after level, through the law alone: the same stresses."""
-    result = solve(name, levels, uplift=parameters.load(name)["uplift"])[0]
+    result = solve(name, levels, uplift=load(name)["uplift"])[0]
     steps = [result.at(time) for time in result.case.requested]
     picked = np.linspace(0, len(steps[0]["x"]) - 1, 12).astype(int)
     for node in picked:
-        column = lambda key: np.array([step[key][node] for step in steps])  # noqa: B023, E731
-        answer = law.evaluate(result.case["law"], np.column_stack([column(n) for n in ("delta_n", "delta_t1", "delta_t2")]),
-                              column("p"), {n: result.case[n] for n in
-                                            ("K_N", "K_T", "sigma_max", "alpha", "pena_rupture", "mu", "adhesion", "pena_tang")})
+        column = lambda key: np.array([step[key][node] for step in steps])  # noqa: B023
+        answer = law.evaluate(
+            result.case["law"],
+            np.column_stack([column(n) for n in ("delta_n", "delta_t1", "delta_t2")]),
+            column("p"),
+            {
+                n: result.case[n]
+                for n in (
+                    "K_N",
+                    "K_T",
+                    "sigma_max",
+                    "alpha",
+                    "pena_rupture",
+                    "mu",
+                    "adhesion",
+                    "pena_tang",
+                )
+            },
+        )
         for key in ("sigma_n", "tau_1"):
-            assert_allclose(column(key), answer[key], rtol=1e-6, atol=1, err_msg=f"{key} at x = {steps[0]['x'][node]:g}")
+            assert_allclose(
+                column(key),
+                answer[key],
+                rtol=1e-6,
+                atol=1,
+                err_msg=f"{key} at x = {steps[0]['x'][node]:g}",
+            )
 
 
 def test_condensed_bodies_from_the_cache(tmp_path, monkeypatch):
-    """A second run of the same dam finds its condensed bodies; another load or joint needs no others."""
+    """A second run of the same dam finds its condensed bodies; another load or joint needs no
+    others."""
     monkeypatch.setenv("DAMJOINT_CACHE", str(tmp_path / "cache"))
-    one, again, other = (run.run(parameters.load("c", settings), tmp_path / "out", False, False, False)[0]
-                         for settings in ({}, {}, {"mu": 0.4, "rho_dam": 2300}))
+    one, again, other = (
+        run.run(load("c", settings), tmp_path / "out", False, False, False)[0]
+        for settings in ({}, {}, {"mu": 0.4, "rho_dam": 2300})
+    )
     assert ["cache" in r.info["wall_seconds"] for r in (one, again, other)] == [False, True, True]
     assert max(differences(one, again)) == 0
     monkeypatch.setenv("DAMJOINT_CACHE", "")
-    fresh, = run.run(parameters.load("c", {"mu": 0.4, "rho_dam": 2300}), tmp_path / "out", False, False, False)
+    (fresh,) = run.run(
+        load("c", {"mu": 0.4, "rho_dam": 2300}), tmp_path / "out", False, False, False
+    )
     assert "cache" not in fresh.info["wall_seconds"]
     assert max(differences(fresh, other)) < 1e-9

@@ -1,34 +1,48 @@
-"""Where there is no equilibrium any more: sliding, overturning, and the branch beyond a prescribed opening."""
+"""Where there is no equilibrium any more: sliding, overturning, and the branch beyond a prescribed
+opening."""
 
 import numpy as np
 import pytest
 from closed_forms import BASE, CENTROID, WATER, WEIGHT, slide_level, thrust
 from damjoint import cli
+from damjoint.results.verdict import statement
 from numpy.testing import assert_allclose
 
 
 @pytest.mark.parametrize("hardening", [0, 1e-3])
 @pytest.mark.parametrize("uplift, levels", [("none", "7.45,7.47"), ("imposed", "6.62,6.65")])
 def test_sliding(solve, uplift, levels, hardening):
-    """Without hardening T = mu N + c L is the end: 7.45784 m dry, 6.63399 m with uplift. The last state is saved."""
-    result, = solve("c", levels, uplift=uplift, pena_tang=hardening)
+    """Without hardening T = mu N + c L is the end: 7.45784 m dry, 6.63399 m with uplift. The last
+    state is saved."""
+    (result,) = solve("c", levels, uplift=uplift, pena_tang=hardening)
     limit = slide_level(0.35, 1000, uplift == "imposed")
     last = result.history["level"][-1]
     assert limit - 1e-3 < last <= limit * (1 + 1e-9)
-    assert result.stopped.startswith("sliding") and f"{last:.6g} m" in result.stopped
+    assert statement(result).startswith("sliding") and f"{last:.6g} m" in statement(result)
     assert_allclose(np.unique(result.joint["level"]), [float(levels[:4]), last])
     assert result.history["slip_length"][-1] > 0.95 * BASE
 
 
 def test_stopping_exits_with_1_and_says_where(command):
-    code, out, err = command("run", "c", "--set", "pena_tang=0", "--set", "uplift=none", "--levels", "7.4,7.6", "--no-fields", "--no-picture")
+    code, out, err = command(
+        "run",
+        "c",
+        "--set",
+        "pena_tang=0",
+        "--set",
+        "uplift=none",
+        "--levels",
+        "7.4,7.6",
+        "--no-fields",
+        "--no-picture",
+    )
     assert code == 1
     assert "sliding: no equilibrium beyond level 7.45" in out + err
 
 
 def test_hardening_holds_the_dam_beyond_sliding(solve):
     """All of the joint slips: H (mean slip) L = T - mu N - c L, 1.24492e-7 m at 9 m dry."""
-    result, = solve("c", uplift="none")
+    (result,) = solve("c", uplift="none")
     mean = (thrust(9) - 0.35 * WEIGHT - 1000 * BASE) / (2e11 * BASE)
     assert mean == pytest.approx(1.24492e-7, rel=1e-5)
     rows = result.at()
@@ -38,28 +52,33 @@ def test_hardening_holds_the_dam_beyond_sliding(solve):
 
 
 def test_overturning(solve):
-    """A dam of half the weight without tension: the resultant leaves the base at level (6 W (b - xc)/WATER)^(1/3) = 9.097 m."""
+    """A dam of half the weight without tension: the resultant leaves the base at level (6 W (b -
+    xc)/WATER)^(1/3) = 9.097 m."""
     limit = (6 * WEIGHT / 2 * (BASE - CENTROID) / WATER) ** (1 / 3)
-    result, = solve("i", "5,10", uplift="none", rho_dam=1200, K_N=1e13, K_T=1e13)
-    assert "overturning" in result.stopped
+    (result,) = solve("i", "5,10", uplift="none", rho_dam=1200, K_N=1e13, K_T=1e13)
+    assert "overturning" in statement(result)
     assert 0.97 * limit < result.history["level"][-1] < limit
 
 
 @pytest.mark.parametrize("sigma_max", [0, 1.5e5])
 @pytest.mark.parametrize("opening", [1e-3, 1e-2])
 def test_beyond_the_critical_load_the_rigid_block_is_the_bound(solve, sigma_max, opening):
-    """K, heel opened far: W (b - xc) = p H^2/2, 5.02 m of uniform pressure, approached from below and never passed."""
+    """K, heel opened far: W (b - xc) = p H^2/2, 5.02 m of uniform pressure, approached from below
+    and never passed."""
     bound = WEIGHT * (BASE - CENTROID) / (WATER * 10**2 / 2)
     assert bound == pytest.approx(5.02, abs=5e-3)
-    result, = solve("k", "1,2,3,4", sigma_max=sigma_max, drive_begin=3, drive_end=4, drive_by=opening, steps=4)
+    (result,) = solve(
+        "k", "1,2,3,4", sigma_max=sigma_max, drive_begin=3, drive_end=4, drive_by=opening, steps=4
+    )
     level = result.history["level"]
     assert np.all(level < bound) and level[-1] > 0.99 * bound
     assert result.heel[-1] - result.heel[11] == pytest.approx(opening, rel=1e-9)
 
 
 def test_published_opening_stays_below_the_bound_and_rises(solve):
-    """K as published: past 3.34 (the last load that load control reached) the curve goes on without snap-back."""
-    result, = solve("k")
+    """K as published: past 3.34 (the last load that load control reached) the curve goes on without
+    snap-back."""
+    (result,) = solve("k")
     level, heel = result.history["level"], result.heel
     assert np.all(np.diff(level) > 0) and np.all(np.diff(heel) > 0)
     assert level.max() < 5.02
@@ -68,12 +87,17 @@ def test_published_opening_stays_below_the_bound_and_rises(solve):
 
 @pytest.mark.parametrize("drive", ["heel", "crest"])
 def test_driven_by_a_displacement_passes_through_the_same_states(solve, drive):
-    """A from 8 m on by the heel's opening or the crest's displacement: at the levels found, level control agrees."""
+    """A from 8 m on by the heel's opening or the crest's displacement: at the levels found, level
+    control agrees."""
     by = {"heel": 6e-7, "crest": 1e-6}[drive]
-    driven, = solve("a", steps=5, uplift="imposed", drive=drive, drive_begin=3, drive_end=4, drive_by=by)
+    (driven,) = solve(
+        "a", steps=5, uplift="imposed", drive=drive, drive_begin=3, drive_end=4, drive_by=by
+    )
     found = driven.history["level"][-5:]
     assert found[0] > 8 and np.all(np.diff(found) > 0)
-    controlled, = solve("a", ",".join(map(repr, [3.0, 6.0, 8.0, *map(float, found)])), uplift="imposed")
+    (controlled,) = solve(
+        "a", ",".join(map(repr, [3.0, 6.0, 8.0, *map(float, found)])), uplift="imposed"
+    )
     assert_allclose(controlled.heel[-5:], driven.heel[-5:], rtol=1e-5)
     assert_allclose(controlled.history["crest_ux"][-5:], driven.history["crest_ux"][-5:], rtol=1e-5)
 

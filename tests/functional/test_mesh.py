@@ -2,29 +2,54 @@
 
 import numpy as np
 import pytest
-from damjoint import mesh, parameters
+from damjoint.scene import mesh
+from damjoint.scene.case import load
 
 # Bulk and joint elements in the verification document's table.
-PUBLISHED = {"a": (2264, 50), "i": (2264, 50), "e": (3626, 100), "g": (3626, 100), "c": (860 + 34, 50), "j": (860 + 34, 50),
-             "b": (37583, 1146), "d": (37583, 1146), "f": (7435, 200), "h": (7435, 200)}
+PUBLISHED = {
+    "a": (2264, 50),
+    "i": (2264, 50),
+    "e": (3626, 100),
+    "g": (3626, 100),
+    "c": (860 + 34, 50),
+    "j": (860 + 34, 50),
+    "b": (37583, 1146),
+    "d": (37583, 1146),
+    "f": (7435, 200),
+    "h": (7435, 200),
+}
 
 
 @pytest.mark.parametrize("name", PUBLISHED)
 def test_element_counts(name, tmp_path):
-    counts = mesh.write_mesh(parameters.load(name), tmp_path / "scene.msh")
+    counts = mesh.write_mesh(load(name), tmp_path / "scene.msh")
     assert (counts["elements"], counts["joint_elements"]) == pytest.approx(PUBLISHED[name], rel=0.1)
 
 
-@pytest.mark.parametrize("settings", [{}, {"mesh_pattern": "regular"}, {"dim": 3, "mesh_pattern": "regular", "n_layers": 2},
-                                      {"dim": 3, "mesh_pattern": "layers"}, {"dim": 3, "mesh_pattern": "split"}, {"dim": 3, "h_dam": 3, "h_found": 3}])
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {},
+        {"mesh_pattern": "regular"},
+        {"dim": 3, "mesh_pattern": "regular", "n_layers": 2},
+        {"dim": 3, "mesh_pattern": "layers"},
+        {"dim": 3, "mesh_pattern": "split"},
+        {"dim": 3, "h_dam": 3, "h_found": 3},
+    ],
+)
 def test_area_of_dam_and_foundation(tmp_path, settings):
     """32.5 and 15 x 5 m2 (times the thickness), by the sum over the elements."""
     import gmsh
 
-    mesh.write_mesh(parameters.load("dam", {"n_joint": 10, "thickness": 0.5, **settings}), tmp_path / "scene.msh")
+    mesh.write_mesh(
+        load("ssnp142", {"n_joint": 10, "thickness": 0.5, **settings}),
+        tmp_path / "scene.msh",
+    )
     dim = settings.get("dim", 2)
     for group, area in ((1, 32.5), (2, 75)):
-        size = sum(np.sum(gmsh.model.mesh.getElementQualities(tags, "volume"))
-                   for entity in gmsh.model.getEntitiesForPhysicalGroup(dim, group)
-                   for tags in gmsh.model.mesh.getElements(dim, entity)[1])
+        size = sum(
+            np.sum(gmsh.model.mesh.getElementQualities(tags, "volume"))
+            for entity in gmsh.model.getEntitiesForPhysicalGroup(dim, group)
+            for tags in gmsh.model.mesh.getElements(dim, entity)[1]
+        )
         assert size == pytest.approx(area * (0.5 if dim == 3 else 1), rel=1e-9)

@@ -4,7 +4,7 @@ import csv
 
 import pytest
 from closed_forms import slide_level
-from damjoint import sweep
+from damjoint.studies import sweep
 from distributed import LocalCluster
 
 
@@ -14,10 +14,26 @@ def rows(path):
 
 
 def test_rows_are_the_runs(solve, command, tmp_path):
-    words = "sweep", "c", "--vary", "mu=0.35,0.4", "--vary", "level=8,9", "--jobs", "1", "--out", "sweep.csv"
+    words = (
+        "sweep",
+        "c",
+        "--vary",
+        "mu=0.35,0.4",
+        "--vary",
+        "level=8,9",
+        "--jobs",
+        "1",
+        "--out",
+        "sweep.csv",
+    )
     assert command(*words)[0] == 0
     table = rows(tmp_path / "sweep.csv")
-    assert [(row["mu"], row["level_asked"]) for row in table] == [("0.35", "8"), ("0.35", "9"), ("0.4", "8"), ("0.4", "9")]
+    assert [(row["mu"], row["level_asked"]) for row in table] == [
+        ("0.35", "8"),
+        ("0.35", "9"),
+        ("0.4", "8"),
+        ("0.4", "9"),
+    ]
     for row in table:
         levels = "3,6,8" if row["level_asked"] == "8" else "3,6,8,9"
         history = solve("c", levels, uplift="imposed", mu=float(row["mu"]))[0].history
@@ -27,38 +43,80 @@ def test_rows_are_the_runs(solve, command, tmp_path):
 
 def test_a_sweep_is_resumed(command, tmp_path):
     """Half of it, then all of it on two processes: the rows already there stay as they are."""
-    sweep = lambda mu: command("sweep", "c", "--vary", f"mu={mu}", "--jobs", "2", "--out", "sweep.csv")  # noqa: E731
+    sweep = lambda mu: command(
+        "sweep", "c", "--vary", f"mu={mu}", "--jobs", "2", "--out", "sweep.csv"
+    )
     assert sweep("0.3:0.4:0.1")[0] == 0
     before = (tmp_path / "sweep.csv").read_text()
     assert sweep("0.3:0.5:0.1")[0] == 0
     after = (tmp_path / "sweep.csv").read_text()
-    assert after.startswith(before) and sorted(row["mu"] for row in rows(tmp_path / "sweep.csv")) == ["0.3", "0.4", "0.5"]
+    assert after.startswith(before) and sorted(
+        row["mu"] for row in rows(tmp_path / "sweep.csv")
+    ) == ["0.3", "0.4", "0.5"]
     assert sweep("0.3:0.5:0.1")[0] == 0
     assert (tmp_path / "sweep.csv").read_text() == after
 
 
 def test_a_dam_that_slides_is_a_row_that_says_so(command, tmp_path):
-    command("sweep", "c", "--set", "pena_tang=0", "--set", "uplift=none", "--vary", "mu=0.25,0.3", "--jobs", "1", "--out", "sweep.csv")
+    command(
+        "sweep",
+        "c",
+        "--set",
+        "pena_tang=0",
+        "--set",
+        "uplift=none",
+        "--vary",
+        "mu=0.25,0.3",
+        "--jobs",
+        "1",
+        "--out",
+        "sweep.csv",
+    )
     for row in rows(tmp_path / "sweep.csv"):
-        assert row["stopped"].startswith("sliding")
-        assert float(row["level"]) == pytest.approx(slide_level(float(row["mu"]), 1000, False), rel=2e-3)
+        assert row["verdict"] == "sliding" and row["statement"].startswith("sliding")
+        assert float(row["level"]) == pytest.approx(
+            slide_level(float(row["mu"]), 1000, False), rel=2e-3
+        )
 
 
 def test_no_level_without_equilibrium(command, tmp_path):
-    """Without tensile strength the shear goes as soon as a point opens: a jump of the law that no level may fall into."""
-    command("sweep", "a", "--set", "sigma_max=0", "--vary", "level=8:9:0.02", "--jobs", "1", "--out", "sweep.csv")
-    openings = [float(row["max_opening"]) for row in rows(tmp_path / "sweep.csv") if not row["stopped"]]
+    """Without tensile strength the shear goes as soon as a point opens: a jump of the law that no
+    level may fall into."""
+    command(
+        "sweep",
+        "a",
+        "--set",
+        "sigma_max=0",
+        "--vary",
+        "level=8:9:0.02",
+        "--jobs",
+        "1",
+        "--out",
+        "sweep.csv",
+    )
+    openings = [
+        float(row["max_opening"])
+        for row in rows(tmp_path / "sweep.csv")
+        if row["verdict"] == "stands"
+    ]
     assert len(openings) == 51 and openings == sorted(openings)
 
 
 def test_a_scheduler_with_two_workers(tmp_path):
     """The same rows as in this process, from a dask cluster of two processes."""
     vary = ["mu=0.35,0.4", "level=8,9"]
-    with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
-        assert sweep.sweep("c", vary, {}, tmp_path / "far.csv", scheduler=cluster.scheduler_address) == 4
+    with LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+    ) as cluster:
+        assert (
+            sweep.sweep("c", vary, {}, tmp_path / "far.csv", scheduler=cluster.scheduler_address)
+            == 4
+        )
     assert sweep.sweep("c", vary, {}, tmp_path / "near.csv", jobs=1) == 4
-    by_key = lambda name: {row["key"]: row for row in rows(tmp_path / name)}  # noqa: E731
+    by_key = lambda name: {row["key"]: row for row in rows(tmp_path / name)}
     far, near = by_key("far.csv"), by_key("near.csv")
     assert far.keys() == near.keys()
     for key, row in near.items():
-        assert {k: v for k, v in far[key].items() if k != "residual"} == {k: v for k, v in row.items() if k != "residual"}
+        assert {k: v for k, v in far[key].items() if k != "residual"} == {
+            k: v for k, v in row.items() if k != "residual"
+        }

@@ -1,19 +1,33 @@
 """The eleven modelings of SSNP142 against the published numbers, and how hard they are to solve."""
 
 import pytest
-from damjoint import validate
+from damjoint.results import validation
 
-#: at most so many Newton iterations: in one step, in all of them (both uplifts of a, b, i counted apart)
-ITERATIONS = {"a": (6, None), "b": (6, None), "c": (5, None), "d": (5, None), "e": (None, 45), "f": (None, 50),
-              "g": (None, 32), "h": (None, 14), "i": (6, None), "j": (5, None), "k": (None, 120)}
-MODELINGS = [pytest.param(name, marks=pytest.mark.heavy) if name in "bdfh" else name for name in ITERATIONS]
+#: at most so many Newton iterations: in one step, in all of them (both uplifts of a, b, i counted
+#: apart)
+ITERATIONS = {
+    "a": (6, None),
+    "b": (6, None),
+    "c": (5, None),
+    "d": (5, None),
+    "e": (None, 45),
+    "f": (None, 50),
+    "g": (None, 32),
+    "h": (None, 14),
+    "i": (6, None),
+    "j": (5, None),
+    "k": (None, 120),
+}
+MODELINGS = [
+    pytest.param(name, marks=pytest.mark.heavy) if name in "bdfh" else name for name in ITERATIONS
+]
 
 
 @pytest.mark.parametrize("name", MODELINGS)
 def test_reference_values(solve, name):
-    comparisons = [c for result in solve(name) for c in validate.compare(result)]
+    comparisons = [c for result in solve(name) for c in validation.compare(result)]
     missed = [c for c in comparisons if c.verdict == "fail"]
-    assert not missed, "\n" + validate.report(missed)
+    assert not missed, "\n" + validation.report(missed)
     assert sum(c.verdict == "pass" for c in comparisons) >= 5
 
 
@@ -40,8 +54,8 @@ def test_validate_fails_with_1(command, monkeypatch):
     """With the first case's references moved by 10 %."""
     from dataclasses import replace
 
-    rows = [replace(r, value=1.1 * r.value) for r in validate.table() if r.tolerance]
-    monkeypatch.setattr(validate, "table", lambda: rows)
+    rows = [replace(r, value=1.1 * r.value) for r in validation.table() if r.tolerance]
+    monkeypatch.setattr(validation, "table", lambda: rows)
     code, out, _ = command("validate", "c")
     assert code == 1
     assert " 0 failed" not in out.splitlines()[-1]

@@ -1,4 +1,5 @@
-"""Bad input: exit code 2, one line that names parameter, value and what is allowed, and nothing left behind."""
+"""Bad input: exit code 2, one line that names parameter, value and what is allowed, and nothing
+left behind."""
 
 import subprocess
 import sys
@@ -19,54 +20,102 @@ def refuse(command, tmp_path, words, parts):
     assert sorted(tmp_path.rglob("*")) == before
 
 
-@pytest.mark.parametrize("setting, allowed", [
-    ("E=abc", "> 0"), ("E=0", "> 0"), ("E=-3e12", "> 0"), ("E=nan", "> 0"), ("E=inf", "> 0"), ("E=", "> 0"), ("nu=0.5", "< 0.5"),
-    ("nu=-0.1", ">= 0"), ("K_N=0", "> 0"), ("K_N=-1e12", "> 0"), ("K_T=0", "> 0"), ("alpha=-0.1", ">= 0"),
-    ("alpha=2.1", "<= 2"), ("sigma_max=-1", ">= 0"), ("pena_rupture=0", "> 0"), ("pena_contact=0", "> 0"),
-    ("mu=-0.35", "> 0"), ("adhesion=-1", ">= 0"), ("pena_tang=-1", ">= 0"), ("visc=0", "> 0"), ("aperture_min=0", "> 0"),
-    ("dim=4", "2, 3"), ("order=3", "1, 2"), ("n_joint=2.5", "integer"), ("n_joint=0", ">= 1"), ("law=glue", "rupture, friction"),
-    ("uplift=some", "none, imposed, flow"), ("mesh_pattern=odd", "free, regular, layers, split"), ("thickness=-1", "> 0")])
+@pytest.mark.parametrize(
+    "setting, allowed",
+    [
+        ("E=abc", "> 0"),
+        ("E=0", "> 0"),
+        ("E=-3e12", "> 0"),
+        ("E=nan", "> 0"),
+        ("E=inf", "> 0"),
+        ("E=", "> 0"),
+        ("nu=0.5", "< 0.5"),
+        ("nu=-0.1", ">= 0"),
+        ("K_N=0", "> 0"),
+        ("K_N=-1e12", "> 0"),
+        ("K_T=0", "> 0"),
+        ("alpha=-0.1", ">= 0"),
+        ("alpha=2.1", "<= 2"),
+        ("sigma_max=-1", ">= 0"),
+        ("pena_rupture=0", "> 0"),
+        ("pena_contact=0", "> 0"),
+        ("mu=-0.35", "> 0"),
+        ("adhesion=-1", ">= 0"),
+        ("pena_tang=-0.5", ">= 0, or -1: (K_N + K_T) 1e-6"),
+        ("E_dam=0", "> 0, or -1: E"),
+        ("tolerance=1", "<= 0.001"),
+        ("visc=0", "> 0"),
+        ("aperture_min=0", "> 0"),
+        ("dim=4", "2, 3"),
+        ("order=3", "1, 2"),
+        ("n_joint=2.5", "integer"),
+        ("n_joint=0", ">= 1"),
+        ("law=glue", "rupture, friction"),
+        ("uplift=some", "none, imposed, flow"),
+        ("mesh_pattern=odd", "free, regular, layers, split"),
+        ("thickness=-1", "> 0"),
+    ],
+)
 def test_parameter_out_of_range(command, tmp_path, setting, allowed):
     name, value = setting.split("=")
     refuse(command, tmp_path, (*RUN, "--set", setting), (f"{name} = {value}", allowed))
 
 
-@pytest.mark.parametrize("words, parts", [
-    (("run", "z"), ("case z", "unknown", "a, b, c")),
-    (("run", "none.case"), ("case none.case", "unknown")),
-    (("validate", "zz"), ("case zz", "unknown")),
-    (("validate", "dam"), ("case dam", "reference", "a, b, c")),
-    (("sweep", "a", "--vary", "mu"), ("--vary mu", "NAME=V1,V2")),
-    (("sweep", "a", "--vary", "mu=0.1:0.5:-0.1"), ("--vary mu=0.1:0.5:-0.1", "step")),
-    (("sweep", "a", "--vary", "mu=-1,1"), ("mu = -1", "> 0")),
-    (("sweep", "a", "--vary", "level=9,12"), ("levels = 12", TO_CREST)),
-    ((*RUN, "--set", "KN=1e12"), ("KN", "unknown parameter", "K_N")),
-    ((*RUN, "--set", "E"), ("--set E", "NAME=VALUE")),
-    ((*RUN, "--levels", "3,11"), ("levels = 11", TO_CREST)),
-    ((*RUN, "--levels", "3,-1"), ("levels = -1", TO_CREST)),
-    ((*RUN, "--levels", ""), ("levels = ", "list of levels in metres")),
-    ((*RUN, "--levels", "3,,6"), ("levels = 3,,6", "list of levels in metres")),
-    ((*RUN, "--levels", "3;6"), ("levels = 3;6", "list of levels in metres")),
-    ((*RUN, "--set", "dam_height=8"), ("levels = 9", "crest (8 m)")),
-    ((*RUN, "--tail-levels", "1,2"), ("tail_levels = 1,2", "one level or as many as levels (4)")),
-    ((*RUN, "--levels", "3,6", "--tail-levels", "1,2,3"), ("tail_levels = 1,2,3", "(2)")),
-    ((*RUN, "--tail-levels", "-1"), ("tail_levels = -1", TO_CREST)),
-    ((*RUN, "--tail-levels=-1"), ("tail_levels = -1", TO_CREST)),
-    ((*RUN, "--engine", "fast"), ("engine = fast", "getdp")),
-    ((*RUN, "--steps", "0"), ("steps = 0", "integer >= 1")),
-    ((*RUN, "--steps", "-2"), ("steps = -2", "integer >= 1")),
-    pytest.param((*RUN, "--steps", "1.5"), ("steps", "1.5", "integer >= 1")),
-    pytest.param((*RUN, "--levels", "-1,3"), ("levels = -1", TO_CREST))])
+@pytest.mark.parametrize(
+    "words, parts",
+    [
+        (("run", "z"), ("case z", "unknown", "a, b, c")),
+        (("run", "none.case"), ("case none.case", "unknown")),
+        (("validate", "zz"), ("case zz", "unknown")),
+        (("validate", "dam"), ("case dam", "reference", "a, b, c")),
+        (("sweep", "a", "--vary", "mu"), ("--vary mu", "NAME=V1,V2")),
+        (("sweep", "a", "--vary", "mu=0.1:0.5:-0.1"), ("--vary mu=0.1:0.5:-0.1", "step")),
+        (("sweep", "a", "--vary", "mu=-1,1"), ("mu = -1", "> 0")),
+        (("sweep", "a", "--vary", "level=9,12"), ("levels = 12", TO_CREST)),
+        ((*RUN, "--set", "KN=1e12"), ("KN", "unknown parameter", "K_N")),
+        ((*RUN, "--set", "E"), ("--set E", "NAME=VALUE")),
+        ((*RUN, "--levels", "3,11"), ("levels = 11", TO_CREST)),
+        ((*RUN, "--levels", "3,-1"), ("levels = -1", TO_CREST)),
+        ((*RUN, "--levels", ""), ("levels = ", "list of levels in metres")),
+        ((*RUN, "--levels", "3,,6"), ("levels = 3,,6", "list of levels in metres")),
+        ((*RUN, "--levels", "3;6"), ("levels = 3;6", "list of levels in metres")),
+        ((*RUN, "--set", "dam_height=8"), ("levels = 9", "crest (8 m)")),
+        (
+            (*RUN, "--tail-levels", "1,2"),
+            ("tail_levels = 1,2", "one level or as many as levels (4)"),
+        ),
+        ((*RUN, "--levels", "3,6", "--tail-levels", "1,2,3"), ("tail_levels = 1,2,3", "(2)")),
+        ((*RUN, "--tail-levels", "-1"), ("tail_levels = -1", TO_CREST)),
+        ((*RUN, "--tail-levels=-1"), ("tail_levels = -1", TO_CREST)),
+        ((*RUN, "--engine", "fast"), ("engine = fast", "getdp")),
+        ((*RUN, "--steps", "0"), ("steps = 0", "integer >= 1")),
+        ((*RUN, "--steps", "-2"), ("steps = -2", "integer >= 1")),
+        pytest.param((*RUN, "--steps", "1.5"), ("steps", "1.5", "integer >= 1")),
+        pytest.param((*RUN, "--levels", "-1,3"), ("levels = -1", TO_CREST)),
+    ],
+)
 def test_bad_words(command, tmp_path, words, parts):
     refuse(command, tmp_path, words, parts)
 
 
 def test_unwritable_output_folder(command, tmp_path):
     (tmp_path / "file").write_text("in the way")
-    refuse(command, tmp_path, (*RUN, "--out", tmp_path / "file" / "below"), ("out = ", "file/below", "folder that can be written"))
+    refuse(
+        command,
+        tmp_path,
+        (*RUN, "--out", tmp_path / "file" / "below"),
+        ("out = ", "file/below", "folder that can be written"),
+    )
 
 
-@pytest.mark.parametrize("words", [(*RUN, "--engine", "getdp"), ("validate", "a", "--engine", "getdp"), ("law", "rupture", "--path", "path.csv")])
+@pytest.mark.parametrize(
+    "words",
+    [
+        (*RUN, "--engine", "getdp"),
+        ("validate", "a", "--engine", "getdp"),
+        ("law", "rupture", "--path", "path.csv"),
+    ],
+)
 def test_missing_getdp(command, tmp_path, monkeypatch, words):
     monkeypatch.setenv("GETDP", "/no/such/getdp")
     (tmp_path / "path.csv").write_text("delta_n,delta_t1,delta_t2\n0,0,0\n")
@@ -76,16 +125,36 @@ def test_missing_getdp(command, tmp_path, monkeypatch, words):
 GOOD = "delta_n,delta_t1,delta_t2\n0,0,0\n"
 
 
-@pytest.mark.parametrize("law, text, parts", [
-    ("glue", GOOD, ("law = glue", "rupture, friction")),
-    ("rupture", None, ("path = path.csv", "No such file")),
-    ("rupture", "", ("path = path.csv", "delta_n,delta_t1,delta_t2")),
-    ("rupture", "delta_n,delta_t1,delta_t2\n", ("path = path.csv", "at least one row")),
-    ("rupture", "delta_n,delta_t1\n0,0\n", ("path = path.csv", "delta_n,delta_t1,delta_t2")),
-    ("friction", "delta_n,delta_t1,delta_t2\n0,zero,0\n", ("path = path.csv", "delta_t1", "numbers")),
-    ("friction", "delta_n,delta_t1,delta_t2\n0,0\n", ("path = path.csv", "delta_t2", "numbers")),
-    ("friction", "delta_n,delta_t1,delta_t2\n0,0,inf\n", ("path = path.csv", "delta_t2", "finite")),
-    ("friction", "delta_n,delta_t1,delta_t2,p\n0,0,0,nan\n", ("path = path.csv", "column p", "finite"))])
+@pytest.mark.parametrize(
+    "law, text, parts",
+    [
+        ("glue", GOOD, ("law = glue", "rupture, friction")),
+        ("rupture", None, ("path = path.csv", "No such file")),
+        ("rupture", "", ("path = path.csv", "delta_n,delta_t1,delta_t2")),
+        ("rupture", "delta_n,delta_t1,delta_t2\n", ("path = path.csv", "at least one row")),
+        ("rupture", "delta_n,delta_t1\n0,0\n", ("path = path.csv", "delta_n,delta_t1,delta_t2")),
+        (
+            "friction",
+            "delta_n,delta_t1,delta_t2\n0,zero,0\n",
+            ("path = path.csv", "delta_t1", "numbers"),
+        ),
+        (
+            "friction",
+            "delta_n,delta_t1,delta_t2\n0,0\n",
+            ("path = path.csv", "delta_t2", "numbers"),
+        ),
+        (
+            "friction",
+            "delta_n,delta_t1,delta_t2\n0,0,inf\n",
+            ("path = path.csv", "delta_t2", "finite"),
+        ),
+        (
+            "friction",
+            "delta_n,delta_t1,delta_t2,p\n0,0,0,nan\n",
+            ("path = path.csv", "column p", "finite"),
+        ),
+    ],
+)
 def test_bad_path_file(command, tmp_path, law, text, parts):
     if text is not None:
         (tmp_path / "path.csv").write_text(text)
@@ -94,29 +163,49 @@ def test_bad_path_file(command, tmp_path, law, text, parts):
 
 def test_law_into_a_missing_folder(command, tmp_path):
     (tmp_path / "path.csv").write_text(GOOD)
-    refuse(command, tmp_path, ("law", "rupture", "--path", "path.csv", "--out", "no/answer.csv"), ("out = no/answer.csv", "existing folder"))
+    refuse(
+        command,
+        tmp_path,
+        ("law", "rupture", "--path", "path.csv", "--out", "no/answer.csv"),
+        ("out = no/answer.csv", "existing folder"),
+    )
 
 
 def test_bad_setting_of_a_law(command, tmp_path):
     (tmp_path / "path.csv").write_text(GOOD)
-    refuse(command, tmp_path, ("law", "rupture", "--path", "path.csv", "--set", "alpha=3"), ("alpha = 3", "<= 2"))
+    refuse(
+        command,
+        tmp_path,
+        ("law", "rupture", "--path", "path.csv", "--set", "alpha=3"),
+        ("alpha = 3", "<= 2"),
+    )
 
 
 def test_level_that_is_no_number(tmp_path):
     """In a process of its own: Gmsh's parser stumbles."""
-    done = subprocess.run([sys.executable, "-m", "damjoint.cli", *RUN, "--levels", "3,nan"], cwd=tmp_path, capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-m", "damjoint.cli", *RUN, "--levels", "3,nan"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+    )
     assert done.returncode == 2
     assert done.stdout == "" and len(done.stderr.splitlines()) == 1 and "nan" in done.stderr
 
 
 def test_a_bad_case_does_not_spoil_the_next_one(tmp_path):
-    (tmp_path / "bad.case").write_text("default_nu = unheard_of; default_E = 1e9;\ntimes() = {1};\n")
+    (tmp_path / "bad.case").write_text(
+        "default_nu = unheard_of; default_E = 1e9;\ntimes() = {1};\n"
+    )
     script = """
-from damjoint import InputError, parameters
+from damjoint import InputError
+from damjoint.scene.case import load
 try:
-    parameters.load("bad.case")
+    load("bad.case")
 except InputError:
-    print(parameters.load("a")["E"])
+    print(load("a")["E"])
 """
-    done = subprocess.run([sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True
+    )
     assert done.stdout.split() == ["3000000000000.0"], done.stderr

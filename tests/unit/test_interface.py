@@ -1,11 +1,11 @@
-"""The joint's linear systems: the changed points' system is the whole one; flow's derivatives are derivatives."""
+"""The joint's linear systems: the changed points' system is the whole one; flow's derivatives are
+derivatives."""
 
 import numpy as np
 import pytest
-from damjoint import parameters
-from damjoint.condense import condense
-from damjoint.interface import lu_solve
-from damjoint.mesh import Mesh
+from damjoint.engines.condensed.bulk import Bodies, condense
+from damjoint.engines.condensed.interface import Interface, lu_solve
+from damjoint.scene.case import load
 from numpy.testing import assert_allclose
 
 SMALL = {"n_joint": 10.0, "h_dam": 3.0, "h_found": 4.0, "order": 2.0}
@@ -14,15 +14,20 @@ VIRGIN = np.diag([1e12, 2e12, 2e12])
 
 @pytest.fixture(scope="module", params=[2, 3])
 def interface(request):
-    solid = {"dim": 3.0, "thickness": 0.5, "n_layers": 1.0, "hold_z": 1.0} if request.param == 3 else {"dim": 2.0}
-    case = parameters.load("e", SMALL | solid)
-    return condense(case, Mesh(case), False).interface
+    solid = (
+        {"dim": 3.0, "thickness": 0.5, "n_layers": 1.0, "hold_z": 1.0}
+        if request.param == 3
+        else {"dim": 2.0}
+    )
+    case = load("e", SMALL | solid)
+    return Interface(condense(case, Bodies.of(case)))
 
 
 @pytest.mark.parametrize("flowing", [False, True])
 @pytest.mark.parametrize("bordered", [False, True])
 def test_the_changed_points_make_the_whole_system(interface, flowing, bordered):
-    """A third of the points with another, unsymmetric tangent; pressures that depend on some of the unknowns."""
+    """A third of the points with another, unsymmetric tangent; pressures that depend on some of the
+    unknowns."""
     rng = np.random.default_rng(142)
     number, size = len(interface.points.weights), len(interface.bulk.free)
     tangent = np.broadcast_to(VIRGIN, (number, 3, 3)).copy()
@@ -60,9 +65,14 @@ def test_pressures_derivatives(interface):
         return flow.solve((1 + opening) ** 3 * weights, drop)
 
     opening = np.maximum(flow.opening @ jump, 0)
-    by_jump, columns, by_drop = flow.sensitivity(pressure(jump, drop)[1], np.where(opening > 0, 3 * (1 + opening) ** 2, 0) * weights)
+    by_jump, columns, by_drop = flow.sensitivity(
+        pressure(jump, drop)[1], np.where(opening > 0, 3 * (1 + opening) ** 2, 0) * weights
+    )
     direction = rng.normal(size=len(jump))
-    for given, along, push in ((by_jump @ direction[columns], direction, 0), (by_drop, 0 * direction, 1)):
+    for given, along, push in (
+        (by_jump @ direction[columns], direction, 0),
+        (by_drop, 0 * direction, 1),
+    ):
         ahead, behind = (pressure(jump + h * along, drop + h * push)[0] for h in (1e-5, -1e-5))
         assert_allclose(given, (ahead - behind) / 2e-5, rtol=0, atol=1e-5 * np.abs(given).max())
 

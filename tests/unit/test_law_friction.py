@@ -1,8 +1,9 @@
-"""The friction law of pro/law_friction.pro against closed forms (code_aster R7.01.25, JOINT_MECA_FROT)."""
+"""The friction law of pro/law_friction.pro against closed forms (code_aster R7.01.25,
+JOINT_MECA_FROT)."""
 
 import numpy as np
 import pytest
-from damjoint import law
+from damjoint.engines.getdp import law
 from numpy.testing import assert_allclose
 
 K_N, K_T, MU, C = 1e12, 2e12, 0.35, 1000.0
@@ -21,7 +22,8 @@ def shear(d_t, d_n=PRESSED, **settings):
 
 
 def closed_form(jumps, hardening):
-    """sigma_n, tau_1, tau_2, lambda along a path: implicit return to |tau| = c - mu sigma + H lambda."""
+    """sigma_n, tau_1, tau_2, lambda along a path: implicit return to |tau| = c - mu sigma + H
+    lambda."""
     slip, total, rows = np.zeros(2), 0.0, []
     for d_n, *d_t in jumps:
         sigma = min(K_N * d_n, C / MU)
@@ -49,11 +51,14 @@ def test_hardening_slope(hardening):
     """While slipping d tau/d delta_t = K_T H/(K_T + H)."""
     d_t = np.array([4e-9, 9e-9])
     tau = shear(d_t, pena_tang=hardening)["tau_1"]
-    assert_allclose(tau, YIELD + K_T * hardening / (K_T + hardening) * (d_t - YIELD / K_T), rtol=1e-9)
+    assert_allclose(
+        tau, YIELD + K_T * hardening / (K_T + hardening) * (d_t - YIELD / K_T), rtol=1e-9
+    )
 
 
 def test_a_cycle_dissipates():
-    """Between +-a without hardening the loop encloses 4 tau_y (a - tau_y/K_T); the cumulated slip only grows."""
+    """Between +-a without hardening the loop encloses 4 tau_y (a - tau_y/K_T); the cumulated slip
+    only grows."""
     a = 6e-9
     d_t = a * np.interp(np.arange(101), [0, 20, 60, 100], [0, 1, -1, 1])
     answer = shear(d_t)
@@ -70,7 +75,9 @@ def test_slip_follows_the_shear_in_3d():
     jumps = [(PRESSED, *(d * way)) for d in (1e-9, 5e-9)]
     answer = along(jumps)
     assert_allclose([answer["tau_1"][1], answer["tau_2"][1]], YIELD * way, rtol=1e-9)
-    assert_allclose([answer["slip_1"][1], answer["slip_2"][1]], (5e-9 - YIELD / K_T) * way, rtol=1e-9)
+    assert_allclose(
+        [answer["slip_1"][1], answer["slip_2"][1]], (5e-9 - YIELD / K_T) * way, rtol=1e-9
+    )
     assert_allclose(answer["lambda"], [0, 5e-9 - YIELD / K_T], rtol=1e-9, atol=1e-20)
 
 
@@ -115,5 +122,7 @@ def test_random_walk(hardening):
     walk[:, 0] = 1e-8 * np.sin(np.arange(120) / 9)
     answer = along(walk, pena_tang=hardening)
     expected = closed_form(walk, hardening)
-    for name, column, scale in zip(("sigma_n", "tau_1", "tau_2", "lambda"), expected.T, (1e4, 1e4, 1e4, 1e-8), strict=True):
+    for name, column, scale in zip(
+        ("sigma_n", "tau_1", "tau_2", "lambda"), expected.T, (1e4, 1e4, 1e4, 1e-8), strict=True
+    ):
         assert_allclose(answer[name], column, rtol=1e-9, atol=1e-9 * scale, err_msg=name)

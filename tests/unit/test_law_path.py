@@ -4,7 +4,7 @@ import csv
 import io
 
 import numpy as np
-from damjoint import law
+from damjoint.engines.getdp import law
 from numpy.testing import assert_allclose
 
 
@@ -14,14 +14,26 @@ def columns(text):
 
 
 def test_path_file_to_standard_output_and_to_a_file(command, tmp_path):
-    """Rupture by hand: 1e-10 m is the peak, 1.1e-10 m half way down, -1e-9 m in contact; p comes off sigma_n."""
-    (tmp_path / "path.csv").write_text("delta_n,delta_t1,delta_t2,p\n1e-10,0,0,0\n1.1e-10,0,0,1000\n-1e-9,2e-9,-1e-9,0\n")
-    words = "law", "rupture", "--path", "path.csv", "--set", "sigma_max=100", "--set", "K_T=5e11"
+    """Rupture by hand: 1e-10 m is the peak, 1.1e-10 m half way down, -1e-9 m in contact; p comes
+    off sigma_n."""
+    (tmp_path / "path.csv").write_text(
+        "delta_n,delta_t1,delta_t2,p\n1e-10,0,0,0\n1.1e-10,0,0,1000\n-1e-9,2e-9,-1e-9,0\n"
+    )
+    settings = "K_N=1e12", "K_T=5e11", "sigma_max=100", "pena_rupture=0.2"
+    words = "law", "rupture", "--path", "path.csv", *(w for s in settings for w in ("--set", s))
     code, out, err = command(*words)
     assert (code, err) == (0, "")
     assert command(*words, "--out", "answer.csv") == (0, "", "")
     for table in (columns(out), columns((tmp_path / "answer.csv").read_text())):
-        assert list(table)[:7] == ["delta_n", "delta_t1", "delta_t2", "p", "sigma_n", "tau_1", "tau_2"]
+        assert list(table)[:7] == [
+            "delta_n",
+            "delta_t1",
+            "delta_t2",
+            "p",
+            "sigma_n",
+            "tau_1",
+            "tau_2",
+        ]
         assert_allclose(table["sigma_n"], [100, 50 - 1000, -1000], rtol=1e-9)
         assert_allclose(table["tau_1"], [0, 0, 1000], rtol=1e-9, atol=1e-9)
         assert_allclose(table["tau_2"], [0, 0, -500], rtol=1e-9, atol=1e-9)
@@ -30,15 +42,22 @@ def test_path_file_to_standard_output_and_to_a_file(command, tmp_path):
 
 def test_friction_without_a_pressure_column(command, tmp_path):
     (tmp_path / "path.csv").write_text("delta_n, delta_t1, delta_t2\n-1e-8, 3e-9, 0\n")
-    code, out, _ = command("law", "friction", "--path", "path.csv", "--set", "K_T=2e12", "--set", "pena_tang=0")
+    settings = "K_N=1e12", "K_T=2e12", "mu=0.35", "adhesion=1000", "pena_tang=0"
+    words = "law", "friction", "--path", "path.csv", *(w for s in settings for w in ("--set", s))
+    code, out, _ = command(*words)
     assert code == 0
     table = columns(out)
     assert_allclose([table["sigma_n"][0], table["tau_1"][0]], [-1e4, 4500], rtol=1e-9)
-    assert_allclose([table["lambda"][0], table["slip_1"][0], table["slip_2"][0]], [0.75e-9, 0.75e-9, 0], rtol=1e-9)
+    assert_allclose(
+        [table["lambda"][0], table["slip_1"][0], table["slip_2"][0]],
+        [0.75e-9, 0.75e-9, 0],
+        rtol=1e-9,
+    )
 
 
 def test_long_path():
     """A thousand rows: more than GetDP reads in one line."""
     closing = -np.linspace(1e-10, 1e-9, 1000)
-    answer = law.evaluate("rupture", np.column_stack([closing, closing, 0 * closing]))
+    jumps = np.column_stack([closing, closing, 0 * closing])
+    answer = law.evaluate("rupture", jumps, settings={"K_N": 1e12})
     assert_allclose(answer["sigma_n"], 1e12 * closing, rtol=1e-12)

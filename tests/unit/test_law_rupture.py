@@ -1,8 +1,9 @@
-"""The rupture law of pro/law_rupture.pro against its closed form (code_aster R7.01.25, JOINT_MECA_RUPT)."""
+"""The rupture law of pro/law_rupture.pro against its closed form (code_aster R7.01.25,
+JOINT_MECA_RUPT)."""
 
 import numpy as np
 import pytest
-from damjoint import law
+from damjoint.engines.getdp import law
 from numpy.testing import assert_allclose
 
 K_N, K_T, S, P = 1e12, 5e11, 100.0, 0.2
@@ -23,7 +24,9 @@ def closed_form(jumps, sigma_max=S, alpha=1.0, pena_contact=1.0):
     """sigma_n, tau_1, tau_2 along a path, row by row."""
     d_e = sigma_max / K_N
     l_c = (1 + P) * d_e
-    l_ct = max({0: 0.0, 2: np.inf}.get(alpha, l_c * np.tan(alpha * np.pi / 4)), 1e-12)  # "at once" is 1e-12 m
+    l_ct = max(
+        {0: 0.0, 2: np.inf}.get(alpha, l_c * np.tan(alpha * np.pi / 4)), 1e-12
+    )  # "at once" is 1e-12 m
     kappa, free, rows = d_e, np.zeros(2), []
     for d_n, *d_t in jumps:
         peak = sigma_max * (1 + P) / P
@@ -48,7 +51,8 @@ def test_monotone_opening_by_hand():
 
 
 def test_unloading_to_the_origin_and_reloading_by_hand():
-    """From 50 Pa at 1.1e-10 m along the secant; back to the same point; on along the softening line."""
+    """From 50 Pa at 1.1e-10 m along the secant; back to the same point; on along the softening
+    line."""
     openings = np.array([1.1, 0.55, 0.11, 0.55, 1.1, 1.15]) * 1e-10
     assert_allclose(normal(openings), [50, 25, 5, 25, 50, 25], rtol=1e-9)
 
@@ -75,7 +79,9 @@ def test_broken_stays_broken_but_still_bears_compression():
 def test_contact_stiffness(beta):
     """sigma = beta K_N delta_n in compression, K_N delta_n in tension, broken or not."""
     openings = np.array([-2.0, 0.5, 1.3, -1.0]) * 1e-10
-    assert_allclose(normal(openings, pena_contact=beta), [-200 * beta, 50, 0, -100 * beta], rtol=1e-9, atol=1e-9)
+    assert_allclose(
+        normal(openings, pena_contact=beta), [-200 * beta, 50, 0, -100 * beta], rtol=1e-9, atol=1e-9
+    )
 
 
 def test_without_strength_there_is_no_tension():
@@ -83,17 +89,27 @@ def test_without_strength_there_is_no_tension():
     assert_allclose(normal(openings, sigma_max=0), [0, 0, -1000, 0], rtol=1e-9, atol=1e-9)
 
 
-@pytest.mark.parametrize("alpha, left", [(0, 0), (1, 0.5), (1.5, 1 - 0.5 / np.tan(1.5 * np.pi / 4)), (2, 1)])
+@pytest.mark.parametrize(
+    "alpha, left", [(0, 0), (1, 0.5), (1.5, 1 - 0.5 / np.tan(1.5 * np.pi / 4)), (2, 1)]
+)
 def test_tangential_stiffness_half_way_to_rupture(alpha, left):
-    """K_t = K_T (1 - delta_n/L_CT), L_CT = L_C tan(alpha pi/4): none left at once (0), never released (2)."""
+    """K_t = K_T (1 - delta_n/L_CT), L_CT = L_C tan(alpha pi/4): none left at once (0), never
+    released (2)."""
     answer = along([(0, 2e-9, -1e-9), (0.5 * L_C, 2e-9, -1e-9)], alpha=alpha)
     assert_allclose(answer["tau_1"], K_T * 2e-9 * np.array([1, left]), rtol=1e-9, atol=1e-6)
     assert_allclose(answer["tau_2"], K_T * -1e-9 * np.array([1, left]), rtol=1e-9, atol=1e-6)
 
 
 def test_released_slip_is_remembered():
-    """Sheared elastically, opened (slides freely to 7e-9 m), closed there: the shear starts anew from 7e-9 m."""
-    jumps = [(-D_E, 1e-9, 0), (2 * L_C, 4e-9, 1e-9), (2 * L_C, 7e-9, 2e-9), (-D_E, 7e-9, 2e-9), (-D_E, 9e-9, -1e-9)]
+    """Sheared elastically, opened (slides freely to 7e-9 m), closed there: the shear starts anew
+    from 7e-9 m."""
+    jumps = [
+        (-D_E, 1e-9, 0),
+        (2 * L_C, 4e-9, 1e-9),
+        (2 * L_C, 7e-9, 2e-9),
+        (-D_E, 7e-9, 2e-9),
+        (-D_E, 9e-9, -1e-9),
+    ]
     answer = along(jumps)
     assert_allclose(answer["tau_1"], K_T * np.array([1e-9, 0, 0, 0, 2e-9]), rtol=1e-9, atol=1e-6)
     assert_allclose(answer["tau_2"], K_T * np.array([0, 0, 0, 0, -3e-9]), rtol=1e-9, atol=1e-6)
@@ -113,13 +129,24 @@ def test_pressure_lowers_the_total_normal_stress_only():
     assert_allclose(wet["tau_1"], dry["tau_1"])
 
 
-@pytest.mark.parametrize("settings", [
-    *({"alpha": alpha} for alpha in (0, 0.5, 1, 1.5, 2)), {"sigma_max": 0, "alpha": 1}, {"sigma_max": 1e4, "pena_contact": 2.5}])
+@pytest.mark.parametrize(
+    "settings",
+    [
+        *({"alpha": alpha} for alpha in (0, 0.5, 1, 1.5, 2)),
+        {"sigma_max": 0, "alpha": 1},
+        {"sigma_max": 1e4, "pena_contact": 2.5},
+    ],
+)
 def test_random_walk(settings):
-    """120 steps that open, break, close and slide in both directions, row by row the closed form."""
+    """120 steps that open, break, close and slide in both directions, row by row the closed
+    form."""
     scale = max(settings.get("sigma_max", S), 1) / K_N
     walk = np.cumsum(np.random.default_rng(142).normal(0, 0.3, (120, 3)), axis=0) * scale
     walk[:, 0] = 0.7 * scale * np.sin(np.arange(120) / 4) * np.linspace(0.5, 3, 120)
     answer = along(walk, **settings)
-    assert_allclose(np.column_stack([answer[n] for n in ("sigma_n", "tau_1", "tau_2")]), closed_form(walk, **settings),
-                    rtol=1e-9, atol=1e-9 * K_N * scale)
+    assert_allclose(
+        np.column_stack([answer[n] for n in ("sigma_n", "tau_1", "tau_2")]),
+        closed_form(walk, **settings),
+        rtol=1e-9,
+        atol=1e-9 * K_N * scale,
+    )

@@ -4,44 +4,61 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from damjoint import parameters, validate
-from damjoint.results import HISTORY, JOINT, Results, nodes_of, why_stopped
+from damjoint.engines.getdp.tables import nodes_of
+from damjoint.results import validation
+from damjoint.results.tables import HISTORY, JOINT, Results
+from damjoint.results.verdict import failed, statement, verdict
+from damjoint.scene.case import load
 
-REFERENCE = validate.Reference("A", "imposed", "delta_n", 1.3, 2e-7, "m", 0.01, "test", "", "node")
+REFERENCE = validation.Reference(
+    "A", "imposed", "delta_n", 1.3, 2e-7, "m", 0.01, "test", "", "node"
+)
 
 
 def test_reference_table():
-    rows = validate.table()
+    rows = validation.table()
     assert {r.modeling for r in rows} == set("ABCDEFGHIJK")
     assert {r.quantity for r in rows} <= {*JOINT, "flux"}
     assert {r.unit for r in rows} <= {"m", "Pa", "kg/m/s"}
     assert all(0 <= r.x <= 5 and r.value != 0 and r.source for r in rows)
     assert all(0 < r.tolerance <= 0.15 for r in rows if r.tolerance is not None)
-    assert validate.modelings() == list("abcdefghijk")
+    assert validation.modelings() == list("abcdefghijk")
 
 
 @pytest.mark.parametrize("name", "abcdefghijk")
 def test_every_scene_of_every_modeling_has_references(name):
-    assert all(validate.references(scene) for scene in parameters.load(name).scenes())
+    assert all(validation.references(scene) for scene in load(name).scenes())
 
 
-@pytest.mark.parametrize("computed, tolerance, verdict", [
-    (2.0e-7, 0.01, "pass"), (2.019e-7, 0.01, "pass"), (2.021e-7, 0.01, "fail"), (1.979e-7, 0.01, "fail"), (-2e-7, 0.01, "fail"),
-    (float("nan"), 0.01, "fail"), (3e-7, None, "info")])
+@pytest.mark.parametrize(
+    "computed, tolerance, verdict",
+    [
+        (2.0e-7, 0.01, "pass"),
+        (2.019e-7, 0.01, "pass"),
+        (2.021e-7, 0.01, "fail"),
+        (1.979e-7, 0.01, "fail"),
+        (-2e-7, 0.01, "fail"),
+        (float("nan"), 0.01, "fail"),
+        (3e-7, None, "info"),
+    ],
+)
 def test_verdict(computed, tolerance, verdict):
-    comparison = validate.Comparison(replace(REFERENCE, tolerance=tolerance), computed)
+    comparison = validation.Comparison(replace(REFERENCE, tolerance=tolerance), computed)
     assert comparison.verdict == verdict
 
 
 def test_difference_is_relative_to_the_reference():
-    negative = validate.Comparison(replace(REFERENCE, value=-4.0), -4.2)
+    negative = validation.Comparison(replace(REFERENCE, value=-4.0), -4.2)
     assert negative.difference == pytest.approx(0.05)
 
 
 def test_report_counts():
-    rows = [validate.Comparison(REFERENCE, 2e-7), validate.Comparison(REFERENCE, 3e-7),
-            validate.Comparison(replace(REFERENCE, tolerance=None), 1.0)]
-    text = validate.report(rows)
+    rows = [
+        validation.Comparison(REFERENCE, 2e-7),
+        validation.Comparison(REFERENCE, 3e-7),
+        validation.Comparison(replace(REFERENCE, tolerance=None), 1.0),
+    ]
+    text = validation.report(rows)
     assert text.endswith("1 passed, 1 failed, 1 for information only")
     assert "+50.00 %" in text
 
@@ -54,9 +71,11 @@ def joint_table(rows):
 
 
 def test_compare_reads_the_nearest_nodes_at_the_last_level_and_averages_over_z():
-    case = parameters.load("a")
-    table = joint_table([(3, 1.3, 0, 9), (4, 1.2, 0, 9), (4, 1.3, 0, 1e-7), (4, 1.3, 1, 3e-7), (4, 1.4, 0, 9)])
-    found = validate.compare(Results(case, {}, table, table))
+    case = load("a")
+    table = joint_table(
+        [(3, 1.3, 0, 9), (4, 1.2, 0, 9), (4, 1.3, 0, 1e-7), (4, 1.3, 1, 3e-7), (4, 1.4, 0, 9)]
+    )
+    found = validation.compare(Results(case, {}, table, table))
     at = [c.computed for c in found if c.reference.x == 1.3 and c.reference.quantity == "delta_n"]
     assert at and at == pytest.approx([2e-7] * len(at))
 
@@ -68,12 +87,51 @@ def test_nodes_shared_by_elements_are_found_once():
     np.testing.assert_allclose(nodes[rows], points, atol=1e-9)
 
 
-@pytest.mark.parametrize("name, last, reason", [
-    ("c", {"N": 1e5, "T": 39_900, "M": 2e5}, "sliding"),  # holds 0.35 * 1e5 + 1000 * 5 = 40000
-    ("a", {"N": 1e5, "T": 39_900, "M": 2e5, "crack_length": 4.9}, "overturning"),
-    ("a", {"N": 1e5, "T": 39_900, "M": 1e3}, "overturning"),
-    ("c", {"N": 1e5, "T": 20_000, "M": 2e5}, "no convergence")])
+def results(name, stopped=True, slip=0.0, **last):
+    """A run whose only step has these resultants; slip: of all nodes."""
+    case = load(name)
+    row = {**dict.fromkeys(HISTORY, 0.0), "time": 1.0, "level": 7.5, **last}
+    joint = {column: np.zeros(3) for column in JOINT}
+    joint["x"], joint["slip"], joint["level"] = (
+        np.array([0, 2.5, 5]),
+        np.full(3, slip),
+        joint["level"] + 7.5,
+    )
+    history = {column: np.array([value]) for column, value in row.items()}
+    return Results(case, history, joint, joint, stopped)
+
+
+@pytest.mark.parametrize(
+    "name, last, reason",
+    [
+        ("c", {"N": 1e5, "T": 39_900, "M": 2e5}, "sliding"),  # holds 0.35 * 1e5 + 1000 * 5 = 40000
+        # the hardening holds as well: 2e11 * 1e-7 * 5 = 1e5
+        ("c", {"N": 1e5, "T": 39_900, "M": 2e5, "slip": 1e-7}, "no convergence"),
+        ("c", {"N": 1e5, "T": 139_000, "M": 2e5, "slip": 1e-7}, "sliding"),
+        # N holds the tension of the open part: adhesion counts on all of the base
+        ("c", {"N": 1e5, "T": 38_000, "M": 2e5, "crack_length": 3.0}, "no convergence"),
+        ("c", {"N": 1e5, "T": 39_900, "M": 1e3}, "overturning"),
+        ("a", {"N": 1e5, "T": 39_900, "M": 2e5, "crack_length": 4.9}, "overturning"),
+        ("a", {"N": 1e5, "T": 39_900, "M": 1e3}, "overturning"),
+        ("c", {"N": 1e5, "T": 20_000, "M": 2e5}, "no convergence"),
+    ],
+)
 def test_why_a_run_stopped(name, last, reason):
-    row = {**dict.fromkeys(HISTORY, 0.0), "level": 7.5, **last}
-    said = why_stopped(parameters.load(name), {name: np.array([value]) for name, value in row.items()})
-    assert said.startswith(reason) and "7.5 m" in said
+    result = results(name, **last)
+    assert verdict(result) == reason and failed(result)
+    assert statement(result).startswith(reason) and "7.5 m" in statement(result)
+
+
+@pytest.mark.parametrize(
+    "name, last, found, failure",
+    [
+        ("c", {"slip_length": 4.9}, "stands", False),
+        ("c", {"slip_length": 5.0}, "sliding", False),  # its hardening is asked for
+        ("a", {"crack_length": 5.0}, "sliding", True),
+        ("a", {"slip": 1e-6}, "sliding", True),  # all nodes have let go
+    ],
+)
+def test_a_dam_whose_whole_joint_has_let_go_slides(name, last, found, failure):
+    result = results(name, stopped=False, N=1e5, T=1e4, M=2e5, **last)
+    assert (verdict(result), failed(result)) == (found, failure)
+    assert statement(result).startswith("sliding: the whole joint") == (found == "sliding")

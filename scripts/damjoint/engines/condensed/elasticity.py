@@ -1,0 +1,102 @@
+"""
+Linear elasticity of a body: stiffness, weight, stress.
+
+Plane strain in 2D.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import sparse
+
+from .elements import BULK, Space, basis, geometry, nodal, points_of, tabulated
+
+
+def elasticity(space: Space, dim: int, young: float, poisson: float) -> sparse.csr_matrix:
+    """
+    Stiffness matrix [N/m] of an isotropic body; unknown dim * function + component.
+
+    Plane strain in 2D.
+    """
+    lam, mu = young * poisson / ((1 + poisson) * (1 - 2 * poisson)), young / (2 * (1 + poisson))
+    points, rows, columns, values = space.body.points[:, :dim], [], [], []
+    for shape, table in space.connectivity:
+        _, gradients, nodal_gradients, weights = tabulated(
+            shape, space.order, BULK[space.order][shape]
+        )
+        cells = table[:, : nodal_gradients.shape[1]]
+        n = table.shape[1]
+        products = np.einsum("q,qak,qbl->qabkl", weights, gradients, gradients).reshape(
+            len(weights), n * n, dim * dim
+        )
+        if shape in ("triangle", "tetra"):  # straight: one Jacobian serves all points
+            products, nodal_gradients = products.sum(axis=0, keepdims=True), nodal_gradients[:1]
+        block = np.zeros((n * n, len(table) * dim * dim))
+        for product, dn in zip(products, nodal_gradients, strict=True):
+            measure, inverse = geometry(points, cells, dn)
+            inverse = np.moveaxis(inverse, 1, 0)
+            # lambda div div + mu (grad : grad + grad : grad^T), from reference (k, l) to real
+            # gradients (i, j): k, l, e, i, j
+            outer = (measure[:, None] * inverse)[:, None, :, :, None] * inverse[None, :, :, None, :]
+            laplace = np.einsum("kleii->kle", outer)
+            hooke = (
+                lam * outer
+                + mu * outer.swapaxes(3, 4)
+                + mu * laplace[..., None, None] * np.eye(dim)
+            )
+            block += product @ hooke.reshape(dim * dim, -1)
+        block = block.reshape(n, n, len(table), dim, dim).transpose(2, 0, 3, 1, 4)
+        unknowns = (dim * table[:, :, None] + np.arange(dim)).reshape(len(table), -1)
+        rows.append(np.repeat(unknowns, n * dim, axis=1).ravel())
+        columns.append(np.tile(unknowns, (1, n * dim)).ravel())
+        values.append(block.ravel())
+    size = dim * len(space.place)
+    return sparse.coo_matrix(
+        (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), (size, size)
+    ).tocsr()
+
+
+def body_force(space: Space, dim: int, component: int) -> np.ndarray:
+    """Load vector of a unit force density along a component [m3 per function]."""
+    numbers = {**BULK[space.order]}
+    points = points_of(space, numbers)
+    load = np.zeros((len(space.place), dim))
+    load[:, component] = points.values.T @ points.weights
+    return load.ravel()
+
+
+#: The middle of each reference element.
+MIDDLE = {
+    "triangle": (1 / 3, 1 / 3),
+    "quad": (0, 0),
+    "tetra": (0.25,) * 3,
+    "wedge": (1 / 3, 1 / 3, 0),
+    "hexahedron": (0, 0, 0),
+}
+
+
+def stress(space: Space, displacements: np.ndarray, young: float, poisson: float) -> np.ndarray:
+    """
+    Stress xx, yy, zz, xy, yz, xz (states, elements, 6) at the middle of each element.
+
+    displacements: (states, functions, 2 or 3)
+    """
+    lam, mu = young * poisson / ((1 + poisson) * (1 - 2 * poisson)), young / (2 * (1 + poisson))
+    number, _, dim = displacements.shape
+    found = []
+    for shape, table in space.connectivity:
+        middle = np.array(MIDDLE[shape], float)
+        _, gradients = basis(shape, space.order, middle)
+        dn = nodal(shape, middle)[1]
+        _, inverse = geometry(space.body.points[:, :dim], table[:, : len(dn)], dn)
+        slopes = gradients @ inverse
+        gradient = np.zeros((number, len(table), 3, 3))
+        for state, displacement in zip(gradient, displacements, strict=True):
+            state[:, :dim, :dim] = displacement[table].transpose(0, 2, 1) @ slopes
+        strain = (gradient + gradient.swapaxes(2, 3)) / 2
+        full = 2 * mu * strain
+        for i in range(3):
+            full[:, :, i, i] += lam * np.trace(strain, axis1=2, axis2=3)
+        parts = [full[:, :, i, k] for i, k in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))]
+        found.append(np.stack(parts, axis=2))
+    return np.concatenate(found, axis=1)

@@ -1,0 +1,296 @@
+"""
+Finite elements of the condensed engine: shape functions, quadrature, interpolation on a body.
+
+The same spaces as pro/spaces.pro: nodal functions N_a of order 1; order 2 adds N_a N_b for every
+edge ab, on the same straight mesh. The quadrature rules are those of GetDP, so that both engines
+solve one discrete problem.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from itertools import product
+
+import numpy as np
+from scipy import sparse
+
+from ...scene.mesh import Body
+
+#: Edges of the reference elements, by node numbers.
+EDGES = {
+    "line": [(0, 1)],
+    "triangle": [(0, 1), (0, 2), (1, 2)],
+    "quad": [(0, 1), (0, 3), (1, 2), (2, 3)],
+    "tetra": [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)],
+    "wedge": [(0, 1), (0, 2), (1, 2), (0, 3), (1, 4), (2, 5), (3, 4), (3, 5), (4, 5)],
+    "hexahedron": [
+        (0, 1),
+        (0, 3),
+        (0, 4),
+        (1, 2),
+        (1, 5),
+        (2, 3),
+        (2, 6),
+        (3, 7),
+        (4, 5),
+        (4, 7),
+        (5, 6),
+        (6, 7),
+    ],
+}
+
+#: Corners of the tensor elements: quad in (u, v), hexahedron in (u, v, w).
+CORNERS = {"line": [(-1,), (1,)], "quad": [(-1, -1), (1, -1), (1, 1), (-1, 1)]}
+CORNERS["hexahedron"] = [(*c, w) for w in (-1, 1) for c in CORNERS["quad"]]
+
+
+def nodal(shape: str, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Nodal functions (n,) and their reference gradient (n, d) at a reference point u (d,)."""
+    if shape in ("triangle", "tetra"):
+        d = len(u)
+        return np.array([1 - u.sum(), *u]), np.vstack([-np.ones(d), np.eye(d)])
+    if shape == "wedge":
+        flat, flat_gradient = nodal("triangle", u[:2])
+        low, high = (1 - u[2]) / 2, (1 + u[2]) / 2
+        values = np.concatenate([flat * low, flat * high])
+        up = np.concatenate([-flat, flat]) / 2
+        return values, np.column_stack([np.vstack([flat_gradient * low, flat_gradient * high]), up])
+    corners = np.array(CORNERS[shape], float)
+    factors = (1 + corners * u) / 2
+    gradient = np.empty_like(corners)
+    for i in range(len(u)):
+        gradient[:, i] = corners[:, i] / 2 * np.prod(np.delete(factors, i, axis=1), axis=1)
+    return factors.prod(axis=1), gradient
+
+
+def basis(shape: str, order: int, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """All functions of an element of this order, and their reference gradient, at a reference
+    point.
+    """
+    n, dn = nodal(shape, np.asarray(u, float))
+    if order == 1:
+        return n, dn
+    a, b = np.array(EDGES[shape]).T
+    return np.concatenate([n, n[a] * n[b]]), np.vstack(
+        [dn, n[a, None] * dn[b] + n[b, None] * dn[a]]
+    )
+
+
+# Triangle rules with 1, 3, 6 and 7 points (degrees 1, 2, 4, 5): Strang and Fix, Dunavant
+_A6, _B6, _A7, _B7 = 0.091576213509771, 0.445948490915965, 0.101286507323456, 0.470142064105115
+TRIANGLE = {
+    1: ([(1 / 3, 1 / 3)], [0.5]),
+    3: ([(1 / 6, 1 / 6), (2 / 3, 1 / 6), (1 / 6, 2 / 3)], [1 / 6] * 3),
+    6: (
+        [
+            (1 - 2 * _A6, _A6),
+            (_A6, 1 - 2 * _A6),
+            (_A6, _A6),
+            (1 - 2 * _B6, _B6),
+            (_B6, 1 - 2 * _B6),
+            (_B6, _B6),
+        ],
+        [0.054975871827661] * 3 + [0.111690794839005] * 3,
+    ),
+    7: (
+        [
+            (1 / 3, 1 / 3),
+            (1 - 2 * _A7, _A7),
+            (_A7, 1 - 2 * _A7),
+            (_A7, _A7),
+            (1 - 2 * _B7, _B7),
+            (_B7, 1 - 2 * _B7),
+            (_B7, _B7),
+        ],
+        [0.1125] + [0.0629695902724135] * 3 + [0.066197076394253] * 3,
+    ),
+}
+# Tetrahedron with 4 points (degree 2)
+_A4, _B4 = 0.1381966011250105, 0.5854101966249685
+# Quadrangle with 7 points (degree 5)
+_Q = [
+    (0, 0),
+    (-0.683130051064, -0.683130051064),
+    (0.683130051064, 0.683130051064),
+    (0.890654421782, -0.374256642286),
+    (-0.890654421782, 0.374256642286),
+    (0.374256642286, -0.890654421782),
+    (-0.374256642286, 0.890654421782),
+]
+_QW = [1.142857142857] + [0.595238095238] * 2 + [0.416666666666] * 4
+
+
+def tensor(n: int, d: int) -> tuple[np.ndarray, np.ndarray]:
+    """Gauss points (n^d, d) and weights on [-1, 1]^d."""
+    x, w = np.polynomial.legendre.leggauss(n)
+    return np.array(list(product(x, repeat=d))), np.array(
+        [np.prod(v) for v in product(w, repeat=d)]
+    )
+
+
+def rule(shape: str, points: int) -> tuple[np.ndarray, np.ndarray]:
+    """Quadrature with a number of points on a reference element: points (n, d), weights (n,)."""
+    if shape == "line":
+        return tensor(points, 1)
+    if shape == "triangle":
+        x, w = TRIANGLE[points]
+    elif shape == "quad":
+        if points != 7:
+            return tensor(round(points**0.5), 2)
+        x, w = _Q, _QW
+    elif shape == "tetra":
+        x, w = (
+            ([(0.25,) * 3], [1 / 6])
+            if points == 1
+            else ([(_A4,) * 3, (_B4, _A4, _A4), (_A4, _B4, _A4), (_A4, _A4, _B4)], [1 / 24] * 4)
+        )
+    elif shape == "wedge":
+        (flat, fw), (up, uw) = (
+            rule("triangle", {6: 3, 21: 7}[points]),
+            tensor({6: 2, 21: 3}[points], 1),
+        )
+        x, w = [(*f, *h) for h in up for f in flat], [a * b for b in uw for a in fw]
+    else:
+        return tensor(round(points ** (1 / 3)), 3)
+    return np.array(x, float), np.array(w, float)
+
+
+#: Points of the rules of pro/spaces.pro, by order and shape.
+BULK = {
+    1: {"triangle": 1, "quad": 4, "tetra": 1, "wedge": 6, "hexahedron": 8},
+    2: {"triangle": 3, "quad": 7, "tetra": 4, "wedge": 21, "hexahedron": 27},
+}
+JOINT = {1: {"line": 2, "triangle": 1, "quad": 4}, 2: {"line": 2, "triangle": 6, "quad": 4}}
+WATER = {"line": 4, "triangle": 6, "quad": 16}
+
+
+@cache
+def tabulated(
+    shape: str, order: int, points: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """At the points of a rule: functions (q, n), reference gradients (q, n, d), nodal gradients (q,
+    m, d), weights (q,).
+    """
+    x, w = rule(shape, points)
+    values, gradients = zip(*(basis(shape, order, u) for u in x), strict=True)
+    return np.array(values), np.array(gradients), np.array([nodal(shape, u)[1] for u in x]), w
+
+
+class Space:
+    """
+    The scalar functions of an order on a body: nodes first, then (order 2) edges.
+
+    place: (n, 3) the node, or the middle of the edge, of each function.
+    """
+
+    def __init__(self, body: Body, order: int) -> None:
+        self.body, self.order = body, order
+        self.place = body.points
+        self.edges = np.zeros((0, 2), int)
+        number = len(body.points)
+        self.connectivity = [(shape, cells) for shape, cells in body.cells]
+        if order == 2:
+            pairs = [np.sort(cells[:, EDGES[shape]], axis=2) for shape, cells in body.cells]
+            codes = np.concatenate(
+                [(p[..., 0].astype(np.int64) * number + p[..., 1]).ravel() for p in pairs]
+            )
+            unique, inverse = np.unique(codes, return_inverse=True)
+            self.edges = np.column_stack([unique // number, unique % number])
+            self.place = np.vstack([body.points, body.points[self.edges].mean(axis=1)])
+            start, tables = 0, []
+            for (shape, cells), p in zip(body.cells, pairs, strict=True):
+                count = p.shape[0] * p.shape[1]
+                table = inverse[start : start + count].reshape(p.shape[:2]) + number
+                tables.append((shape, np.hstack([cells, table])))
+                start += count
+            self.connectivity = tables
+
+    def find(self, part: Space) -> np.ndarray:
+        """The functions of this space that are those of a part (a face, an edge of the body, the
+        joint).
+        """
+        place = {t: i for i, t in enumerate(self.body.node_tags)}
+        nodes = np.array([place[t] for t in part.body.node_tags], int)
+        if self.order == 1:
+            return nodes
+        number = len(self.body.points)
+        codes = self.edges[:, 0].astype(np.int64) * number + self.edges[:, 1]
+        pairs = np.sort(nodes[part.edges], axis=1)
+        return np.concatenate(
+            [
+                nodes,
+                number
+                + np.searchsorted(codes, pairs[:, 0].astype(np.int64) * number + pairs[:, 1]),
+            ]
+        )
+
+
+def geometry(
+    points: np.ndarray, cells: np.ndarray, dn: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """
+    Measure of the element per reference measure (e,), and reference-to-real gradient (e, d, 3 or
+    less).
+
+    dn: (m, d) nodal gradients at one point; points (n, D). For d < D the pseudo-inverse: gradients
+    along the element.
+    """
+    jacobian = np.einsum("md,eml->edl", dn, points[cells])
+    metric = jacobian @ jacobian.transpose(0, 2, 1)
+    return np.sqrt(np.linalg.det(metric)), np.linalg.solve(metric, jacobian)
+
+
+@dataclass
+class Points:
+    """Quadrature points of a space: weights (q,), positions (q, 3), functions and their gradients
+    as sparse matrices.
+    """
+
+    weights: np.ndarray
+    positions: np.ndarray
+    #: (q, functions)
+    values: sparse.csr_matrix
+    #: (q, functions) for x and for z
+    gradients: tuple[sparse.csr_matrix, sparse.csr_matrix]
+    #: element of each point
+    elements: np.ndarray
+
+
+def points_of(space: Space, numbers: dict[str, int], gradients: bool = False) -> Points:
+    """The points of the rules with these numbers of points; element by element."""
+    weights, positions, tables, coefficients, slopes, elements, start = [], [], [], [], [], [], 0
+    for shape, table in space.connectivity:
+        values, dg, dn, w = tabulated(shape, space.order, numbers[shape])
+        cells = table[:, : dn.shape[1]]
+        e, q, n = len(table), len(w), table.shape[1]
+        measure, inverse = zip(*(geometry(space.body.points, cells, d) for d in dn), strict=True)
+        weights.append((np.array(measure) * w[:, None]).T.ravel())
+        positions.append(
+            np.einsum("qm,eml->eql", values[:, : dn.shape[1]], space.body.points[cells]).reshape(
+                -1, 3
+            )
+        )
+        tables.append(np.repeat(table, q, axis=0).ravel())
+        coefficients.append(np.broadcast_to(values, (e, q, n)).ravel())
+        slopes.append(
+            np.einsum("qnd,qedl->eqnl", dg, np.array(inverse)).reshape(-1, 3)
+            if gradients
+            else np.zeros((0, 3))
+        )
+        elements.append(start + np.repeat(np.arange(e), q))
+        start += e
+    widths = np.concatenate(
+        [np.full(len(t) * numbers[s], t.shape[1]) for s, t in space.connectivity]
+    )
+    pointers = np.concatenate([[0], np.cumsum(widths)])
+    size = (len(widths), len(space.place))
+    build = lambda data: sparse.csr_matrix((data, np.concatenate(tables), pointers), size)
+    slope = np.concatenate(slopes)
+    return Points(
+        np.concatenate(weights),
+        np.concatenate(positions),
+        build(np.concatenate(coefficients)),
+        (build(slope[:, 0]), build(slope[:, 2])) if gradients else (),
+        np.concatenate(elements),
+    )

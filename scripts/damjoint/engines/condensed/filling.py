@@ -1,0 +1,155 @@
+"""The loading of a case followed step by step, with the strategy of pro/strategy.pro."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from copy import copy
+
+import numpy as np
+
+from ...results.tables import Results
+from ...scene.case import Case
+from .equilibrium import Joint
+from .interface import Interface
+from .newton import Attempt, Iterate, newton
+from .record import Record, State
+
+
+class Filling:
+    """The loading of a case followed step by step; the converged steps are rows, the requested
+    levels tables.
+    """
+
+    def __init__(
+        self, case: Case, interface: Interface, on_step: Callable[[float], None] = lambda time: None
+    ) -> None:
+        self.case, self.joint, self.on_step = case, Joint(case, interface), on_step
+        self.driven = case["drive"] != "level"
+        self.record = Record(self.joint)
+        self.state = State.virgin(self.joint)
+        self.reference = self.unbalanced(case)
+        #: the prescribed displacement at drive_begin, and the level at drive_end
+        self.displacement = self.left = 0.0
+        self.stopped = False
+
+    def unbalanced(self, case: Case) -> float:
+        """Norm of the residual of the untouched joint under the highest water: what convergence is
+        measured by.
+        """
+        joint, virgin = self.joint, State.virgin(self.joint)
+        highest = max(case.levels), max(case.tail_levels)
+        return np.linalg.norm(joint.residual(virgin.jump, virgin.memory, *highest)[0])
+
+    def fork(self, case: Case) -> Filling:
+        """Another filling, of a case that agrees with this one's as far as this one has come, to go
+        on from there.
+        """
+        other = copy(self)
+        other.case, other.reference, other.record = case, self.unbalanced(case), self.record.copy()
+        return other
+
+    def attempts(self) -> list[Attempt]:
+        """The attempts at a step, in order; the last one, with the secant, is for before giving
+        up.
+        """
+        case, shared = self.case, self.case.shared
+        most, halvings = int(case["max_iterations"]), int(case["max_halvings"])
+        ways = zip(shared["attempt_growth"], shared["attempt_secant"], strict=True)
+        found = [Attempt(growth, bool(secant), most, halvings) for growth, secant in ways]
+        return [*found, Attempt(case["growth"], True, int(case["burst_iterations"]), halvings)]
+
+    def run(self) -> Results:
+        """Follow all the times of the case that are still to come."""
+        for target in self.case.times:
+            if target > self.state.time and not self.stopped:
+                self.reach(target)
+                if target in self.case.requested and not self.stopped:
+                    self.record.save(self.state)
+        if self.stopped and self.state.time > 0 and self.record.saved_until < self.state.time:
+            self.record.save(self.state)
+        return self.results()
+
+    def reach(self, target: float) -> None:
+        """Steps up to a time; a step that fails is cut, the next ones grow back."""
+        *attempts, last_resort = self.attempts()
+        cuts, dt = 0, np.inf
+        while self.state.time < target and not self.stopped:
+            time = min(self.state.time + dt, target)
+            time = target if target - time < 1e-9 else time
+            found = next(filter(None, (self.solve(time, attempt) for attempt in attempts)), None)
+            if found is None:
+                dt, cuts = self.case.shared["cut"][0] * (time - self.state.time), cuts + 1
+                if dt < self.case["smallest_step"]:
+                    time, found = target, self.solve(target, last_resort)
+                    self.stopped = found is None
+            if found:
+                dt = 2 * (time - self.state.time)
+                self.accept(cuts, *found)
+                cuts = 0
+
+    def water_at(self, time: float) -> tuple[float, float, bool, float]:
+        """Reservoir and tailwater level, whether a displacement is prescribed instead, and how
+        much.
+        """
+        case = self.case
+        level, tail = case.level_at(time), case.tail_at(time)
+        if not self.driven:
+            return level, tail, False, 0.0
+        begin, end, last = case["drive_begin"], case["drive_end"], case.times[-1]
+        if time > end + 1e-9:  # the level goes on from where it was left
+            level = self.left + (case.level_at(last) - self.left) * (time - end) / (last - end)
+        target = self.displacement + case["drive_by"] * (time - begin) / (end - begin)
+        return level, tail, begin + 1e-9 < time < end + 1e-9, target
+
+    def solve(self, time: float, attempt: Attempt) -> tuple[State, int, float] | None:
+        """A step from the last state: the new one, iterations, residual over reference; or None."""
+        joint, memory = self.joint, self.state.memory
+        level, tail, prescribed, target = self.water_at(time)
+        stiff = joint.case["K_N"] * joint.bulk.width
+
+        def evaluate(jump: np.ndarray, level: float) -> Iterate:
+            value, derivatives = joint.residual(jump, memory, level, tail, attempt.secant)
+            size, edge = np.linalg.norm(value), None
+            if prescribed:
+                if self.case["drive"] == "heel":
+                    found, row, rate = joint.interface.heel @ jump, joint.interface.heel, 0.0
+                else:
+                    found, row, rate = joint.crest(jump, level, tail)
+                size, edge = np.hypot(size, stiff * (found - target)), (row, rate, target - found)
+
+            def correction() -> tuple[np.ndarray, float]:
+                change, slope = derivatives()
+                border = edge and (slope, *edge)
+                return joint.interface.solve(joint.virgin, change, -value, border)
+
+            return Iterate(jump, level, size, correction)
+
+        start = evaluate(self.state.jump, self.state.level if prescribed else level)
+        found = newton(evaluate, start, self.case["tolerance"] * self.reference, attempt)
+        if found is None:
+            return None
+        end, iterations = found
+        if np.abs(end.jump).max() > 0.1 * self.case["dam_height"]:
+            return None  # the dam has fallen: an equilibrium of small displacements only
+        memories = self.state.remember(joint, end.jump)
+        return (
+            State(time, end.level, tail, end.jump, *memories),
+            iterations,
+            end.size / self.reference,
+        )
+
+    def accept(self, cuts: int, state: State, iterations: int, residual: float) -> None:
+        """Commit a converged step and write its row of history."""
+        self.state = state
+        self.record.add(state, iterations, cuts, residual)
+        if self.driven:
+            if state.time < self.case["drive_begin"] + 1e-9:
+                name = "heel" if self.case["drive"] == "heel" else "crest_ux"
+                self.displacement = self.record.rows[name][-1]
+            if state.time < self.case["drive_end"] + 1e-9:
+                self.left = state.level
+        self.on_step(state.time)
+
+    def results(self) -> Results:
+        """All tables so far."""
+        return self.record.results(self.case, self.stopped)

@@ -1,0 +1,154 @@
+"""What is kept of a loading: a row of history per step, the joint's tables at the requested
+levels.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ...results.tables import HISTORY, Results, history_table, joint_table
+from ...scene.case import Case
+from .equilibrium import Joint, Pressure
+from .laws import Memory
+
+#: What is found at each step; the other columns of HISTORY are made from these.
+FOUND = (*(set(HISTORY) - {"load_factor", "x_resultant"}), "heel")
+
+
+@dataclass(frozen=True)
+class State:
+    """A converged state: what the next step starts from, with the memory of the law's points and of
+    the nodes.
+    """
+
+    time: float
+    level: float
+    tail: float
+    jump: np.ndarray
+    memory: Memory
+    nodes: Memory
+
+    @staticmethod
+    def virgin(joint: Joint) -> State:
+        """Before any load."""
+        law, interface = joint.law, joint.interface
+        memories = law.start(len(interface.points.weights)), law.start(len(interface.space.place))
+        return State(0.0, 0.0, 0.0, np.zeros(len(joint.bulk.free)), *memories)
+
+    def remember(self, joint: Joint, jump: np.ndarray) -> tuple[Memory, Memory]:
+        """The memories after a step to a jump."""
+        law, interface = joint.law, joint.interface
+        at_points = interface.jumps(interface.at_points, jump)
+        at_nodes = interface.jumps(interface.at_nodes, jump)
+        return law.remember(at_points, self.memory), law.remember(at_nodes, self.nodes)
+
+
+@dataclass
+class Record:
+    """Rows and tables of a loading."""
+
+    joint: Joint
+    #: FOUND, a value per step
+    rows: dict[str, list[float]] = field(default_factory=lambda: {name: [] for name in FOUND})
+    #: per requested level: the joint's rows, and those extrapolated from element means
+    tables: list[tuple[np.ndarray, np.ndarray]] = field(default_factory=list)
+    #: the states of the tables
+    saved: list[State] = field(default_factory=list)
+    #: the water's pressure in the state last added
+    pressure: Pressure | None = None
+
+    def copy(self) -> Record:
+        """Another one, to go on with by itself."""
+        rows = {name: list(values) for name, values in self.rows.items()}
+        return Record(self.joint, rows, list(self.tables), list(self.saved), self.pressure)
+
+    @property
+    def saved_until(self) -> float:
+        """The time of the last table."""
+        return self.saved[-1].time if self.saved else 0.0
+
+    def add(self, state: State, iterations: int, cuts: int, residual: float) -> None:
+        """The row of a converged step."""
+        joint, law, interface = self.joint, self.joint.law, self.joint.interface
+        at_points = interface.jumps(interface.at_points, state.jump)
+        traction, _ = law.respond(at_points, state.memory)
+        weights = interface.points.weights / joint.bulk.width
+        arm = joint.bulk.base - interface.points.positions[:, 0]
+        pressure = self.pressure = joint.pressure(state.jump, state.level, state.tail)
+        row = {
+            "time": state.time,
+            "level": state.level,
+            "tail_level": state.tail,
+            "iterations": iterations,
+            "cuts": cuts,
+            "residual": residual,
+            "crack_length": weights @ law.open(at_points, state.memory),
+            "slip_length": weights @ law.slid(at_points, state.memory),
+            "max_opening": interface.jumps(interface.at_nodes, state.jump)[:, 0].max(),
+            "crest_ux": joint.crest(state.jump, state.level, state.tail)[0],
+            "N": -weights @ traction[:, 0],
+            "T": weights @ traction[:, 1],
+            "M": -weights @ (traction[:, 0] * arm),
+            "U": interface.water_points.weights @ pressure.water_points / joint.bulk.width,
+            "flux": pressure.leakage,
+            "heel": interface.heel @ state.jump,
+        }
+        for name, value in row.items():
+            self.rows[name].append(float(value))
+
+    def save(self, state: State) -> None:
+        """The joint at the state last added, node by node; and with jump and stress made from
+        element means.
+        """
+        joint, law, interface = self.joint, self.joint.law, self.joint.interface
+        place, corners = interface.space.place, len(joint.bulk.joint.points)
+        pressure = self.pressure
+        jump = interface.jumps(interface.at_nodes, state.jump)
+        traction, _ = law.respond(jump, state.nodes)
+        traction[:, 0] -= pressure.nodes
+        columns = [
+            np.full((len(place), 2), (state.time, state.level)),
+            place,
+            jump,
+            traction,
+            pressure.nodes[:, None],
+            law.damage(jump, state.nodes)[:, None],
+            np.linalg.norm(state.nodes.vector, axis=1)[:, None],
+        ]
+        if pressure.flux is not None:
+            columns.append(self.node_means(pressure.flux[:, None], True))
+        table = np.hstack(columns)
+        at_points = interface.jumps(interface.at_points, state.jump)
+        stress, _ = law.respond(at_points, state.memory)
+        stress[:, 0] -= pressure.points
+        weights, elements = interface.points.weights, interface.points.elements
+        total = np.bincount(elements, weights)
+        parts = (*at_points.T, *stress.T)
+        means = np.column_stack([np.bincount(elements, weights * v) / total for v in parts])
+        extra = table.copy()
+        extra[:corners, 5:11] = self.node_means(means, False)
+        self.saved.append(state)
+        self.tables.append((table, extra))
+
+    def node_means(self, values: np.ndarray, middles: bool) -> np.ndarray:
+        """Mean over the joint elements around each node (and each middle of an edge) of element
+        values (e, m).
+        """
+        space = self.joint.interface.space
+        number = len(space.place) if middles else len(space.body.points)
+        total, count, start = np.zeros((number, values.shape[1])), np.zeros(number), 0
+        for (_, whole), (_, cells) in zip(space.connectivity, space.body.cells, strict=True):
+            table = whole if middles else cells
+            rows = np.repeat(np.arange(start, start + len(table)), table.shape[1])
+            np.add.at(total, table.ravel(), values[rows])
+            np.add.at(count, table.ravel(), 1)
+            start += len(table)
+        return total / count[:, None]
+
+    def results(self, case: Case, stopped: bool) -> Results:
+        """All tables so far."""
+        rows = {name: np.array(values, float) for name, values in self.rows.items()}
+        joint, extrapolated = (joint_table(case, [t[k] for t in self.tables]) for k in (0, 1))
+        return Results(case, history_table(case, rows), joint, extrapolated, stopped, rows["heel"])

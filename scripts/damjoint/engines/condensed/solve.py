@@ -1,0 +1,58 @@
+"""The condensed engine's side of the interface of engines/__init__.py."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from functools import lru_cache, partial
+
+from threadpoolctl import threadpool_limits
+
+from ...results.fields import Field
+from ...scene.case import Case
+from .. import OnStep, Outcome
+from .bulk import Bodies, joint_size
+from .cache import cached
+from .filling import Filling
+from .interface import Interface
+
+#: Jump unknowns from which on a second thread of the linear algebra pays; below it waits and
+#: disturbs.
+MANY = 3000
+
+
+def solve(case: Case, on_step: OnStep, _fields: bool) -> Iterator[Outcome]:
+    """The scenes of a case on one condensed mesh; see engines/__init__.py."""
+    with threadpool_limits(1 if joint_size(case) < MANY else None):
+        start = time.perf_counter()
+        bulk, made = cached(case)
+        before = bulk.seconds if made else {"cache": time.perf_counter() - start}
+        interface, fillings, recovered = Interface(bulk), [], []
+
+        @lru_cache
+        def bodies() -> Bodies:
+            return made or Bodies.of(case)
+
+        def fields(number: int) -> dict[float, Field]:
+            """All scenes at once: one factorisation."""
+            if len(recovered) < len(fillings):
+                from .recover import recover
+
+                recovered[:] = recover(bodies(), [(f.joint, f.record.saved) for f in fillings])
+            return recovered[number]
+
+        for number, scene in enumerate(case.scenes()):
+            begin, error = time.perf_counter(), None
+            fillings.append(Filling(scene, interface, partial(on_step, number)))
+            try:
+                fillings[-1].run()
+            except BaseException as caught:  # an interruption, too: what has converged is a result
+                error = caught
+            result = fillings[-1].results()
+            result.info = {
+                "engine": "condensed",
+                "mesh": bulk.counts,
+                "unknowns": bulk.unknowns,
+                "wall_seconds": before | {"solve": time.perf_counter() - begin},
+            }
+            yield Outcome(result, lambda: bodies().mesh, partial(fields, number), error)

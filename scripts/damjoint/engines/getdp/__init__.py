@@ -1,0 +1,1 @@
+"""The plain engine: GetDP runs the problem definition, pro/damjoint.pro."""

@@ -1,0 +1,74 @@
+"""A joint law along a path of jumps, evaluated by the very functions of the problem definition."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from ... import data
+from ...scene.case import load
+from ...scene.parameters import assignments, listing, parameter
+from . import process
+
+#: What the scalar and the vector of a law's memory are called, in the output.
+MEMORY = {
+    "rupture": ("kappa", "released_1", "released_2"),
+    "friction": ("lambda", "slip_1", "slip_2"),
+}
+
+#: GetDP wants a mesh: one line, in the region JOINT (3).
+ONE_LINE = """$MeshFormat
+2.2 0 8
+$EndMeshFormat
+$Nodes
+2
+1 0 0 0
+2 1 0 0
+$EndNodes
+$Elements
+1
+1 1 2 3 1 1 2
+$EndElements
+"""
+
+
+def evaluate(
+    law: str, jumps: np.ndarray, pressure: np.ndarray | None = None, settings: dict | None = None
+) -> dict[str, np.ndarray]:
+    """The law along a path.
+
+    law: rupture or friction; jumps: (n, 3) delta_n, delta_t1, delta_t2 [m], each row one converged
+    step from the virgin state on; pressure: (n,) [Pa], 0 by default; settings: {parameter: value}.
+    Returns columns sigma_n (total), tau_1, tau_2 [Pa] and the law's state. Raises InputError,
+    RunError.
+    """
+    parameter("law").check(law)
+    jumps = np.asarray(jumps, float).reshape(-1, 3)
+    pressure = np.zeros(len(jumps)) if pressure is None else np.asarray(pressure, float)
+    values = load("dam", {**(settings or {}), "law": law}).values
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "one.msh").write_text(ONE_LINE)
+        columns = {
+            "path_n": jumps[:, 0],
+            "path_t1": jumps[:, 1],
+            "path_t2": jumps[:, 2],
+            "path_p": pressure,
+        }
+        problem = folder / "path.pro"
+        problem.write_text(
+            assignments(values)
+            + "".join(listing(n, column) for n, column in columns.items())
+            + f'out_dir = "./";\nInclude "{data("pro")}/law_path.pro";\n'
+        )
+        process.execute(problem, ["-msh", str(folder / "one.msh"), "-solve", "Path"])
+        table = np.loadtxt(folder / "law.txt", ndmin=2)
+    return dict(
+        zip(
+            ("sigma_n", "tau_1", "tau_2", *MEMORY[law], "damage", "open", "slid"),
+            table.T,
+            strict=True,
+        )
+    )

@@ -1,0 +1,58 @@
+"""The plain engine's side of the interface of engines/__init__.py: one GetDP process per scene, two
+at a time.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+from ...scene.case import Case
+from ...scene.mesh import Mesh
+from .. import OnStep, Outcome
+from . import process, tables
+
+
+def solve(case: Case, on_step: OnStep, fields: bool) -> Iterator[Outcome]:
+    """
+    The scenes of a case; GetDP works in a temporary folder.
+
+    See engines/__init__.py.
+    """
+    process.find_getdp()
+    start = time.perf_counter()
+    mesh = Mesh(case)
+    meshed = time.perf_counter() - start
+    with tempfile.TemporaryDirectory(prefix="damjoint-") as name, ThreadPoolExecutor(2) as pool:
+        mesh_file = Path(name) / "scene.msh"
+        mesh.write(mesh_file)
+        scenes, waiting = case.scenes(), []
+        for number, scene in enumerate(scenes):
+            folder = Path(name) / scene["uplift"]
+            folder.mkdir()
+            watch = lambda now, number=number: on_step(number, now)
+            waiting.append(
+                (folder, pool.submit(process.fill, scene, mesh_file, folder, fields, watch))
+            )
+        for scene, (folder, future) in zip(scenes, waiting, strict=True):
+            error, told = None, {}
+            try:
+                told = future.result()
+            except BaseException as caught:
+                error = caught
+                if not isinstance(caught, Exception):  # interrupted: the others need not go on
+                    process.stop_all()
+            result, saved = tables.read(scene, folder)
+            result.info = {
+                "engine": "getdp",
+                "mesh": mesh.counts,
+                "unknowns": told.get("unknowns"),
+                "wall_seconds": {"mesh": meshed, "solve": told.get("wall")},
+                "getdp": {"version": told.get("version"), "peak_memory_mb": told.get("memory")},
+            }
+
+            found = tables.read_fields(folder, saved, mesh) if fields and not error else {}
+            yield Outcome(result, lambda: mesh, lambda found=found: found, error)

@@ -1,0 +1,157 @@
+"""What GetDP has printed, as results."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from ...results.fields import Field
+from ...results.tables import Results, history_table, joint_table
+from ...scene.case import Case
+from ...scene.mesh import Mesh
+
+BODIES = ("dam", "foundation")
+
+#: Columns of history.txt (pro/strategy.pro), behind the word "step".
+PRINTED = [
+    "time",
+    "level",
+    "iterations",
+    "cuts",
+    "residual",
+    "crack_length",
+    "slip_length",
+    "max_opening",
+    "crest_ux",
+    "N",
+    "T",
+    "M",
+    "heel",
+    "flux_in",
+    "flux",
+    "U",
+]
+
+
+def read_simple_table(path: Path, components: int = 3) -> tuple[np.ndarray, np.ndarray]:
+    """GetDP's SimpleTable on elements: points (elements x nodes, 3) and values (elements x nodes,
+    components).
+    """
+    table = np.loadtxt(path, ndmin=2)
+    points = 3 * table.shape[1] // (3 + components)
+    return table[:, :points].reshape(-1, 3), table[:, points:].reshape(-1, components)
+
+
+def nodes_of(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Distinct points, sorted by x, then z, and for each given point the row of its node."""
+    rounded = np.round(points / max(1e-300, np.abs(points).max()), 9)
+    _, first, inverse = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
+    return points[first], inverse.ravel()
+
+
+def node_means(rows: np.ndarray, values: np.ndarray, number: int) -> np.ndarray:
+    """Mean of the values that fall on each of `number` nodes; rows: the node of each value."""
+    total = np.zeros((number, values.shape[1]))
+    np.add.at(total, rows, values)
+    return total / np.bincount(rows, minlength=number)[:, None]
+
+
+def read_history(case: Case, folder: Path) -> dict[str, np.ndarray]:
+    """The rows of history.txt that are complete, {column of PRINTED: values}, and tail_level."""
+    file = folder / "history.txt"
+    lines = file.read_text().splitlines() if file.exists() else []
+    rows = [line.split()[1:] for line in lines]
+    steps = np.array([row for row in rows if len(row) == len(PRINTED)], float)
+    printed = dict(zip(PRINTED, steps.reshape(-1, len(PRINTED)).T, strict=True))
+    return printed | {"tail_level": np.array([case.tail_at(time) for time in printed["time"]])}
+
+
+def saved_times(case: Case, history: dict[str, np.ndarray], stopped: bool) -> dict[int, float]:
+    """The requested times that have been reached, by the number that GetDP's files carry."""
+    done = history["time"]
+    saved = {i + 1: t for i, t in enumerate(case.times) if t in case.requested and t in done}
+    if (
+        stopped and len(done) and done[-1] not in case.times
+    ):  # the last state before a run has stopped
+        saved[int(np.isin(case.times, done).sum()) + 1] = float(done[-1])
+    return saved
+
+
+def read(case: Case, folder: Path) -> tuple[Results, dict[int, float]]:
+    """
+    Read what GetDP has left in a folder, complete or not: everything up to the last converged step.
+
+    Returns the results, and the times of the files by their number.
+    """
+    history = read_history(case, folder)
+    status = folder / "status.txt"
+    stopped = status.exists() and status.read_text().strip() != "0"
+    saved = saved_times(case, history, stopped)
+    order = [1, 0, 2]  # y, x, z: normal, tangent 1, tangent 2
+    joint, extrapolated = [], []
+    for number, time in saved.items():
+
+        def read_table(name: str, components: int = 3, number: int = number) -> tuple:
+            return read_simple_table(folder / f"{name}_{number}.txt", components)
+
+        points, jump = read_table("jump")
+        nodes, rows = nodes_of(points)
+        jump, traction, state = (
+            node_means(rows, values, len(nodes))
+            for values in (jump, read_table("traction")[1], read_table("state")[1])
+        )
+        flux = []
+        if case["uplift"] == "flow":
+            flux = [node_means(rows, read_table("flux", 1)[1], len(nodes))]
+        level = history["level"][np.flatnonzero(history["time"] == time)[0]]
+        when = np.tile([time, level], (len(nodes), 1))
+        joint.append(np.hstack([when, nodes, jump[:, order], traction[:, order], state, *flux]))
+        extra = joint[-1].copy()
+        corners, mean_jump = read_table("mean_jump")
+        _, corner_rows = nodes_of(np.vstack([nodes, corners]))
+        corner_rows = corner_rows[len(nodes) :]
+        present = np.unique(corner_rows)
+        for columns, values in (
+            (slice(5, 8), mean_jump),
+            (slice(8, 11), read_table("mean_traction")[1]),
+        ):
+            with np.errstate(invalid="ignore"):
+                means = node_means(corner_rows, values[:, order], len(nodes))
+            extra[present, columns] = means[present]
+        extrapolated.append(extra)
+    result = Results(
+        case,
+        history_table(case, history),
+        joint_table(case, joint),
+        joint_table(case, extrapolated),
+        stopped,
+        history["heel"],
+    )
+    return result, saved
+
+
+def read_values(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """GetDP's NodeTable or ElementTable with one value set each: numbers and values."""
+    table = np.loadtxt(path, skiprows=1, ndmin=2)
+    return table[:, 0].astype(int), table[:, 1:]
+
+
+def pick(numbers: np.ndarray, values: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """The values that belong to the wanted numbers."""
+    order = np.argsort(numbers)
+    return values[order[np.searchsorted(numbers, wanted, sorter=order)]]
+
+
+def read_fields(folder: Path, saved: dict[int, float], mesh: Mesh) -> dict[float, Field]:
+    """The fields that GetDP has left in a folder, by time; saved: see `read`."""
+    found = {}
+    for number, time in saved.items():
+        elements, stress = read_values(folder / f"stress_{number}.txt")
+        stress = stress[:, [0, 3, 5, 1, 4, 2]]
+        displacement = {n: read_values(folder / f"u_{n}_{number}.txt") for n in BODIES}
+        found[time] = Field(
+            {n: pick(*displacement[n], mesh.bodies[n].node_tags) for n in BODIES},
+            {n: pick(elements, stress, mesh.bodies[n].element_tags) for n in BODIES},
+        )
+    return found

@@ -1,0 +1,146 @@
+"""The pages that are made from the code: python -m damjoint.pages {parameters,results,bench,all}.
+
+Run from the checkout: `make pages`, `make bench`.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+
+from tabulate import tabulate
+
+from .results.tables import FLUX, HISTORY, JOINT
+from .scene.parameters import declared
+
+REFERENCE = Path("reference")
+
+
+def markdown(rows: list[tuple], heads: tuple[str, ...]) -> str:
+    """A table in Markdown."""
+    return tabulate(rows, heads, tablefmt="github", disable_numparse=True)
+
+
+def parameters_page() -> str:
+    """reference/parameters.md: every parameter, by group."""
+    parts = [
+        "# Parameters",
+        "Made from [pro/parameters.pro](../pro/parameters.pro) by `make pages`. Each is set by "
+        "`--set name=value`, by `default_name = value;` in a case file, or in the Gmsh window. "
+        "The defaults are those of a 45 m dam of ordinary concrete on rock; "
+        "[cases/ssnp142.case](../cases/ssnp142.case) has those of the verification case. "
+        "A parameter whose default is -1 follows others.",
+        "The loading is a list in the case file, or an option: `levels() = {30, 40, 45};` "
+        "(`--levels`) [m above the joint], level number i being reached at t = i, from 0 at t = 0; "
+        "`tail_levels()` (`--tail-levels`) likewise, one value for all or as many as levels; "
+        "`times()` (`--steps` between two levels) the converged steps. Default: two thirds and "
+        "eight ninths of the height, and the crest.",
+    ]
+    groups: dict[str, list[tuple]] = {}
+    for parameter in declared().values():
+        description, _, unit = parameter.meaning.rpartition(" [")
+        if not unit.endswith("]"):
+            description, unit = parameter.meaning, ""
+        notes = parameter.help if not parameter.follows else ""
+        groups.setdefault(parameter.group, []).append(
+            (
+                f"`{parameter.name}`",
+                description,
+                unit.rstrip("]"),
+                parameter.default,
+                parameter.allowed(),
+                parameter.matters,
+                notes,
+            )
+        )
+    heads = "name", "meaning", "unit", "default", "allowed", "matters if", "notes"
+    for group, rows in groups.items():
+        parts += [f"## {group}", markdown(rows, heads)]
+    return "\n\n".join(parts) + "\n"
+
+
+def results_page() -> str:
+    """reference/results.md: the columns of the tables."""
+    joint, history = (
+        markdown([(f"`{n}`", u, m) for n, (u, m) in columns.items()], ("column", "unit", "meaning"))
+        for columns in (JOINT | FLUX, HISTORY)
+    )
+    parts = [
+        "# Results",
+        "The columns of the tables that a run writes; `run.json` repeats the units. Signs: "
+        "[theory.md](theory.md). Made by `make pages`.",
+        "## joint.csv",
+        "A row per joint node and requested level, sorted by level, x and z; order 2 lists the "
+        "middles of the edges, too. Every row obeys the joint law: nodes have a memory of their "
+        "own. `flux` where water flows.",
+        joint,
+        "## history.csv",
+        "A row per converged step. Forces are per metre of thickness, in 3D too.",
+        history,
+        "## curve.csv",
+        "Of a run driven by a displacement: `time`, `level` [m], `pressure` [Pa] at the foot of "
+        "the face, `heel_opening` [m], `crest_ux` [m] of each converged step.",
+        "## fields/",
+        "`bulk.msh` and `joint.msh` for Gmsh (a view per field with all levels as its steps); "
+        "`fields.pvd` with `bulk_t*.vtu` and `joint_t*.vtu` for ParaView. Bulk: `displacement` "
+        "[m], `stress` [Pa] (xx, yy, zz, xy, yz, xz), `body` (1 dam, 2 foundation). Joint: `jump` "
+        "[m] and `traction` [Pa] along x, y, z, and the columns of joint.csv.",
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def validation_page() -> str:
+    """reference/ssnp142.md: the comparison with the published numbers, all cases run anew."""
+    from .results import validation
+    from .run import run
+    from .scene.case import load
+
+    comparisons = []
+    with tempfile.TemporaryDirectory() as folder:
+        for name in validation.modelings():
+            for result in run(load(name), Path(folder) / name, fields=False, picture=False):
+                comparisons += validation.compare(result)
+    return (
+        "\n\n".join(
+            [
+                "# SSNP142: computed beside published",
+                "As `damjoint validate` prints it; written by `make pages`. "
+                '"Extrapolated" rows were published as node values made from integration points, '
+                "and are compared with the same. Rows for information belong to another geometry, "
+                "to a variable with another meaning, or to a value that the document prints "
+                "otherwise. At the heel the opening of I is almost 7 % above the GEFDYN value, "
+                "whose tolerance is 7 %: the mesh-converged opening is 4.29e-7 m.",
+                validation.report(comparisons, "github"),
+            ]
+        )
+        + "\n"
+    )
+
+
+def take_bench(out: Path) -> None:
+    """Page, picture and the modelings' table of README.md from a benchmark's folder."""
+    shutil.copy(out / "benchmarks.md", REFERENCE)
+    shutil.copy(out / "accuracy.png", REFERENCE / "pictures")
+    readme, table = Path("README.md"), (out / "modelings.md").read_text()
+    marks = r"(<!-- modelings -->\n).*?(<!-- /modelings -->)"
+    text = re.sub(marks, lambda m: m[1] + table + m[2], readme.read_text(), flags=re.S)
+    readme.write_text(text)
+
+
+def main(words: list[str]) -> None:
+    """Write the pages that are asked for."""
+    if words[0] == "bench":
+        take_bench(Path(words[1]))
+    if words[0] in ("parameters", "all"):
+        (REFERENCE / "parameters.md").write_text(parameters_page())
+    if words[0] in ("results", "all"):
+        (REFERENCE / "results.md").write_text(results_page())
+    if words[0] in ("validation", "all"):
+        (REFERENCE / "ssnp142.md").write_text(validation_page())
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,1 @@
+"""What comes out: tables, verdict, fields, pictures, comparison with published numbers."""

@@ -1,0 +1,111 @@
+"""Files of a run's fields, for ParaView and for Gmsh."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import gmsh
+import meshio
+import numpy as np
+
+from ..scene.mesh import Mesh
+from ..scene.parameters import constants, start_gmsh
+from .fields import BODIES, OF_JOINT, Field, joint_data
+from .tables import Results
+
+
+def write_fields(result: Results, mesh: Mesh, fields: dict[float, Field], folder: Path) -> None:
+    """
+    Write, below folder, bulk_*.vtu and joint_*.vtu per requested time with fields.pvd (ParaView),
+    and bulk.msh and joint.msh with a view per field, all times in each (Gmsh).
+
+    Dam and foundation have their own points on the joint, so that the opening shows.
+    """
+    folder.mkdir(exist_ok=True)
+    dam, foundation, joint = (mesh.bodies[n] for n in (*BODIES, "joint"))
+    points = np.vstack([dam.points, foundation.points])
+    cells = dam.cells + [(shape, c + len(dam.points)) for shape, c in foundation.cells]
+    regions = constants()
+    body = [
+        np.full(len(c), int(regions[n.upper()][0])) for n in BODIES for _, c in mesh.bodies[n].cells
+    ]
+    cuts = np.cumsum([len(c) for _, c in cells])[:-1]
+    entries, joints, moved, stresses = [], {}, {}, {}
+    for time, field in fields.items():
+        joints[time] = joint_data(result, joint, time)
+        moved[time] = np.vstack([field.displacement[n] for n in BODIES])
+        stresses[time] = np.vstack([field.stress[n] for n in BODIES])
+        bulk = meshio.Mesh(
+            points,
+            cells,
+            point_data={"displacement": moved[time]},
+            cell_data={"stress": np.split(stresses[time], cuts), "body": body},
+        )
+        names = f"bulk_t{time:g}.vtu", f"joint_t{time:g}.vtu"
+        bulk.write(folder / names[0], compression=None)
+        lips = meshio.Mesh(joint.points, joint.cells, point_data=joints[time])
+        lips.write(folder / names[1], compression=None)
+        entries += [(time, part, name) for part, name in enumerate(names)]
+    lines = "".join(f'<DataSet timestep="{t!r}" part="{k}" file="{n}"/>\n' for t, k, n in entries)
+    collection = f"<Collection>\n{lines}</Collection>"
+    (folder / "fields.pvd").write_text(
+        f'<VTKFile type="Collection" version="0.1">\n{collection}\n</VTKFile>\n'
+    )
+    if not fields:
+        return
+    # xx, xy, xz, yx, ...: what Gmsh calls a tensor
+    tensor = [0, 3, 5, 3, 1, 4, 5, 4, 2]
+    of_bulk = [
+        ("displacement [m]", "NodeData", moved),
+        ("stress [Pa]", "ElementData", {t: s[:, tensor] for t, s in stresses.items()}),
+    ]
+    write_views(folder / "bulk.msh", points, cells, of_bulk)
+    of_joint = [
+        (f"{name} [{OF_JOINT[name][0]}]", "NodeData", {t: d[name] for t, d in joints.items()})
+        for name in next(iter(joints.values()))
+    ]
+    write_views(folder / "joint.msh", joint.points, joint.cells, of_joint)
+
+
+#: Gmsh's numbers of the shapes of order 1.
+TYPES = {"line": 1, "triangle": 2, "quad": 3, "tetra": 4, "hexahedron": 5, "wedge": 6}
+DIMENSION = {"line": 1, "triangle": 2, "quad": 2, "tetra": 3, "hexahedron": 3, "wedge": 3}
+
+
+def write_views(
+    path: Path, points: np.ndarray, cells: list, views: list[tuple[str, str, dict]]
+) -> None:
+    """
+    A mesh and views on it, with a step per time: a file for Gmsh.
+
+    views: name, kind, values by time.
+    """
+    start_gmsh()
+    before, own = gmsh.model.getCurrent(), "fields of damjoint"
+    gmsh.model.add(own)
+    tags = np.arange(1, len(points) + 1)
+    entity = gmsh.model.addDiscreteEntity(DIMENSION[cells[0][0]])
+    dimension = DIMENSION[cells[0][0]]
+    gmsh.model.mesh.addNodes(dimension, entity, tags, points.ravel())
+    first = 1
+    for shape, table in cells:
+        numbers = np.arange(first, first + len(table))
+        gmsh.model.mesh.addElementsByType(entity, TYPES[shape], numbers, (table + 1).ravel())
+        first += len(table)
+    gmsh.option.setNumber("Mesh.Binary", 1)
+    gmsh.option.setNumber("PostProcessing.SaveMesh", 0)
+    gmsh.write(str(path))
+    for name, kind, steps in views:
+        view = gmsh.view.add(name)
+        places = tags if kind == "NodeData" else np.arange(1, first)
+        for step, (time, values) in enumerate(steps.items()):
+            values = values.reshape(len(places), -1)
+            gmsh.view.addHomogeneousModelData(
+                view, step, own, kind, places, values.ravel(), time, values.shape[1]
+            )
+        gmsh.view.write(view, str(path), append=True)
+        gmsh.view.remove(view)
+    gmsh.model.setCurrent(own)
+    gmsh.model.remove()
+    if before in gmsh.model.list():
+        gmsh.model.setCurrent(before)

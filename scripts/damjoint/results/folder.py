@@ -1,0 +1,123 @@
+"""
+The folder of a run: run.json, and what an earlier run has left there.
+
+Only files that carry a run's own names, beside a run.json that damjoint has written, are ever
+removed.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from pathlib import Path
+
+from .. import InputError, __version__
+from ..scene.case import Case
+from .tables import FLUX, HISTORY, JOINT, Results
+from .verdict import statement, verdict
+
+#: Names that a run writes, besides its pictures.
+TABLES = ("joint.csv", "history.csv", "curve.csv", "run.json")
+FIELDS = re.compile(r"(bulk|joint)(_t[\w.+-]+\.vtu|\.msh)|fields\.pvd")
+#: Where further scenes of a case go.
+SCENES = ("none", "imposed", "flow")
+
+
+def check_writable(folder: Path) -> None:
+    """Raise InputError if the output folder can not be made or written; makes nothing."""
+    existing = folder
+    while not existing.exists():
+        existing = existing.parent
+    if not existing.is_dir() or not os.access(existing, os.W_OK | os.X_OK):
+        raise InputError(f"out = {folder}: must be a folder that can be written")
+
+
+def scene_folder(case: Case, scene: Case, out: Path) -> Path:
+    """Where a scene's files go: the case's main scene into out, any further one into
+    out/<uplift>.
+    """
+    return out if scene["uplift"] == case["uplift"] else out / scene["uplift"]
+
+
+def earlier(folder: Path) -> dict | None:
+    """The run.json of an earlier run in this folder; None if there is none that damjoint has
+    written.
+    """
+    try:
+        told = json.loads((folder / "run.json").read_text())
+        return told if "damjoint" in told["versions"] and isinstance(told["case"], str) else None
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
+def clear(folder: Path) -> None:
+    """Remove what an earlier run has left in a folder, and below it in the folders of further
+    scenes.
+    """
+    told = earlier(folder)
+    for name in SCENES:
+        if told is not None and (folder / name).is_dir() and not (folder / name).is_symlink():
+            clear(folder / name)
+            remove_if_empty(folder / name)
+    if told is None:
+        return
+    names = [*TABLES, *(f"{told['case']}{end}" for end in (".png", "_curve.png"))]
+    for name in names:
+        if Path(name).name == name:
+            (folder / name).unlink(missing_ok=True)
+    fields = folder / "fields"
+    if fields.is_dir() and not fields.is_symlink():
+        for file in fields.iterdir():
+            if FIELDS.fullmatch(file.name):
+                file.unlink()
+        remove_if_empty(fields)
+
+
+def remove_if_empty(folder: Path) -> None:
+    """Remove a folder that has nothing in it."""
+    if not any(folder.iterdir()):
+        folder.rmdir()
+
+
+def begin(case: Case, folder: Path) -> None:
+    """Make the folder of a scene and say in its run.json that a run is under way."""
+    folder.mkdir(parents=True, exist_ok=True)
+    write_json(
+        folder, {"case": case.name, "state": "running", "versions": {"damjoint": __version__}}
+    )
+
+
+def write_info(results: Results, folder: Path, state: str = "") -> None:
+    """Write run.json: parameters, verdict, sizes, versions, seconds, memory, units of the tables.
+
+    state: interrupted or failed; else it is stopped or complete.
+    """
+    case = results.case
+    flowing = case["uplift"] == "flow"
+    write_json(
+        folder,
+        {
+            "case": case.name,
+            "title": case.title,
+            "state": state or ("stopped" if results.stopped else "complete"),
+            "verdict": verdict(results),
+            "statement": statement(results),
+            "parameters": case.values,
+            "levels": case.levels,
+            "tail_levels": case.tail_levels,
+            "times": case.times,
+            **results.info,
+            "units": {
+                n: unit
+                for n, (unit, _) in {**JOINT, **HISTORY, **(FLUX if flowing else {})}.items()
+            },
+        },
+    )
+
+
+def write_json(folder: Path, told: dict) -> None:
+    """Write run.json whole or not at all."""
+    part = folder / "run.json.part"
+    part.write_text(json.dumps(told, indent=2) + "\n")
+    part.replace(folder / "run.json")

@@ -1,0 +1,160 @@
+"""Results of a run as tables: joint.csv, history.csv, curve.csv."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TextIO
+
+import numpy as np
+
+from ..scene.case import Case
+
+#: Columns of joint.csv: a row per joint node and requested level.
+JOINT = {
+    "time": ("-", "t of the requested level"),
+    "level": ("m", "reservoir level above the joint"),
+    "x": ("m", "place of the node: 0 at the heel, along the joint"),
+    "y": ("m", "place of the node: height"),
+    "z": ("m", "place of the node: across, 3D"),
+    "delta_n": ("m", "normal jump, opening > 0"),
+    "delta_t1": ("m", "tangential jump along x, dam moving downstream > 0"),
+    "delta_t2": ("m", "tangential jump along z"),
+    "sigma_n": ("Pa", "total normal stress, water included, compression < 0"),
+    "tau_1": ("Pa", "shear stress along x, of the sign of the slip it causes"),
+    "tau_2": ("Pa", "shear stress along z"),
+    "p": ("Pa", "water pressure in the joint"),
+    "damage": ("-", "rupture: used part of the softening, 1 broken; friction: 1 where open"),
+    "slip": ("m", "size of the released (rupture) or plastic (friction) slip"),
+    "sigma_n_eff": ("Pa", "effective normal stress, sigma_n + p"),
+}
+#: One more where water flows.
+FLUX = {"flux": ("kg/(m s)", "mass flux along x, mean of the elements around the node")}
+
+#: Columns of history.csv: a row per converged step. Forces are per metre of thickness, in 3D too.
+HISTORY = {
+    "time": ("-", "t of the step"),
+    "level": ("m", "reservoir level above the joint"),
+    "load_factor": ("-", "level over the level prescribed for this t"),
+    "iterations": ("-", "Newton iterations of the step"),
+    "cuts": ("-", "how often the step was shortened"),
+    "residual": ("-", "remaining out-of-balance force over that of the highest water"),
+    "crack_length": ("m", "broken (rupture) or open (friction) joint"),
+    "slip_length": ("m", "released (rupture) or slipped (friction) joint"),
+    "max_opening": ("m", "largest opening of a node"),
+    "crest_ux": ("m", "displacement of the upstream end of the crest along x"),
+    "N": ("N/m", "effective normal force on the joint, compression > 0"),
+    "T": ("N/m", "shear force on the joint, downstream > 0"),
+    "M": ("N m/m", "moment of N about the toe, holding the dam down > 0"),
+    "flux": ("kg/(m s)", "leakage: mass flux out of the toe"),
+    "tail_level": ("m", "tailwater level above the joint"),
+    "U": ("N/m", "uplift: resultant of the water pressure in the joint"),
+    "x_resultant": ("m", "where N meets the joint, from the heel"),
+}
+
+
+@dataclass
+class Results:
+    """What a run has found: tables as {column: array}."""
+
+    case: Case
+    #: a row per converged step, columns HISTORY
+    history: dict[str, np.ndarray]
+    #: a row per joint node and requested level, columns JOINT, and FLUX where water flows
+    joint: dict[str, np.ndarray]
+    #: the same rows with jumps and stresses extrapolated from element means, as published codes
+    #: print them
+    extrapolated: dict[str, np.ndarray]
+    #: whether the run ended before its last level
+    stopped: bool = False
+    #: opening of the heel [m] at each row of history
+    heel: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    #: what run.json says of the run itself: engine, sizes, versions, seconds
+    info: dict = field(default_factory=dict)
+
+    def at(self, time: float | None = None) -> dict[str, np.ndarray]:
+        """The joint rows of a requested time, the last one by default, sorted by x and z."""
+        return rows_at(self.joint, time)
+
+    def at_extrapolated(self, time: float | None = None) -> dict[str, np.ndarray]:
+        """As `at`, with jump and stress extrapolated from the integration points."""
+        return rows_at(self.extrapolated, time)
+
+    @property
+    def last(self) -> dict[str, float]:
+        """The last row of the history; empty before the first step."""
+        return {name: float(column[-1]) for name, column in self.history.items() if len(column)}
+
+
+def rows_at(table: dict[str, np.ndarray], time: float | None = None) -> dict[str, np.ndarray]:
+    """The rows of one time (the last one by default), sorted by x, then z."""
+    time = table["time"].max() if time is None else time
+    rows = np.flatnonzero(np.isclose(table["time"], time))
+    x, z = (np.round(table[n][rows] / max(np.abs(table["x"]).max(), 1e-300), 9) for n in "xz")
+    rows = rows[np.lexsort((z, x))]
+    return {name: column[rows] for name, column in table.items()}
+
+
+def joint_table(case: Case, blocks: list[np.ndarray]) -> dict[str, np.ndarray]:
+    """
+    The joint's table from blocks of rows, one per requested time: time ..
+
+    slip, and flux where water flows.     Adds sigma_n_eff and sorts each block by x, then z.
+    """
+    flowing = case["uplift"] == "flow"
+    given = [*list(JOINT)[:-1], *(FLUX if flowing else ())]
+    rows = np.vstack(blocks) if blocks else np.zeros((0, len(given)))
+    table = dict(zip(given, rows.T, strict=True))
+    table["sigma_n_eff"] = table["sigma_n"] + table["p"]
+    table = {name: table[name] for name in [*JOINT, *(FLUX if flowing else ())]}
+    times = list(dict.fromkeys(table["time"]))
+    parts = [rows_at(table, time) for time in times]
+    return {
+        name: np.concatenate([p[name] for p in parts]) if parts else table[name] for name in table
+    }
+
+
+def history_table(case: Case, rows: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """The history from what an engine has found at each step; load_factor and x_resultant are made
+    here.
+    """
+    scheduled = np.array([case.level_at(time) for time in rows["time"]])
+    factor = np.divide(rows["level"], scheduled, out=np.ones_like(scheduled), where=scheduled > 0)
+    # where M = N (base - x)
+    arm = np.divide(rows["M"], rows["N"], out=np.full_like(scheduled, np.nan), where=rows["N"] > 0)
+    rows = rows | {"load_factor": factor, "x_resultant": case["dam_base"] - arm}
+    return {name: rows[name] for name in HISTORY}
+
+
+def write_csv(target: Path | TextIO, table: dict[str, np.ndarray]) -> None:
+    """Write a table with its column names to a path or an open file; numbers with twelve digits."""
+    if isinstance(target, Path):
+        with target.open("w", newline="") as file:
+            write_csv(file, table)
+        return
+    writer = csv.writer(target, lineterminator="\n")
+    writer.writerow(table)
+    writer.writerows([f"{v:.12g}" for v in row] for row in zip(*table.values(), strict=True))
+
+
+def write(results: Results, folder: Path) -> None:
+    """Write joint.csv and history.csv into a folder; curve.csv (load against opening) of a driven
+    case.
+    """
+    case, history = results.case, results.history
+    joint = dict(results.joint)
+    for axis in "xyz":  # the mesh generator's last digits
+        joint[axis] = np.round(joint[axis], 9) + 0.0
+    write_csv(folder / "joint.csv", joint)
+    write_csv(folder / "history.csv", history)
+    if case["drive"] != "level":
+        pressure = case["rho_water"] * case["g"] * history["level"]
+        curve = {
+            "time": history["time"],
+            "level": history["level"],
+            "pressure": pressure,
+            "heel_opening": results.heel,
+            "crest_ux": history["crest_ux"],
+        }
+        write_csv(folder / "curve.csv", curve)

@@ -1,0 +1,146 @@
+"""
+What a run has found, in words: whether the dam stands, and if not, how it fails.
+
+This is the one place that reads a failure out of resultants.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..scene.case import Case
+from .tables import Results
+
+
+def verdict(results: Results) -> str:
+    """
+    One of: stands, sliding, overturning, no convergence, no equilibrium, interrupted.
+
+    "no equilibrium": not even at the first step. "sliding" also where the whole joint has slipped
+    or opened and the dam stands on nothing but the joint's hardening.
+    """
+    if not results.last:
+        return "no equilibrium"
+    if results.stopped:
+        return why_stopped(results)
+    return "sliding" if loose_from(results) is not None else "stands"
+
+
+def failed(results: Results) -> bool:
+    """Whether the run's exit code has to be 1: stopped, or sliding on a hardening that nobody asked
+    for.
+    """
+    if results.stopped or not results.last:
+        return True
+    asked = results.case["law"] == "friction" and results.case.hardening_asked
+    return loose_from(results) is not None and not asked
+
+
+def loose_from(results: Results) -> float | None:
+    """
+    The level [m] from which on the whole joint has slipped or is open; None if a part of it still
+    holds.
+
+    Once slipped, a joint counts as slipped. Seen at the integration points of every step, or at the
+    nodes of the last requested level.
+    """
+    history, base = results.history, results.case["dam_base"]
+    gone = np.maximum(history["slip_length"], history["crack_length"]) > base * (1 - 1e-9)
+    if gone.any() and gone[-1]:
+        return float(history["level"][np.flatnonzero(~gone)[-1] + 1 if not gone.all() else 0])
+    rows = results.at() if len(results.joint["time"]) else {}
+    if rows and np.all((rows["damage"] >= 1) | (rows["slip"] > 0)):
+        return float(rows["level"][0])
+    return None
+
+
+def why_stopped(results: Results) -> str:
+    """
+    Overturning, sliding or no convergence, from the last converged state.
+
+    Overturning: the crack has crossed most of the base, or the resultant is in its last tenth.
+    Sliding: the shear is within 2 % of what the joint can hold, T <= mu N + c L + H (mean slip) L
+    (N holds the tension c/mu of open points, so that c acts on all of L); or the whole joint has
+    let go.
+    """
+    case, last = results.case, results.last
+    base = case["dam_base"]
+    if last["crack_length"] > 0.8 * base or last["M"] < 0.1 * last["N"] * base:
+        return "overturning"
+    if case["law"] == "friction":
+        hardened = case["pena_tang"] * mean_slip(results) * base
+        holds = case["mu"] * last["N"] + case["adhesion"] * base + hardened
+        if last["T"] > 0.98 * holds:
+            return "sliding"
+    return "sliding" if last["slip_length"] > 0.98 * base else "no convergence"
+
+
+def mean_slip(results: Results) -> float:
+    """Mean slip along the joint at the last saved state [m]."""
+    if not len(results.joint["time"]):
+        return 0.0
+    rows = results.at()
+    place, inverse = np.unique(rows["x"].round(9), return_inverse=True)
+    slip = np.bincount(inverse, rows["slip"]) / np.bincount(inverse)
+    return float(np.sum((slip[1:] + slip[:-1]) / 2 * np.diff(place)) / np.ptp(place))
+
+
+def statement(results: Results) -> str:
+    """In words: why and where a run has stopped, or that the dam slides; empty if it stands."""
+    case, last, found = results.case, results.last, verdict(results)
+    if found == "no equilibrium":
+        return "no equilibrium even at the first step"
+    if results.stopped:
+        hint = stiff_joint(results) if found == "no convergence" else ""
+        where = f"level {last['level']:.6g} m (t = {last['time']:.6g})"
+        return f"{found}{hint}: no equilibrium beyond {where}; the last converged state is saved"
+    if found == "stands":
+        return ""
+    said = (
+        f"sliding: the whole joint has slipped or is open from level {loose_from(results):.6g} m on"
+    )
+    if case["law"] != "friction":
+        return said + "; nothing holds it along the joint"
+    asked = "" if case.hardening_asked else ", a default that no joint has; set it if yours hardens"
+    return (
+        f"{said}; the dam stands on the hardening pena_tang = {case['pena_tang']:.4g} Pa/m{asked}"
+    )
+
+
+def stiff_joint(results: Results) -> str:
+    """A hint, if the joint is too stiff for its elements."""
+    case = results.case
+    stiff = case["K_N"] * case["dam_base"] / case["n_joint"] / min(case["E_dam"], case["E_found"])
+    if stiff < 100:
+        return ""
+    why = f"the joint is too stiff for this mesh: K_N h/E = {stiff:.3g}"
+    return f" ({why}; refine n_joint or lower K_N)"
+
+
+def path_statement(results: Results) -> str:
+    """In words, what a prescribed displacement has found: the largest level, and whether the path
+    turns back.
+    """
+    history, case = results.history, results.case
+    level, time = history["level"], history["time"]
+    if not len(level):
+        return "no step has converged"
+    driven = (time > case["drive_begin"] - 1e-9) & (time < case["drive_end"] + 1e-9)
+    load = case["rho_water"] * case["g"] * level.max()
+    said = f"largest load: level {level.max():.5g} m ({load / 1e3:.5g} kPa)"
+    falls = bool((np.diff(level[driven]) < 0).any())
+    moved = history["crest_ux"][driven], results.heel[driven]
+    back = any(bool((np.diff(m) < 0).any()) for m in moved)
+    said += "; the level " + ("falls while the displacement grows" if falls else "rises all along")
+    return said + ("; snap-back met" if back else "; no snap-back")
+
+
+def overturning_level(case: Case) -> float:
+    """Level [m] of a uniform pressure at which the dry dam without tension turns over about its
+    toe.
+    """
+    base, crest, height = case["dam_base"], case["dam_crest"], case["dam_height"]
+    area = (base + crest) / 2 * height
+    centroid = (base**2 + base * crest + crest**2) / (3 * (base + crest))
+    weight = case["rho_dam"] * case["g"] * area
+    return weight * (base - centroid) / (case["rho_water"] * case["g"] * height**2 / 2)

@@ -1,0 +1,1 @@
+"""What is asked: parameters, case files, meshes."""

@@ -1,0 +1,234 @@
+"""Cases: a scene and its loading, read from a case file, with overrides, checked."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from .. import InputError, data
+from . import casefile
+from .parameters import assignments, declared, include, listing, parse
+
+CASES = data("cases")
+
+
+@dataclass(frozen=True)
+class Case:
+    """A scene and its loading, fully resolved: everything a run depends on."""
+
+    name: str
+    title: str
+    values: dict[str, float | str]
+    #: reservoir and tailwater [m] at t = 1, 2, ...
+    levels: tuple[float, ...]
+    tail_levels: tuple[float, ...]
+    #: converged steps asked for; those in `requested` have a joint table
+    times: tuple[float, ...]
+    #: further uplift modes that the published case runs
+    also_uplift: tuple[str, ...] = ()
+    #: whether pena_tang has been set: a dam whose whole joint slips is meant to stand on it
+    hardening_asked: bool = False
+    #: what the solvers share besides the parameters: {name: values}, from pro/parameters.pro
+    shared: dict[str, list[float]] = field(default_factory=dict, compare=False, repr=False)
+
+    def __getitem__(self, name: str) -> float | str:
+        return self.values[name]
+
+    @property
+    def requested(self) -> tuple[float, ...]:
+        """The times at which a level of the list or the end of a prescribed displacement is
+        reached; the last.
+        """
+        ends = {self["drive_end"]} if self["drive"] != "level" else set()
+        return tuple(t for t in self.times if t == round(t) or t in ends or t == self.times[-1])
+
+    def level_at(self, time: float) -> float:
+        """Reservoir level [m] at a time, linear between the levels, from 0 at t = 0."""
+        return between(self.levels, time)
+
+    def tail_at(self, time: float) -> float:
+        """Tailwater level [m] at a time."""
+        return between(self.tail_levels, time)
+
+    def before_last_level(self) -> Case | None:
+        """The case without its last level; None if there is only one, or the level is not what is
+        prescribed.
+        """
+        before = len(self.levels) - 1
+        if not before or self["drive"] != "level":
+            return None
+        return replace(
+            self,
+            levels=self.levels[:-1],
+            tail_levels=self.tail_levels[:-1],
+            times=tuple(t for t in self.times if t <= before),
+        )
+
+    def scenes(self) -> list[Case]:
+        """The case itself, then the other uplift modes it is published with."""
+        others = (
+            replace(self, values={**self.values, "uplift": mode}, also_uplift=())
+            for mode in self.also_uplift
+        )
+        return [self, *others]
+
+
+def between(levels: tuple[float, ...], time: float) -> float:
+    """Level at a time, linear between the levels at t = 1, 2, ..., from 0 at t = 0."""
+    points = (0.0, *levels)
+    i = min(int(time), len(points) - 2)
+    return points[i] + (time - i) * (points[i + 1] - points[i])
+
+
+def case_file(case: str) -> Path:
+    """
+    The file of a case given by letter, name or path.
+
+    Raises InputError if there is none.
+    """
+    for path in (CASES / f"{case.lower()}.case", Path(case)):
+        if path.suffix == ".case" and path.is_file():
+            return path
+    names = ", ".join(path.stem for path in sorted(CASES.glob("*.case")))
+    raise InputError(f"case {case}: unknown; allowed: {names}, or the path of a .case file")
+
+
+#: For an accuracy: elements along the joint, and layers in 3D where something varies along z.
+ACCURACIES = {"coarse": (40, 1), "standard": (100, 2), "fine": (200, 4)}
+
+
+def mesh_for(accuracy: str, case: Case) -> dict[str, float | str]:
+    """
+    Mesh and order for an accuracy of about 3 % (coarse), 1 % (standard) or 0.2 % (fine).
+
+    Measured by `damjoint bench`. Order 2, triangles, in 3D extruded and cut into tetrahedra: these
+    contain the plane fields exactly, however thick they are. Raises InputError.
+    """
+    if accuracy not in ACCURACIES:
+        raise InputError(f"accuracy = {accuracy}: must be one of {', '.join(ACCURACIES)}")
+    (n, layers), solid = ACCURACIES[accuracy], case["dim"] == 3
+    plane = case["hold_z"] or max(case["nu_dam"], case["nu_found"]) == 0
+    return {
+        "order": 2.0,
+        "mesh_pattern": "split" if solid else "free",
+        "n_layers": 1.0 if plane else float(layers),
+        "n_joint": float(n),
+        "h_dam": -1.0,
+        "h_found": -1.0,
+    }
+
+
+def load(
+    case: str,
+    overrides: Mapping[str, float | str] | None = None,
+    levels: str | None = None,
+    tail_levels: str | None = None,
+    steps: int | None = None,
+    accuracy: str | None = None,
+) -> Case:
+    """Read a case, apply overrides and check everything.
+
+    case: letter, name or path; overrides: {name: value}; levels, tail_levels: 'a,b,c' in metres,
+    reached at t = 1, 2, 3; steps: equal steps between two levels; accuracy: coarse, standard or
+    fine, chooses mesh and order (overrides win) and one step per level. Raises InputError.
+    """
+    path, overrides = case_file(case), dict(overrides or {})
+    if accuracy is not None:
+        plain = load(case, overrides)
+        overrides = mesh_for(accuracy, plain) | overrides
+        steps = steps or (1 if plain["drive"] == "level" else None)
+    if steps is not None and steps < 1:
+        raise InputError(f"steps = {steps}: must be an integer >= 1")
+    said = casefile.read(path)
+    lists = dict(said.lists)
+    if levels is not None:
+        lists["levels"] = numbers("levels", levels)
+    if levels is not None or steps is not None:
+        lists.pop("times", None)
+    own_tail = lists.pop("tail_levels", [0.0])
+    known = declared()
+    checked = {name: known[name].check(value) for name, value in overrides.items()}
+    text = assignments(said.defaults | checked)
+    found = parse(text + "".join(listing(n, v) for n, v in lists.items()) + include())
+    values = {name: known[name].check(found[name][0]) for name in known}
+    heights = check_levels("levels", found["levels"], values)
+    if tail_levels is not None:
+        own_tail = numbers("tail_levels", tail_levels)
+    tails = check_levels("tail_levels", own_tail, values)
+    if len(set(tails)) == 1:
+        tails = tails[:1] * len(heights)
+    if len(tails) != len(heights):
+        told = ",".join(f"{v:g}" for v in tails)
+        whose = " (the case's own; give --tail-levels)" if tail_levels is None else ""
+        raise InputError(
+            f"tail_levels = {told}{whose}: must be one level or as many as levels ({len(heights)})"
+        )
+    times = tuple(found["times"])
+    if steps is not None:
+        times = tuple(i + (k + 1) / steps for i in range(len(heights)) for k in range(steps))
+    check_times(times, len(heights))
+    if values["drive"] != "level":
+        begin, end = values["drive_begin"], values["drive_end"]
+        if not 0 <= begin < end <= len(heights):
+            raise InputError(
+                f"drive_begin, drive_end = {begin:g}, {end:g}: must be "
+                f"0 <= drive_begin < drive_end <= {len(heights)} (the last t)"
+            )
+        times = tuple(sorted({*times, end, *([begin] if begin > 0 else [])}))
+    also = said.texts.get("also_uplift", "").split() if "uplift" not in overrides else []
+    also = tuple(known["uplift"].check(mode) for mode in also)
+    shared = {
+        n: found[n] for n in ("attempt_growth", "attempt_secant", "cut", "artificial", "sudden")
+    }
+    return Case(
+        path.stem,
+        said.texts.get("title", path.stem),
+        values,
+        heights,
+        tails,
+        times,
+        also,
+        bool(found["hardening_asked"][0]),
+        shared,
+    )
+
+
+def numbers(name: str, text: str) -> list[float]:
+    """
+    Numbers from 'a,b,c'.
+
+    Raises InputError if empty or malformed.
+    """
+    try:
+        found = [float(v) for v in text.split(",")]
+    except ValueError:
+        found = []
+    if not found or not all(map(math.isfinite, found)):
+        raise InputError(f"{name} = {text}: must be a list of levels in metres, such as 3,6,8,9")
+    return found
+
+
+def check_levels(name: str, levels: Iterable[float], values: Mapping) -> tuple[float, ...]:
+    """
+    Water levels [m].
+
+    Raises InputError if one is negative or above the crest.
+    """
+    for level in levels:
+        if not 0 <= level <= values["dam_height"]:
+            raise InputError(
+                f"{name} = {level:g}: must be between 0 and the crest ({values['dam_height']:g} m)"
+            )
+    return tuple(levels)
+
+
+def check_times(times: tuple[float, ...], last: int) -> None:
+    """Raise InputError if the times do not increase or lie outside 0 < t <= last."""
+    for before, time in zip((0.0, *times), times, strict=False):
+        if not before < time <= last:
+            raise InputError(
+                f"times = {','.join(f'{t:g}' for t in times)}: must increase from above 0 "
+                f"to at most {last} (level number i is reached at t = i)"
+            )

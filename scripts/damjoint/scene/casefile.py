@@ -1,0 +1,181 @@
+"""Case files: data in a small part of Gmsh's language, read here; nothing in them is ever executed.
+
+A case is a list of statements, in any layout, with // and /* */ comments:
+
+    Include "other.case";            the statements of another case file, beside this one
+    title = "words";
+    also_uplift = "none";            further uplift modes the case is published with
+    default_<parameter> = value;     a text or arithmetic with + - * / ^ ( ), Pi and defaults set
+    before levels() = {value, ...};         tail_levels() and times() likewise
+"""
+
+from __future__ import annotations
+
+import ast
+import difflib
+import math
+import operator
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from .. import InputError
+from .parameters import parameter
+
+LISTS = ("levels", "tail_levels", "times")
+TEXTS = ("title", "also_uplift")
+#: Bytes a case file may have, and files that may include one another.
+LONGEST, DEEPEST = 1_000_000, 8
+
+TOKEN = re.compile(
+    r"""(?P<nothing>\s+|//[^\n]*|/\*.*?\*/) |(?P<text>"[^"\\\n]*")
+    |(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?) |(?P<name>[A-Za-z_]\w*)
+    |(?P<mark>[-+*/^(){},;=]) |(?P<other>.)""",
+    re.X | re.S,
+)
+OPERATORS = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.Pow: operator.pow,
+    ast.UAdd: operator.pos,
+    ast.USub: operator.neg,
+}
+
+
+@dataclass
+class CaseText:
+    """What a case file says: defaults by parameter, lists, texts."""
+
+    defaults: dict[str, float | str] = field(default_factory=dict)
+    lists: dict[str, list[float]] = field(default_factory=dict)
+    texts: dict[str, str] = field(default_factory=dict)
+
+
+def read(path: Path) -> CaseText:
+    """
+    The statements of a case file and of those it includes.
+
+    Raises InputError, naming file, line and statement, for anything else than the statements above.
+    """
+    found = CaseText()
+    read_into(found, path, 0)
+    return found
+
+
+def read_into(found: CaseText, path: Path, depth: int) -> None:
+    """Add the statements of a case file; depth: of inclusion."""
+    if path.suffix != ".case":
+        raise InputError(f'Include "{path.name}": must be a .case file')
+    if depth > DEEPEST:
+        raise InputError(
+            f"case {path}: includes itself, or more than {DEEPEST} files one in another"
+        )
+    try:
+        if path.stat().st_size > LONGEST:
+            raise InputError(f"case {path}: must be a text of at most {LONGEST} bytes")
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"case {path}: {error}") from None
+    statement, first = [], 0
+    for match in TOKEN.finditer(text):
+        kind, token = match.lastgroup, match[0]
+        if kind == "nothing":
+            continue
+        first = first if statement else text.count("\n", 0, match.start()) + 1
+        statement.append((kind, token))
+        where = f"case {path}, line {first}"
+        if kind == "other":
+            raise InputError(f"{where}: {said(statement)}: {token!r} is not part of a case")
+        if token == ";":
+            take(found, statement[:-1], path, depth, where)
+            statement = []
+    if statement:
+        raise InputError(f"{where}: {said(statement)}: does not end with a semicolon")
+
+
+def said(statement: list[tuple[str, str]]) -> str:
+    """A statement in one line, not longer than a line."""
+    words = " ".join(token for _, token in statement)
+    return words if len(words) < 60 else words[:57] + "..."
+
+
+def take(found: CaseText, statement: list, path: Path, depth: int, where: str) -> None:
+    """Carry out one statement: enter what it sets into `found`."""
+    kinds, tokens = zip(*statement, strict=True) if statement else ((), ())
+    where = f"{where}: {said(statement)}"
+    if tokens[:1] == ("Include",) and kinds[1:] == ("text",):
+        read_into(found, path.parent / tokens[1][1:-1], depth + 1)
+    elif kinds[:1] == ("name",) and tokens[1:4] == ("(", ")", "=") and tokens[0] in LISTS:
+        found.lists[tokens[0]] = numbers(tokens[4:], found, where)
+    elif kinds[:1] == ("name",) and tokens[1:2] == ("=",) and tokens[0] in TEXTS:
+        if kinds[2:] != ("text",):
+            raise InputError(f'{where}: must be {tokens[0]} = "words"')
+        found.texts[tokens[0]] = tokens[2][1:-1]
+    elif kinds[:1] == ("name",) and tokens[1:2] == ("=",) and tokens[0].startswith("default_"):
+        name = tokens[0].removeprefix("default_")
+        try:
+            known = parameter(name)
+        except InputError as error:
+            raise InputError(f"{where}: {error}") from None
+        value = tokens[2][1:-1] if kinds[2:] == ("text",) else evaluate(tokens[2:], found, where)
+        found.defaults[name] = known.check(value)
+    else:
+        words = [*(f"{n}()" for n in LISTS), *TEXTS, "Include", "default_<parameter>"]
+        near = difflib.get_close_matches("".join(tokens[:3]).partition("=")[0], words, 1)
+        raise InputError(
+            f"{where}: not a statement of a case; allowed: "
+            + (f"{near[0]} (did you mean that?), " if near else "")
+            + 'Include "file.case", title, also_uplift, default_<parameter> = value, '
+            + "levels() = {...}, tail_levels() = {...}, times() = {...}"
+        )
+
+
+def numbers(tokens: tuple[str, ...], found: CaseText, where: str) -> list[float]:
+    """
+    The values of a list { a, b, ...
+
+    }.
+    """
+    if tokens[:1] != ("{",) or tokens[-1:] != ("}",):
+        raise InputError(f"{where}: must be a list of numbers in braces, such as {{3, 6, 8, 9}}")
+    items, part = [], []
+    for token in (*tokens[1:-1], ","):
+        if token == ",":
+            items.append(evaluate(tuple(part), found, where))
+            part = []
+        else:
+            part.append(token)
+    return items
+
+
+def evaluate(tokens: tuple[str, ...], found: CaseText, where: str) -> float:
+    """The value of an arithmetic expression."""
+    bad = InputError(
+        f"{where}: must be a number, or arithmetic with + - * / ^ ( ), Pi and defaults set before"
+    )
+
+    def value(node: ast.expr) -> float:
+        if isinstance(node, ast.Constant) and isinstance(node.value, (int, float)):
+            return float(node.value)
+        if isinstance(node, ast.Name):
+            known = math.pi if node.id == "Pi" else None
+            known = found.defaults.get(node.id.removeprefix("default_"), known)
+            if isinstance(known, float) and (node.id == "Pi" or node.id.startswith("default_")):
+                return known
+        if isinstance(node, ast.BinOp) and type(node.op) in OPERATORS:
+            return OPERATORS[type(node.op)](value(node.left), value(node.right))
+        if isinstance(node, ast.UnaryOp) and type(node.op) in OPERATORS:
+            return OPERATORS[type(node.op)](value(node.operand))
+        raise bad
+
+    try:
+        number = value(ast.parse(" ".join(tokens).replace("^", "**"), mode="eval").body)
+    except (SyntaxError, ArithmeticError, ValueError, RecursionError, MemoryError):
+        raise bad from None
+    if not isinstance(number, float) or not math.isfinite(
+        number
+    ):  # complex: a root of a negative number
+        raise bad
+    return number

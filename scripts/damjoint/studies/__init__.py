@@ -1,0 +1,1 @@
+"""What is done with many runs: sweeps, benchmarks; and a joint law along a path."""

@@ -1,0 +1,608 @@
+"""Benchmarks: wall time and memory beside the published code's, error against time, growth, what
+each option costs.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import platform
+import re
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterable
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+from tqdm import tqdm
+
+from .. import RunError
+from ..engines.condensed import factor
+from ..engines.condensed.bulk import Bodies, condense
+from ..engines.condensed.filling import Filling
+from ..engines.condensed.interface import Interface
+from ..results import tables
+from ..results.pictures import along
+from ..results.tables import Results
+from ..results.verdict import statement
+from ..run import run
+from ..scene.case import ACCURACIES, Case, load
+from .sweep import filled, interface_of
+
+#: code_aster 15.2, sequential, on a 2-core machine: seconds of wall time of the whole job without
+#: meshing.
+PUBLISHED = {
+    "a": 3.9,
+    "b": 44.1,
+    "c": 2.0,
+    "d": 19.1,
+    "e": 25.4,
+    "f": 168,
+    "g": 5.1,
+    "h": 27.6,
+    "i": 4.6,
+    "j": 3.7,
+    "k": 5.2,
+}
+
+#: Scenes of the error-against-time benchmark: case, and what it is about.
+SCENES = {"rupture": "a", "friction": "c", "flow": "e"}
+QUANTITIES = ("heel_opening", "toe_stress", "crack_tip", "slip", "leakage")
+
+#: Where the seconds of a run go; start: Python, libraries, reading the case.
+PARTS = ("start", "mesh", "assembly", "condensation", "newton", "post")
+
+
+def cold(arguments: list[str]) -> tuple[float, dict]:
+    """
+    Wall seconds and run.json of a damjoint run in a process of its own, with an empty cache, no
+    fields, no picture.
+
+    Raises RunError if it fails.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        command = [
+            sys.executable,
+            "-m",
+            "damjoint.cli",
+            "run",
+            *arguments,
+            "--no-fields",
+            "--no-picture",
+            "--out",
+            f"{folder}/out",
+        ]
+        start = time.perf_counter()
+        done = subprocess.run(
+            command,
+            env={**os.environ, "DAMJOINT_CACHE": ""},
+            stdout=subprocess.DEVNULL,
+            check=False,
+        )
+        wall = time.perf_counter() - start
+        if done.returncode:
+            raise RunError(
+                f"bench: damjoint run {' '.join(arguments)} ended with exit code {done.returncode}"
+            )
+        told = json.loads(Path(folder, "out", "run.json").read_text())
+        for further in Path(folder, "out").glob("*/run.json"):  # the other scene
+            seconds = json.loads(further.read_text())["wall_seconds"]
+            for part in ("solve", "post"):
+                told["wall_seconds"][part] += seconds[part]
+        return wall, told
+
+
+class Table(dict):
+    """Columns of a table, {name: values}, filled row by row."""
+
+    def __init__(self, *names: str) -> None:
+        super().__init__({name: [] for name in names})
+
+    def add(self, *values: object) -> None:
+        """One more row."""
+        for column, value in zip(self.values(), values, strict=True):
+            column.append(value)
+
+    def rows(self, *where: object) -> np.ndarray:
+        """Indices of the rows whose first columns have these values."""
+        return np.flatnonzero(
+            [row[: len(where)] == where for row in zip(*self.values(), strict=True)]
+        )
+
+
+def bar(things: Iterable, title: str, total: int | None = None) -> Iterable:
+    """The things with a progress bar, on a terminal; total: their number if they do not know it."""
+    return tqdm(things, desc=title, total=total, disable=not sys.stderr.isatty())
+
+
+def cases(short: bool) -> Table:
+    """Each modeling, all its scenes, published steps, meshes of the document's size: seconds and
+    where they went, MB, ratio to the published code; unless short, the plain engine's, too.
+    """
+    table = Table(
+        "case", "seconds", *PARTS, "MB", "published", "times faster", "GetDP", "times faster, GetDP"
+    )
+    for name in bar(PUBLISHED, "cases"):
+        wall, told = cold([name])
+        spent = [
+            told["wall_seconds"][part]
+            for part in ("mesh", "assembly", "condensation", "solve", "post")
+        ]
+        plain = float("nan") if short else cold([name, "--engine", "getdp"])[0]
+        table.add(
+            name,
+            wall,
+            wall - sum(spent),
+            *spent,
+            told["peak_memory_mb"],
+            PUBLISHED[name],
+            PUBLISHED[name] / wall,
+            plain,
+            PUBLISHED[name] / plain,
+        )
+    total = {n: sum(c) for n, c in table.items() if n != "case"}
+    table.add(
+        "sum",
+        *(total[n] for n in ("seconds", *PARTS)),
+        max(table["MB"]),
+        total["published"],
+        total["published"] / total["seconds"],
+        total["GetDP"],
+        total["published"] / total["GetDP"],
+    )
+    return table
+
+
+def measure(case: Case) -> tuple[Results, dict[str, float]]:
+    """Solve a scene in this process; the seconds of PARTS but the start, and the number of
+    unknowns.
+    """
+    bulk = condense(case, Bodies.of(case))
+    begin = time.perf_counter()
+    result = Filling(case, Interface(bulk)).run()
+    done = time.perf_counter()
+    with tempfile.TemporaryDirectory() as folder:
+        tables.write(result, Path(folder))
+    return result, {
+        **bulk.seconds,
+        "newton": done - begin,
+        "post": time.perf_counter() - done,
+        "unknowns": bulk.unknowns,
+    }
+
+
+def read_off(result: Results) -> np.ndarray:
+    """QUANTITIES at the last level, means over z; the crack's tip where the opening interpolates to
+    zero.
+    """
+    mean = along(result.at())
+    x, opening = mean["x"], mean["delta_n"]
+    last = np.flatnonzero(opening > 0).max(initial=0)
+    tip = (
+        x[last] + (x[last + 1] - x[last]) * opening[last] / (opening[last] - opening[last + 1])
+        if opening[last] > 0
+        else 0.0
+    )
+    slip = np.sum((mean["slip"][1:] + mean["slip"][:-1]) / 2 * np.diff(x)) / x[-1]
+    return np.array([result.heel[-1], mean["sigma_n"][-1], tip, slip, result.history["flux"][-1]])
+
+
+def worst(found: np.ndarray, exact: np.ndarray) -> float:
+    """The largest relative difference of QUANTITIES."""
+    return float(np.max(errors(found, exact)))
+
+
+def errors(found: np.ndarray, exact: np.ndarray) -> np.ndarray:
+    """Relative differences; 0 where the exact value is."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(exact == 0, 0, np.abs(found / exact - 1))
+
+
+def settings(
+    order: int, n: int, grading: float, pattern: str, dim: int, height: float = 10.0
+) -> dict:
+    """Mesh parameters of one point of the error-against-time benchmark; grading 1 as --accuracy,
+    smaller finer far away.
+    """
+    # as pro/parameters.pro has them
+    sizes = {"h_dam": 1.25 * grading * height / n**0.5, "h_found": 2.5 * grading * height / n**0.5}
+    solid = (
+        {"dim": 3.0, "thickness": 0.2 if pattern == "free" else 1.0, "n_layers": 1.0, "hold_z": 1.0}
+        if dim == 3
+        else {"dim": 2.0}
+    )
+    return {"order": float(order), "n_joint": float(n), "mesh_pattern": pattern, **sizes, **solid}
+
+
+def overkill(short: bool) -> tuple[dict[str, np.ndarray], Table]:
+    """QUANTITIES of each modeling's main scene on the finest mesh, {case: values}, and for SCENES
+    how they got there: observed order and remaining error by extrapolation.
+
+    Plane strain of order 2, 640 elements along the joint (80 if short), twice finer than --accuracy
+    far away; the 3D modelings are plane, too (nu = 0, nothing varies along z).
+    """
+    sizes = (20, 40, 80) if short else (160, 320, 640)
+    exact, table = (
+        {},
+        Table(
+            "scene",
+            "quantity",
+            *(f"n = {n}" for n in sizes),
+            "observed order",
+            "remaining error [%]",
+        ),
+    )
+    for name in bar(SCENES.values() if short else PUBLISHED, "overkill"):
+        wanted = sizes if name in SCENES.values() else sizes[-1:]
+        found = [
+            read_off(
+                measure(load(name, settings(2, n, 0.5, "free", 2) | {"uplift": main_uplift(name)}))[
+                    0
+                ]
+            )
+            for n in wanted
+        ]
+        exact[name] = found[-1]
+        if len(found) == 1:
+            continue
+        scene = next(s for s, c in SCENES.items() if c == name)
+        for quantity, values in zip(QUANTITIES, np.transpose(found), strict=True):
+            if values[-1]:
+                before, last = np.abs(np.diff(values))
+                order = np.log2(before / last) if last else np.inf
+                # Richardson; where the differences do not shrink as they should, the last of them
+                remaining = last / (2**order - 1) if order > 1 else last
+                table.add(scene, quantity, *values, order, 100 * remaining / abs(values[-1]))
+    return exact, table
+
+
+def accuracy(short: bool, exact: dict[str, np.ndarray], start: float) -> Table:
+    """Error of QUANTITIES against the overkill solution, and the seconds spent: a row per scene and
+    mesh, published steps, and for one mesh other numbers of steps.
+    """
+    table = Table(
+        "scene",
+        "dim",
+        "pattern",
+        "order",
+        "n_joint",
+        "grading",
+        "steps",
+        "unknowns",
+        "seconds",
+        *PARTS,
+        *(f"error_{q}" for q in QUANTITIES),
+        "worst",
+    )
+    numbers = (10, 20) if short else (10, 20, 40, 80, 160, 320)
+    gradings = (1.0,) if short else (2.0, 1.0, 0.5)
+    runs = [
+        (2, "free", order, n, grading, None)
+        for order in (1, 2)
+        for n in numbers
+        for grading in gradings
+    ]
+    runs += [(2, "regular", order, n, 1.0, None) for order in (1, 2) for n in numbers]
+    runs += [
+        (3, pattern, order, n, 1.0, None)
+        for pattern, most in (("layers", 80), ("split", 160), ("free", 40))
+        for order in (1, 2)
+        for n in numbers
+        if n <= most
+    ]
+    runs += [(2, "free", 2, numbers[-2], 1.0, steps) for steps in (1, 2, 4)]
+    for scene, name in SCENES.items():
+        main = {"uplift": main_uplift(name)}
+        for dim, pattern, order, n, grading, steps in bar(runs, scene):
+            chosen = settings(order, n, grading, pattern, dim) | main
+            result, spent = measure(load(name, chosen, steps=steps))
+            spent["start"] = start
+            off = errors(read_off(result), exact[name])
+            table.add(
+                scene,
+                dim,
+                pattern,
+                order,
+                n,
+                grading,
+                steps or "published",
+                spent["unknowns"],
+                sum(spent[p] for p in PARTS),
+                *(spent[p] for p in PARTS),
+                *off,
+                max(off),
+            )
+    return table
+
+
+def recommended(short: bool, exact: dict[str, np.ndarray]) -> Table:
+    """Each modeling's main scene: worst error of the published mesh and steps, and error and
+    seconds of --accuracy.
+    """
+    levels = list(ACCURACIES)[: 1 if short else None]
+    table = Table(
+        "case",
+        "published: error [%]",
+        "published",
+        *(
+            f"{level}: {what}"
+            for level in levels
+            for what in ("error [%]", "seconds", "of these start")
+        ),
+    )
+    for name in bar(list(exact), "accuracy"):
+        main = {"uplift": main_uplift(name)}
+        row = [100 * worst(read_off(measure(load(name, main))[0]), exact[name]), PUBLISHED[name]]
+        for level in levels:
+            case = load(name, main, accuracy=level)
+            result, _ = measure(case)
+            wall, told = cold([name, "--accuracy", level, "--set", f"uplift={main['uplift']}"])
+            row += [
+                100 * worst(read_off(result), exact[name]),
+                wall,
+                wall - sum(told["wall_seconds"].values()),
+            ]
+        table.add(name, *row)
+    table.add(
+        "sum, worst", *(max(c) if "error" in n else sum(c) for n, c in table.items() if n != "case")
+    )
+    return table
+
+
+def main_uplift(name: str) -> str:
+    """The main uplift mode of a case."""
+    return str(load(name)["uplift"])
+
+
+def front(seconds: np.ndarray, error: np.ndarray, gain: float = 1.0) -> np.ndarray:
+    """Indices of the points that no other beats in both time and error, by time; each below `gain`
+    times the error before.
+    """
+    chosen = []
+    for i in np.argsort(seconds):
+        if not chosen or error[i] < gain * error[chosen[-1]]:
+            chosen.append(i)
+    return np.array(chosen)
+
+
+def growth(short: bool) -> Table:
+    """Seconds and memory against the number of unknowns, each size in a process of its own."""
+    table = Table("dim", "order", "n_joint", "unknowns", "seconds", "MB")
+    sizes = [(2, n) for n in ((50, 100) if short else (50, 100, 200, 400))]
+    sizes += [(3, n) for n in ((20,) if short else (20, 40, 60, 90, 125))]
+    for dim, n in bar(sizes, "growth"):
+        chosen = {
+            "dim": dim,
+            "order": 2 if dim == 2 else 1,
+            "n_joint": n,
+            "mesh_pattern": "free",
+            "uplift": "imposed",
+        }
+        # uniform refinement: every size goes with the joint's
+        chosen |= (
+            {"h_dam": 15 / n, "h_found": 40 / n}
+            if dim == 2
+            else {"n_layers": max(1, n // 5), "h_dam": 20 / n, "h_found": 40 / n}
+        )
+        pairs = [part for k, v in chosen.items() for part in ("--set", f"{k}={v}")]
+        wall, told = cold(["a", *pairs, "--levels", "9"])
+        table.add(dim, chosen["order"], n, told["unknowns"], wall, told["peak_memory_mb"])
+    return table
+
+
+def beyond_memory() -> str:
+    """What a run says whose joint alone needs more than the machine has."""
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            run(
+                load("b", {"n_joint": 1000.0, "n_layers": 1000.0}),
+                Path(folder),
+                False,
+                False,
+                False,
+            )
+        except RunError as error:
+            return str(error)
+    raise RunError("bench: a joint beyond the memory has run")
+
+
+def exponents(table: Table) -> list[str]:
+    """Fitted exponents of time and memory over the three largest sizes."""
+    lines = []
+    for dim in (2, 3):
+        rows = [i for i, d in enumerate(table["dim"]) if d == dim][-3:]
+        if len(rows) > 1:
+            n = np.log([table["unknowns"][i] for i in rows])
+            fits = [
+                np.polyfit(n, np.log([table[c][i] for i in rows]), 1)[0] for c in ("seconds", "MB")
+            ]
+            lines.append(f"{dim}D: time ~ unknowns^{fits[0]:.2f}, memory ~ unknowns^{fits[1]:.2f}")
+    return lines
+
+
+def switches(short: bool) -> Table:
+    """What a scene pays for each thing it may need: seconds with and without, in one process, best
+    of three.
+    """
+
+    def best(call: Callable[[], object]) -> float:
+        spent = []
+        for _ in range(1 if short else 3):
+            start = time.perf_counter()
+            call()
+            spent.append(time.perf_counter() - start)
+        return min(spent)
+
+    def filling(*about: object) -> Callable[[], object]:
+        return lambda: Filling(load("e", *about), joint).run()
+
+    def whole(*about: object) -> Callable[[], object]:
+        return lambda: measure(load("a", *about))
+
+    def written(fields: bool, picture: bool) -> Callable[[], object]:
+        return lambda: run(load("a"), Path(folder), fields, picture, False)
+
+    table, dry = Table("option", "with", "without", "ratio"), {"uplift": "none"}
+    with threadpool_limits(1), tempfile.TemporaryDirectory() as folder:
+        joint = Interface(condense(load("e"), Bodies.of(load("e"))))
+        for option, with_it, without in bar(
+            [
+                ("pressure unknowns (flow instead of none)", filling({}, "9"), filling(dry, "9")),
+                (
+                    "load unknown (drive=heel instead of level)",
+                    filling(dry | {"drive": "heel"}, "8,9"),
+                    filling(dry, "8,9"),
+                ),
+                ("20 steps instead of 1", filling(dry, "9", None, 20), filling(dry, "9")),
+                (
+                    "z (3D layers instead of 2D)",
+                    whole(settings(2, 50, 1.0, "layers", 3), "9"),
+                    whole(settings(2, 50, 1.0, "free", 2), "9"),
+                ),
+                (
+                    "the bulk condensed anew (instead of kept)",
+                    lambda: measure(load("e", dry, "9")),
+                    filling(dry, "9"),
+                ),
+                (
+                    "a fine mesh far from the joint",
+                    whole({"order": 2.0, "h_dam": 0.1, "h_found": 0.1}, "9"),
+                    whole({"order": 2.0}, "9"),
+                ),
+                ("fields for ParaView and Gmsh", written(True, False), written(False, False)),
+                ("the picture", written(False, True), written(False, False)),
+            ],
+            "switches",
+        ):
+            seconds = best(with_it), best(without)
+            table.add(option, *seconds, seconds[0] / seconds[1])
+    return table
+
+
+def sweeps(short: bool) -> Table:
+    """What a sweep pays for one row more on a mesh that is condensed: a level between the last two
+    (one step per level, as sweeps of levels take), and with published steps a joint that is weaker
+    (sigma_max or mu), one that is stiffer (K_N, K_T); main scenes, published meshes, one thread.
+    """
+    table = Table(
+        "case",
+        "dim",
+        "first run",
+        "another level",
+        "steps",
+        "another strength",
+        "another stiffness",
+    )
+    for name in bar("ac" if short else PUBLISHED, "sweeps"):
+        main = {"uplift": main_uplift(name)}
+        case = load(name, main)
+        if case["drive"] != "level":
+            continue
+        weaker = (
+            {"sigma_max": 0.9 * case["sigma_max"]}
+            if case["law"] == "rupture"
+            else {"mu": 0.9 * case["mu"]}
+        )
+        stiffer = {"K_N": 1.1 * case["K_N"], "K_T": 1.1 * case["K_T"]}
+        ends = [
+            ",".join(map(str, (*case.levels[:-1], top)))
+            for top in (case.levels[-1], (case.levels[-2] + case.levels[-1]) / 2)
+        ]
+        first, above = (load(name, main, levels) for levels in ends)
+        with threadpool_limits(1):
+            joint, known, spent = Interface(condense(case, Bodies.of(case))), {}, []
+            runs = [partial(filled, one, known, joint) for one in (first, above)]
+            runs += [Filling(load(name, main | s), joint).run for s in (weaker, stiffer)]
+            for run_it in runs:
+                start = time.perf_counter()
+                run_it()
+                spent.append(time.perf_counter() - start)
+        table.add(name, int(case["dim"]), *spent[:2], len(case.times), *spent[2:])
+    return table
+
+
+def one_of_the_grid(values: tuple) -> tuple:
+    """A combination of the stress grid: values, how it ended, the last level, iterations, cuts,
+    seconds.
+    """
+    law, aperture, stiffness, young = values
+    case = load(
+        "e" if law == "rupture" else "g",
+        settings(2, 50, 1.0, "free", 2)
+        | {
+            "aperture_min": aperture,
+            "K_N": stiffness,
+            "K_T": stiffness,
+            "E": young,
+            "pena_tang": 0.1 * stiffness,
+        },
+        "3,6,8,9,10",
+    )
+    with threadpool_limits(1):
+        start = time.perf_counter()
+        result = Filling(case, interface_of(case)).run()
+        spent = time.perf_counter() - start
+    history = result.history
+    level = history["level"][-1] if len(history["level"]) else 0.0
+    end = statement(result).split(":")[0].replace(" (", ", ") or "converged"
+    return (*values, end, level, history["iterations"].sum(), history["cuts"].sum(), spent)
+
+
+def stress(short: bool) -> Table:
+    """The flow to its limits: closed aperture, joint and bulk stiffness over many decades, the
+    reservoir filled to the crest.
+    """
+    grid = list(
+        product(
+            ("rupture", "friction"), (1e-9, 1e-8, 1e-6, 1e-4), (1e9, 1e12, 1e14), (1e10, 3e11, 3e12)
+        )
+    )
+    grid = grid[::18] if short else grid
+    table = Table(
+        "law", "aperture_min", "K_N", "E", "end", "level", "iterations", "cuts", "seconds"
+    )
+    with ProcessPoolExecutor() as pool:
+        for row in bar(pool.map(one_of_the_grid, grid), "stress", len(grid)):
+            table.add(*row)
+    return table
+
+
+def checks(short: bool) -> list[str]:
+    """What holds to machine precision, on a fine mesh: equilibrium and mass balance."""
+    case = load("g", settings(2, 80 if short else 320, 1.0, "free", 2))
+    result, spent = measure(case)
+    last = {n: c[-1] for n, c in result.history.items()}
+    thrust = case["rho_water"] * case["g"] * last["level"] ** 2 / 2
+    rows = result.at()
+    return [
+        f"G with {spent['unknowns']} unknowns: shear over thrust minus one "
+        f"{last['T'] / thrust - 1:.1e}",
+        "flux at the toe over flux at the heel minus one "
+        f"{rows['flux'][-1] / rows['flux'][0] - 1:.1e}",
+    ]
+
+
+def machine() -> str:
+    """Processor, cores, Python and factorisation, in a line."""
+    try:
+        told = Path("/proc/cpuinfo").read_text()
+        processor = re.search(r"model name\s*:\s*(.*)", told)[1]
+    except (OSError, TypeError):
+        processor = platform.processor() or platform.machine()
+    cores = len(os.sched_getaffinity(0))
+    return f"{processor}, {cores} cores, Python {platform.python_version()}, {factor.name()}"
+
+
+def write_table(table: Table, path: Path) -> None:
+    """A table as CSV."""
+    with path.open("w", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(table)
+        writer.writerows(zip(*table.values(), strict=True))

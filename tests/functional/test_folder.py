@@ -1,0 +1,142 @@
+"""The output folder: what a run leaves there, and what it must never do to what is there."""
+
+import json
+
+import numpy as np
+import pytest
+from test_output import read
+
+SMALL = ("--set", "n_joint=10", "--set", "h_dam=3", "--set", "h_found=4")
+BARE = (*SMALL, "--no-fields", "--no-picture")
+
+
+@pytest.mark.parametrize("engine", ["getdp", "condensed"])
+def test_what_a_user_keeps_in_the_folder_stays(command, tmp_path, engine):
+    """Also under the names work/ and fields/, beside an earlier run."""
+    mine = [
+        "work/history.txt",
+        "work/deep/notes.txt",
+        "fields/mine.vtu",
+        "photo.png",
+        "none/my.csv",
+    ]
+    for name in mine:
+        (tmp_path / "out" / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "out" / name).write_text("mine")
+    for _ in range(2):
+        words = "run", "a", *SMALL, "--levels", "6", "--engine", engine, "--out", "out"
+        assert command(*words)[0] == 0
+    assert all((tmp_path / "out" / name).read_text() == "mine" for name in mine)
+
+
+@pytest.mark.parametrize("words", [(), ("--out", "here/there"), ("--out", 'it\'s "mine" é')])
+def test_the_plain_engine_takes_any_folder(command, tmp_path, words):
+    code, _, err = command("run", "c", *SMALL, "--levels", "3", "--engine", "getdp", *words)
+    assert (code, err) == (0, "")
+    folder = tmp_path / (words[1] if words else "out/c")
+    assert len(read(folder / "joint.csv")["x"]) == 11
+    assert sorted(p.name for p in folder.iterdir()) == [
+        "c.png",
+        "fields",
+        "history.csv",
+        "joint.csv",
+        "run.json",
+    ]
+
+
+def test_nothing_of_an_earlier_run_passes_for_results_of_this_one(command, tmp_path):
+    """A driven case with two uplifts and three levels, then a plain one with one level."""
+    words = "run", "a", *SMALL, "--out", "out"
+    driven = "--set", "drive=heel", "--set", "drive_by=1e-8"
+    assert command(*words, "--levels", "3,6,7", *driven)[0] == 0
+    before = {str(p.relative_to(tmp_path / "out")) for p in (tmp_path / "out").rglob("*")}
+    assert {"curve.csv", "a_curve.png", "none/joint.csv", "fields/bulk_t3.vtu"} <= before
+    assert command("run", "c", *SMALL, "--out", "out", "--levels", "6")[0] == 0
+    after = {str(p.relative_to(tmp_path / "out")) for p in (tmp_path / "out").rglob("*")}
+    fields = {"fields.pvd", "bulk_t1.vtu", "joint_t1.vtu", "bulk.msh", "joint.msh"}
+    tables = {"joint.csv", "history.csv", "run.json", "c.png", "fields"}
+    assert after == tables | {f"fields/{name}" for name in fields}
+
+
+def test_bad_input_leaves_an_earlier_run_alone(command, tmp_path):
+    assert command("run", "c", *BARE, "--levels", "6", "--out", "out")[0] == 0
+    before = {p: p.read_bytes() for p in (tmp_path / "out").iterdir()}
+    assert command("run", "c", *BARE, "--levels", "60", "--out", "out")[0] == 2
+    assert {p: p.read_bytes() for p in (tmp_path / "out").iterdir()} == before
+
+
+def test_a_foreign_run_json_protects_the_folder(command, tmp_path):
+    """Only what damjoint has written is removed; its own names are overwritten."""
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "run.json").write_text('{"case": "../../elsewhere", "by": "me"}')
+    (tmp_path / "out" / "curve.csv").write_text("mine")
+    assert command("run", "c", *BARE, "--levels", "6", "--out", "out")[0] == 0
+    assert (tmp_path / "out" / "curve.csv").read_text() == "mine"
+
+
+@pytest.mark.parametrize("engine", ["getdp", "condensed"])
+def test_a_run_that_stops_leaves_its_last_state(command, tmp_path, engine):
+    """Tables, fields and picture, also in the middle between two requested levels."""
+    hardening = "--set", "pena_tang=0", "--set", "uplift=none"
+    words = "run", "c", *SMALL, *hardening, "--levels", "7.4,7.6", "--engine", engine
+    code, out, err = command(*words)
+    assert code == 1 and "sliding: no equilibrium beyond level 7.45" in out and err == ""
+    told = json.loads((tmp_path / "out/c/run.json").read_text())
+    assert (told["state"], told["verdict"]) == ("stopped", "sliding")
+    joint, history = read(tmp_path / "out/c/joint.csv"), read(tmp_path / "out/c/history.csv")
+    assert joint["time"].max() == history["time"][-1] and 1 < joint["time"].max() < 2
+    assert len(list((tmp_path / "out/c/fields").glob("bulk_t*.vtu"))) == 2
+
+
+def test_a_dam_on_the_default_hardening_slides(command, tmp_path):
+    """The whole joint slips: in words, in run.json, exit code 1; 0 where hardening is asked for."""
+    words = "run", "c", *BARE, "--set", "uplift=none", "--levels", "7,9", "--set"
+    code, out, _ = command(*words, "pena_tang=-1", "--out", "default")
+    assert code == 1 and "sliding: the whole joint has slipped or is open from level 9 m on" in out
+    told = json.loads((tmp_path / "default" / "run.json").read_text())
+    assert (told["state"], told["verdict"]) == ("complete", "sliding")
+    code, out, _ = command(*words, "pena_tang=2e11", "--out", "asked")
+    assert code == 0 and "stands on the hardening pena_tang = 2e+11" in out
+
+
+def test_the_last_level_is_always_a_table(command, tmp_path):
+    assert command("run", "k", *BARE)[0] == 0
+    joint, history = (read(tmp_path / f"out/k/{name}.csv") for name in ("joint", "history"))
+    assert joint["time"].max() == history["time"][-1] == 4.84
+    assert np.isclose(joint["time"], 3.84).any()  # the end of the prescribed opening
+
+
+def test_units_and_verdict_in_run_json(command, tmp_path):
+    assert command("run", "e", *BARE, "--levels", "3")[0] == 0
+    told = json.loads((tmp_path / "out/e/run.json").read_text())
+    columns = [*read(tmp_path / "out/e/joint.csv"), *read(tmp_path / "out/e/history.csv")]
+    assert set(columns) == set(told["units"]) and told["units"]["sigma_n_eff"] == "Pa"
+    assert told["verdict"] == "stands" and told["state"] == "complete"
+
+
+def test_tailwater_in_the_history(command, tmp_path):
+    words = "run", "c", *BARE, "--levels", "6,9", "--tail-levels", "1,2", "--steps", "2"
+    assert command(*words)[0] == 0
+    history = read(tmp_path / "out/c/history.csv")
+    assert list(history["tail_level"]) == [0.5, 1, 1.5, 2]
+    uplift = 9810 * (history["level"] + history["tail_level"]) / 2 * 5
+    assert np.allclose(history["U"], uplift, rtol=1e-9)
+
+
+@pytest.mark.parametrize("engine", ["getdp", "condensed"])
+def test_an_interrupted_run_keeps_what_has_converged(tmp_path, monkeypatch, engine):
+    """Ctrl-C after the second step."""
+    from damjoint import run
+    from damjoint.scene.case import load
+
+    def interrupt(self, scene, now):
+        if now > 1:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(run.Progress, "step", interrupt)
+    case = load("c", {"n_joint": 10.0, "h_dam": 3.0, "h_found": 4.0})
+    with pytest.raises(KeyboardInterrupt):
+        run.run(case, tmp_path / "out", False, False, False, engine)
+    history = read(tmp_path / "out" / "history.csv")
+    assert 1 <= len(history["time"]) < 5
+    assert json.loads((tmp_path / "out" / "run.json").read_text())["state"] == "interrupted"

@@ -1,0 +1,127 @@
+"""Case files are data: what they may say, and that nothing in them is ever executed."""
+
+import gmsh
+import pytest
+from damjoint import InputError
+from damjoint.scene import casefile, parameters
+from damjoint.scene.case import CASES, load
+
+
+@pytest.mark.parametrize("path", sorted(CASES.glob("*.case")), ids=lambda path: path.stem)
+def test_read_as_gmsh_reads_it(path):
+    """The cases open in Gmsh and GetDP as they are: both have to see the same in them."""
+    ours = casefile.read(path)
+    parameters.start_gmsh()
+    gmsh.parser.clear()
+    gmsh.parser.parse(str(path))
+    names = gmsh.parser.getNames()
+    numbers = {n: gmsh.parser.getNumber(n).tolist() for n in names}
+    texts = {n: list(gmsh.parser.getString(n)) for n in names if not numbers[n]}
+    expected = {f"default_{n}": [v] for n, v in ours.defaults.items() if isinstance(v, float)}
+    assert {n: v for n, v in numbers.items() if v} == expected | ours.lists
+    expected = {f"default_{n}": [v] for n, v in ours.defaults.items() if isinstance(v, str)}
+    assert texts == expected | {n: [v] for n, v in ours.texts.items()}
+
+
+def write(tmp_path, text, name="mine.case"):
+    path = tmp_path / name
+    path.write_text(text)
+    return path
+
+
+def test_arithmetic_comments_and_defaults_set_before(tmp_path):
+    path = write(
+        tmp_path,
+        "/* two\nlines */ default_K_N = 2 * 1e11; // half of it\ndefault_K_T = default_K_N / 2 ^ 2;"
+        "\nlevels() = {1, (2 + 3) * -1 + 10.5, 1.e1};\n",
+    )
+    found = casefile.read(path)
+    assert found.defaults == {"K_N": 2e11, "K_T": 5e10}
+    assert found.lists == {"levels": [1, 5.5, 10]}
+
+
+def test_included_files_come_first_and_can_be_overruled(tmp_path):
+    write(tmp_path, "default_mu = 0.5; default_E = 1e9;", "common.case")
+    found = casefile.read(write(tmp_path, 'Include "common.case"; default_mu = 0.7;'))
+    assert found.defaults == {"mu": 0.7, "E": 1e9}
+
+
+@pytest.mark.parametrize(
+    "text, said",
+    [
+        ('SystemCall "touch x";', "SystemCall"),
+        ('title = "t"; SystemCall "touch x";', "line 1"),
+        ('\n\nPrint("x");', "line 3"),
+        ('Printf("hello") > "x";', "not part of a case"),
+        ('Include "../pro/parameters.pro";', "must be a .case file"),
+        ('Include "/etc/passwd";', "must be a .case file"),
+        ("If(1) default_E = 1e9; EndIf", "If"),
+        ('default_law = Str["friction"];', "not part of a case"),
+        ("default_E = GetEnv(1);", "must be a number"),
+        ("default_E = __import__;", "must be a number"),
+        ("default_E = E;", "must be a number"),
+        ("default_E = 9^9^9^9;", "must be a number"),
+        ("default_E = (-8)^0.5;", "must be a number"),
+        ("default_E = 1/0;", "must be a number"),
+        ("default_E = ;", "must be a number"),
+        ("default_E = 1e9", "semicolon"),
+        ("default_dam_hieght = 12;", "dam_height"),
+        ("default_E = 1e9; default_dam_hieght = 12;", "dam_height"),
+        ("level() = {3};", "levels()"),
+        ("default_E = 1e9; level() = {3};", "levels()"),
+        ("titel = 3;", "title"),
+        ("levels() = 3;", "braces"),
+        ("levels() = {3, };", "must be a number"),
+        ("levels() = {3, 6}; times() = {1, 3};", "times = 1,3"),
+        ("levels() = {3, 6}; times() = {2, 1};", "times = 2,1"),
+        ("levels() = {3, 6}; times() = {1, 1};", "times = 1,1"),
+        ("levels() = {3, 6}; times() = {0, 1};", "times = 0,1"),
+        ('also_uplift = "some";', "none, imposed, flow"),
+        ("levels() = {1, 2, 3}; tail_levels() = {1, 2};", "tail_levels = 1,2"),
+    ],
+)
+def test_anything_else_is_refused_before_gmsh_sees_it(command, tmp_path, text, said):
+    write(tmp_path, text)
+    before = sorted(tmp_path.rglob("*"))
+    code, out, err = command("run", "mine.case", "--no-fields", "--no-picture")
+    assert (code, out) == (2, "") and len(err.splitlines()) == 1
+    assert said in err and sorted(tmp_path.rglob("*")) == before
+
+
+def test_files_that_are_no_cases(command, tmp_path):
+    (tmp_path / "binary.case").write_bytes(bytes(range(256)))
+    write(tmp_path, 'Include "itself.case";', "itself.case")
+    write(tmp_path, "// nothing\n" * 200_000, "enormous.case")
+    for name, said in (("binary", "decode"), ("itself", "includes itself"), ("enormous", "bytes")):
+        code, _, err = command("run", f"{name}.case")
+        assert code == 2 and said in err and len(err.splitlines()) == 1
+
+
+def test_levels_without_times_are_all_reached(tmp_path):
+    case = load(str(write(tmp_path, "default_dam_height = 12; levels() = {6, 9, 11, 11.5, 12};")))
+    assert case.times == (1, 2, 3, 4, 5)
+    assert [case.level_at(t) for t in case.times] == [6, 9, 11, 11.5, 12]
+
+
+def test_the_case_keeps_its_tailwater(tmp_path):
+    """One value, or one per level, also under other levels; else it has to be said anew."""
+    text = "default_dam_height = 12; levels() = {6, 9, 11}; tail_levels() = {%s};"
+    constant = str(write(tmp_path, text % "2", "constant.case"))
+    rising = str(write(tmp_path, text % "1, 2, 3", "rising.case"))
+    assert load(constant, levels="5,10").tail_levels == (2, 2)
+    assert load(rising, levels="5,8,10").tail_levels == (1, 2, 3)
+    with pytest.raises(InputError, match="the case's own; give --tail-levels"):
+        load(rising, levels="5,10")
+    assert load(rising, levels="5,10", tail_levels="0").tail_levels == (0, 0)
+
+
+def test_defaults_are_a_real_dam():
+    """Concrete on rock, and what follows from the geometry."""
+    case = load("dam")
+    assert 1e10 <= case["E"] <= 5e10 and case["dam_height"] == 45
+    energy = case["sigma_max"] ** 2 * (1 + case["pena_rupture"]) / (2 * case["K_N"])
+    assert 50 <= energy <= 200  # N/m
+    assert (case["found_side"], case["found_depth"]) == (90, 90)
+    assert case.levels[-1] == 45
+    taller = load("dam", {"dam_height": 60.0, "E": 3e10})
+    assert taller["found_depth"] == 120 and taller["E_found"] == 3e10 and taller.levels[-1] == 60

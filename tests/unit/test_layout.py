@@ -1,0 +1,81 @@
+"""The arrows between the parts of the package point one way; the pages made from it are current."""
+
+import ast
+from pathlib import Path
+
+import damjoint
+import pytest
+from damjoint import pages
+
+PACKAGE = Path(damjoint.__file__).parent
+#: Each part uses only those before it.
+PARTS = ["", "scene", "results", "engines", "run", "studies", "pages", "cli"]
+
+
+def part_of(path):
+    top = path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+    return "" if top == "__init__" else top
+
+
+def imported(path):
+    """The modules of the package that a file imports, as paths below it."""
+    here = path.relative_to(PACKAGE).with_suffix("").parts
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom) and node.level:
+            base = here[: len(here) - node.level]
+            names = (node.module or "").split(".") if node.module else []
+            yield from ((*base, *names, alias.name) for alias in node.names)
+
+
+@pytest.mark.parametrize("path", sorted(PACKAGE.rglob("*.py")), ids=lambda p: str(p.name))
+def test_a_module_uses_only_what_stands_above_it(path):
+    for names in imported(path):
+        used = names[0] if names[0] in PARTS else ""
+        assert PARTS.index(used) <= PARTS.index(part_of(path)), f"{path} imports {names}"
+
+
+def test_the_engines_do_not_know_one_another():
+    for engine, other in (("getdp", "condensed"), ("condensed", "getdp")):
+        for path in (PACKAGE / "engines" / engine).rglob("*.py"):
+            assert not any(other in names for names in imported(path)), path
+
+
+def test_no_circles():
+    """Among the modules, by following every import."""
+    graph = {}
+    for path in PACKAGE.rglob("*.py"):
+        name = path.relative_to(PACKAGE).with_suffix("").parts
+        name = name[:-1] if name[-1] == "__init__" else name
+        graph[name] = set()
+        for names in imported(path):
+            target = next(
+                (names[:n] for n in (len(names), len(names) - 1) if is_module(names[:n])), ()
+            )
+            if target != name:
+                graph[name].add(target)
+    done, under_way = set(), []
+
+    def visit(name):
+        assert name not in under_way, [*under_way, name]
+        if name in done:
+            return
+        under_way.append(name)
+        for target in graph.get(name, ()):
+            visit(target)
+        under_way.pop()
+        done.add(name)
+
+    for name in graph:
+        visit(name)
+
+
+def is_module(names):
+    place = PACKAGE.joinpath(*names)
+    return place.with_suffix(".py").is_file() or (place / "__init__.py").is_file()
+
+
+@pytest.mark.parametrize("name", ["parameters", "results"])
+def test_pages_are_current(name):
+    """`make pages` after a change of a parameter or a column."""
+    path = Path(__file__).parents[2] / "reference" / f"{name}.md"
+    assert path.read_text() == getattr(pages, f"{name}_page")()
