@@ -18,7 +18,6 @@ from __future__ import annotations
 import hashlib
 import os
 import pickle
-import re
 import time
 from dataclasses import dataclass, fields
 from functools import cached_property
@@ -26,20 +25,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy.sparse.linalg  # noqa: F401 (sparse.linalg)
 from scipy import linalg, sparse
 
-from . import RunError, __version__, fem
+from . import __version__, fem
+from .factor import check_memory, dense_memory, schur_complement
 from .mesh import GEOMETRY, Body, Mesh
 from .parameters import Case
 
 if TYPE_CHECKING:
     from .interface import Interface
-
-try:
-    import mumps
-except ImportError:  # no wheel for this Python
-    mumps = None
 
 #: What the condensed bodies depend on besides the mesh.
 MATERIAL = ("order", "hold_z", "E_dam", "E_found", "nu_dam", "nu_found")
@@ -48,81 +42,16 @@ MATERIAL = ("order", "hold_z", "E_dam", "E_found", "nu_dam", "nu_found")
 CACHE_LIMIT = 2_000_000_000
 
 
-def check_memory(needed: float, unknowns: int, joint: int) -> None:
-    """Raise RunError if more memory [bytes] is needed than the machine has left."""
-    try:
-        left = float(re.search(r"MemAvailable:\s+(\d+)", Path("/proc/meminfo").read_text())[1]) * 1024
-    except (OSError, TypeError):
-        return
-    if needed > left:
-        raise RunError(f"memory: {unknowns} unknowns, {joint} of them on the joint and the wet faces, need about {needed / 1e9:.1f} GB and "
-                       f"{left / 1e9:.1f} GB are left; use a coarser mesh (n_joint, n_layers, h_dam, h_found)")
-
-
 def joint_size(case: Case) -> int:
     """Number of jump unknowns of a case, before any meshing (free meshes of order 2 have a few less)."""
     dim, order = int(case["dim"]), int(case["order"])
     return dim * (order * int(case["n_joint"]) + 1) * (order * int(case["n_layers"]) + 1 if dim == 3 else 1)
 
 
-def dense_memory(joint: int) -> float:
-    """Memory [bytes] of the Schur complement of so many unknowns, its factors and the products made later on."""
-    return 8.0 * joint**2 * 6
-
-
 def check_size(case: Case) -> None:
     """Raise RunError, before any meshing, if the joint alone asks for more memory than there is."""
     joint = joint_size(case)
     check_memory(dense_memory(joint), joint, joint)
-
-
-def schur_complement(matrix: sparse.csr_matrix, keep: np.ndarray) -> np.ndarray:
-    """Dense Schur complement (k, k) of a symmetric matrix on the k unknowns `keep`.
-
-    By MUMPS where python-mumps is installed; else by scipy's SuperLU, ten times slower in 3D. Raises RunError
-    before it runs out of memory.
-    """
-    dense = dense_memory(len(keep))
-    check_memory(dense, matrix.shape[0], len(keep))
-    if mumps is None:
-        return schur_by_superlu(matrix, keep)
-    result = np.zeros((len(keep), len(keep)))
-    with mumps.Context() as context:
-        context.set_matrix(sparse.triu(matrix, format="coo"), symmetric=True)
-        context.mumps_instance.icntl[19] = 1  # Schur complement on the host
-        context.mumps_instance.icntl[31] = 1  # factors not kept
-        indices = keep.astype(np.int32) + 1  # Fortran's; MUMPS keeps the address
-        context.mumps_instance.set_schur(result, indices)
-        context.analyze(ordering="metis" if matrix.shape[0] > 15000 else "scotch")
-        check_memory(dense + 1e6 * context.mumps_instance.infog[16], matrix.shape[0], len(keep))  # MUMPS's estimate in MB
-        context.factor(reuse_analysis=True, pivot_tol=0.0)
-    return np.tril(result) + np.tril(result, -1).T  # a symmetric factorisation leaves the lower triangle
-
-
-def schur_by_superlu(matrix: sparse.csr_matrix, keep: np.ndarray) -> np.ndarray:
-    """The same by a factorisation of the interior and one solve per kept unknown."""
-    inside = np.setdiff1d(np.arange(matrix.shape[0]), keep)
-    matrix = matrix.tocsc()
-    factor = sparse.linalg.splu(matrix[inside][:, inside], permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
-                                options={"SymmetricMode": True})
-    coupling = matrix[inside][:, keep]
-    return matrix[keep][:, keep].toarray() - coupling.T @ factor.solve(coupling.toarray())
-
-
-def solve_symmetric(matrix: sparse.csr_matrix, right: np.ndarray) -> np.ndarray:
-    """Solution (n, m) of a symmetric positive definite system, by the solver of schur_complement."""
-    if mumps is None:
-        return sparse.linalg.splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}).solve(right)
-    with mumps.Context() as context:
-        context.set_matrix(sparse.triu(matrix, format="coo"), symmetric=True)
-        context.factor(pivot_tol=0.0)
-        # python-mumps 0.0.2 writes to the right-hand side once more when the context ends: own it until then
-        work = np.array(right, order="F")
-        context.mumps_instance.set_dense_rhs(work)
-        context.mumps_instance.job = 3
-        context.call()
-        solution = work.copy()
-    return solution
 
 
 def unknowns(functions: np.ndarray, dim: int, components: list[int] | None = None) -> np.ndarray:

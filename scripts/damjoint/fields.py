@@ -11,8 +11,9 @@ import numpy as np
 from scipy import sparse
 
 from . import fem
-from .condense import Bodies, push_of_water, solve_symmetric, unknowns
+from .condense import Bodies, push_of_water, unknowns
 from .condensed import Joint
+from .factor import solve_symmetric
 from .mesh import Body, Mesh
 from .parameters import start_gmsh
 from .results import Results, rows_at
