@@ -219,7 +219,10 @@ def draw_maps(figure: Figure, joint: Body, result: Results) -> None:
         values = rows[name][nearest] * factor
         for _, table in joint.cells:
             faces = PolyCollection(
-                joint.points[table][:, :, [0, 2]], array=values[table].mean(axis=1), cmap=colors
+                joint.points[table][:, :, [0, 2]],
+                array=values[table].mean(axis=1),
+                cmap=colors,
+                edgecolor="face",
             )
             faces.set_clim(values.min(), values.max())
             axes.add_collection(faces)

@@ -26,7 +26,10 @@ JOINT = {
     "tau_2": ("Pa", "shear stress along z"),
     "p": ("Pa", "water pressure in the joint"),
     "damage": ("-", "rupture: used part of the softening, 1 broken; friction: 1 where open"),
-    "slip": ("m", "size of the released (rupture) or plastic (friction) slip"),
+    "slip": (
+        "m",
+        "rupture: tangential jump at which the point last slid freely; friction: plastic slip",
+    ),
     "sigma_n_eff": ("Pa", "effective normal stress, sigma_n + p"),
 }
 #: One more where water flows.
