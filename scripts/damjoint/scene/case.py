@@ -14,6 +14,19 @@ from .parameters import assignments, declared, include, listing, parse
 CASES = data("cases")
 
 
+#: Values of pro/parameters.pro that the engines share and nobody sets.
+SHARED = (
+    "attempt_growth",
+    "attempt_secant",
+    "attempt_iterations",
+    "cut",
+    "round_off",
+    "coarsest",
+    "artificial",
+    "sudden",
+)
+
+
 @dataclass(frozen=True)
 class Case:
     """A scene and its loading, fully resolved: everything a run depends on."""
@@ -179,9 +192,7 @@ def load(
         times = tuple(sorted({*times, end, *([begin] if begin > 0 else [])}))
     also = said.texts.get("also_uplift", "").split() if "uplift" not in overrides else []
     also = tuple(known["uplift"].check(mode) for mode in also)
-    shared = {
-        n: found[n] for n in ("attempt_growth", "attempt_secant", "cut", "artificial", "sudden")
-    }
+    shared = {n: found[n] for n in SHARED}
     return Case(
         path.stem,
         said.texts.get("title", path.stem),

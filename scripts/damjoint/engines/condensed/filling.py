@@ -52,11 +52,12 @@ class Filling:
         """The attempts at a step, in order; the last one, with the secant, is for before giving
         up.
         """
-        case, shared = self.case, self.case.shared
-        most, halvings = int(case["max_iterations"]), int(case["max_halvings"])
-        ways = zip(shared["attempt_growth"], shared["attempt_secant"], strict=True)
-        found = [Attempt(growth, bool(secant), most, halvings) for growth, secant in ways]
-        return [*found, Attempt(case["growth"], True, int(case["burst_iterations"]), halvings)]
+        of_each = (self.case.shared[f"attempt_{n}"] for n in ("growth", "secant", "iterations"))
+        halvings = int(self.case["max_halvings"])
+        return [
+            Attempt(growth, bool(secant), int(iterations), halvings)
+            for growth, secant, iterations in zip(*of_each, strict=True)
+        ]
 
     def run(self) -> Results:
         """Follow all the times of the case that are still to come."""
