@@ -1,6 +1,6 @@
 #!/bin/sh
-# make setup: system packages, then the Python environment in .venv, made by $PYTHON (default: the one
-# that .venv has, or python3). With nothing to do it takes no time.
+# make setup: system packages, then the Python environment in .venv, made by $PYTHON (default: the
+# one that .venv has, or python3). With nothing to do it takes no time.
 set -eu
 cd "$(dirname "$0")/.."
 PATH=$PATH:/usr/sbin:/sbin
@@ -21,7 +21,8 @@ elif [ -n "${PYTHON:-}" ]; then fail "PYTHON = $PYTHON: no such program; correct
 fi
 debian=python${version:-3}  # the interpreter's Debian package: python3.12
 
-# What is missing, under its Debian name: GetDP, what the gmsh wheel links to, a fast BLAS for GetDP, venv.
+# What is missing, under its Debian name: GetDP, what the gmsh wheel links to, a fast BLAS for
+# GetDP, venv.
 missing=""
 libraries=$(ldconfig -p 2>/dev/null || true)
 has() { case $libraries in *"$1"*) ;; *) return 1 ;; esac; }
@@ -38,7 +39,8 @@ library libgomp1 libgomp.so.1
 library libxcursor1 libXcursor.so.1
 library libxinerama1 libXinerama.so.1
 library libxft2 libXft.so.2
-[ -x .venv/bin/python ] || "$python" -c "import ensurepip" 2>/dev/null || missing="$missing $debian $debian-venv"
+[ -x .venv/bin/python ] || "$python" -c "import ensurepip" 2>/dev/null ||
+  missing="$missing $debian $debian-venv"
 
 if [ "$(id -u)" = 0 ]; then as_root=""
 elif sudo -n true 2>/dev/null; then as_root="sudo"
@@ -53,45 +55,56 @@ install() {
 if [ -n "$missing" ]; then
   [ "$as_root" != none ] ||
     fail "missing software. On Debian or Ubuntu type:  sudo apt-get install -y$missing" \
-         " (elsewhere: the same libraries, and GetDP >= 3.2 on the PATH or in GETDP); then make setup again."
+         " (elsewhere: the same libraries, and GetDP >= 3.2 on the PATH or in GETDP);" \
+         "then make setup again."
   install $missing
 fi
 
-# What python-mumps is compiled with. A BLAS of its own: MUMPS takes the system's, whose plain one is slow.
+# What python-mumps is compiled with, and OpenBLAS: MUMPS takes the system's BLAS, whose plain one
+# is slow.
 wanted() {
   [ -x .venv/bin/python ] && python=.venv/bin/python
   echo '#include <dmumps_c.h>
         int main(void) { return 0; }' | cc -x c - -ldmumps_seq -o /dev/null 2>/dev/null ||
     printf ' gcc libc6-dev libmumps-seq-dev'
   "$python" -c 'import os, sys, sysconfig
-sys.exit(not os.path.exists(os.path.join(sysconfig.get_path("include"), "Python.h")))' || printf " $debian-dev"
+sys.exit(not os.path.exists(os.path.join(sysconfig.get_path("include"), "Python.h")))' ||
+    printf " $debian-dev"
   has libopenblas.so.0 || printf ' libopenblas0-pthread'
 }
 fast() { .venv/bin/python -c "import mumps" 2>/dev/null; }
 
-# The stamp is newer than all it depends on once everything below has succeeded; MUMPS may have failed.
+# The stamp is newer than all it depends on once everything below has succeeded, but for MUMPS.
 if [ -x .venv/bin/python ] &&
    [ -n "$(find .venv/.stamp -newer pyproject.toml -newer scripts/setup.sh 2>/dev/null)" ]; then
   # without MUMPS, once more as soon as there is what it needs
-  if [ -d .venv/lib/python*/site-packages/mumps ] || [ -e .venv/mumps.log ] || [ -n "$(wanted)" ]; then exit 0; fi
+  if [ -d .venv/lib/python*/site-packages/mumps ] || [ -e .venv/mumps.log ] ||
+     [ -n "$(wanted)" ]; then exit 0; fi
 else
   [ -x .venv/bin/python ] || "$python" -m venv .venv
   .venv/bin/pip install -q --disable-pip-version-check -e ".[test]"
 fi
 
 # The fast factorisation. Not from pip's cache: what was built for another libmumps does not load.
-build() { .venv/bin/pip install -q --disable-pip-version-check "$@" >.venv/mumps.log 2>&1 && fast; }
+# The build starts a script by `env python`, which plain Debian lacks and .venv has.
+build() {
+  PATH=$PWD/.venv/bin:$PATH \
+    pip install -q --disable-pip-version-check "$@" >.venv/mumps.log 2>&1 && fast
+}
 if ! fast; then
   lacking=$(wanted)
   if [ -n "$lacking" ] && install $lacking >/dev/null 2>&1; then lacking=""; fi
   if [ -z "$lacking" ] && build --no-cache-dir -e ".[fast]"; then :
   # the one wheel there is, of numpy 1's time
-  elif [ -d .venv/lib/python3.11 ] && build --only-binary python-mumps "python-mumps==0.0.2" "numpy<2"; then :
+  elif [ -d .venv/lib/python3.11 ] &&
+       build --only-binary python-mumps "python-mumps==0.0.2" "numpy<2"; then :
   else
     .venv/bin/pip uninstall -q -y python-mumps 2>/dev/null || true
     help="Why: .venv/mumps.log; to try again, delete it and make setup."
-    [ -z "$lacking" ] || help="On Debian or Ubuntu type:  sudo apt-get install -y$lacking  and make setup."
-    [ -z "$lacking" ] || rm -f .venv/mumps.log
+    if [ -n "$lacking" ]; then
+      help="On Debian or Ubuntu type:  sudo apt-get install -y$lacking  and make setup."
+      rm -f .venv/mumps.log
+    fi
     echo "setup: without MUMPS 3D takes several times longer (SuperLU instead). $help" >&2
   fi
 fi

@@ -56,8 +56,7 @@ def along(rows: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 
 def draw(result: Results, mesh: Mesh, fields: dict[float, Field], folder: Path) -> Path:
-    """
-    Draw the last saved state to folder/<case>.png and return its path; fields: at least the last
+    """Draw the last saved state to folder/<case>.png and return its path; fields: at least the last
     one.
 
     Left: the deformed bodies, displacement exaggerated so that it shows. Right: jumps and stresses

@@ -100,8 +100,7 @@ def rows_at(table: dict[str, np.ndarray], time: float | None = None) -> dict[str
 
 
 def joint_table(case: Case, blocks: list[np.ndarray]) -> dict[str, np.ndarray]:
-    """
-    The joint's table from blocks of rows, one per requested time: time ..
+    """The joint's table from blocks of rows, one per requested time: time ..
 
     slip, and flux where water flows.     Adds sigma_n_eff and sorts each block by x, then z.
     """

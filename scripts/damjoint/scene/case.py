@@ -96,8 +96,7 @@ def between(levels: tuple[float, ...], time: float) -> float:
 
 
 def case_file(case: str) -> Path:
-    """
-    The file of a case given by letter, name or path.
+    """The file of a case given by letter, name or path.
 
     Raises InputError if there is none.
     """
@@ -113,8 +112,7 @@ ACCURACIES = {"coarse": (40, 1), "standard": (100, 2), "fine": (200, 4)}
 
 
 def mesh_for(accuracy: str, case: Case) -> dict[str, float | str]:
-    """
-    Mesh and order for an accuracy of about 3 % (coarse), 1 % (standard) or 0.2 % (fine).
+    """Mesh and order for an accuracy of about 3 % (coarse), 1 % (standard) or 0.2 % (fine).
 
     Measured by `damjoint bench`. Order 2, triangles, in 3D extruded and cut into tetrahedra: these
     contain the plane fields exactly, however thick they are. Raises InputError.
@@ -207,8 +205,7 @@ def load(
 
 
 def numbers(name: str, text: str) -> list[float]:
-    """
-    Numbers from 'a,b,c'.
+    """Numbers from 'a,b,c'.
 
     Raises InputError if empty or malformed.
     """
@@ -222,8 +219,7 @@ def numbers(name: str, text: str) -> list[float]:
 
 
 def check_levels(name: str, levels: Iterable[float], values: Mapping) -> tuple[float, ...]:
-    """
-    Water levels [m].
+    """Water levels [m].
 
     Raises InputError if one is negative or above the crest.
     """

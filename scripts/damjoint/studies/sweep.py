@@ -28,8 +28,7 @@ from ..scene.case import Case, load
 
 
 def values_of(text: str) -> tuple[str, list[str]]:
-    """
-    ('name', ['v1', ...]) from 'name=v1,v2,...' or 'name=first:last:step'.
+    """('name', ['v1', ...]) from 'name=v1,v2,...' or 'name=first:last:step'.
 
     Raises InputError.
     """
@@ -64,8 +63,7 @@ def values_of(text: str) -> tuple[str, list[str]]:
 def combinations(
     case: str, vary: list[str], settings: dict
 ) -> Iterator[tuple[dict[str, str], Case]]:
-    """
-    All combinations: the varied values, and the case with them.
+    """All combinations: the varied values, and the case with them.
 
     Raises InputError.
         level: the last level; the case's levels below it come first.
@@ -83,8 +81,7 @@ def combinations(
 
 
 def up_to(base: Case, top: float) -> tuple[str, str]:
-    """
-    Levels and tailwater of a case up to a last level: those of its levels that lie below come
+    """Levels and tailwater of a case up to a last level: those of its levels that lie below come
     first.
 
     The tailwater of the last level is the case's own where it first reaches that level (or its last
@@ -179,8 +176,7 @@ def bundles(cases: dict[str, Case]) -> list[list[str]]:
 
 
 def read_done(path: Path, columns: list[str]) -> set[str]:
-    """
-    The keys of the complete rows of a result file; a half-written last line is cut off.
+    """The keys of the complete rows of a result file; a half-written last line is cut off.
 
     Raises InputError.
     """
@@ -249,8 +245,7 @@ def sweep(
     scheduler: str | None = None,
     progress: Callable = tqdm,
 ) -> int:
-    """
-    Compute what is missing in out (CSV) and return the number of rows computed.
+    """Compute what is missing in out (CSV) and return the number of rows computed.
 
     Columns: key, the varied names (a varied level as level_asked), the columns of history.csv,
     verdict and statement. Each row is written whole when it is done; a sweep that is interrupted

@@ -51,7 +51,7 @@ def check_memory(needed: float, unknowns: int, joint: int) -> None:
 
 
 def dense_memory(joint: int) -> float:
-    """Memory [bytes] of the Schur complement of so many unknowns, factors and later products."""
+    """Memory [bytes] of a Schur complement of so many unknowns, its factors and products."""
     return 8.0 * joint**2 * 6
 
 

@@ -26,8 +26,7 @@ ALONE = {
 
 
 def find_getdp() -> str:
-    """
-    The GetDP program: $GETDP, then PATH.
+    """The GetDP program: $GETDP, then PATH.
 
     Raises InputError if there is none.
     """
@@ -76,8 +75,7 @@ def execute(
     threads: int = 1,
     on_line: Callable[[str], None] = lambda line: None,
 ) -> dict:
-    """
-    Run GetDP on a problem file, in its folder, and return {version, unknowns, wall, memory}.
+    """Run GetDP on a problem file, in its folder, and return {version, unknowns, wall, memory}.
 
     arguments: after the problem file; threads: of the linear algebra; on_line: called with each
     line printed. Raises RunError with GetDP's first error line, and its last lines where it ended
@@ -134,8 +132,7 @@ def fill(
     fields: bool = False,
     on_step: Callable[[float], None] = lambda time: None,
 ) -> dict:
-    """
-    Follow the loading of a case.
+    """Follow the loading of a case.
 
     Tables are left in folder (see tables.py); returns what `execute` tells.
         fields: also displacement and stress; on_step: called with the time of each converged step.

@@ -79,8 +79,8 @@ def saved_times(case: Case, history: dict[str, np.ndarray], stopped: bool) -> di
 
 
 def read(case: Case, folder: Path) -> tuple[Results, dict[int, float]]:
-    """
-    Read what GetDP has left in a folder, complete or not: everything up to the last converged step.
+    """Read what GetDP has left in a folder, complete or not: everything up to the last converged
+    step.
 
     Returns the results, and the times of the files by their number.
     """
