@@ -65,8 +65,7 @@ def combinations(
 ) -> Iterator[tuple[dict[str, str], Case]]:
     """All combinations: the varied values, and the case with them.
 
-    Raises InputError.
-        level: the last level; the case's levels below it come first.
+    level: the last level; the case's levels below it come first. Raises InputError.
     """
     axes = [values_of(text) for text in vary]
     base = load(case, settings)
@@ -90,7 +89,7 @@ def up_to(base: Case, top: float) -> tuple[str, str]:
     below = [i for i, level in enumerate(base.levels) if level < top]
     first = next((i for i, level in enumerate(base.levels) if level >= top), None)
     tail = base.tail_levels[-1]
-    if first is not None:
+    if first is not None and len(set(base.tail_levels)) > 1:
         before = base.levels[first - 1] if first else 0.0
         share = (
             (top - before) / (base.levels[first] - before) if base.levels[first] > before else 1.0
