@@ -105,7 +105,7 @@ def parser() -> argparse.ArgumentParser:
         "law", parents=[settings], help="evaluate a joint law along a path of jumps"
     )
     add = law.add_argument
-    add("law", help="rupture or friction")
+    add("law", help="rupture, friction or bond")
     add(
         "--path",
         type=Path,
