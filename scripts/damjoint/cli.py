@@ -1,4 +1,4 @@
-"""The command line: damjoint run | validate | sweep | bench | law."""
+"""The command line: damjoint new | run | validate | sweep | bench | law."""
 
 from __future__ import annotations
 
@@ -63,6 +63,10 @@ def parser() -> argparse.ArgumentParser:
     add("--no-picture", action="store_true", help="no PNG")
     add("--engine", default="auto", help=of_engine)
     run.set_defaults(call=do_run)
+
+    new = commands.add_parser("new", help="write a commented case file to begin with")
+    new.add_argument("path", type=Path, metavar="MY.case", help="the file to write")
+    new.set_defaults(call=do_new)
 
     check = commands.add_parser(
         "validate", help="compare with the published numbers; exit code 1 if a row fails"
@@ -164,6 +168,15 @@ def warn_if_slow() -> None:
             "'make setup' says what is missing",
             file=sys.stderr,
         )
+
+
+def do_new(arguments: argparse.Namespace) -> int:
+    """damjoint new."""
+    from .scene import template
+
+    template.write(arguments.path)
+    print(f"{arguments.path}: a 45 m dam on rock; damjoint run {arguments.path}")
+    return 0
 
 
 def do_validate(arguments: argparse.Namespace) -> int:
