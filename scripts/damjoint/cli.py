@@ -249,6 +249,9 @@ def main(argv: list[str] | None = None) -> int:
     except RunError as error:
         print(f"damjoint: {error}", file=sys.stderr)
         return 1
+    except OSError as error:  # no space, no permission, a folder that has gone
+        print(f"damjoint: {error}", file=sys.stderr)
+        return 1
     except KeyboardInterrupt:
         said = "interrupted; everything up to the last converged step is saved"
         print(f"damjoint: {said}", file=sys.stderr)
