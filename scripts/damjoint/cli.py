@@ -123,7 +123,7 @@ def parser() -> argparse.ArgumentParser:
 
 def do_run(arguments: argparse.Namespace) -> int:
     """Damjoint run; 0, or 1 if the dam does not stand or the run stopped before its last level."""
-    from .results.verdict import failed, path_statement, statement
+    from .results.verdict import failed, hints, path_statement, statement
     from .run import run
     from .scene import parameters
     from .scene.case import load
@@ -152,8 +152,8 @@ def do_run(arguments: argparse.Namespace) -> int:
         )
         if case["drive"] != "level":
             print(path_statement(result))
-        if statement(result):
-            print(statement(result))
+        for said in filter(None, [statement(result), *hints(result)]):
+            print(said)
         code = max(code, int(failed(result)))
     return code
 

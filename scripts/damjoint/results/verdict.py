@@ -108,14 +108,35 @@ def statement(results: Results) -> str:
     )
 
 
-def stiff_joint(results: Results) -> str:
-    """A hint, if the joint is too stiff for its elements."""
+#: K_N h/E beyond which node stresses oscillate.
+STIFF = 100
+
+
+def stiffness_ratio(results: Results) -> float:
+    """K_N h/E: the joint's stiffness over that of the bulk within an element's length h."""
     case = results.case
-    stiff = case["K_N"] * case["dam_base"] / case["n_joint"] / min(case["E_dam"], case["E_found"])
-    if stiff < 100:
+    length = case["dam_base"] / case["n_joint"]
+    return case["K_N"] * length / min(case["E_dam"], case["E_found"])
+
+
+def stiff_joint(results: Results) -> str:
+    """A hint to a run that has not converged, if the joint is too stiff for its elements."""
+    ratio = stiffness_ratio(results)
+    if ratio < STIFF:
         return ""
-    why = f"the joint is too stiff for this mesh: K_N h/E = {stiff:.3g}"
+    why = f"the joint is too stiff for this mesh: K_N h/E = {ratio:.3g}"
     return f" ({why}; refine n_joint or lower K_N)"
+
+
+def hints(results: Results) -> list[str]:
+    """What an engineer should know of a result besides its verdict."""
+    found, ratio = [], stiffness_ratio(results)
+    if ratio >= STIFF:
+        found.append(
+            f"K_N h/E = {ratio:.3g}: the joint is stiff for this mesh, its node stresses oscillate "
+            "(N, T, M do not): refine n_joint or lower K_N"
+        )
+    return found
 
 
 def path_statement(results: Results) -> str:
