@@ -20,7 +20,7 @@ from .verdict import hints, statement, verdict
 TABLES = ("joint.csv", "history.csv", "curve.csv", "run.json")
 FIELDS = re.compile(r"(bulk|joint)(_t[\w.+-]+\.vtu|\.msh)|fields\.pvd")
 #: Where further scenes of a case go.
-SCENES = ("none", "imposed", "flow")
+SCENES = ("none", "imposed", "drained", "flow")
 
 
 def check_writable(folder: Path) -> None:

@@ -177,6 +177,7 @@ def load(
         raise InputError(
             f"tail_levels = {told}{whose}: must be one level or as many as levels ({len(heights)})"
         )
+    check_drains(values)
     times = tuple(found["times"])
     if steps is not None:
         times = tuple(i + (k + 1) / steps for i in range(len(heights)) for k in range(steps))
@@ -229,6 +230,21 @@ def check_energies(found: Mapping[str, list]) -> None:
                 f"{name} = {values[name]:g}: must be > {least:.4g} N/m ({formula}, what the joint "
                 "stores before it softens)"
             )
+
+
+def check_drains(values: Mapping) -> None:
+    """Raise InputError if the drains are not under the dam, or do not suit a driven scene."""
+    if values["uplift"] != "drained":
+        return
+    if not values["drain_x"] < values["dam_base"]:
+        raise InputError(
+            f"drain_x = {values['drain_x']:g}: must be < dam_base ({values['dam_base']:g} m)"
+        )
+    if values["drive"] != "level" and values["drain_level"] > 0:
+        raise InputError(
+            f"drain_level = {values['drain_level']:g}: must be 0 with drive = {values['drive']} "
+            "(the pressure has to be linear in the level)"
+        )
 
 
 def numbers(name: str, text: str) -> list[float]:
