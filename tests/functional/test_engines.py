@@ -97,6 +97,8 @@ SCENES = {
     "c without adhesion": {"adhesion": 0.0},
     "e bond": BOND,
     "f bond": COARSE | BOND,
+    "c stiff, no hardening": {"K_T": 9e14, "mu": 0.06, "pena_tang": 0.0, "levels": "1,2"},
+    "i soft, no strength": {"E": 1e10, "sigma_max": 0.0, "K_N": 1e11, "K_T": 5e10, "nu": 0.2},
 }
 
 
@@ -104,7 +106,8 @@ SCENES = {
 @pytest.mark.parametrize("scene", SCENES)
 def test_engines_agree(scene, tmp_path):
     """Whole loadings to the end: the same joint.csv to 1e-6 of the largest jump, stress, ..."""
-    case = load(scene[0], SCENES[scene])
+    settings = dict(SCENES[scene])
+    case = load(scene[0], settings, settings.pop("levels", None))
     plain, fast = (
         run.run(case, tmp_path / name, fields=False, picture=False, progress=False, engine=name)
         for name in ("getdp", "condensed")

@@ -18,6 +18,7 @@ CASES = data("cases")
 SHARED = (
     "attempt_growth",
     "attempt_secant",
+    "attempt_release",
     "attempt_iterations",
     "cut",
     "round_off",

@@ -141,31 +141,42 @@ class Joint:
         )
 
     def residual(
-        self, jump: np.ndarray, memory: Memory, level: float, tail: float, secant: bool = False
-    ) -> tuple[np.ndarray, Callable[[], tuple[Change, np.ndarray]]]:
+        self,
+        jump: np.ndarray,
+        memory: Memory,
+        level: float,
+        tail: float,
+        within: np.ndarray | None = None,
+    ) -> tuple[np.ndarray, Callable[[bool], tuple[Change, np.ndarray]]]:
         """The residual (j,), and a function that gives its derivatives with jump (a change of the
-        virgin joint's) and level (j,).
+        virgin joint's, by the law's tangent or by its secant) and level (j,).
+
+        within: see the law's `respond`.
         """
         interface = self.interface
-        traction, tangent = self.law.respond(
-            interface.jumps(interface.at_points, jump), memory, secant
-        )
+        at_points = interface.jumps(interface.at_points, jump)
+        traction, tangent = self.law.respond(at_points, memory, within=within)
+
+        def law_change(secant: bool) -> Change:
+            stiffness = self.law.respond(at_points, memory, True)[1] if secant else tangent
+            return interface.change(stiffness, self.virgin)
+
         load, rate = self.loads(level, tail)
         value = self.bulk.stiffness @ jump - load + interface.forces(traction)
         if not self.flowing:
-            return value, lambda: (interface.change(tangent, self.virgin), -rate)
+            return value, lambda secant: (law_change(secant), -rate)
         flow = interface.flow
         pressure, solution = self.solve_flow(jump, level, tail)
         value = value - flow.lift @ pressure
 
-        def derivatives() -> tuple[Change, np.ndarray]:
+        def derivatives(secant: bool) -> tuple[Change, np.ndarray]:
             narrowest = self.case["aperture_min"]
             opening = flow.opening @ jump
             growing = (
                 np.where(opening > 0, 3 / narrowest * (1 + opening / narrowest) ** 2, 0)
                 * interface.points.weights
             )
-            change = interface.change(tangent, self.virgin)
+            change = law_change(secant)
             change.pressure, change.columns, per_drop = flow.sensitivity(solution, growing)
             return change, -rate - flow.lift @ (self.unit_weight * per_drop)
 

@@ -54,11 +54,13 @@ class Filling:
         """The attempts at a step, in order; the last one, with the secant, is for before giving
         up.
         """
-        of_each = (self.case.shared[f"attempt_{n}"] for n in ("growth", "secant", "iterations"))
-        halvings = int(self.case["max_halvings"])
+        parts = ("growth", "secant", "release", "iterations")
+        of_each = zip(*(self.case.shared[f"attempt_{n}"] for n in parts), strict=True)
+        halvings, most = int(self.case["max_halvings"]), 2 if self.joint.law.releases else 1
         return [
-            Attempt(growth, bool(secant), int(iterations), halvings)
-            for growth, secant, iterations in zip(*of_each, strict=True)
+            Attempt(growth, int(secant), int(release), int(iterations), halvings)
+            for growth, secant, release, iterations in of_each
+            if release <= most
         ]
 
     def run(self) -> Results:
@@ -142,8 +144,14 @@ class Filling:
         level, tail, prescribed, target = self.water_at(time)
         stiff = joint.case["K_N"] * joint.bulk.width
 
-        def evaluate(jump: np.ndarray, level: float) -> Iterate:
-            value, derivatives = joint.residual(jump, memory, level, tail, attempt.secant)
+        def evaluate(jump: np.ndarray, level: float, last: Iterate | None) -> Iterate:
+            side = within = None
+            if attempt.release:
+                side = joint.law.side(joint.interface.jumps(joint.interface.at_points, jump))
+                if last:
+                    within = (side * last.side < 0) & ((side < 0) | (attempt.release > 1))
+                    side = np.where(within, 0, side)
+            value, derivatives = joint.residual(jump, memory, level, tail, within)
             size, edge = np.linalg.norm(value), None
             if prescribed:
                 if self.case["drive"] == "heel":
@@ -152,16 +160,15 @@ class Filling:
                     found, row, rate = joint.crest(jump, level, tail)
                 size, edge = np.hypot(size, stiff * (found - target)), (row, rate, target - found)
 
-            def correction() -> tuple[np.ndarray, float]:
-                change, slope = derivatives()
+            def correction(secant: bool) -> tuple[np.ndarray, float]:
+                change, slope = derivatives(secant)
                 border = edge and (slope, *edge)
                 return joint.interface.solve(joint.virgin, change, -value, border)
 
-            return Iterate(jump, level, value, size, correction)
+            return Iterate(jump, level, value, size, correction, side)
 
-        found = newton(
-            evaluate, evaluate(*self.start(time, level, prescribed, first)), self.limit, attempt
-        )
+        start = evaluate(*self.start(time, level, prescribed, first), None)
+        found = newton(evaluate, start, self.limit, attempt)
         if found is None:
             return None
         end, iterations = found

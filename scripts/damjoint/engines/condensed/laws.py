@@ -1,9 +1,9 @@
 """The joint laws of pro/law_*.pro once more, for many points at once: the condensed engine's.
 
-A law is a class with `start`, `respond` and `remember`, and what its memory means. Arrays: jump (q,
-3) is delta_n, delta_t1, delta_t2 [m]; traction (q, 3) is sigma_n (effective), tau_1, tau_2 [Pa];
-tangent (q, 3, 3) its derivative [Pa/m]; the memory a scalar (q,) and a vector (q, 2). Formulas:
-design of JOINT_MECA_RUPT and JOINT_MECA_FROT (code_aster R7.01.25).
+A law is a class with `start`, `respond`, `side` and `remember`, and what its memory means. Arrays:
+jump (q, 3) is delta_n, delta_t1, delta_t2 [m]; traction (q, 3) is sigma_n (effective), tau_1, tau_2
+[Pa]; tangent (q, 3, 3) its derivative [Pa/m]; the memory a scalar (q,) and a vector (q, 2).
+Formulas: design of JOINT_MECA_RUPT and JOINT_MECA_FROT (code_aster R7.01.25).
 """
 
 from __future__ import annotations
@@ -21,6 +21,16 @@ class Memory:
 
     scalar: np.ndarray
     vector: np.ndarray
+
+
+class Law:
+    """What a law has that releases no shear by opening."""
+
+    releases = False
+
+    def side(self, jump: np.ndarray) -> np.ndarray:
+        """Where a point is in that release: nowhere."""
+        return np.zeros(len(jump), int)
 
 
 class Rupture:
@@ -58,11 +68,26 @@ class Rupture:
         """Tangential stiffness [Pa/m]."""
         return np.where(opening <= 0, self.K_T, self.K_T * np.maximum(1 - opening / self.L_CT, 0))
 
+    @property
+    def releases(self) -> bool:
+        """Whether opening ends the tangential stiffness."""
+        return np.isfinite(self.L_CT)
+
+    def side(self, jump: np.ndarray) -> np.ndarray:
+        """Where a point is: before the release of its shear (-1), in it (0), beyond it (1)."""
+        return np.select([jump[:, 0] <= 0, jump[:, 0] < self.L_CT], [-1, 0], 1)
+
     def respond(
-        self, jump: np.ndarray, memory: Memory, secant: bool = False
+        self,
+        jump: np.ndarray,
+        memory: Memory,
+        secant: bool = False,
+        within: np.ndarray | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Traction and tangent; secant: the positive stiffness that never softens instead of the
-        tangent.
+        """Traction and tangent.
+
+        secant: the positive stiffness that never softens instead of the tangent; within: the points
+        whose shear is on the line of its release, wherever they are.
         """
         opening, kappa, slip = jump[:, 0], memory.scalar, jump[:, 1:] - memory.vector
         closed, broken = opening <= 0, self.broken(opening, kappa)
@@ -92,6 +117,10 @@ class Rupture:
         if not secant:
             falling = np.where((opening > 0) & (opening < self.L_CT), -self.K_T / self.L_CT, 0)
             tangent[:, 1:, 0] = falling[:, None] * slip
+        if within is not None and within.any():
+            line = self.K_T * (1 - opening[within] / self.L_CT)
+            traction[within, 1:] = line[:, None] * slip[within]
+            tangent[within, 1:, 0] = -self.K_T / self.L_CT * slip[within]
         return traction, tangent
 
     def remember(self, jump: np.ndarray, memory: Memory) -> Memory:
@@ -120,7 +149,7 @@ class Rupture:
         return np.linalg.norm(memory.vector, axis=1) > 0
 
 
-class Friction:
+class Friction(Law):
     """Mohr-Coulomb friction with hardening, implicit return.
 
     Memory: lambda, the cumulated slip, and the slip.
@@ -150,10 +179,15 @@ class Friction:
         )
 
     def respond(
-        self, jump: np.ndarray, memory: Memory, secant: bool = False
+        self,
+        jump: np.ndarray,
+        memory: Memory,
+        secant: bool = False,
+        within: np.ndarray | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Traction and (unsymmetric) tangent; the law never softens, so that secant changes
-        nothing.
+        """Traction and (unsymmetric) tangent.
+
+        secant: stress over jump, without the coupling, instead of the tangent; within: none here.
         """
         normal, size, n, slip = self.trial(jump, memory)
         traction = np.column_stack([normal, (size - self.K_T * slip)[:, None] * n])
@@ -161,6 +195,10 @@ class Friction:
         tangent = np.zeros((len(jump), 3, 3))
         tangent[:, 0, 0] = np.where(closed, self.K_N, self.artificial * self.K_N)
         left = np.where(sliding, 1 - self.K_T * slip / np.maximum(size, 1e-300), 1.0)
+        if secant:
+            along = self.K_T * np.maximum(left, self.artificial)
+            tangent[:, 1, 1] = tangent[:, 2, 2] = along
+            return traction, tangent
         along = np.where(sliding, self.H / (self.K_T + self.H), 1.0)
         outer = n[:, :, None] * n[:, None, :]
         eye = np.eye(2)
@@ -195,7 +233,7 @@ class Friction:
         return memory.scalar > 0
 
 
-class Bond:
+class Bond(Law):
     """A bond that breaks and slides (pro/law_bond.pro).
 
     Memory: the damage D of tension and cohesion, and the slip.
@@ -241,9 +279,16 @@ class Bond:
         return self.strength * (1 - damage) / kappa, -self.strength * self.delta_c / kappa**2
 
     def respond(
-        self, jump: np.ndarray, memory: Memory, secant: bool = False
+        self,
+        jump: np.ndarray,
+        memory: Memory,
+        secant: bool = False,
+        within: np.ndarray | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Traction and (unsymmetric) tangent; secant: a positive stiffness that never softens."""
+        """Traction and (unsymmetric) tangent.
+
+        secant: a positive stiffness that never softens instead of the tangent; within: none here.
+        """
         size, n, opened, slip, damage, gone = self.trial(jump, memory)
         opening, sliding = jump[:, 0], slip > 0
         closed = opening <= 0

@@ -15,25 +15,31 @@ class Attempt:
 
     #: how much the residual may grow before a correction is halved
     growth: float
-    #: whether the law's secant stiffness takes the place of the tangent
-    secant: bool
+    #: for how many iterations the law's secant stiffness takes the place of the tangent
+    secant: int
+    #: whether points that pass over the release of their shear stop in it first: no (0), those that
+    #: close (1), all (2)
+    release: int
     iterations: int
     halvings: int
 
 
 @dataclass
 class Iterate:
-    """An iterate: jump and level, residual and its size, and its correction (jump, level)."""
+    """An iterate: jump and level, residual and its size, its correction (jump, level) by the law's
+    tangent or by its secant, and where its points are in the release of their shear.
+    """
 
     jump: np.ndarray
     level: float
     residual: np.ndarray
     size: float
-    correction: Callable[[], tuple[np.ndarray, float]]
+    correction: Callable[[bool], tuple[np.ndarray, float]]
+    side: np.ndarray | None = None
 
 
-#: The iterate at a jump and a level.
-Evaluate = Callable[[np.ndarray, float], Iterate]
+#: The iterate at a jump and a level, that follows another one or none.
+Evaluate = Callable[[np.ndarray, float, "Iterate | None"], Iterate]
 
 
 @dataclass(frozen=True)
@@ -68,7 +74,7 @@ def noise(now: Iterate, evaluate: Evaluate) -> float:
     """The norm of the residual's change when the last bit of every unknown is rounded away."""
     larger = now.jump * (SPLITTER + 1)
     rounded = larger - (larger - now.jump)
-    return np.linalg.norm(evaluate(rounded, now.level).residual - now.residual) / SPLITTER
+    return np.linalg.norm(evaluate(rounded, now.level, None).residual - now.residual) / SPLITTER
 
 
 def newton(
@@ -89,12 +95,12 @@ def newton(
             return None
         sizes.append(now.size)
         try:
-            jump, level = now.correction()
+            jump, level = now.correction(iterations < attempt.secant)
         except (linalg.LinAlgError, ValueError):  # singular, or not a number
             return None
         fraction = 1.0
         for _ in range(attempt.halvings + 1):
-            tried = evaluate(now.jump + fraction * jump, now.level + fraction * level)
+            tried = evaluate(now.jump + fraction * jump, now.level + fraction * level, now)
             if tried.size <= attempt.growth * now.size:
                 break
             fraction /= 2

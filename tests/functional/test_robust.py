@@ -1,0 +1,63 @@
+"""Scenes that have an equilibrium which plain Newton does not find."""
+
+import numpy as np
+import pytest
+from damjoint.engines.condensed.laws import Friction, Memory, Rupture
+from damjoint.results.verdict import verdict
+from damjoint.scene.case import load
+
+#: A real dam whose joint releases its shear over a distance far below its jumps.
+LOOSE = {"dam_height": 40, "dam_base": 30, "E": 1e10, "sigma_max": 0}
+
+
+@pytest.mark.parametrize("uplift", ["imposed", "flow"])
+@pytest.mark.parametrize("n_joint", [60, 100])
+def test_a_joint_without_tensile_strength_opens_in_one_step(solve, uplift, n_joint):
+    """Some points are in equilibrium neither closed nor open, but within the release of their
+    shear."""
+    (result,) = solve("dam", "40", **LOOSE, uplift=uplift, n_joint=n_joint)
+    assert verdict(result) == "stands"
+    assert result.history["iterations"].sum() < 60
+    assert 3e-6 < result.history["max_opening"][-1] < 6e-6
+
+
+def test_shear_released_at_once_on_a_soft_dam(solve):
+    """SSNP142's brittle joint (L_CT = 1e-10 m) under openings of 4e-4 m. An independent solver
+    finds 4.142e-4 m."""
+    (result,) = solve("ssnp142", "40", dam_height=40, dam_base=30, E=1e10, h_found=7)
+    assert verdict(result) == "stands"
+    assert result.history["max_opening"][-1] == pytest.approx(4.142e-4, rel=2e-3)
+
+
+@pytest.mark.parametrize("overrides", [{"K_T": 9e14, "mu": 0.06}, {"K_T": 9e14, "mu": 0.04}])
+def test_stiff_friction_without_hardening(solve, overrides):
+    """The tangent makes the whole joint slip forward, then backward, and so on."""
+    (result,) = solve("ssnp142", "1.5", law="friction", pena_tang=0, **overrides)
+    assert not result.stopped and result.last["level"] == 1.5
+
+
+def test_secant_of_friction_is_stress_over_jump():
+    law = Friction(load("ssnp142", {"law": "friction", "K_T": 9e14}))
+    rng = np.random.default_rng(1)
+    jump = rng.normal(0, [1e-8, 2e-11, 2e-11], (200, 3)) - [5e-8, 0, 0]
+    memory = Memory(np.zeros(200), rng.normal(0, 2e-11, (200, 2)))
+    traction, secant = law.respond(jump, memory, secant=True)
+    slid = law.trial(jump, memory)[3] > 0
+    assert 0 < slid.sum() < 200
+    np.testing.assert_allclose(
+        np.einsum("qij,qj->qi", secant, jump - np.pad(memory.vector, ((0, 0), (1, 0)))),
+        traction,
+        rtol=1e-9,
+    )
+    assert np.all(np.diagonal(secant, axis1=1, axis2=2) > 0)
+
+
+def test_line_of_the_release_is_the_law_inside_it_and_its_extension_outside():
+    law = Rupture(load("ssnp142", {"sigma_max": 0}))
+    memory = law.start(3)
+    jump = np.array([[0.25, 1e6, 0], [-3.0, 1e6, 0], [5.0, 1e6, 0]]) * law.L_CT
+    line, tangent = law.respond(jump, memory, within=np.ones(3, bool))
+    np.testing.assert_allclose(line[:, 1], law.K_T * np.array([0.75, 4, -4]) * 1e6 * law.L_CT)
+    np.testing.assert_allclose(tangent[:, 1, 0], -law.K_T * 1e6)
+    assert law.side(jump).tolist() == [0, -1, 1]
+    np.testing.assert_array_equal(line[0], law.respond(jump, memory)[0][0])
