@@ -1,0 +1,316 @@
+"""One session of the window: what happens when something is pressed or comes back; the event loop.
+
+ONELAB tells of what the user does by one text, the action: "check" when a parameter has changed,
+and the words of the buttons.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import gmsh
+
+from .. import InputError, RunError, data
+from ..scene.case import Case
+from ..scene.mesh import GEOMETRY
+from ..scene.parameters import assignments, start_gmsh
+from . import tree, views
+from .sheet import Request, Sheet
+from .worker import Engine, Scene
+
+ACTION, BUTTON = "ONELAB/Action", "ONELAB/Button"
+RUN, STOP, SAVE = ("Run", "run"), ("Stop", "stop"), "save"
+#: Seconds that a change waits for the engine's process to start, a turn for events.
+START, TURN = 60.0, 0.02
+
+
+class Session:
+    """
+    The state of the window, and what it does.
+
+    With a window or without: `turn` looks once at what the user has done and at what the engine
+    says; it never waits.
+    """
+
+    def __init__(self, request: Request, windowed: bool = False) -> None:
+        prepare()
+        self.windowed = windowed
+        self.engine = Engine()
+        self.folder = tempfile.TemporaryDirectory(prefix="damjoint_")
+        #: checking, running, saving, or nothing of them
+        self.busy = ""
+        self.checks = False
+        self.tree: tree.Tree | None = None
+        self.status = ""
+        self.scenes: list[Scene] = []
+        #: of the last run, of those kept for comparison, and the water before a run
+        self.gallery: views.Gallery | None = None
+        self.kept: list[views.Gallery] = []
+        self.water: views.Gallery | None = None
+        self.message = views.Gallery()
+        self.drawn: tuple = ()
+        self.started = 0.0
+        tree.put(tree.text(ACTION, "", visible=False), button(RUN))
+        self.say("starting ...", tree.CALM)
+        kind, *told = next(self.engine.messages(START), ("late",))
+        if kind != "ready":
+            raise RunError(f"gui: the engine's process has not started ({kind})")
+        self.tree = tree.Tree(*told)
+        if windowed:
+            self.update()
+            gmsh.fltk.closeTreeItem("0Modules")
+        self.check(request)
+
+    def close(self) -> None:
+        """End the engine's process and remove what is temporary."""
+        self.engine.close()
+        self.folder.cleanup()
+
+    # what the user does
+
+    def turn(self, wait: float = 0.0) -> None:
+        """Look at the action and at the engine's messages; wait: at most so long for one [s]."""
+        action = tree.get_text(ACTION)
+        if action:
+            gmsh.onelab.setString(ACTION, [""])
+            self.act(action)
+        for kind, *told in self.engine.messages(wait):
+            getattr(self, f"on_{kind}")(*told)
+
+    def act(self, action: str) -> None:
+        """Do what has been pressed."""
+        if action == STOP[1]:
+            self.engine.stop()
+            self.say("stopping; press Stop again to end at once, keeping nothing", tree.WARN)
+        elif action == RUN[1] and self.busy != "running":
+            self.run()
+        elif action == SAVE and not self.busy:
+            self.busy = "saving"
+            self.say("saving ...", tree.CALM)
+            self.engine.send("save", tree.get_text(tree.FOLDER))
+        elif action in ("check", "reset") and self.busy:
+            self.checks = True  # when what is under way has ended
+        elif action in ("check", "reset") and not self.other_scene():
+            self.check()
+
+    def other_scene(self) -> bool:
+        """Whether the user has asked to see another scene of the last run; shows it then."""
+        if not self.scenes or tree.chosen_scene(self.scenes) == self.scene_shown:
+            return False
+        self.show(tree.chosen_scene(self.scenes), keep=False)
+        return True
+
+    def check(self, request: Request | None = None) -> None:
+        """Have a request checked: what stands in the tree, if none is given."""
+        try:
+            self.engine.send("check", request or self.tree.asked())
+            self.busy = "checking"
+        except InputError as error:
+            self.on_bad(str(error))
+
+    def run(self) -> None:
+        """Have what stands in the tree run."""
+        try:
+            request = self.tree.asked()
+        except InputError as error:
+            self.on_bad(str(error))
+            return
+        self.busy, self.started = "running", time.perf_counter()
+        tree.put(button(STOP))
+        self.say("running: mesh and bodies", tree.CALM)
+        self.engine.send("run", request)
+
+    # what the engine says
+
+    def on_ready(self, *_: object) -> None:
+        """Another process is there, after one that has died; it knows the same."""
+
+    def on_checked(self, sheet: Sheet) -> None:
+        """A request is good: parameters, drawing and water follow."""
+        before = self.tree.sheet
+        self.tree.show(sheet)
+        drawn = drawing_of(sheet)
+        if drawn != self.drawn:
+            self.draw(sheet.case)
+            self.drawn = drawn
+            self.tree.show(sheet)  # reading the geometry has declared the parameters anew
+        if self.busy == "running":
+            self.update()
+            return
+        if before and before.path != sheet.path:
+            self.drop_results()
+        changed = self.scenes and before and sheet.request != before.request
+        self.free("changed since the run: press Run" if changed else "ready: press Run", tree.CALM)
+
+    def on_bad(self, why: str) -> None:
+        """A value is bad: said in one line, nothing runs, everything stays."""
+        self.free(why, tree.BAD)
+
+    def on_failed(self, why: str) -> None:
+        """A run, or what else was under way, has failed."""
+        self.free(why, tree.BAD)
+
+    def on_died(self, code: int | None) -> None:
+        """The engine's process is gone, by a second Stop or by itself."""
+        stopped = "stopped at once, nothing kept"
+        self.free(stopped if code == -9 else f"the engine has ended ({code}); press Run", tree.BAD)
+
+    def on_step(self, at: tuple[int, float]) -> None:
+        """A step has converged."""
+        case = self.tree.sheet.case
+        scene, now = at
+        several = f"uplift {case.scenes()[scene]['uplift']}, " if case.also_uplift else ""
+        last = case.times[-1]
+        self.say(
+            f"running: {several}level {case.level_at(now):.3g} m, t = {now:.3g} of {last:g}",
+            tree.CALM,
+        )
+
+    def on_done(self, scenes: list[Scene]) -> None:
+        """A run has ended, at its last level or before."""
+        self.scenes = scenes
+        self.show(0, keep=bool(tree.get_number(tree.KEEP)))
+        took = f"{time.perf_counter() - self.started:.2f} s"
+        trouble = [scene.said for scene in scenes if scene.said]
+        if trouble:
+            self.free(f"{trouble[0]} ({took})", tree.WARN)
+        else:
+            self.free(f"done in {took}: the dam stands", tree.GOOD)
+
+    def on_saved(self, folder: str) -> None:
+        """The last run is written."""
+        self.free(f"saved: {folder}", tree.GOOD)
+
+    # what is shown
+
+    def free(self, status: str, color: str) -> None:
+        """Ready for something else."""
+        self.busy = ""
+        tree.put(button(RUN))
+        self.say(status, color)
+        if self.checks:
+            self.checks = False
+            self.check()
+
+    def say(self, status: str, color: str) -> None:
+        """A line in the tree and at the bottom of the window; bad news in the picture, too."""
+        self.status = status
+        tree.say(status, color)
+        self.message.close()
+        if color == tree.BAD:
+            self.message.write(20, 100, [status], views.RED, 15)
+        self.update()
+        if self.windowed:
+            gmsh.fltk.setStatusMessage(status)
+
+    def update(self) -> None:
+        """Have the window follow."""
+        if self.windowed:
+            gmsh.fltk.update()
+            gmsh.graphics.draw()
+
+    def draw(self, case: Case) -> None:
+        """The undeformed outline, to be meshed by Gmsh's key, and the water; results are hidden."""
+        name = Path(self.folder.name) / f"{case.name}.geo"
+        values = {parameter: case[parameter] for parameter in GEOMETRY}
+        name.write_text(f'{assignments(values)}Include "{data("geo")}/dam.geo";\n')
+        gmsh.model.remove()
+        gmsh.open(str(name))
+        if self.water:
+            self.water.close()
+        self.water = views.outline_water(case)
+        self.outline(True)
+
+    def outline(self, shown: bool) -> None:
+        """Show the undeformed outline with its water, or the results."""
+        for option in ("Geometry.Curves", "Geometry.Points", "Mesh.SurfaceEdges", "Mesh.Lines"):
+            gmsh.option.setNumber(option, shown and option != "Geometry.Points")
+        if self.water:
+            self.water.show(shown)
+        for gallery in [*self.kept, *([self.gallery] if self.gallery else [])]:
+            gallery.show(not shown)
+
+    def show(self, scene: int, keep: bool) -> None:
+        """Show a scene of the last run, in place of the views before or beside them."""
+        if self.gallery and keep:
+            self.kept.append(self.gallery)
+        elif self.gallery:
+            self.gallery.close()
+        if not keep:
+            for gallery in self.kept:
+                gallery.close()
+            self.kept = []
+        self.scene_shown = scene
+        self.gallery = views.show(self.scenes[scene])
+        self.outline(False)
+        tree.show_results(self.scenes, scene)
+        self.update()
+
+    def drop_results(self) -> None:
+        """Another case: what an earlier one has given goes."""
+        for gallery in [*self.kept, *([self.gallery] if self.gallery else [])]:
+            gallery.close()
+        self.scenes, self.kept, self.gallery = [], [], None
+        tree.hide_results()
+
+
+#: Options of Gmsh: nothing of its own when a parameter changes, and what the window looks like.
+OPTIONS = {
+    "Solver.AutoMesh": 0,
+    "Solver.AutoSaveDatabase": 0,
+    "Solver.AutoLoadDatabase": 0,
+    "Solver.AutoCheck": 1,
+    "General.Verbosity": 3,
+    "General.Terminal": 0,
+    "General.MenuWidth": 560,
+    "General.GraphicsWidth": 1600,
+    "General.GraphicsHeight": 900,
+    "General.SmallAxes": 0,
+    "General.Antialiasing": 1,
+    "General.BackgroundGradient": 0,
+    "Geometry.PointLabels": 0,
+}
+
+
+def prepare() -> None:
+    """Start Gmsh with the window's options, which it reads when a window opens."""
+    start_gmsh()
+    for name, value in OPTIONS.items():
+        gmsh.option.setNumber(name, value)
+
+
+def button(what: tuple[str, str]) -> dict:
+    """Gmsh's button for an action: its label and the action's word."""
+    return {"type": "string", "name": BUTTON, "values": list(what), "visible": False}
+
+
+def drawing_of(sheet: Sheet) -> tuple:
+    """What the drawing depends on."""
+    case = sheet.case
+    return (sheet.path, *(case[n] for n in GEOMETRY), max(case.levels), max(case.tail_levels))
+
+
+def gui(request: Request) -> None:
+    """
+    Open the window on a request and stay until it is closed.
+
+    Raises InputError before anything opens, RunError where there is no display.
+    """
+    request.load()
+    if sys.platform.startswith("linux") and not (
+        os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    ):
+        raise RunError("gui: needs a display, and DISPLAY is not set")
+    prepare()
+    gmsh.fltk.initialize()
+    session = Session(request, windowed=True)
+    try:
+        while gmsh.fltk.isAvailable():
+            gmsh.fltk.wait(TURN)
+            session.turn()
+    finally:
+        session.close()
