@@ -227,7 +227,7 @@ class Deformed:
         return float(history[column][np.argmin(np.abs(history["time"] - time))])
 
     def beside(self, face: str, levels: list[float], face_x, far: float) -> np.ndarray:
-        """Strips of water between a face, displaced, and x = far, in front and, in 3D, behind."""
+        """Strips of water between a face, displaced, and x = far; in 3D both sides and the top."""
         dam = self.scene.bodies["dam"]
         near = 1e-9 * self.scene.result.case["dam_height"]
         on = np.abs(dam.points[:, 0] - face_x(dam.points[:, 1])) < near
@@ -242,6 +242,9 @@ class Deformed:
                 beside = np.column_stack([np.full_like(y, far), y, np.full_like(y, z)])
                 wet = np.column_stack([x, y, np.full_like(y, z)])
                 sides.append(np.stack([beside[:-1], wet[:-1], wet[1:], beside[1:]], axis=1))
+            if self.depth:
+                ends = (far, 0), (x[-1], 0), (x[-1], self.depth), (far, self.depth)
+                sides.append(np.array([[(at, level, z) for at, z in ends]]))
             found.append(np.concatenate(sides))
         return np.array(found)
 

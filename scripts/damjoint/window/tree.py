@@ -119,13 +119,17 @@ class Tree:
         other = self.sheet is None or sheet.path != self.sheet.path
         self.sheet = sheet
         case, request = sheet.case, sheet.request
-        own = [self.title(name) for name in self.titles]
-        chosen = self.title(request.case)
-        more = [] if chosen in own else [chosen]
+        menu = self.menu(sheet)
         texts = level_texts(case)
         times = ", ".join(f"{t:.4g}" for t in case.times)
         put(
-            text(CASE, chosen, choices=[*own, *more, OPEN], help="one of the list, or a .case file"),
+            number(
+                CASE,
+                menu.index(self.title(request.case)),
+                choices=list(range(len(menu))),
+                valueLabels={title: place for place, title in enumerate(menu)},
+                help="the modelings of SSNP142, your own dam, a case file",
+            ),
             text(FILE, sheet.path, kind="file", help="choose a case file of your own"),
             text(
                 LEVELS,
@@ -156,23 +160,22 @@ class Tree:
             )
         # read back, since the database may round a number
         self.shown = {e["name"]: value_of(e["name"]) for e in sheet.entries} | {
-            name: get_text(name) for name in (CASE, FILE, LEVELS, TAIL_LEVELS, STEPS, ACCURACY)
+            name: value_of(name) for name in (CASE, FILE, LEVELS, TAIL_LEVELS, STEPS, ACCURACY)
         }
 
     def title(self, case: str) -> str:
         """How a case is called in the menu."""
-        if case.lower() in self.titles:
-            name = case.lower()
-            said = self.titles[name]
-            return said if said.lower().startswith(f"{name}:") else f"{name}: {said}"
-        return Path(case).stem
+        name = case.lower()
+        if name not in self.titles:
+            return Path(case).stem
+        said = self.titles[name]
+        return said if said.lower().startswith(f"{name}:") else f"{name}: {said}"
 
-    def named(self, title: str) -> str:
-        """The case of an entry of the menu: its name, or a path typed there."""
-        for name in self.titles:
-            if title in (self.title(name), name):
-                return name
-        return title
+    def menu(self, sheet: Sheet) -> list[str]:
+        """The entries of the menu of cases, in order; a file's case is there while it is open."""
+        own = [self.title(name) for name in self.titles]
+        title = self.title(sheet.request.case)
+        return [*own, *([] if title in own else [title]), OPEN]
 
     def entry(self, told: dict) -> dict:
         """
@@ -197,7 +200,7 @@ class Tree:
         if parameter.follows and told["values"][0] == AUTOMATIC:
             leader = parameter.follows.split(",")[0]
             value = self.sheet.case[parameter.name]
-            entry["label"] = f"= {value:.6g} ({leader}): {parameter.meaning}"
+            entry["label"] = f"{parameter.name} = {value:.6g} ({leader}): {parameter.meaning}"
         return entry
 
     def asked(self) -> Request:
@@ -207,17 +210,19 @@ class Tree:
         Another case starts afresh. Raises InputError where no case has been chosen yet.
         """
         request, shown = self.sheet.request, self.shown
-        case, file = get_text(CASE), get_text(FILE)
+        case, file = get_number(CASE), get_text(FILE)
         if file != shown[FILE]:
             return Request(file)
-        if case == OPEN:
-            raise InputError('case file: choose it at "Case file", below the menu of cases')
         if case != shown[CASE]:
-            return Request(self.named(case))
-        names = {parameter.label: name for name, parameter in self.known.items()}
+            names = list(self.titles)
+            if case < len(names):
+                return Request(names[int(case)])
+            if self.menu(self.sheet)[int(case)] == OPEN:
+                raise InputError('case file: choose it at "Case file", below the menu of cases')
+        labels = {parameter.label: name for name, parameter in self.known.items()}
         changed = {
-            names[label]: value_of(label)
-            for label in names
+            labels[label]: value_of(label)
+            for label in labels
             if label in shown and value_of(label) != shown[label]
         }
         return replace(

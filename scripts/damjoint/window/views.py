@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import gmsh
 import numpy as np
@@ -26,7 +26,9 @@ ORANGE: Color = (214, 120, 0, 255)
 RED: Color = (200, 20, 20, 255)
 GREEN: Color = (46, 125, 50, 255)
 DARK: Color = (60, 60, 60, 255)
-WATER: Color = (61, 155, 224, 130)
+GREY: Color = (150, 150, 150, 255)
+LAKE: Color = (61, 155, 224, 255)
+WATER: Color = (*LAKE[:3], 130)
 #: From little to much displacement, and from pressed to free.
 STONE = ((226, 222, 212), (168, 187, 205), (88, 137, 186), (11, 60, 120))
 FIRE = ((11, 60, 120), (88, 137, 186), (226, 222, 212), (200, 60, 30))
@@ -41,6 +43,8 @@ class Gallery:
 
     def __init__(self) -> None:
         self.tags: list[int] = []
+        #: those that wait for the user to tick them
+        self.spare: list[int] = []
 
     def add(
         self, name: str, pieces: list[Pieces], colors: Sequence[tuple], **numbers: float
@@ -74,10 +78,17 @@ class Gallery:
         gmsh.view.option.setNumber(tag, "TimeStep", len(lines) - 1)
         return tag
 
+    def put_aside(self, prefix: str) -> None:
+        """Hide all of it, with a word before the names, for the user to tick."""
+        for tag in set(self.tags) & set(gmsh.view.getTags()):
+            name = gmsh.view.option.getString(tag, "Name")
+            gmsh.view.option.setString(tag, "Name", f"{prefix} {name}")
+            gmsh.view.option.setNumber(tag, "Visible", 0)
+
     def show(self, shown: bool) -> None:
         """Show or hide all of it."""
         for tag in set(self.tags) & set(gmsh.view.getTags()):
-            gmsh.view.option.setNumber(tag, "Visible", shown)
+            gmsh.view.option.setNumber(tag, "Visible", shown and tag not in self.spare)
 
     def close(self) -> None:
         """Remove those of the views that are still there."""
@@ -120,6 +131,9 @@ def outline_water(case: Case) -> Gallery:
     ):
         corners = [(end, 0), (x, 0), (x - slope * level, level), (end, level)]
         faces += [[(*corner, z) for corner in corners] for z in {0.0, depth} if level > 0]
+        if depth and level > 0:
+            top = (end, 0.0), (corners[2][0], 0.0), (corners[2][0], depth), (end, depth)
+            faces.append([(at, level, z) for at, z in top])
     if faces:
         points = np.array(faces, float)
         pieces = Pieces(points, np.ones((1, *points.shape[:2], 1)))
@@ -127,18 +141,25 @@ def outline_water(case: Case) -> Gallery:
     return gallery
 
 
-def show(scene: Scene) -> Gallery:
-    """All views of a scene; its last text and curves alone if no requested level was reached."""
+def show(scene: Scene, before: Sequence[Scene] = ()) -> Gallery:
+    """
+    All views of a scene; its first line and history alone if no requested level was reached.
+
+    before: earlier runs, whose last curves are drawn in grey for comparison.
+    """
     gallery = Gallery()
+    graphs = Graphs(gallery)
     if scene.times.size:
         deformed = Deformed(scene)
         show_deformed(gallery, deformed)
         if scene.result.case["dim"] == 3:
             show_maps(gallery, deformed)
-        show_curves(gallery, scene)
+        show_curves(graphs, scene, [other for other in before if other.times.size])
         gallery.write(20, 52, captions(deformed), DARK, 15)
-    if len(scene.result.history["time"]) > 1:
-        show_history(gallery, scene)
+    if len(scene.result.history["time"]):
+        show_history(graphs, scene, before)
+    if before:
+        gallery.write(180, 98, ["grey curves: before"], GREY, 13)
     gallery.write(20, 28, [heading_of(scene)], DARK, 18)
     return gallery
 
@@ -157,7 +178,7 @@ def captions(deformed: Deformed) -> list[str]:
         tail = f", tailwater {now['tail_level']:.4g} m" if now["tail_level"] > 0 else ""
         lines.append(
             f"level {now['level']:.4g} m{tail}: largest opening {in_unit(now['max_opening'])}, "
-            f"crack {now['crack_length']:.3g} m; displacement x {deformed.scale:g}"
+            f"crack {now['crack_length']:.3g} m"
         )
     return lines
 
@@ -165,32 +186,35 @@ def captions(deformed: Deformed) -> list[str]:
 def in_unit(length: float) -> str:
     """A length in a unit that suits it."""
     name, factor = unit([np.array([length])], LENGTHS)
-    return f"{length * factor:.3g} {plain(name)}"
-
-
-def plain(name: str) -> str:
-    """A unit in letters that every font of the window has."""
-    return name.replace("µm", "1e-6 m").replace("nm", "1e-9 m")
+    return f"{length * factor:.3g} {name}"
 
 
 def show_deformed(gallery: Gallery, deformed: Deformed) -> None:
     """Dam and foundation, their outline, water, crack and slip, all displaced by one factor."""
     height = deformed.scene.result.case["dam_height"]
     moves = {"VectorType": 5, "DisplacementFactor": deformed.scale}
-    scale = {"AutoPosition": 0, "PositionX": 40, "PositionY": -60, "Width": 300, "Height": 14}
+    scale = scale_at(0)
     gallery.add("displacement [m]", deformed.bodies(), STONE, **moves, **scale, Light=0)
-    gallery.add(
-        "vertical stress [Pa]", deformed.stress(), FIRE, **scale, Light=0, Visible=0,
+    gallery.spare.append(
+        gallery.add("vertical stress [Pa]", deformed.stress(), FIRE, **scale, Light=0, Visible=0)
     )
     flat = {**moves, "ShowScale": 0, "Light": 0}
     gallery.add("water", [deformed.water()], [WATER], **flat)
-    gallery.add("outline", [deformed.outline()], [DARK], **flat, LineWidth=1.5)
+    above = {**flat, "OffsetZ": 1e-3 * height}  # or lines and faces in one plane hide one another
+    gallery.add("outline", [deformed.outline()], [DARK], **above, LineWidth=1.5)
     marks = deformed.marks()
-    above = {**flat, "LineWidth": 5, "OffsetZ": 1e-3 * height}
+    above |= {"LineWidth": 3, "OffsetZ": 2e-3 * height}
     slipped = gallery.add("slipped joint", [marks["slipped"]], [ORANGE], **above)
     broken = gallery.add("open or broken joint", [marks["open"]], [RED], **above)
     label(broken, 20, 76, ["red: joint open or broken"], 13)
     label(slipped, 210, 76, ["orange: joint slipped"], 13)
+    gallery.write(20, 98, [f"displacement x {deformed.scale:g}"], DARK, 13)
+
+
+def scale_at(place: int) -> dict[str, float]:
+    """Options of a scale of colors at one of four places, bottom left."""
+    x, y = 40 + 240 * (place % 2), -60 - 70 * (place // 2)
+    return {"AutoPosition": 0, "PositionX": x, "PositionY": y, "Width": 180, "Height": 12}
 
 
 def show_maps(gallery: Gallery, deformed: Deformed) -> None:
@@ -203,24 +227,31 @@ def show_maps(gallery: Gallery, deformed: Deformed) -> None:
     length, per_m = unit([r["delta_n"] for r in rows], LENGTHS)
     stress, per_pa = unit([r["p"] for r in rows], STRESSES)
     state = [np.where(r["damage"] >= 1, 2.0, np.where(r["slip"] > 0, 1.0, 0.0)) for r in rows]
-    shown = (
-        (f"opening of the joint [{plain(length)}]", [r["delta_n"] * per_m for r in rows], STONE),
-        (f"pressure in the joint [{stress}]", [r["p"] * per_pa for r in rows], STONE),
-        ("state: closed, slipped, open", state, (STONE[0], ORANGE, RED)),
-    )
+    shown = [
+        (f"opening of the joint [{length}]", [r["delta_n"] * per_m for r in rows], STONE),
+        ("joint: closed, slipped, open", state, (STONE[0], ORANGE, RED)),
+    ]
+    if case["uplift"] != "none":
+        shown.append((f"water pressure [{stress}]", [r["p"] * per_pa for r in rows], STONE))
+    # as wide as the foundation, and deep enough to be seen
+    base, depth = case["dam_base"], case["thickness"]
+    wider = min(2.5, 1 + 2 * case["found_side"] / base)
+    stretch = np.array([wider, 1.0, max(wider, 0.25 * wider * base / depth)])
     for i, (name, values, colors) in enumerate(shown):
-        below = np.array([0, -case["found_depth"] - (i + 1) * 0.12 * case["dam_height"], 0])
+        below = np.array([0, -case["found_depth"] - (i + 1) * 0.17 * case["dam_height"], 0])
+        below += (1 - stretch) * np.array([base / 2, 0, depth])
+        points = joint.points * stretch + below
         pieces = [
-            Pieces(joint.points[table] + below, np.array(values)[:, nearest][:, table, None])
+            Pieces(points[table], np.array(values)[:, nearest][:, table, None])
             for _, table in joint.cells
         ]
-        place = {"AutoPosition": 0, "PositionX": 40, "PositionY": -110 - 50 * i}
-        gallery.add(name, pieces, colors, **place, Width=300, Height=14, Light=0)
+        whole = {"RangeType": 2, "CustomMin": 0, "CustomMax": 2} if values is state else {}
+        gallery.add(name, pieces, colors, **scale_at(i + 1), **whole, Light=0)
 
 
 @dataclass
 class Curve:
-    """A line of a graph: x (n,) or (steps, n), y (steps, n)."""
+    """A line of a graph: x (n,), y (steps, n)."""
 
     name: str
     x: np.ndarray
@@ -228,90 +259,125 @@ class Curve:
     color: Color
 
 
-def show_curves(gallery: Gallery, scene: Scene) -> None:
+def show_curves(graphs: Graphs, scene: Scene, before: Sequence[Scene]) -> None:
     """Along the joint (means over z in 3D): opening, slip, stresses, pressure."""
     rows = [along(scene.result.at(time)) for time in scene.times]
-    x, where = rows[0]["x"], "x [m], heel to toe"
+    olds = [along(other.result.at()) for other in before]
+    wet = scene.result.case["uplift"] != "none"
+    shown: list[tuple[str, tuple, list]] = [
+        ("opening", LENGTHS, [("", "delta_n", BLUE)]),
+        ("slip", LENGTHS, [("jump", "delta_t1", ORANGE), ("slip", "slip", DARK)]),
+        ("normal stress", STRESSES, [("total", "sigma_n", BLUE)]),
+        ("shear stress", STRESSES, [("", "tau_1", ORANGE)]),
+    ]
+    if wet:
+        shown[2][2].append(("effective", "sigma_n_eff", GREEN))
+        shown.append(("water pressure", STRESSES, [("", "p", LAKE)]))
+    for title, units, parts in shown:
+        first = parts[0][1]
+        curves = [
+            Curve(name, rows[0]["x"], np.array([r[column] for r in rows]), color)
+            for name, column, color in parts
+        ]
+        curves += [Curve("before", old["x"], old[first][None], GREY) for old in olds]
+        graphs.add(title, units, "x [m], heel to toe", curves)
 
-    def curve(name: str, column: str, color: Color) -> Curve:
-        return Curve(name, x, np.array([r[column] for r in rows]), color)
 
-    graph(gallery, 0, "opening", LENGTHS, where, [curve("", "delta_n", BLUE)])
-    slips = [curve("moved", "delta_t1", ORANGE), curve("slip", "slip", DARK)]
-    graph(gallery, 1, "slip", LENGTHS, where, slips)
-    normal = [curve("total", "sigma_n", BLUE)]
-    if scene.result.case["uplift"] != "none":
-        normal.append(curve("effective", "sigma_n_eff", GREEN))
-    graph(gallery, 2, "normal stress", STRESSES, where, normal)
-    graph(gallery, 3, "shear stress", STRESSES, where, [curve("", "tau_1", ORANGE)])
-    graph(gallery, 4, "water pressure", STRESSES, where, [curve("", "p", WATER[:3] + (255,))])
-
-
-def show_history(gallery: Gallery, scene: Scene) -> None:
+def show_history(graphs: Graphs, scene: Scene, before: Sequence[Scene]) -> None:
     """Level over opening, crest movement and crack length, all converged steps."""
-    history, case = scene.result.history, scene.result.case
-    driven = case["drive"] != "level"
-    opening = scene.result.heel if driven else history["max_opening"]
-    name = "heel opening" if driven else "largest opening"
-    for place, title, values in ((5, name, opening), (6, "crest movement", history["crest_ux"])):
-        length, factor = unit([values], LENGTHS)
-        curve = Curve("", values * factor, history["level"][None], BLUE)
-        x_label = f"{title} [{plain(length)}]"
-        graph(gallery, place, "level", (("m", 1),), x_label, [curve], points=True)
-    crack = Curve("", history["crack_length"], history["level"][None], RED)
-    graph(gallery, 7, "level", (("m", 1),), "crack length [m]", [crack], points=True)
+    driven = scene.result.case["drive"] != "level"
+    shown = (
+        ("heel opening" if driven else "largest opening", "max_opening", LENGTHS, BLUE),
+        ("crest movement", "crest_ux", LENGTHS, BLUE),
+        ("crack length", "crack_length", (("m", 1),), RED),
+    )
+    for title, column, units, color in shown:
+        curves = []
+        for other in (scene, *before):
+            history = other.result.history
+            x = other.result.heel if driven and column == "max_opening" else history[column]
+            if len(x):
+                name, kind = ("", color) if other is scene else ("before", GREY)
+                curves.append(Curve(name, x, history["level"][None], kind))
+        length, factor = unit([curve.x for curve in curves], units)
+        for curve in curves:
+            curve.x = curve.x * factor
+        graphs.add("level", (("m", 1),), f"{title} [{length}]", curves, points=True)
 
 
-def graph(
-    gallery: Gallery,
-    place: int,
-    title: str,
-    units: tuple,
-    x_label: str,
-    curves: list[Curve],
-    points: bool = False,
-) -> None:
-    """
-    Curves in one graph, at one of the places on the right (two columns, from the top left).
+class Graphs:
+    """Graphs on the right, in two columns from the top left."""
 
-    units: of which the values get the one that suits them; points: marked on the curve.
-    """
-    name, factor = unit([curve.y for curve in curves], units)
-    low = min(0.0, *(float(curve.y.min()) * factor for curve in curves))
-    high = max(0.0, *(float(curve.y.max()) * factor for curve in curves))
-    if high - low < 1e-12 * max(abs(high), abs(low), 1e-300) or high == low:
-        high = low + 1.0
-    column, row = place % 2, place // 2
-    x = -GRAPH_PITCH[0] * (2 - column) + 70
-    y = 40 + GRAPH_PITCH[1] * row
-    for i, curve in enumerate(curves):
-        steps, count = curve.y.shape
-        spots = np.zeros((count, 3))
-        spots[:, 0] = curve.x
-        lines = np.stack([spots[:-1], spots[1:]], axis=1)
-        values = np.stack([curve.y[:, :-1], curve.y[:, 1:]], axis=2)[..., None] * factor
-        tag = gallery.add(
-            f"{title} [{plain(name)}]" if not i else f"{title}, {curve.name} [{plain(name)}]",
-            [Pieces(lines, values.reshape(steps, count - 1, 2, 1))],
-            [curve.color],
-            Type=4,
-            AutoPosition=0,
-            PositionX=x,
-            PositionY=y,
-            Width=GRAPH_SIZE[0],
-            Height=GRAPH_SIZE[1],
-            RangeType=2,
-            CustomMin=low,
-            CustomMax=high,
-            NbIso=4,
-            Axes=0 if i else 3,
-            LineWidth=2,
-            IntervalsType=3 if points else 2,
-            PointSize=4,
-            AxesTicsX=3,
+    def __init__(self, gallery: Gallery) -> None:
+        self.gallery, self.count = gallery, 0
+
+    def add(
+        self, title: str, units: tuple, x_label: str, curves: list[Curve], points: bool = False
+    ) -> None:
+        """
+        One more graph, with curves on common axes; these hold zero.
+
+        units: of which the values get the one that suits them; points: marked on the curves.
+        """
+        name, factor = unit([curve.y for curve in curves], units)
+        x_range, y_range = (
+            span(np.concatenate([getattr(curve, axis).ravel() for curve in curves]))
+            for axis in "xy"
         )
-        gmsh.view.option.setString(tag, "Format", "%.3g")
-        gmsh.view.option.setString(tag, "AxesFormatX", "%.3g")
-        gmsh.view.option.setString(tag, "AxesLabelX", x_label)
-        if curve.name:
-            label(tag, x + GRAPH_SIZE[0] - 60, y - 8 - 14 * (len(curves) - 1 - i), [curve.name], 12)
+        low, high = (value * factor for value in y_range)
+        x = -GRAPH_PITCH[0] * (2 - self.count % 2) + 70
+        y = 40 + GRAPH_PITCH[1] * (self.count // 2)
+        self.count += 1
+        for i, curve in enumerate(curves):
+            tag = self.gallery.add(
+                f"{title}{', ' if curve.name else ''}{curve.name} [{name}]"
+                if i
+                else f"{title} [{name}]",
+                [pieces_of(curve, factor, x_range, 2 * high - low + 1)],
+                [curve.color],
+                Type=4,
+                AutoPosition=0,
+                PositionX=x,
+                PositionY=y,
+                Width=GRAPH_SIZE[0],
+                Height=GRAPH_SIZE[1],
+                RangeType=2,
+                CustomMin=low,
+                CustomMax=high,
+                NbIso=4,
+                Axes=0 if i else 3,
+                LineWidth=2,
+                IntervalsType=3 if points else 2,
+                AxesTicsX=3,
+            )
+            gmsh.view.option.setString(tag, "Format", "%.3g")
+            gmsh.view.option.setString(tag, "AxesFormatX", "%.3g")
+            gmsh.view.option.setString(tag, "AxesLabelX", x_label)
+        named = [i for i, curve in enumerate(curves) if curve.name not in ("", "before")]
+        for line, i in enumerate(named if len(named) > 1 else ()):
+            place = x + GRAPH_SIZE[0] - 60, y - 22 + 14 * line
+            label(self.gallery.tags[i - len(curves)], *place, [curves[i].name], 12)
+
+
+def span(values: np.ndarray) -> tuple[float, float]:
+    """The range of some values, zero in it; never empty."""
+    low, high = min(0.0, float(values.min())), max(0.0, float(values.max()))
+    return (low, high) if high > low else (0.0, 1.0)
+
+
+def pieces_of(curve: Curve, factor: float, x_range: tuple, beyond: float) -> Pieces:
+    """
+    A curve as lines along x.
+
+    Gmsh takes the range of x from the curve itself. So that several share one, each gets a line
+    over all of it with a value beyond the range of y, which is not drawn.
+    """
+    x = np.zeros((max(len(curve.x), 2), 3))  # one point alone: twice
+    x[:, 0] = curve.x
+    y = np.broadcast_to(curve.y, (len(curve.y), len(x))) * factor
+    ends = np.zeros((1, 2, 3))
+    ends[0, :, 0] = x_range
+    lines = np.concatenate([ends, np.stack([x[:-1], x[1:]], axis=1)])
+    values = np.stack([y[:, :-1], y[:, 1:]], axis=2)
+    values = np.concatenate([np.full((len(y), 1, 2), beyond), values], axis=1)
+    return Pieces(lines, values[..., None])

@@ -47,9 +47,10 @@ class Session:
         self.tree: tree.Tree | None = None
         self.status = ""
         self.scenes: list[Scene] = []
-        #: of the last run, of those kept for comparison, and the water before a run
+        #: the views of the last run, the runs kept for comparison, and the water before a run
         self.gallery: views.Gallery | None = None
-        self.kept: list[views.Gallery] = []
+        self.scene_shown = 0
+        self.kept: list[tuple[Scene, views.Gallery]] = []
         self.water: views.Gallery | None = None
         self.message = views.Gallery()
         self.drawn: tuple = ()
@@ -101,7 +102,7 @@ class Session:
         """Whether the user has asked to see another scene of the last run; shows it then."""
         if not self.scenes or tree.chosen_scene(self.scenes) == self.scene_shown:
             return False
-        self.show(tree.chosen_scene(self.scenes), keep=False)
+        self.show(tree.chosen_scene(self.scenes))
         return True
 
     def check(self, request: Request | None = None) -> None:
@@ -172,8 +173,9 @@ class Session:
 
     def on_done(self, scenes: list[Scene]) -> None:
         """A run has ended, at its last level or before."""
+        self.keep_or_drop()
         self.scenes = scenes
-        self.show(0, keep=bool(tree.get_number(tree.KEEP)))
+        self.show(0)
         took = f"{time.perf_counter() - self.started:.2f} s"
         trouble = [scene.said for scene in scenes if scene.said]
         if trouble:
@@ -202,7 +204,7 @@ class Session:
         tree.say(status, color)
         self.message.close()
         if color == tree.BAD:
-            self.message.write(20, 100, [status], views.RED, 15)
+            self.message.write(20, 124, [status], views.RED, 15)
         self.update()
         if self.windowed:
             gmsh.fltk.setStatusMessage(status)
@@ -224,6 +226,8 @@ class Session:
             self.water.close()
         self.water = views.outline_water(case)
         self.outline(True)
+        aside(False)
+        turn_to(case["dim"] == 3)
 
     def outline(self, shown: bool) -> None:
         """Show the undeformed outline with its water, or the results."""
@@ -231,29 +235,34 @@ class Session:
             gmsh.option.setNumber(option, shown and option != "Geometry.Points")
         if self.water:
             self.water.show(shown)
-        for gallery in [*self.kept, *([self.gallery] if self.gallery else [])]:
-            gallery.show(not shown)
+        if self.gallery:
+            self.gallery.show(not shown)
 
-    def show(self, scene: int, keep: bool) -> None:
-        """Show a scene of the last run, in place of the views before or beside them."""
-        if self.gallery and keep:
-            self.kept.append(self.gallery)
-        elif self.gallery:
+    def show(self, scene: int) -> None:
+        """Show a scene of the last run in place of the views before."""
+        if self.gallery:
             self.gallery.close()
-        if not keep:
-            for gallery in self.kept:
-                gallery.close()
-            self.kept = []
         self.scene_shown = scene
-        self.gallery = views.show(self.scenes[scene])
+        self.gallery = views.show(self.scenes[scene], [old for old, _ in self.kept])
         self.outline(False)
+        aside(True)
         tree.show_results(self.scenes, scene)
         self.update()
 
+    def keep_or_drop(self) -> None:
+        """Before new results come: the views there are kept for comparison, or go."""
+        if not tree.get_number(tree.KEEP):
+            self.drop_results()
+        elif self.gallery:
+            self.gallery.put_aside(f"run {len(self.kept) + 1}:")
+            self.kept.append((self.scenes[self.scene_shown], self.gallery))
+            self.gallery = None
+
     def drop_results(self) -> None:
-        """Another case: what an earlier one has given goes."""
-        for gallery in [*self.kept, *([self.gallery] if self.gallery else [])]:
-            gallery.close()
+        """What earlier runs have given goes."""
+        for gallery in (*(kept for _, kept in self.kept), self.gallery):
+            if gallery:
+                gallery.close()
         self.scenes, self.kept, self.gallery = [], [], None
         tree.hide_results()
 
@@ -272,6 +281,8 @@ OPTIONS = {
     "General.SmallAxes": 0,
     "General.Antialiasing": 1,
     "General.BackgroundGradient": 0,
+    "General.GraphicsFontSize": 12,
+    "General.GraphicsFontSizeTitle": 14,
     "Geometry.PointLabels": 0,
 }
 
@@ -279,8 +290,27 @@ OPTIONS = {
 def prepare() -> None:
     """Start Gmsh with the window's options, which it reads when a window opens."""
     start_gmsh()
+    gmsh.option.setString("General.GraphicsFontEngine", "StringTexture")
     for name, value in OPTIONS.items():
         gmsh.option.setNumber(name, value)
+
+
+def turn_to(solid: bool) -> None:
+    """Look at the plane scene from the front, at a solid one from above and upstream."""
+    if solid == (gmsh.option.getNumber("General.RotationY") != 0):
+        return  # as the user has turned it
+    gmsh.option.setNumber("General.Trackball", 0)
+    for axis, degrees in zip("XYZ", (20, 30, 0) if solid else (0, 0, 0), strict=True):
+        gmsh.option.setNumber(f"General.Rotation{axis}", degrees)
+
+
+def aside(narrow: bool) -> None:
+    """Move the scene to the left of the graphs, smaller; or back."""
+    scale = 0.68 if narrow else 1.0
+    for axis in "XYZ":
+        gmsh.option.setNumber(f"General.Scale{axis}", scale)
+    shift = 0.42 * gmsh.option.getNumber("General.BoundingBoxSize") if narrow else 0.0
+    gmsh.option.setNumber("General.TranslationX", -shift)
 
 
 def button(what: tuple[str, str]) -> dict:
