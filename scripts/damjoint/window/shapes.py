@@ -36,7 +36,7 @@ STRIPS = 12
 
 @dataclass
 class Pieces:
-    """Lines, triangles or quadrangles: points (n, corners, 3) [m], values (steps, n, corners, c)."""
+    """Lines or faces: points (n, corners, 3) [m], values (steps, n, corners, components)."""
 
     points: np.ndarray
     values: np.ndarray
@@ -235,7 +235,7 @@ class Deformed:
         place = np.flatnonzero(on)[np.argsort(dam.points[on, 1])]
         found = []
         for moved, level in zip(self.moved["dam"], levels, strict=True):
-            y = np.linspace(0, level, STRIPS + 1)
+            y = np.linspace(0, level, (1 if self.depth else STRIPS) + 1)
             x = face_x(y) + self.scale * np.interp(y, dam.points[place, 1], moved[place, 0])
             sides = []
             for z in {0.0, self.depth}:

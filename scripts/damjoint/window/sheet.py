@@ -42,9 +42,7 @@ class Request:
         if self.steps is not None and not self.steps.isdigit():
             raise InputError(f"steps = {self.steps}: must be an integer >= 1")
         steps = None if self.steps is None else int(self.steps)
-        return load(
-            self.case, self.overrides, self.levels, self.tail_levels, steps, self.accuracy
-        )
+        return load(self.case, self.overrides, self.levels, self.tail_levels, steps, self.accuracy)
 
 
 @dataclass(frozen=True)
@@ -74,8 +72,8 @@ def fill(request: Request) -> Sheet:
     asked = {n: v for n, v in request.overrides.items() if v != own[n]}
     request = replace(request, overrides=asked)
     case = request.load()
-    told = json.loads(gmsh.onelab.get())["onelab"]["parameters"]
-    entries = [entry for entry in told if entry["name"].startswith("Parameters/")]
+    # one by one: Gmsh does not mask quotes, which paths among its own entries may have
+    entries = [json.loads(gmsh.onelab.get(known.label)) for known in declared().values()]
     return Sheet(request, case, entries, str(path))
 
 

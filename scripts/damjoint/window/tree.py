@@ -15,9 +15,9 @@ import gmsh
 import numpy as np
 
 from .. import InputError
+from ..results.verdict import verdict
 from ..scene.case import Case, numbers
 from ..scene.parameters import AUTOMATIC, Parameter
-from ..results.verdict import verdict
 from .sheet import Request, Sheet
 from .worker import Scene
 
@@ -64,7 +64,7 @@ def put(*entries: dict) -> None:
     for entry in entries:
         told = {"visible": True, "readOnly": False, **entry}
         told["attributes"] = {**opened(entry["name"]), **entry.get("attributes", {})}
-        gmsh.onelab.set(json.dumps(told))
+        gmsh.onelab.set(json.dumps(told, ensure_ascii=False))
 
 
 def opened(name: str) -> dict[str, str]:
@@ -218,7 +218,7 @@ class Tree:
             if case < len(names):
                 return Request(names[int(case)])
             if self.menu(self.sheet)[int(case)] == OPEN:
-                raise InputError('case file: choose it at "Case file", below the menu of cases')
+                raise InputError("case file: choose it in the field Case file, below the menu")
         labels = {parameter.label: name for name, parameter in self.known.items()}
         changed = {
             labels[label]: value_of(label)

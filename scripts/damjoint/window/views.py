@@ -37,7 +37,6 @@ FIRE = ((11, 60, 120), (88, 137, 186), (226, 222, 212), (200, 60, 30))
 GRAPH_SIZE, GRAPH_PITCH = (175, 118), (268, 218)
 
 
-
 class Gallery:
     """The views of one run; `close` takes them away."""
 
@@ -59,7 +58,10 @@ class Gallery:
         blocks: dict[str, list[np.ndarray]] = {}
         for piece in pieces:
             blocks.setdefault(piece.kind(), []).append(piece.listed())
-        for kind, some in blocks.items():  # a second call with the same kind would replace the first
+        for (
+            kind,
+            some,
+        ) in blocks.items():  # a second call with the same kind would replace the first
             data = np.vstack(some)
             gmsh.view.addListData(tag, kind, len(data), data.ravel())
         steps = max((piece.values.shape[0] for piece in pieces), default=1)
@@ -108,7 +110,7 @@ def paint(tag: int, colors: Sequence[tuple]) -> None:
     table = np.array([(*color, 255)[:4] for color in colors], float)
     at = np.linspace(0, len(table) - 1, 64)
     shades = np.column_stack([np.interp(at, range(len(table)), c) for c in table.T]).round()
-    text = ", ".join("{%d, %d, %d, %d}" % tuple(shade) for shade in shades)
+    text = ", ".join("{" + ", ".join(f"{part:.0f}" for part in shade) + "}" for shade in shades)
     with tempfile.NamedTemporaryFile("w", suffix=".geo") as file:
         file.write(f"View[{gmsh.view.getIndex(tag)}].ColorTable = {{ {text} }};\n")
         file.flush()

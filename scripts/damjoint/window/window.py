@@ -24,8 +24,9 @@ from .worker import Engine, Scene
 
 ACTION, BUTTON = "ONELAB/Action", "ONELAB/Button"
 RUN, STOP, SAVE = ("Run", "run"), ("Stop", "stop"), "save"
-#: Seconds that a change waits for the engine's process to start, a turn for events.
-START, TURN = 60.0, 0.02
+#: Seconds: for the engine's process to start, for a turn of the event loop, between two lines of
+#: progress.
+START, TURN, QUIET = 60.0, 0.02, 0.2
 
 
 class Session:
@@ -54,7 +55,7 @@ class Session:
         self.water: views.Gallery | None = None
         self.message = views.Gallery()
         self.drawn: tuple = ()
-        self.started = 0.0
+        self.started = self.quiet_until = 0.0
         tree.put(tree.text(ACTION, "", visible=False), button(RUN))
         self.say("starting ...", tree.CALM)
         kind, *told = next(self.engine.messages(START), ("late",))
@@ -67,9 +68,10 @@ class Session:
         self.check(request)
 
     def close(self) -> None:
-        """End the engine's process and remove what is temporary."""
+        """End the engine's process and Gmsh, and remove what is temporary."""
         self.engine.close()
         self.folder.cleanup()
+        gmsh.finalize()
 
     # what the user does
 
@@ -161,7 +163,10 @@ class Session:
         self.free(stopped if code == -9 else f"the engine has ended ({code}); press Run", tree.BAD)
 
     def on_step(self, at: tuple[int, float]) -> None:
-        """A step has converged."""
+        """A step has converged; said a few times a second, since drawing costs more than a step."""
+        if time.perf_counter() < self.quiet_until or self.engine.interrupted:
+            return
+        self.quiet_until = time.perf_counter() + QUIET
         case = self.tree.sheet.case
         scene, now = at
         several = f"uplift {case.scenes()[scene]['uplift']}, " if case.also_uplift else ""
@@ -245,7 +250,7 @@ class Session:
         self.scene_shown = scene
         self.gallery = views.show(self.scenes[scene], [old for old, _ in self.kept])
         self.outline(False)
-        aside(True)
+        aside(True, self.scenes[scene].result.case["dim"] == 3)
         tree.show_results(self.scenes, scene)
         self.update()
 
@@ -304,13 +309,16 @@ def turn_to(solid: bool) -> None:
         gmsh.option.setNumber(f"General.Rotation{axis}", degrees)
 
 
-def aside(narrow: bool) -> None:
-    """Move the scene to the left of the graphs, smaller; or back."""
+def aside(narrow: bool, solid: bool = False) -> None:
+    """Move the scene to the left of the graphs, smaller, and what lies below a solid up; or
+    back.
+    """
     scale = 0.68 if narrow else 1.0
+    size = gmsh.option.getNumber("General.BoundingBoxSize")
     for axis in "XYZ":
         gmsh.option.setNumber(f"General.Scale{axis}", scale)
-    shift = 0.42 * gmsh.option.getNumber("General.BoundingBoxSize") if narrow else 0.0
-    gmsh.option.setNumber("General.TranslationX", -shift)
+    gmsh.option.setNumber("General.TranslationX", -0.42 * size * narrow)
+    gmsh.option.setNumber("General.TranslationY", 0.12 * size * (narrow and solid))
 
 
 def button(what: tuple[str, str]) -> dict:
