@@ -1,6 +1,6 @@
-// dam2d.geo - the plane scene: dam, foundation and the joint between them (y = 0, 0 <= x <= dam_base).
-// One conforming mesh: the joint is a line of ordinary elements, the two lips are two function spaces
-// on the same nodes (pro/spaces.pro). Sizes grow from the joint outwards.
+// dam2d.geo - the plane scene: dam, foundation and the joint between them (y = 0, 0 <= x <=
+// dam_base). One conforming mesh: the joint is a line of ordinary elements, the two lips are two
+// function spaces on the same nodes (pro/spaces.pro). Sizes grow from the joint outwards.
 
 Include "../pro/parameters.pro";
 
@@ -37,8 +37,8 @@ If(!regular)
   foundation() = {2};
   fixed() = {6, 7, 8};
 Else
-  // Quadrangles in the dam, under it and beside it; a few coarse triangles at the far sides, where the
-  // stress is almost uniform.
+  // Quadrangles in the dam, under it and beside it; a few coarse triangles at the far sides, where
+  // the stress is almost uniform.
   n_dam = Ceil(9 * n_joint / 50);
   n_depth = Ceil(7 * n_joint / 50);
   n_side = Ceil(5 * n_joint / 50);

@@ -1,6 +1,7 @@
 // dam3d.geo - the plane scene of dam2d.geo extruded along z over the thickness.
-// mesh_pattern free: tetrahedra; layers: prisms; split: layers cut into tetrahedra; regular: hexahedra (and a few
-// prisms). The joint itself is always a grid of n_joint x n_layers rectangles, halved under tetrahedra.
+// mesh_pattern free: tetrahedra; layers: prisms; split: layers cut into tetrahedra; regular:
+// hexahedra (and a few prisms). The joint itself is always a grid of n_joint x n_layers rectangles,
+// halved under tetrahedra.
 
 Include "dam2d.geo";
 

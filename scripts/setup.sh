@@ -1,15 +1,34 @@
 #!/bin/sh
-# make setup: system packages, then the Python environment in .venv. With nothing to do it takes no time.
+# make setup: system packages, then the Python environment in .venv, made by $PYTHON (default: the
+# one that .venv has, or python3). With nothing to do it takes no time.
 set -eu
 cd "$(dirname "$0")/.."
 PATH=$PATH:/usr/sbin:/sbin
 
-# What is missing, under its Debian name: GetDP, what the gmsh wheel links to, a fast BLAS for GetDP, venv.
+fail() { echo "setup: $*" >&2; exit 1; }
+
+if [ -n "${PYTHON:-}" ]; then python=$PYTHON
+elif [ -x .venv/bin/python ]; then python=.venv/bin/python
+else python=python3
+fi
+if command -v "$python" >/dev/null; then
+  version=$("$python" -c 'import sys; print("%d.%d" % sys.version_info[:2])')
+  "$python" -c 'import sys; sys.exit(sys.version_info < (3, 10))' ||
+    fail "$python is Python $version; 3.10 or newer is needed (PYTHON=python3.12 make setup)."
+  # Made by another Python, or by one that the system has replaced since
+  [ -d ".venv/lib/python$version" ] || rm -rf .venv
+elif [ -n "${PYTHON:-}" ]; then fail "PYTHON = $PYTHON: no such program; correct or unset it."
+fi
+debian=python${version:-3}  # the interpreter's Debian package: python3.12
+
+# What is missing, under its Debian name: GetDP, what the gmsh wheel links to, a fast BLAS for
+# GetDP, venv.
 missing=""
 libraries=$(ldconfig -p 2>/dev/null || true)
-library() { case $libraries in *"$2"*) ;; *) missing="$missing $1" ;; esac; }
+has() { case $libraries in *"$1"*) ;; *) return 1 ;; esac; }
+library() { has "$2" || missing="$missing $1"; }
 if [ -n "${GETDP:-}" ]; then
-  command -v "$GETDP" >/dev/null || { echo "setup: GETDP = $GETDP: no such program; correct or unset it." >&2; exit 1; }
+  command -v "$GETDP" >/dev/null || fail "GETDP = $GETDP: no such program; correct or unset it."
 else
   command -v getdp >/dev/null || missing="$missing getdp"
   library libopenblas0-pthread libopenblas.so.0
@@ -20,24 +39,73 @@ library libgomp1 libgomp.so.1
 library libxcursor1 libXcursor.so.1
 library libxinerama1 libXinerama.so.1
 library libxft2 libXft.so.2
-[ -x .venv/bin/python ] || python3 -c "import ensurepip" 2>/dev/null || missing="$missing python3 python3-venv"
+[ -x .venv/bin/python ] || "$python" -c "import ensurepip" 2>/dev/null ||
+  missing="$missing $debian $debian-venv"
+
+if [ "$(id -u)" = 0 ]; then as_root=""
+elif sudo -n true 2>/dev/null; then as_root="sudo"
+else as_root="none"
+fi
+command -v apt-get >/dev/null || as_root="none"
+install() {
+  [ "$as_root" != none ] && $as_root apt-get update -q &&
+    $as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends "$@"
+}
 
 if [ -n "$missing" ]; then
-  if [ "$(id -u)" = 0 ]; then as_root=""
-  elif sudo -n true 2>/dev/null; then as_root="sudo"
-  else as_root="none"
-  fi
-  if [ "$as_root" = none ] || ! command -v apt-get >/dev/null; then
-    echo "setup: missing software. On Debian or Ubuntu type:  sudo apt-get install -y$missing" \
-         " (elsewhere: the same libraries, and GetDP >= 3.2 on the PATH or in GETDP); then make setup again." >&2
-    exit 1
-  fi
-  $as_root apt-get update -q
-  $as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends $missing
+  [ "$as_root" != none ] ||
+    fail "missing software. On Debian or Ubuntu type:  sudo apt-get install -y$missing" \
+         " (elsewhere: the same libraries, and GetDP >= 3.2 on the PATH or in GETDP);" \
+         "then make setup again."
+  install $missing
 fi
 
-# The stamp is newer than all it depends on once everything below has succeeded.
-if [ -n "$(find .venv/.stamp -newer pyproject.toml -newer scripts/setup.sh 2>/dev/null)" ]; then exit 0; fi
-python3 -m venv .venv
-.venv/bin/pip install -q --disable-pip-version-check -e ".[test]"
+# What python-mumps is compiled with, and OpenBLAS: MUMPS takes the system's BLAS, whose plain one
+# is slow.
+wanted() {
+  [ -x .venv/bin/python ] && python=.venv/bin/python
+  echo '#include <dmumps_c.h>
+        int main(void) { return 0; }' | cc -x c - -ldmumps_seq -o /dev/null 2>/dev/null ||
+    printf ' gcc libc6-dev libmumps-seq-dev'
+  "$python" -c 'import os, sys, sysconfig
+sys.exit(not os.path.exists(os.path.join(sysconfig.get_path("include"), "Python.h")))' ||
+    printf " $debian-dev"
+  has libopenblas.so.0 || printf ' libopenblas0-pthread'
+}
+fast() { .venv/bin/python -c "import mumps" 2>/dev/null; }
+
+# The stamp is newer than all it depends on once everything below has succeeded, but for MUMPS.
+if [ -x .venv/bin/python ] &&
+   [ -n "$(find .venv/.stamp -newer pyproject.toml -newer scripts/setup.sh 2>/dev/null)" ]; then
+  # without MUMPS, once more as soon as there is what it needs
+  if [ -d .venv/lib/python*/site-packages/mumps ] || [ -e .venv/mumps.log ] ||
+     [ -n "$(wanted)" ]; then exit 0; fi
+else
+  [ -x .venv/bin/python ] || "$python" -m venv .venv
+  .venv/bin/pip install -q --disable-pip-version-check -e ".[test]"
+fi
+
+# The fast factorisation. Not from pip's cache: what was built for another libmumps does not load.
+# The build starts a script by `env python`, which plain Debian lacks and .venv has.
+build() {
+  PATH=$PWD/.venv/bin:$PATH \
+    pip install -q --disable-pip-version-check "$@" >.venv/mumps.log 2>&1 && fast
+}
+if ! fast; then
+  lacking=$(wanted)
+  if [ -n "$lacking" ] && install $lacking >/dev/null 2>&1; then lacking=""; fi
+  if [ -z "$lacking" ] && build --no-cache-dir -e ".[fast]"; then :
+  # the one wheel there is, of numpy 1's time
+  elif [ -d .venv/lib/python3.11 ] &&
+       build --only-binary python-mumps "python-mumps==0.0.2" "numpy<2"; then :
+  else
+    .venv/bin/pip uninstall -q -y python-mumps 2>/dev/null || true
+    help="Why: .venv/mumps.log; to try again, delete it and make setup."
+    if [ -n "$lacking" ]; then
+      help="On Debian or Ubuntu type:  sudo apt-get install -y$lacking  and make setup."
+      rm -f .venv/mumps.log
+    fi
+    echo "setup: without MUMPS 3D takes several times longer (SuperLU instead). $help" >&2
+  fi
+fi
 touch .venv/.stamp

@@ -1,5 +1,4 @@
-"""
-Concrete gravity dams on a thin joint that opens, breaks, slides and lets water in.
+"""Concrete gravity dams on a thin joint that opens, breaks, slides and lets water in.
 
 scene/    what is asked: parameters, case files, meshes
 results/  what comes out: tables, verdict, fields, pictures, comparison with published numbers
@@ -19,16 +18,14 @@ __version__ = "0.2.0"
 
 
 class InputError(ValueError):
-    """
-    Bad input: one line that names the parameter, its value and what is allowed.
+    """Bad input: one line that names the parameter, its value and what is allowed.
 
     The command exits with 2.
     """
 
 
 class RunError(RuntimeError):
-    """
-    A computation that failed for another reason than the input.
+    """A computation that failed for another reason than the input.
 
     The command exits with 1.
     """

@@ -139,13 +139,16 @@ def do_run(arguments: argparse.Namespace) -> int:
     out = arguments.out or Path("out") / case.name
     fields, picture = not arguments.no_fields, not arguments.no_picture
     code = 0
+    if case["dim"] == 3 and arguments.engine != "getdp":
+        warn_if_slow()
     for result in run(case, out, fields, picture, engine=arguments.engine):
         history, last = result.history, result.last
         print(
             f"{case.name}, uplift {result.case['uplift']}: {len(history['time'])} steps, "
             f"{history['iterations'].sum():.0f} iterations, {history['cuts'].sum():.0f} cuts; "
             f"level {last.get('level', 0):g} m, "
-            f"largest opening {last.get('max_opening', 0):.4g} m; {out}"
+            f"largest opening {last.get('max_opening', 0):.4g} m; "
+            f"{result.info.get('factorisation', 'GetDP')}; {out}"
         )
         if case["drive"] != "level":
             print(path_statement(result))
@@ -163,6 +166,18 @@ def do_gui(arguments: argparse.Namespace) -> int:
 
     gui(Request(arguments.case, parameters.settings(arguments.settings)))
     return 0
+
+
+def warn_if_slow() -> None:
+    """Say before a 3D run that it takes several times longer than it need."""
+    from .engines.condensed import factor
+
+    if factor.is_slow():
+        print(
+            f"damjoint: {factor.name()} factorises, several times slower in 3D than MUMPS; "
+            "'make setup' says what is missing",
+            file=sys.stderr,
+        )
 
 
 def do_validate(arguments: argparse.Namespace) -> int:

@@ -114,6 +114,7 @@ def validation_page() -> str:
                 "otherwise. At the heel the opening of I is almost 7 % above the GEFDYN value, "
                 "whose tolerance is 7 %: the mesh-converged opening is 4.29e-7 m.",
                 validation.report(comparisons, "github"),
+                "![Modeling K: past the critical load](pictures/k_curve.png)",
             ]
         )
         + "\n"

@@ -47,8 +47,7 @@ def run(
     progress: bool = True,
     engine: str = "auto",
 ) -> list[tables.Results]:
-    """
-    Run all scenes of a case and write their results below out, in place of an earlier run's.
+    """Run all scenes of a case and write their results below out, in place of an earlier run's.
 
     fields: also displacement, stress and joint fields for Gmsh and ParaView; picture: also a PNG;
     engine: condensed (auto) or getdp, the plain problem definition.

@@ -8,16 +8,11 @@ import pytest
 
 @pytest.mark.heavy
 def test_short_form(command, tmp_path):
-    page = tmp_path / "page.md"
-    page.write_text("before\n<!-- bench -->\nstale text\n<!-- /bench -->\nafter\n")
-    assert command("bench", "--short", "--out", "bench", "--readme", "page.md")[0] == 0
-    text = page.read_text()
-    assert (
-        text.startswith("before\n<!-- bench -->\n**Modelings**")
-        and text.endswith("<!-- /bench -->\nafter\n")
-        and "stale text" not in text
-    )
+    assert command("bench", "--short", "--out", "bench")[0] == 0
+    text = (tmp_path / "bench" / "benchmarks.md").read_text()
+    assert text.startswith("# Benchmarks\n") and text.count("\n## ") == 7
     assert (tmp_path / "bench" / "accuracy.png").read_bytes()[:4] == b"\x89PNG"
+    assert len((tmp_path / "bench" / "modelings.md").read_text().splitlines()) == 13
 
     def table(name):
         with (tmp_path / "bench" / f"{name}.csv").open() as file:

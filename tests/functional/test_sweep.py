@@ -4,6 +4,7 @@ import csv
 
 import pytest
 from closed_forms import slide_level
+from damjoint.scene.case import CASES
 from damjoint.studies import sweep
 from distributed import LocalCluster
 
@@ -120,3 +121,18 @@ def test_a_scheduler_with_two_workers(tmp_path):
         assert {k: v for k, v in far[key].items() if k != "residual"} == {
             k: v for k, v in row.items() if k != "residual"
         }
+
+
+def test_a_varied_level_keeps_the_tailwater(command, tmp_path):
+    """A constant one, and one that rises with the reservoir: interpolated at the level asked."""
+    common = "default_n_joint = 10; default_h_dam = 3; levels() = {3, 6, 9}; times() = {3};"
+    for name, tails, expected in (("same", "1", 1.0), ("rises", "0, 1, 2", 1.5)):
+        text = f'Include "ssnp142.case"; {common} tail_levels() = {{{tails}}};'
+        (tmp_path / "ssnp142.case").write_text((CASES / "ssnp142.case").read_text())
+        (tmp_path / f"{name}.case").write_text(text)
+        out = f"{name}.csv"
+        words = "sweep", f"{name}.case", "--vary", "level=7.5", "--jobs", "1", "--out", out
+        assert command(*words)[0] == 0
+        (row,) = rows(tmp_path / out)
+        assert float(row["tail_level"]) == pytest.approx(expected)
+        assert float(row["level"]) == 7.5

@@ -1,5 +1,4 @@
-"""
-How a scene is solved: two engines behind one small interface.
+"""How a scene is solved: two engines behind one small interface.
 
 `solve(case, on_step, fields)` of engines/condensed/solve.py and of engines/getdp/solve.py give,
 scene by scene, an Outcome; they know nothing of output folders, and what uses them nothing of their
@@ -38,8 +37,8 @@ class Outcome:
 
 
 def solve(case: Case, engine: str, on_step: OnStep, fields: bool) -> Iterator[Outcome]:
-    """
-    The scenes of a case, one after the other; fields: whether the bodies' fields will be asked for.
+    """The scenes of a case, one after the other; fields: whether the bodies' fields will be asked
+    for.
 
     engine: condensed (auto), or getdp, the plain problem definition. Raises InputError, RunError.
     """

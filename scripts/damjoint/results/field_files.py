@@ -15,9 +15,8 @@ from .tables import Results
 
 
 def write_fields(result: Results, mesh: Mesh, fields: dict[float, Field], folder: Path) -> None:
-    """
-    Write, below folder, bulk_*.vtu and joint_*.vtu per requested time with fields.pvd (ParaView),
-    and bulk.msh and joint.msh with a view per field, all times in each (Gmsh).
+    """Write, below folder, bulk_*.vtu and joint_*.vtu per requested time with fields.pvd
+    (ParaView), and bulk.msh and joint.msh with a view per field, all times in each (Gmsh).
 
     Dam and foundation have their own points on the joint, so that the opening shows.
     """
@@ -75,8 +74,7 @@ DIMENSION = {"line": 1, "triangle": 2, "quad": 2, "tetra": 3, "hexahedron": 3, "
 def write_views(
     path: Path, points: np.ndarray, cells: list, views: list[tuple[str, str, dict]]
 ) -> None:
-    """
-    A mesh and views on it, with a step per time: a file for Gmsh.
+    """A mesh and views on it, with a step per time: a file for Gmsh.
 
     views: name, kind, values by time.
     """

@@ -14,8 +14,7 @@ BODIES = ("dam", "foundation")
 
 @dataclass
 class Field:
-    """
-    The bulk at one time: displacement (nodes, 3) [m] and stress (elements, 6) [Pa] by body.
+    """The bulk at one time: displacement (nodes, 3) [m] and stress (elements, 6) [Pa] by body.
 
     Stress: xx, yy, zz, xy, yz, xz at the middle of each element.
     """

@@ -1,5 +1,4 @@
-"""
-The folder of a run: run.json, and what an earlier run has left there.
+"""The folder of a run: run.json, and what an earlier run has left there.
 
 Only files that carry a run's own names, beside a run.json that damjoint has written, are ever
 removed.

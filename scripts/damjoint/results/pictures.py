@@ -56,8 +56,7 @@ def along(rows: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 
 def draw(result: Results, mesh: Mesh, fields: dict[float, Field], folder: Path) -> Path:
-    """
-    Draw the last saved state to folder/<case>.png and return its path; fields: at least the last
+    """Draw the last saved state to folder/<case>.png and return its path; fields: at least the last
     one.
 
     Left: the deformed bodies, displacement exaggerated so that it shows. Right: jumps and stresses
@@ -85,7 +84,7 @@ def draw(result: Results, mesh: Mesh, fields: dict[float, Field], folder: Path) 
     figure.text(0.06, 0.955, heading(result), fontsize=13, va="center")
     said = statement(result)
     if said:
-        figure.text(0.06, 0.92, textwrap.shorten(said, 160), fontsize=9, color=RED, va="center")
+        figure.text(0.06, 0.94, textwrap.fill(said, 170), fontsize=9, color=RED, va="top")
     if len(result.joint["time"]):
         rows = result.at()
         draw_section(section, result, mesh, fields, rows)
@@ -138,7 +137,7 @@ def draw_section(
         place = (dam.points + scale * moved["dam"])[lip, :2]
         open_parts = np.stack([place[:-1], place[1:]], axis=1)[broken[:-1] & broken[1:]]
         axes.add_collection(LineCollection(open_parts, color=RED, linewidth=2.5))
-    beside = min(case["found_side"], 1.2 * height)
+    beside = min(case["found_side"], 0.6 * height)
     axes.fill_between([-beside, 0], 0, last["level"], color=WATER, alpha=0.4, linewidth=0)
     tail = last["tail_level"]
     if tail > 0:
@@ -149,7 +148,7 @@ def draw_section(
         )
     axes.set(
         xlim=(-1.03 * beside, base + 1.03 * beside),
-        ylim=(-1.03 * min(case["found_depth"], height), 1.1 * height),
+        ylim=(-1.03 * min(case["found_depth"], 0.5 * height), 1.1 * height),
         aspect="equal",
         xlabel="x [m]",
         ylabel="y [m]",
@@ -219,7 +218,10 @@ def draw_maps(figure: Figure, joint: Body, result: Results) -> None:
         values = rows[name][nearest] * factor
         for _, table in joint.cells:
             faces = PolyCollection(
-                joint.points[table][:, :, [0, 2]], array=values[table].mean(axis=1), cmap=colors
+                joint.points[table][:, :, [0, 2]],
+                array=values[table].mean(axis=1),
+                cmap=colors,
+                edgecolor="face",
             )
             faces.set_clim(values.min(), values.max())
             axes.add_collection(faces)

@@ -26,7 +26,10 @@ JOINT = {
     "tau_2": ("Pa", "shear stress along z"),
     "p": ("Pa", "water pressure in the joint"),
     "damage": ("-", "rupture: used part of the softening, 1 broken; friction: 1 where open"),
-    "slip": ("m", "size of the released (rupture) or plastic (friction) slip"),
+    "slip": (
+        "m",
+        "rupture: tangential jump at which the point last slid freely; friction: plastic slip",
+    ),
     "sigma_n_eff": ("Pa", "effective normal stress, sigma_n + p"),
 }
 #: One more where water flows.
@@ -97,8 +100,7 @@ def rows_at(table: dict[str, np.ndarray], time: float | None = None) -> dict[str
 
 
 def joint_table(case: Case, blocks: list[np.ndarray]) -> dict[str, np.ndarray]:
-    """
-    The joint's table from blocks of rows, one per requested time: time ..
+    """The joint's table from blocks of rows, one per requested time: time ..
 
     slip, and flux where water flows.     Adds sigma_n_eff and sorts each block by x, then z.
     """

@@ -92,9 +92,8 @@ def modelings() -> list[str]:
 
 
 def compare(result: Results) -> list[Comparison]:
-    """
-    Every reference row of the scene beside the computed value: at the node of the same x, mean over
-    z.
+    """Every reference row of the scene beside the computed value: at the node of the same x, mean
+    over z.
 
     Read at the last level, or at the end of the prescribed displacement.
     """

@@ -1,5 +1,4 @@
-"""
-What a run has found, in words: whether the dam stands, and if not, how it fails.
+"""What a run has found, in words: whether the dam stands, and if not, how it fails.
 
 This is the one place that reads a failure out of resultants.
 """
@@ -13,8 +12,7 @@ from .tables import Results
 
 
 def verdict(results: Results) -> str:
-    """
-    One of: stands, sliding, overturning, no convergence, no equilibrium, interrupted.
+    """One of: stands, sliding, overturning, no convergence, no equilibrium, interrupted.
 
     "no equilibrium": not even at the first step. "sliding" also where the whole joint has slipped
     or opened and the dam stands on nothing but the joint's hardening.
@@ -37,9 +35,8 @@ def failed(results: Results) -> bool:
 
 
 def loose_from(results: Results) -> float | None:
-    """
-    The level [m] from which on the whole joint has slipped or is open; None if a part of it still
-    holds.
+    """The level [m] from which on the whole joint has slipped or is open; None if a part of it
+    still holds.
 
     Once slipped, a joint counts as slipped. Seen at the integration points of every step, or at the
     nodes of the last requested level.
@@ -55,8 +52,7 @@ def loose_from(results: Results) -> float | None:
 
 
 def why_stopped(results: Results) -> str:
-    """
-    Overturning, sliding or no convergence, from the last converged state.
+    """Overturning, sliding or no convergence, from the last converged state.
 
     Overturning: the crack has crossed most of the base, or the resultant is in its last tenth.
     Sliding: the shear is within 2 % of what the joint can hold, T <= mu N + c L + H (mean slip) L

@@ -14,6 +14,19 @@ from .parameters import assignments, declared, include, listing, parse
 CASES = data("cases")
 
 
+#: Values of pro/parameters.pro that the engines share and nobody sets.
+SHARED = (
+    "attempt_growth",
+    "attempt_secant",
+    "attempt_iterations",
+    "cut",
+    "round_off",
+    "coarsest",
+    "artificial",
+    "sudden",
+)
+
+
 @dataclass(frozen=True)
 class Case:
     """A scene and its loading, fully resolved: everything a run depends on."""
@@ -83,8 +96,7 @@ def between(levels: tuple[float, ...], time: float) -> float:
 
 
 def case_file(case: str) -> Path:
-    """
-    The file of a case given by letter, name or path.
+    """The file of a case given by letter, name or path.
 
     Raises InputError if there is none.
     """
@@ -100,8 +112,7 @@ ACCURACIES = {"coarse": (40, 1), "standard": (100, 2), "fine": (200, 4)}
 
 
 def mesh_for(accuracy: str, case: Case) -> dict[str, float | str]:
-    """
-    Mesh and order for an accuracy of about 3 % (coarse), 1 % (standard) or 0.2 % (fine).
+    """Mesh and order for an accuracy of about 3 % (coarse), 1 % (standard) or 0.2 % (fine).
 
     Measured by `damjoint bench`. Order 2, triangles, in 3D extruded and cut into tetrahedra: these
     contain the plane fields exactly, however thick they are. Raises InputError.
@@ -179,9 +190,7 @@ def load(
         times = tuple(sorted({*times, end, *([begin] if begin > 0 else [])}))
     also = said.texts.get("also_uplift", "").split() if "uplift" not in overrides else []
     also = tuple(known["uplift"].check(mode) for mode in also)
-    shared = {
-        n: found[n] for n in ("attempt_growth", "attempt_secant", "cut", "artificial", "sudden")
-    }
+    shared = {n: found[n] for n in SHARED}
     return Case(
         path.stem,
         said.texts.get("title", path.stem),
@@ -196,8 +205,7 @@ def load(
 
 
 def numbers(name: str, text: str) -> list[float]:
-    """
-    Numbers from 'a,b,c'.
+    """Numbers from 'a,b,c'.
 
     Raises InputError if empty or malformed.
     """
@@ -211,8 +219,7 @@ def numbers(name: str, text: str) -> list[float]:
 
 
 def check_levels(name: str, levels: Iterable[float], values: Mapping) -> tuple[float, ...]:
-    """
-    Water levels [m].
+    """Water levels [m].
 
     Raises InputError if one is negative or above the crest.
     """

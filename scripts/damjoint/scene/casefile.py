@@ -54,8 +54,7 @@ class CaseText:
 
 
 def read(path: Path) -> CaseText:
-    """
-    The statements of a case file and of those it includes.
+    """The statements of a case file and of those it includes.
 
     Raises InputError, naming file, line and statement, for anything else than the statements above.
     """
@@ -142,8 +141,7 @@ def take(found: CaseText, statement: list, path: Path, depth: int, where: str) -
 
 
 def numbers(tokens: tuple[str, ...], found: CaseText, where: str) -> list[float]:
-    """
-    The values of a list { a, b, ...
+    """The values of a list { a, b, ...
 
     }.
     """

@@ -59,8 +59,7 @@ class Body:
 
 
 class Mesh:
-    """
-    The mesh of a case: its bodies by the names of REGIONS, and its size.
+    """The mesh of a case: its bodies by the names of REGIONS, and its size.
 
     Raises RunError with Gmsh's message if there is no mesh for the parameters.
     """
@@ -141,8 +140,7 @@ class Mesh:
 
 
 def write_mesh(case: Case, path: Path) -> dict[str, int]:
-    """
-    Mesh the case, write it to path and return its counts.
+    """Mesh the case, write it to path and return its counts.
 
     Raises RunError.
     """

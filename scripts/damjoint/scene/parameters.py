@@ -71,8 +71,7 @@ class Parameter:
         return words.strip() + (f", or -1: {self.follows}" if self.follows else "")
 
     def check(self, value: float | str) -> float | str:
-        """
-        The value as a number or a choice.
+        """The value as a number or a choice.
 
         Raises InputError if it is not a number, out of range or not one of the choices.
         """
@@ -95,8 +94,7 @@ class Parameter:
 
 
 def parse(text: str) -> dict[str, list[float] | list[str]]:
-    """
-    What Gmsh's parser knows after reading a text of our own: {name: values}.
+    """What Gmsh's parser knows after reading a text of our own: {name: values}.
 
     Raises InputError.
     """
@@ -175,8 +173,7 @@ def in_words(condition: str) -> str:
 
 
 def parameter(name: str) -> Parameter:
-    """
-    The declared parameter of this name.
+    """The declared parameter of this name.
 
     Raises InputError, with the nearest names, if there is none.
     """
@@ -188,8 +185,7 @@ def parameter(name: str) -> Parameter:
 
 
 def settings(pairs: Iterable[str]) -> dict[str, float | str]:
-    """
-    {name: checked value} from texts 'name=value'.
+    """{name: checked value} from texts 'name=value'.
 
     Raises InputError.
     """

@@ -61,8 +61,7 @@ PARTS = ("start", "mesh", "assembly", "condensation", "newton", "post")
 
 
 def cold(arguments: list[str]) -> tuple[float, dict]:
-    """
-    Wall seconds and run.json of a damjoint run in a process of its own, with an empty cache, no
+    """Wall seconds and run.json of a damjoint run in a process of its own, with an empty cache, no
     fields, no picture.
 
     Raises RunError if it fails.

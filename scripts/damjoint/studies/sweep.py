@@ -28,8 +28,7 @@ from ..scene.case import Case, load
 
 
 def values_of(text: str) -> tuple[str, list[str]]:
-    """
-    ('name', ['v1', ...]) from 'name=v1,v2,...' or 'name=first:last:step'.
+    """('name', ['v1', ...]) from 'name=v1,v2,...' or 'name=first:last:step'.
 
     Raises InputError.
     """
@@ -64,11 +63,9 @@ def values_of(text: str) -> tuple[str, list[str]]:
 def combinations(
     case: str, vary: list[str], settings: dict
 ) -> Iterator[tuple[dict[str, str], Case]]:
-    """
-    All combinations: the varied values, and the case with them.
+    """All combinations: the varied values, and the case with them.
 
-    Raises InputError.
-        level: the last level; the case's levels below it come first.
+    level: the last level; the case's levels below it come first. Raises InputError.
     """
     axes = [values_of(text) for text in vary]
     base = load(case, settings)
@@ -83,8 +80,7 @@ def combinations(
 
 
 def up_to(base: Case, top: float) -> tuple[str, str]:
-    """
-    Levels and tailwater of a case up to a last level: those of its levels that lie below come
+    """Levels and tailwater of a case up to a last level: those of its levels that lie below come
     first.
 
     The tailwater of the last level is the case's own where it first reaches that level (or its last
@@ -93,7 +89,7 @@ def up_to(base: Case, top: float) -> tuple[str, str]:
     below = [i for i, level in enumerate(base.levels) if level < top]
     first = next((i for i, level in enumerate(base.levels) if level >= top), None)
     tail = base.tail_levels[-1]
-    if first is not None:
+    if first is not None and len(set(base.tail_levels)) > 1:
         before = base.levels[first - 1] if first else 0.0
         share = (
             (top - before) / (base.levels[first] - before) if base.levels[first] > before else 1.0
@@ -179,8 +175,7 @@ def bundles(cases: dict[str, Case]) -> list[list[str]]:
 
 
 def read_done(path: Path, columns: list[str]) -> set[str]:
-    """
-    The keys of the complete rows of a result file; a half-written last line is cut off.
+    """The keys of the complete rows of a result file; a half-written last line is cut off.
 
     Raises InputError.
     """
@@ -249,8 +244,7 @@ def sweep(
     scheduler: str | None = None,
     progress: Callable = tqdm,
 ) -> int:
-    """
-    Compute what is missing in out (CSV) and return the number of rows computed.
+    """Compute what is missing in out (CSV) and return the number of rows computed.
 
     Columns: key, the varied names (a varied level as level_asked), the columns of history.csv,
     verdict and statement. Each row is written whole when it is done; a sweep that is interrupted

@@ -1,6 +1,5 @@
-"""
-The condensed engine: the elastic bodies are eliminated once, the loading is followed on the joint
-alone.
+"""The condensed engine: the elastic bodies are eliminated once, the loading is followed on the
+joint alone.
 
 elements.py, elasticity.py  finite elements: functions, rules, stiffness, stress factor.py
 factorisation of large sparse matrices bulk.py, cache.py           both bodies eliminated, and kept

@@ -84,8 +84,7 @@ class Bodies:
 
     @staticmethod
     def of(case: Case) -> Bodies:
-        """
-        Mesh a case, number its unknowns and assemble.
+        """Mesh a case, number its unknowns and assemble.
 
         Raises RunError (mesh).
         """

@@ -1,5 +1,4 @@
-"""
-Condensed bodies kept on disk, by mesh and elasticity.
+"""Condensed bodies kept on disk, by mesh and elasticity.
 
 A file is numpy's npz (arrays only, nothing that could be executed) with a header: the version and
 the scene it belongs to. What is foreign, damaged or of another version is ignored and made anew.
@@ -43,8 +42,7 @@ def key_of(case: Case) -> tuple:
 
 
 def cached(case: Case) -> tuple[Condensed, Bodies | None]:
-    """
-    The condensed bodies of a case, from the cache or made and kept there.
+    """The condensed bodies of a case, from the cache or made and kept there.
 
     Returns them, and if they had to be made what they were made of. Raises RunError (mesh, memory).
     """
@@ -110,8 +108,7 @@ BODY = ("points", "node_tags", "element_tags")
 
 
 def unpacked(flat: dict[str, np.ndarray]) -> Condensed:
-    """
-    The bodies from their arrays.
+    """The bodies from their arrays.
 
     Raises KeyError, ValueError if something is missing.
     """

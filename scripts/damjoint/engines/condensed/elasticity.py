@@ -1,5 +1,4 @@
-"""
-Linear elasticity of a body: stiffness, weight, stress.
+"""Linear elasticity of a body: stiffness, weight, stress.
 
 Plane strain in 2D.
 """
@@ -13,8 +12,7 @@ from .elements import BULK, Space, basis, geometry, nodal, points_of, tabulated
 
 
 def elasticity(space: Space, dim: int, young: float, poisson: float) -> sparse.csr_matrix:
-    """
-    Stiffness matrix [N/m] of an isotropic body; unknown dim * function + component.
+    """Stiffness matrix [N/m] of an isotropic body; unknown dim * function + component.
 
     Plane strain in 2D.
     """
@@ -76,8 +74,7 @@ MIDDLE = {
 
 
 def stress(space: Space, displacements: np.ndarray, young: float, poisson: float) -> np.ndarray:
-    """
-    Stress xx, yy, zz, xy, yz, xz (states, elements, 6) at the middle of each element.
+    """Stress xx, yy, zz, xy, yz, xz (states, elements, 6) at the middle of each element.
 
     displacements: (states, functions, 2 or 3)
     """

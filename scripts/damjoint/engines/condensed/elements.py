@@ -1,5 +1,4 @@
-"""
-Finite elements of the condensed engine: shape functions, quadrature, interpolation on a body.
+"""Finite elements of the condensed engine: shape functions, quadrature, interpolation on a body.
 
 The same spaces as pro/spaces.pro: nodal functions N_a of order 1; order 2 adds N_a N_b for every
 edge ab, on the same straight mesh. The quadrature rules are those of GetDP, so that both engines
@@ -178,8 +177,7 @@ def tabulated(
 
 
 class Space:
-    """
-    The scalar functions of an order on a body: nodes first, then (order 2) edges.
+    """The scalar functions of an order on a body: nodes first, then (order 2) edges.
 
     place: (n, 3) the node, or the middle of the edge, of each function.
     """
@@ -229,8 +227,7 @@ class Space:
 def geometry(
     points: np.ndarray, cells: np.ndarray, dn: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """
-    Measure of the element per reference measure (e,), and reference-to-real gradient (e, d, 3 or
+    """Measure of the element per reference measure (e,), and reference-to-real gradient (e, d, 3 or
     less).
 
     dn: (m, d) nodal gradients at one point; points (n, D). For d < D the pseudo-inverse: gradients

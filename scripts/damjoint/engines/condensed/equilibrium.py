@@ -19,8 +19,7 @@ from .laws import LAWS, Memory
 
 @dataclass
 class Pressure:
-    """
-    Water pressure [Pa] at the law's points, at the water's points and at the nodes; and if it
+    """Water pressure [Pa] at the law's points, at the water's points and at the nodes; and if it
     flows, its mass flux:
 
     mean of each joint element [kg/(m s)], and out of the toe per metre of thickness.
@@ -50,8 +49,7 @@ class Joint:
     # ---------------------------------------------------------------------------------------------
 
     def face_forces(self, name: str, level: float) -> tuple[np.ndarray, np.ndarray]:
-        """
-        Forces of the water on the functions of a face [N] and their derivative with its level.
+        """Forces of the water on the functions of a face [N] and their derivative with its level.
 
         With the factor a + b y of pro/loads.pro: exact resultant and moment in spite of the
         waterline's kink.
@@ -110,8 +108,7 @@ class Joint:
         return total, rate
 
     def solve_flow(self, jump: np.ndarray, level: float, tail: float) -> tuple[np.ndarray, object]:
-        """
-        Pressure beyond the linear one at the inner nodes for an opening, and the solution's
+        """Pressure beyond the linear one at the inner nodes for an opening, and the solution's
         sensitivity.
 
         The conductivity w^3 is scaled by aperture_min^-3.

@@ -11,7 +11,7 @@ from ...results.tables import Results
 from ...scene.case import Case
 from .equilibrium import Joint
 from .interface import Interface
-from .newton import Attempt, Iterate, newton
+from .newton import Attempt, Iterate, Limit, newton
 from .record import Record, State
 
 
@@ -27,6 +27,8 @@ class Filling:
         self.driven = case["drive"] != "level"
         self.record = Record(self.joint)
         self.state = State.virgin(self.joint)
+        #: the step before
+        self.before: State | None = None
         self.reference = self.unbalanced(case)
         #: the prescribed displacement at drive_begin, and the level at drive_end
         self.displacement = self.left = 0.0
@@ -52,11 +54,12 @@ class Filling:
         """The attempts at a step, in order; the last one, with the secant, is for before giving
         up.
         """
-        case, shared = self.case, self.case.shared
-        most, halvings = int(case["max_iterations"]), int(case["max_halvings"])
-        ways = zip(shared["attempt_growth"], shared["attempt_secant"], strict=True)
-        found = [Attempt(growth, bool(secant), most, halvings) for growth, secant in ways]
-        return [*found, Attempt(case["growth"], True, int(case["burst_iterations"]), halvings)]
+        of_each = (self.case.shared[f"attempt_{n}"] for n in ("growth", "secant", "iterations"))
+        halvings = int(self.case["max_halvings"])
+        return [
+            Attempt(growth, bool(secant), int(iterations), halvings)
+            for growth, secant, iterations in zip(*of_each, strict=True)
+        ]
 
     def run(self) -> Results:
         """Follow all the times of the case that are still to come."""
@@ -76,7 +79,8 @@ class Filling:
         while self.state.time < target and not self.stopped:
             time = min(self.state.time + dt, target)
             time = target if target - time < 1e-9 else time
-            found = next(filter(None, (self.solve(time, attempt) for attempt in attempts)), None)
+            tries = (self.solve(time, attempt, attempt is attempts[0]) for attempt in attempts)
+            found = next(filter(None, tries), None)
             if found is None:
                 dt, cuts = self.case.shared["cut"][0] * (time - self.state.time), cuts + 1
                 if dt < self.case["smallest_step"]:
@@ -101,8 +105,39 @@ class Filling:
         target = self.displacement + case["drive_by"] * (time - begin) / (end - begin)
         return level, tail, begin + 1e-9 < time < end + 1e-9, target
 
-    def solve(self, time: float, attempt: Attempt) -> tuple[State, int, float] | None:
-        """A step from the last state: the new one, iterations, residual over reference; or None."""
+    @property
+    def limit(self) -> Limit:
+        """When a step has converged."""
+        shared, reference = self.case.shared, self.reference
+        return Limit(
+            self.case["tolerance"] * reference,
+            shared["coarsest"][0] * reference,
+            shared["round_off"][0],
+        )
+
+    def start(
+        self, time: float, level: float, prescribed: bool, first: bool
+    ) -> tuple[np.ndarray, float]:
+        """Where Newton starts: the last state, for the first attempt extrapolated from the last two
+        where the loading goes on in the same direction.
+        """
+        now, before = self.state, self.before
+        if first and before and before.time > 0:
+            new, old = (time, before.time) if self.driven else (level, before.level)
+            here = now.time if self.driven else now.level
+            ahead = (new - here) / (here - old) if here != old else 0.0
+            if 0 < ahead < 4:
+                jump = now.jump + ahead * (now.jump - before.jump)
+                return jump, now.level + ahead * (now.level - before.level) if prescribed else level
+        return now.jump, now.level if prescribed else level
+
+    def solve(
+        self, time: float, attempt: Attempt, first: bool = False
+    ) -> tuple[State, int, float] | None:
+        """A step from the last state: the new one, iterations, residual over reference; or None.
+
+        first: whether it is the first attempt at the step.
+        """
         joint, memory = self.joint, self.state.memory
         level, tail, prescribed, target = self.water_at(time)
         stiff = joint.case["K_N"] * joint.bulk.width
@@ -122,10 +157,11 @@ class Filling:
                 border = edge and (slope, *edge)
                 return joint.interface.solve(joint.virgin, change, -value, border)
 
-            return Iterate(jump, level, size, correction)
+            return Iterate(jump, level, value, size, correction)
 
-        start = evaluate(self.state.jump, self.state.level if prescribed else level)
-        found = newton(evaluate, start, self.case["tolerance"] * self.reference, attempt)
+        found = newton(
+            evaluate, evaluate(*self.start(time, level, prescribed, first)), self.limit, attempt
+        )
         if found is None:
             return None
         end, iterations = found
@@ -140,7 +176,7 @@ class Filling:
 
     def accept(self, cuts: int, state: State, iterations: int, residual: float) -> None:
         """Commit a converged step and write its row of history."""
-        self.state = state
+        self.before, self.state = self.state, state
         self.record.add(state, iterations, cuts, residual)
         if self.driven:
             if state.time < self.case["drive_begin"] + 1e-9:

@@ -87,8 +87,7 @@ class Flow:
         return (self._in_series if self.dim == 2 else self._in_the_plane)(conductivity, drop)
 
     def _in_series(self, conductivity: np.ndarray, drop: float) -> tuple[np.ndarray, object]:
-        """
-        2D: the elements are resistances in series.
+        """2D: the elements are resistances in series.
 
         No differences of nearly equal numbers, however far the conductivities lie apart (a
         factorised matrix loses the closed joint beside the open one).
@@ -131,9 +130,8 @@ class Flow:
     def sensitivity(
         self, solution: object, rate: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """
-        The pressure's derivatives: with the unknowns that matter (p, m), which these are (m,), and
-        with the drop (p,).
+        """The pressure's derivatives: with the unknowns that matter (p, m), which these are (m,),
+        and with the drop (p,).
 
         rate (q,): how the conductivities times weights grow with the opening.
         """
@@ -161,8 +159,7 @@ class Flow:
         columns: float,
         width: float,
     ) -> tuple[np.ndarray, float]:
-        """
-        Mass flux along x: mean of each joint element [kg/(m s)], and out of the toe per metre of
+        """Mass flux along x: mean of each joint element [kg/(m s)], and out of the toe per metre of
         thickness.
 
         conductivity: rho w^3/(12 visc) at the law's points; pressure: beyond the linear one at the

@@ -225,8 +225,7 @@ class Interface:
 
 
 def lu_solve(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """
-    Solution by LU, the matrix overwritten or not.
+    """Solution by LU, the matrix overwritten or not.
 
     Raises LinAlgError if it is singular.     A large matrix is factorised in single precision,
     twice as fast, and the solution refined; in double precision     where that does not converge.

@@ -1,5 +1,4 @@
-"""
-The joint laws of pro/law_*.pro once more, for many points at once: the condensed engine's.
+"""The joint laws of pro/law_*.pro once more, for many points at once: the condensed engine's.
 
 A law is a class with `start`, `respond` and `remember`, and what its memory means. Arrays: jump (q,
 3) is delta_n, delta_t1, delta_t2 [m]; traction (q, 3) is sigma_n (effective), tau_1, tau_2 [Pa];
@@ -25,8 +24,7 @@ class Memory:
 
 
 class Rupture:
-    """
-    Cohesive rupture.
+    """Cohesive rupture.
 
     Memory: kappa, the largest opening so far, and the released slip.
     """
@@ -123,8 +121,7 @@ class Rupture:
 
 
 class Friction:
-    """
-    Mohr-Coulomb friction with hardening, implicit return.
+    """Mohr-Coulomb friction with hardening, implicit return.
 
     Memory: lambda, the cumulated slip, and the slip.
     """

@@ -14,9 +14,8 @@ from .record import State
 
 
 def recover(bodies: Bodies, scenes: list[tuple[Joint, list[State]]]) -> list[dict[float, Field]]:
-    """
-    The fields of some states of scenes on the same bodies, by scene and time: the bulk solved once
-    more.
+    """The fields of some states of scenes on the same bodies, by scene and time: the bulk solved
+    once more.
 
     Dam and foundation glued at the joint are one elastic body, loaded besides by the forces that
     the jump needs in the dam, -K_dam jump; the water in the joint acts on both lips and cancels.

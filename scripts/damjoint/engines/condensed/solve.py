@@ -11,6 +11,7 @@ from threadpoolctl import threadpool_limits
 from ...results.fields import Field
 from ...scene.case import Case
 from .. import OnStep, Outcome
+from . import factor
 from .bulk import Bodies, joint_size
 from .cache import cached
 from .filling import Filling
@@ -51,6 +52,7 @@ def solve(case: Case, on_step: OnStep, _fields: bool) -> Iterator[Outcome]:
             result = fillings[-1].results()
             result.info = {
                 "engine": "condensed",
+                "factorisation": factor.name(),
                 "mesh": bulk.counts,
                 "unknowns": bulk.unknowns,
                 "wall_seconds": before | {"solve": time.perf_counter() - begin},

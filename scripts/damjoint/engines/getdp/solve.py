@@ -17,8 +17,7 @@ from . import process, tables
 
 
 def solve(case: Case, on_step: OnStep, fields: bool) -> Iterator[Outcome]:
-    """
-    The scenes of a case; GetDP works in a temporary folder.
+    """The scenes of a case; GetDP works in a temporary folder.
 
     See engines/__init__.py.
     """

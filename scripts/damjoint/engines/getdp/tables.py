@@ -38,6 +38,8 @@ def read_simple_table(path: Path, components: int = 3) -> tuple[np.ndarray, np.n
     """GetDP's SimpleTable on elements: points (elements x nodes, 3) and values (elements x nodes,
     components).
     """
+    if not path.stat().st_size:
+        raise ValueError(f"{path} is empty")
     table = np.loadtxt(path, ndmin=2)
     points = 3 * table.shape[1] // (3 + components)
     return table[:, :points].reshape(-1, 3), table[:, points:].reshape(-1, components)
@@ -78,57 +80,63 @@ def saved_times(case: Case, history: dict[str, np.ndarray], stopped: bool) -> di
     return saved
 
 
-def read(case: Case, folder: Path) -> tuple[Results, dict[int, float]]:
+def read_joint(
+    case: Case, folder: Path, number: int, time: float, level: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """The joint's rows of one requested time, and the same extrapolated from element means.
+
+    Raises OSError, ValueError if a file is missing or not whole.
     """
-    Read what GetDP has left in a folder, complete or not: everything up to the last converged step.
+
+    def table(name: str, components: int = 3) -> tuple[np.ndarray, np.ndarray]:
+        return read_simple_table(folder / f"{name}_{number}.txt", components)
+
+    order = [1, 0, 2]  # y, x, z: normal, tangent 1, tangent 2
+    points, jump = table("jump")
+    nodes, rows = nodes_of(points)
+    found = jump, table("traction")[1], table("state")[1]
+    jump, traction, state = (node_means(rows, values, len(nodes)) for values in found)
+    flux = []
+    if case["uplift"] == "flow":
+        flux = [node_means(rows, table("flux", 1)[1], len(nodes))]
+    when = np.tile([time, level], (len(nodes), 1))
+    whole = np.hstack([when, nodes, jump[:, order], traction[:, order], state, *flux])
+    extra = whole.copy()
+    corners, mean_jump = table("mean_jump")
+    _, corner_rows = nodes_of(np.vstack([nodes, corners]))
+    corner_rows = corner_rows[len(nodes) :]
+    present = np.unique(corner_rows)
+    means = (slice(5, 8), mean_jump), (slice(8, 11), table("mean_traction")[1])
+    for columns, values in means:
+        with np.errstate(invalid="ignore"):
+            at_nodes = node_means(corner_rows, values[:, order], len(nodes))
+        extra[present, columns] = at_nodes[present]
+    return whole, extra
+
+
+def read(case: Case, folder: Path) -> tuple[Results, dict[int, float]]:
+    """Read what GetDP has left in a folder, complete or not: everything up to the last converged
+    step.
 
     Returns the results, and the times of the files by their number.
     """
     history = read_history(case, folder)
     status = folder / "status.txt"
-    stopped = status.exists() and status.read_text().strip() != "0"
-    saved = saved_times(case, history, stopped)
-    order = [1, 0, 2]  # y, x, z: normal, tangent 1, tangent 2
-    joint, extrapolated = [], []
-    for number, time in saved.items():
-
-        def read_table(name: str, components: int = 3, number: int = number) -> tuple:
-            return read_simple_table(folder / f"{name}_{number}.txt", components)
-
-        points, jump = read_table("jump")
-        nodes, rows = nodes_of(points)
-        jump, traction, state = (
-            node_means(rows, values, len(nodes))
-            for values in (jump, read_table("traction")[1], read_table("state")[1])
-        )
-        flux = []
-        if case["uplift"] == "flow":
-            flux = [node_means(rows, read_table("flux", 1)[1], len(nodes))]
+    finished = status.exists()
+    stopped = finished and status.read_text().strip() != "0"
+    blocks, saved = [], {}
+    for number, time in saved_times(case, history, stopped).items():
         level = history["level"][np.flatnonzero(history["time"] == time)[0]]
-        when = np.tile([time, level], (len(nodes), 1))
-        joint.append(np.hstack([when, nodes, jump[:, order], traction[:, order], state, *flux]))
-        extra = joint[-1].copy()
-        corners, mean_jump = read_table("mean_jump")
-        _, corner_rows = nodes_of(np.vstack([nodes, corners]))
-        corner_rows = corner_rows[len(nodes) :]
-        present = np.unique(corner_rows)
-        for columns, values in (
-            (slice(5, 8), mean_jump),
-            (slice(8, 11), read_table("mean_traction")[1]),
-        ):
-            with np.errstate(invalid="ignore"):
-                means = node_means(corner_rows, values[:, order], len(nodes))
-            extra[present, columns] = means[present]
-        extrapolated.append(extra)
-    result = Results(
-        case,
-        history_table(case, history),
-        joint_table(case, joint),
-        joint_table(case, extrapolated),
-        stopped,
-        history["heel"],
-    )
-    return result, saved
+        try:
+            blocks.append(read_joint(case, folder, number, time, level))
+        except (OSError, ValueError):  # GetDP has been ended while it was writing this one
+            if finished:
+                raise
+            break
+        saved[number] = time
+    joint, extrapolated = (joint_table(case, [b[k] for b in blocks]) for k in (0, 1))
+    table = history_table(case, history)
+    return Results(case, table, joint, extrapolated, stopped, history["heel"]), saved
 
 
 def read_values(path: Path) -> tuple[np.ndarray, np.ndarray]:

@@ -1,0 +1,40 @@
+"""The wheel, installed into a fresh environment, runs a case from another folder."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+CHECKOUT = Path(__file__).parents[2]
+
+
+def call(*words, **options):
+    done = subprocess.run(
+        [str(w) for w in words], capture_output=True, text=True, check=False, **options
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+@pytest.mark.heavy
+def test_wheel_in_a_fresh_environment(tmp_path):
+    call(sys.executable, "-m", "build", "--wheel", "--outdir", tmp_path, CHECKOUT)
+    (wheel,) = tmp_path.glob("damjoint-*.whl")
+    call(sys.executable, "-m", "venv", tmp_path / "env")
+    python = tmp_path / "env" / "bin" / "python"
+    call(python, "-m", "pip", "install", "-q", wheel)
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    environment = {**os.environ, "DAMJOINT_CACHE": "", "PYTHONPATH": ""}
+    command = tmp_path / "env" / "bin" / "damjoint"
+    for engine in ("condensed", "getdp"):
+        words = "run", "c", "--levels", "6", "--engine", engine, "--out", engine
+        call(command, *words, cwd=elsewhere, env=environment)
+        assert json.loads((elsewhere / engine / "run.json").read_text())["verdict"] == "stands"
+    said = call(command, "validate", "c", cwd=elsewhere, env=environment)
+    assert ", 0 failed, " in said
+    where = call(python, "-c", "import damjoint; print(damjoint.data('pro'))", cwd=elsewhere)
+    assert where.startswith(str(tmp_path / "env"))
