@@ -56,7 +56,8 @@ def skin(body: Body) -> list[tuple[np.ndarray, np.ndarray]]:
     """What is seen of a body: faces as rows of point numbers, and the element each belongs to.
 
     In 2D all elements, in 3D the faces that belong to one element only.
-    """found: dict[int, list] = {}
+    """
+    found: dict[int, list] = {}
     first = 0
     for shape, table in body.cells:
         for side in FACES[shape]:
@@ -146,7 +147,8 @@ class Deformed:
     def lip(self, name: str) -> tuple[np.ndarray, np.ndarray]:
         """A body's lip on the side that is looked at: points (n, 3) from heel to toe, and their
         displacement (steps, n, 3).
-        """points, base = self.scene.bodies[name].points, self.scene.result.case["dam_base"]
+        """
+        points, base = self.scene.bodies[name].points, self.scene.result.case["dam_base"]
         near = 1e-9 * base
         on = (np.abs(points[:, 1]) < near) & (np.abs(points[:, 2] - self.depth) < near)
         on &= (points[:, 0] > -near) & (points[:, 0] < base + near)
@@ -167,7 +169,8 @@ class Deformed:
         """Both lips of the joint where it is open or broken, and where it has slipped else.
 
         A part that is not in that state at a step is drawn in a point.
-        """found: dict[str, list] = {"open": [], "slipped": []}
+        """
+        found: dict[str, list] = {"open": [], "slipped": []}
         for name in BODIES:
             points, moved = self.lip(name)
             gone = self.at_lip("damage", points[:, 0]) >= 1
@@ -199,7 +202,8 @@ class Deformed:
     def placed(self, corners: np.ndarray) -> Pieces:
         """Faces whose corners (steps, n, 4, 3) move, as pieces whose displacement brings them
         there.
-        """last = corners[-1]
+        """
+        last = corners[-1]
         return Pieces(last, (corners - last) / self.scale)
 
     def reservoir(self) -> np.ndarray:

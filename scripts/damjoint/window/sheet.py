@@ -37,7 +37,8 @@ class Request:
         """The case, as `damjoint run` reads it.
 
         Raises InputError.
-        """if self.steps is not None and not self.steps.isdigit():
+        """
+        if self.steps is not None and not self.steps.isdigit():
             raise InputError(f"steps = {self.steps}: must be an integer >= 1")
         steps = None if self.steps is None else int(self.steps)
         return load(self.case, self.overrides, self.levels, self.tail_levels, steps, self.accuracy)
@@ -61,7 +62,8 @@ def fill(request: Request) -> Sheet:
 
     Values that are the case's own count as not asked for: a case that is published with two uplifts
     keeps both. Raises InputError.
-    """path = case_file(request.case)
+    """
+    path = case_file(request.case)
     declared()
     replace(request, overrides={}, levels=None, tail_levels=None, steps=None).load()
     own = {name: gmsh_value(declared()[name].label) for name in declared()}

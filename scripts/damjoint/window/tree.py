@@ -182,7 +182,8 @@ class Tree:
 
         Without a step or bare choices: Gmsh's buttons for loops, which would do nothing, are off
         then. One that follows others says what, and its value.
-        """parameter = next(p for p in self.known.values() if p.label == told["name"])
+        """
+        parameter = next(p for p in self.known.values() if p.label == told["name"])
         entry = {k: told[k] for k in ("type", "name", "values", "visible", "choices") if k in told}
         allowed = f"{parameter.name}: {parameter.allowed()}"
         note = told.get("help", "") if not parameter.follows else ""
@@ -205,7 +206,8 @@ class Tree:
         """What the user asks for now.
 
         Another case starts afresh. Raises InputError where no case has been chosen yet.
-        """request, shown = self.sheet.request, self.shown
+        """
+        request, shown = self.sheet.request, self.shown
         case, file = get_number(CASE), get_text(FILE)
         if file != shown[FILE]:
             return Request(file)

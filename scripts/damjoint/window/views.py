@@ -51,7 +51,8 @@ class Gallery:
         """A view of some pieces, in one color or a scale of colors; numbers: its options.
 
         Returns its tag.
-        """tag = gmsh.view.add(name)
+        """
+        tag = gmsh.view.add(name)
         self.tags.append(tag)
         blocks: dict[str, list[np.ndarray]] = {}
         for piece in pieces:
@@ -145,7 +146,8 @@ def show(scene: Scene, before: Sequence[Scene] = ()) -> Gallery:
     """All views of a scene; its first line and history alone if no requested level was reached.
 
     before: earlier runs, whose last curves are drawn in grey for comparison.
-    """gallery = Gallery()
+    """
+    gallery = Gallery()
     graphs = Graphs(gallery)
     if scene.times.size:
         deformed = Deformed(scene)
@@ -315,7 +317,8 @@ class Graphs:
         """One more graph, with curves on common axes; these hold zero.
 
         units: of which the values get the one that suits them; points: marked on the curves.
-        """name, factor = unit([curve.y for curve in curves], units)
+        """
+        name, factor = unit([curve.y for curve in curves], units)
         x_range, y_range = (
             span(np.concatenate([getattr(curve, axis).ravel() for curve in curves]))
             for axis in "xy"
@@ -366,7 +369,8 @@ def pieces_of(curve: Curve, factor: float, x_range: tuple, beyond: float) -> Pie
 
     Gmsh takes the range of x from the curve itself. So that several share one, each gets a line
     over all of it with a value beyond the range of y, which is not drawn.
-    """x = np.zeros((max(len(curve.x), 2), 3))  # one point alone: twice
+    """
+    x = np.zeros((max(len(curve.x), 2), 3))  # one point alone: twice
     x[:, 0] = curve.x
     y = np.broadcast_to(curve.y, (len(curve.y), len(x))) * factor
     ends = np.zeros((1, 2, 3))

@@ -311,7 +311,8 @@ def turn_to(solid: bool) -> None:
 def aside(narrow: bool, solid: bool = False) -> None:
     """Move the scene to the left of the graphs, smaller, and what lies below a solid up; or
     back.
-    """scale = 0.68 if narrow else 1.0
+    """
+    scale = 0.68 if narrow else 1.0
     size = gmsh.option.getNumber("General.BoundingBoxSize")
     for axis in "XYZ":
         gmsh.option.setNumber(f"General.Scale{axis}", scale)
@@ -334,7 +335,8 @@ def gui(request: Request) -> None:
     """Open the window on a request and stay until it is closed.
 
     Raises InputError before anything opens, RunError where there is no display.
-    """request.load()
+    """
+    request.load()
     if sys.platform.startswith("linux") and not (
         os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     ):

@@ -88,7 +88,8 @@ def serve(pipe: Connection) -> None:
     In: ("check", Request), ("run", Request), ("save", folder). Out: ("ready", titles, parameters),
     ("checked", Sheet), ("bad", why), ("step", number of the scene, time), ("done", [Scene]),
     ("failed", why), ("saved", folder).
-    """stoppable = Interruptible()
+    """
+    stoppable = Interruptible()
     pipe.send(("ready", titles(), declared()))
     # what a first run would load while somebody waits for it
     from ..engines.condensed import recover, solve  # noqa: F401
@@ -134,7 +135,8 @@ def save(folder: str, last: tuple[Sheet, list[Outcome]] | None) -> None:
     """Write the last run and the case file that repeats it.
 
     Raises InputError if there is none, or the folder can not be written.
-    """if last is None:
+    """
+    if last is None:
         raise InputError("nothing to save yet: press Run first")
     sheet, outcomes = last
     keep(sheet.case, outcomes, Path(folder))
@@ -166,7 +168,8 @@ class Engine:
         """What has come back; wait: at most so many seconds for a first one.
 
         A process that has died gives ("died", exit code), and another one is started.
-        """try:
+        """
+        try:
             while self.pipe.poll(wait):
                 yield self.pipe.recv()
                 wait = 0.0
