@@ -55,7 +55,7 @@ class Hand:
 
     def save(self, folder):
         gmsh.onelab.setString(tree.FOLDER, [str(folder)])
-        self.press("save")
+        self.press(tree.SAVE_ACTION)
         self.wait()
         assert self.session.status == f"saved: {folder}"
 
@@ -244,9 +244,20 @@ def test_stop_keeps_what_has_converged(open_window, tmp_path):
     assert hand.run().startswith("done in")
 
 
+def test_an_emptied_database_is_filled_again(open_window):
+    """Reset, in Gmsh's menu beside Run."""
+    hand = open_window("a")
+    hand.type("E", 1e10)
+    gmsh.onelab.clear()
+    hand.press("reset")
+    hand.wait()
+    assert hand.entry("E")["values"] == [3e12] and tree.get_text(tree.SAVE)
+    assert gmsh.onelab.getString("ONELAB/Button") == ["Run", "run"]
+
+
 def test_nothing_to_save_before_a_run(open_window, tmp_path):
     hand = open_window("e")
-    hand.press("save")
+    hand.press(tree.SAVE_ACTION)
     hand.wait()
     assert hand.session.status == "nothing to save yet: press Run first"
 

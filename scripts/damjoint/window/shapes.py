@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..results.fields import BODIES
+from ..scene.case import Case
 from ..scene.mesh import Body
 from .worker import Scene
 
@@ -32,6 +33,13 @@ FACES = {
 }
 #: Strips of the water beside a face: it follows the bent face.
 STRIPS = 12
+
+
+def frame(case: Case) -> tuple[float, float, float]:
+    """What is shown of a scene: x from, x to, y from [m]; up to the crest."""
+    height = case["dam_height"]
+    beside = min(case["found_side"], 0.6 * height)
+    return -beside, case["dam_base"] + beside, -min(case["found_depth"], 0.5 * height)
 
 
 @dataclass
@@ -210,16 +218,15 @@ class Deformed:
         """Quadrangles of the water upstream, (steps, n, 4, 3)."""
         case = self.scene.result.case
         level = [self.level("level", time) for time in self.times]
-        far = -min(case["found_side"], 1.2 * case["dam_height"])
-        return self.beside("upstream", level, lambda y: np.zeros_like(y), far)
+        return self.beside("upstream", level, lambda y: np.zeros_like(y), frame(case)[0])
 
     def tailwater(self) -> np.ndarray:
         """Quadrangles of the water downstream."""
         case = self.scene.result.case
         level = [self.level("tail_level", time) for time in self.times]
         lean = (case["dam_base"] - case["dam_crest"]) / case["dam_height"]
-        far = case["dam_base"] + min(case["found_side"], 1.2 * case["dam_height"])
-        return self.beside("downstream", level, lambda y: case["dam_base"] - lean * y, far)
+        face = lambda y: case["dam_base"] - lean * y
+        return self.beside("downstream", level, face, frame(case)[1])
 
     def level(self, column: str, time: float) -> float:
         """A water level at a requested time [m]: the one found, if a displacement is prescribed."""

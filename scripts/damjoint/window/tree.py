@@ -36,6 +36,8 @@ FOLDER = "Parameters/7Output/0Folder"
 KEEP = "Parameters/7Output/1Keep the last views for comparison"
 SAVE = "Parameters/7Output/2Save tables, fields, picture and case file"
 
+#: The action that its button tells; Gmsh's own "save" is of the database.
+SAVE_ACTION = "save results"
 #: What stands for "as the case has it" among choices, and for the choice of a case file.
 OWN, OPEN = "as the case", "open a case file ..."
 
@@ -116,7 +118,7 @@ class Tree:
 
     def show(self, sheet: Sheet) -> None:
         """Put a sheet into the tree."""
-        other = self.sheet is None or sheet.path != self.sheet.path
+        other = self.sheet is None or sheet.path != self.sheet.path or not get_text(SAVE)
         self.sheet = sheet
         case, request = sheet.case, sheet.request
         menu = self.menu(sheet)
@@ -156,7 +158,7 @@ class Tree:
             put(
                 text(FOLDER, str(Path("out") / case.name), help="where Save writes"),
                 number(KEEP, 0, choices=[0, 1], help="views of the last run stay beside the new"),
-                text(SAVE, "save", attributes={"Macro": "Action", "Aspect": "Button"}),
+                text(SAVE, SAVE_ACTION, attributes={"Macro": "Action", "Aspect": "Button"}),
             )
         # read back, since the database may round a number
         self.shown = {e["name"]: value_of(e["name"]) for e in sheet.entries} | {

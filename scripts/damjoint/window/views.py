@@ -16,7 +16,8 @@ import numpy as np
 
 from ..results.pictures import LENGTHS, STRESSES, along, heading, unit
 from ..scene.case import Case
-from .shapes import Deformed, Pieces
+from .camera import CLIPPED, MAPS, clip
+from .shapes import Deformed, Pieces, frame
 from .worker import Scene
 
 Color = tuple[int, int, int, int]
@@ -33,8 +34,9 @@ WATER: Color = (*LAKE[:3], 130)
 STONE = ((226, 222, 212), (168, 187, 205), (88, 137, 186), (11, 60, 120))
 FIRE = ((11, 60, 120), (88, 137, 186), (226, 222, 212), (200, 60, 30))
 
-#: Pixels of a graph, and from its left edge and top to those of the next.
+#: Pixels of a graph, from its left edge and top to those of the next, and of both columns.
 GRAPH_SIZE, GRAPH_PITCH = (175, 118), (268, 218)
+GRAPHS_WIDTH = 2 * GRAPH_PITCH[0]
 
 
 class Gallery:
@@ -123,8 +125,7 @@ def outline_water(case: Case) -> Gallery:
     depth = case["thickness"] if case["dim"] == 3 else 0.0
     height = case["dam_height"]
     lean = (case["dam_base"] - case["dam_crest"]) / height
-    beside = min(case["found_side"], 1.2 * height)
-    far = -beside, case["dam_base"] + beside
+    far = frame(case)
     faces = []
     for level, x, slope, end in (
         (max(case.levels), 0.0, 0.0, far[0]),
@@ -192,11 +193,20 @@ def in_unit(length: float) -> str:
 def show_deformed(gallery: Gallery, deformed: Deformed) -> None:
     """Dam and foundation, their outline, water, crack and slip, all displaced by one factor."""
     height = deformed.scene.result.case["dam_height"]
-    moves = {"VectorType": 5, "DisplacementFactor": deformed.scale}
+    clip(deformed.scene.result.case)
+    moves = {"VectorType": 5, "DisplacementFactor": deformed.scale, "Clip": CLIPPED}
     scale = scale_at(0)
     gallery.add("displacement [m]", deformed.bodies(), STONE, **moves, **scale, Light=0)
     gallery.spare.append(
-        gallery.add("vertical stress [Pa]", deformed.stress(), FIRE, **scale, Light=0, Visible=0)
+        gallery.add(
+            "vertical stress [Pa]",
+            deformed.stress(),
+            FIRE,
+            **scale,
+            Clip=CLIPPED,
+            Light=0,
+            Visible=0,
+        )
     )
     flat = {**moves, "ShowScale": 0, "Light": 0}
     gallery.add("water", [deformed.water()], [WATER], **flat)
@@ -235,10 +245,11 @@ def show_maps(gallery: Gallery, deformed: Deformed) -> None:
         shown.append((f"water pressure [{stress}]", [r["p"] * per_pa for r in rows], STONE))
     # as wide as the foundation, and deep enough to be seen
     base, depth = case["dam_base"], case["thickness"]
-    wider = min(2.5, 1 + 2 * case["found_side"] / base)
+    left, right, bottom = frame(case)
+    wider = min(2.5, (right - left) / base)
     stretch = np.array([wider, 1.0, max(wider, 0.25 * wider * base / depth)])
     for i, (name, values, colors) in enumerate(shown):
-        below = np.array([0, -case["found_depth"] - (i + 1) * 0.17 * case["dam_height"], 0])
+        below = np.array([0, bottom - (i + 1) * MAPS * case["dam_height"], 0])
         below += (1 - stretch) * np.array([base / 2, 0, depth])
         points = joint.points * stretch + below
         pieces = [

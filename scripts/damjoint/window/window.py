@@ -18,12 +18,14 @@ from .. import InputError, RunError, data
 from ..scene.case import Case
 from ..scene.mesh import GEOMETRY
 from ..scene.parameters import assignments, start_gmsh
-from . import tree, views
+from . import camera, tree, views
 from .sheet import Request, Sheet
 from .worker import Engine, Scene
 
+#: What Gmsh's menu beside Run says of a database that is read or emptied counts as a change.
+CHANGES = "check", "load", "reset"
 ACTION, BUTTON = "ONELAB/Action", "ONELAB/Button"
-RUN, STOP, SAVE = ("Run", "run"), ("Stop", "stop"), "save"
+RUN, STOP = ("Run", "run"), ("Stop", "stop")
 #: Seconds: for the engine's process to start, for a turn of the event loop, between two lines of
 #: progress.
 START, TURN, QUIET = 60.0, 0.02, 0.2
@@ -54,6 +56,7 @@ class Session:
         self.water: views.Gallery | None = None
         self.message = views.Gallery()
         self.drawn: tuple = ()
+        self.aimed: tuple = ()
         self.started = self.quiet_until = 0.0
         tree.put(tree.text(ACTION, "", visible=False), button(RUN))
         self.say("starting ...", tree.CALM)
@@ -88,15 +91,17 @@ class Session:
         if action == STOP[1]:
             self.engine.stop()
             self.say("stopping; press Stop again to end at once, keeping nothing", tree.WARN)
-        elif action == RUN[1] and self.busy != "running":
+        elif action == RUN[1] and self.busy != "running" and self.tree.sheet:
             self.run()
-        elif action == SAVE and not self.busy:
+        elif action == tree.SAVE_ACTION and not self.busy:
             self.busy = "saving"
             self.say("saving ...", tree.CALM)
             self.engine.send("save", tree.get_text(tree.FOLDER))
-        elif action in ("check", "reset") and self.busy:
+        elif action in CHANGES and self.busy:
             self.checks = True  # when what is under way has ended
-        elif action in ("check", "reset") and not self.other_scene():
+        elif action == "reset" or not tree.get_text(tree.SAVE):  # the database is empty
+            self.check(Request(self.tree.sheet.request.case))
+        elif action in CHANGES and not self.other_scene():
             self.check()
 
     def other_scene(self) -> bool:
@@ -230,17 +235,23 @@ class Session:
             self.water.close()
         self.water = views.outline_water(case)
         self.outline(True)
-        aside(False)
-        turn_to(case["dim"] == 3)
+        camera.turn_to(case["dim"] == 3)
+        self.aim(case, False)
 
     def outline(self, shown: bool) -> None:
         """Show the undeformed outline with its water, or the results."""
-        for option in ("Geometry.Curves", "Geometry.Points", "Mesh.SurfaceEdges", "Mesh.Lines"):
-            gmsh.option.setNumber(option, shown and option != "Geometry.Points")
+        gmsh.option.setNumber("Geometry.Curves", shown)
         if self.water:
             self.water.show(shown)
         if self.gallery:
             self.gallery.show(not shown)
+
+    def aim(self, case: Case, beside_graphs: bool) -> None:
+        """Place the scene in the window anew when it has changed, else leave it to the user."""
+        if self.aimed != (key := (beside_graphs, *(case[name] for name in GEOMETRY))):
+            self.aimed = key
+            gmsh.graphics.draw()  # or the box around all is that of before
+            camera.aim(case, views.GRAPHS_WIDTH if beside_graphs else 0)
 
     def show(self, scene: int) -> None:
         """Show a scene of the last run in place of the views before."""
@@ -248,8 +259,9 @@ class Session:
             self.gallery.close()
         self.scene_shown = scene
         self.gallery = views.show(self.scenes[scene], [old for old, _ in self.kept])
+        gmsh.model.mesh.clear()  # if the user has had one drawn: another one can be on top
         self.outline(False)
-        aside(True, self.scenes[scene].result.case["dim"] == 3)
+        self.aim(self.scenes[scene].result.case, True)
         tree.show_results(self.scenes, scene)
         self.update()
 
@@ -287,7 +299,7 @@ OPTIONS = {
     "General.BackgroundGradient": 0,
     "General.GraphicsFontSize": 12,
     "General.GraphicsFontSizeTitle": 14,
-    "Geometry.PointLabels": 0,
+    "Geometry.Points": 0,
 }
 
 
@@ -297,27 +309,6 @@ def prepare() -> None:
     gmsh.option.setString("General.GraphicsFontEngine", "StringTexture")
     for name, value in OPTIONS.items():
         gmsh.option.setNumber(name, value)
-
-
-def turn_to(solid: bool) -> None:
-    """Look at the plane scene from the front, at a solid one from above and upstream."""
-    if solid == (gmsh.option.getNumber("General.RotationY") != 0):
-        return  # as the user has turned it
-    gmsh.option.setNumber("General.Trackball", 0)
-    for axis, degrees in zip("XYZ", (20, 30, 0) if solid else (0, 0, 0), strict=True):
-        gmsh.option.setNumber(f"General.Rotation{axis}", degrees)
-
-
-def aside(narrow: bool, solid: bool = False) -> None:
-    """Move the scene to the left of the graphs, smaller, and what lies below a solid up; or
-    back.
-    """
-    scale = 0.68 if narrow else 1.0
-    size = gmsh.option.getNumber("General.BoundingBoxSize")
-    for axis in "XYZ":
-        gmsh.option.setNumber(f"General.Scale{axis}", scale)
-    gmsh.option.setNumber("General.TranslationX", -0.42 * size * narrow)
-    gmsh.option.setNumber("General.TranslationY", 0.12 * size * (narrow and solid))
 
 
 def button(what: tuple[str, str]) -> dict:
@@ -347,6 +338,9 @@ def gui(request: Request) -> None:
     try:
         while gmsh.fltk.isAvailable():
             gmsh.fltk.wait(TURN)
-            session.turn()
+            try:
+                session.turn()
+            except Exception as error:  # whatever it is, the window stays
+                session.on_failed(f"{type(error).__name__}: {error}")
     finally:
         session.close()
