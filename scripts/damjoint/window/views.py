@@ -177,10 +177,9 @@ def captions(deformed: Deformed) -> list[str]:
         row = int(np.argmin(np.abs(result.history["time"] - time)))
         now = {name: float(column[row]) for name, column in result.history.items()}
         tail = f", tailwater {now['tail_level']:.4g} m" if now["tail_level"] > 0 else ""
-        lines.append(
-            f"level {now['level']:.4g} m{tail}: largest opening {in_unit(now['max_opening'])}, "
-            f"crack {now['crack_length']:.3g} m"
-        )
+        opened = now["max_opening"]
+        said = f"largest opening {in_unit(opened)}" if opened > 0 else "closed"
+        lines.append(f"level {now['level']:.4g} m{tail}: {said}, crack {now['crack_length']:.3g} m")
     return lines
 
 

@@ -90,7 +90,10 @@ class Session:
         """Do what has been pressed."""
         if action == STOP[1]:
             self.engine.stop()
-            self.say("stopping; press Stop again to end at once, keeping nothing", tree.WARN)
+            self.say(
+                "stopping after this step; Stop again: at once, nothing is kept",
+                tree.WARN,
+            )
         elif action == RUN[1] and self.busy != "running" and self.tree.sheet:
             self.run()
         elif action == tree.SAVE_ACTION and not self.busy:

@@ -62,24 +62,29 @@ class Scene:
         return np.unique(self.result.joint["time"])
 
 
-class Interruptible:
-    """SIGINT ends what runs inside with KeyboardInterrupt, and is ignored outside."""
+class Stop:
+    """The wish to stop, told by SIGINT.
+
+    Before the first step it ends what is under way at once; from then on the engine asks for it
+    after each converged step, when all that is kept of the step is there.
+    """
 
     def __init__(self) -> None:
-        self.inside = False
-        signal.signal(signal.SIGINT, self.interrupt)
+        self.wanted = self.at_once = False
+        signal.signal(signal.SIGINT, self.take)
 
-    def interrupt(self, _number: int, _frame: FrameType | None) -> None:
+    def take(self, _number: int, _frame: FrameType | None) -> None:
         """What the signal calls."""
-        if self.inside:
-            self.inside = False
+        self.wanted = True
+        if self.at_once:
+            self.at_once = False
             raise KeyboardInterrupt
 
-    def __enter__(self) -> None:
-        self.inside = True
-
-    def __exit__(self, *_: object) -> None:
-        self.inside = False
+    def after_step(self) -> None:
+        """Raises KeyboardInterrupt if it is wanted."""
+        self.at_once = False
+        if self.wanted:
+            raise KeyboardInterrupt
 
 
 def serve(pipe: Connection) -> None:
@@ -89,7 +94,7 @@ def serve(pipe: Connection) -> None:
     ("checked", Sheet), ("bad", why), ("step", number of the scene, time), ("done", [Scene]),
     ("failed", why), ("saved", folder).
     """
-    stoppable = Interruptible()
+    stop = Stop()
     pipe.send(("ready", titles(), declared()))
     # what a first run would load while somebody waits for it
     from ..engines.condensed import recover, solve  # noqa: F401
@@ -108,7 +113,7 @@ def serve(pipe: Connection) -> None:
             sheet = fill(asked)
             pipe.send(("checked", sheet))
             if kind == "run":
-                outcomes = follow(sheet, pipe, stoppable)
+                outcomes = follow(sheet, pipe, stop)
                 pipe.send(("done", [Scene.of(outcome) for outcome in outcomes]))
                 last = sheet, outcomes
         except InputError as error:
@@ -119,15 +124,28 @@ def serve(pipe: Connection) -> None:
             pipe.send(("failed", str(error) or type(error).__name__))
 
 
-def follow(sheet: Sheet, pipe: Connection, stoppable: Interruptible) -> list[Outcome]:
-    """The scenes of a case; each converged step is told."""
+def follow(sheet: Sheet, pipe: Connection, stop: Stop) -> list[Outcome]:
+    """The scenes of a case; each converged step is told.
+
+    Raises what ends it before its first step (KeyboardInterrupt, RunError); later that is an
+    outcome.
+    """
     outcomes = []
-    with stoppable:
-        told = lambda scene, time: pipe.send(("step", (scene, time)))
-        for outcome in solve(sheet.case, "condensed", told, True):
+
+    def on_step(scene: int, time: float) -> None:
+        pipe.send(("step", (scene, time)))
+        stop.after_step()
+
+    stop.wanted, stop.at_once = False, True
+    try:
+        for outcome in solve(sheet.case, "condensed", on_step, True):
             outcomes.append(outcome)
             if outcome.error:
                 break
+    finally:
+        stop.at_once = False
+    if outcomes[-1].error and not any(outcome.result.last for outcome in outcomes):
+        raise outcomes[-1].error
     return outcomes
 
 
