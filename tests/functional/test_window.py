@@ -182,6 +182,18 @@ def test_views_have_a_step_per_level_and_replace_those_before(open_window):
     assert not any("run 1" in view for view in hand.views)
 
 
+def test_the_status_says_whether_the_results_are_those_of_the_parameters(open_window):
+    hand = open_window("c", **SMALL)
+    done = hand.run()
+    assert hand.type(tree.KEEP, 1.0) == done
+    assert hand.type("dam_crest", 2.0) == "changed since the run: press Run"
+    visible = [gmsh.view.option.getNumber(tag, "Visible") for tag in gmsh.view.getTags()]
+    assert sum(visible) == 1  # the water beside the new outline
+    assert hand.type("dam_crest", 1.5) == done
+    visible = [gmsh.view.option.getNumber(tag, "Visible") for tag in gmsh.view.getTags()]
+    assert sum(visible) == len(visible) - 2  # all but that water, and the stress
+
+
 def test_drawing_follows_geometry_and_can_be_meshed(open_window):
     hand = open_window("e")
     assert gmsh.model.getBoundingBox(-1, -1)[4] == pytest.approx(10, abs=1e-6)

@@ -48,7 +48,10 @@ class Session:
         self.checks = False
         self.tree: tree.Tree | None = None
         self.status = ""
+        #: the last run: its scenes, what was asked for, the line that says how it ended
         self.scenes: list[Scene] = []
+        self.ran: Request | None = None
+        self.outcome = "", tree.CALM
         #: the views of the last run, the runs kept for comparison, and the water before a run
         self.gallery: views.Gallery | None = None
         self.scene_shown = 0
@@ -153,8 +156,14 @@ class Session:
             return
         if before and before.path != sheet.path:
             self.drop_results()
-        changed = self.scenes and before and sheet.request != before.request
-        self.free("changed since the run: press Run" if changed else "ready: press Run", tree.CALM)
+        if not self.scenes:
+            self.free("ready: press Run", tree.CALM)
+        elif sheet.request != self.ran:
+            self.free("changed since the run: press Run", tree.CALM)
+        else:  # nothing that matters to it, or changed back
+            self.outline(False)
+            self.aim(sheet.case, True)
+            self.free(*self.outcome)
 
     def on_bad(self, why: str) -> None:
         """A value is bad: said in one line, nothing runs, everything stays."""
@@ -190,10 +199,11 @@ class Session:
         self.show(0)
         took = f"{time.perf_counter() - self.started:.2f} s"
         trouble = [scene.said for scene in scenes if scene.said]
+        self.outcome = f"done in {took}: the dam stands", tree.GOOD
         if trouble:
-            self.free(f"{trouble[0]} ({took})", tree.WARN)
-        else:
-            self.free(f"done in {took}: the dam stands", tree.GOOD)
+            self.outcome = f"{trouble[0]} ({took})", tree.WARN
+        self.ran = self.tree.sheet.request
+        self.free(*self.outcome)
 
     def on_saved(self, folder: str) -> None:
         """The last run is written."""
@@ -269,7 +279,13 @@ class Session:
         self.update()
 
     def keep_or_drop(self) -> None:
-        """Before new results come: the views there are kept for comparison, or go."""
+        """Before new results come: the views there are kept for comparison, or go.
+
+        Gmsh's own graphs of results go in any case: they would stay as they are.
+        """
+        for tag in gmsh.view.getTags():
+            if gmsh.view.option.getString(tag, "Name") in tree.RESULTS.values():
+                gmsh.view.remove(tag)
         if not tree.get_number(tree.KEEP):
             self.drop_results()
         elif self.gallery:
