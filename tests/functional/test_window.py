@@ -232,6 +232,18 @@ def test_a_bad_value_is_one_line_and_nothing_runs(open_window, name, value, why)
     assert hand.run().startswith("done in")
 
 
+def test_what_is_pressed_meanwhile_is_done_afterwards(open_window, tmp_path):
+    hand = open_window("c", **SMALL)
+    done = hand.run()
+    gmsh.onelab.setString(tree.FOLDER, [str(tmp_path / "c")])
+    hand.press(tree.SAVE_ACTION)
+    hand.press("run")
+    hand.press("check")
+    hand.wait()
+    assert hand.session.status.startswith(done.partition("(")[0])
+    assert (tmp_path / "c" / "joint.csv").exists()
+
+
 def test_stop_keeps_what_has_converged(open_window, tmp_path):
     hand = open_window("e", **SMALL)
     hand.type(tree.STEPS, "2000")

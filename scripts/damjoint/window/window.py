@@ -45,7 +45,8 @@ class Session:
         self.folder = tempfile.TemporaryDirectory(prefix="damjoint_")
         #: checking, running, saving, or nothing of them
         self.busy = ""
-        self.checks = False
+        #: what waits for that to end: check, run, or nothing
+        self.later = ""
         self.tree: tree.Tree | None = None
         self.status = ""
         #: the last run: its scenes, what was asked for, the line that says how it ended
@@ -93,18 +94,17 @@ class Session:
         """Do what has been pressed."""
         if action == STOP[1]:
             self.engine.stop()
-            self.say(
-                "stopping after this step; Stop again: at once, nothing is kept",
-                tree.WARN,
-            )
-        elif action == RUN[1] and self.busy != "running" and self.tree.sheet:
+            self.say("stopping after this step; Stop again: at once, nothing is kept", tree.WARN)
+        elif action == RUN[1] and (self.busy == "saving" or not self.tree.sheet):
+            self.later = "run"
+        elif action == RUN[1] and self.busy != "running":
             self.run()
         elif action == tree.SAVE_ACTION and not self.busy:
             self.busy = "saving"
             self.say("saving ...", tree.CALM)
             self.engine.send("save", tree.get_text(tree.FOLDER))
         elif action in CHANGES and self.busy:
-            self.checks = True  # when what is under way has ended
+            self.later = self.later or "check"
         elif action == "reset" or not tree.get_text(tree.SAVE):  # the database is empty
             self.check(Request(self.tree.sheet.request.case))
         elif action in CHANGES and not self.other_scene():
@@ -216,9 +216,9 @@ class Session:
         self.busy = ""
         tree.put(button(RUN))
         self.say(status, color)
-        if self.checks:
-            self.checks = False
-            self.check()
+        later, self.later = self.later, ""
+        if later:
+            getattr(self, later)()
 
     def say(self, status: str, color: str) -> None:
         """A line in the tree and at the bottom of the window; bad news in the picture, too."""
