@@ -1,4 +1,4 @@
-"""The command line: damjoint run | gui | validate | sweep | bench | law."""
+"""The command line: damjoint new | run | gui | validate | sweep | bench | law."""
 
 from __future__ import annotations
 
@@ -68,6 +68,10 @@ def parser() -> argparse.ArgumentParser:
     window.add_argument("case", nargs="?", default="dam", help=of_case)
     window.set_defaults(call=do_gui)
 
+    new = commands.add_parser("new", help="write a commented case file to begin with")
+    new.add_argument("path", type=Path, metavar="MY.case", help="the file to write")
+    new.set_defaults(call=do_new)
+
     check = commands.add_parser(
         "validate", help="compare with the published numbers; exit code 1 if a row fails"
     )
@@ -109,7 +113,7 @@ def parser() -> argparse.ArgumentParser:
         "law", parents=[settings], help="evaluate a joint law along a path of jumps"
     )
     add = law.add_argument
-    add("law", help="rupture or friction")
+    add("law", help="rupture, friction or bond")
     add(
         "--path",
         type=Path,
@@ -123,7 +127,7 @@ def parser() -> argparse.ArgumentParser:
 
 def do_run(arguments: argparse.Namespace) -> int:
     """Damjoint run; 0, or 1 if the dam does not stand or the run stopped before its last level."""
-    from .results.verdict import failed, path_statement, statement
+    from .results.verdict import failed, hints, path_statement, statement
     from .run import run
     from .scene import parameters
     from .scene.case import load
@@ -152,8 +156,8 @@ def do_run(arguments: argparse.Namespace) -> int:
         )
         if case["drive"] != "level":
             print(path_statement(result))
-        if statement(result):
-            print(statement(result))
+        for said in filter(None, [statement(result), *hints(result)]):
+            print(said)
         code = max(code, int(failed(result)))
     return code
 
@@ -178,6 +182,15 @@ def warn_if_slow() -> None:
             "'make setup' says what is missing",
             file=sys.stderr,
         )
+
+
+def do_new(arguments: argparse.Namespace) -> int:
+    """damjoint new."""
+    from .scene import template
+
+    template.write(arguments.path)
+    print(f"{arguments.path}: a 45 m dam on rock; damjoint run {arguments.path}")
+    return 0
 
 
 def do_validate(arguments: argparse.Namespace) -> int:
@@ -248,6 +261,9 @@ def main(argv: list[str] | None = None) -> int:
         print(f"damjoint: {error}", file=sys.stderr)
         return 2
     except RunError as error:
+        print(f"damjoint: {error}", file=sys.stderr)
+        return 1
+    except OSError as error:  # no space, no permission, a folder that has gone
         print(f"damjoint: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 from closed_forms import BASE, CENTROID, WATER, WEIGHT, integral, resultants, slide_level, thrust
+from damjoint import InputError, run
+from damjoint.scene.case import load
 from numpy.testing import assert_allclose
 
 
@@ -90,3 +92,40 @@ def test_joint_table_carries_the_resultants(solve, name):
         result.history["N"][-1], rel=5e-3
     )
     assert integral(rows["x"], rows["tau_1"]) == pytest.approx(result.history["T"][-1], rel=3e-2)
+
+
+@pytest.mark.parametrize("engine", ["condensed", "getdp"])
+@pytest.mark.parametrize(
+    "level, tail, effectiveness, outlet, at_drains",
+    [
+        (8, 0, 0, 0, 6.4),  # none: linear
+        (8, 1, 0.5, 0, 1 + 0.5 * 5.6),  # down to the tailwater: 8 - 7/5 = 6.6
+        (8, 1, 1, 3, 3),  # down to the gallery
+        (3, 0, 1, 5, 2.4),  # the gallery is higher than the head
+    ],
+)
+def test_drains(tmp_path, engine, level, tail, effectiveness, outlet, at_drains):
+    """Uplift linear from heel to drains (1 m) to toe: U, N, M by closed form, p in the table."""
+    drains = {"drain_x": 1.0, "drain_effectiveness": effectiveness, "drain_level": outlet}
+    settings = {"uplift": "drained", "n_joint": 20.0, **{n: float(v) for n, v in drains.items()}}
+    case = load("c", settings, str(level), str(tail))
+    (result,) = run.run(case, tmp_path, False, False, False, engine)
+    heads = np.array([level, at_drains, tail]) * WATER
+    uplift = (heads[0] + heads[1]) / 2 * 1 + (heads[1] + heads[2]) / 2 * 4
+    x, p = result.at()["x"], result.at()["p"]
+    assert_allclose(p, np.interp(x, (0, 1, 5), heads), rtol=1e-9, atol=1e-6)
+    last = result.last
+    assert last["U"] == pytest.approx(uplift, rel=1e-9)
+    dry_n, _, dry_m = resultants(level, tail, False)
+    moment = integral(np.array([0.0, 1, 5]), heads, np.array([5.0, 4, 0]))
+    assert last["N"] == pytest.approx(dry_n - uplift, rel=1e-6)
+    assert last["M"] == pytest.approx(dry_m - moment, rel=1e-6)
+
+
+def test_drains_where_there_are_none():
+    for settings, said in (
+        ({"drain_x": 5.0}, "drain_x = 5: must be < dam_base"),
+        ({"drain_level": 1.0, "drive": "heel"}, "drain_level = 1: must be 0"),
+    ):
+        with pytest.raises(InputError, match=said):
+            load("c", {"uplift": "drained"} | settings)

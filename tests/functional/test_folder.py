@@ -140,3 +140,25 @@ def test_an_interrupted_run_keeps_what_has_converged(tmp_path, monkeypatch, engi
     history = read(tmp_path / "out" / "history.csv")
     assert 1 <= len(history["time"]) < 5
     assert json.loads((tmp_path / "out" / "run.json").read_text())["state"] == "interrupted"
+
+
+@pytest.mark.parametrize("printed", ["rubbish", "step abc", "Error   : it hurts"])
+def test_a_getdp_that_prints_rubbish(command, tmp_path, monkeypatch, printed):
+    fake = tmp_path / "getdp"
+    fake.write_text(f"#!/bin/sh\necho '{printed}'\nexit 3\n")
+    fake.chmod(0o755)
+    monkeypatch.setenv("GETDP", str(fake))
+    code, _, err = command("run", "c", *BARE, "--engine", "getdp")
+    assert code == 1 and len(err.splitlines()) == 1 and printed in err
+    assert json.loads((tmp_path / "out/c/run.json").read_text())["state"] == "failed"
+
+
+def test_a_full_disk_is_one_line(command, tmp_path, monkeypatch):
+    from damjoint.results import tables
+
+    def full(*words):
+        raise OSError(28, "No space left on device", "joint.csv")
+
+    monkeypatch.setattr(tables, "write_csv", full)
+    code, _, err = command("run", "c", *BARE)
+    assert code == 1 and "No space left on device" in err and len(err.splitlines()) == 1

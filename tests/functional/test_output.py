@@ -133,3 +133,13 @@ def test_stress_in_the_dam_carries_its_weight(folder):
     assert np.mean(stress[high, 1] * (1.5 + 0.35 * (10 - middle[high, 1]))) == pytest.approx(
         -np.mean(above), rel=0.1
     )
+
+
+def test_a_joint_stiff_for_its_mesh_is_said(command, tmp_path):
+    """Stresses of its nodes oscillate: K_N h/E = 1e14 * 0.5 / 1e10 = 5000."""
+    small = "--set", "n_joint=10", "--set", "h_dam=3", "--set", "h_found=4"
+    stiff = "--set", "K_N=1e14", "--set", "E=1e10", "--no-fields", "--no-picture"
+    code, out, _ = command("run", "c", *small, *stiff, "--levels", "3")
+    assert code == 0 and "K_N h/E = 5e+03" in out
+    told = json.loads((tmp_path / "out/c/run.json").read_text())
+    assert len(told["hints"]) == 1

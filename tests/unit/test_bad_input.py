@@ -51,7 +51,7 @@ def refuse(command, tmp_path, words, parts):
         ("n_joint=2.5", "integer"),
         ("n_joint=0", ">= 1"),
         ("law=glue", "rupture, friction"),
-        ("uplift=some", "none, imposed, flow"),
+        ("uplift=some", "none, imposed, drained, flow"),
         ("mesh_pattern=odd", "free, regular, layers, split"),
         ("thickness=-1", "> 0"),
     ],

@@ -76,7 +76,7 @@ def test_included_files_come_first_and_can_be_overruled(tmp_path):
         ("levels() = {3, 6}; times() = {2, 1};", "times = 2,1"),
         ("levels() = {3, 6}; times() = {1, 1};", "times = 1,1"),
         ("levels() = {3, 6}; times() = {0, 1};", "times = 0,1"),
-        ('also_uplift = "some";', "none, imposed, flow"),
+        ('also_uplift = "some";', "none, imposed, drained, flow"),
         ("levels() = {1, 2, 3}; tail_levels() = {1, 2};", "tail_levels = 1,2"),
     ],
 )

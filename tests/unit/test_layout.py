@@ -79,3 +79,12 @@ def test_pages_are_current(name):
     """`make pages` after a change of a parameter or a column."""
     path = Path(__file__).parents[2] / "reference" / f"{name}.md"
     assert path.read_text() == getattr(pages, f"{name}_page")()
+
+
+@pytest.mark.parametrize("folder", ["pro", "geo", "cases"])
+def test_lines_are_not_too_long(folder):
+    """As ruff sees to it in Python."""
+    for path in damjoint.data(folder).iterdir():
+        if path.suffix in (".pro", ".geo", ".case"):
+            long = [line for line in path.read_text().splitlines() if len(line) > 100]
+            assert not long, f"{path}: {long[0]}"

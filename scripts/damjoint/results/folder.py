@@ -14,13 +14,13 @@ from pathlib import Path
 from .. import InputError, __version__
 from ..scene.case import Case
 from .tables import FLUX, HISTORY, JOINT, Results
-from .verdict import statement, verdict
+from .verdict import hints, statement, verdict
 
 #: Names that a run writes, besides its pictures.
 TABLES = ("joint.csv", "history.csv", "curve.csv", "run.json")
 FIELDS = re.compile(r"(bulk|joint)(_t[\w.+-]+\.vtu|\.msh)|fields\.pvd")
 #: Where further scenes of a case go.
-SCENES = ("none", "imposed", "flow")
+SCENES = ("none", "imposed", "drained", "flow")
 
 
 def check_writable(folder: Path) -> None:
@@ -102,6 +102,7 @@ def write_info(results: Results, folder: Path, state: str = "") -> None:
             "state": state or ("stopped" if results.stopped else "complete"),
             "verdict": verdict(results),
             "statement": statement(results),
+            "hints": hints(results),
             "parameters": case.values,
             "levels": case.levels,
             "tail_levels": case.tail_levels,

@@ -161,7 +161,7 @@ def draw_section(
 def draw_joint(jumps: Axes, stresses: Axes, case: Case, curves: dict[str, np.ndarray]) -> None:
     """Jumps and stresses over x, with the published values."""
     x = curves["x"]
-    slipped = "released slip" if case["law"] == "rupture" else "plastic slip"
+    slipped = "released slip" if case["law"] == "rupture" else "slip"
     length, per_m = unit([curves["delta_n"], curves["delta_t1"]], LENGTHS)
     jumps.plot(x, curves["delta_n"] * per_m, color=BLUE, label="opening")
     jumps.plot(x, curves["delta_t1"] * per_m, color=ORANGE, label="tangential jump (downstream)")

@@ -25,10 +25,10 @@ JOINT = {
     "tau_1": ("Pa", "shear stress along x, of the sign of the slip it causes"),
     "tau_2": ("Pa", "shear stress along z"),
     "p": ("Pa", "water pressure in the joint"),
-    "damage": ("-", "rupture: used part of the softening, 1 broken; friction: 1 where open"),
+    "damage": ("-", "rupture, bond: used part of the softening, 1 broken; friction: 1 where open"),
     "slip": (
         "m",
-        "rupture: tangential jump at which the point last slid freely; friction: plastic slip",
+        "rupture: tangential jump at the last free slide; else: plastic slip",
     ),
     "sigma_n_eff": ("Pa", "effective normal stress, sigma_n + p"),
 }
@@ -43,8 +43,8 @@ HISTORY = {
     "iterations": ("-", "Newton iterations of the step"),
     "cuts": ("-", "how often the step was shortened"),
     "residual": ("-", "remaining out-of-balance force over that of the highest water"),
-    "crack_length": ("m", "broken (rupture) or open (friction) joint"),
-    "slip_length": ("m", "released (rupture) or slipped (friction) joint"),
+    "crack_length": ("m", "broken (rupture) or open (friction, bond) joint"),
+    "slip_length": ("m", "released (rupture) or slipped (friction, bond) joint"),
     "max_opening": ("m", "largest opening of a node"),
     "crest_ux": ("m", "displacement of the upstream end of the crest along x"),
     "N": ("N/m", "effective normal force on the joint, compression > 0"),

@@ -39,8 +39,11 @@ def loose_from(results: Results) -> float | None:
     still holds.
 
     Once slipped, a joint counts as slipped. Seen at the integration points of every step, or at the
-    nodes of the last requested level.
+    nodes of the last requested level. A bond does not harden: where all of it slips there is no
+    equilibrium, and a dam that has come to rest stands on friction.
     """
+    if results.case["law"] == "bond":
+        return None
     history, base = results.history, results.case["dam_base"]
     gone = np.maximum(history["slip_length"], history["crack_length"]) > base * (1 - 1e-9)
     if gone.any() and gone[-1]:
@@ -56,8 +59,8 @@ def why_stopped(results: Results) -> str:
 
     Overturning: the crack has crossed most of the base, or the resultant is in its last tenth.
     Sliding: the shear is within 2 % of what the joint can hold, T <= mu N + c L + H (mean slip) L
-    (N holds the tension c/mu of open points, so that c acts on all of L); or the whole joint has
-    let go.
+    (N holds the tension c/mu of open points, so that c acts on all of L), for a bond beyond what
+    remains once it has gone, mu N; or the whole joint has let go.
     """
     case, last = results.case, results.last
     base = case["dam_base"]
@@ -68,6 +71,8 @@ def why_stopped(results: Results) -> str:
         holds = case["mu"] * last["N"] + case["adhesion"] * base + hardened
         if last["T"] > 0.98 * holds:
             return "sliding"
+    if case["law"] == "bond" and last["T"] > 0.98 * case["mu"] * last["N"]:
+        return "sliding"
     return "sliding" if last["slip_length"] > 0.98 * base else "no convergence"
 
 
@@ -103,14 +108,35 @@ def statement(results: Results) -> str:
     )
 
 
-def stiff_joint(results: Results) -> str:
-    """A hint, if the joint is too stiff for its elements."""
+#: K_N h/E beyond which node stresses oscillate.
+STIFF = 100
+
+
+def stiffness_ratio(results: Results) -> float:
+    """K_N h/E: the joint's stiffness over that of the bulk within an element's length h."""
     case = results.case
-    stiff = case["K_N"] * case["dam_base"] / case["n_joint"] / min(case["E_dam"], case["E_found"])
-    if stiff < 100:
+    length = case["dam_base"] / case["n_joint"]
+    return case["K_N"] * length / min(case["E_dam"], case["E_found"])
+
+
+def stiff_joint(results: Results) -> str:
+    """A hint to a run that has not converged, if the joint is too stiff for its elements."""
+    ratio = stiffness_ratio(results)
+    if ratio < STIFF:
         return ""
-    why = f"the joint is too stiff for this mesh: K_N h/E = {stiff:.3g}"
+    why = f"the joint is too stiff for this mesh: K_N h/E = {ratio:.3g}"
     return f" ({why}; refine n_joint or lower K_N)"
+
+
+def hints(results: Results) -> list[str]:
+    """What an engineer should know of a result besides its verdict."""
+    found, ratio = [], stiffness_ratio(results)
+    if ratio >= STIFF:
+        found.append(
+            f"K_N h/E = {ratio:.3g}: the joint is stiff for this mesh, its node stresses oscillate "
+            "(N, T, M do not): refine n_joint or lower K_N"
+        )
+    return found
 
 
 def path_statement(results: Results) -> str:

@@ -163,6 +163,7 @@ def load(
     checked = {name: known[name].check(value) for name, value in overrides.items()}
     text = assignments(said.defaults | checked)
     found = parse(text + "".join(listing(n, v) for n, v in lists.items()) + include())
+    check_energies(found)
     values = {name: known[name].check(found[name][0]) for name in known}
     heights = check_levels("levels", found["levels"], values)
     if tail_levels is not None:
@@ -176,6 +177,7 @@ def load(
         raise InputError(
             f"tail_levels = {told}{whose}: must be one level or as many as levels ({len(heights)})"
         )
+    check_drains(values)
     times = tuple(found["times"])
     if steps is not None:
         times = tuple(i + (k + 1) / steps for i in range(len(heights)) for k in range(steps))
@@ -202,6 +204,47 @@ def load(
         bool(found["hardening_asked"][0]),
         shared,
     )
+
+
+def check_energies(found: Mapping[str, list]) -> None:
+    """Raise InputError if a fracture energy is given twice, or too small for the joint's stiffness:
+    a point would snap back.
+    """
+    law, values = found["law"][0], {n: v[0] for n, v in found.items() if v}
+    if values["softening_twice"]:
+        raise InputError(
+            f"G_f, pena_rupture = {values['G_f']:g}, {values['pena_rupture']:g}: must be one of "
+            "them, the other -1 (G_f = sigma_max^2 (1 + pena_rupture) / (2 K_N))"
+        )
+    elastic = {
+        "G_f": (
+            law != "friction",
+            values["sigma_max"] ** 2 / (2 * values["K_N"]),
+            "sigma_max^2/(2 K_N)",
+        ),
+        "G_t": (law == "bond", values["adhesion"] ** 2 / (2 * values["K_T"]), "adhesion^2/(2 K_T)"),
+    }
+    for name, (matters, least, formula) in elastic.items():
+        if matters and not values[name] > least:
+            raise InputError(
+                f"{name} = {values[name]:g}: must be > {least:.4g} N/m ({formula}, what the joint "
+                "stores before it softens)"
+            )
+
+
+def check_drains(values: Mapping) -> None:
+    """Raise InputError if the drains are not under the dam, or do not suit a driven scene."""
+    if values["uplift"] != "drained":
+        return
+    if not values["drain_x"] < values["dam_base"]:
+        raise InputError(
+            f"drain_x = {values['drain_x']:g}: must be < dam_base ({values['dam_base']:g} m)"
+        )
+    if values["drive"] != "level" and values["drain_level"] > 0:
+        raise InputError(
+            f"drain_level = {values['drain_level']:g}: must be 0 with drive = {values['drive']} "
+            "(the pressure has to be linear in the level)"
+        )
 
 
 def numbers(name: str, text: str) -> list[float]:

@@ -80,8 +80,11 @@ def keep(made: Condensed, header: str, path: Path) -> None:
     part = path.with_suffix(f".{os.getpid()}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with part.open("wb") as file:
-            np.savez(file, header=np.array(header), **packed(made))
+        # as numpy.savez does it, but closed also where the disk is full
+        with zipfile.ZipFile(part, "w") as file:
+            for name, array in {"header": np.array(header), **packed(made)}.items():
+                with file.open(f"{name}.npy", "w", force_zip64=True) as entry:
+                    np.lib.format.write_array(entry, array, allow_pickle=False)
         part.replace(path)
         prune(path.parent)
     except OSError:

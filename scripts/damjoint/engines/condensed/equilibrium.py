@@ -81,9 +81,31 @@ class Joint:
         factor = self.unit_weight * points.weights * (a + b * y)
         return points.values.T @ (factor * pressure), points.values.T @ (factor * slope)
 
-    def linear_pressure(self, x: np.ndarray, level: float, tail: float) -> np.ndarray:
-        """Pressure linear from heel to toe [Pa]."""
-        return self.unit_weight * (level + (tail - level) * x / self.bulk.base)
+    def drains(self, level: float, tail: float) -> tuple[float, float, float]:
+        """Where the drains are [m], the head there [m], and its derivative with the level.
+
+        Without drains: the middle of a line from heel to toe. Else they take away their part of the
+        head above their outlet or the tailwater (EM 1110-2-2200).
+        """
+        case, base = self.case, self.bulk.base
+        if case["uplift"] != "drained":
+            return base / 2, (level + tail) / 2, 0.5
+        x, left = case["drain_x"], 1 - case["drain_effectiveness"]
+        head, rate = level + (tail - level) * x / base, 1 - x / base
+        outlet = max(case["drain_level"], tail)
+        if head <= outlet:
+            return x, head, rate
+        return x, outlet + left * (head - outlet), left * rate
+
+    def imposed_pressure(self, x: np.ndarray, level: float, tail: float) -> np.ndarray:
+        """Pressure imposed in the joint [Pa]: linear from heel to drains to toe."""
+        at, head, _ = self.drains(level, tail)
+        return self.unit_weight * np.interp(x, (0, at, self.bulk.base), (level, head, tail))
+
+    def imposed_rate(self, x: np.ndarray, level: float, tail: float) -> np.ndarray:
+        """Its derivative with the level [Pa/m]."""
+        at, _, rate = self.drains(level, tail)
+        return self.unit_weight * np.interp(x, (0, at, self.bulk.base), (1, rate, 0))
 
     def loads(self, level: float, tail: float) -> tuple[np.ndarray, np.ndarray]:
         """t_0 and the imposed part of the water in the joint together (j,), and their derivative
@@ -102,8 +124,8 @@ class Joint:
             total = total + bulk.pressure["downstream"] @ self.face_forces("downstream", tail)[0]
         if self.wet:
             w, x = interface.water_points.weights, interface.water_points.positions[:, 0]
-            total = total + interface.water.T @ (w * self.linear_pressure(x, level, tail))
-            rate = rate + interface.water.T @ (w * self.unit_weight * (1 - x / bulk.base))
+            total = total + interface.water.T @ (w * self.imposed_pressure(x, level, tail))
+            rate = rate + interface.water.T @ (w * self.imposed_rate(x, level, tail))
         self.known_loads = (level, tail), (total, rate)
         return total, rate
 
@@ -156,7 +178,7 @@ class Joint:
         here = [interface.points.positions, interface.water_points.positions, place]
         if not self.wet:
             return Pressure(*(np.zeros(len(x)) for x in here))
-        found = [self.linear_pressure(x[:, 0], level, tail) for x in here]
+        found = [self.imposed_pressure(x[:, 0], level, tail) for x in here]
         if not self.flowing:
             return Pressure(*found)
         flow = interface.flow

@@ -195,4 +195,106 @@ class Friction:
         return memory.scalar > 0
 
 
-LAWS = {"rupture": Rupture, "friction": Friction}
+class Bond:
+    """A bond that breaks and slides (pro/law_bond.pro).
+
+    Memory: the damage D of tension and cohesion, and the slip.
+    """
+
+    def __init__(self, case: Case) -> None:
+        self.K_N, self.K_T = case["K_N"], case["K_T"]
+        self.strength, self.cohesion, self.mu = case["sigma_max"], case["adhesion"], case["mu"]
+        self.artificial = case.shared["artificial"][0]
+        self.delta_e = self.strength / self.K_N
+        self.delta_c = 2 * case["G_f"] / (self.strength or self.cohesion or 1.0)
+        self.per_slip = self.cohesion / (2 * case["G_t"])
+        self.K_soft = self.K_T - self.cohesion * self.per_slip
+
+    def start(self, points: int) -> Memory:
+        """The virgin joint."""
+        return Memory(np.zeros(points), np.zeros((points, 2)))
+
+    def opened(self, opening: np.ndarray, damage: np.ndarray) -> np.ndarray:
+        """Damage by the opening."""
+        share = (opening - self.delta_e) / (self.delta_c - self.delta_e)
+        return np.maximum(damage, np.clip(share, 0, 1))
+
+    def trial(self, jump: np.ndarray, memory: Memory) -> tuple[np.ndarray, ...]:
+        """Size and direction of the elastic shear stress, damage by the opening, slip of this step,
+        new damage, and whether the bond is gone.
+        """
+        shear = self.K_T * (jump[:, 1:] - memory.vector)
+        size = np.linalg.norm(shear, axis=1)
+        excess = size + self.mu * self.K_N * np.minimum(jump[:, 0], 0)
+        opened = self.opened(jump[:, 0], memory.scalar)
+        softened = np.maximum((excess - self.cohesion * (1 - opened)) / self.K_soft, 0)
+        gone = opened + self.per_slip * softened >= 1
+        slip = np.where(gone, np.maximum(excess / self.K_T, 0), softened)
+        damage = np.where(gone, 1.0, opened + self.per_slip * softened)
+        return size, shear / np.maximum(size, 1e-300)[:, None], opened, slip, damage, gone
+
+    def back(self, damage: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Slope of the line to the origin in tension, and its derivative with the damage."""
+        if not self.strength:
+            return np.zeros_like(damage), np.zeros_like(damage)
+        kappa = self.delta_e + damage * (self.delta_c - self.delta_e)
+        return self.strength * (1 - damage) / kappa, -self.strength * self.delta_c / kappa**2
+
+    def respond(
+        self, jump: np.ndarray, memory: Memory, secant: bool = False
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Traction and (unsymmetric) tangent; secant: a positive stiffness that never softens."""
+        size, n, opened, slip, damage, gone = self.trial(jump, memory)
+        opening, sliding = jump[:, 0], slip > 0
+        closed = opening <= 0
+        slope, d_slope = self.back(damage)
+        normal = np.where(closed, self.K_N, slope) * opening
+        traction = np.column_stack([normal, (size - self.K_T * slip)[:, None] * n])
+        left = 1 - self.K_T * slip / np.maximum(size, 1e-300)
+        tangent = np.zeros((len(jump), 3, 3))
+        weak = self.artificial * self.K_N
+        if secant:
+            tangent[:, 0, 0] = np.where(closed, self.K_N, np.maximum(slope, weak))
+            shear = self.K_T * np.maximum(left, self.artificial)
+            tangent[:, 1, 1] = tangent[:, 2, 2] = shear
+            return traction, tangent
+        growing = (opened > memory.scalar) & (opened < 1)
+        d_opened = np.where(growing, 1 / (self.delta_c - self.delta_e), 0)
+        pressing = self.mu * self.K_N * (opening < 0)
+        with_size = np.where(gone, 1.0, self.K_T / self.K_soft) * sliding
+        softening = (pressing + self.cohesion * d_opened) / self.K_soft
+        with_opening = np.where(gone, pressing / self.K_T, softening) * sliding
+        d_damage = np.where(gone, 0, d_opened + self.per_slip * with_opening)
+        open_stiffness = slope + opening * d_slope * d_damage
+        broken = (damage >= 1) | (self.strength == 0)
+        tangent[:, 0, 0] = np.select([closed, broken], [self.K_N, weak], open_stiffness)
+        by_slip = opening * d_slope * np.where(gone, 0, self.per_slip * with_size)
+        tangent[:, 0, 1:] = np.where(closed | broken, 0, by_slip)[:, None] * n
+        tangent[:, 1:, 0] = (-self.K_T * with_opening)[:, None] * n
+        outer, eye = n[:, :, None] * n[:, None, :], np.eye(2)
+        tangent[:, 1:, 1:] = self.K_T * (
+            left[:, None, None] * (eye - outer)
+            + (1 - with_size)[:, None, None] * outer
+            + self.artificial * eye
+        )
+        return traction, tangent
+
+    def remember(self, jump: np.ndarray, memory: Memory) -> Memory:
+        """The memory after convergence."""
+        _, n, _, slip, damage, _ = self.trial(jump, memory)
+        return Memory(damage, memory.vector + slip[:, None] * n)
+
+    def damage(self, jump: np.ndarray, memory: Memory) -> np.ndarray:
+        """0 virgin to 1 broken."""
+        return memory.scalar
+
+    def open(self, jump: np.ndarray, memory: Memory) -> np.ndarray:
+        """Whether the point is open and its bond gone."""
+        return (jump[:, 0] > 0) & ((memory.scalar >= 1) | (self.strength == 0))
+
+    def slid(self, jump: np.ndarray, memory: Memory) -> np.ndarray:
+        """Whether the point has slipped."""
+        return np.linalg.norm(memory.vector, axis=1) > 0
+
+
+LAWS = {"rupture": Rupture, "friction": Friction, "bond": Bond}

@@ -16,6 +16,7 @@ from . import process
 MEMORY = {
     "rupture": ("kappa", "released_1", "released_2"),
     "friction": ("lambda", "slip_1", "slip_2"),
+    "bond": ("D", "slip_1", "slip_2"),
 }
 
 #: GetDP wants a mesh: one line, in the region JOINT (3).
@@ -39,8 +40,9 @@ def evaluate(
 ) -> dict[str, np.ndarray]:
     """The law along a path.
 
-    law: rupture or friction; jumps: (n, 3) delta_n, delta_t1, delta_t2 [m], each row one converged
-    step from the virgin state on; pressure: (n,) [Pa], 0 by default; settings: {parameter: value}.
+    law: rupture, friction or bond; jumps: (n, 3) delta_n, delta_t1, delta_t2 [m], each row one
+    converged step from the virgin state on; pressure: (n,) [Pa], 0 by default; settings:
+    {parameter: value}.
     Returns columns sigma_n (total), tau_1, tau_2 [Pa] and the law's state. Raises InputError,
     RunError.
     """

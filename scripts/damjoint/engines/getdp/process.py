@@ -140,8 +140,8 @@ def fill(
     problem = write_problem(case, folder, {"views": 0.0, "fields": float(fields)})
 
     def watch(line: str) -> None:
-        if line.startswith("step "):
-            on_step(float(line.split()[1]))
+        if match := re.match(r"step ([\d.e+-]+) ", line):
+            on_step(float(match[1]))
 
     threads = 1 if case["dim"] == 2 else 2
     return execute(problem, ["-msh", str(mesh), "-solve", "Fill"], threads, watch)

@@ -1,0 +1,69 @@
+"""A case file to begin with: the 45 m dam of the defaults, every parameter with its meaning."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from .. import InputError
+from .parameters import Parameter, declared
+
+HEAD = """// {name} - a dam on rock. It runs as it is: damjoint run {name}
+// Change what is yours. Lines that begin with // are the other parameters at their defaults; -1
+// stands for "follows others", told behind it. Everything is SI.
+
+title = "{title}";
+
+// Reservoir and tailwater [m above the joint], reached at t = 1, 2, ... from 0; they may go down.
+levels() = {{30, 40, 45}};
+tail_levels() = {{0, 0, 3}};
+"""
+
+#: What most dams have to change.
+COMMON = (
+    *("law", "uplift", "dam_base", "dam_crest", "dam_height", "E_dam", "E_found", "nu", "rho_dam"),
+    *("K_N", "K_T", "sigma_max", "mu", "adhesion", "G_f"),
+)
+
+
+def line(parameter: Parameter, value: str) -> str:
+    """A statement with the parameter's meaning behind it; a comment unless it is a common one."""
+    value = f'"{value}"' if parameter.text else value
+    about = parameter.meaning + (f"; {parameter.matters}" if parameter.matters else "")
+    if parameter.follows:
+        about += f"; -1: {parameter.follows}"
+    if parameter.choices:
+        about += f"; {parameter.allowed()}"
+    mark = "" if parameter.name in COMMON else "// "
+    return f"{mark}default_{parameter.name} = {value};  // {about}"
+
+
+#: Values of the example that the defaults leave to others.
+EXAMPLE = {"E_dam": "2.5e10", "E_found": "2.5e10", "G_f": "100"}
+
+
+def text(name: str, title: str) -> str:
+    """The whole file."""
+    lines, group = [HEAD.format(name=name, title=title)], ""
+    for parameter in declared().values():
+        if parameter.group != group:
+            group = parameter.group
+            lines.append(f"\n// {group}")
+        lines.append(line(parameter, EXAMPLE.get(parameter.name, parameter.default)))
+    return "\n".join(lines) + "\n"
+
+
+def write(path: Path) -> None:
+    """Write the file.
+
+    Raises InputError if the path is taken, does not end in .case, or can not be written.
+    """
+    if path.suffix != ".case":
+        raise InputError(f"new = {path}: must end in .case")
+    if path.exists():
+        raise InputError(f"new = {path}: must not exist yet")
+    try:
+        title = re.sub(r'["\\\n]', "'", path.stem)
+        path.write_text(text(re.sub(r"\s", " ", path.name), title), encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"new = {path}: {error}") from None
