@@ -259,6 +259,10 @@ def show_maps(gallery: Gallery, deformed: Deformed) -> None:
         gallery.add(name, pieces, colors, **scale_at(i + 1), **whole, Light=0)
 
 
+#: The name of curves of earlier runs.
+BEFORE = "before"
+
+
 @dataclass
 class Curve:
     """A line of a graph: x (n,), y (steps, n)."""
@@ -289,7 +293,7 @@ def show_curves(graphs: Graphs, scene: Scene, before: Sequence[Scene]) -> None:
             Curve(name, rows[0]["x"], np.array([r[column] for r in rows]), color)
             for name, column, color in parts
         ]
-        curves += [Curve("before", old["x"], old[first][None], GREY) for old in olds]
+        curves += [Curve(BEFORE, old["x"], old[first][None], GREY) for old in olds]
         graphs.add(title, units, "x [m], heel to toe", curves)
 
 
@@ -307,7 +311,7 @@ def show_history(graphs: Graphs, scene: Scene, before: Sequence[Scene]) -> None:
             history = other.result.history
             x = other.result.heel if driven and column == "max_opening" else history[column]
             if len(x):
-                name, kind = ("", color) if other is scene else ("before", GREY)
+                name, kind = ("", color) if other is scene else (BEFORE, GREY)
                 curves.append(Curve(name, x, history["level"][None], kind))
         length, factor = unit([curve.x for curve in curves], units)
         for curve in curves:
@@ -337,11 +341,11 @@ class Graphs:
         x = -GRAPH_PITCH[0] * (2 - self.count % 2) + 70
         y = 40 + GRAPH_PITCH[1] * (self.count // 2)
         self.count += 1
-        for i, curve in enumerate(curves):
+        main = curves[0]
+        curves = sorted(curves, key=lambda curve: curve.name != BEFORE)  # drawn below the others
+        for curve in curves:
             tag = self.gallery.add(
-                f"{title}{', ' if curve.name else ''}{curve.name} [{name}]"
-                if i
-                else f"{title} [{name}]",
+                f"{title} [{name}]" if curve is main else f"{title}, {curve.name} [{name}]",
                 [pieces_of(curve, factor, x_range, 2 * high - low + 1)],
                 [curve.color],
                 Type=4,
@@ -354,15 +358,16 @@ class Graphs:
                 CustomMin=low,
                 CustomMax=high,
                 NbIso=4,
-                Axes=0 if i else 3,
+                Axes=3 if curve is main else 0,
                 LineWidth=2,
                 IntervalsType=3 if points else 2,
                 AxesTicsX=3,
             )
+            gmsh.view.option.setColor(tag, "Background2D", 255, 255, 255, 0)
             gmsh.view.option.setString(tag, "Format", "%.3g")
             gmsh.view.option.setString(tag, "AxesFormatX", "%.3g")
             gmsh.view.option.setString(tag, "AxesLabelX", x_label)
-        named = [i for i, curve in enumerate(curves) if curve.name not in ("", "before")]
+        named = [i for i, curve in enumerate(curves) if curve.name not in ("", BEFORE)]
         for line, i in enumerate(named if len(named) > 1 else ()):
             place = x + GRAPH_SIZE[0] - 60, y - 22 + 14 * line
             label(self.gallery.tags[i - len(curves)], *place, [curves[i].name], 12)
