@@ -1,4 +1,4 @@
-"""The command line: damjoint new | run | validate | sweep | bench | law."""
+"""The command line: damjoint new | run | gui | validate | sweep | bench | law."""
 
 from __future__ import annotations
 
@@ -63,6 +63,10 @@ def parser() -> argparse.ArgumentParser:
     add("--no-picture", action="store_true", help="no PNG")
     add("--engine", default="auto", help=of_engine)
     run.set_defaults(call=do_run)
+
+    window = commands.add_parser("gui", parents=[settings], help="a case in Gmsh's window")
+    window.add_argument("case", nargs="?", default="dam", help=of_case)
+    window.set_defaults(call=do_gui)
 
     new = commands.add_parser("new", help="write a commented case file to begin with")
     new.add_argument("path", type=Path, metavar="MY.case", help="the file to write")
@@ -156,6 +160,16 @@ def do_run(arguments: argparse.Namespace) -> int:
             print(said)
         code = max(code, int(failed(result)))
     return code
+
+
+def do_gui(arguments: argparse.Namespace) -> int:
+    """Damjoint gui; 0 when the window is closed."""
+    from .scene import parameters
+    from .window.sheet import Request
+    from .window.window import gui
+
+    gui(Request(arguments.case, parameters.settings(arguments.settings)))
+    return 0
 
 
 def warn_if_slow() -> None:

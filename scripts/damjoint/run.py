@@ -75,20 +75,35 @@ def run(
 
     for outcome in solve(case, engine, on_step, fields or picture):
         take_folder()
-        folder = folders.scene_folder(case, outcome.result.case, out)
-        folder.mkdir(exist_ok=True)
-        save(outcome, folder)
+        save(outcome, case, out)
         found.append(outcome)
         if outcome.error:
             raise outcome.error
     bar.bar.close()
     for outcome in found if fields or picture else []:
-        finish(outcome, folders.scene_folder(case, outcome.result.case, out), fields, picture)
+        finish(outcome, case, out, fields, picture)
     return [outcome.result for outcome in found]
 
 
-def save(outcome: Outcome, folder: Path) -> None:
-    """Write the tables of a scene, and run.json with what it took."""
+def keep(case: Case, outcomes: list[Outcome], out: Path) -> None:
+    """
+    Write outcomes of a case below out as `run` does, in place of an earlier run's.
+
+    Raises InputError if out can not be written.
+    """
+    folders.check_writable(out)
+    folders.clear(out)
+    folders.begin(case, out)
+    for outcome in outcomes:
+        save(outcome, case, out)
+    for outcome in outcomes:
+        finish(outcome, case, out, fields=True, picture=True)
+
+
+def save(outcome: Outcome, case: Case, out: Path) -> None:
+    """Write the tables of a scene of a case below out, and run.json with what it took."""
+    folder = folders.scene_folder(case, outcome.result.case, out)
+    folder.mkdir(exist_ok=True)
     start, result = time.perf_counter(), outcome.result
     tables.write(result, folder)
     result.info["wall_seconds"]["post"] = time.perf_counter() - start
@@ -98,15 +113,20 @@ def save(outcome: Outcome, folder: Path) -> None:
         versions["getdp"] = plain["version"]
     memory = max(peak_memory(), plain.get("peak_memory_mb") or 0.0)
     result.info |= {"peak_memory_mb": round(memory, 1), "versions": versions}
-    state = ""
-    if outcome.error:
-        state = "failed" if isinstance(outcome.error, Exception) else "interrupted"
-    folders.write_info(result, folder, state)
+    folders.write_info(result, folder, ended(outcome))
 
 
-def finish(outcome: Outcome, folder: Path, fields: bool, picture: bool) -> None:
+def ended(outcome: Outcome) -> str:
+    """How a scene ended before its time: failed or interrupted; empty if it did not."""
+    if not outcome.error:
+        return ""
+    return "failed" if isinstance(outcome.error, Exception) else "interrupted"
+
+
+def finish(outcome: Outcome, case: Case, out: Path, fields: bool, picture: bool) -> None:
     """Write fields and picture of a scene, and the time that all writing took."""
     start, result = time.perf_counter(), outcome.result
+    folder = folders.scene_folder(case, result.case, out)
     at = outcome.fields()
     if fields:
         from .results.field_files import write_fields
@@ -117,7 +137,7 @@ def finish(outcome: Outcome, folder: Path, fields: bool, picture: bool) -> None:
 
         draw(result, outcome.mesh(), at, folder)
     result.info["wall_seconds"]["post"] += time.perf_counter() - start
-    folders.write_info(result, folder)
+    folders.write_info(result, folder, ended(outcome))
 
 
 def peak_memory() -> float:

@@ -9,7 +9,7 @@ from damjoint import pages
 
 PACKAGE = Path(damjoint.__file__).parent
 #: Each part uses only those before it.
-PARTS = ["", "scene", "results", "engines", "run", "studies", "pages", "cli"]
+PARTS = ["", "scene", "results", "engines", "run", "studies", "pages", "window", "cli"]
 
 
 def part_of(path):

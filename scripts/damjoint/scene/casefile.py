@@ -20,7 +20,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from .. import InputError
-from .parameters import parameter
+from .parameters import assignments, parameter
 
 LISTS = ("levels", "tail_levels", "times")
 TEXTS = ("title", "also_uplift")
@@ -61,6 +61,15 @@ def read(path: Path) -> CaseText:
     found = CaseText()
     read_into(found, path, 0)
     return found
+
+
+def written(said: CaseText) -> str:
+    """The text of a case file that says the same: `read` gives it back."""
+    lines = [f'{name} = "{words}";\n' for name, words in said.texts.items()]
+    lists = [
+        f"{name}() = {{{', '.join(map(repr, values))}}};\n" for name, values in said.lists.items()
+    ]
+    return "".join([*lines, assignments(said.defaults), *lists])
 
 
 def read_into(found: CaseText, path: Path, depth: int) -> None:

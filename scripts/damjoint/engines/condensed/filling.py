@@ -70,9 +70,14 @@ class Filling:
                 self.reach(target)
                 if target in self.case.requested and not self.stopped:
                     self.record.save(self.state)
-        if self.stopped and self.state.time > 0 and self.record.saved_until < self.state.time:
-            self.record.save(self.state)
+        if self.stopped:
+            self.keep_last()
         return self.results()
+
+    def keep_last(self) -> None:
+        """Make a table of the last converged state, if there is none yet."""
+        if self.state.time > 0 and self.record.saved_until < self.state.time:
+            self.record.save(self.state)
 
     def reach(self, target: float) -> None:
         """Steps up to a time; a step that fails is cut, the next ones grow back."""

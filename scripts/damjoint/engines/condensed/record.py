@@ -69,6 +69,11 @@ class Record:
         """The time of the last table."""
         return self.saved[-1].time if self.saved else 0.0
 
+    def complete(self, state: State) -> bool:
+        """Whether the row of a state is there, and whole: an interruption can come at any time."""
+        whole = len({len(values) for values in self.rows.values()}) == 1
+        return whole and self.rows["time"][-1:] == [state.time]
+
     def add(self, state: State, iterations: int, cuts: int, residual: float) -> None:
         """The row of a converged step."""
         joint, law, interface = self.joint, self.joint.law, self.joint.interface

@@ -49,6 +49,8 @@ def solve(case: Case, on_step: OnStep, _fields: bool) -> Iterator[Outcome]:
                 fillings[-1].run()
             except BaseException as caught:  # an interruption, too: what has converged is a result
                 error = caught
+                if fillings[-1].record.complete(fillings[-1].state):
+                    fillings[-1].keep_last()
             result = fillings[-1].results()
             result.info = {
                 "engine": "condensed",
