@@ -126,7 +126,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 def do_run(arguments: argparse.Namespace) -> int:
-    """Damjoint run; 0, or 1 if the dam does not stand or the run stopped before its last level."""
+    """damjoint run; 0, or 1 if the dam does not stand or the run stopped before its last level."""
     from .results.verdict import failed, hints, path_statement, statement
     from .run import run
     from .scene import parameters
@@ -163,7 +163,7 @@ def do_run(arguments: argparse.Namespace) -> int:
 
 
 def do_gui(arguments: argparse.Namespace) -> int:
-    """Damjoint gui; 0 when the window is closed."""
+    """damjoint gui; 0 when the window is closed."""
     from .scene import parameters
     from .window.sheet import Request
     from .window.window import gui
@@ -194,7 +194,7 @@ def do_new(arguments: argparse.Namespace) -> int:
 
 
 def do_validate(arguments: argparse.Namespace) -> int:
-    """Damjoint validate; 1 if a row fails."""
+    """damjoint validate; 1 if a row fails."""
     from .results import validation
     from .results.verdict import statement
     from .run import run
@@ -217,7 +217,7 @@ def do_validate(arguments: argparse.Namespace) -> int:
 
 
 def do_sweep(arguments: argparse.Namespace) -> int:
-    """Damjoint sweep."""
+    """damjoint sweep."""
     from .scene import parameters
     from .studies.sweep import sweep
 
@@ -231,7 +231,7 @@ def do_sweep(arguments: argparse.Namespace) -> int:
 
 
 def do_bench(arguments: argparse.Namespace) -> int:
-    """Damjoint bench."""
+    """damjoint bench."""
     from .studies.bench_page import bench
 
     bench(arguments.out, arguments.short)
@@ -239,7 +239,7 @@ def do_bench(arguments: argparse.Namespace) -> int:
 
 
 def do_law(arguments: argparse.Namespace) -> int:
-    """Damjoint law."""
+    """damjoint law."""
     from .scene import parameters
     from .studies import law_path
 

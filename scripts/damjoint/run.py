@@ -86,8 +86,7 @@ def run(
 
 
 def keep(case: Case, outcomes: list[Outcome], out: Path) -> None:
-    """
-    Write outcomes of a case below out as `run` does, in place of an earlier run's.
+    """Write outcomes of a case below out as `run` does, in place of an earlier run's.
 
     Raises InputError if out can not be written.
     """

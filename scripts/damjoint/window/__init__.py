@@ -1,5 +1,4 @@
-"""
-The Gmsh window: damjoint gui.
+"""The Gmsh window: damjoint gui.
 
 sheet.py    what a request from the window comes to: the case, and its ONELAB parameters
 tree.py     the ONELAB tree: parameters, choices and results shown in it; what the user asks for

@@ -1,5 +1,4 @@
-"""
-The deformed scene as lines and faces, step by step.
+"""The deformed scene as lines and faces, step by step.
 
 All of it is meant to be shown as displaced by one factor: what has no displacement of its own
 (water, marks that come and go) is given the one that brings it to its place.

@@ -1,5 +1,4 @@
-"""
-Results as Gmsh views: list data with a step per requested level, so that Gmsh's arrows play the
+"""Results as Gmsh views: list data with a step per requested level, so that Gmsh's arrows play the
 filling.
 
 Works on the current Gmsh session, with or without a window.

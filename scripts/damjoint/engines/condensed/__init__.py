@@ -1,11 +1,12 @@
-"""The condensed engine: the elastic bodies are eliminated once, the loading is followed on the
-joint alone.
+"""The condensed engine: bodies eliminated once, the loading followed on the joint alone.
 
-elements.py, elasticity.py  finite elements: functions, rules, stiffness, stress factor.py
-factorisation of large sparse matrices bulk.py, cache.py           both bodies eliminated, and kept
-on disk interface.py, flow.py       the joint's interpolations and linear systems; water that flows
-in it laws.py                     the joint laws of pro/law_*.pro, many points at once
-equilibrium.py, newton.py   residual and tangent; Newton's method filling.py, record.py       the
-loading followed step by step; what is kept of a step recover.py                  the bodies'
-displacement and stress, from the joint's solve.py                    the interface to the rest
+elements.py, elasticity.py  finite elements: functions, rules, stiffness, stress
+factor.py                   factorisation of large sparse matrices
+bulk.py, cache.py           both bodies eliminated, and kept on disk
+interface.py, flow.py       the joint's interpolations and linear systems; water that flows in it
+laws.py                     the joint laws of pro/law_*.pro, many points at once
+equilibrium.py, newton.py   residual and tangent; Newton's method
+filling.py, record.py       the loading followed step by step; what is kept of a step
+recover.py                  the bodies' displacement and stress, from the joint's
+solve.py                    the interface to the rest
 """
