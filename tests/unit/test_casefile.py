@@ -125,3 +125,10 @@ def test_defaults_are_a_real_dam():
     assert case.levels[-1] == 45
     taller = load("dam", {"dam_height": 60.0, "E": 3e10})
     assert taller["found_depth"] == 120 and taller["E_found"] == 3e10 and taller.levels[-1] == 60
+
+
+def test_what_is_written_is_read_again(tmp_path):
+    said = casefile.read(CASES / "k.case")
+    said.defaults |= {"law": "friction", "drive_by": 1 / 3}
+    (tmp_path / "again.case").write_text(casefile.written(said))
+    assert casefile.read(tmp_path / "again.case") == said

@@ -361,5 +361,7 @@ def gui(request: Request) -> None:
                 session.turn()
             except Exception as error:  # whatever it is, the window stays
                 session.on_failed(f"{type(error).__name__}: {error}")
+    except KeyboardInterrupt:
+        pass  # Ctrl-C in the terminal closes the window, too
     finally:
         session.close()
