@@ -46,6 +46,26 @@ def press_run(folder, changed):
     return np.array((folder / "res/a/history.txt").read_text().split("step")[-1].split(), float)
 
 
+@pytest.mark.parametrize(
+    "words, said",
+    [
+        ("level_2 10.5", "Level 2 = 10.5 m: must be between 0 and the crest (10 m)"),
+        ("tail_level_1 -3", "Tailwater at level 1 = -3 m: must be between 0 and the crest (10 m)"),
+        ("dam_height 8", "Level 4 = 9 m: must be between 0 and the crest (8 m)"),
+    ],
+)
+def test_impossible_levels_are_told_before_anything_runs(plain, words, said):
+    """In Gmsh and in GetDP: one line with the level, its value and what is allowed."""
+    gmsh_command = [sys.executable, "-c", GMSH, str(plain / "a.geo"), "-", "-v", "2"]
+    for command in (gmsh_command, [find_getdp(), str(plain / "a.pro"), "-v", "2"]):
+        done = subprocess.run(
+            [*command, "-setnumber", *words.split()], capture_output=True, text=True, check=False
+        )
+        lines = [line for line in (done.stdout + done.stderr).splitlines() if line.strip()]
+        assert len(lines) == 1 and said in lines[0]
+    assert done.returncode and not (plain / "res").exists()
+
+
 CHANGES = (
     COARSE | {"uplift": "none"},
     {"E": 3e11},
@@ -112,9 +132,9 @@ def window(plain, tmp_path):
     opened = [screen]
     sizes = {"GraphicsWidth": 1200, "GraphicsHeight": 800, "MenuWidth": 330}
     places = {"GraphicsPositionX": 0, "GraphicsPositionY": 0}
-    options = [f"-setnumber General.{n} {v}".split() for n, v in (sizes | places).items()]
     command = [sys.executable, "-c", GMSH, "-setstring", "Solver.Executable0", find_getdp()]
-    command += sum(options, [])
+    for name, value in (sizes | places).items():
+        command += ["-setnumber", f"General.{name}", str(value)]
 
     def open_window(*arguments):
         opened.append(
