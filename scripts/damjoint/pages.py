@@ -37,7 +37,8 @@ def parameters_page() -> str:
         "(`--levels`) [m above the joint], level number i being reached at t = i, from 0 at t = 0; "
         "`tail_levels()` (`--tail-levels`) likewise, one value for all or as many as levels; "
         "`times()` (`--steps` between two levels) the converged steps. Default: two thirds and "
-        "eight ninths of the height, and the crest.",
+        "eight ninths of the height, and the crest. The Gmsh window has them as numbers, in the "
+        "group Water levels.",
     ]
     groups: dict[str, list[tuple]] = {}
     for parameter in declared().values():

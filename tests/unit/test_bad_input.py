@@ -88,6 +88,10 @@ def test_parameter_out_of_range(command, tmp_path, setting, allowed):
         ((*RUN, "--tail-levels", "-1"), ("tail_levels = -1", TO_CREST)),
         ((*RUN, "--tail-levels=-1"), ("tail_levels = -1", TO_CREST)),
         ((*RUN, "--engine", "fast"), ("engine = fast", "getdp")),
+        (
+            ("run", "f", "--engine", "getdp", "--set", "mesh_pattern=layers"),
+            ("mesh_pattern = layers", "free, split"),
+        ),
         ((*RUN, "--steps", "0"), ("steps = 0", "integer >= 1")),
         ((*RUN, "--steps", "-2"), ("steps = -2", "integer >= 1")),
         pytest.param((*RUN, "--steps", "1.5"), ("steps", "1.5", "integer >= 1")),

@@ -27,14 +27,16 @@ FILE = "00Case/1Case file"
 STATUS = "01Results/00Status"
 VERDICT = "01Results/01Verdict"
 SCENE = "01Results/02Scene shown"
-LEVELS = "Parameters/0Water levels/0Levels, reached at t = 1, 2, ... [m]"
-TAIL_LEVELS = "Parameters/0Water levels/1Tailwater, one or as many [m]"
-STEPS = "Parameters/0Water levels/2Steps between two levels"
-TIMES = "Parameters/0Water levels/3Converged steps at t"
-ACCURACY = "Parameters/2Mesh/0Accuracy"
-FOLDER = "Parameters/7Output/0Folder"
-KEEP = "Parameters/7Output/1Keep the last views for comparison"
-SAVE = "Parameters/7Output/2Save tables, fields, picture and case file"
+LEVELS = "Parameters/1Water levels/0Levels, reached at t = 1, 2, ... [m]"
+TAIL_LEVELS = "Parameters/1Water levels/1Tailwater, one or as many [m]"
+STEPS = "Parameters/1Water levels/2Steps between two levels"
+TIMES = "Parameters/1Water levels/3Converged steps at t"
+#: What the tree has of the water levels.
+OF_LEVELS = (LEVELS, TAIL_LEVELS, STEPS, TIMES)
+ACCURACY = "Parameters/3Mesh/0Accuracy"
+FOLDER = "Parameters/8Output/0Folder"
+KEEP = "Parameters/8Output/1Keep the last views for comparison"
+SAVE = "Parameters/8Output/2Save tables, fields, picture and case file"
 
 #: The action that its button tells; Gmsh's own "save" is of the database.
 SAVE_ACTION = "save results"
@@ -307,3 +309,12 @@ def chosen_scene(scenes: list[Scene]) -> int:
     modes = [scene.result.case["uplift"] for scene in scenes]
     mode = get_text(SCENE)
     return modes.index(mode) if mode in modes else 0
+
+
+def drop_plain_levels() -> None:
+    """Drop the water levels of the plain problem definition, one entry each, which a .geo brings
+    along: here they are lists.
+    """
+    for name in gmsh.onelab.getNames("Parameters/1Water levels/.*"):
+        if name not in OF_LEVELS:
+            gmsh.onelab.clear(name)

@@ -244,6 +244,7 @@ class Session:
         name.write_text(f'{assignments(values)}Include "{data("geo")}/dam.geo";\n')
         gmsh.model.remove()
         gmsh.open(str(name))
+        tree.drop_plain_levels()
         if self.water:
             self.water.close()
         self.water = views.outline_water(case)

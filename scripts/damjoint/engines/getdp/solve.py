@@ -10,10 +10,14 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+from ... import InputError
 from ...scene.case import Case
 from ...scene.mesh import Mesh
 from .. import OnStep, Outcome
 from . import process, tables
+
+#: Patterns that pro/*.pro knows in 3D: GetDP's rules for prisms and hexahedra do not do.
+SOLID = ("free", "split")
 
 
 def solve(case: Case, on_step: OnStep, fields: bool) -> Iterator[Outcome]:
@@ -22,6 +26,11 @@ def solve(case: Case, on_step: OnStep, fields: bool) -> Iterator[Outcome]:
     See engines/__init__.py.
     """
     process.find_getdp()
+    if case["dim"] == 3 and case["mesh_pattern"] not in SOLID:
+        raise InputError(
+            f"mesh_pattern = {case['mesh_pattern']}: must be one of {', '.join(SOLID)} "
+            "with engine = getdp in 3D"
+        )
     start = time.perf_counter()
     mesh = Mesh(case)
     meshed = time.perf_counter() - start

@@ -1,0 +1,199 @@
+"""The plain problem definition in Gmsh's window: cases/*.pro with GetDP, nothing of Python."""
+
+import os
+import shutil
+import subprocess
+import sys
+import time
+
+import gmsh
+import numpy as np
+import pytest
+from damjoint import data, run
+from damjoint.engines.getdp.process import find_getdp
+from damjoint.scene.case import load
+from damjoint.scene.parameters import parameter, start_gmsh
+from matplotlib.image import imread
+
+#: Of an order 1 mesh that is solved in a second
+COARSE = {"n_joint": 20.0, "h_dam": 2.0, "h_found": 4.0}
+
+
+@pytest.fixture
+def plain(tmp_path):
+    """A copy of geo, pro and cases: a run leaves mesh and results beside the case."""
+    for name in ("geo", "pro", "cases"):
+        shutil.copytree(data(name), tmp_path / name, ignore=shutil.ignore_patterns("res"))
+    return tmp_path / "cases"
+
+
+def press_run(folder, changed):
+    """What the window does at Run, in Gmsh without a window: parameters changed in the tree, the
+    drawing made anew, meshed, GetDP as ONELAB's client. The last row of history.txt."""
+    for label, value in changed.items():
+        if isinstance(value, str):
+            gmsh.onelab.setString(label, [value])
+        else:
+            gmsh.onelab.setNumber(label, [value])
+    gmsh.clear()
+    gmsh.parser.clear()
+    gmsh.open(str(folder / "a.geo"))
+    gmsh.model.mesh.generate(2)
+    gmsh.write(str(folder / "a.msh"))
+    gmsh.onelab.run(
+        "GetDP", f"{find_getdp()} {folder / 'a.pro'} -msh {folder / 'a.msh'} -solve Fill -v 0"
+    )
+    return np.array((folder / "res/a/history.txt").read_text().split("step")[-1].split(), float)
+
+
+@pytest.mark.parametrize(
+    "words, said",
+    [
+        ("level_2 10.5", "Level 2 = 10.5 m: must be between 0 and the crest (10 m)"),
+        ("tail_level_1 -3", "Tailwater at level 1 = -3 m: must be between 0 and the crest (10 m)"),
+        ("dam_height 8", "Level 4 = 9 m: must be between 0 and the crest (8 m)"),
+    ],
+)
+def test_impossible_levels_are_told_before_anything_runs(plain, words, said):
+    """In Gmsh and in GetDP: one line with the level, its value and what is allowed."""
+    gmsh_command = [sys.executable, "-c", GMSH, str(plain / "a.geo"), "-", "-v", "2"]
+    for command in (gmsh_command, [find_getdp(), str(plain / "a.pro"), "-v", "2"]):
+        done = subprocess.run(
+            [*command, "-setnumber", *words.split()], capture_output=True, text=True, check=False
+        )
+        lines = [line for line in (done.stdout + done.stderr).splitlines() if line.strip()]
+        assert len(lines) == 1 and said in lines[0]
+    assert done.returncode and not (plain / "res").exists()
+
+
+CHANGES = (
+    COARSE | {"uplift": "none"},
+    {"E": 3e11},
+    {"E": 3e10, "nu": 0.2},
+    {"K_N": 2e11, "K_T": 3e11},
+    {"dam_height": 11.0, "dam_base": 6.0},
+    {"n_joint": 25.0},
+    {"sigma_max": 5e4},
+)
+
+
+@pytest.mark.heavy
+def test_every_change_in_the_tree_acts(plain):
+    """Changes in the tree, one run after the other, against the other engine."""
+    labels = {n: parameter(n).label for change in CHANGES for n in change}
+    start_gmsh()
+    gmsh.onelab.clear()
+    rows = [press_run(plain, {labels[n]: v for n, v in change.items()}) for change in CHANGES]
+    level = {"Parameters/1Water levels/20004Level 4 [m]": 8.5}
+    rows.append(press_run(plain, level))
+    gmsh.onelab.clear()
+    changed, levels = {}, "3,6,8,9"
+    for change, row in zip((*CHANGES, {}), rows, strict=True):
+        changed |= change
+        levels = levels if change else "3,6,8,8.5"
+        case = load("a", changed, levels)
+        expected = solved(case, plain)
+        assert row[[1, 5, 7, 8]] == pytest.approx(expected, rel=1e-6), (change, levels)
+
+
+def solved(case, folder):
+    """Level, crack length, largest opening and crest displacement of the default engine."""
+    result = run.run(case, folder / "other", fields=False, picture=False, progress=False)[0]
+    return [result.history[n][-1] for n in ("level", "crack_length", "max_opening", "crest_ux")]
+
+
+#: Gmsh's colours of the status in the tree
+GREEN, RED = (127, 218, 127), (255, 72, 63)
+
+
+@pytest.fixture
+def window(plain, tmp_path):
+    """window(*arguments): Gmsh's own window on cases/a.pro, of fixed size, on a screen of its own.
+    It gives press(): Run, until the status is there and shows; a picture."""
+    for tool in ("Xvfb", "xdotool", "import"):
+        if not shutil.which(tool):
+            pytest.skip(f"{tool} is missing (apt-get install xvfb xdotool imagemagick)")
+    read, write = os.pipe()
+    screen = subprocess.Popen(
+        ["Xvfb", "-displayfd", str(write), "-screen", "0", "1300x900x24", "-nolisten", "tcp"],
+        pass_fds=(write,),
+        stderr=subprocess.DEVNULL,
+    )
+    os.close(write)
+    with os.fdopen(read) as number:
+        display = ":" + number.readline().strip()
+    environment = os.environ | {
+        "DISPLAY": display,
+        "HOME": str(tmp_path),  # no settings of the user's, none left to him
+        "LIBGL_ALWAYS_SOFTWARE": "1",
+    }
+    # xdotool and import wait for ever for a window that does not come
+    call = lambda *words: subprocess.run(words, env=environment, check=True, timeout=60)
+    opened = [screen]
+    sizes = {"GraphicsWidth": 1200, "GraphicsHeight": 800, "MenuWidth": 330}
+    places = {"GraphicsPositionX": 0, "GraphicsPositionY": 0}
+    command = [sys.executable, "-c", GMSH, "-setstring", "Solver.Executable0", find_getdp()]
+    for name, value in (sizes | places).items():
+        command += ["-setnumber", f"General.{name}", str(value)]
+
+    def open_window(*arguments):
+        opened.append(
+            subprocess.Popen([*command, *arguments, str(plain / "a.pro")], env=environment)
+        )
+        time.sleep(3)
+
+        def press(name):
+            results = plain / "res/a"
+            began, ended = results / "clear.geo", results / "status.geo"
+            before = [stamp(began), stamp(ended)]
+            pressed, end = 0.0, time.monotonic() + 120
+            while stamp(ended) == before[1]:
+                assert time.monotonic() < end and opened[-1].poll() is None
+                if stamp(began) == before[0] and time.monotonic() > pressed + 10:
+                    call("xdotool", "mousemove", "250", "818", "click", "1")
+                    pressed = time.monotonic()
+                time.sleep(0.2)
+            time.sleep(3)
+            picture = tmp_path / f"{name}.png"
+            call("import", "-window", "root", str(picture))
+            return imread(picture)
+
+        return press
+
+    yield open_window
+    for process in reversed(opened):
+        process.kill()
+        process.wait()
+
+
+#: The gmsh command, of the package that is installed
+GMSH = "import sys, gmsh; gmsh.initialize(['gmsh', *sys.argv[1:]], run=True); gmsh.finalize()"
+
+
+def stamp(file):
+    return file.stat().st_mtime_ns if file.exists() else 0
+
+
+def pixels(picture, colour):
+    """How many pixels have a colour."""
+    return (np.abs(picture[..., :3] * 255 - colour).max(axis=2) < 3).sum()
+
+
+@pytest.mark.heavy
+def test_window_shows_a_complete_run(window, plain):
+    """Run twice: the status is green both times, the views of the first run are gone."""
+    press = window()
+    for name in ("first", "second"):
+        picture = press(name)
+        assert pixels(picture, GREEN) > 500 and not pixels(picture, RED) > 500
+    assert "complete" in (plain / "res/a/status.geo").read_text()
+    assert len(list((plain / "res/a").glob("opening_*.pos"))) == 8
+
+
+@pytest.mark.heavy
+def test_window_shows_where_a_run_stops(window, plain):
+    """A dam that slides without hardening: red, with the level."""
+    words = "-setstring law friction -setstring uplift none -setnumber pena_tang 0"
+    picture = window(*words.split())("stopped")
+    assert pixels(picture, RED) > 500 and not pixels(picture, GREEN) > 500
+    assert "stopped_at = 7.4" in (plain / "res/a/stopped.geo").read_text()
