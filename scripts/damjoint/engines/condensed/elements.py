@@ -1,8 +1,8 @@
 """Finite elements of the condensed engine: shape functions, quadrature, interpolation on a body.
 
 The same spaces as pro/spaces.pro: nodal functions N_a of order 1; order 2 adds N_a N_b for every
-edge ab, on the same straight mesh. The quadrature rules are those of GetDP, so that both engines
-solve one discrete problem.
+edge ab, on the same straight mesh. The quadrature rules are those of pro/spaces.pro, so that both
+engines solve one discrete problem. Wedges and hexahedra are this engine's alone.
 """
 
 from __future__ import annotations
@@ -155,7 +155,8 @@ def rule(shape: str, points: int) -> tuple[np.ndarray, np.ndarray]:
     return np.array(x, float), np.array(w, float)
 
 
-#: Points of the rules of pro/spaces.pro, by order and shape.
+#: Points of the rules, by order and shape. Quadrangles of the joint with order 2 take 2 x 2 points
+#: (published: 3 x 3), so that layers repeat the plane scene exactly.
 BULK = {
     1: {"triangle": 1, "quad": 4, "tetra": 1, "wedge": 6, "hexahedron": 8},
     2: {"triangle": 3, "quad": 7, "tetra": 4, "wedge": 21, "hexahedron": 27},
