@@ -267,7 +267,7 @@ def main(argv: list[str] | None = None) -> int:
         print(f"damjoint: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
-        said = "interrupted; everything up to the last converged step is saved"
+        said = "interrupted; what has been finished is saved"
         print(f"damjoint: {said}", file=sys.stderr)
         return 130
 

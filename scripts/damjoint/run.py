@@ -5,15 +5,14 @@ from __future__ import annotations
 import re
 import resource
 import sys
-import threading
 import time
 from importlib.metadata import version
 from pathlib import Path
 
 from tqdm import tqdm
 
-from . import InputError, __version__
-from .engines import ENGINES, Outcome, solve
+from . import __version__
+from .engines import Outcome, engine_of
 from .results import folder as folders
 from .results import tables
 from .scene.case import Case
@@ -54,31 +53,22 @@ def run(
     Returns the results in the order of case.scenes(). A run that stops early, or is interrupted,
     leaves what has converged. Raises InputError, RunError.
     """
-    if engine not in ENGINES:
-        raise InputError(f"engine = {engine}: must be one of {', '.join(ENGINES)}")
+    chosen = engine_of(case, engine)
     folders.check_writable(out)
-    bar, found, taken, lock = Progress(case, progress), [], [], threading.Lock()
-
-    def take_folder() -> None:
-        """Once there is something to write, and not before: bad input leaves an earlier run as it
-        is.
-        """
-        with lock:
-            if not taken:
-                taken.append(out)
-                folders.clear(out)
-                folders.begin(case, out)
-
-    def on_step(scene: int, now: float) -> None:
-        take_folder()
-        bar.step(scene, now)
-
-    for outcome in solve(case, engine, on_step, fields or picture):
-        take_folder()
-        save(outcome, case, out)
-        found.append(outcome)
-        if outcome.error:
-            raise outcome.error
+    folders.clear(out)  # only now: bad input leaves an earlier run as it is
+    folders.say(case, out, "running")
+    bar, found = Progress(case, progress), []
+    try:
+        for outcome in chosen.solve(case, bar.step, fields or picture):
+            save(outcome, case, out)
+            found.append(outcome)
+            if outcome.error:
+                raise outcome.error
+    except BaseException as error:
+        if not found:
+            state = "failed" if isinstance(error, Exception) else "interrupted"
+            folders.say(case, out, state, str(error) or "nothing had converged")
+        raise
     bar.bar.close()
     for outcome in found if fields or picture else []:
         finish(outcome, case, out, fields, picture)
@@ -92,7 +82,7 @@ def keep(case: Case, outcomes: list[Outcome], out: Path) -> None:
     """
     folders.check_writable(out)
     folders.clear(out)
-    folders.begin(case, out)
+    folders.say(case, out, "running")
     for outcome in outcomes:
         save(outcome, case, out)
     for outcome in outcomes:
@@ -112,14 +102,17 @@ def save(outcome: Outcome, case: Case, out: Path) -> None:
         versions["getdp"] = plain["version"]
     memory = max(peak_memory(), plain.get("peak_memory_mb") or 0.0)
     result.info |= {"peak_memory_mb": round(memory, 1), "versions": versions}
-    folders.write_info(result, folder, ended(outcome))
+    folders.write_info(result, folder, *ended(outcome))
 
 
-def ended(outcome: Outcome) -> str:
-    """How a scene ended before its time: failed or interrupted; empty if it did not."""
+def ended(outcome: Outcome) -> tuple[str, str]:
+    """How a scene ended before its time, failed or interrupted, and why; empty if it did not."""
     if not outcome.error:
-        return ""
-    return "failed" if isinstance(outcome.error, Exception) else "interrupted"
+        return "", ""
+    last = outcome.result.last
+    where = f" after level {last['level']:.6g} m" if last else " before the first step"
+    state = "failed" if isinstance(outcome.error, Exception) else "interrupted"
+    return state, f"{state}{where}" + (f": {outcome.error}" if str(outcome.error) else "")
 
 
 def finish(outcome: Outcome, case: Case, out: Path, fields: bool, picture: bool) -> None:
@@ -136,7 +129,7 @@ def finish(outcome: Outcome, case: Case, out: Path, fields: bool, picture: bool)
 
         draw(result, outcome.mesh(), at, folder)
     result.info["wall_seconds"]["post"] += time.perf_counter() - start
-    folders.write_info(result, folder, ended(outcome))
+    folders.write_info(result, folder, *ended(outcome))
 
 
 def peak_memory() -> float:

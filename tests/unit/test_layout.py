@@ -9,7 +9,7 @@ from damjoint import pages
 
 PACKAGE = Path(damjoint.__file__).parent
 #: Each part uses only those before it.
-PARTS = ["", "scene", "results", "engines", "run", "studies", "pages", "window", "cli"]
+PARTS = ["", "scene", "results", "engines", "run", "studies", "pages", "window", "cli", "__main__"]
 
 
 def part_of(path):

@@ -1,15 +1,17 @@
 """How a scene is solved: two engines behind one small interface.
 
-`solve(case, on_step, fields)` of engines/condensed/solve.py and of engines/getdp/solve.py give,
-scene by scene, an Outcome; they know nothing of output folders, and what uses them nothing of their
-insides.
+`check(case)` of engines/condensed/solve.py and of engines/getdp/solve.py raises InputError, and
+`solve(case, on_step, fields)` gives, scene by scene, an Outcome (fields: whether the bodies' fields
+will be asked for; raises RunError). They know nothing of output folders, and what uses them nothing
+of their insides.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
+from types import ModuleType
 
 from .. import InputError
 from ..results.fields import Field
@@ -36,13 +38,13 @@ class Outcome:
     error: BaseException | None = None
 
 
-def solve(case: Case, engine: str, on_step: OnStep, fields: bool) -> Iterator[Outcome]:
-    """The scenes of a case, one after the other; fields: whether the bodies' fields will be asked
-    for.
+def engine_of(case: Case, name: str) -> ModuleType:
+    """The engine of a name: condensed (auto), or getdp, the plain problem definition.
 
-    engine: condensed (auto), or getdp, the plain problem definition. Raises InputError, RunError.
+    Raises InputError if there is none, or if it can not run the case.
     """
-    if engine not in ENGINES:
-        raise InputError(f"engine = {engine}: must be one of {', '.join(ENGINES)}")
-    name = "condensed" if engine == "auto" else engine
-    yield from import_module(f".{name}.solve", __name__).solve(case, on_step, fields)
+    if name not in ENGINES:
+        raise InputError(f"engine = {name}: must be one of {', '.join(ENGINES)}")
+    found = import_module(f".{'condensed' if name == 'auto' else name}.solve", __name__)
+    found.check(case)
+    return found

@@ -79,18 +79,19 @@ def remove_if_empty(folder: Path) -> None:
         folder.rmdir()
 
 
-def begin(case: Case, folder: Path) -> None:
-    """Make the folder of a scene and say in its run.json that a run is under way."""
+def say(case: Case, folder: Path, state: str, statement: str = "") -> None:
+    """Make the folder of a case and say in its run.json how far a run is that has no results yet:
+    running, interrupted or failed.
+    """
     folder.mkdir(parents=True, exist_ok=True)
-    write_json(
-        folder, {"case": case.name, "state": "running", "versions": {"damjoint": __version__}}
-    )
+    told = {"case": case.name, "state": state, "statement": statement}
+    write_json(folder, told | {"versions": {"damjoint": __version__}})
 
 
-def write_info(results: Results, folder: Path, state: str = "") -> None:
+def write_info(results: Results, folder: Path, state: str = "", why: str = "") -> None:
     """Write run.json: parameters, verdict, sizes, versions, seconds, memory, units of the tables.
 
-    state: interrupted or failed; else it is stopped or complete.
+    state: interrupted or failed, and why; else it is stopped or complete.
     """
     case = results.case
     flowing = case["uplift"] == "flow"
@@ -100,8 +101,8 @@ def write_info(results: Results, folder: Path, state: str = "") -> None:
             "case": case.name,
             "title": case.title,
             "state": state or ("stopped" if results.stopped else "complete"),
-            "verdict": verdict(results),
-            "statement": statement(results),
+            "verdict": state or verdict(results),
+            "statement": why or statement(results),
             "hints": hints(results),
             "parameters": case.values,
             "levels": case.levels,

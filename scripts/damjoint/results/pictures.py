@@ -81,7 +81,8 @@ def draw(result: Results, mesh: Mesh, fields: dict[float, Field], folder: Path) 
     )
     section = figure.add_subplot(grid[:, 0])
     jumps, stresses = (figure.add_subplot(grid[i, 1]) for i in (0, 1))
-    figure.text(0.06, 0.955, heading(result), fontsize=13, va="center")
+    head = textwrap.fill(heading(result), 105)
+    figure.text(0.06, 0.99, head, fontsize=12.5, va="top", parse_math=False)
     said = statement(result)
     if said:
         figure.text(0.06, 0.94, textwrap.fill(said, 170), fontsize=9, color=RED, va="top")
@@ -154,7 +155,8 @@ def draw_section(
         ylabel="y [m]",
     )
     axes.set_title(
-        f"displacement x {scale:.2g}" + (", open joint red" if len(rows["x"]) else ""), fontsize=10
+        f"displacement x {scale:.2g}" + (", broken or open joint red" if len(rows["x"]) else ""),
+        fontsize=10,
     )
 
 
@@ -178,7 +180,8 @@ def draw_joint(jumps: Axes, stresses: Axes, case: Case, curves: dict[str, np.nda
         "delta_t1": (jumps, per_m, ORANGE),
         "sigma_n": (stresses, per_pa, BLUE),
     }
-    for row in validation.references(case):
+    published = validation.references(case) if curves["time"][0] == validation.read_at(case) else []
+    for row in published:
         if row.quantity in marks and row.tolerance is not None:
             axes, factor, color = marks[row.quantity]
             spread = abs(row.value * row.tolerance * factor)
@@ -254,7 +257,8 @@ def draw_curve(result: Results, path: Path) -> None:
         bound = overturning_level(case)
         label = f"rigid dam turns over: {bound:.3f} m"
         axes.axhline(bound, color="black", linestyle="--", linewidth=0.8, label=label)
-    axes.set(xlabel=f"opening of the heel [{length}]", ylabel="level [m]", title=case.title)
+    axes.set(xlabel=f"opening of the heel [{length}]", ylabel="level [m]")
+    axes.set_title(textwrap.fill(case.title, 70), parse_math=False)
     axes.legend(fontsize=8)
     axes.grid(alpha=0.3)
     figure.savefig(path, dpi=110)

@@ -80,8 +80,15 @@ def table() -> list[Reference]:
 
 
 def references(case: Case) -> list[Reference]:
-    """The reference rows of a scene."""
+    """The reference rows of a scene, if it is what has been published."""
+    if not case.published:
+        return []
     return [r for r in table() if r.modeling == case.name.upper() and r.uplift == case["uplift"]]
+
+
+def read_at(case: Case) -> float:
+    """The time the references belong to: the last, or the end of the prescribed displacement."""
+    return case.times[-1] if case["drive"] == "level" else case["drive_end"]
 
 
 def modelings() -> list[str]:
@@ -99,7 +106,7 @@ def compare(result: Results) -> list[Comparison]:
     """
     found = []
     case = result.case
-    time = None if case["drive"] == "level" else case["drive_end"]
+    time = read_at(case)
     for reference in references(case):
         rows = result.at(time) if reference.read_as == "node" else result.at_extrapolated(time)
         near = np.abs(rows["x"] - reference.x)

@@ -150,6 +150,8 @@ def path_statement(results: Results) -> str:
     driven = (time > case["drive_begin"] - 1e-9) & (time < case["drive_end"] + 1e-9)
     load = case["rho_water"] * case["g"] * level.max()
     said = f"largest load: level {level.max():.5g} m ({load / 1e3:.5g} kPa)"
+    if case["drive_by"] < 0:
+        return said + "; the displacement was taken back"
     falls = bool((np.diff(level[driven]) < 0).any())
     moved = history["crest_ux"][driven], results.heel[driven]
     back = any(bool((np.diff(m) < 0).any()) for m in moved)

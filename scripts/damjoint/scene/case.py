@@ -13,6 +13,9 @@ from .parameters import assignments, declared, include, listing, parse
 
 CASES = data("cases")
 
+#: Steps between two levels at most.
+MOST_STEPS = 100_000
+
 
 #: Values of pro/parameters.pro that the engines share and nobody sets.
 SHARED = (
@@ -42,6 +45,8 @@ class Case:
     times: tuple[float, ...]
     #: further uplift modes that the published case runs
     also_uplift: tuple[str, ...] = ()
+    #: whether it is a case of the package as it was published, but for mesh and solver
+    published: bool = False
     #: whether pena_tang has been set: a dam whose whole joint slips is meant to stand on it
     hardening_asked: bool = False
     #: what the solvers share besides the parameters: {name: values}, from pro/parameters.pro
@@ -151,8 +156,8 @@ def load(
         plain = load(case, overrides)
         overrides = mesh_for(accuracy, plain) | overrides
         steps = steps or (1 if plain["drive"] == "level" else None)
-    if steps is not None and steps < 1:
-        raise InputError(f"steps = {steps}: must be an integer >= 1")
+    if steps is not None and not 1 <= steps <= MOST_STEPS:
+        raise InputError(f"steps = {steps}: must be an integer >= 1 and <= {MOST_STEPS}")
     said = casefile.read(path)
     lists = dict(said.lists)
     if levels is not None:
@@ -193,6 +198,10 @@ def load(
         times = tuple(sorted({*times, end, *([begin] if begin > 0 else [])}))
     also = said.texts.get("also_uplift", "").split() if "uplift" not in overrides else []
     also = tuple(known["uplift"].check(mode) for mode in also)
+    if len({values["uplift"], *also}) <= len(also):
+        raise InputError(
+            f"also_uplift = {' '.join(also)}: must be other modes than uplift, each once"
+        )
     shared = {n: found[n] for n in SHARED}
     return Case(
         path.stem,
@@ -202,6 +211,7 @@ def load(
         tails,
         times,
         also,
+        as_published(path, checked, levels, tail_levels),
         bool(found["hardening_asked"][0]),
         shared,
     )
@@ -233,6 +243,13 @@ def check_energies(found: Mapping[str, list]) -> None:
             )
 
 
+def as_published(path: Path, overrides: Mapping, *loading: str | None) -> bool:
+    """Whether a case of the package is run with nothing changed but mesh, solver and uplift."""
+    harmless = {n for n, p in declared().items() if p.group in ("Mesh", "Solver")}
+    own = path.resolve().parent == CASES.resolve()
+    return own and set(overrides) <= harmless | {"order", "uplift"} and not any(loading)
+
+
 def check_drains(values: Mapping) -> None:
     """Raise InputError if the drains are not under the dam, or do not suit a driven scene."""
     if values["uplift"] != "drained":
@@ -254,7 +271,7 @@ def numbers(name: str, text: str) -> list[float]:
     Raises InputError if empty or malformed.
     """
     try:
-        found = [float(v) for v in text.split(",")]
+        found = [float(v) for v in text.replace("_", "?").split(",")]
     except ValueError:
         found = []
     if not found or not all(map(math.isfinite, found)):
@@ -276,10 +293,15 @@ def check_levels(name: str, levels: Iterable[float], values: Mapping) -> tuple[f
 
 
 def check_times(times: tuple[float, ...], last: int) -> None:
-    """Raise InputError if the times do not increase or lie outside 0 < t <= last."""
+    """Raise InputError if the times do not increase from above 0 to the last level's interval."""
     for before, time in zip((0.0, *times), times, strict=False):
         if not before < time <= last:
             raise InputError(
                 f"times = {','.join(f'{t:g}' for t in times)}: must increase from above 0 "
                 f"to at most {last} (level number i is reached at t = i)"
             )
+    if times[-1] <= last - 1:
+        raise InputError(
+            f"times = {','.join(f'{t:g}' for t in times)}: must end after {last - 1}, on the way to "
+            f"the last level (reached at t = {last})"
+        )

@@ -83,7 +83,7 @@ def read_into(found: CaseText, path: Path, depth: int) -> None:
     try:
         if path.stat().st_size > LONGEST:
             raise InputError(f"case {path}: must be a text of at most {LONGEST} bytes")
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"case {path}: {error}") from None
     statement, first = [], 0
@@ -147,6 +147,8 @@ def numbers(tokens: tuple[str, ...], found: CaseText, where: str) -> list[float]
     """
     if tokens[:1] != ("{",) or tokens[-1:] != ("}",):
         raise InputError(f"{where}: must be a list of numbers in braces, such as {{3, 6, 8, 9}}")
+    if len(tokens) == 2:
+        raise InputError(f"{where}: must have at least one number")
     items, part = [], []
     for token in (*tokens[1:-1], ","):
         if token == ",":
@@ -164,7 +166,7 @@ def evaluate(tokens: tuple[str, ...], found: CaseText, where: str) -> float:
     )
 
     def value(node: ast.expr) -> float:
-        if isinstance(node, ast.Constant) and isinstance(node.value, (int, float)):
+        if isinstance(node, ast.Constant) and type(node.value) in (int, float):
             return float(node.value)
         if isinstance(node, ast.Name):
             known = math.pi if node.id == "Pi" else None

@@ -103,7 +103,11 @@ class Mesh:
 
     def _body(self, dimension: int, group: int) -> Body:
         blocks, numbers = {}, {}
-        for entity in gmsh.model.getEntitiesForPhysicalGroup(dimension, group):
+        try:
+            entities = gmsh.model.getEntitiesForPhysicalGroup(dimension, group)
+        except Exception as error:  # what gmsh raises: a region that is too thin to be found
+            raise RunError(f"mesh: {error}; look at the geometry's proportions") from None
+        for entity in entities:
             for kind, elements, nodes in zip(
                 *gmsh.model.mesh.getElements(dimension, entity), strict=True
             ):

@@ -81,7 +81,7 @@ class Parameter:
                 raise bad
             return value
         try:
-            number = float(value)
+            number = float(str(value).replace("_", "?"))  # Python would take 1_000 for a number
         except ValueError:
             raise bad from None
         if self.follows and number == AUTOMATIC:

@@ -7,6 +7,7 @@ from __future__ import annotations
 import csv
 import hashlib
 import itertools
+import math
 import os
 import sys
 from collections.abc import Callable, Iterator
@@ -48,6 +49,8 @@ def values_of(text: str) -> tuple[str, list[str]]:
             raise bad from None
         if not np.isfinite([first, last, step]).all() or step == 0 or (last - first) / step < 0:
             raise bad
+        if (last - first) / step >= MOST_ROWS:
+            raise InputError(f"--vary {text}: must give at most {MOST_ROWS} values")
         found = [f"{first + i * step:.12g}" for i in range(int((last - first) / step + 1e-9) + 1)]
     if name.strip() == "level":
         try:
@@ -68,6 +71,12 @@ def combinations(
     level: the last level; the case's levels below it come first. Raises InputError.
     """
     axes = [values_of(text) for text in vary]
+    names = [name for name, _ in axes]
+    for name in names:
+        if names.count(name) > 1 or name in settings:
+            raise InputError(f"--vary {name}: must be given once, and not by --set as well")
+    if math.prod(len(values) for _, values in axes) > MOST_ROWS:
+        raise InputError(f"--vary: must give at most {MOST_ROWS} rows in all")
     base = load(case, settings)
     for values in itertools.product(*(v for _, v in axes)):
         chosen = dict(zip((n for n, _ in axes), values, strict=True))
@@ -108,6 +117,9 @@ def key_of(case: Case) -> str:
         ).encode()
     ).hexdigest()[:16]
 
+
+#: Rows of a sweep at most.
+MOST_ROWS = 1_000_000
 
 #: What a row says in words.
 SAID = ("verdict", "statement")

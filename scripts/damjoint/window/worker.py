@@ -20,7 +20,8 @@ from types import FrameType
 import numpy as np
 
 from .. import InputError, RunError
-from ..engines import Outcome, solve
+from ..engines import Outcome
+from ..engines.condensed.solve import solve
 from ..results.fields import Field
 from ..results.tables import Results
 from ..results.verdict import failed, statement
@@ -47,7 +48,7 @@ class Scene:
     @staticmethod
     def of(outcome: Outcome) -> Scene:
         """What an outcome shows; computes the bodies' fields."""
-        result, how = outcome.result, ended(outcome)
+        result, (how, _) = outcome.result, ended(outcome)
         said = statement(result)
         if how and isinstance(outcome.error, (InputError, RunError)):
             said = str(outcome.error)
@@ -138,7 +139,7 @@ def follow(sheet: Sheet, pipe: Connection, stop: Stop) -> list[Outcome]:
 
     stop.wanted, stop.at_once = False, True
     try:
-        for outcome in solve(sheet.case, "condensed", on_step, True):
+        for outcome in solve(sheet.case, on_step, True):
             outcomes.append(outcome)
             if outcome.error:
                 break

@@ -12,11 +12,13 @@ import json
 import os
 import zipfile
 from dataclasses import fields
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
+from scipy import linalg
 
-from ... import __version__
+from ... import RunError, __version__, data
 from ...scene.case import Case
 from ...scene.mesh import GEOMETRY, Body
 from .bulk import MATERIAL, Bodies, Condensed, check_size, condense
@@ -41,20 +43,34 @@ def key_of(case: Case) -> tuple:
     return (*(case[n] for n in GEOMETRY + MATERIAL), max(case.tail_levels) > 0)
 
 
+@lru_cache(maxsize=1)
+def sources() -> str:
+    """A fingerprint of all that makes condensed bodies of a case: meshes and elements."""
+    here = Path(__file__).parent
+    makers = [here / f"{name}.py" for name in ("elements", "elasticity", "bulk", "factor")]
+    texts = [path.read_bytes() for path in (*sorted(data("geo").glob("*.geo")), *makers)]
+    return hashlib.sha256(b"".join(texts)).hexdigest()
+
+
 def cached(case: Case) -> tuple[Condensed, Bodies | None]:
     """The condensed bodies of a case, from the cache or made and kept there.
 
     Returns them, and if they had to be made what they were made of. Raises RunError (mesh, memory).
     """
-    header = json.dumps([__version__, [f.name for f in fields(Condensed)], key_of(case)])
+    header = json.dumps([__version__, sources(), key_of(case)])
     place = folder()
     path = place and place / (hashlib.sha256(header.encode()).hexdigest()[:24] + ".npz")
     found = read(path, header) if path else None
     if found:
         return found, None
     check_size(case)
-    bodies = Bodies.of(case)
-    made = condense(case, bodies)
+    try:
+        bodies = Bodies.of(case)
+        made = condense(case, bodies)
+    except (ArithmeticError, RuntimeError, linalg.LinAlgError) as error:
+        if isinstance(error, RunError):
+            raise
+        raise RunError(f"bodies: can not be eliminated ({error}); look at the geometry") from None
     if path:
         keep(made, header, path)
     return made, bodies

@@ -7,6 +7,7 @@ from copy import copy
 
 import numpy as np
 
+from ... import RunError
 from ...results.tables import Results
 from ...scene.case import Case
 from .equilibrium import Joint
@@ -40,7 +41,10 @@ class Filling:
         """
         joint, virgin = self.joint, State.virgin(self.joint)
         highest = max(case.levels), max(case.tail_levels)
-        return np.linalg.norm(joint.residual(virgin.jump, virgin.memory, *highest)[0])
+        size = np.linalg.norm(joint.residual(virgin.jump, virgin.memory, *highest)[0])
+        if not np.isfinite(size):
+            raise RunError("loads: are not finite numbers; look at densities, levels and gravity")
+        return size
 
     def fork(self, case: Case) -> Filling:
         """Another filling, of a case that agrees with this one's as far as this one has come, to go
@@ -183,7 +187,7 @@ class Filling:
         return (
             State(time, end.level, tail, end.jump, *memories),
             iterations,
-            end.size / self.reference,
+            end.size / (self.reference or 1.0),
         )
 
     def accept(self, cuts: int, state: State, iterations: int, residual: float) -> None:

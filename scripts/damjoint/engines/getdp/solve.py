@@ -20,17 +20,21 @@ from . import process, tables
 SOLID = ("free", "split")
 
 
-def solve(case: Case, on_step: OnStep, fields: bool) -> Iterator[Outcome]:
-    """The scenes of a case; GetDP works in a temporary folder.
-
-    See engines/__init__.py.
-    """
+def check(case: Case) -> None:
+    """Raise InputError if there is no GetDP, or it can not run the case."""
     process.find_getdp()
     if case["dim"] == 3 and case["mesh_pattern"] not in SOLID:
         raise InputError(
             f"mesh_pattern = {case['mesh_pattern']}: must be one of {', '.join(SOLID)} "
             "with engine = getdp in 3D"
         )
+
+
+def solve(case: Case, on_step: OnStep, fields: bool) -> Iterator[Outcome]:
+    """The scenes of a case; GetDP works in a temporary folder.
+
+    See engines/__init__.py.
+    """
     start = time.perf_counter()
     mesh = Mesh(case)
     meshed = time.perf_counter() - start
