@@ -92,6 +92,8 @@ SCENES = {
     # slides by a centimetre: its residual is rounding long before it is 1e-9 of the loads
     "a sliding": {"law": "friction"},
     "c without adhesion": {"adhesion": 0.0},
+    # where the weight comes first
+    "g weak": {"mu": 0.06, "adhesion": 0.0, "pena_tang": 0.0, "nu": 0.3, "E": 1e10, "levels": "2"},
     "c stiff, no hardening": {"K_T": 9e14, "mu": 0.06, "pena_tang": 0.0, "levels": "1,2"},
     "i soft, no strength": {"E": 1e10, "sigma_max": 0.0, "K_N": 1e11, "K_T": 5e10, "nu": 0.2},
 }

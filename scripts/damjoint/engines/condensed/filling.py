@@ -75,14 +75,24 @@ class Filling:
         return self.results()
 
     def reach(self, target: float) -> None:
-        """Steps up to a time; a step that fails is cut, the next ones grow back."""
+        """Steps up to a time; a step that fails is cut, the next ones grow back.
+
+        The first step holds the weight, too, at any length: it is cut to the weight alone first.
+        """
         *attempts, last_resort = self.attempts()
-        cuts, dt = 0, np.inf
+        cuts, dt, weighed = 0, np.inf, self.state.time > 0
         while self.state.time < target and not self.stopped:
             time = min(self.state.time + dt, target)
             time = target if target - time < 1e-9 else time
             tries = (self.solve(time, attempt, attempt is attempts[0]) for attempt in attempts)
             found = next(filter(None, tries), None)
+            if found is None and not weighed:
+                weighed = True
+                tries = (self.solve(0.0, attempt) for attempt in (*attempts, last_resort))
+                weight = next(filter(None, tries), None)
+                if weight is not None:
+                    self.state, cuts = weight[0], cuts + 1
+                    continue
             if found is None:
                 dt, cuts = self.case.shared["cut"][0] * (time - self.state.time), cuts + 1
                 if dt < self.case["smallest_step"]:
