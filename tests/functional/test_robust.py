@@ -72,3 +72,9 @@ def test_the_weight_comes_first_where_the_first_step_fails(solve):
     (result,) = solve("dam", "35,41", **shape, **stiff, **joint)
     assert verdict(result) == "stands"
     assert result.history["time"][0] > 0 and result.history["cuts"][0] > 0
+
+
+def test_the_last_level_is_known_to_the_smallest_step(solve):
+    """T = mu N + c L at 7.45784 m dry; levels from 6 to 8 m, so that 1/1024 of it is 2 mm."""
+    (result,) = solve("c", "3,6,8,9", uplift="none", pena_tang=0)
+    assert 7.45784 - 2 / 1024 < result.last["level"] < 7.4579

@@ -94,8 +94,9 @@ class Filling:
                     self.state, cuts = weight[0], cuts + 1
                     continue
             if found is None:
-                dt, cuts = self.case.shared["cut"][0] * (time - self.state.time), cuts + 1
-                if dt < self.case["smallest_step"]:
+                tried, smallest = time - self.state.time, self.case["smallest_step"]
+                dt, cuts = max(self.case.shared["cut"][0] * tried, smallest), cuts + 1
+                if tried < smallest * (1 + 1e-9):
                     time, found = target, self.solve(target, last_resort)
                     self.stopped = found is None
             if found:
