@@ -97,6 +97,8 @@ SCENES = {
     "c without adhesion": {"adhesion": 0.0},
     "e bond": BOND,
     "f bond": COARSE | BOND,
+    # where the weight comes first
+    "g weak": {"mu": 0.06, "adhesion": 0.0, "pena_tang": 0.0, "nu": 0.3, "E": 1e10, "levels": "2"},
     "c stiff, no hardening": {"K_T": 9e14, "mu": 0.06, "pena_tang": 0.0, "levels": "1,2"},
     "i soft, no strength": {"E": 1e10, "sigma_max": 0.0, "K_N": 1e11, "K_T": 5e10, "nu": 0.2},
 }

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from damjoint.scene.case import CASES
 from test_output import read
 
 SMALL = ("--set", "n_joint=10", "--set", "h_dam=3", "--set", "h_found=4")
@@ -139,7 +140,8 @@ def test_an_interrupted_run_keeps_what_has_converged(tmp_path, monkeypatch, engi
         run.run(case, tmp_path / "out", False, False, False, engine)
     history = read(tmp_path / "out" / "history.csv")
     assert 1 <= len(history["time"]) < 5
-    assert json.loads((tmp_path / "out" / "run.json").read_text())["state"] == "interrupted"
+    told = json.loads((tmp_path / "out" / "run.json").read_text())
+    assert told["state"] == told["verdict"] == "interrupted" and "after level" in told["statement"]
 
 
 @pytest.mark.parametrize("printed", ["rubbish", "step abc", "Error   : it hurts"])
@@ -162,3 +164,25 @@ def test_a_full_disk_is_one_line(command, tmp_path, monkeypatch):
     monkeypatch.setattr(tables, "write_csv", full)
     code, _, err = command("run", "c", *BARE)
     assert code == 1 and "No space left on device" in err and len(err.splitlines()) == 1
+
+
+def test_a_run_that_fails_early_does_not_leave_an_earlier_ones_results(command, tmp_path):
+    """A mesh that can not be: one line, and run.json says so."""
+    assert command("run", "c", *BARE, "--out", "out")[0] == 0
+    thin = "--set", "dim=3", "--set", "thickness=1e-6", "--set", "mesh_pattern=split"
+    code, _, err = command("run", "c", *BARE, *thin, "--out", "out")
+    assert code == 1 and len(err.splitlines()) == 1
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["run.json"]
+    told = json.loads((tmp_path / "out" / "run.json").read_text())
+    assert told["state"] == "failed" and told["statement"] in err
+
+
+def test_a_title_with_dollars_and_of_any_length(command, tmp_path):
+    (tmp_path / "ssnp142.case").write_text((CASES / "ssnp142.case").read_text())
+    title = "costs $5_{ and $6 " * 12
+    text = (
+        f'Include "ssnp142.case"; title = "{title}"; default_n_joint = 10; default_drive = "heel";'
+    )
+    (tmp_path / "my.case").write_text(text)
+    assert command("run", "my.case", "--no-fields")[0] == 0
+    assert (tmp_path / "out/my/my.png").exists() and (tmp_path / "out/my/my_curve.png").exists()

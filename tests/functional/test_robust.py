@@ -61,3 +61,20 @@ def test_line_of_the_release_is_the_law_inside_it_and_its_extension_outside():
     np.testing.assert_allclose(tangent[:, 1, 0], -law.K_T * 1e6)
     assert law.side(jump).tolist() == [0, -1, 1]
     np.testing.assert_array_equal(line[0], law.respond(jump, memory)[0][0])
+
+
+def test_the_weight_comes_first_where_the_first_step_fails(solve):
+    """Weight and first water in one step find nothing; it leaves no row, and the whole cut is
+    told."""
+    stiff = {"E": 1.79e10, "K_N": 6.73e14, "K_T": 1.47e14, "law": "friction", "uplift": "flow"}
+    shape = {"dam_height": 132, "dam_base": 92, "dam_crest": 19.9, "nu": 0.136, "n_joint": 30}
+    joint = {"mu": 0.957, "adhesion": 26300, "aperture_min": 1.27e-8}
+    (result,) = solve("dam", "35,41", **shape, **stiff, **joint)
+    assert verdict(result) == "stands"
+    assert result.history["time"][0] > 0 and result.history["cuts"][0] > 0
+
+
+def test_the_last_level_is_known_to_the_smallest_step(solve):
+    """T = mu N + c L at 7.45784 m dry; levels from 6 to 8 m, so that 1/1024 of it is 2 mm."""
+    (result,) = solve("c", "3,6,8,9", uplift="none", pena_tang=0)
+    assert 7.45784 - 2 / 1024 < result.last["level"] < 7.4579

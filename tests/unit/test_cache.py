@@ -77,3 +77,9 @@ def test_a_folder_that_can_not_be_written_costs_time_only(tmp_path, monkeypatch)
     (tmp_path / "file").write_text("in the way")
     monkeypatch.setenv("DAMJOINT_CACHE", str(tmp_path / "file" / "below"))
     assert cache.cached(load("a", SMALL))[1] is not None
+
+
+def test_another_mesh_makes_other_bodies(kept, monkeypatch):
+    """After a change of geo/ or of the elements nothing old is found."""
+    monkeypatch.setattr(cache, "sources", lambda: "changed")
+    assert cache.cached(load("a", SMALL))[1] is not None

@@ -3,6 +3,7 @@
 import gmsh
 import pytest
 from damjoint import InputError
+from damjoint.results import validation
 from damjoint.scene import casefile, parameters
 from damjoint.scene.case import CASES, load
 
@@ -76,6 +77,11 @@ def test_included_files_come_first_and_can_be_overruled(tmp_path):
         ("levels() = {3, 6}; times() = {2, 1};", "times = 2,1"),
         ("levels() = {3, 6}; times() = {1, 1};", "times = 1,1"),
         ("levels() = {3, 6}; times() = {0, 1};", "times = 0,1"),
+        ("levels() = {20, 40}; times() = {0.5, 1};", "must end after 1"),
+        ("levels() = {};", "at least one number"),
+        ("default_mu = True;", "must be a number"),
+        ('also_uplift = "none none";', "each once"),
+        ('also_uplift = "imposed";', "other modes than uplift"),
         ('also_uplift = "some";', "none, imposed, drained, flow"),
         ("levels() = {1, 2, 3}; tail_levels() = {1, 2};", "tail_levels = 1,2"),
     ],
@@ -132,3 +138,18 @@ def test_what_is_written_is_read_again(tmp_path):
     said.defaults |= {"law": "friction", "drive_by": 1 / 3}
     (tmp_path / "again.case").write_text(casefile.written(said))
     assert casefile.read(tmp_path / "again.case") == said
+
+
+def test_a_file_from_windows(tmp_path):
+    """A byte order mark and CRLF line ends."""
+    (tmp_path / "mine.case").write_bytes(b"\xef\xbb\xbfdefault_mu = 0.7;\r\n// words\r\n")
+    assert casefile.read(tmp_path / "mine.case").defaults == {"mu": 0.7}
+
+
+def test_published_is_what_has_been_published(tmp_path):
+    """Another loading, another parameter or another file of the same name has no references."""
+    copy = tmp_path / "a.case"
+    copy.write_text("levels() = {45};")
+    assert load("a").published and load("a", {"n_joint": 20.0, "order": 2.0}).published
+    others = load("a", levels="6"), load("a", {"sigma_max": 5e4}), load(str(copy))
+    assert not any(case.published or validation.references(case) for case in others)

@@ -302,6 +302,6 @@ def check_times(times: tuple[float, ...], last: int) -> None:
             )
     if times[-1] <= last - 1:
         raise InputError(
-            f"times = {','.join(f'{t:g}' for t in times)}: must end after {last - 1}, on the way to "
-            f"the last level (reached at t = {last})"
+            f"times = {','.join(f'{t:g}' for t in times)}: must end after {last - 1}, on the way "
+            f"to the last level (reached at t = {last})"
         )

@@ -84,17 +84,28 @@ class Filling:
             self.record.save(self.state)
 
     def reach(self, target: float) -> None:
-        """Steps up to a time; a step that fails is cut, the next ones grow back."""
+        """Steps up to a time; a step that fails is cut, the next ones grow back.
+
+        The first step holds the weight, too, at any length: it is cut to the weight alone first.
+        """
         *attempts, last_resort = self.attempts()
-        cuts, dt = 0, np.inf
+        cuts, dt, weighed = 0, np.inf, self.state.time > 0
         while self.state.time < target and not self.stopped:
             time = min(self.state.time + dt, target)
             time = target if target - time < 1e-9 else time
             tries = (self.solve(time, attempt, attempt is attempts[0]) for attempt in attempts)
             found = next(filter(None, tries), None)
+            if found is None and not weighed:
+                weighed = True
+                tries = (self.solve(0.0, attempt) for attempt in (*attempts, last_resort))
+                weight = next(filter(None, tries), None)
+                if weight is not None:
+                    self.state, cuts = weight[0], cuts + 1
+                    continue
             if found is None:
-                dt, cuts = self.case.shared["cut"][0] * (time - self.state.time), cuts + 1
-                if dt < self.case["smallest_step"]:
+                tried, smallest = time - self.state.time, self.case["smallest_step"]
+                dt, cuts = max(self.case.shared["cut"][0] * tried, smallest), cuts + 1
+                if tried < smallest * (1 + 1e-9):
                     time, found = target, self.solve(target, last_resort)
                     self.stopped = found is None
             if found:
