@@ -213,3 +213,20 @@ except InputError:
         [sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True
     )
     assert done.stdout.split() == ["3000000000000.0"], done.stderr
+
+
+@pytest.mark.parametrize("setting", ["h_dam=1e-5", "h_found=1e-5", "n_joint=100000"])
+def test_more_than_the_memory_is_refused_before_meshing(command, setting):
+    code, _, err = command("run", "dam", "--set", setting, "--no-fields", "--no-picture")
+    assert code == 1 and "need about" in err and len(err.splitlines()) == 1
+
+
+def test_too_many_steps_and_rows(command):
+    for words, said in (
+        (("run", "a", "--steps", "99999999999"), "steps = 99999999999"),
+        (("sweep", "a", "--vary", "mu=0:1:1e-12"), "at most"),
+        (("sweep", "a", "--vary", "mu=0.5", "--vary", "mu=0.6"), "--vary mu"),
+        (("sweep", "a", "--vary", "mu=0.5", "--set", "mu=0.6"), "--vary mu"),
+    ):
+        code, _, err = command(*words)
+        assert code == 2 and said in err and len(err.splitlines()) == 1
