@@ -50,8 +50,8 @@ def joint_size(case: Case) -> int:
 def bulk_size(case: Case) -> float:
     """About the number of unknowns of both bodies, before any meshing.
 
-    A triangle has half of the product of the sizes at both ends of the body, order 2 four unknowns a
-    triangle. (Prisms and tetrahedra: within a factor of three.)
+    A triangle has half of the product of the sizes at both ends of the body, order 2 four unknowns
+    a triangle. (Prisms and tetrahedra: within a factor of three.)
     """
     dim, order, near = int(case["dim"]), int(case["order"]), case["dam_base"] / case["n_joint"]
     dam = (case["dam_base"] + case["dam_crest"]) / 2 * case["dam_height"]
