@@ -187,8 +187,9 @@ class Filling:
 
             return Iterate(jump, level, value, size, correction, side)
 
-        start = evaluate(*self.start(time, level, prescribed, first), None)
-        found = newton(evaluate, start, self.limit, attempt)
+        with np.errstate(over="ignore", invalid="ignore"):  # an attempt that flies off is dropped
+            start = evaluate(*self.start(time, level, prescribed, first), None)
+            found = newton(evaluate, start, self.limit, attempt)
         if found is None:
             return None
         end, iterations = found
