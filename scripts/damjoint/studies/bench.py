@@ -31,6 +31,7 @@ from ..engines.condensed.interface import Interface
 from ..results import tables
 from ..results.pictures import along
 from ..results.tables import Results
+from ..results.validation import read_at
 from ..results.verdict import statement
 from ..run import run
 from ..scene.case import ACCURACIES, Case, load
@@ -178,10 +179,12 @@ def measure(case: Case) -> tuple[Results, dict[str, float]]:
 
 
 def read_off(result: Results) -> np.ndarray:
-    """QUANTITIES at the last level, means over z; the crack's tip where the opening interpolates to
-    zero.
+    """QUANTITIES where the published numbers are read (at the last level, or at the end of the
+    prescribed displacement), means over z; the crack's tip where the opening interpolates to zero.
     """
-    mean = along(result.at())
+    time = read_at(result.case)
+    step = np.flatnonzero(np.isclose(result.history["time"], time))[0]
+    mean = along(result.at(time))
     x, opening = mean["x"], mean["delta_n"]
     last = np.flatnonzero(opening > 0).max(initial=0)
     tip = (
@@ -190,7 +193,8 @@ def read_off(result: Results) -> np.ndarray:
         else 0.0
     )
     slip = np.sum((mean["slip"][1:] + mean["slip"][:-1]) / 2 * np.diff(x)) / x[-1]
-    return np.array([result.heel[-1], mean["sigma_n"][-1], tip, slip, result.history["flux"][-1]])
+    ends = result.heel[step], mean["sigma_n"][-1], tip, slip, result.history["flux"][step]
+    return np.array(ends)
 
 
 def worst(found: np.ndarray, exact: np.ndarray) -> float:
