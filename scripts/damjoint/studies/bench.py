@@ -182,9 +182,10 @@ def read_off(result: Results) -> np.ndarray:
     """QUANTITIES where the published numbers are read (at the last level, or at the end of the
     prescribed displacement), means over z; the crack's tip where the opening interpolates to zero.
     """
-    time = read_at(result.case)
-    step = np.flatnonzero(np.isclose(result.history["time"], time))[0]
-    mean = along(result.at(time))
+    times = result.history["time"]
+    reached = np.flatnonzero(np.isclose(times, read_at(result.case)))
+    step = reached[0] if len(reached) else -1  # a mesh far too coarse may stop before
+    mean = along(result.at(times[step]))
     x, opening = mean["x"], mean["delta_n"]
     last = np.flatnonzero(opening > 0).max(initial=0)
     tip = (
