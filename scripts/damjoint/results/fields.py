@@ -35,11 +35,16 @@ OF_JOINT = {
 }
 
 
+def row_of_nodes(body: Body, rows: dict[str, np.ndarray]) -> np.ndarray:
+    """For each mesh node of the joint (n,) its row in the joint's table at one time."""
+    far = (body.points[:, None, 0] - rows["x"]) ** 2 + (body.points[:, None, 2] - rows["z"]) ** 2
+    return np.argmin(far, axis=1)
+
+
 def joint_data(result: Results, body: Body, time: float) -> dict[str, np.ndarray]:
     """The joint's table at its mesh nodes: OF_JOINT by name, vectors along x, y, z."""
     rows = result.at(time)
-    far = (body.points[:, None, 0] - rows["x"]) ** 2 + (body.points[:, None, 2] - rows["z"]) ** 2
-    nearest = np.argmin(far, axis=1)
+    nearest = row_of_nodes(body, rows)
     return {
         name: np.column_stack([rows[c][nearest] for c in columns]).squeeze()
         for name, (_, columns) in OF_JOINT.items()

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from ..scene.case import Case
 from ..scene.mesh import Body, Mesh
 from . import validation
-from .fields import Field
+from .fields import Field, row_of_nodes
 from .tables import Results
 from .verdict import overturning_level, statement
 
@@ -207,8 +207,7 @@ def draw_joint(jumps: Axes, stresses: Axes, case: Case, curves: dict[str, np.nda
 def draw_maps(figure: Figure, joint: Body, result: Results) -> None:
     """The joint seen from above: opening and effective normal stress at its nodes."""
     rows = result.at()
-    far = (joint.points[:, None, 0] - rows["x"]) ** 2 + (joint.points[:, None, 2] - rows["z"]) ** 2
-    nearest = np.argmin(far, axis=1)
+    nearest = row_of_nodes(joint, rows)
     for i, (name, label, units, colors) in enumerate(
         (
             ("delta_n", "opening", LENGTHS, "Blues"),

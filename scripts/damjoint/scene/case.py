@@ -9,7 +9,7 @@ from pathlib import Path
 
 from .. import InputError, data
 from . import casefile
-from .parameters import assignments, declared, include, listing, parse
+from .parameters import INCLUDE, assignments, declared, listing, parse
 
 CASES = data("cases")
 
@@ -168,7 +168,7 @@ def load(
     known = declared()
     checked = {name: known[name].check(value) for name, value in overrides.items()}
     text = assignments(said.defaults | checked)
-    found = parse(text + "".join(listing(n, v) for n, v in lists.items()) + include())
+    found = parse(text + "".join(listing(n, v) for n, v in lists.items()) + INCLUDE)
     check_energies(found)
     values = {name: known[name].check(found[name][0]) for name in known}
     heights = check_levels("levels", found["levels"], values)

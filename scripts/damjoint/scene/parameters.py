@@ -18,6 +18,8 @@ import gmsh
 from .. import InputError, data
 
 DECLARATIONS = data("pro") / "parameters.pro"
+#: The line by which a text includes the declarations.
+INCLUDE = f'Include "{DECLARATIONS}";\n'
 
 #: The value of a parameter that follows others.
 AUTOMATIC = -1.0
@@ -120,21 +122,15 @@ DECLARED = re.compile(r"(\w+) = \{(?:Str\[)?default_\1\b((?:[^{}\"]|\"[^\"]*\"|\
 
 
 @lru_cache(maxsize=1)
-def include() -> str:
-    """The line by which a text includes the declarations."""
-    return f'Include "{DECLARATIONS}";\n'
-
-
-@lru_cache(maxsize=1)
 def constants() -> dict[str, list]:
     """All values of the declarations by themselves: defaults, regions, what the solvers share."""
-    return parse(include())
+    return parse(INCLUDE)
 
 
 @lru_cache(maxsize=1)
 def declared() -> dict[str, Parameter]:
     """All declared parameters by name."""
-    parse(include())
+    parse(INCLUDE)
     text = re.sub(r"//[^\n]*", "", DECLARATIONS.read_text())
     parameters = {}
     for name, rest in DECLARED.findall(text):

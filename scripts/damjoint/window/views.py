@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import gmsh
 import numpy as np
 
+from ..results.fields import row_of_nodes
 from ..results.pictures import LENGTHS, STRESSES, along, heading, unit
 from ..scene.case import Case
 from .camera import CLIPPED, MAPS, clip
@@ -230,8 +231,7 @@ def show_maps(gallery: Gallery, deformed: Deformed) -> None:
     scene = deformed.scene
     case, joint = scene.result.case, scene.bodies["joint"]
     rows = [scene.result.at(time) for time in deformed.times]
-    far = (joint.points[:, None, 0] - rows[0]["x"]) ** 2
-    nearest = np.argmin(far + (joint.points[:, None, 2] - rows[0]["z"]) ** 2, axis=1)
+    nearest = row_of_nodes(joint, rows[0])
     length, per_m = unit([r["delta_n"] for r in rows], LENGTHS)
     stress, per_pa = unit([r["p"] for r in rows], STRESSES)
     state = [np.where(r["damage"] >= 1, 2.0, np.where(r["slip"] > 0, 1.0, 0.0)) for r in rows]
