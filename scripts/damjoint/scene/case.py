@@ -30,6 +30,14 @@ SHARED = (
     "sudden",
 )
 
+#: What pro/section.pro finds of the section: the joint's ends, the faces' segments, the marks where
+#: line forces act.
+SECTION = (
+    *("heel_x", "heel_y", "toe_x", "toe_y", "joint_length", "crest_x", "neck_y"),
+    *("seg_side", "seg_body", "seg_x0", "seg_y0", "seg_x1", "seg_y1"),
+    *("mark_region", "mark_x", "mark_y", "mark_segment"),
+)
+
 
 @dataclass(frozen=True)
 class Case:
@@ -51,6 +59,8 @@ class Case:
     hardening_asked: bool = False
     #: what the solvers share besides the parameters: {name: values}, from pro/parameters.pro
     shared: dict[str, list[float]] = field(default_factory=dict, compare=False, repr=False)
+    #: the section, by the names of pro/section.pro
+    section: dict[str, list[float]] = field(default_factory=dict, compare=False, repr=False)
 
     def __getitem__(self, name: str) -> float | str:
         return self.values[name]
@@ -214,6 +224,7 @@ def load(
         as_published(path, checked, levels, tail_levels),
         bool(found["hardening_asked"][0]),
         shared,
+        {n: found[n] for n in SECTION},
     )
 
 

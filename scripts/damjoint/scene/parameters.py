@@ -165,7 +165,10 @@ def in_words(condition: str) -> str:
         return f"{match[1]} = {match[2]}"
     if match := re.search(r'StrCmp\((\w+), "(\w+)"\)', condition):
         return f"{match[1]} not {match[2]}"
-    return re.search(r"\((\w+) == (\d)\)", condition).expand(r"\1 = \2")
+    words = re.search(r"\((.*)\)", condition)[1]
+    for mark, word in (("==", "="), ("!= 0", "not 0"), ("||", "or")):
+        words = words.replace(mark, word)
+    return words
 
 
 def parameter(name: str) -> Parameter:
