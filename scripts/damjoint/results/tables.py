@@ -30,6 +30,7 @@ JOINT = {
         "m",
         "rupture: tangential jump at the last free slide; else: plastic slip",
     ),
+    "s": ("m", "distance from the heel along the joint"),
     "sigma_n_eff": ("Pa", "effective normal stress, sigma_n + p"),
 }
 #: One more where water flows.

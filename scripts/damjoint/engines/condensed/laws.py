@@ -144,6 +144,10 @@ class Rupture:
         """Whether the point belongs to the crack."""
         return self.broken(jump[:, 0], memory.scalar) & (memory.scalar > 0)
 
+    def opens_at(self, memory: Memory) -> np.ndarray:
+        """The opening from which on a point is open [m]."""
+        return np.where(memory.scalar >= self.L_C, 0.0, self.L_C)
+
     def slid(self, jump: np.ndarray, memory: Memory) -> np.ndarray:
         """Whether the point has let go along the joint."""
         return np.linalg.norm(memory.vector, axis=1) > 0
@@ -159,7 +163,7 @@ class Friction(Law):
         self.K_N, self.K_T, self.H = case["K_N"], case["K_T"], case["pena_tang"]
         self.mu, self.adhesion = case["mu"], case["adhesion"]
         self.artificial = case.shared["artificial"][0]
-        self.opens_at = self.adhesion / (self.mu * self.K_N)
+        self.cap_opening = self.adhesion / (self.mu * self.K_N)
 
     def start(self, points: int) -> Memory:
         """The virgin joint."""
@@ -167,7 +171,7 @@ class Friction(Law):
 
     def trial(self, jump: np.ndarray, memory: Memory) -> tuple[np.ndarray, ...]:
         """Normal stress, size and direction of the elastic shear stress, slip of this step."""
-        normal = self.K_N * np.minimum(jump[:, 0], self.opens_at)
+        normal = self.K_N * np.minimum(jump[:, 0], self.cap_opening)
         shear = self.K_T * (jump[:, 1:] - memory.vector)
         size = np.linalg.norm(shear, axis=1)
         beyond = size + self.mu * normal - self.H * memory.scalar - self.adhesion
@@ -191,7 +195,7 @@ class Friction(Law):
         """
         normal, size, n, slip = self.trial(jump, memory)
         traction = np.column_stack([normal, (size - self.K_T * slip)[:, None] * n])
-        closed, sliding = jump[:, 0] <= self.opens_at, slip > 0
+        closed, sliding = jump[:, 0] <= self.cap_opening, slip > 0
         tangent = np.zeros((len(jump), 3, 3))
         tangent[:, 0, 0] = np.where(closed, self.K_N, self.artificial * self.K_N)
         left = np.where(sliding, 1 - self.K_T * slip / np.maximum(size, 1e-300), 1.0)
@@ -226,7 +230,11 @@ class Friction(Law):
 
     def open(self, jump: np.ndarray, memory: Memory) -> np.ndarray:
         """Whether the opening is beyond that of the cap adhesion/mu."""
-        return jump[:, 0] > self.opens_at
+        return jump[:, 0] > self.cap_opening
+
+    def opens_at(self, memory: Memory) -> np.ndarray:
+        """The opening from which on a point is open [m]."""
+        return np.full(len(memory.scalar), self.cap_opening)
 
     def slid(self, jump: np.ndarray, memory: Memory) -> np.ndarray:
         """Whether the point has slipped."""
@@ -336,6 +344,11 @@ class Bond(Law):
     def open(self, jump: np.ndarray, memory: Memory) -> np.ndarray:
         """Whether the point is open and its bond gone."""
         return (jump[:, 0] > 0) & ((memory.scalar >= 1) | (self.strength == 0))
+
+    def opens_at(self, memory: Memory) -> np.ndarray:
+        """The opening from which on a point is open [m]."""
+        bonded = (memory.scalar < 1) & (self.strength > 0)
+        return np.where(bonded, self.delta_c, 0.0)
 
     def slid(self, jump: np.ndarray, memory: Memory) -> np.ndarray:
         """Whether the point has slipped."""
