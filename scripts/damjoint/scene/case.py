@@ -28,6 +28,8 @@ SHARED = (
     "coarsest",
     "artificial",
     "sudden",
+    "crack_aperture",
+    "crack_most",
 )
 
 #: What pro/section.pro finds of the section: the joint's ends, the faces' segments, the marks where

@@ -178,7 +178,8 @@ class Joint:
         if self.case["uplift"] == "flow":
             narrowest, most = self.case["aperture_min"], np.inf
         else:
-            narrowest, most = CRACK, MOST
+            shared = self.case.shared
+            narrowest, most = (shared[f"crack_{n}"][0] for n in ("aperture", "most"))
             opening = opening - self.law.opens_at(memory)
         wider = np.maximum(opening, 0) / narrowest
         factor = 1 + np.minimum(wider, most)
@@ -268,7 +269,3 @@ class Joint:
         rate = bulk.crest_pressure @ self.rate(forces, loading) if self.driven else 0.0
         return float(value), bulk.crest_jump, float(rate)
 
-
-#: uplift = cracked: aperture of the closed joint [m], and how many times it a point opens until it
-#: holds all of the head: it then conducts a million times as well.
-CRACK, MOST = 1e-8, 100.0
