@@ -1,6 +1,8 @@
 """What acts on the part of a section above its joint, from its outline alone: an integration of its
 own, by parameters of the case, which knows nothing of segments, meshes or engines."""
 
+from itertools import pairwise
+
 import numpy as np
 
 
@@ -48,13 +50,18 @@ def integrate(a, b, pressure, kinks):
     cuts = np.unique(np.clip([0, 1, *cuts], 0, 1))
     x, w = np.polynomial.legendre.leggauss(60)
     force, moment = np.zeros(2), 0.0
-    for low, high in zip(cuts[:-1], cuts[1:], strict=True):
+    for low, high in pairwise(cuts):
         for u, weight in zip(low + (high - low) * (x + 1) / 2, w * (high - low) / 2, strict=True):
             place = a + u * along
             part = pressure(place[1]) * weight * inwards
             force += part
             moment += place[0] * part[1] - place[1] * part[0]
     return force, moment
+
+
+def still(y, level):
+    """Height of still water above y."""
+    return max(level - y, 0)
 
 
 def loads(case, level, tail):
@@ -69,6 +76,7 @@ def loads(case, level, tail):
     weight = v["rho_dam"] * v["g"] * area
     parts = [(centre, weight * np.array([v["k_h"], v["k_v"] - 1]))]
     unit = v["rho_water"] * v["g"]
+    top = v["silt_height"]
     silt = v["rho_silt"] * v["g"] * v["silt_K0"]
     force, moment = np.zeros(2), 0.0
     for a, b in zip(polygon, nxt, strict=True):
@@ -78,7 +86,6 @@ def loads(case, level, tail):
         ):
             continue  # the joint
         outwards = np.array([along[1], -along[0]])
-        still = lambda y, top: max(top - y, 0)
         pressures = []
         if abs(outwards[0]) < 1e-9:
             pressures = [(lambda y: unit * still(y, level), [level])] * int(v["crest_water"])
@@ -92,10 +99,9 @@ def loads(case, level, tail):
             f, m = integrate(a, b, pressure, kinks)
             force, moment = force + f, moment + m
         if outwards[0] < -1e-9:
-            top = v["silt_height"]
             f, _ = integrate(a, b, lambda y: silt * still(y, top), [top])
             arm, _ = integrate(a, b, lambda y: y * silt * still(y, top), [top])
-            force, moment = force + [f[0], 0], moment - arm[0]
+            force, moment = force + np.array([f[0], 0]), moment - arm[0]
     crest = v["dam_height"]
     if v["ice_force"]:
         x = v["batter"] * min(v["ice_level"] / v["batter_height"], 1)

@@ -275,7 +275,7 @@ def check_section(found: Mapping[str, list]) -> None:
             raise InputError(f"{name} = {values[name]:g}: must be {sign} dam_height ({height:g} m)")
     if not values["batter"] < base:
         raise InputError(f"batter = {values['batter']:g}: must be < dam_base ({base:g} m)")
-    if not (0 < values["toe_x"] - values["heel_x"] and values["toe_y"] < height):
+    if not (values["toe_x"] - values["heel_x"] > 0 and values["toe_y"] < height):
         raise InputError(
             f"joint_slope = {values['joint_slope']:g}: must let the joint leave the dam below its "
             f"crest ({height:g} m)"
@@ -340,7 +340,7 @@ def check_levels(name: str, levels: Iterable[float], values: Mapping) -> tuple[f
         if not 0 <= level <= 2 * values["dam_height"]:
             raise InputError(
                 f"{name} = {level:g}: must be between 0 and twice the dam's height "
-                f"({values['dam_height']:g} m)"
+                f"({2 * values['dam_height']:g} m)"
             )
     return tuple(levels)
 

@@ -11,7 +11,7 @@ import gmsh
 import numpy as np
 from scipy import sparse
 
-from .. import InputError, RunError, data
+from .. import RunError, data
 from .case import Case
 from .parameters import assignments, constants, start_gmsh
 
@@ -50,7 +50,15 @@ NEEDED = ("dam", "foundation", "joint", "fixed", "heel", "toe", "crest")
 SIDES = ("up", "down", "top", "floor", "bed")
 
 #: Gmsh element types of order 1 by their VTK name.
-SHAPES = {15: "vertex", 1: "line", 2: "triangle", 3: "quad", 4: "tetra", 5: "hexahedron", 6: "wedge"}
+SHAPES = {
+    15: "vertex",
+    1: "line",
+    2: "triangle",
+    3: "quad",
+    4: "tetra",
+    5: "hexahedron",
+    6: "wedge",
+}
 
 
 @dataclass

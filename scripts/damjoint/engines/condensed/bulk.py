@@ -251,12 +251,12 @@ class Reduced:
         bordered = sparse.bmat(
             [[stiffness[kept][:, kept], columns], [columns.T, None]], format="csr"
         )
-        n, l, k = len(joint), len(loaded), loads.shape[1]
+        n, m, k = len(joint), len(loaded), loads.shape[1]
         ends = np.concatenate([place[joint], place[loaded], len(kept) + np.arange(k)])
         schur = schur_complement(bordered, ends)
-        jj, jl, ll = schur[:n, :n], schur[:n, n : n + l], schur[n : n + l, n : n + l]
-        on_joint, on_kept = schur[:n, n + l :], schur[n : n + l, n + l :]
-        if not l:
+        jj, jl, ll = schur[:n, :n], schur[:n, n : n + m], schur[n : n + m, n : n + m]
+        on_joint, on_kept = schur[:n, n + m :], schur[n : n + m, n + m :]
+        if not m:
             return Reduced(jj.copy(), jl, on_joint.copy(), jl, ll, on_kept)
         spread = linalg.solve(ll, jl.T, assume_a="pos").T
         reduced = jj - spread @ jl.T
@@ -314,9 +314,7 @@ def condense(case: Case, bodies: Bodies) -> Condensed:
         )
 
     dam = reduced["dam"].stiffness
-    both = linalg.cholesky(
-        reduced["foundation"].stiffness + dam, lower=True, overwrite_a=True
-    )
+    both = linalg.cholesky(reduced["foundation"].stiffness + dam, lower=True, overwrite_a=True)
     half = linalg.solve_triangular(both, dam, lower=True)  # L^-1 S_d
     stiffness = dam - half.T @ half
 

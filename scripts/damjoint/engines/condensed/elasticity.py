@@ -10,7 +10,6 @@ from scipy import sparse
 
 from .elements import BULK, Space, basis, geometry, nodal, points_of, tabulated
 
-
 #: Young's modulus [Pa] and Poisson's ratio [-] by region.
 Material = dict[str, tuple[float, float]]
 

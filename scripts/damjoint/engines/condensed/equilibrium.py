@@ -1,8 +1,8 @@
 """The equilibrium of the joint with the condensed bodies around it (see bulk.py).
 
-Unknown: the jump. Residual R = N^T W t(jump) - (water in the joint) + S jump - t_0(loading) = 0; the
-pressure of flowing water is solved for the jump at hand before every residual, and its derivative
-enters the tangent.
+Unknown: the jump. Residual R = N^T W t(jump) - (water in the joint) + S jump - t_0(loading) = 0;
+the pressure of flowing water is solved for the jump at hand before every residual, and its
+derivative enters the tangent.
 """
 
 from __future__ import annotations
@@ -133,7 +133,8 @@ class Joint:
         that a matrix of `Along` leads to: linear on the way from the reservoir's level to the
         tailwater's, at a dry end from that end's own height.
 
-        Drains take away their part of the head above their outlet or the tailwater (EM 1110-2-2200).
+        Drains take away their part of the head above their outlet or the tailwater (EM
+        1110-2-2200).
         """
         case, along = self.case, self.interface.along
         fields = along.heel_y, along.toe_y, along.way
@@ -268,4 +269,3 @@ class Joint:
         forces = lambda other: self._pushed(other)[0]
         rate = bulk.crest_pressure @ self.rate(forces, loading) if self.driven else 0.0
         return float(value), bulk.crest_jump, float(rate)
-

@@ -31,6 +31,7 @@ class WetFace:
         self.normals = surface.normals[self.points.elements][:, :dim]
         self.y, self.tilt = self.points.positions[:, 1], np.abs(self.normals[:, 0])
         self.straight = self.high > self.low
+        self.elements = [(shape, row) for shape, table in self.space.connectivity for row in table]
         self.flat = np.ptp(surface.points[:, 1]) < 1e-9 * np.abs(surface.points).max()
 
     def spread(self, traction: np.ndarray) -> np.ndarray:
@@ -42,7 +43,9 @@ class WetFace:
         if self.flat or not self.straight:
             cut = [] if self.flat else self.cut_by(level)
             outside = ~np.isin(self.points.elements, cut)
-            forces = self.spread(-(height(level, self.y, self.tilt) * outside)[:, None] * self.normals)
+            forces = self.spread(
+                -(height(level, self.y, self.tilt) * outside)[:, None] * self.normals
+            )
             for element in cut:
                 self.add_wet_part(forces, element, level, height)
         else:
@@ -80,36 +83,23 @@ class WetFace:
         least, most = (np.concatenate([f(h, axis=1) for h in heights]) for f in (np.min, np.max))
         return np.flatnonzero((least < level) & (level < most))
 
-    def add_wet_part(
-        self, forces: np.ndarray, element: int, level: float, height: Height
-    ) -> None:
+    def add_wet_part(self, forces: np.ndarray, element: int, level: float, height: Height) -> None:
         """Add what presses on an element below the waterline, a straight line on a flat element."""
-        start = 0
-        for shape, table in self.space.connectivity:
-            if element < start + len(table):
-                break
-            start += len(table)
-        functions = table[element - start]
+        shape, functions = self.elements[element]
         corners = elements.REFERENCE[shape]
         place = self.surface.points[functions[: len(corners)]]
         normal = self.surface.normals[element, : self.dim]
-        for simplex in below(corners, place[:, 1] - level):
-            x, w = elements.rule(*(("line", 4) if len(corners) == 2 else ("triangle", 6)))
-            share = np.column_stack([(1 - x) / 2, (1 + x) / 2]) if len(corners) == 2 else (
-                np.column_stack([1 - x.sum(axis=1), x])
-            )
-            for u, weight in zip(share @ simplex, w, strict=True):
-                values, _ = elements.basis(shape, self.space.order, u)
+        of_functions = forces.reshape(-1, self.dim)
+        simplex, points = ("line", 4) if len(corners) == 2 else ("triangle", 6)
+        for part in below(corners, place[:, 1] - level):
+            for x, weight in zip(*elements.rule(simplex, points), strict=True):
+                u = elements.nodal(simplex, x)[0] @ part
                 n, dn = elements.nodal(shape, u)
                 jacobian = dn.T @ place
-                real = np.sqrt(np.linalg.det(jacobian @ jacobian.T))
-                part = measure(simplex) * weight * real
-                here = height(level, n @ place[:, 1], abs(normal[0]))
-                for component in range(self.dim):
-                    np.add.at(
-                        forces, self.dim * functions + component,
-                        -part * here * normal[component] * values,
-                    )
+                area = measure(part) * weight * np.sqrt(np.linalg.det(jacobian @ jacobian.T))
+                here = area * height(level, n @ place[:, 1], abs(normal[0]))
+                values = elements.basis(shape, self.space.order, u)[0]
+                of_functions[functions] -= here * np.outer(values, normal)
 
 
 #: Moments that tell a force and its lever apart: m0 m2 - m1^2 over m1^2; and by how much of the

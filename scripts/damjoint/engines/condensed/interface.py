@@ -64,7 +64,9 @@ class Chord:
     @staticmethod
     def of(bulk: Condensed) -> Chord:
         """The chord of a joint."""
-        heel, toe = (bulk.joint.points[nodes][:, :2].mean(axis=0) for nodes in (bulk.heel, bulk.toe))
+        heel, toe = (
+            bulk.joint.points[nodes][:, :2].mean(axis=0) for nodes in (bulk.heel, bulk.toe)
+        )
         length = float(np.linalg.norm(toe - heel))
         along = (toe - heel) / length
         return Chord(toe, along, np.array([-along[1], along[0]]), length)

@@ -65,9 +65,7 @@ class Record:
     def copy(self) -> Record:
         """Another one, to go on with by itself."""
         rows = {name: list(values) for name, values in self.rows.items()}
-        return replace(
-            self, rows=rows, tables=list(self.tables), saved=list(self.saved)
-        )
+        return replace(self, rows=rows, tables=list(self.tables), saved=list(self.saved))
 
     @property
     def saved_until(self) -> float:

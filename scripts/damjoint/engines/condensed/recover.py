@@ -13,9 +13,7 @@ from .factor import solve_symmetric
 from .record import Record
 
 
-def recover(
-    bodies: Bodies, scenes: list[tuple[Joint, Record]]
-) -> list[dict[float, Field]]:
+def recover(bodies: Bodies, scenes: list[tuple[Joint, Record]]) -> list[dict[float, Field]]:
     """The fields of the saved states of scenes on the same bodies, by scene and time: the bulk
     solved once more. Displacements count from the state under the weight alone, if there is one.
 
@@ -48,9 +46,7 @@ def recover(
     if not any(record.saved for _, record in scenes):
         return [{} for _ in scenes]
     case = states[0][0].case
-    units = {
-        name: unit_loads(bodies, name) for name in bodies.spaces
-    }
+    units = {name: unit_loads(bodies, name) for name in bodies.spaces}
     jumps = np.zeros((len(states), sizes[0]))
     rights = np.zeros((total, len(states)))
     for i, (joint, state) in enumerate(states):

@@ -171,10 +171,7 @@ def read_fields(folder: Path, saved: dict[int, float], mesh: Mesh) -> dict[float
         stress = stress[:, [0, 3, 5, 1, 4, 2]]
         displacement = {n: read_values(folder / f"u_{n}_{number}.txt") for n in BODIES}
         found[time] = Field(
-            {
-                n: pick(*displacement[n], mesh.bodies[n].node_tags) - at_rest[n]
-                for n in BODIES
-            },
+            {n: pick(*displacement[n], mesh.bodies[n].node_tags) - at_rest[n] for n in BODIES},
             {n: pick(elements, stress, mesh.bodies[n].element_tags) for n in BODIES},
         )
     return found
