@@ -237,8 +237,8 @@ def signed(value: float) -> str:
 
 
 def check(cases: list[Case], out: Path) -> list[Check]:
-    """Run cases, each into its folder below out, and write check.csv there; into each scene's
-    folder gravity.csv and CASE_check.png.
+    """Run cases, each into its folder below out, and write check.csv there, again after each of
+    them; into each scene's folder gravity.csv and CASE_check.png.
 
     Raises InputError, RunError.
     """
@@ -255,8 +255,8 @@ def check(cases: list[Case], out: Path) -> list[Check]:
             folder = folders.scene_folder(case, result.case, out / case.name)
             write_csv(folder / "gravity.csv", method.table())
             draw_check(result, method, picture_table(checks[-1]), folder)
-    rows = [row for found in checks for row in found.rows]
-    write_csv(out / "check.csv", {name: [row[name] for row in rows] for name in CHECK})
+        rows = [row for found in checks for row in found.rows]
+        write_csv(out / "check.csv", {name: [row[name] for row in rows] for name in CHECK})
     return checks
 
 
