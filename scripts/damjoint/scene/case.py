@@ -194,6 +194,7 @@ def load(
             f"tail_levels = {told}{whose}: must be one level or as many as levels ({len(heights)})"
         )
     check_drains(values)
+    check_works(values)
     times = tuple(found["times"])
     if steps is not None:
         times = tuple(i + (k + 1) / steps for i in range(len(heights)) for k in range(steps))
@@ -274,6 +275,17 @@ def check_drains(values: Mapping) -> None:
             f"drain_level = {values['drain_level']:g}: must be 0 with drive = {values['drive']} "
             "(the pressure has to be linear in the level)"
         )
+
+
+def check_works(values: Mapping) -> None:
+    """Raise InputError if a joint is to be grouted or sawn that does not know it."""
+    known = values["law"] == "rupture" and values["uplift"] != "flow"
+    for name in ("grout_pressure", "saw_thickness"):
+        if values[name] > 0 and not known:
+            raise InputError(
+                f"{name} = {values[name]:g}: must be 0 with law = {values['law']}, uplift = "
+                f"{values['uplift']} (known to law = rupture, and not to uplift = flow)"
+            )
 
 
 def numbers(name: str, text: str) -> list[float]:
