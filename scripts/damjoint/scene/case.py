@@ -279,12 +279,12 @@ def check_drains(values: Mapping) -> None:
 
 def check_works(values: Mapping) -> None:
     """Raise InputError if a joint is to be grouted or sawn that does not know it."""
-    known = values["law"] == "rupture" and values["uplift"] != "flow"
+    known = values["law"] == "rupture" and values["uplift"] in ("none", "imposed", "drained")
     for name in ("grout_pressure", "saw_thickness"):
         if values[name] > 0 and not known:
             raise InputError(
                 f"{name} = {values[name]:g}: must be 0 with law = {values['law']}, uplift = "
-                f"{values['uplift']} (known to law = rupture, and not to uplift = flow)"
+                f"{values['uplift']} (known to law = rupture, and to none, imposed and drained)"
             )
 
 
