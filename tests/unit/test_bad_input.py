@@ -92,6 +92,14 @@ def test_parameter_out_of_range(command, tmp_path, setting, allowed):
             ("run", "f", "--engine", "getdp", "--set", "mesh_pattern=layers"),
             ("mesh_pattern = layers", "free, split"),
         ),
+        (
+            ("run", "c", "--set", "grout_pressure=5e4"),
+            ("grout_pressure = 50000", "law = friction", "must be 0"),
+        ),
+        (
+            (*RUN, "--set", "saw_thickness=1e-3", "--set", "uplift=flow"),
+            ("saw_thickness = 0.001", "uplift = flow", "must be 0"),
+        ),
         ((*RUN, "--steps", "0"), ("steps = 0", "integer >= 1")),
         ((*RUN, "--steps", "-2"), ("steps = -2", "integer >= 1")),
         pytest.param((*RUN, "--steps", "1.5"), ("steps", "1.5", "integer >= 1")),

@@ -197,6 +197,7 @@ def load(
             f"tail_levels = {told}{whose}: must be one level or as many as levels ({len(heights)})"
         )
     check_drains(values, found["joint_length"][0])
+    check_works(values)
     times = tuple(found["times"])
     if steps is not None:
         times = tuple(i + (k + 1) / steps for i in range(len(heights)) for k in range(steps))
@@ -315,6 +316,17 @@ def check_drains(values: Mapping, length: float) -> None:
             f"drain_level = {values['drain_level']:g}: must be 0 with drive = {values['drive']} "
             "(the pressure has to be linear in the level)"
         )
+
+
+def check_works(values: Mapping) -> None:
+    """Raise InputError if a joint is to be grouted or sawn that does not know it."""
+    known = values["law"] == "rupture" and values["uplift"] in ("none", "imposed", "drained")
+    for name in ("grout_pressure", "saw_thickness"):
+        if values[name] > 0 and not known:
+            raise InputError(
+                f"{name} = {values[name]:g}: must be 0 with law = {values['law']}, uplift = "
+                f"{values['uplift']} (known to law = rupture, and to none, imposed and drained)"
+            )
 
 
 def numbers(name: str, text: str) -> list[float]:

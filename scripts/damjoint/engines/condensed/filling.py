@@ -179,7 +179,8 @@ class Filling:
 
         first: whether it is the first attempt at the step.
         """
-        joint, memory = self.joint, self.state.memory
+        joint, state = self.joint, self.state.staged(self.joint, time)
+        memory = state.memory
         level, tail, prescribed, target = self.water_at(time)
         asked = Loading.at(self.case, time, level, tail)
         stiff = joint.case["K_N"] * joint.bulk.width
@@ -187,7 +188,8 @@ class Filling:
         def evaluate(jump: np.ndarray, level: float, last: Iterate | None) -> Iterate:
             side = within = None
             if attempt.release:
-                side = joint.law.side(joint.interface.jumps(joint.interface.at_points, jump))
+                at_points = joint.interface.jumps(joint.interface.at_points, jump)
+                side = joint.law.side(at_points, memory)
                 if last:
                     within = (side * last.side < 0) & ((side < 0) | (attempt.release > 1))
                     side = np.where(within, 0, side)
@@ -216,7 +218,7 @@ class Filling:
         end, iterations = found
         if np.abs(end.jump).max() > 0.1 * self.case["dam_height"]:
             return None  # the dam has fallen: an equilibrium of small displacements only
-        memories = self.state.remember(joint, end.jump)
+        memories = state.remember(joint, end.jump)
         return (
             State(time, replace(asked, level=end.level), end.jump, *memories),
             iterations,

@@ -38,6 +38,11 @@ class State:
         memories = law.start(len(interface.points.weights)), law.start(len(interface.rows))
         return State(0.0, Loading(0.0, 0.0), np.zeros(len(joint.bulk.free)), *memories)
 
+    def staged(self, joint: Joint, time: float) -> State:
+        """The state with the memories for a step that goes on to a time."""
+        memories = (joint.law.stage(m, self.time, time) for m in (self.memory, self.nodes))
+        return replace(self, **dict(zip(("memory", "nodes"), memories, strict=True)))
+
     def remember(self, joint: Joint, jump: np.ndarray) -> tuple[Memory, Memory]:
         """The memories after a step to a jump."""
         law, interface = joint.law, joint.interface
