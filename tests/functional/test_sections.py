@@ -4,6 +4,7 @@ integration of the tests' own; cracked uplift against the gravity method."""
 import numpy as np
 import pytest
 from damjoint import InputError
+from damjoint.results import gravity
 from damjoint.scene.case import load
 from numpy.testing import assert_allclose
 from sections import resultants
@@ -159,3 +160,26 @@ def test_a_bond_keeps_the_water_out_until_it_is_gone(solve):
 def test_no_such_section(settings, said):
     with pytest.raises(InputError, match=said):
         load("dam", settings)
+
+
+@pytest.mark.parametrize("effectiveness", [0.0, 0.5, 1.0])
+def test_drains_in_what_the_crack_has_left(solve, effectiveness):
+    """As the gravity method has them, on a rigid dam; the drains stand on a node."""
+    drains = {"drains": 1, "drain_x": 4, "drain_effectiveness": effectiveness}
+    mesh = {"n_joint": 340, "uplift": "cracked"}
+    (result,) = solve("dam", "40,45", "3", **RIGID | mesh | drains)
+    hand = gravity.at(result.case, 2.0)
+    assert result.last["U"] == pytest.approx(hand.U, rel=1e-3)
+    assert result.last["crack_length"] == pytest.approx(hand.crack_length, abs=0.05)
+
+
+@pytest.mark.parametrize("name", ["e", pytest.param("f", marks=pytest.mark.heavy)])
+def test_drains_where_water_flows(solve, name):
+    """They take a part of the flow: what is left of it leaves at the toe, and the same in 2D and
+    3D."""
+    (result,) = solve(name, drains=1, drain_x=1, drain_effectiveness=0.5)
+    flux = result.at()["flux"]
+    x = result.at()["s"]
+    assert result.last["flux"] == pytest.approx(1.0788e-15, rel=1e-3)
+    assert flux[x > 1.2] == pytest.approx(result.last["flux"], rel=1e-2)
+    assert (flux[x < 0.9] > 2 * result.last["flux"]).all()

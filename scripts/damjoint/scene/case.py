@@ -348,13 +348,14 @@ def check_drains(values: Mapping, length: float) -> None:
     """Raise InputError if the drains are not under the dam, or do not suit a driven scene; length:
     of the joint [m].
     """
-    if values["uplift"] != "drained":
+    drained = values["uplift"] == "drained"
+    if not drained and not (values["drains"] and values["uplift"] in ("cracked", "flow")):
         return
     if not values["drain_x"] < length:
         raise InputError(
             f"drain_x = {values['drain_x']:g}: must be < the joint's length ({length:g} m)"
         )
-    if values["drive"] != "level" and values["drain_level"] > 0:
+    if drained and values["drive"] != "level" and values["drain_level"] > 0:
         raise InputError(
             f"drain_level = {values['drain_level']:g}: must be 0 with drive = {values['drive']} "
             "(the pressure has to be linear in the level)"

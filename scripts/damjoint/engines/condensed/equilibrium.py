@@ -44,6 +44,7 @@ class Joint:
         self.case, self.bulk, self.interface = case, interface.bulk, interface
         self.wet, self.flowing = case["uplift"] != "none", case["uplift"] in ("flow", "cracked")
         self.driven = case["drive"] != "level"
+        self.drains = interface.drains(case["drain_x"]) if self.flowing and case["drains"] else None
         self.unit_weight = case["rho_water"] * case["g"]
         self.law = LAWS[case["law"]](case)
         self.virgin = self.law.respond(np.zeros((1, 3)), self.law.start(1))[1][0]
@@ -203,10 +204,33 @@ class Joint:
     def solve_flow(
         self, jump: np.ndarray, memory: Memory, loading: Loading
     ) -> tuple[np.ndarray, object]:
-        """Pressure beyond the imposed one at the inner nodes, and the solution's sensitivity."""
-        weights = self.interface.points.weights
-        conductivity = self.aperture(jump, memory)[0] * weights
-        return self.interface.flow.solve(conductivity, self.unit_weight * self.head(loading))
+        """Pressure beyond the imposed one at the inner nodes; and for each solution it is made of
+        its share in it and what its sensitivity wants.
+
+        Drains: of the head that the joint would have there, they take away their part above their
+        outlet or the tailwater; the pressure is that part of one with the outlet's head at the
+        drains, and the rest of one without them. A crack that has reached them takes their effect
+        (EM 1110-2-2200).
+        """
+        case, flow = self.case, self.interface.flow
+        factor = self.aperture(jump, memory)[0]
+        conductivity = factor * self.interface.points.weights
+        head = self.head(loading)
+        free, solution = flow.solve(conductivity, self.unit_weight * head)
+        if self.drains is None:
+            return free, [(1.0, solution)]
+        nodes, points = self.drains
+        outlet = max(case["drain_level"], loading.tail)
+        there = head[nodes] + self.beyond(free)[nodes] / self.unit_weight
+        cracked = case["uplift"] == "cracked" and (factor[points] > 1).any()
+        effect = case["drain_effectiveness"]
+        if cracked or not (there > outlet).all() or effect == 0:
+            return free, [(1.0, solution)]
+        drawn, drained = flow.solve(
+            conductivity, self.unit_weight * head, nodes, (self.unit_weight * outlet)
+        )
+        parts = [(1 - effect, solution), (effect, drained)]
+        return (1 - effect) * free + effect * drawn, parts
 
     def residual(
         self,
@@ -244,7 +268,10 @@ class Joint:
             change = law_change(secant)
             if self.flowing:
                 growing = self.aperture(jump, memory)[1] * interface.points.weights
-                change.pressure, change.columns = interface.flow.sensitivity(solution, growing)
+                found = [interface.flow.sensitivity(part, growing) for _, part in solution]
+                change.columns = found[0][1]
+                shares = (share for share, _ in solution)
+                change.pressure = sum(s * p for s, (p, _) in zip(shares, found, strict=True))
             if not self.driven:
                 return change, None
             slope = -self.rate(self._loads, loading)
@@ -272,8 +299,9 @@ class Joint:
             return Pressure(*found)
         factor, _, narrowest = self.aperture(jump, memory)
         conductivity = self.case["rho_water"] * narrowest**3 * factor / (12 * self.case["visc"])
-        head = self.unit_weight * self.head(loading)
-        return Pressure(*found, *interface.flow.flux(conductivity, inner, head, bulk.width))
+        total = self.unit_weight * self.head(loading) + whole
+        nodes = () if self.drains is None else (self.drains[0],)
+        return Pressure(*found, *interface.flow.flux(conductivity, total, bulk.width, *nodes))
 
     def crest(self, jump: np.ndarray, loading: Loading) -> tuple[float, np.ndarray, float]:
         """The crest's displacement along x [m], and its derivatives with jump and level."""

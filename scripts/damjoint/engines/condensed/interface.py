@@ -214,6 +214,21 @@ class Interface:
         """Scalar fields along the joint, and how far each place is on the way to the toe."""
         return Along(self.bulk, self.space)
 
+    def drains(self, distance: float) -> tuple[np.ndarray, np.ndarray]:
+        """The nodes nearest to a line at a distance from the heel along the joint [m], and the
+        law's points beside them.
+        """
+        way, tables = self.along.way, [table for _, table in self.bulk.joint.cells]
+        at, near = distance / self.length, []
+        for table in tables:  # in each element that the line crosses, its nearest node
+            low, high = way[table].min(axis=1), way[table].max(axis=1)
+            crossed = table[(low <= at) & (at <= high)]
+            best = np.abs(way[crossed] - at).argmin(axis=1)
+            near.append(crossed[np.arange(len(crossed)), best])
+        nodes = np.intersect1d(np.concatenate(near), self.along.inside)
+        beside = np.concatenate([np.isin(table, nodes).any(axis=1) for table in tables])
+        return nodes, np.flatnonzero(beside[self.points.elements])
+
     # -- linear systems
     # ------------------------------------------------------------------------------------
 

@@ -31,6 +31,8 @@ def check(case: Case) -> None:
             f"mesh_pattern = {case['mesh_pattern']}: must be one of {', '.join(SOLID)} "
             "with engine = getdp in 3D"
         )
+    if case["drains"] and case["uplift"] in ("cracked", "flow"):
+        raise InputError(f"drains = 1: must be 0 with engine = getdp and uplift = {case['uplift']}")
     if case.geometry:
         check_own(mesh_of(case), case)
 
