@@ -1,4 +1,4 @@
-"""The command line: damjoint new | run | check | gui | validate | critical | sweep | bench | law."""
+"""The command line: new | run | check | critical | gui | validate | sweep | bench | law."""
 
 from __future__ import annotations
 

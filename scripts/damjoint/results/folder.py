@@ -61,7 +61,8 @@ def clear(folder: Path) -> None:
             remove_if_empty(folder / name)
     if told is None:
         return
-TABLES = ("joint.csv", "history.csv", "curve.csv", "gravity.csv", "critical.csv", "run.json")
+    pictures = ("", "_curve", "_check", "_critical")
+    names = [*TABLES, *(f"{told['case']}{end}.png" for end in pictures)]
     for name in names:
         if Path(name).name == name:
             (folder / name).unlink(missing_ok=True)

@@ -64,7 +64,7 @@ CRITICAL = {
     "driven": ("-", "0: the level was prescribed, 1: a displacement, and the level found"),
     **{n: HISTORY[n] for n in ("level", "crest_ux", "crack_length", "slip_length", "N", "T", "M")},
     "pushed": ("m", "how far the dam was pushed where a displacement was prescribed"),
-    "compression": ("Pa", "largest effective compression of a node of the joint"),
+    "compression": ("Pa", "total compression at the toe"),
 }
 
 #: Columns of gravity.csv: a row per load on the body above the joint, and their sum.

@@ -101,7 +101,7 @@ def bound(case: Case, last: dict[str, float]) -> str:
     length = case["dam_base"]
     holds = case["mu"] * last["N"] + case["adhesion"] * length
     if case["law"] != "rupture" and last["T"] >= (1 - AT_BOUND) * holds:
-        return f"T = {last['T']:.5g} N/m is all that mu N + c L can hold"
+        return f"T = {last['T']:.5g} N/m reaches mu N + c L"
     arm = last["M"] / last["N"] if last["N"] > 0 else 0.0
     if arm < 0.01 * length:
         return f"the resultant is {arm:.3g} m from the toe"

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 
@@ -23,9 +24,13 @@ from ..scene.case import Case
 #: Relative precision of a critical value.
 PRECISION = 1e-4
 
-#: First push over the displacement so far; each one over the one before; one that fails is tried
-#: at this part, down to the smallest over the displacement so far.
-FIRST, GROWTH, CUT, SMALLEST = 0.05, 1.5, 0.25, 1e-5
+#: First push over the displacement so far; each one over the one before, at most; one that fails is
+#: tried at this part of its length, so often.
+FIRST, GROWTH, CUT, CUTS = 0.05, 1.5, 0.25, 5
+
+#: By how much a push should raise the level, relatively: the highest level of a joint that softens
+#: depends on the steps by some hundredths of that.
+RISE = 0.005
 
 #: How many times as far a dam is pushed before its level counts as risen no more: for a first
 #: opinion, and for sure.
@@ -34,8 +39,8 @@ ROUGH, SURE = 1.5, 4.0
 #: Levels that differ relatively by less are the same.
 PLATEAU = 1e-7
 
-#: Halvings at most of the interval around a peak.
-HALVINGS = 16
+#: Looks at most at a branch's end.
+MOST_LOOKS = 30
 
 #: Time between two pushes, after the last level: only their order matters, and that all loads that
 #: grow in time are there.
@@ -60,10 +65,18 @@ class Point:
 
     @cached_property
     def compression(self) -> float:
-        """Largest effective compression at a node of the joint [Pa]."""
-        joint, state = self.filling.joint, self.filling.state
-        jump = joint.interface.jumps(joint.interface.at_nodes, state.jump)
-        return float(-joint.law.respond(jump, state.nodes)[0][:, 0].min())
+        """Largest total compression at the toe [Pa]."""
+        joint, state, pressure = (
+            self.filling.joint,
+            self.filling.state,
+            self.filling.record.pressure.nodes,
+        )
+        interface = joint.interface
+        x = interface.space.place[:, 0]
+        toe = x > x.max() - 1e-9 * np.ptp(x)
+        jump = interface.jumps(interface.at_nodes, state.jump)
+        effective = joint.law.respond(jump, state.nodes)[0][:, 0]
+        return float((pressure - effective)[toe].max())
 
     @property
     def last(self) -> dict[str, float]:
@@ -92,10 +105,12 @@ class Branch:
         is called with each level found.
         """
         self.case, self.on_step = case, on_step
-        self.strength = case.values.get("f_c", 0)
         self.points: list[Point] = []
         filling = Filling(case, interface, lambda _: self.add(Point(kept(filling))))
-        filling.run()
+        filling.reach(case.times[0])
+        for time in case.times[1:]:
+            if filling.stopped or not solved(filling, time, 1):
+                break
         ahead = [v for t, v in enumerate(case.levels, 1) if t >= filling.state.time]
         self.target = max(ahead) if target is None else target
         #: whether no further push has been found
@@ -115,12 +130,12 @@ class Branch:
 
     @property
     def crushed(self) -> bool:
-        """Whether the joint's compression has passed f_c at its last point."""
+        """Whether the toe's compression has passed f_c at its last point."""
         return bool(self.points) and self.crushes(self.points[-1])
 
     def crushes(self, point: Point) -> bool:
-        """Whether the joint's compression passes f_c at a point."""
-        return self.strength > 0 and point.compression > self.strength
+        """Whether the toe's compression passes f_c at a point."""
+        return self.case["f_c"] > 0 and point.compression > self.case["f_c"]
 
     @property
     def arrival(self) -> int | None:
@@ -149,9 +164,9 @@ class Branch:
         return int(np.argmax(levels >= (1 - PLATEAU) * levels.max())) if sound else 0
 
     @property
-    def missing(self) -> float:
-        """How much its highest level is below the target [m]."""
-        return self.target - self.points[self.top].level
+    def highest(self) -> float:
+        """Its highest level [m]; nan if there is none."""
+        return self.points[self.top].level if self.points else np.nan
 
     @property
     def crushed_at_top(self) -> bool:
@@ -192,72 +207,87 @@ class Branch:
             self.refine(self.target)
 
     def go_on(self) -> None:
-        """The next push, at any length."""
+        """The next push, of the crest at any length, or else of the heel."""
         last = self.points[-1]
-        while self.push > SMALLEST * (last.pushed or self.size):
-            found = self.pushed(last, self.push)
+        for control, cuts in product(("crest", "heel"), range(CUTS)):
+            push = self.push * CUT**cuts
+            found = self.pushed(last, push, control)
             if found:
-                self.push *= GROWTH
+                rise = max((found.level - last.level) / found.level, 1e-12)
+                self.push = push * min(max(RISE / rise, CUT), GROWTH)
                 self.add(found)
                 return
-            self.push *= CUT
         self.stuck = True
 
-    def pushed(self, point: Point, by: float) -> Point | None:
-        """The equilibrium at which the crest, or else the heel, has moved further [m]."""
+    def pushed(self, point: Point, by: float, control: str) -> Point | None:
+        """The equilibrium at which the crest or the heel has moved further [m]."""
         end = max(point.filling.state.time, len(self.case.levels)) + TICK
-        for control in ("crest", "heel"):
-            found = moved(point.filling, self.case, control, by, end)
-            if found:
-                return Point(found, (point.pushed or self.size) + by, control)
-        return None
-
-    def between(self, a: Point, b: Point) -> Point | None:
-        """An equilibrium between two neighbours."""
-        if b.control != "level":
-            return self.pushed(a, (b.pushed - (a.pushed or self.size)) / 2)
-        found = solved(a.filling.fork(self.case), (a.filling.state.time + b.filling.state.time) / 2)
-        return found and Point(found)
+        found = moved(point.filling, self.case, control, by, end)
+        return found and Point(found, (point.pushed or self.size) + by, control)
 
     # -- its end, more closely
     # ----------------------------------------------------------------------------------------------
 
     def refine(self, wanted: float = np.inf) -> None:
-        """Halve the intervals around the branch's end to the precision: around its highest level,
-        or where it passes the target or f_c; no further than needed to see that a wanted level is
-        out of reach.
+        """Look at the branch's end to the precision: at its highest level, or where it passes the
+        target or f_c; no closer than needed to see that a wanted level is out of reach.
         """
-        for _ in range(HALVINGS):
-            passed = len(self.points) - 1 if self.crushed_at_top else self.arrival
-            right = self.top if passed is None else passed
-            if right == 0 or (passed is None and right + 1 == len(self.points)):
+        for _ in range(MOST_LOOKS):
+            left, share, possible = self.unknown()
+            known = not possible - self.highest > PRECISION / 2 * possible
+            if known or possible < wanted < np.inf:
                 return
-            high, rise = self.points[right].level, self.rise(right, passed is None)
-            if rise <= PRECISION / 2 * high or high + rise < wanted < np.inf:
+            middle = self.between(left, share)
+            if middle is None:
                 return
-            for i in (right, right - 1) if passed is None else (right - 1,):
-                middle = self.between(self.points[i], self.points[i + 1])
-                if middle is None:
-                    return
-                if self.crushes(middle):
-                    self.points[i + 1 :] = [middle]
-                else:
-                    self.points.insert(i + 1, middle)
+            if self.crushes(middle):
+                self.points[left + 1 :] = [middle]
+            else:
+                self.points.insert(left + 1, middle)
 
-    def rise(self, right: int, peak: bool) -> float:
-        """What is unknown of a level [m] at the right end of an interval; at a peak, how much
-        higher the branch can be on both sides of it if it is concave.
+    def unknown(self) -> tuple[int, float, float]:
+        """Where to look next: the number of a point, the share of the way to the next one, and the
+        highest level [m] that may be there; the highest one found if no look is needed.
         """
-        points = self.points[max(right - 2, 0) : right + 2]
-        levels = np.array([p.level for p in points])
-        if not peak or len(points) < 4 or not points[1].pushed:
-            return abs(self.points[right].level - self.points[right - 1].level)
-        place = np.array([p.pushed or self.size for p in points])
-        if place[1] <= place[0]:
-            return np.inf
-        before, after = np.diff(levels)[:2] / np.diff(place)[:2]
-        highest = levels[1:3] + np.array([before, after]) * np.diff(place)[1:]
-        return float(highest.max() - levels[2])
+        if self.crushed_at_top or self.arrival is not None:
+            right = len(self.points) - 1 if self.crushed else self.arrival
+            ends = [p.level for p in self.points[max(right - 1, 0) : right + 1]]
+            return right - 1, 0.5, self.highest + max(ends) - min(ends)
+        inner = (i for i in (self.top - 1, self.top) if 0 <= i < len(self.points) - 1)
+        sides = [(i, *self.summit(i)) for i in inner if self.points[i + 1].pushed]
+        return max(sides, key=lambda side: side[2], default=(self.top, 0.5, self.highest))
+
+    def summit(self, left: int) -> tuple[float, float]:
+        """How high a branch that gets no steeper can be between a point and the next one, and at
+        which share of the way it is likely to bend: where the lines through their neighbours meet.
+        """
+        a, b = self.points[left], self.points[left + 1]
+        length, chord = b.pushed - (a.pushed or self.size), self.slope(left)
+        before, beyond = self.slope(left - 1), self.slope(left + 1)
+        if before is None:
+            return 0.5, max(a.level, b.level) + abs(b.level - a.level)
+        share = 0.5
+        if beyond is not None and before > chord > beyond:
+            share = np.clip((chord - beyond) / (before - beyond), 0.1, 0.9)
+        return float(share), max(a.level + before * length, b.level)
+
+    def slope(self, left: int) -> float | None:
+        """Rise of the level over the push between a point and the next one; None if there is no
+        push.
+        """
+        if left < 0 or left + 1 >= len(self.points) or not self.points[left + 1].pushed:
+            return None
+        a, b = self.points[left], self.points[left + 1]
+        return (b.level - a.level) / (b.pushed - (a.pushed or self.size))
+
+    def between(self, left: int, share: float) -> Point | None:
+        """The equilibrium at a share of the way from a point to the next one."""
+        a, b = self.points[left], self.points[left + 1]
+        if b.pushed:
+            return self.pushed(a, share * (b.pushed - (a.pushed or self.size)), b.control)
+        times = a.filling.state.time, b.filling.state.time
+        found = solved(kept(a.filling), times[0] + share * (times[1] - times[0]))
+        return found and Point(found)
 
 
 def kept(filling: Filling) -> Filling:
@@ -285,14 +315,15 @@ def moved(filling: Filling, case: Case, control: str, by: float, end: float) -> 
             times=(*(t for t in case.times if t <= begin), end),
         )
     )
-    driven.driven = True
+    if not driven.driven:  # no extrapolation from one control to the other
+        driven.driven, driven.before = True, None
     driven.displacement = filling.record.rows["heel" if control == "heel" else "crest_ux"][-1]
     return solved(driven, end)
 
 
-def solved(filling: Filling, time: float) -> Filling | None:
-    """A filling gone on with to a time by one step; None if it is not found."""
-    attempts = filling.attempts()[:-1]
+def solved(filling: Filling, time: float, most: int = 3) -> Filling | None:
+    """A filling gone on with to a time by one step; None if so many attempts do not find it."""
+    attempts = filling.attempts()[:most]
     for attempt in attempts:
         found = filling.solve(time, attempt, attempt is attempts[0])
         if found:

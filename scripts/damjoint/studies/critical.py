@@ -11,16 +11,18 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from itertools import chain, count, zip_longest
+from itertools import chain, zip_longest
 from pathlib import Path
 
 import numpy as np
+from scipy.optimize import bisect
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from .. import InputError
 from ..engines import Outcome
 from ..results import folder as folders
+from ..results import gravity
 from ..results.tables import CRITICAL, Results, write_csv
 from ..results.verdict import bound, statement
 from ..run import save
@@ -149,9 +151,7 @@ class Search:
         Raises InputError.
         """
         name, levels, tails = self.asked
-        if self.of == "level":
-            changed = {}
-        elif self.of == "strength":
+        if self.of == "strength":
             changed = {n: self.own[n] / value for n in STRENGTH} | {"pena_rupture": -1.0}
         else:
             changed = {self.name: value}
@@ -197,15 +197,21 @@ class Search:
     def value(self) -> Answer:
         """Outwards from the case's own value until the answer changes, then halved."""
         found = self.trial(1.0 if self.of == "strength" else self.own[self.name])
+        other = self.change(found)
+        if other is None:
+            return self.no_change(found)
+        stands, fails = (found, other) if found.stands else (other, found)
         while True:
-            other = self.change(found)
-            if other is None:
-                return self.no_change(found)
-            stands, fails = self.halved(*((found, other) if found.stands else (other, found)))
+            stands, fails = self.halved(stands, fails)
             fails.branch.follow(SURE)
+            fails.branch.refine()
             if not fails.stands:
                 return self.answer(stands.value, fails.branch, arrived(stands))
-            found = fails  # pushed further it does stand: on from there
+            step = fails.value - stands.value  # pushed further it does stand: on from there
+            stands = fails
+            while fails.stands:
+                step *= 2
+                fails = self.trial(stands.value + step)
 
     def no_change(self, found: Trial) -> Answer:
         """The answer where all values that have been tried end as one of them does."""
@@ -244,25 +250,24 @@ class Search:
         """The two, as near to each other as the precision asks for; halved every third time at
         least.
         """
-        for turn in count():
-            ends = stands.value, fails.value
-            if abs(ends[0] - ends[1]) <= PRECISION * max(map(abs, ends)):
-                return stands, fails
+        ends, turn = (stands.value, fails.value), 0
+        while abs(ends[0] - ends[1]) > PRECISION * max(map(abs, ends)):
             value = self.foreseen(*ends) if turn % 3 else None
             found = self.trial(middle(*ends) if value is None else value)
             stands, fails = (found, fails) if found.stands else (stands, found)
+            ends, turn = (stands.value, fails.value), turn + 1
+        return stands, fails
 
     def foreseen(self, stands: float, fails: float) -> float | None:
         """A value just before the one at which the highest levels of the last two trials that
         failed say that the dam just fails, or just beyond it; None if they say nothing.
         """
         known = [t for t in self.trials if not t.stands and t.branch.points][-2:]
-        if len(known) < 2:
+        values = [t.value for t in known]
+        missing = [t.branch.target - t.branch.highest for t in known]
+        if len(set(missing)) < 2:
             return None
-        (a, b), gap = (t.value for t in known), [t.branch.missing for t in known]
-        if gap[0] == gap[1]:
-            return None
-        root = b - gap[1] * (b - a) / (gap[1] - gap[0])
+        root = values[1] - missing[1] * np.diff(values)[0] / np.diff(missing)[0]
         aside = np.sign(fails - stands) * 0.4 * PRECISION * abs(root)
         low, high = sorted((stands, fails))
         return next((v for v in (root - aside, root + aside) if low < v < high), None)
@@ -276,23 +281,50 @@ class Search:
 
     def answer(self, value: float | None, failing: Branch, point: Point | None) -> Answer:
         """The answer, with what the failing branch shows."""
-        mode, why, doubt = failing.mode, "", ""
+        why, doubt = "", "no further equilibrium is found, but no mechanism either"
         if not failing.points:
-            doubt = "no equilibrium was found even at the first step"
+            doubt = "no equilibrium is found even at the first step"
         elif failing.crushed_at_top:
-            why = f"the compression of the joint passes f_c = {failing.strength:g} Pa beyond it"
+            why = f"beyond it the toe's compression passes f_c = {failing.case['f_c']:g} Pa"
         elif failing.settled(SURE):
-            top, last = failing.points[failing.top], failing.points[-1]
-            far = last.pushed / (top.pushed or failing.size)
+            top = failing.points[failing.top]
+            far = failing.points[-1].pushed / (top.pushed or failing.size)
             why = (
-                f"beyond it the water stands at most at {top.level:.6g} m, however far the dam is "
-                f"pushed (to {far:.2g} times its displacement)"
+                f"beyond it, pushed {far:.2g} times as far, the dam holds {top.level:.6g} m at most"
             )
             if reached := bound(failing.case, top.last):
                 why += f"; there {reached}"
-        elif failing.stuck:
-            doubt = "no further equilibrium is found, but no mechanism either"
-        return Answer(value, mode, why, doubt, point)
+        beside = None if value is None else self.by_gravity(value)
+        return Answer(value, failing.mode, why, "" if why else doubt, point, beside)
+
+    # -- beside it
+    # ----------------------------------------------------------------------------------------------
+
+    def by_gravity(self, value: float) -> float | None:
+        """The critical value of the gravity method that is nearest to one of the finite elements;
+        None if there is none near.
+        """
+        here = self.rigid_block_stands(value)
+        for share in (0.02, 0.05, 0.1, 0.2, 0.5, 0.9):
+            for other in (value * (1 + share), value * (1 - share)):
+                there = self.rigid_block_stands(other)
+                if there is not None and there != here:
+                    sign = lambda v: 1.0 if self.rigid_block_stands(v) == here else -1.0
+                    return float(bisect(sign, value, other, rtol=PRECISION / 1000))
+        return None
+
+    def rigid_block_stands(self, value: float) -> bool | None:
+        """Whether the gravity method finds an equilibrium, with friction if the law has it, and a
+        toe that is not crushed; None if the case allows no such value.
+        """
+        try:
+            case = self.own if self.of == "level" else self.case_at(value)
+        except InputError:
+            return None
+        method = gravity.at(case, case.times[-1], value if self.of == "level" else None)
+        slides = case["law"] != "rupture" and method.SSF < 1
+        crushed = 0 < case["f_c"] < -method.sigma_n_toe
+        return method.stands and not slides and not crushed
 
 
 def arrived(trial: Trial) -> Point:

@@ -11,21 +11,22 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from ..results.pictures import BLUE, GREEN, LENGTHS, ORANGE, RED, unit
-from .branch import Branch
+from .branch import Branch, Point
 
 if TYPE_CHECKING:
     from .critical import Answer, Search
 
 
 def draw(search: Search, answer: Answer, path: Path) -> None:
-    """Draw level against crest for the two dams on both sides of the critical value and, but for a
-    critical level, the level that every value can hold.
+    """Draw level against crest for the dams on both sides of the critical value and, but for a
+    critical level, the highest level with every value.
     """
     single = search.of == "level"
-    figure = Figure(figsize=(7 if single else 12, 4.8), layout="constrained")
+    figure = Figure(figsize=(7.5 if single else 12, 4.8), layout="constrained")
     FigureCanvasAgg(figure)
     *left, right = figure.subplots(1, 1 if single else 2, squeeze=False)[0]
-    figure.suptitle(textwrap.fill(heading(search, answer), 70 if single else 120), fontsize=11)
+    said = textwrap.fill(heading(search, answer), 75 if single else 120)
+    figure.suptitle(said, fontsize=11, parse_math=False)
     for axes in left:
         draw_trials(axes, search, answer)
     draw_branches(right, search, answer)
@@ -46,53 +47,45 @@ def heading(search: Search, answer: Answer) -> str:
 def draw_trials(axes: Axes, search: Search, answer: Answer) -> None:
     """The highest level found with each value."""
     for stands, color, mark, label in (
-        (True, GREEN, "^", "stands (the water rises no higher)"),
-        (False, RED, "v", "fails: its highest equilibrium"),
+        (True, GREEN, "^", "stands at the level asked for"),
+        (False, RED, "v", "fails: its highest level"),
     ):
-        trials = [t for t in search.trials if t.stands == stands and t.branch.points]
-        levels = [
-            t.branch.target if stands else t.branch.points[t.branch.top].level for t in trials
-        ]
-        axes.plot([t.value for t in trials], levels, mark, color=color, label=label)
-    if answer.value is not None:
-        axes.axvline(answer.value, color="black", linewidth=0.8, label=f"{answer.value:.5g}")
-    if answer.gravity is not None:
-        label = f"gravity method {answer.gravity:.5g}"
-        axes.axvline(answer.gravity, color="black", linestyle=":", linewidth=1, label=label)
-    axes.set(xlabel=f"{search.of}" + f" [{search.unit.strip() or '-'}]", ylabel="level [m]")
+        branches = {t.value: t.branch for t in search.trials if t.stands == stands}
+        levels = [b.target if stands else b.highest for b in branches.values()]
+        axes.plot(list(branches), levels, mark, color=color, label=label)
+    for value, style, label in marks(answer):
+        axes.axvline(value, color="black", linestyle=style, linewidth=0.9, label=label)
+    axes.set(xlabel=f"{search.of} [{search.unit.strip() or '-'}]", ylabel="level [m]")
+
+
+def marks(answer: Answer) -> list[tuple[float, str, str]]:
+    """The critical values to be marked: value, line style, label."""
+    by = ((answer.value, "-", "critical"), (answer.gravity, ":", "gravity method"))
+    return [(v, style, f"{name} {v:.5g}") for v, style, name in by if v is not None]
 
 
 def draw_branches(axes: Axes, search: Search, answer: Answer) -> None:
-    """Level against crest of the last dam that stands and of the last one that fails.
-
-    A branch that ends in a plateau is drawn up to where it is reached and half as far again.
-    """
-    chosen = [
-        next((t for t in reversed(search.trials) if t.stands == s), None) for s in (True, False)
-    ]
-    branches = [(t, pushed_so_far(t.branch)) for t in chosen if t and t.branch.points]
-    crests = [[p.last["crest_ux"] for p in points] for _, points in branches]
-    name, factor = unit([abs(max(c, key=abs)) for c in crests], LENGTHS)
-    for (trial, points), crest in zip(branches, crests, strict=True):
+    """Level against crest of the last dam that stands and of the last one that fails."""
+    last = {t.stands: t for t in search.trials if t.branch.points}
+    shown = [(t, until_beyond(t.branch)) for t in last.values()]
+    crests = [[p.last["crest_ux"] for p in points] for _, points in shown]
+    name, factor = unit([abs(max(crest, key=abs)) for crest in crests], LENGTHS)
+    for (trial, points), crest in zip(shown, crests, strict=True):
         label = f"{search.of} {trial.value:.6g}{search.unit}"
-        color = GREEN if trial.stands else BLUE
         axes.plot(
-            [c * factor for c in crest],
+            [value * factor for value in crest],
             [p.level for p in points],
             "o-",
-            color=color,
+            color=GREEN if trial.stands else BLUE,
             markersize=3,
             label="equilibria" if search.of == "level" else label,
         )
-    if search.of == "level" and answer.value is not None:
-        axes.axhline(answer.value, color=ORANGE, linewidth=0.8, label=f"{answer.value:.5g} m")
-        if answer.gravity is not None:
-            label = f"gravity method {answer.gravity:.5g} m"
-            axes.axhline(answer.gravity, color="black", linestyle=":", linewidth=1, label=label)
+    for value, style, label in marks(answer) if search.of == "level" else ():
+        axes.axhline(value, color=ORANGE, linestyle=style, linewidth=1.2, label=f"{label} m")
     axes.set(xlabel=f"crest, downstream [{name}]", ylabel="level [m]")
 
 
-def pushed_so_far(branch: Branch) -> list:
-    """The points of a branch up to three times the push of its highest level."""
-    far = 3 * (branch.points[branch.top].pushed or branch.size)
+def until_beyond(branch: Branch) -> list[Point]:
+    """The points of a branch up to twice the push of its highest level."""
+    far = 2 * (branch.points[branch.top].pushed or branch.size)
     return [p for p in branch.points if p.pushed <= far]
