@@ -96,15 +96,17 @@ AT_BOUND = 1e-3
 def bound(case: Case, last: dict[str, float]) -> str:
     """Which bound of the rigid block resultants have reached, in words; empty if none.
 
-    Friction and bond hold T <= mu N + c L, a joint without tension M >= 0.
+    Friction without hardening and bond hold T <= mu N + c L, a joint without tension M >= 0.
     """
     length = case["dam_base"]
     holds = case["mu"] * last["N"] + case["adhesion"] * length
-    if case["law"] != "rupture" and last["T"] >= (1 - AT_BOUND) * holds:
+    bounded = case["law"] == "bond" or (case["law"] == "friction" and not case["pena_tang"])
+    if bounded and last["T"] >= (1 - AT_BOUND) * holds:
         return f"T = {last['T']:.5g} N/m reaches mu N + c L"
     arm = last["M"] / last["N"] if last["N"] > 0 else 0.0
     if arm < 0.01 * length:
-        return f"the resultant is {arm:.3g} m from the toe"
+        side = "from" if arm >= 0 else "beyond"
+        return f"the resultant is {abs(arm):.3g} m {side} the toe"
     return ""
 
 

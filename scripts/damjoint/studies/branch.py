@@ -8,10 +8,9 @@ level rises no more, however far the dam is pushed, is a mechanism.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import product
 
 import numpy as np
 
@@ -24,9 +23,15 @@ from ..scene.case import Case
 #: Relative precision of a critical value.
 PRECISION = 1e-4
 
-#: First push over the displacement so far; each one over the one before, at most; one that fails is
-#: tried at this part of its length, so often.
-FIRST, GROWTH, CUT, CUTS = 0.05, 1.5, 0.25, 5
+#: First push over the displacement so far; each one over the one before, at least and at most.
+FIRST, SHRINKING, GROWTH = 0.05, 0.25, 2.0
+
+#: A push that fails is tried at these parts of its length, but for what is smaller than this part
+#: of the displacement so far; then over a burst in which the dam springs back, these parts of it.
+PARTS, SMALLEST, JUMPS = (1, 1 / 4, 1 / 16), 1e-4, (0.01, 0.05, 0.25)
+
+#: How many steps of the level may fail, each one half of the one before, until the dam is pushed.
+FAILURES = 2
 
 #: By how much a push should raise the level, relatively: the highest level of a joint that softens
 #: depends on the steps by some hundredths of that.
@@ -38,6 +43,9 @@ ROUGH, SURE = 1.5, 4.0
 
 #: Levels that differ relatively by less are the same.
 PLATEAU = 1e-7
+
+#: Equilibria at most on a branch.
+MOST_POINTS = 500
 
 #: Looks at most at a branch's end.
 MOST_LOOKS = 30
@@ -108,9 +116,8 @@ class Branch:
         self.points: list[Point] = []
         filling = Filling(case, interface, lambda _: self.add(Point(kept(filling))))
         filling.reach(case.times[0])
-        for time in case.times[1:]:
-            if filling.stopped or not solved(filling, time, 1):
-                break
+        if not filling.stopped:
+            fill(filling)
         ahead = [v for t, v in enumerate(case.levels, 1) if t >= filling.state.time]
         self.target = max(ahead) if target is None else target
         #: whether no further push has been found
@@ -169,6 +176,12 @@ class Branch:
         return self.points[self.top].level if self.points else np.nan
 
     @property
+    def knee(self) -> int:
+        """The number of the point from which on the level rises by less than the precision."""
+        levels = np.array([p.level for p in self.points])
+        return int(np.argmax(levels >= (1 - PRECISION / 2) * self.highest))
+
+    @property
     def crushed_at_top(self) -> bool:
         """Whether it is the compression that ends it."""
         return self.crushed and self.top + 2 == len(self.points)
@@ -185,11 +198,11 @@ class Branch:
         """How the dam fails; empty if it is not seen."""
         if self.crushed_at_top:
             return "crushed toe"
-        if self.top + 1 >= len(self.points):
+        if self.knee + 1 >= len(self.points):
             return ""
-        top, last = self.points[self.top].filling, self.points[-1].filling
+        knee, last = self.points[self.knee].filling, self.points[-1].filling
         interface = last.joint.interface
-        moved = interface.jumps(interface.at_nodes, last.state.jump - top.state.jump)
+        moved = interface.jumps(interface.at_nodes, last.state.jump - knee.state.jump)
         x = interface.space.place[:, 0]
         return movement(self.case, self.points[-1].last["crack_length"], x, moved)
 
@@ -203,21 +216,31 @@ class Branch:
         """
         while not (self.stuck or self.reached or self.crushed or self.settled(factor)):
             self.go_on()
+            self.stuck |= len(self.points) >= MOST_POINTS
         if not self.reached:
             self.refine(self.target)
 
     def go_on(self) -> None:
-        """The next push, of the crest at any length, or else of the heel."""
+        """The next push."""
         last = self.points[-1]
-        for control, cuts in product(("crest", "heel"), range(CUTS)):
-            push = self.push * CUT**cuts
+        for control, push in self.pushes():
             found = self.pushed(last, push, control)
             if found:
                 rise = max((found.level - last.level) / found.level, 1e-12)
-                self.push = push * min(max(RISE / rise, CUT), GROWTH)
+                self.push = push * min(max(RISE / rise, SHRINKING), GROWTH)
                 self.add(found)
                 return
         self.stuck = True
+
+    def pushes(self) -> Iterator[tuple[str, float]]:
+        """What is tried for a push: of the crest; of the heel, where the crest turns back; of the
+        crest, over a burst in which both turn back.
+        """
+        far = self.points[-1].pushed or self.size
+        for control in ("crest", "heel"):
+            wanted = (part * self.push for part in PARTS)
+            yield from ((control, push) for push in wanted if push > SMALLEST * far)
+        yield from (("crest", part * far) for part in JUMPS)
 
     def pushed(self, point: Point, by: float, control: str) -> Point | None:
         """The equilibrium at which the crest or the heel has moved further [m]."""
@@ -295,6 +318,18 @@ def kept(filling: Filling) -> Filling:
     found = filling.fork(filling.case)
     found.on_step = lambda _: None
     return found
+
+
+def fill(filling: Filling) -> None:
+    """Go on through the times of a filling's case until some steps have failed."""
+    failures, length = 0, np.inf
+    for target in filling.case.times[1:]:
+        while filling.state.time < target:
+            ahead = min(length, target - filling.state.time)
+            if not solved(filling, filling.state.time + ahead, 1):
+                failures, length = failures + 1, ahead / 2
+            if failures > FAILURES:
+                return
 
 
 def displacement(point: Point) -> float:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain, zip_longest
 from pathlib import Path
 
@@ -37,6 +37,9 @@ STRENGTH = ("sigma_max", "adhesion", "mu", "G_f", "G_t")
 
 #: Few attempts at a step of the level: where it fails the dam is pushed instead.
 QUICK = {"smallest_step": 1.0, "max_iterations": 15.0, "burst_iterations": 15.0}
+
+#: What says how the loading is driven.
+DRIVE = ("drive", "drive_begin", "drive_end", "drive_by")
 
 #: The smallest value of a parameter that has to be positive.
 TINY = 1e-30
@@ -84,8 +87,8 @@ class Answer:
             mode = f" ({self.mode})" if self.mode else ""
             found = [f"{name}: critical {of} {self.value:.6g}{unit}{mode}"]
             found.append(self.why or f"not confirmed: {self.doubt}")
-        if self.point and (standing := statement(last_state(self.point))):
-            found.append(f"there: {standing}")
+        if self.point and self.point.filling.case["pena_tang"] and search.own.hardening_asked:
+            found += filter(None, [statement(last_state(search, self.point))])
         if self.gravity is not None:
             found.append(f"gravity method: {self.gravity:.6g}{unit}")
         return found
@@ -287,8 +290,8 @@ class Search:
         elif failing.crushed_at_top:
             why = f"beyond it the toe's compression passes f_c = {failing.case['f_c']:g} Pa"
         elif failing.settled(SURE):
-            top = failing.points[failing.top]
-            far = failing.points[-1].pushed / (top.pushed or failing.size)
+            top, knee = failing.points[failing.top], failing.points[failing.knee]
+            far = failing.points[-1].pushed / (knee.pushed or failing.size)
             why = (
                 f"beyond it, pushed {far:.2g} times as far, the dam holds {top.level:.6g} m at most"
             )
@@ -397,9 +400,13 @@ def table(search: Search) -> dict[str, np.ndarray]:
     return {name: np.array([row[name] for row in rows]) for name in CRITICAL}
 
 
-def last_state(point: Point) -> Results:
-    """The results of an equilibrium and of what led there."""
-    filling = point.filling.fork(point.filling.case)
+def last_state(search: Search, point: Point) -> Results:
+    """The results of an equilibrium and of what led there, with the parameters as they were asked
+    for.
+    """
+    case = point.filling.case
+    asked = {n: search.own[n] for n in (*QUICK, *DRIVE)}
+    filling = point.filling.fork(replace(case, values=case.values | asked))
     filling.keep_last()
     return filling.results()
 
@@ -414,7 +421,7 @@ def write(search: Search, answer: Answer, out: Path, seconds: float) -> None:
     folders.clear(out)
     folders.say(case, out, "complete", answer.doubt)
     if answer.point:
-        result = last_state(answer.point)
+        result = last_state(search, answer.point)
         result.info = {"critical": told(search, answer), "wall_seconds": {"search": seconds}}
         save(Outcome(result, mesh=lambda: None, fields=dict), case, out)
     write_csv(out / "critical.csv", table(search))
