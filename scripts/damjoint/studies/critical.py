@@ -415,7 +415,7 @@ def write(search: Search, answer: Answer, out: Path, seconds: float) -> None:
     """Write the last equilibrium as `damjoint run` does, critical.csv and its picture below out, in
     place of an earlier run's files.
     """
-    from .critical_picture import draw
+    from .critical_picture import Found, draw
 
     case = search.own
     folders.clear(out)
@@ -425,7 +425,10 @@ def write(search: Search, answer: Answer, out: Path, seconds: float) -> None:
         result.info = {"critical": told(search, answer), "wall_seconds": {"search": seconds}}
         save(Outcome(result, mesh=lambda: None, fields=dict), case, out)
     write_csv(out / "critical.csv", table(search))
-    draw(search, answer, out / f"{case.name}_critical.png")
+    trials = [(t.value, t.stands, t.branch) for t in search.trials]
+    what = case.title, search.of, search.unit, trials
+    shown = Found(*what, answer.value, answer.gravity, answer.mode)
+    draw(shown, out / f"{case.name}_critical.png")
 
 
 def told(search: Search, answer: Answer) -> dict:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import NamedTuple
 
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -13,74 +13,85 @@ from matplotlib.figure import Figure
 from ..results.pictures import BLUE, GREEN, LENGTHS, ORANGE, RED, unit
 from .branch import Branch, Point
 
-if TYPE_CHECKING:
-    from .critical import Answer, Search
+
+class Found(NamedTuple):
+    """What is drawn: title, what is varied and its unit, (value, stands, branch) of each trial, the
+    critical value by both methods (or None), the mode.
+    """
+
+    title: str
+    of: str
+    unit: str
+    trials: list[tuple[float, bool, Branch]]
+    value: float | None
+    gravity: float | None
+    mode: str
 
 
-def draw(search: Search, answer: Answer, path: Path) -> None:
+def draw(found: Found, path: Path) -> None:
     """Draw level against crest for the dams on both sides of the critical value and, but for a
     critical level, the highest level with every value.
     """
-    single = search.of == "level"
+    single = found.of == "level"
     figure = Figure(figsize=(7.5 if single else 12, 4.8), layout="constrained")
     FigureCanvasAgg(figure)
     *left, right = figure.subplots(1, 1 if single else 2, squeeze=False)[0]
-    said = textwrap.fill(heading(search, answer), 75 if single else 120)
+    said = textwrap.fill(heading(found), 75 if single else 120)
     figure.suptitle(said, fontsize=11, parse_math=False)
     for axes in left:
-        draw_trials(axes, search, answer)
-    draw_branches(right, search, answer)
+        draw_trials(axes, found)
+    draw_branches(right, found)
     for axes in (*left, right):
         axes.grid(alpha=0.3)
         axes.legend(fontsize=8)
     figure.savefig(path, dpi=110)
 
 
-def heading(search: Search, answer: Answer) -> str:
+def heading(found: Found) -> str:
     """What the picture shows, in a line."""
-    if answer.value is None:
-        return f"{search.own.title}: no critical {search.of} found"
-    said = f"{search.own.title}: critical {search.of} {answer.value:.5g}{search.unit}"
-    return said + (f", {answer.mode}" if answer.mode else "")
+    if found.value is None:
+        return f"{found.title}: no critical {found.of} found"
+    said = f"{found.title}: critical {found.of} {found.value:.5g}{found.unit}"
+    return said + (f", {found.mode}" if found.mode else "")
 
 
-def draw_trials(axes: Axes, search: Search, answer: Answer) -> None:
+def draw_trials(axes: Axes, found: Found) -> None:
     """The highest level found with each value."""
     for stands, color, mark, label in (
         (True, GREEN, "^", "stands at the level asked for"),
         (False, RED, "v", "fails: its highest level"),
     ):
-        branches = {t.value: t.branch for t in search.trials if t.stands == stands}
+        branches = {v: branch for v, ends, branch in found.trials if ends == stands}
         levels = [b.target if stands else b.highest for b in branches.values()]
         axes.plot(list(branches), levels, mark, color=color, label=label)
-    for value, style, label in marks(answer):
+    for value, style, label in marks(found):
         axes.axvline(value, color="black", linestyle=style, linewidth=0.9, label=label)
-    axes.set(xlabel=f"{search.of} [{search.unit.strip() or '-'}]", ylabel="level [m]")
+    axes.set(xlabel=f"{found.of} [{found.unit.strip() or '-'}]", ylabel="level [m]")
 
 
-def marks(answer: Answer) -> list[tuple[float, str, str]]:
+def marks(found: Found) -> list[tuple[float, str, str]]:
     """The critical values to be marked: value, line style, label."""
-    by = ((answer.value, "-", "critical"), (answer.gravity, ":", "gravity method"))
+    by = ((found.value, "-", "critical"), (found.gravity, ":", "gravity method"))
     return [(v, style, f"{name} {v:.5g}") for v, style, name in by if v is not None]
 
 
-def draw_branches(axes: Axes, search: Search, answer: Answer) -> None:
+def draw_branches(axes: Axes, found: Found) -> None:
     """Level against crest of the last dam that stands and of the last one that fails."""
-    last = {t.stands: t for t in search.trials if t.branch.points}
-    shown = [(t, until_beyond(t.branch)) for t in last.values()]
-    crests = [[p.last["crest_ux"] for p in points] for _, points in shown]
+    last = {ends: (value, branch) for value, ends, branch in found.trials if branch.points}
+    shown = [(ends, value, until_beyond(branch)) for ends, (value, branch) in last.items()]
+    crests = [[p.last["crest_ux"] for p in points] for *_, points in shown]
     name, factor = unit([abs(max(crest, key=abs)) for crest in crests], LENGTHS)
-    for (trial, points), crest in zip(shown, crests, strict=True):
-        label = f"{search.of} {trial.value:.6g}{search.unit}"
+    for (stands, value, points), crest in zip(shown, crests, strict=True):
+        label = f"{found.of} {value:.6g}{found.unit}"
         axes.plot(
-            [value * factor for value in crest],
+            [moved * factor for moved in crest],
             [p.level for p in points],
             "o-",
-            color=GREEN if trial.stands else BLUE,
+            color=GREEN if stands else BLUE,
             markersize=3,
-            label="equilibria" if search.of == "level" else label,
+            label="equilibria" if found.of == "level" else label,
         )
-    for value, style, label in marks(answer) if search.of == "level" else ():
+    for value, style, label in marks(found) if found.of == "level" else ():
         axes.axhline(value, color=ORANGE, linestyle=style, linewidth=1.2, label=f"{label} m")
     axes.set(xlabel=f"crest, downstream [{name}]", ylabel="level [m]")
 
