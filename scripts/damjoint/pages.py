@@ -13,7 +13,7 @@ from pathlib import Path
 
 from tabulate import tabulate
 
-from .results.tables import CHECK, FLUX, HISTORY, JOINT, LOADS
+from .results.tables import CHECK, CRITICAL, FLUX, HISTORY, JOINT, LOADS
 from .scene.parameters import declared
 
 REFERENCE = Path("reference")
@@ -65,9 +65,9 @@ def parameters_page() -> str:
 
 def results_page() -> str:
     """reference/results.md: the columns of the tables."""
-    joint, history, check, loads = (
+    joint, history, check, loads, critical = (
         markdown([(f"`{n}`", u, m) for n, (u, m) in columns.items()], ("column", "unit", "meaning"))
-        for columns in (JOINT | FLUX, HISTORY, CHECK, LOADS)
+        for columns in (JOINT | FLUX, HISTORY, CHECK, LOADS, CRITICAL)
     )
     parts = [
         "# Results",
@@ -92,6 +92,10 @@ def results_page() -> str:
         "Of `damjoint check`: the gravity method's resultants, a row per load, the uplift and the "
         "sum.",
         loads,
+        "## critical.csv",
+        "Of `damjoint critical`: a row per equilibrium of each dam that was tried, pushed beyond "
+        "its highest level where it fails.",
+        critical,
         "## fields/",
         "`bulk.msh` and `joint.msh` for Gmsh (a view per field with all levels as its steps); "
         "`fields.pvd` with `bulk_t*.vtu` and `joint_t*.vtu` for ParaView. Bulk: `displacement` "

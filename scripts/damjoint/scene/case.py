@@ -10,7 +10,7 @@ from pathlib import Path
 
 from .. import InputError, data
 from . import casefile
-from .parameters import INCLUDE, assignments, declared, listing, parse
+from .parameters import INCLUDE, assignments, constants, declared, listing, parse
 
 CASES = data("cases")
 
@@ -205,11 +205,11 @@ def load(
     if not geometry:
         check_section(found)
     values = {name: known[name].check(found[name][0]) for name in known}
-    most = math.inf if geometry else 2 * values["dam_height"]
-    heights = check_levels("levels", found["levels"], most)
+    highest = math.inf if geometry else ceiling(values)
+    heights = check_levels("levels", found["levels"], highest)
     if tail_levels is not None:
         own_tail = numbers("tail_levels", tail_levels)
-    tails = check_levels("tail_levels", own_tail, most)
+    tails = check_levels("tail_levels", own_tail, highest)
     if len(set(tails)) == 1:
         tails = tails[:1] * len(heights)
     if len(tails) != len(heights):
@@ -387,15 +387,22 @@ def numbers(name: str, text: str) -> list[float]:
     return found
 
 
-def check_levels(name: str, levels: Iterable[float], most: float) -> tuple[float, ...]:
-    """Water levels [m].
+def ceiling(values: Mapping) -> float:
+    """The highest water level that a dam may have [m]."""
+    return constants()["highest_level"][0] * values["dam_height"]
 
-    Raises InputError if one is negative or above `most`, twice the dam's height.
+
+def check_levels(name: str, levels: Iterable[float], highest: float) -> tuple[float, ...]:
+    """Water levels [m]; above the crest the dam is overtopped.
+
+    Raises InputError if one is negative or above the highest one.
     """
     for level in levels:
-        if not 0 <= level <= most:
-            limit = f"between 0 and twice the dam's height ({most:g} m)"
-            raise InputError(f"{name} = {level:g}: must be {limit if most < math.inf else '>= 0'}")
+        if not 0 <= level <= highest:
+            limit = f"between 0 and {highest:g} m, twice the dam's height"
+            raise InputError(
+                f"{name} = {level:g}: must be {limit if highest < math.inf else '>= 0'}"
+            )
     return tuple(levels)
 
 

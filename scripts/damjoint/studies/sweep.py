@@ -19,13 +19,13 @@ from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from .. import InputError, RunError, __version__
-from ..engines.condensed import cache
 from ..engines.condensed.filling import Filling
 from ..engines.condensed.interface import Interface
 from ..results.tables import HISTORY
 from ..results.verdict import statement, verdict
 from ..scene import parameters
 from ..scene.case import Case, load
+from .bodies import interface_of
 
 
 def values_of(text: str) -> tuple[str, list[str]]:
@@ -126,17 +126,6 @@ SAID = ("verdict", "statement")
 
 #: Rows that are computed together at most: they share the steps up to the levels where they part.
 MOST = 8
-
-_LAST: dict[tuple, Interface] = {}
-
-
-def interface_of(case: Case) -> Interface:
-    """The joint of a case with its condensed bodies; the last one used stays in memory."""
-    key = cache.key_of(case)
-    if key not in _LAST:
-        _LAST.clear()
-        _LAST[key] = Interface(cache.cached(case)[0])
-    return _LAST[key]
 
 
 def filled(case: Case, known: dict[tuple, Filling], interface: Interface) -> Filling:
