@@ -171,4 +171,5 @@ def draw_points(axes: Axes, rows: list[Row], names: list[str]) -> None:
             axes.plot(*(v[some] for v in inputs), ".", color=color, markersize=4, label=said)
         axes.set(ylabel=label(names[1]))
         axes.grid(alpha=0.3)
+        axes.ticklabel_format(scilimits=(-3, 4))
     axes.legend(fontsize=8)

@@ -234,18 +234,19 @@ def cases_of(case: str, plan: Plan, settings: dict, loading: Loading) -> Iterato
     level: the last level; the levels of the case (or the loading) below it come first. Raises
     InputError.
     """
-    words = vars(loading)
+    words, known = vars(loading), {}
     base = load(case, settings, **words)
     for row in plan.rows():
-        changed = settings | {n: v for n, v in row.items() if n != "level"}
-        if "level" in row:
-            levels, tails = up_to(base, float(row["level"]))
-            yield row, load(case, changed, **(words | {"levels": levels, "tail_levels": tails}))
-        else:
-            yield row, load(case, changed, **words)
+        alone = {n: v for n, v in row.items() if n in parameters.independent()}
+        key = tuple(v for n, v in row.items() if n not in alone)
+        if key not in known:
+            changed = settings | {n: v for n, v in row.items() if n != "level"}
+            ends = up_to(base, float(row["level"])) if "level" in row else {}
+            known[key] = load(case, changed, **(words | ends))
+        yield row, known[key].changed(alone)
 
 
-def up_to(base: Case, top: float) -> tuple[str, str]:
+def up_to(base: Case, top: float) -> dict[str, str]:
     """Levels and tailwater of a case up to a last level: those of its levels that lie below come
     first.
 
@@ -263,4 +264,5 @@ def up_to(base: Case, top: float) -> tuple[str, str]:
         tail = base.tail_at(first + share)
     levels = [*(base.levels[i] for i in below), top]
     tails = [*(base.tail_levels[i] for i in below), tail]
-    return tuple(",".join(f"{v:.12g}" for v in values) for values in (levels, tails))
+    joined = lambda values: ",".join(f"{v:.12g}" for v in values)
+    return {"levels": joined(levels), "tail_levels": joined(tails)}

@@ -21,6 +21,7 @@ from ..results.tables import HISTORY
 from ..results.verdict import failed, statement, verdict
 from ..scene.case import Case
 from .bodies import interface_of
+from .limit import mechanism
 from .plan import AS_IT_IS, Loading, Plan, Row, cases_of, column_of
 
 
@@ -62,32 +63,35 @@ def filled(case: Case, known: dict[tuple, Filling], interface: Interface) -> Fil
     return known[key]
 
 
-def last_rows(cases: list[Case]) -> list[dict[str, float | str]]:
+def last_rows(cases: list[Case], quick: bool = False) -> list[dict[str, float | str]]:
     """For cases that differ in levels only: the columns of history.csv at the last level, and what
     it says in words.
+
+    quick: no search for the last equilibrium of a dam whose loads are beyond what its joint can
+    hold; its columns stay empty.
     """
     known = {}
     with threadpool_limits(1):
-        return [last_row(case, known) for case in cases]
+        return [last_row(case, known, quick) for case in cases]
 
 
-def last_row(case: Case, known: dict[tuple, Filling]) -> dict[str, float | str]:
+def last_row(case: Case, known: dict[tuple, Filling], quick: bool) -> dict[str, float | str]:
     """The row of a case; one whose computation fails, in whatever way, says why: the others go
     on.
     """
+    row = dict.fromkeys((*HISTORY, *SAID), "")
     try:
-        result = filled(case, known, interface_of(case)).results()
+        interface = interface_of(case)
+        found, why = mechanism(case, interface) if quick else ("", "")
+        if found:
+            return row | dict(zip(SAID, (1, found, why), strict=True))
+        result = filled(case, known, interface).results()
     except Exception as error:
         why = str(error) if isinstance(error, RunError) else f"{type(error).__name__}: {error}"
-        words = {"failed": 1, "verdict": ERROR, "statement": " ".join(why.split())}
-        return dict.fromkeys(HISTORY, "") | words
+        return row | dict(zip(SAID, (1, ERROR, " ".join(why.split())), strict=True))
     last = {name: f"{value:.12g}" for name, value in result.last.items()}
-    said = {
-        "failed": int(failed(result)),
-        "verdict": verdict(result),
-        "statement": statement(result),
-    }
-    return dict.fromkeys(HISTORY, "") | last | said
+    said = int(failed(result)), verdict(result), statement(result)
+    return row | last | dict(zip(SAID, said, strict=True))
 
 
 def bundles(cases: dict[str, Case]) -> list[list[str]]:
@@ -120,7 +124,9 @@ def read_done(path: Path, columns: list[str]) -> set[str]:
     return {row[0] for row in rows[1:] if len(row) == len(columns)}
 
 
-def spread(cases: dict[str, Case], jobs: int, scheduler: str | None) -> Iterator[tuple[str, dict]]:
+def spread(
+    cases: dict[str, Case], quick: bool, jobs: int, scheduler: str | None
+) -> Iterator[tuple[str, dict]]:
     """(key, row) of each case as it is done: here, in `jobs` processes, or on a dask scheduler."""
     work = bundles(cases)
     chosen = [[cases[key] for key in keys] for keys in work]
@@ -140,18 +146,19 @@ def spread(cases: dict[str, Case], jobs: int, scheduler: str | None) -> Iterator
             ) from None
         with client:
             futures = {
-                client.submit(last_rows, some, key=f"damjoint-{'-'.join(keys)}"): keys
+                client.submit(last_rows, some, quick, key=f"damjoint-{'-'.join(keys)}"): keys
                 for keys, some in zip(work, chosen, strict=True)
             }
             for future in as_finished(futures):
                 yield from zip(futures[future], future.result(), strict=True)
     elif jobs == 1 or len(work) == 1:
         for keys, some in zip(work, chosen, strict=True):
-            yield from zip(keys, last_rows(some), strict=True)
+            yield from zip(keys, last_rows(some, quick), strict=True)
     else:
         with ProcessPoolExecutor(jobs) as pool:
             waiting = {
-                pool.submit(last_rows, some): keys for keys, some in zip(work, chosen, strict=True)
+                pool.submit(last_rows, some, quick): keys
+                for keys, some in zip(work, chosen, strict=True)
             }
             try:
                 for future in as_completed(waiting):
@@ -201,7 +208,8 @@ def sweep(
         writer = csv.writer(file, lineterminator="\n")
         if fresh:
             writer.writerow(columns)
-        rows = spread(missing, jobs or os.cpu_count() or 1, scheduler) if missing else ()
+        quick = bool(plan.sampled)
+        rows = spread(missing, quick, jobs or os.cpu_count() or 1, scheduler) if missing else ()
         for key, row in progress(
             rows, total=len(missing), desc=f"sweep {case}", disable=not sys.stderr.isatty()
         ):
