@@ -1,4 +1,4 @@
-"""The command line: damjoint new | run | gui | validate | sweep | bench | law."""
+"""The command line: damjoint new | run | check | gui | validate | sweep | bench | law."""
 
 from __future__ import annotations
 
@@ -55,18 +55,21 @@ def parser() -> argparse.ArgumentParser:
     )
     of_case = "a letter a..k, dam, or the path of a .case file"
     of_engine = "auto, condensed (the bulk eliminated once) or getdp (the plain problem definition)"
-    loading = Parser(add_help=False)
-    add = loading.add_argument
+
+    water = Parser(add_help=False)
+    add = water.add_argument
     add("--levels", help="water levels [m] reached at t = 1, 2, ...: 3,6,8,9; may go down, too")
     add(
         "--tail-levels",
         help="tailwater levels [m], one or as many as levels (default: the case's own)",
     )
-    add("--steps", type=whole, help="equal steps between two levels (default 1)")
     add(
         "--accuracy",
         help="coarse (about 3 %%), standard (1 %%) or fine (0.2 %%): chooses mesh, order and steps",
     )
+
+    loading = Parser(add_help=False, parents=[water])
+    loading.add_argument("--steps", type=whole, help="equal steps between two levels (default 1)")
 
     run = commands.add_parser(
         "run", parents=[settings, loading], help="fill the reservoir of a case"
@@ -78,6 +81,21 @@ def parser() -> argparse.ArgumentParser:
     add("--no-picture", action="store_true", help="no PNG")
     add("--engine", default="auto", help=of_engine)
     run.set_defaults(call=do_run)
+
+    safety = commands.add_parser(
+        "check",
+        parents=[settings, water],
+        help="safety factors by finite elements and by hand; exit code 1 if one is too low",
+    )
+    add = safety.add_argument
+    add("cases", nargs="+", metavar="CASE", help=f"load combinations: {of_case}")
+    add(
+        "--out",
+        type=Path,
+        default=Path("out/check"),
+        help="where check.csv and the cases' folders go (default out/check)",
+    )
+    safety.set_defaults(call=do_check)
 
     window = commands.add_parser("gui", parents=[settings], help="a case in Gmsh's window")
     window.add_argument("case", nargs="?", default="dam", help=of_case)
@@ -200,6 +218,22 @@ def do_run(arguments: argparse.Namespace) -> int:
             print(said)
         code = max(code, int(failed(result)))
     return code
+
+
+def do_check(arguments: argparse.Namespace) -> int:
+    """damjoint check; 1 if a check is not met."""
+    from .scene import parameters
+    from .scene.case import load
+    from .studies.check import check, text_table
+
+    settings = parameters.settings(arguments.settings)
+    water = arguments.levels, arguments.tail_levels
+    cases = [load(name, settings, *water, accuracy=arguments.accuracy) for name in arguments.cases]
+    if any(case["dim"] == 3 for case in cases):
+        warn_if_slow()
+    checks = check(cases, arguments.out)
+    print(f"{text_table(checks)}\n\n{arguments.out / 'check.csv'}")
+    return int(any(answer.fails for one in checks for answer in (one.finite_elements, one.gravity)))
 
 
 def do_gui(arguments: argparse.Namespace) -> int:
