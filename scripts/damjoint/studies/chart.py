@@ -76,22 +76,20 @@ def draw_curves(figure: Figure, plan: Plan, rows: list[Row], names: list[str]) -
     (name,) = names
     others = [other for other in plan.varied if other != name]
     curves: dict[str, list[Row]] = {}
-    for row in rows:
-        curves.setdefault(", ".join(row[o] for o in others), []).append(row)
+    for row in sorted(rows, key=lambda row: float(row[column_of(name)])):
+        curves.setdefault(", ".join(row[column_of(o)] for o in others), []).append(row)
     for panel, (column, (words, units)) in panels_of(figure):
         size, factor = unit([np.nan_to_num(numbers(rows, column))], units)
         for number, (said, some) in enumerate(curves.items()):
             x, y, bad = numbers(some, column_of(name)), numbers(some, column) * factor, fails(some)
-            order = np.argsort(x)
-            x, y, bad = x[order], y[order], bad[order]
             color = f"C{number}" if others else BLUE
             panel.plot(x, np.where(bad, np.nan, y), "o-", markersize=4, color=color, label=said)
             panel.plot(x[bad], y[bad], "x", color=color if others else RED)
-        panel.plot([], [], "x", color=RED, label="fails: the last state before")
+        mark = "black" if others else RED
+        panel.plot([], [], "x", color=mark, label="fails: the last state before")
         panel.set(xlabel=label(name), ylabel=f"{words} [{size}]")
         panel.grid(alpha=0.3)
-    bad = fails(rows).any()
-    if bad or others:
+    if fails(rows).any() or others:
         panel.legend(fontsize=8)
 
 
