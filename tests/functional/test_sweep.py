@@ -1,6 +1,11 @@
 """Sweeps: each row is the run of its own; a file is resumed."""
 
 import csv
+import os
+import signal
+import subprocess
+import sys
+import time
 
 import pytest
 from closed_forms import slide_level
@@ -58,6 +63,30 @@ def test_a_sweep_is_resumed(command, tmp_path):
     ) == ["0.3", "0.4", "0.5"]
     assert sweep("0.3:0.5:0.1")[0] == 0
     assert (tmp_path / "sweep.csv").read_text() == after
+
+
+def test_an_interrupted_sweep_ends_at_once_and_keeps_its_rows(tmp_path):
+    """Not after the minute that the other rows would take."""
+    words = "sweep", "c", "--set", "n_joint=20", "--vary", "mu=0.3:0.7:1e-4", "--jobs", "2"
+    out = tmp_path / "c_sweep.csv"
+    with subprocess.Popen(
+        [sys.executable, "-m", "damjoint", *words],
+        cwd=tmp_path,
+        start_new_session=True,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        while not out.exists() or len(out.read_text().splitlines()) < 10:
+            assert process.poll() is None
+            time.sleep(0.05)
+        os.killpg(process.pid, signal.SIGINT)
+        try:
+            _, said = process.communicate(timeout=15)
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+            raise
+    assert process.returncode == 130 and len(said.splitlines()) == 1
+    assert 9 <= len(rows(out)) < 4001
 
 
 def test_a_dam_that_slides_is_a_row_that_says_so(command, tmp_path):

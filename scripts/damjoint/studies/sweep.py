@@ -169,7 +169,7 @@ def spread(
                     "saved, the same command goes on; --jobs 1 takes least memory"
                 ) from None
             except BaseException:
-                pool.shutdown(wait=False, cancel_futures=True)
+                pool.shutdown(cancel_futures=True)  # waits: a pool that has gone cancels nothing
                 raise
 
 
