@@ -1,4 +1,4 @@
-"""The command line: damjoint new | run | check | gui | validate | sweep | bench | law."""
+"""The command line: new | run | check | critical | gui | validate | sweep | bench | law."""
 
 from __future__ import annotations
 
@@ -113,6 +113,25 @@ def parser() -> argparse.ArgumentParser:
     add("--out", type=Path, default=Path("out"), help="where the cases' folders go (default out)")
     add("--engine", default="auto", help=of_engine)
     check.set_defaults(call=do_validate)
+
+    limit = commands.add_parser(
+        "critical",
+        parents=[settings],
+        help="the level, strength or parameter at which no equilibrium is left",
+    )
+    add = limit.add_argument
+    add("case", help=of_case)
+    add(
+        "--of",
+        default="level",
+        metavar="WHAT",
+        help="level (default), strength (factor that divides mu, c, f_t and the fracture "
+        "energies), uplift (effectiveness of the drains), k_h or any parameter",
+    )
+    add("--levels", help="water levels [m] on the way; all but a critical level ask for the last")
+    add("--tail-levels", help="tailwater levels [m], one or as many as levels")
+    add("--out", type=Path, help="output folder (default out/CASE_critical)")
+    limit.set_defaults(call=do_critical)
 
     vary = commands.add_parser(
         "sweep",
@@ -288,6 +307,23 @@ def do_validate(arguments: argparse.Namespace) -> int:
             comparisons += validation.compare(result)
     print(validation.report(comparisons))
     return int(any(c.verdict == "fail" for c in comparisons))
+
+
+def do_critical(arguments: argparse.Namespace) -> int:
+    """damjoint critical; 0, or 1 if there is no critical value, or none that is confirmed."""
+    from .scene import parameters
+    from .studies.critical import critical
+
+    answer, said = critical(
+        arguments.case,
+        arguments.of,
+        parameters.settings(arguments.settings),
+        arguments.levels,
+        arguments.tail_levels,
+        arguments.out,
+    )
+    print("\n".join(said))
+    return int(not answer.confirmed)
 
 
 def do_sweep(arguments: argparse.Namespace) -> int:

@@ -56,6 +56,17 @@ HISTORY = {
     "x_resultant": ("m", "where N meets the joint, from the heel"),
 }
 
+#: Columns of critical.csv: a row per equilibrium of each dam that was tried.
+CRITICAL = {
+    "trial": ("-", "number of the dam that was tried"),
+    "value": ("", "what was varied: level [m], strength, or the parameter"),
+    "stands": ("-", "1: there is an equilibrium with this value, 0: none was found"),
+    "driven": ("-", "0: the level was prescribed, 1: a displacement, and the level found"),
+    **{n: HISTORY[n] for n in ("level", "crest_ux", "crack_length", "slip_length", "N", "T", "M")},
+    "pushed": ("m", "how far the dam was pushed where a displacement was prescribed"),
+    "compression": ("Pa", "total compression at the toe"),
+}
+
 #: Columns of gravity.csv: a row per load on the body above the joint, and their sum.
 LOADS = {
     "load": ("", "what acts"),

@@ -77,6 +77,37 @@ def why_stopped(results: Results) -> str:
     return "sliding" if last["slip_length"] > 0.98 * base else "no convergence"
 
 
+def movement(case: Case, crack_length: float, x: np.ndarray, moved: np.ndarray) -> str:
+    """Broken through, overturning or sliding, from how a dam that has lost its equilibrium goes on.
+
+    crack_length: [m], after it; x (n,): places of the joint's nodes; moved (n, 3): the change of
+    their jumps. Sliding: the joint's slip is larger than what the rotation opens at the heel.
+    """
+    if crack_length > case["dam_base"] * (1 - 1e-9):
+        return "broken through"
+    rotation = np.polyfit(x, moved[:, 0], 1)[0] * np.ptp(x)
+    return "overturning" if -rotation > abs(moved[:, 1].mean()) else "sliding"
+
+
+#: How near to a bound of the rigid block counts as there, relatively.
+AT_BOUND = 1e-3
+
+
+def bound(case: Case, last: dict[str, float]) -> str:
+    """Which bound of the rigid block resultants have reached, in words; empty if none.
+
+    Friction and bond hold T <= mu N + c L, a joint without tension M >= 0.
+    """
+    length = case["dam_base"]
+    holds = case["mu"] * last["N"] + case["adhesion"] * length
+    if case["law"] != "rupture" and last["T"] >= (1 - AT_BOUND) * holds:
+        return f"T = {last['T']:.5g} N/m reaches mu N + c L"
+    arm = last["M"] / last["N"] if last["N"] > 0 else 0.0
+    if arm < 0.01 * length:
+        return f"the resultant is {arm:.3g} m from the toe"
+    return ""
+
+
 def mean_slip(results: Results) -> float:
     """Mean slip along the joint at the last saved state [m]."""
     if not len(results.joint["time"]):

@@ -9,7 +9,15 @@ from pathlib import Path
 
 from .. import InputError, data
 from . import casefile
-from .parameters import INCLUDE, assignments, declared, independent, listing, parse
+from .parameters import (
+    INCLUDE,
+    assignments,
+    constants,
+    declared,
+    independent,
+    listing,
+    parse,
+)
 
 CASES = data("cases")
 
@@ -304,15 +312,21 @@ def numbers(name: str, text: str) -> list[float]:
     return found
 
 
-def check_levels(name: str, levels: Iterable[float], values: Mapping) -> tuple[float, ...]:
-    """Water levels [m].
+def ceiling(values: Mapping) -> float:
+    """The highest water level that a dam may have [m]."""
+    return constants()["highest_level"][0] * values["dam_height"]
 
-    Raises InputError if one is negative or above the crest.
+
+def check_levels(name: str, levels: Iterable[float], values: Mapping) -> tuple[float, ...]:
+    """Water levels [m]; above the crest the dam is overtopped.
+
+    Raises InputError if one is negative or above twice the dam's height.
     """
+    highest = ceiling(values)
     for level in levels:
-        if not 0 <= level <= values["dam_height"]:
+        if not 0 <= level <= highest:
             raise InputError(
-                f"{name} = {level:g}: must be between 0 and the crest ({values['dam_height']:g} m)"
+                f"{name} = {level:g}: must be between 0 and {highest:g} m, twice the dam's height"
             )
     return tuple(levels)
 
