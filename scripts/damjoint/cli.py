@@ -170,6 +170,14 @@ def parser() -> argparse.ArgumentParser:
         metavar="A,B=R",
         help="rank correlation of two sampled names (repeatable)",
     )
+    add(
+        "--critical",
+        nargs="?",
+        const="level",
+        default="",
+        metavar="WHAT",
+        help="also the critical level (default), strength, ... of each row, as damjoint critical",
+    )
     add("--jobs", type=whole, help="processes (default: all cores)")
     add("--scheduler", metavar="ADDRESS", help="a dask.distributed scheduler instead")
     add("--out", type=Path, help="result file, resumed if it exists (default CASE_sweep.csv)")
@@ -338,7 +346,7 @@ def do_sweep(arguments: argparse.Namespace) -> int:
     if not arguments.sample and arguments.correlate:
         raise InputError(f"--correlate {arguments.correlate[0]}: needs --sample")
     sample = sample_of(arguments.sample, **how) if arguments.sample else None
-    plan = plan_of(arguments.vary, arguments.tie, sample, settings)
+    plan = plan_of(arguments.vary, arguments.tie, sample, settings, arguments.critical)
     loading = Loading(arguments.levels, arguments.tail_levels, arguments.steps, arguments.accuracy)
     count, rows = sweep(
         arguments.case, plan, settings, out, loading, arguments.jobs, arguments.scheduler

@@ -223,6 +223,18 @@ def test_ties_loading_and_accuracy(command, solve, tmp_path):
             assert float(row[name]) == pytest.approx(float(last[name]), rel=1e-6), name
 
 
+def test_a_critical_level_is_a_column(command, tmp_path):
+    """That at which the dam slides; the file is not one of the plain sweep."""
+    words = *SLIDES, "--levels", "30", "--set", "n_joint=10", "--vary", "mu=0.6"
+    assert command(*words, "--critical")[0] == 0
+    (row,) = rows(tmp_path / "sweep.csv")
+    assert float(row["critical_level"]) == pytest.approx(40.619, rel=1e-4)
+    assert (row["level"], row["verdict"]) == ("30", "stands")
+    assert (row["mode"], row["confirmed"]) == ("sliding", "1") and row["confirmed_by"]
+    assert (tmp_path / "sweep.png").exists()
+    assert command(*words)[0] == 2
+
+
 def test_a_row_that_fails_says_why_and_the_others_go_on(command, tmp_path, monkeypatch):
     whole = sweep.filled
 

@@ -73,6 +73,8 @@ def test_parameter_out_of_range(command, tmp_path, setting, allowed):
         (("sweep", "a", "--vary", "mu=-1,1"), ("mu = -1", "> 0")),
         (("sweep", "a", "--vary", "level=9,22"), ("levels = 22", TO_TWICE)),
         (("sweep", "a", "--vary", "level=9,x"), ("level = x", "metres")),
+        (("sweep", "a", "--vary", "mu=1", "--critical", "mu"), ("--critical mu", "varied")),
+        (("sweep", "a", "--vary", "mu=1", "--critical", "law"), ("--of law", "must be level")),
         (("sweep", "a"), ("--vary, --sample", "one must be given")),
         (("sweep", "a", "--vary", "mu=0.5", "--tie", "adhesion=x()"), ("--tie adhesion=x()",)),
         (("sweep", "a", "--sample", "5", "mu=normal(0,1)"), ("--sample mu=normal(0,1)", "> 0")),

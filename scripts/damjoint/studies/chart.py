@@ -56,7 +56,9 @@ def is_number(text: str) -> bool:
 def label(name: str) -> str:
     """What an axis says of a parameter: its name and unit."""
     if name == "level":
-        return "last water level [m]"
+        return "water level [m]"
+    if name in ("strength", "uplift"):  # of critical values
+        return {"strength": "strength reduction", "uplift": "drain_effectiveness"}[name]
     unit_of = re.search(r"\[.*\]|$", parameters.parameter(name).meaning)[0]
     return f"{name} {unit_of}"
 
@@ -66,9 +68,22 @@ def fails(rows: list[Row]) -> np.ndarray:
     return np.array([row["failed"] == "1" for row in rows])
 
 
-def panels_of(figure: Figure) -> Iterator[tuple[Axes, tuple[str, tuple]]]:
-    """An axes for each quantity that is drawn, beside one another."""
-    return zip(figure.subplots(1, len(DRAWN)), DRAWN.items(), strict=True)
+def crossed(plan: Plan, rows: list[Row]) -> np.ndarray:
+    """Whether each row has a cross: its dam fails, or its critical value is not confirmed."""
+    if plan.critical:
+        return np.array([row["confirmed"] != "1" for row in rows])
+    return fails(rows)
+
+
+def panels_of(figure: Figure, plan: Plan) -> Iterator[tuple[Axes, tuple[str, tuple]]]:
+    """An axes for each quantity that is drawn, beside one another: the critical value alone if
+    there is one.
+    """
+    drawn = DRAWN
+    if plan.critical:
+        words, _, size = label(plan.critical).partition(" [")
+        drawn = {plan.critical_columns[0]: (f"critical {words}", ((size.rstrip("]") or "-", 1),))}
+    return zip(figure.subplots(1, len(drawn), squeeze=False)[0], drawn.items(), strict=True)
 
 
 def draw_curves(figure: Figure, plan: Plan, rows: list[Row], names: list[str]) -> None:
@@ -78,18 +93,23 @@ def draw_curves(figure: Figure, plan: Plan, rows: list[Row], names: list[str]) -
     curves: dict[str, list[Row]] = {}
     for row in sorted(rows, key=lambda row: float(row[column_of(name)])):
         curves.setdefault(", ".join(row[column_of(o)] for o in others), []).append(row)
-    for panel, (column, (words, units)) in panels_of(figure):
+    for panel, (column, (words, units)) in panels_of(figure, plan):
         size, factor = unit([np.nan_to_num(numbers(rows, column))], units)
         for number, (said, some) in enumerate(curves.items()):
-            x, y, bad = numbers(some, column_of(name)), numbers(some, column) * factor, fails(some)
+            x, y, bad = (
+                numbers(some, column_of(name)),
+                numbers(some, column) * factor,
+                crossed(plan, some),
+            )
             color = f"C{number}" if others else BLUE
             panel.plot(x, np.where(bad, np.nan, y), "o-", markersize=4, color=color, label=said)
             panel.plot(x[bad], y[bad], "x", color=color if others else RED)
         mark = "black" if others else RED
-        panel.plot([], [], "x", color=mark, label="fails: the last state before")
+        said = "not confirmed" if plan.critical else "fails: the last state before"
+        panel.plot([], [], "x", color=mark, label=said)
         panel.set(xlabel=label(name), ylabel=f"{words} [{size}]")
         panel.grid(alpha=0.3)
-    if fails(rows).any() or others:
+    if crossed(plan, rows).any() or others:
         panel.legend(fontsize=8)
 
 
@@ -97,8 +117,8 @@ def draw_maps(figure: Figure, plan: Plan, rows: list[Row], names: list[str]) -> 
     """A panel for each quantity over two varied parameters, with a cross where the dam fails."""
     x, y = (numbers(rows, column_of(name)) for name in names)
     (across, i), (up, j) = (np.unique(v, return_inverse=True) for v in (x, y))
-    bad = fails(rows)
-    for panel, (column, (words, units)) in panels_of(figure):
+    bad = crossed(plan, rows)
+    for panel, (column, (words, units)) in panels_of(figure, plan):
         values = np.where(bad, np.nan, numbers(rows, column))
         size, factor = unit([np.nan_to_num(values)], units)
         grid = np.full((len(up), len(across)), np.nan)
@@ -109,7 +129,8 @@ def draw_maps(figure: Figure, plan: Plan, rows: list[Row], names: list[str]) -> 
         panel.set(xlabel=label(names[0]), ylabel=label(names[1]))
         panel.label_outer()
     if bad.any():
-        figure.supxlabel("crosses: the dam fails", fontsize=9, color=RED)
+        said = "not confirmed" if plan.critical else "the dam fails"
+        figure.supxlabel(f"crosses: {said}", fontsize=9, color=RED)
 
 
 def draw_probability(figure: Figure, plan: Plan, rows: list[Row], names: list[str]) -> None:

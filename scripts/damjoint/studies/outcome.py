@@ -42,7 +42,7 @@ def probabilities(plan: Plan, rows: list[Row]) -> list[dict[str, object]]:
 
 def sensitivities(plan: Plan, rows: list[Row]) -> list[dict[str, object]]:
     """For each combination of the varied values and each sampled input: Spearman's rank correlation
-    with the outcomes; nan where an outcome does not change.
+    with the outcomes and a critical value; nan where an outcome does not change.
     """
     found = []
     for values, some in groups(plan, rows):
@@ -50,6 +50,7 @@ def sensitivities(plan: Plan, rows: list[Row]) -> list[dict[str, object]]:
         results = {o: numbers(some, o) for o in OUTCOMES}
         for outcome in OUTCOMES[1:]:
             results[outcome][~stand] = np.nan
+        results |= {c: numbers(some, c) for c in plan.critical_columns[:1]}
         for name in plan.sampled:
             drawn = numbers(some, column_of(name))
             ranks = {o: sampling.sensitivity(drawn, y) for o, y in results.items()}

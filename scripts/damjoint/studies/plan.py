@@ -141,6 +141,16 @@ class Plan:
     sampled: dict[str, list[str]]
     #: expressions of the names that stand before
     tied: dict[str, str]
+    #: whose critical value is a column: level, strength, uplift or a parameter; empty: none
+    critical: str = ""
+
+    @property
+    def critical_columns(self) -> list[str]:
+        """The columns of the critical value: itself, the mode, whether it is confirmed (1, 0), and
+        what confirms it or does not.
+        """
+        names = f"critical_{self.critical}", "mode", "confirmed", "confirmed_by"
+        return list(names) if self.critical else []
 
     @property
     def names(self) -> list[str]:
@@ -201,8 +211,11 @@ def tie(name: str, expression: str, row: Row) -> str:
     return value
 
 
-def plan_of(vary: list[str], tied: list[str], sample: Sample | None, settings: dict) -> Plan:
-    """The plan of the texts NAME=VALUES, NAME=EXPRESSION and a sample; settings: what is set.
+def plan_of(
+    vary: list[str], tied: list[str], sample: Sample | None, settings: dict, critical: str = ""
+) -> Plan:
+    """The plan of the texts NAME=VALUES, NAME=EXPRESSION and a sample; settings: what is set;
+    critical: as in Plan.
 
     Raises InputError.
     """
@@ -225,7 +238,9 @@ def plan_of(vary: list[str], tied: list[str], sample: Sample | None, settings: d
     number = math.prod(len(values) for _, values in axes) * (sample.number if sample else 1)
     if number > MOST_ROWS:
         raise InputError(f"--vary, --sample: must give at most {MOST_ROWS} rows in all")
-    return Plan(dict(axes), sample.values() if sample else {}, dict(ties))
+    if any(critical == name for _, name in names):
+        raise InputError(f"--critical {critical}: must not be varied, sampled or tied as well")
+    return Plan(dict(axes), sample.values() if sample else {}, dict(ties), critical)
 
 
 def cases_of(case: str, plan: Plan, settings: dict, loading: Loading) -> Iterator[tuple[Row, Case]]:

@@ -6,9 +6,10 @@ import csv
 import hashlib
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
 from pathlib import Path
 
 from threadpoolctl import threadpool_limits
@@ -19,8 +20,9 @@ from ..engines.condensed.filling import Filling
 from ..engines.condensed.interface import Interface
 from ..results.tables import HISTORY
 from ..results.verdict import failed, statement, verdict
-from ..scene.case import Case
+from ..scene.case import Case, mesh_for
 from .bodies import interface_of
+from .critical import Search
 from .limit import mechanism
 from .plan import AS_IT_IS, Loading, Plan, Row, cases_of, column_of
 
@@ -63,44 +65,84 @@ def filled(case: Case, known: dict[tuple, Filling], interface: Interface) -> Fil
     return known[key]
 
 
-def last_rows(cases: list[Case], quick: bool = False) -> list[dict[str, float | str]]:
-    """For cases that differ in levels only: the columns of history.csv at the last level, and what
-    it says in words.
+@dataclass(frozen=True)
+class Task:
+    """What one row asks for."""
 
-    quick: no search for the last equilibrium of a dam whose loads are beyond what its joint can
-    hold; its columns stay empty.
+    case: Case
+    #: no search for the last equilibrium of a dam whose loads are beyond what its joint can hold
+    quick: bool
+    #: what `critical.Search` takes, if a critical value is asked for
+    search: tuple = ()
+    #: columns of that value
+    columns: Sequence[str] = ()
+
+
+def last_rows(tasks: list[Task]) -> list[dict[str, float | str]]:
+    """For cases that differ in levels only: the columns of history.csv at the last level (empty if
+    there is no equilibrium), what it says in words, and the critical value.
     """
     known = {}
     with threadpool_limits(1):
-        return [last_row(case, known, quick) for case in cases]
+        return [last_row(task, known) | critical_value(task) for task in tasks]
 
 
-def last_row(case: Case, known: dict[tuple, Filling], quick: bool) -> dict[str, float | str]:
+def last_row(task: Task, known: dict[tuple, Filling]) -> dict[str, float | str]:
     """The row of a case; one whose computation fails, in whatever way, says why: the others go
     on.
     """
     row = dict.fromkeys((*HISTORY, *SAID), "")
     try:
-        interface = interface_of(case)
-        found, why = mechanism(case, interface) if quick else ("", "")
+        interface = interface_of(task.case)
+        found, why = mechanism(task.case, interface) if task.quick else ("", "")
         if found:
             return row | dict(zip(SAID, (1, found, why), strict=True))
-        result = filled(case, known, interface).results()
+        result = filled(task.case, known, interface).results()
     except Exception as error:
-        why = str(error) if isinstance(error, RunError) else f"{type(error).__name__}: {error}"
-        return row | dict(zip(SAID, (1, ERROR, " ".join(why.split())), strict=True))
+        return row | dict(zip(SAID, (1, ERROR, in_words(error)), strict=True))
     last = {name: f"{value:.12g}" for name, value in result.last.items()}
     said = int(failed(result)), verdict(result), statement(result)
     return row | last | dict(zip(SAID, said, strict=True))
 
 
-def bundles(cases: dict[str, Case]) -> list[list[str]]:
+def in_words(error: Exception) -> str:
+    """Why a computation has failed, in a line."""
+    kind = "" if isinstance(error, RunError) else f"{type(error).__name__}: "
+    return " ".join(f"{kind}{error}".split())
+
+
+def critical_value(task: Task) -> dict[str, float | str]:
+    """The columns of a critical value; where the search fails it says why."""
+    if not task.search:
+        return {}
+    try:
+        answer = Search(*task.search).run()
+    except Exception as error:
+        return dict(zip(task.columns, ("", "", 0, in_words(error)), strict=True))
+    value = "" if answer.value is None else f"{answer.value:.12g}"
+    said = value, answer.mode, int(answer.confirmed), answer.why or answer.doubt
+    return dict(zip(task.columns, said, strict=True))
+
+
+def search_for(
+    case: str, plan: Plan, settings: dict, loading: Loading, row: Row, one: Case
+) -> tuple:
+    """What `Search` takes for the critical value of a row of a plan, whose case is given."""
+    if not plan.critical:
+        return ()
+    mesh = mesh_for(loading.accuracy, one) if loading.accuracy else ()
+    changed = settings | {n: one[n] for n in (*mesh, *row) if n != "level"}
+    levels, tails = (",".join(map(repr, v)) for v in (one.levels, one.tail_levels))
+    return case, plan.critical, changed, levels, tails
+
+
+def bundles(tasks: dict[str, Task]) -> list[list[str]]:
     """The keys of cases that differ in levels only, together; at most MOST of them, for rows to
     come in time.
     """
     groups: dict[tuple, list[str]] = {}
-    for key, case in cases.items():
-        groups.setdefault(tuple(sorted(case.values.items())), []).append(key)
+    for key, task in tasks.items():
+        groups.setdefault(tuple(sorted(task.case.values.items())), []).append(key)
     return [keys[i : i + MOST] for keys in groups.values() for i in range(0, len(keys), MOST)]
 
 
@@ -124,12 +166,10 @@ def read_done(path: Path, columns: list[str]) -> set[str]:
     return {row[0] for row in rows[1:] if len(row) == len(columns)}
 
 
-def spread(
-    cases: dict[str, Case], quick: bool, jobs: int, scheduler: str | None
-) -> Iterator[tuple[str, dict]]:
-    """(key, row) of each case as it is done: here, in `jobs` processes, or on a dask scheduler."""
-    work = bundles(cases)
-    chosen = [[cases[key] for key in keys] for keys in work]
+def spread(tasks: dict[str, Task], jobs: int, scheduler: str | None) -> Iterator[tuple[str, dict]]:
+    """(key, row) of each task as it is done: here, in `jobs` processes, or on a dask scheduler."""
+    work = bundles(tasks)
+    chosen = [[tasks[key] for key in keys] for keys in work]
     if scheduler:
         try:
             from dask.distributed import Client
@@ -146,19 +186,18 @@ def spread(
             ) from None
         with client:
             futures = {
-                client.submit(last_rows, some, quick, key=f"damjoint-{'-'.join(keys)}"): keys
+                client.submit(last_rows, some, key=f"damjoint-{'-'.join(keys)}"): keys
                 for keys, some in zip(work, chosen, strict=True)
             }
             for future in as_finished(futures):
                 yield from zip(futures[future], future.result(), strict=True)
     elif jobs == 1 or len(work) == 1:
         for keys, some in zip(work, chosen, strict=True):
-            yield from zip(keys, last_rows(some, quick), strict=True)
+            yield from zip(keys, last_rows(some), strict=True)
     else:
         with ProcessPoolExecutor(jobs) as pool:
             waiting = {
-                pool.submit(last_rows, some, quick): keys
-                for keys, some in zip(work, chosen, strict=True)
+                pool.submit(last_rows, some): keys for keys, some in zip(work, chosen, strict=True)
             }
             try:
                 for future in as_completed(waiting):
@@ -186,34 +225,38 @@ def sweep(
     """Compute what is missing in out (CSV); the number of rows computed, and all rows of the plan.
 
     Columns: key, the plan's names (level as level_asked), the columns of history.csv, whether it
-    failed, verdict and statement. Each row is written whole when it is done; a sweep that is
-    interrupted goes on where it was. Raises InputError, RunError.
+    failed, verdict and statement, the critical value. Each row is written whole when it is done; a
+    sweep that is interrupted goes on where it was. Raises InputError, RunError.
     """
     if jobs is not None and jobs < 1:
         raise InputError(f"jobs = {jobs}: must be an integer >= 1")
     if not out.parent.is_dir():
         raise InputError(f"out = {out}: must be a file in an existing folder")
-    chosen, cases, keys = {}, {}, []
+    chosen, tasks, keys = {}, {}, []
     for values, one in cases_of(case, plan, settings, loading):
-        key = key_of(one)
-        chosen[key], cases[key] = values, one
-        keys.append(key)
-    columns = ["key", *map(column_of, plan.names), *HISTORY, *SAID]
+        search = search_for(case, plan, settings, loading, values, one)
+        keys.append(key_of(one))
+        chosen[keys[-1]] = values
+        tasks[keys[-1]] = Task(one, bool(plan.sampled), search, plan.critical_columns)
+    results = [*HISTORY, *SAID, *plan.critical_columns]
+    columns = ["key", *map(column_of, plan.names), *results]
     done = read_done(out, columns)
-    missing = {key: one for key, one in cases.items() if key not in done}
+    missing = {key: task for key, task in tasks.items() if key not in done}
     if missing:
-        interface_of(next(iter(missing.values())))  # condensed once, before the processes start
+        first = next(iter(missing.values()))
+        if first.search:
+            Search(*first.search)  # what is asked for is checked here
+        interface_of(first.case)  # condensed once, before the processes start
     fresh = not out.exists() or not out.stat().st_size
     with out.open("a", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         if fresh:
             writer.writerow(columns)
-        quick = bool(plan.sampled)
-        rows = spread(missing, quick, jobs or os.cpu_count() or 1, scheduler) if missing else ()
+        rows = spread(missing, jobs or os.cpu_count() or 1, scheduler) if missing else ()
         for key, row in progress(
             rows, total=len(missing), desc=f"sweep {case}", disable=not sys.stderr.isatty()
         ):
-            writer.writerow([key, *chosen[key].values(), *(row[c] for c in (*HISTORY, *SAID))])
+            writer.writerow([key, *chosen[key].values(), *(row[c] for c in results)])
             file.flush()
     with out.open(newline="") as file:
         found = {row["key"]: row for row in csv.DictReader(file)}
