@@ -223,6 +223,7 @@ def test_ties_loading_and_accuracy(command, solve, tmp_path):
             assert float(row[name]) == pytest.approx(float(last[name]), rel=1e-6), name
 
 
+@pytest.mark.heavy
 def test_a_critical_level_is_a_column(command, tmp_path):
     """That at which the dam slides; the file is not one of the plain sweep."""
     words = *SLIDES, "--levels", "30", "--set", "n_joint=10", "--vary", "mu=0.6"
