@@ -96,6 +96,17 @@ def results_page() -> str:
         "Of `damjoint critical`: a row per equilibrium of each dam that was tried, pushed beyond "
         "its highest level where it fails.",
         critical,
+        "## CASE_sweep.csv",
+        "Of `damjoint sweep`, a row per combination, in the order in which they are done: `key`; "
+        "the varied, sampled and tied values (a level as `level_asked`); the last row of "
+        "history.csv; `failed` (1 where `damjoint run` ends with exit code 1), `verdict`, "
+        "`statement`; with `--critical` the critical value, its `mode`, whether it is `confirmed` "
+        "and by what. A row of a sample whose loads are beyond what the joint could hold at most "
+        "says so and has no more. Beside it `_probability.csv` (with the interval of Clopper and "
+        "Pearson; rows without an answer are `undecided`, failures but for the lower limit), "
+        "`_sensitivity.csv` (Spearman's rank correlation of each sampled input with `failed` "
+        "and, over the rows that stand, with crack, opening and crest) and a chart of one or two "
+        "varied numbers or of the sample.",
         "## fields/",
         "`bulk.msh` and `joint.msh` for Gmsh (a view per field with all levels as its steps); "
         "`fields.pvd` with `bulk_t*.vtu` and `joint_t*.vtu` for ParaView. Bulk: `displacement` "

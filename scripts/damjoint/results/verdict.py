@@ -81,7 +81,9 @@ def movement(case: Case, crack_length: float, x: np.ndarray, moved: np.ndarray) 
     """Broken through, overturning or sliding, from how a dam that has lost its equilibrium goes on.
 
     crack_length: [m], after it; x (n,): distance of the joint's nodes from the heel; moved (n, 3):
-    the change of their jumps. Sliding: the joint's slip is larger than what the rotation opens at the heel.
+    the change of their jumps.
+
+    Sliding: the joint's slip is larger than what the rotation opens at the heel.
     """
     if crack_length > case.joint_along * (1 - 1e-9):
         return "broken through"

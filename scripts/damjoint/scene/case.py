@@ -10,7 +10,15 @@ from pathlib import Path
 
 from .. import InputError, data
 from . import casefile
-from .parameters import INCLUDE, assignments, constants, declared, listing, parse
+from .parameters import (
+    INCLUDE,
+    assignments,
+    constants,
+    declared,
+    independent,
+    listing,
+    parse,
+)
 
 CASES = data("cases")
 
@@ -114,6 +122,21 @@ class Case:
             tail_levels=self.tail_levels[:-1],
             times=tuple(t for t in self.times if t <= before),
         )
+
+    def changed(self, values: Mapping[str, float | str]) -> Case:
+        """The case with other values of independent parameters, as `load` makes it, without
+        Gmsh's parser.
+
+        Raises InputError.
+        """
+        checked = {name: declared()[name].check(value) for name, value in values.items()}
+        if not checked.keys() <= independent():
+            raise KeyError(*checked.keys() - independent())
+        values = self.values | checked
+        check_energies({name: [v] for name, v in values.items()} | {"softening_twice": [0.0]})
+        check_drains(values, self.joint_length)
+        check_works(values)
+        return replace(self, values=values, published=False)
 
     def scenes(self) -> list[Case]:
         """The case itself, then the other uplift modes it is published with."""
