@@ -1,4 +1,4 @@
-"""The command line: damjoint new | run | gui | validate | sweep | bench | law."""
+"""The command line: damjoint new | run | plot | report | gui | validate | sweep | bench | law."""
 
 from __future__ import annotations
 
@@ -63,6 +63,16 @@ def parser() -> argparse.ArgumentParser:
     add("--no-picture", action="store_true", help="no PNG")
     add("--engine", default="auto", help=of_engine)
     run.set_defaults(call=do_run)
+
+    plot = commands.add_parser("plot", help="redraw a run's pictures from its files")
+    plot.add_argument("out", type=Path, metavar="OUT", help="a folder that a run has written")
+    plot.set_defaults(call=do_plot)
+
+    report = commands.add_parser("report", help="one HTML page from the files of runs")
+    add = report.add_argument
+    add("out", type=Path, nargs="+", metavar="OUT", help="folders that runs have written")
+    add("--to", type=Path, default=Path("report.html"), help="the page (default report.html)")
+    report.set_defaults(call=do_report)
 
     window = commands.add_parser("gui", parents=[settings], help="a case in Gmsh's window")
     window.add_argument("case", nargs="?", default="dam", help=of_case)
@@ -160,6 +170,25 @@ def do_run(arguments: argparse.Namespace) -> int:
             print(said)
         code = max(code, int(failed(result)))
     return code
+
+
+def do_plot(arguments: argparse.Namespace) -> int:
+    """damjoint plot."""
+    from .results import pictures, stored
+
+    found = [(folder, stored.read(folder)) for folder in stored.runs_in(arguments.out)]
+    for folder, solution in found:
+        print(pictures.draw(solution, folder))
+    return 0
+
+
+def do_report(arguments: argparse.Namespace) -> int:
+    """damjoint report."""
+    from .studies import report
+
+    report.write(arguments.out, arguments.to)
+    print(arguments.to)
+    return 0
 
 
 def do_gui(arguments: argparse.Namespace) -> int:

@@ -108,6 +108,8 @@ def write_info(results: Results, folder: Path, state: str = "", why: str = "") -
             "levels": case.levels,
             "tail_levels": case.tail_levels,
             "times": case.times,
+            "published": case.published,
+            "hardening_asked": case.hardening_asked,
             **results.info,
             "units": {
                 n: unit

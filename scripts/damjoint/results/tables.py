@@ -84,6 +84,11 @@ class Results:
         """As `at`, with jump and stress extrapolated from the integration points."""
         return rows_at(self.extrapolated, time)
 
+    def state(self, time: float) -> dict[str, float]:
+        """The row of the history at a time, or next to it."""
+        row = np.argmin(np.abs(self.history["time"] - time))
+        return {name: float(column[row]) for name, column in self.history.items()}
+
     @property
     def last(self) -> dict[str, float]:
         """The last row of the history; empty before the first step."""
