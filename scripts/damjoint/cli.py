@@ -1,4 +1,6 @@
-"""The command line: damjoint new | run | plot | report | gui | validate | sweep | bench | law."""
+"""The command line: damjoint new | run | check | plot | report | gui | validate | sweep | bench |
+law.
+"""
 
 from __future__ import annotations
 
@@ -45,24 +47,42 @@ def parser() -> argparse.ArgumentParser:
     of_case = "a letter a..k, dam, or the path of a .case file"
     of_engine = "auto, condensed (the bulk eliminated once) or getdp (the plain problem definition)"
 
-    run = commands.add_parser("run", parents=[settings], help="fill the reservoir of a case")
-    add = run.add_argument
-    add("case", help=of_case)
+    water = Parser(add_help=False)
+    add = water.add_argument
     add("--levels", help="water levels [m] reached at t = 1, 2, ...: 3,6,8,9; may go down, too")
     add(
         "--tail-levels",
         help="tailwater levels [m], one or as many as levels (default: the case's own)",
     )
-    add("--steps", type=whole, help="equal steps between two levels (default 1)")
     add(
         "--accuracy",
         help="coarse (about 3 %%), standard (1 %%) or fine (0.2 %%): chooses mesh, order and steps",
     )
+
+    run = commands.add_parser("run", parents=[settings, water], help="fill the reservoir of a case")
+    add = run.add_argument
+    add("case", help=of_case)
+    add("--steps", type=whole, help="equal steps between two levels (default 1)")
     add("--out", type=Path, help="output folder (default out/CASE)")
     add("--no-fields", action="store_true", help="no displacement and stress fields")
     add("--no-picture", action="store_true", help="no PNG")
     add("--engine", default="auto", help=of_engine)
     run.set_defaults(call=do_run)
+
+    safety = commands.add_parser(
+        "check",
+        parents=[settings, water],
+        help="safety factors by finite elements and by hand; exit code 1 if one is too low",
+    )
+    add = safety.add_argument
+    add("cases", nargs="+", metavar="CASE", help=f"load combinations: {of_case}")
+    add(
+        "--out",
+        type=Path,
+        default=Path("out/check"),
+        help="where check.csv and the cases' folders go (default out/check)",
+    )
+    safety.set_defaults(call=do_check)
 
     plot = commands.add_parser("plot", help="redraw a run's pictures from its files")
     plot.add_argument("out", type=Path, metavar="OUT", help="a folder that a run has written")
@@ -170,6 +190,22 @@ def do_run(arguments: argparse.Namespace) -> int:
             print(said)
         code = max(code, int(failed(result)))
     return code
+
+
+def do_check(arguments: argparse.Namespace) -> int:
+    """damjoint check; 1 if a check is not met."""
+    from .scene import parameters
+    from .scene.case import load
+    from .studies.check import check, text_table
+
+    settings = parameters.settings(arguments.settings)
+    water = arguments.levels, arguments.tail_levels
+    checks = check(
+        [load(name, settings, *water, accuracy=arguments.accuracy) for name in arguments.cases],
+        arguments.out,
+    )
+    print(f"{text_table(checks)}\n\n{arguments.out / 'check.csv'}")
+    return int(any(answer.fails for one in checks for answer in (one.finite_elements, one.gravity)))
 
 
 def do_plot(arguments: argparse.Namespace) -> int:

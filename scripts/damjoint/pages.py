@@ -13,7 +13,7 @@ from pathlib import Path
 
 from tabulate import tabulate
 
-from .results.tables import FLUX, HISTORY, JOINT
+from .results.tables import CHECK, FLUX, HISTORY, JOINT, LOADS
 from .scene.parameters import declared
 
 REFERENCE = Path("reference")
@@ -65,9 +65,9 @@ def parameters_page() -> str:
 
 def results_page() -> str:
     """reference/results.md: the columns of the tables."""
-    joint, history = (
+    joint, history, check, loads = (
         markdown([(f"`{n}`", u, m) for n, (u, m) in columns.items()], ("column", "unit", "meaning"))
-        for columns in (JOINT | FLUX, HISTORY)
+        for columns in (JOINT | FLUX, HISTORY, CHECK, LOADS)
     )
     parts = [
         "# Results",
@@ -84,6 +84,14 @@ def results_page() -> str:
         "## curve.csv",
         "Of a run driven by a displacement: `time`, `level` [m], `pressure` [Pa] at the foot of "
         "the face, `heel_opening` [m], `crest_ux` [m] of each converged step.",
+        "## check.csv",
+        "Of `damjoint check`: for each scene a row by the finite elements, one by the gravity "
+        "method, and, where both are for the same level, one with the first less the second.",
+        check,
+        "## gravity.csv",
+        "Of `damjoint check`: the gravity method's resultants, a row per load, the uplift and the "
+        "sum.",
+        loads,
         "## fields/",
         "`bulk.msh` and `joint.msh` for Gmsh (a view per field with all levels as its steps); "
         "`fields.pvd` with `bulk_t*.vtu` and `joint_t*.vtu` for ParaView. Bulk: `displacement` "

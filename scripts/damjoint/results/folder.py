@@ -17,7 +17,7 @@ from .tables import FLUX, HISTORY, JOINT, Results
 from .verdict import hints, statement, verdict
 
 #: Names that a run writes, besides its pictures.
-TABLES = ("joint.csv", "history.csv", "curve.csv", "run.json")
+TABLES = ("joint.csv", "history.csv", "curve.csv", "gravity.csv", "run.json")
 FIELDS = re.compile(r"(bulk|joint)(_t[\w.+-]+\.vtu|\.msh)|fields\.pvd")
 #: Where further scenes of a case go.
 SCENES = ("none", "imposed", "drained", "flow")
@@ -61,7 +61,7 @@ def clear(folder: Path) -> None:
             remove_if_empty(folder / name)
     if told is None:
         return
-    names = [*TABLES, *(f"{told['case']}{end}" for end in (".png", "_curve.png"))]
+    names = [*TABLES, *(f"{told['case']}{end}" for end in (".png", "_curve.png", "_check.png"))]
     for name in names:
         if Path(name).name == name:
             (folder / name).unlink(missing_ok=True)

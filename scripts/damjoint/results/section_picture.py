@@ -13,10 +13,10 @@ from matplotlib.figure import FigureBase
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from ..scene.case import Case
 from ..scene.parameters import constants
 from .drawing import CONCRETE, DARK, GREEN, GREY, ORANGE, RED, ROCK, SILT, WATER, panels
 from .fields import Solution, distance, nearest_rows, state_of
+from .gravity import grown
 from .outline import Section, section_of
 from .units import FORCES, STRESSES, told
 
@@ -28,11 +28,6 @@ def exaggeration(displacement: dict[str, np.ndarray], height: float) -> float:
     """The factor, of one digit, by which displacements are drawn."""
     largest = max((np.abs(u).max(initial=0) for u in displacement.values()), default=0)
     return float(f"{MOVED * height / largest:.1g}") if largest > 0 else 1.0
-
-
-def grown(case: Case, name: str, time: float) -> float:
-    """How much of a load is there at a time; name: of the time at which all of it is."""
-    return min(max(time - case[name] + 1, 0.0), 1.0)
 
 
 def draw_section(figure: FigureBase, solution: Solution, time: float) -> None:

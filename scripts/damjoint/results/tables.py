@@ -56,6 +56,35 @@ HISTORY = {
     "x_resultant": ("m", "where N meets the joint, from the heel"),
 }
 
+#: Columns of gravity.csv: a row per load on the body above the joint, and their sum.
+LOADS = {
+    "load": ("", "what acts"),
+    "Fx": ("N/m", "horizontal force, downstream > 0"),
+    "Fy": ("N/m", "vertical force, upwards > 0"),
+    "moment": ("N m/m", "about the joint's toe, holding the dam down > 0"),
+}
+
+#: Columns of check.csv: a row per scene and answer at the last level, and one of differences.
+CHECK = {
+    "case": ("", "name of the case"),
+    "answer": ("", "finite elements, gravity method, or the difference of the two"),
+    "uplift": ("", "water in the joint"),
+    **{name: HISTORY[name] for name in ("level", "tail_level", "N", "T", "M", "U", "x_resultant")},
+    "sigma_n_heel": ("Pa", "total normal stress at the heel, compression < 0"),
+    "sigma_n_toe": ("Pa", "total normal stress at the toe"),
+    "sigma_n_eff_heel": ("Pa", "effective normal stress at the heel, 0 where it is cracked"),
+    "sigma_n_eff_toe": ("Pa", "effective normal stress at the toe"),
+    "crack_length": HISTORY["crack_length"],
+    "SSF": ("-", "sliding: (mu N + adhesion (length - crack_length)) / T"),
+    "OSF": ("-", "overturning: stabilising over overturning moments about the toe"),
+    "position": ("", "where N meets the joint: middle third, middle half, within base, outside"),
+    "required_SSF": ("-", "what the case requires; 0: nothing"),
+    "required_OSF": ("-", "what the case requires; 0: nothing"),
+    "f_c": ("Pa", "compressive strength at the toe; 0: not checked"),
+    "verdict": ("", "pass or fail"),
+    "why": ("", "why it fails"),
+}
+
 
 @dataclass
 class Results:
@@ -134,15 +163,18 @@ def history_table(case: Case, rows: dict[str, np.ndarray]) -> dict[str, np.ndarr
     return {name: rows[name] for name in HISTORY}
 
 
-def write_csv(target: Path | TextIO, table: dict[str, np.ndarray]) -> None:
-    """Write a table with its column names to a path or an open file; numbers with twelve digits."""
+def write_csv(target: Path | TextIO, table: dict[str, np.ndarray | list]) -> None:
+    """Write a table with its column names to a path or an open file; numbers with twelve digits,
+    texts as they are.
+    """
     if isinstance(target, Path):
         with target.open("w", newline="") as file:
             write_csv(file, table)
         return
     writer = csv.writer(target, lineterminator="\n")
     writer.writerow(table)
-    writer.writerows([f"{v:.12g}" for v in row] for row in zip(*table.values(), strict=True))
+    rows = zip(*table.values(), strict=True)
+    writer.writerows([v if isinstance(v, str) else f"{v:.12g}" for v in row] for row in rows)
 
 
 def write(results: Results, folder: Path) -> None:

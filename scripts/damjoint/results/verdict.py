@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..scene.case import Case
+from . import gravity
 from .tables import Results
 
 
@@ -160,11 +161,8 @@ def path_statement(results: Results) -> str:
 
 
 def overturning_level(case: Case) -> float:
-    """Level [m] of a uniform pressure at which the dry dam without tension turns over about its
-    toe.
+    """Level [m] of a uniform pressure at which the rigid dam without tension turns over about its
+    toe: the moment is linear in it.
     """
-    base, crest, height = case["dam_base"], case["dam_crest"], case["dam_height"]
-    area = (base + crest) / 2 * height
-    centroid = (base**2 + base * crest + crest**2) / (3 * (base + crest))
-    weight = case["rho_dam"] * case["g"] * area
-    return weight * (base - centroid) / (case["rho_water"] * case["g"] * height**2 / 2)
+    empty, one = (gravity.at(case, case.times[-1], level).M for level in (0.0, 1.0))
+    return empty / (empty - one)

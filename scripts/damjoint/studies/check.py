@@ -1,0 +1,274 @@
+"""Checks: the finite elements' answer at the last level beside the gravity method's, with the
+factors that the case requires; load combinations are cases that include a common file.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from tabulate import tabulate
+
+from .. import InputError
+from ..engines import engine_of
+from ..results import folder as folders
+from ..results import gravity, verdict
+from ..results.check_picture import draw_check
+from ..results.fields import along
+from ..results.gravity import GravityMethod
+from ..results.tables import CHECK, Results, write_csv
+from ..results.units import FORCES, MOMENTS, STRESSES, unit
+from ..run import run
+from ..scene.case import Case
+
+FINITE_ELEMENTS, GRAVITY = "finite elements", "gravity method"
+DIFFERENCE, REQUIRED = "difference", "required"
+
+#: The columns of check.csv that are numbers which the two answers share.
+NUMBERS = tuple(CHECK)[list(CHECK).index("level") : list(CHECK).index("OSF") + 1]
+
+#: What the printed table shows: heading by column, in groups that share a unit.
+SHOWN = (
+    ((("m", 1),), {"level": "level"}),
+    (FORCES, {"N": "N", "T": "T", "U": "U"}),
+    (MOMENTS, {"M": "M"}),
+    ((("m", 1),), {"x_resultant": "N at x"}),
+    (STRESSES, {"sigma_n_eff_heel": "eff. heel", "sigma_n_eff_toe": "eff. toe"}),
+    ((("m", 1),), {"crack_length": "crack"}),
+    ((("-", 1),), {"SSF": "SSF", "OSF": "OSF"}),
+)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What one method says of a scene at its last level."""
+
+    case: Case
+    by: str
+    #: NUMBERS in SI units; nan where there is none
+    numbers: Mapping[str, float]
+    #: why there is no equilibrium; empty if there is one
+    statement: str = ""
+
+    @property
+    def fails(self) -> list[str]:
+        """Why it fails: the statement, and each check that is not met."""
+        case, found = self.case, self.numbers
+        said = [
+            f"{name} {found[name]:.4g} < {value:g}"
+            for name, value in required(case).items()
+            if found[name] < value
+        ]
+        if case["f_c"] and -found["sigma_n_toe"] > case["f_c"]:
+            said.append(f"{-found['sigma_n_toe']:.4g} Pa at the toe > f_c = {case['f_c']:g} Pa")
+        return [self.statement, *said] if self.statement else said
+
+    @property
+    def length(self) -> float:
+        """Of the joint [m]."""
+        return self.case.section["joint_length"][0]
+
+    @property
+    def row(self) -> dict[str, float | str]:
+        """Its row of check.csv."""
+        return {
+            "case": self.case.name,
+            "answer": self.by,
+            "uplift": self.case["uplift"],
+            **self.numbers,
+            "position": gravity.position(self.numbers["x_resultant"], self.length),
+            **{name: self.case[name] for name in ("required_SSF", "required_OSF", "f_c")},
+            "verdict": "fail" if self.fails else "pass",
+            "why": "; ".join(self.fails),
+        }
+
+
+def least_sliding_factor(case: Case) -> float:
+    """What the case requires; at least 1 where its law has friction: below it there is no
+    equilibrium.
+    """
+    return max(case["required_SSF"], 0.0 if case["law"] == "rupture" else 1.0)
+
+
+def by_gravity(method: GravityMethod) -> Answer:
+    """The gravity method's answer."""
+    said = "" if method.stands else "overturning: no part of the joint is left under compression"
+    numbers = {name: float(getattr(method, name)) for name in NUMBERS}
+    return Answer(method.case, GRAVITY, numbers, said)
+
+
+def by_finite_elements(result: Results) -> Answer:
+    """The answer of a run at the last level it reached, safety factors from its resultants.
+
+    Stresses are node values at the joint's ends, where those of an elastic body depend on the mesh.
+    """
+    case, last = result.case, result.last
+    said = verdict.statement(result) if verdict.failed(result) else ""
+    if not last:
+        return Answer(case, FINITE_ELEMENTS, dict.fromkeys(NUMBERS, math.nan), said)
+    method, rows = gravity.at(case, last["time"], last["level"]), along(result.at())
+    numbers = {name: last[name] for name in NUMBERS if name in last}
+    for name in ("sigma_n", "sigma_n_eff"):
+        numbers |= {f"{name}_heel": rows[name][0], f"{name}_toe": rows[name][-1]}
+    uncracked = method.body.length - last["crack_length"]
+    numbers["SSF"] = gravity.sliding_factor(case, last["N"], last["T"], uncracked)
+    lifting = method.resultant.moment - last["M"]
+    numbers["OSF"] = gravity.overturning_factor(method.loads, lifting)
+    return Answer(case, FINITE_ELEMENTS, {name: float(numbers[name]) for name in NUMBERS}, said)
+
+
+def hand_calculation(result: Results) -> GravityMethod:
+    """The gravity method at a case's last level: the one prescribed, or found where a displacement
+    is.
+    """
+    case = result.case
+    found = result.last.get("level") if case["drive"] != "level" else None
+    return gravity.at(case, case.times[-1], found)
+
+
+@dataclass(frozen=True)
+class Check:
+    """Both answers for a scene."""
+
+    finite_elements: Answer
+    gravity: Answer
+
+    @property
+    def comparable(self) -> bool:
+        """Whether both are for the same level."""
+        pair = self.finite_elements.numbers["level"], self.gravity.numbers["level"]
+        return math.isclose(*pair, abs_tol=1e-9)
+
+    @property
+    def rows(self) -> list[dict[str, float | str]]:
+        """Rows of check.csv: the answers and, if they are for the same level, their difference."""
+        one, other = self.finite_elements, self.gravity
+        if not self.comparable:
+            return [one.row, other.row]
+        less = {name: difference(one.numbers[name], other.numbers[name]) for name in NUMBERS}
+        return [one.row, other.row, Answer(one.case, DIFFERENCE, less).row | NO_VERDICT]
+
+    @property
+    def shown(self) -> list[dict[str, float | str]]:
+        """Rows of the printed table: those of check.csv and what is required."""
+        factors = required(self.gravity.case)
+        if all(map(math.isnan, factors.values())):
+            return self.rows
+        asked = {"case": self.gravity.case.name, "uplift": self.gravity.case["uplift"]}
+        blank = dict.fromkeys(NUMBERS, math.nan)
+        return [*self.rows, asked | {"answer": REQUIRED} | blank | factors | NO_VERDICT]
+
+    @property
+    def notes(self) -> list[str]:
+        """What to know when the two are compared."""
+        case, found = self.gravity.case, []
+        if case["law"] == "rupture":
+            given = f"mu = {case['mu']:g}, adhesion = {case['adhesion']:g} Pa"
+            found.append(f"SSF with {given}, which the law rupture does not have")
+        if case["uplift"] == "flow":
+            found.append("gravity method: full head in the crack, linear beyond it")
+        if case["f_c"]:
+            found.append("the finite elements' stress at the toe, a corner, depends on the mesh")
+        if not self.comparable:
+            found.append("no differences: the finite elements did not reach the last level")
+        return found
+
+
+#: A difference is not judged.
+NO_VERDICT = {"position": "", "verdict": "", "why": ""}
+
+
+def required(case: Case) -> dict[str, float]:
+    """The safety factors that a case requires; nan where it requires none."""
+    least = {"SSF": least_sliding_factor(case), "OSF": case["required_OSF"]}
+    return {name: value or math.nan for name, value in least.items()}
+
+
+def difference(one: float, other: float) -> float:
+    """One less the other; 0 if they agree to nine digits, or are both infinite."""
+    return 0.0 if math.isclose(one, other, rel_tol=1e-9) else one - other
+
+
+def text_table(checks: list[Check]) -> str:
+    """The table as text, in units by size, and below it why a row fails and what to know."""
+    rows = [row for check in checks for row in check.shown]
+    columns, heads = [], []
+    for units, names in SHOWN:
+        values = np.array([[row[name] for row in rows] for name in names], dtype=float)
+        size, factor = unit([values[np.isfinite(values)]], units)
+        heads += [f"{title}\n[{size}]" for title in names.values()]
+        show = [signed if row["answer"] == DIFFERENCE else number for row in rows]
+        columns += [[f(v * factor) for f, v in zip(show, line, strict=True)] for line in values]
+    told = ([row[name] for row in rows] for name in ("position", "verdict"))
+    names, answers = [label(checks, row) for row in rows], [row["answer"] for row in rows]
+    table = tabulate(
+        zip(names, answers, *columns, *told, strict=True),
+        ["case", "", *heads, "N in", ""],
+        disable_numparse=True,
+        colalign=("left", "left", *("right" for _ in columns), "left", "left"),
+    )
+    said = [
+        f"{label(checks, row)}, {row['answer']}: fails, {row['why']}" for row in rows if row["why"]
+    ]
+    said += [
+        f"{label(checks, check.gravity.row)}: {note}" for check in checks for note in check.notes
+    ]
+    return "\n\n".join(filter(None, [table, "\n".join(said)]))
+
+
+def label(checks: list[Check], row: Mapping) -> str:
+    """The name of a row's scene, with its uplift where the case has several."""
+    scenes = {c.gravity.case["uplift"] for c in checks if c.gravity.case.name == row["case"]}
+    return row["case"] + (f", {row['uplift']}" if len(scenes) > 1 else "")
+
+
+def number(value: float) -> str:
+    """A number's cell: five digits; empty where there is none."""
+    return "" if math.isnan(value) else f"{value:.5g}"
+
+
+def signed(value: float) -> str:
+    """A difference's cell: its sign and three digits."""
+    return f"{value:+.3g}" if value else "0"
+
+
+def check(cases: list[Case], out: Path) -> list[Check]:
+    """Run cases, each into its folder below out, and write check.csv there; into each scene's
+    folder gravity.csv and CASE_check.png.
+
+    Raises InputError, RunError.
+    """
+    names = [case.name for case in cases]
+    for case in cases:
+        if names.count(case.name) > 1:
+            raise InputError(f"case {case.name}: must be given once, by a name of its own")
+        engine_of(case, "auto")
+    checks = []
+    for case in cases:
+        for result in run(case, out / case.name):
+            method = hand_calculation(result)
+            checks.append(Check(by_finite_elements(result), by_gravity(method)))
+            folder = folders.scene_folder(case, result.case, out / case.name)
+            write_csv(folder / "gravity.csv", method.table())
+            draw_check(result, method, picture_table(checks[-1]), folder)
+    rows = [row for found in checks for row in found.rows]
+    write_csv(out / "check.csv", {name: [row[name] for row in rows] for name in CHECK})
+    return checks
+
+
+def picture_table(found: Check) -> list[tuple[str, ...]]:
+    """The table beside the picture: a row per quantity."""
+    pair = found.finite_elements, found.gravity
+    cells = [("", "FE", "gravity", "required")]
+    least = required(found.gravity.case)
+    for units, names in SHOWN:
+        values = [[answer.numbers[name] for answer in pair] for name in names]
+        size, factor = unit([np.array(values)[np.isfinite(values)]], units)
+        for (name, title), line in zip(names.items(), values, strict=True):
+            told = (number(v * factor) for v in line)
+            head = title if size == "-" else f"{title} [{size}]"
+            cells.append((head, *told, number(least.get(name, math.nan))))
+    return [*cells, ("", *("fail" if answer.fails else "pass" for answer in pair), "")]

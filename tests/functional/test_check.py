@@ -1,0 +1,141 @@
+"""Checks: the finite elements carry what the gravity method says, and the verdicts follow."""
+
+import csv
+import math
+from dataclasses import replace
+
+import matplotlib.image
+import pytest
+from damjoint.results import gravity
+from damjoint.studies.check import by_finite_elements, by_gravity, hand_calculation
+
+#: SSNP142's dam on a coarse mesh: what load combinations share.
+COMMON = """
+default_dam_base = 5; default_dam_crest = 1.5; default_dam_height = 10;
+default_found_side = 5; default_found_depth = 5; default_order = 1; default_n_joint = 20;
+default_E = 3e12; default_nu = 0; default_K_N = 1e12; default_K_T = 1e12;
+default_law = "friction"; default_mu = 0.8; default_adhesion = 1e5; default_f_c = 1e7;
+default_required_SSF = 1.5; default_required_OSF = 1.2;
+"""
+COMBINATIONS = {
+    "usual": 'title = "usual"; levels() = {7};',
+    "flood": 'title = "flood"; default_required_SSF = 1.3; default_required_OSF = 1.1; '
+    "levels() = {7, 9.5}; tail_levels() = {0, 1};",
+}
+
+
+@pytest.fixture
+def combinations(tmp_path):
+    (tmp_path / "common.case").write_text(COMMON)
+    for name, text in COMBINATIONS.items():
+        (tmp_path / f"{name}.case").write_text(f'Include "common.case"; {text}')
+    return [f"{name}.case" for name in COMBINATIONS]
+
+
+def rows(path):
+    with path.open() as file:
+        return {(row["case"], row["answer"]): row for row in csv.DictReader(file)}
+
+
+def test_two_combinations(command, combinations, tmp_path):
+    code, out, _ = command("check", *combinations)
+    assert code == 0
+    table = rows(tmp_path / "out/check/check.csv")
+    assert len(table) == 6
+    for name in COMBINATIONS:
+        answers = "finite elements", "gravity method", "difference"
+        computed, by_hand, less = (table[name, answer] for answer in answers)
+        for column in ("N", "T", "M", "U", "x_resultant", "OSF"):
+            assert float(computed[column]) == pytest.approx(float(by_hand[column]), rel=1e-6)
+        for column in ("sigma_n_eff_toe", "crack_length", "SSF"):
+            expected = float(computed[column]) - float(by_hand[column])
+            assert float(less[column]) == pytest.approx(expected, rel=1e-6, abs=1e-9)
+        assert computed["verdict"] == by_hand["verdict"] == "pass" and less["verdict"] == ""
+        folder = tmp_path / "out/check" / name
+        assert (folder / "run.json").is_file() and (folder / "fields/fields.pvd").is_file()
+        assert matplotlib.image.imread(folder / f"{name}_check.png").std() > 0.1
+        with (folder / "gravity.csv").open() as file:
+            loads = list(csv.DictReader(file))
+        assert loads[0]["load"] == "weight" and loads[-1]["load"] == "sum"
+        for column in ("Fx", "Fy", "moment"):
+            total = math.fsum(float(row[column]) for row in loads[:-1])
+            assert total == pytest.approx(float(loads[-1][column]), rel=1e-9)
+        assert float(loads[-1]["Fx"]) == pytest.approx(float(by_hand["T"]))
+    for said in ("usual", "flood", "gravity method", "required", "1.3", "pass"):
+        assert said in out
+    assert "fail" not in out
+
+
+@pytest.mark.parametrize(
+    "setting, said",
+    [
+        ({"required_SSF": 3.0}, "SSF {SSF:.4g} < 3"),
+        ({"required_OSF": 5.0}, "OSF {OSF:.4g} < 5"),
+        ({"f_c": 1.5e5}, "{toe:.4g} Pa at the toe > f_c = 150000 Pa"),
+    ],
+)
+def test_a_check_that_is_not_met(solve, setting, said):
+    (result,) = solve("d", "7", dim=2.0, n_joint=20.0)
+    for answer in (by_finite_elements(result), by_gravity(hand_calculation(result))):
+        assert not answer.fails and answer.row["verdict"] == "pass"
+        stricter = replace(answer, case=replace(answer.case, values=answer.case.values | setting))
+        expected = said.format(**answer.numbers, toe=-answer.numbers["sigma_n_toe"])
+        assert stricter.fails == [expected]
+        assert (stricter.row["verdict"], stricter.row["why"]) == ("fail", expected)
+
+
+def test_a_dam_that_slides(command, combinations, tmp_path):
+    """It stops before its last level, which the gravity method finds too high."""
+    weak = "mu=0.25", "adhesion=1000", "pena_tang=0", "smallest_step=0.004"
+    settings = "required_SSF=0", "required_OSF=0", *weak
+    words = [word for setting in settings for word in ("--set", setting)]
+    code, out, _ = command("check", "flood.case", *words, "--out", "here")
+    assert code == 1
+    table = rows(tmp_path / "here/check.csv")
+    assert set(table) == {("flood", "finite elements"), ("flood", "gravity method")}
+    computed, by_hand = table.values()
+    assert computed["why"].startswith("sliding: no equilibrium beyond level")
+    assert float(computed["level"]) < 9.5 == float(by_hand["level"])
+    assert by_hand["why"] == f"SSF {float(by_hand['SSF']):.4g} < 1"
+    assert float(computed["SSF"]) == pytest.approx(1, abs=0.01)
+    assert "did not reach the last level" in out
+
+
+def test_bad_input_leaves_nothing(command, combinations, tmp_path):
+    for words, said in (
+        (("usual.case", "usual.case"), "case usual: must be given once"),
+        (("usual.case", "none.case"), "case none.case: unknown"),
+        (("usual.case", "--set", "f_c=-1"), "f_c = -1: must be"),
+        (("usual.case", "--levels", "3,x"), "levels = 3,x: must be"),
+    ):
+        code, _, error = command("check", *words)
+        assert code == 2 and said in error and error.count("\n") == 1
+        assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    "name, levels, tail_levels, settings",
+    [
+        ("a", None, None, {}),
+        ("c", None, "1,2,3,4", {}),
+        ("k", None, None, {}),
+        ("c", "8", "1", {"uplift": "drained", "drain_x": 1.0, "drain_level": 3.0, "n_joint": 20}),
+    ],
+)
+def test_resultants(solve, name, levels, tail_levels, settings):
+    """Of the finite elements and the gravity method, whatever the joint does."""
+    for result in solve(name, levels, tail_levels, **settings):
+        computed, by_hand = by_finite_elements(result), by_gravity(hand_calculation(result))
+        for column in ("level", "tail_level", "N", "T", "M", "U", "x_resultant", "OSF"):
+            expected = pytest.approx(by_hand.numbers[column], rel=1e-6, abs=1e-9)
+            assert computed.numbers[column] == expected, column
+
+
+def test_resultants_with_flow(solve):
+    """Their uplift differs; what it lifts does not."""
+    (result,) = solve("e")
+    method = gravity.at(result.case, result.case.times[-1])
+    last = result.last
+    assert last["N"] + last["U"] == pytest.approx(method.N + method.U, rel=1e-6)
+    assert last["T"] == pytest.approx(method.T, rel=1e-6)
+    assert last["U"] == pytest.approx(method.U, rel=0.1)

@@ -1,0 +1,357 @@
+"""The gravity method beside closed forms: published tables, and each load by quadrature."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from closed_forms import BASE, CENTROID, WEIGHT, resultants, slide_level
+from damjoint.results import gravity
+from damjoint.scene.case import load
+from numpy.testing import assert_allclose
+from scipy.integrate import quad
+from scipy.optimize import brentq
+
+WATER = 1000 * 9.81
+#: A dam with everything: batter, neck, a lift joint that falls towards the toe.
+WHOLE = {
+    "batter": 4.0,
+    "batter_height": 20.0,
+    "neck_height": 6.0,
+    "joint_height": 8.0,
+    "joint_slope": -5.0,
+}
+SECTIONS = {
+    "plain": {},
+    "batter": {"batter": 4.0, "batter_height": 20.0},
+    "neck": {"neck_height": 6.0},
+    "lift": {"joint_height": 8.0, "batter": 4.0},
+    "rising": {"joint_slope": 7.0},
+    "whole": WHOLE,
+}
+
+
+def large(settings, tail="3"):
+    """The 45 m dam at its crest."""
+    return load("dam", settings, "45", tail)
+
+
+# -- published tables
+
+
+@pytest.mark.parametrize(
+    "level, normal, shear, moment",
+    [(40, 13517, 7804, 202.4), (43, 13017, 9025, 165.7), (45, 12683, 9888, 139.2)],
+)
+def test_table_of_the_45_m_dam(level, normal, shear, moment):
+    found = gravity.at(load("dam", {}, str(level), "3"), 1)
+    assert found.N / 1e3 == pytest.approx(normal, abs=0.5)
+    assert found.T / 1e3 == pytest.approx(shear, abs=0.5)
+    assert found.M / 1e6 == pytest.approx(moment, abs=0.05)
+
+
+def test_crack_of_the_45_m_dam():
+    """Without tension: by three times the resultant's distance from the toe under linear uplift; by
+    a cubic equation where the crack takes the full head (12185 kN, 128.3 MN m, 2.42 m)."""
+    found = gravity.at(large({"sigma_max": 0.0}), 1)
+    assert found.crack_length == pytest.approx(1.08, abs=0.005)
+    assert found.crack_length == pytest.approx(34 - 3 * found.M / found.N, rel=1e-9)
+    dry = gravity.at(large({"sigma_max": 0.0, "uplift": "none"}), 1)
+    # N B = 3 M with B left: the water beyond full head, 42 w B/2, acts at B/3 like the stress
+    left = 3 * (dry.M - WATER * 45 * 34**2 / 2) / (dry.N - WATER * 45 * 34)
+    for uplift in ("cracked", "flow"):
+        wet = gravity.at(large({"sigma_max": 0.0, "uplift": uplift}), 1)
+        assert wet.crack_length == pytest.approx(34 - left, rel=1e-9)
+        assert wet.crack_length == pytest.approx(2.42, abs=0.01)
+        assert wet.N / 1e3 == pytest.approx(12185, abs=1)
+        assert wet.M / 1e6 == pytest.approx(128.3, abs=0.05)
+        assert wet.sigma_n_eff_heel == 0 and wet.tip_stress == pytest.approx(0, abs=1)
+        # all of N on the uncracked joint: a triangle
+        assert wet.sigma_n_eff_toe == pytest.approx(-2 * wet.N / left, rel=1e-9)
+
+
+def test_sliding_of_the_45_m_dam():
+    assert gravity.at(large({"mu": 1.0, "adhesion": 2e5}), 1).SSF == pytest.approx(1.97, abs=5e-3)
+    for mu, level in ((0.6, 40.619), (0.7, 43.161)):
+        case = large({"mu": mu, "adhesion": 0.0})
+        slides = brentq(lambda h, case=case: gravity.at(case, 1, h).SSF - 1, 30, 45)
+        assert slides == pytest.approx(level, abs=5e-4)
+
+
+@pytest.mark.parametrize(
+    "uplift, decompression, overturning", [("none", 8.98764, 11.462), ("imposed", 8.064, 10.017)]
+)
+def test_levels_of_ssnp142(uplift, decompression, overturning):
+    """The thrust of a level above the crest is that of heavier water at the crest."""
+    strong = load("a", {"uplift": uplift, "sigma_max": 1e9}, "10")
+    found = brentq(lambda h: gravity.at(strong, 1, h).tip_stress, 5, 10)
+    assert found == pytest.approx(decompression, abs=5e-4)
+    case = load("a", {"uplift": uplift, "sigma_max": 0.0, "crest_water": 0.0}, "10")
+    if uplift == "none":
+        heavy = {"rho_water": 1000 * (overturning / 10) ** 3}
+        case = load("a", heavy | {"uplift": "none", "sigma_max": 0.0}, "10")
+        assert gravity.at(case, 1).M == pytest.approx(0, abs=2e-3 * WEIGHT)
+        assert gravity.at(case, 1, 10.01).crack_length == 5
+    else:
+        assert gravity.at(case, 1, overturning - 1e-3).crack_length < 5
+        turned = gravity.at(case, 1, overturning + 1e-3)
+        assert turned.crack_length == 5 and not turned.stands
+
+
+def test_sliding_levels_of_ssnp142():
+    for uplift in ("none", "imposed"):
+        case = load("c", {"uplift": uplift}, "9")
+        found = brentq(lambda h, case=case: gravity.at(case, 1, h).SSF - 1, 5, 9)
+        assert found == pytest.approx(slide_level(0.35, 1000, uplift == "imposed"), rel=1e-9)
+
+
+def test_plain_resultants():
+    case = load("c", {}, "9", "4")
+    for uplift in ("none", "imposed"):
+        case.values["uplift"] = uplift
+        found = gravity.at(case, 1)
+        expected = resultants(9, 4, uplift == "imposed")
+        assert_allclose((found.N, found.T, found.M), expected, rtol=1e-12)
+    assert found.resultant.fy == pytest.approx(-WEIGHT + found.loads[2].fy)
+    assert found.loads[0].moment == pytest.approx(WEIGHT * (BASE - CENTROID))
+
+
+# -- loads by quadrature over the faces
+
+
+def side_of(case, side):
+    """Straight parts of the upper body's faces as pairs of points, from pro/section.pro's order."""
+    found = case.section
+    code = {"UP": 0, "DOWN": 1, "TOP": 2}[side]
+    columns = zip(
+        *(found[f"seg_{n}"] for n in ("side", "body", "x0", "y0", "x1", "y1")), strict=True
+    )
+    return [(np.array(c[2:4]), np.array(c[4:6])) for c in columns if c[0] == code and c[1] == 0]
+
+
+def by_quadrature(case, side, pressure, horizontal_only=False):
+    """Fx, Fy and moment about the toe of pressure(y, share of the normal along x) on a side."""
+    toe = np.array([case.section["toe_x"][0], case.section["toe_y"][0]])
+    total = np.zeros(3)
+    for a, b in side_of(case, side):
+        along = b - a
+        inward = np.array([-along[1], along[0]])
+        share = abs(along[1]) / np.hypot(*along)
+
+        def part(r, i, a=a, along=along, inward=inward, share=share):
+            place = a + r * along
+            force = pressure(place[1], share) * inward * (1, not horizontal_only)
+            arm = place - toe
+            return (*force, arm[0] * force[1] - arm[1] * force[0])[i]
+
+        kinks = [
+            (level - a[1]) / along[1] for level in (45.0, 30.0, 12.0, 10.0, 8.0) if along[1] != 0
+        ]
+        kinks = [k for k in kinks if 0 < k < 1] or None
+        total += [quad(part, 0, 1, (i,), points=kinks, epsabs=1e-6, limit=200)[0] for i in range(3)]
+    return total
+
+
+def load_of(case, name, level=None):
+    found = {row.name: row for row in gravity.at(case, 1, level).loads}[name]
+    return found.fx, found.fy, found.moment
+
+
+@pytest.mark.parametrize("section", SECTIONS)
+@pytest.mark.parametrize("level, tail", [(30, 12), (45, 10), (48.5, 0)])
+def test_water_on_faces(section, level, tail):
+    case = load("dam", SECTIONS[section], "40", str(tail))
+    hydrostatic = lambda surface: lambda y, _: WATER * max(surface - y, 0)
+    names = {"reservoir": ("UP", level), "water on the crest": ("TOP", level)}
+    for name, (side, surface) in (names | {"tailwater": ("DOWN", tail)}).items():
+        expected = by_quadrature(case, side, hydrostatic(surface))
+        if any(abs(expected) > 1e-6):
+            assert_allclose(load_of(case, name, level), expected, rtol=1e-8, atol=1e-2)
+        else:
+            assert name not in {row.name for row in gravity.at(case, 1, level).loads}
+
+
+@pytest.mark.parametrize("section", SECTIONS)
+def test_silt_and_westergaard(section):
+    case = load(
+        "dam", SECTIONS[section] | {"silt_height": 12.0, "k_h": 0.1, "k_v": -0.05}, "30", "0"
+    )
+    silt = by_quadrature(case, "UP", lambda y, _: 900 * 9.81 * 0.5 * max(12 - y, 0), True)
+    assert_allclose(load_of(case, "silt"), silt, rtol=1e-8, atol=1e-2)
+    size = 7 / 8 * 0.1 * WATER
+    added = by_quadrature(
+        case, "UP", lambda y, share: size * share * math.sqrt(30 * max(30 - y, 0))
+    )
+    assert_allclose(load_of(case, "added water pressure"), added, rtol=1e-7, atol=1e-2)
+    weight, quake = load_of(case, "weight"), load_of(case, "earthquake")
+    assert quake[0] == pytest.approx(-0.1 * weight[1])
+    assert quake[1] == pytest.approx(0.05 * weight[1])
+
+
+@pytest.mark.parametrize("section", SECTIONS)
+def test_weight_by_slices(section):
+    """Area and first moments of the upper body from its width at each height."""
+    case = load("dam", SECTIONS[section])
+    body = gravity.Body(case)
+    (x0, y0), bottom = body.toe, min(body.toe[1], body.heel[1])
+
+    def ends(y):
+        """Where the horizontal at y cuts the outline."""
+        corners = body.outline + body.toe
+        cuts = [
+            a[0] + (y - a[1]) / (b[1] - a[1]) * (b[0] - a[0])
+            for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)
+            if min(a[1], b[1]) <= y < max(a[1], b[1])
+        ]
+        return min(cuts), max(cuts)
+
+    breaks = sorted({*(body.outline[:, 1] + y0), 45.0})
+    sums = np.zeros(3)
+    for low, high in itertools.pairwise(breaks):
+        if high - low < 1e-9:
+            continue
+        moments = (
+            lambda y: ends(y)[1] - ends(y)[0],
+            lambda y: (ends(y)[1] ** 2 - ends(y)[0] ** 2) / 2 - x0 * (ends(y)[1] - ends(y)[0]),
+            lambda y: (y - y0) * (ends(y)[1] - ends(y)[0]),
+        )
+        sums += [quad(m, low, high)[0] for m in moments]
+    assert bottom == pytest.approx(breaks[0])
+    area, x, y = body.area_and_centroid
+    assert_allclose((area, area * x, area * y), sums, rtol=1e-9)
+
+
+def test_line_forces():
+    """Ice and a force on the faces, an anchor that leans upstream: by hand on the plain dam."""
+    leaning = {"anchor_force": 2e6, "anchor_angle": 30.0}
+    other = {"force_x": -3e4, "force_y": 5e4, "force_face": "downstream", "force_at": 9.0}
+    settings = {"ice_force": 1e5, "ice_level": 30.0} | leaning | other
+    case = large(settings)
+    assert_allclose(load_of(case, "ice"), (1e5, 0, -1e5 * 30))
+    pull = -2e6 * np.array([0.5, math.sqrt(0.75)])
+    assert_allclose(load_of(case, "anchor"), (*pull, -31.5 * pull[1] - 45 * pull[0]))
+    x = -9 * 29 / 45  # of the downstream face, from the toe
+    assert_allclose(load_of(case, "force"), (-3e4, 5e4, x * 5e4 + 9 * 3e4))
+    lifted = large(settings | {"joint_height": 31.0})
+    assert {row.name for row in gravity.at(lifted, 1).loads}.isdisjoint({"ice", "force"})
+
+
+def test_loads_grow_over_the_unit_before_their_time():
+    settings = {"silt_height": 10.0, "silt_t": 2.0, "ice_force": 1e5, "k_h": 0.1}
+    case = load("dam", settings, "45,45,45")
+    moments = lambda time: {row.name: row.moment for row in gravity.at(case, time).loads}
+    assert "silt" not in moments(1) and "ice" not in moments(2)
+    assert moments(1.25)["silt"] == pytest.approx(0.25 * moments(2)["silt"])
+    assert moments(3)["silt"] == moments(2)["silt"]
+    for name in ("ice", "earthquake", "added water pressure"):
+        assert moments(2.5)[name] == pytest.approx(0.5 * moments(3)[name])
+
+
+def test_uniform_pressure():
+    """Modeling K: on the whole face; the level at which it turns the dry dam over."""
+    case = load("k")
+    assert_allclose(load_of(case, "reservoir", 5.02), (WATER * 50.2, 0, -WATER * 251))
+    assert gravity.at(case, 1, 49_247 / WATER).M == pytest.approx(0, abs=1e-4 * WEIGHT)
+
+
+def test_inclined_joint():
+    """A block's weight on a joint that rises towards the toe: W cos, -W sin, and its moment."""
+    case = load("dam", {"joint_slope": 10.0, "uplift": "none"}, "45", "0")
+    found, lean = gravity.at(case, 1, 0.0), math.radians(10)
+    weight = -found.loads[0].fy
+    assert found.T == pytest.approx(-weight * math.sin(lean))
+    assert found.N == pytest.approx(weight * math.cos(lean))
+    assert found.M == pytest.approx(found.loads[0].moment)
+    table = gravity.at(large({"joint_slope": -10.0}), 1).table()
+    assert table["load"][-1] == "sum"
+    for column in ("Fx", "Fy", "moment"):
+        assert sum(table[column][:-1]) == pytest.approx(table[column][-1])
+
+
+# -- uplift
+
+
+def test_heads_stand_above_the_joint():
+    """On a lift joint at 8 m: nothing from a tailwater at 3 m; heads over the ends of a slope."""
+    found = gravity.at(large({"joint_height": 8.0}), 1).uplift
+    assert_allclose(found.p, np.array([37, 37, 0]) * WATER)
+    length = gravity.Body(large({"joint_height": 8.0})).length
+    assert found.force == pytest.approx(WATER * 37 * length / 2)
+    assert found.moment == pytest.approx(WATER * 37 * length**2 / 3)
+    case = large({"joint_slope": -5.0})
+    found = gravity.at(case, 1).uplift
+    assert found.p[-1] == pytest.approx(WATER * (3 + 34 * math.tan(math.radians(5))))
+
+
+DRAINS = {"drain_x": 4.0, "drain_effectiveness": 0.5, "drain_level": 6.0}
+
+
+@pytest.mark.parametrize(
+    "mode, crack, places, heads",
+    [
+        ("drained", 0.0, (0, 0, 4, 34), (45, 45, 6 + 0.5 * (45 - 42 * 4 / 34 - 6), 3)),
+        ("drained", 2.0, (0, 0, 4, 34), (45, 45, 6 + 0.5 * (45 - 42 * 4 / 34 - 6), 3)),
+        ("cracked", 2.0, (0, 2, 4, 34), (45, 45, 6 + 0.5 * (42 * 30 / 32 + 3 - 6), 3)),
+        ("cracked", 5.0, (0, 5, 34), (45, 45, 3)),
+        ("flow", 2.0, (0, 2, 34), (45, 45, 3)),
+        ("imposed", 2.0, (0, 0, 34), (45, 45, 3)),
+        ("none", 2.0, (0, 0, 34), (0, 0, 0)),
+    ],
+)
+def test_uplift_rules(mode, crack, places, heads):
+    case = large(DRAINS | {"uplift": mode, "drains": 1.0})
+    found = gravity.Uplift(case, gravity.Body(case), 45, 3, crack)
+    assert_allclose(found.s, places)
+    assert_allclose(found.p, np.array(heads) * WATER)
+    pressure = lambda s: np.interp(s, found.s, found.p)
+    kinks = [2, 4, 5]
+    assert found.force == pytest.approx(quad(pressure, 0, 34, points=kinks)[0])
+    moment = quad(lambda s: pressure(s) * (34 - s), 0, 34, points=kinks)[0]
+    assert found.moment == pytest.approx(moment)
+
+
+def test_drains_lose_their_effect_where_the_crack_passes_them():
+    """Drains that stop it leave a shorter crack; weak ones near the heel are passed, and do
+    nothing."""
+    settings = DRAINS | {"uplift": "cracked", "sigma_max": 0.0, "rho_dam": 2150.0}
+    without = gravity.at(large(settings), 1)
+    stopped = gravity.at(large(settings | {"drains": 1.0, "drain_x": 10.0}), 1)
+    weak = {"drains": 1.0, "drain_x": 1.0, "drain_effectiveness": 0.05}
+    passed = gravity.at(large(settings | weak), 1)
+    assert 0 < stopped.crack_length < 10 < without.crack_length < 34
+    assert len(stopped.uplift.s) == 4 and len(passed.uplift.s) == 3
+    assert passed.crack_length == pytest.approx(without.crack_length, rel=1e-9)
+
+
+# -- strength and factors
+
+
+def test_tensile_strength():
+    """Below it no crack; beyond it rupture has none left at the tip, friction keeps c/mu."""
+    settings = {"uplift": "none", "rho_water": 1600.0}
+    free = gravity.at(large(settings | {"sigma_max": 0.0}), 1)
+    tension = gravity.at(large(settings | {"sigma_max": 1e9, "G_f": 1e9}), 1)
+    assert tension.crack_length == 0 and tension.sigma_n_eff_heel == tension.tip_stress > 0
+    strength = tension.tip_stress
+    weaker = {"sigma_max": 0.99 * strength}
+    assert gravity.at(large(settings | {"sigma_max": 1.01 * strength}), 1).crack_length == 0
+    assert gravity.at(large(settings | weaker), 1).crack_length == pytest.approx(free.crack_length)
+    kept = gravity.at(large(settings | {"law": "friction", "mu": 1.0, "adhesion": strength / 2}), 1)
+    assert kept.tip_stress == pytest.approx(strength / 2, rel=1e-6)
+    assert 0 < kept.crack_length < free.crack_length
+
+
+def test_factors_and_position():
+    found = gravity.at(large({"mu": 0.8, "adhesion": 1e5, "sigma_max": 0.0}), 1)
+    holds = 0.8 * found.N + 1e5 * (34 - found.crack_length)
+    assert found.SSF == pytest.approx(holds / found.T)
+    # weight and tailwater (pushing back, and down) against reservoir and uplift
+    rows = {row.name: row for row in found.loads}
+    holding = rows["weight"].moment + rows["tailwater"].moment
+    assert found.OSF == pytest.approx(holding / (found.uplift.moment - rows["reservoir"].moment))
+    assert found.eccentricity == pytest.approx(34 / 2 - found.M / found.N)
+    words = [gravity.position(x, 12) for x in (4.01, 8.1, 9.1, 3.1, 11.9, 12.1, -0.1)]
+    third, half, base, outside = "middle third", "middle half", "within base", "outside"
+    assert words == [third, half, base, half, base, outside, outside]
+    dry = gravity.at(large({"uplift": "none"}, tail="0"), 1, 0.0)
+    assert dry.SSF == dry.OSF == math.inf and dry.stands
