@@ -16,7 +16,7 @@ from matplotlib.figure import FigureBase
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from ..scene.case import Case
-from . import validation
+from . import gravity, validation
 from .drawing import BLUE, DARK, GREEN, GREY, ORANGE, RED, WATER, figure_of, legend_above, panels
 from .fields import Solution, along, distance, row_of_nodes, state_of
 from .outline import skin
@@ -108,12 +108,14 @@ def shear_limit(case: Case, rows: dict[str, np.ndarray]) -> tuple[str, np.ndarra
 
 def draw_joint(figure: FigureBase, result: Results, time: float) -> None:
     """Jumps, normal stresses and shear along the joint (means over z in 3D), with the published
-    values.
+    values or, where there are none, the stress of the gravity method.
     """
     case, curves = result.case, along(result.at(time))
     jumps, normals, shears = panels(figure, 3, 1, top=0.5, down=0.42).flat
     draw_jumps(jumps, case, curves)
-    draw_normal_stress(normals, case, curves)
+    factor = draw_normal_stress(normals, case, curves)
+    if not validation.references(case):
+        draw_by_hand(normals, gravity.at(case, time, result.state(time)["level"]), factor)
     draw_shear(shears, case, curves)
     state = state_of(curves)
     for axes in (jumps, normals, shears):
@@ -143,8 +145,11 @@ def draw_jumps(axes: Axes, case: Case, curves: dict[str, np.ndarray]) -> None:
     axes.set_ylabel(f"jump [{length}]")
 
 
-def draw_normal_stress(axes: Axes, case: Case, curves: dict[str, np.ndarray]) -> None:
-    """Total and effective normal stress, and the water pressure between them."""
+def draw_normal_stress(axes: Axes, case: Case, curves: dict[str, np.ndarray]) -> float:
+    """Total and effective normal stress, and the water pressure between them.
+
+    Returns how many of the unit drawn make a Pa.
+    """
     stress, factor = unit([curves["sigma_n"], curves["sigma_n_eff"]], STRESSES)
     s = curves["s"]
     axes.plot(s, curves["sigma_n"] * factor, color=BLUE, label="total (tension > 0)")
@@ -152,9 +157,20 @@ def draw_normal_stress(axes: Axes, case: Case, curves: dict[str, np.ndarray]) ->
         effective = curves["sigma_n_eff"] * factor
         axes.plot(s, effective, "--", color=DARK, label="effective")
         look = {"color": WATER, "alpha": 0.25, "linewidth": 0}
-        axes.fill_between(s, -curves["p"] * factor, 0, **look, label="uplift, downwards")
+        axes.fill_between(s, -curves["p"] * factor, 0, **look, label="uplift")
     draw_published(axes, case, curves, {"sigma_n": BLUE}, factor)
     axes.set_ylabel(f"normal stress [{stress}]")
+    return factor
+
+
+def draw_by_hand(axes: Axes, hand: gravity.GravityMethod, factor: float) -> None:
+    """The effective stress by the gravity method: none over the crack, linear beyond it."""
+    if hand.stands:
+        crack, length = hand.crack_length, hand.body.length
+        s, stress = [0, crack, crack, length], [0, 0, hand.tip_stress, hand.sigma_n_eff_toe]
+        axes.plot(
+            s, np.array(stress) * factor, ":", color=GREY, linewidth=1.8, label="gravity method"
+        )
 
 
 def draw_shear(axes: Axes, case: Case, curves: dict[str, np.ndarray]) -> None:
@@ -184,8 +200,8 @@ def draw_published(
             value = np.array([r.value for r in some]) * factor
             spread = np.abs(value) * [r.tolerance for r in some]
             look = {"fmt": "o", "markersize": 4, "color": color, "mfc": "white", "capsize": 2}
-            place = [r.x for r in some]
-            axes.errorbar(place, value, spread, **look, label="published")
+            label = "published" if name != "delta_t1" else None  # beside delta_n: once is enough
+            axes.errorbar([r.x for r in some], value, spread, **look, label=label)
 
 
 def draw_history(figure: FigureBase, result: Results) -> None:

@@ -42,7 +42,8 @@ def read(folder: Path) -> Solution:
         result = results_of(told, folder)
         bodies, fields = fields_in(folder / "fields", np.unique(result.joint["time"]))
     except DAMAGED as error:
-        raise InputError(f"out = {folder}: damaged: {error!r}") from None
+        why = error if isinstance(error, InputError) else f"damaged: {error!r}"
+        raise InputError(f"out = {folder}: {why}") from None
     return Solution(result, bodies, fields)
 
 
@@ -74,6 +75,9 @@ def case_of(told: dict) -> Case:
     name = told["case"]
     if Path(name).name != name:
         raise InputError(f"case {name!r}: must be the name of a case")
+    if missing := [n for n in declared() if n not in told["parameters"]]:
+        made = told["versions"]["damjoint"]
+        raise InputError(f"parameters {', '.join(missing)} are unknown to its damjoint {made}")
     values = {n: p.check(told["parameters"][n]) for n, p in declared().items()}
     lists = {n: tuple(map(float, told[n])) for n in ("levels", "tail_levels", "times")}
     found = parse(resolved(values, lists["levels"]))
@@ -109,7 +113,8 @@ def fields_in(folder: Path, times: np.ndarray) -> tuple[dict[str, Body], dict[fl
     for time in times.tolist():
         path = folder / f"bulk_t{time:g}.vtu"
         if path.is_file():
-            bulk, joint = meshio.read(path), meshio.read(folder / f"joint_t{time:g}.vtu")
+            # not meshio.read: it leaves the process where a file is damaged
+            bulk, joint = (meshio.vtu.read(p) for p in (path, folder / f"joint_t{time:g}.vtu"))
             parts = {name: part(bulk, number) for number, name in names.items()}
             bodies = {n: p[0] for n, p in parts.items() if len(p[0].points)}
             bodies["joint"] = body_of(joint.points, [(b.type, b.data) for b in joint.cells])

@@ -14,15 +14,16 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from matplotlib.figure import Figure
 
 from .. import InputError, __version__
-from ..results import pictures, stored
+from ..results import gravity, pictures, stored
 from ..results.drawing import figure_of
 from ..results.fields import Solution
 from ..results.section_picture import draw_section
 from ..results.tables import Results
 from ..results.units import FLUXES, FORCES, LENGTHS, MOMENTS, Units, unit
-from ..results.verdict import failed, stiffness_ratio
+from ..results.verdict import stiffness_ratio
 from ..scene.case import Case
 from ..scene.parameters import constants, declared, parse
+from .check import Check, by_finite_elements, by_gravity, hand_calculation, picture_table
 
 #: Of the parts of a picture that are dots, not lines.
 DPI = 160
@@ -71,21 +72,27 @@ def part_of(folder: Path, solution: Solution) -> dict:
     """What the page says of a run, for the template."""
     result = solution.result
     case, told = result.case, result.info
-    states = bool(len(result.joint["time"]))
+    found = Check(by_finite_elements(result), by_gravity(hand_calculation(result)))
+    answers = found.finite_elements, found.gravity
+    fails = [f"{answer.by}: {why}" for answer in answers for why in answer.fails]
+    if told["state"] in ("failed", "interrupted"):
+        fails.insert(0, told["statement"])
     made = datetime.fromtimestamp((folder / "run.json").stat().st_mtime)
     return {
         "folder": str(folder),
         "title": case.title,
         "name": case.name,
         "verdict": told["verdict"],
-        "passed": told["state"] == "complete" and not failed(result),
-        "statement": told["statement"],
+        "fails": fails,
         "hints": told["hints"],
         "made": f"{made:%Y-%m-%d %H:%M}",
         "scene": scene_of(case),
         "differences": differences(case),
         "levels": levels_table(result),
-        "pictures": pictures_of(solution) if states else [],
+        "loads": loads_table(result),
+        "check": check_table(found),
+        "notes": found.notes,
+        "pictures": pictures_of(solution) if len(result.joint["time"]) else [],
         "facts": facts(result),
     }
 
@@ -145,15 +152,15 @@ def table(columns: list[tuple[str, np.ndarray, Units]]) -> dict:
     for head, values, units in columns:
         name, factor = unit([np.nan_to_num(values)], units)
         heads.append(f"{head} [{name}]")
-        cells.append([f"{v * factor:.4g}" if np.isfinite(v) else "-" for v in values])
+        cells.append([f"{v * factor + 0.0:.4g}" if np.isfinite(v) else "-" for v in values])
     return {"heads": heads, "rows": list(zip(*cells, strict=True))}
 
 
 def levels_table(result: Results) -> dict:
-    """The history at the requested levels, and where the resultant is."""
+    """The history at the requested levels and where the run has stopped; where the resultant is."""
     history, case = result.history, result.case
     rows = np.flatnonzero([np.isclose(case.requested, t).any() for t in history["time"]])
-    if len(history["time"]):  # where a run has stopped
+    if len(history["time"]):
         rows = np.union1d(rows, len(history["time"]) - 1)
     shown = [
         (head, history[name][rows], units)
@@ -161,7 +168,28 @@ def levels_table(result: Results) -> dict:
         if (name != "flux" or case["uplift"] == "flow")
         and (name != "tail_level" or history[name].any())
     ]
-    return table(shown)
+    found = table(shown)
+    length = result.case.section["joint_length"][0]
+    found["heads"].append("N' meets")
+    where = (gravity.position(x, length) for x in history["x_resultant"][rows])
+    found["rows"] = [(*row, at) for row, at in zip(found["rows"], where, strict=True)]
+    return found
+
+
+def loads_table(result: Results) -> dict:
+    """The loads on the body above the joint, and the uplift, at the last level."""
+    rows = hand_calculation(result).table()
+    heads = ("downstream", FORCES), ("upwards", FORCES), ("moment about the toe", MOMENTS)
+    names, *columns = rows.values()
+    found = table([(h, np.array(v), u) for (h, u), v in zip(heads, columns, strict=True)])
+    named = [(name, *row) for name, row in zip(names, found["rows"], strict=True)]
+    return {"heads": ["load", *found["heads"]], "rows": named}
+
+
+def check_table(found: Check) -> dict:
+    """The finite elements' answer beside the gravity method's, and what is required."""
+    heads, *rows = picture_table(found)
+    return {"heads": heads, "rows": rows}
 
 
 def pictures_of(solution: Solution) -> list[dict[str, str]]:
