@@ -4,7 +4,7 @@ scene/    what is asked: parameters, case files, meshes
 results/  what comes out: tables, verdict, fields, pictures, comparison with published numbers
 engines/  how it is solved: getdp/ runs the problem definition, condensed/ follows the joint alone
 run.py    one case, solved and written
-studies/  what is done with many runs: sweeps, benchmarks, a law along a path
+studies/  what is done with runs: checks, sweeps, benchmarks, a law along a path
 window/   the Gmsh window, with the condensed engine behind it
 cli.py    the command line
 

@@ -200,10 +200,10 @@ def do_check(arguments: argparse.Namespace) -> int:
 
     settings = parameters.settings(arguments.settings)
     water = arguments.levels, arguments.tail_levels
-    checks = check(
-        [load(name, settings, *water, accuracy=arguments.accuracy) for name in arguments.cases],
-        arguments.out,
-    )
+    cases = [load(name, settings, *water, accuracy=arguments.accuracy) for name in arguments.cases]
+    if any(case["dim"] == 3 for case in cases):
+        warn_if_slow()
+    checks = check(cases, arguments.out)
     print(f"{text_table(checks)}\n\n{arguments.out / 'check.csv'}")
     return int(any(answer.fails for one in checks for answer in (one.finite_elements, one.gravity)))
 

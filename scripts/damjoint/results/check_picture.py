@@ -28,19 +28,20 @@ COMPUTED, HAND = "finite elements", "gravity method"
 
 
 def draw_check(
-    result: Results, method: GravityMethod, cells: list[tuple[str, ...]], folder: Path
+    result: Results, method: GravityMethod, cells: list[tuple[str, ...]], why: str, folder: Path
 ) -> Path:
     """Draw the last saved state to folder/<case>_check.png and return its path.
 
     cells: the table beside it, its head in the first row; the first column is what, the others are
-    what the methods say.
+    what the methods say; why: what fails, in words.
     """
     figure = Figure(figsize=(11, 7.2))
     FigureCanvasAgg(figure)
-    section = figure.add_axes((0.055, 0.075, 0.59, 0.83))
-    beside = figure.add_axes((0.665, 0.075, 0.325, 0.83))
+    section = figure.add_axes((0.055, 0.075, 0.59, 0.81))
+    beside = figure.add_axes((0.665, 0.075, 0.325, 0.81))
     head = textwrap.fill(heading(result), 100)
     figure.text(0.055, 0.975, head, fontsize=13, va="top", parse_math=False)
+    figure.text(0.055, 0.94, textwrap.fill(why, 150), fontsize=9, color=RED, va="top")
     draw_scene(section, method)
     draw_joint(section, result, method)
     handles, labels = section.get_legend_handles_labels()
@@ -166,7 +167,7 @@ def draw_joint(axes: Axes, result: Results, method: GravityMethod) -> None:
         (UPLIFT_AT, "uplift", WATER, pressure, rows.get("p", none)),
         (
             STRESS_AT,
-            "effective stress",
+            "effective compression",
             ORANGE,
             effective_stress(method),
             -rows.get("sigma_n_eff", none),

@@ -13,14 +13,13 @@ from pathlib import Path
 
 from .. import InputError, __version__
 from ..scene.case import Case
+from ..scene.parameters import declared
 from .tables import FLUX, HISTORY, JOINT, Results
 from .verdict import hints, statement, verdict
 
 #: Names that a run writes, besides its pictures.
 TABLES = ("joint.csv", "history.csv", "curve.csv", "gravity.csv", "run.json")
 FIELDS = re.compile(r"(bulk|joint)(_t[\w.+-]+\.vtu|\.msh)|fields\.pvd")
-#: Where further scenes of a case go.
-SCENES = ("none", "imposed", "drained", "flow")
 
 
 def check_writable(folder: Path) -> None:
@@ -55,7 +54,7 @@ def clear(folder: Path) -> None:
     scenes.
     """
     told = earlier(folder)
-    for name in SCENES:
+    for name in declared()["uplift"].choices:  # where further scenes of a case go
         if told is not None and (folder / name).is_dir() and not (folder / name).is_symlink():
             clear(folder / name)
             remove_if_empty(folder / name)

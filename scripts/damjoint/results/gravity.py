@@ -403,7 +403,7 @@ class GravityMethod:
     def table(self) -> dict[str, list]:
         """Its resultants by the columns tables.LOADS: the loads, the uplift, the sum."""
         tx, ty = self.body.along
-        joint = Load("uplift", -ty * self.U, tx * self.U, 0.0, -self.uplift.moment)
+        joint = Load("uplift", 0.0 - ty * self.U, tx * self.U, 0.0, 0.0 - self.uplift.moment)
         rows = [*self.loads, joint]
         rows.append(together("sum", rows))
         cells = [(row.name, row.fx, row.fy, row.moment) for row in rows]

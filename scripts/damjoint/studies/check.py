@@ -162,6 +162,12 @@ class Check:
         return [*self.rows, asked | {"answer": REQUIRED} | blank | factors | NO_VERDICT]
 
     @property
+    def why(self) -> str:
+        """What fails, in words."""
+        pair = self.finite_elements, self.gravity
+        return "; ".join(f"{one.by}: {'; '.join(one.fails)}" for one in pair if one.fails)
+
+    @property
     def notes(self) -> list[str]:
         """What to know when the two are compared."""
         case, found = self.gravity.case, []
@@ -236,8 +242,8 @@ def signed(value: float) -> str:
 
 
 def check(cases: list[Case], out: Path) -> list[Check]:
-    """Run cases, each into its folder below out, and write check.csv there; into each scene's
-    folder gravity.csv and CASE_check.png.
+    """Run cases, each into its folder below out, and write check.csv there, again after each of
+    them; into each scene's folder gravity.csv and CASE_check.png.
 
     Raises InputError, RunError.
     """
@@ -253,9 +259,9 @@ def check(cases: list[Case], out: Path) -> list[Check]:
             checks.append(Check(by_finite_elements(result), by_gravity(method)))
             folder = folders.scene_folder(case, result.case, out / case.name)
             write_csv(folder / "gravity.csv", method.table())
-            draw_check(result, method, picture_table(checks[-1]), folder)
-    rows = [row for found in checks for row in found.rows]
-    write_csv(out / "check.csv", {name: [row[name] for row in rows] for name in CHECK})
+            draw_check(result, method, picture_table(checks[-1]), checks[-1].why, folder)
+        rows = [row for found in checks for row in found.rows]
+        write_csv(out / "check.csv", {name: [row[name] for row in rows] for name in CHECK})
     return checks
 
 
