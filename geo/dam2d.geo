@@ -1,41 +1,147 @@
-// dam2d.geo - the plane scene: dam, foundation and the joint between them (y = 0, 0 <= x <=
-// dam_base). One conforming mesh: the joint is a line of ordinary elements, the two lips are two
-// function spaces on the same nodes (pro/spaces.pro). Sizes grow from the joint outwards.
+// dam2d.geo - the plane scene: dam, foundation and the joint between them, from heel to toe (see
+// pro/section.pro). One conforming mesh: the joint is a line of ordinary elements, the two lips are
+// two function spaces on the same nodes (pro/spaces.pro). Sizes grow from the joint outwards.
 
 Include "../pro/parameters.pro";
 
-h_joint = dam_base / n_joint;
+h_joint = joint_length / n_joint;
 regular = !StrCmp(mesh_pattern, "regular");
 
-Point(1) = {0, 0, 0, h_joint};  // heel
-Point(2) = {dam_base, 0, 0, h_joint};  // toe
-Point(3) = {dam_crest, dam_height, 0, h_dam};
-Point(4) = {0, dam_height, 0, h_dam};
-Point(5) = {-found_side, 0, 0, h_found};
-Point(6) = {-found_side, -found_depth, 0, h_found};
-Point(7) = {dam_base + found_side, -found_depth, 0, h_found};
-Point(8) = {dam_base + found_side, 0, 0, h_found};
-
+Point(1) = {heel_x, heel_y, 0, h_joint};
+Point(2) = {toe_x, toe_y, 0, h_joint};
 Line(1) = {1, 2};  // joint
-Line(2) = {2, 3};  // downstream face
-Line(3) = {3, 4};  // crest
-Line(4) = {4, 1};  // upstream face
 Transfinite Curve {1} = n_joint + 1;
 
-Curve Loop(1) = {1, 2, 3, 4};
+side_names() = Str["upstream face", "downstream face", "crest surface", "reservoir floor",
+                   "tailwater bed"];
+
+// The segments of the faces, cut at the marks: for each its curves, piece_start(i) to
+// piece_start(i + 1) in pieces().
+known_x() = {heel_x, toe_x};
+known_y() = {heel_y, toe_y};
+known_point() = {1, 2};
+mark_point() = {};
+For k In {1 : #mark_x()}
+  mark_point() += 0;
+EndFor
+pieces() = {};
+piece_start() = {0};
+For i In {0 : #seg_side() - 1}
+  // where to stop: at the marks in their order along the segment, then at its end
+  dx = seg_x1(i) - seg_x0(i);
+  dy = seg_y1(i) - seg_y0(i);
+  before = (regular && seg_side(i) >= FLOOR) ? 1 : 0;  // quadrangles divide these themselves
+  from = 0;
+  For stop In {0 : #mark_x() + 1}
+    share = (stop == 0) ? 0 : 1;
+    For k In {0 : #mark_x() - 1}
+      mark_share = ((mark_x(k) - seg_x0(i)) * dx + (mark_y(k) - seg_y0(i)) * dy) / (dx^2 + dy^2);
+      If(stop > 0 && mark_segment(k) == i && mark_share > before + 1e-9 && mark_share < share)
+        share = mark_share;
+      EndIf
+    EndFor
+    If(before < 1)
+      x = seg_x0(i) + share * dx;
+      y = seg_y0(i) + share * dy;
+      point = 0;
+      For k In {0 : #known_point() - 1}
+        If((known_x(k) - x)^2 + (known_y(k) - y)^2 < (1e-9 * dam_height)^2)
+          point = known_point(k);
+        EndIf
+      EndFor
+      If(point == 0)
+        point = newp;
+        // above the joint to h_dam at the crest, below it to h_found at the foundation's depth
+        h = (seg_side(i) >= FLOOR && (x < 0 || x > dam_base)) ? h_found :
+            (seg_body(i) == UPPER) ?
+            h_joint + (h_dam - h_joint) * (y - heel_y) / (dam_height - heel_y) :
+            h_joint + (h_found - h_joint) * (heel_y - y) / (heel_y + found_depth);
+        Point(point) = {x, y, 0, (h < h_joint && seg_side(i) < FLOOR) ? h_joint : h};
+        known_x() += x;
+        known_y() += y;
+        known_point() += point;
+      EndIf
+      For k In {0 : #mark_x() - 1}
+        If((mark_x(k) - x)^2 + (mark_y(k) - y)^2 < (1e-9 * dam_height)^2)
+          mark_point(k) = point;
+        EndIf
+      EndFor
+      If(stop > 0)
+        line = newl;
+        Line(line) = {from, point};
+        pieces() += line;
+      EndIf
+      from = point;
+      before = share;
+    EndIf
+  EndFor
+  piece_start() += #pieces();
+EndFor
+
+// The upper body; the lower one: under a lift joint the dam's concrete, with a base glued to the
+// foundation; the foundation
+upper() = {1};
+under() = {};
+surface_left() = {};  // of the foundation, from the heel outwards
+surface_right() = {};  // and towards the toe
+For i In {0 : #seg_side() - 1}
+  For k In {piece_start(i) : piece_start(i + 1) - 1}
+    If(seg_body(i) == UPPER)
+      upper() += pieces(k);
+    ElseIf(seg_side(i) == FLOOR)
+      surface_left() += pieces(k);
+    ElseIf(seg_side(i) == BED)
+      surface_right() += pieces(k);
+    Else
+      under() += pieces(k);
+    EndIf
+  EndFor
+EndFor
+Curve Loop(1) = {upper()};
 Plane Surface(1) = {1};
 dam() = {1};
+lower() = {};
+base() = {1};
+base_points() = {1, 2};
+If(lift)
+  For k In {0 : #known_point() - 1}
+    If(known_x(k) == 0 && known_y(k) == 0)
+      base_points(0) = known_point(k);
+    ElseIf(known_x(k) == dam_base && known_y(k) == 0)
+      base_points(1) = known_point(k);
+    EndIf
+  EndFor
+  base() = {newl};
+  Line(base(0)) = {base_points(0), base_points(1)};
+EndIf
 
 If(!regular)
-  Line(5) = {1, 5};
-  Line(6) = {5, 6};
-  Line(7) = {6, 7};
-  Line(8) = {7, 8};
-  Line(9) = {8, 2};
-  Curve Loop(2) = {5, 6, 7, 8, 9, -1};
+  left = newp;
+  Point(left) = {-found_side, -found_depth, 0, h_found};
+  right = newp;
+  Point(right) = {dam_base + found_side, -found_depth, 0, h_found};
+  corner_left = 0;
+  corner_right = 0;
+  For k In {0 : #known_point() - 1}
+    If(known_x(k) < 0 && known_x(k) == -found_side)
+      corner_left = known_point(k);
+    ElseIf(known_x(k) == dam_base + found_side)
+      corner_right = known_point(k);
+    EndIf
+  EndFor
+  side = newl;
+  Line(side) = {corner_left, left};
+  Line(side + 1) = {left, right};
+  Line(side + 2) = {right, corner_right};
+  fixed() = {side, side + 1, side + 2};
+  Curve Loop(2) = {surface_left(), fixed(), surface_right(), -base(0)};
   Plane Surface(2) = {2};
   foundation() = {2};
-  fixed() = {6, 7, 8};
+  If(lift)
+    Curve Loop(3) = {base(0), under(), -1};
+    Plane Surface(3) = {3};
+    lower() = {3};
+  EndIf
 Else
   // Quadrangles in the dam, under it and beside it; a few coarse triangles at the far sides, where
   // the stress is almost uniform.
@@ -43,11 +149,15 @@ Else
   n_depth = Ceil(7 * n_joint / 50);
   n_side = Ceil(5 * n_joint / 50);
   side = 0.5 * found_side;  // width of the quadrangles beside the joint
+  Point(5) = {-found_side, 0, 0, h_found};
+  Point(6) = {-found_side, -found_depth, 0, h_found};
+  Point(7) = {dam_base + found_side, -found_depth, 0, h_found};
+  Point(8) = {dam_base + found_side, base_toe_y, 0, h_found};
   Point(9) = {0, -found_depth, 0, h_found};
   Point(10) = {dam_base, -found_depth, 0, h_found};
   Point(11) = {-side, 0, 0, h_found};
   Point(12) = {-side, -found_depth, 0, h_found};
-  Point(13) = {dam_base + side, 0, 0, h_found};
+  Point(13) = {dam_base + side, base_toe_y, 0, h_found};
   Point(14) = {dam_base + side, -found_depth, 0, h_found};
   Line(5) = {1, 11};
   Line(6) = {11, 5};
@@ -84,16 +194,38 @@ Else
   Recombine Surface {1:4};
   foundation() = {2:6};
   fixed() = {7, 8, 9, 10, 11, 12, 13};
+  surface_left() = {5, 6};
+  surface_right() = {14, 15};
 EndIf
 
 If(dim == 2)
-  Physical Surface("dam", DAM) = dam();
-  Physical Surface("foundation", FOUNDATION) = foundation();
+  Physical Surface("dam", DAM) = {dam()};
+  Physical Surface("foundation", FOUNDATION) = {foundation()};
+  Physical Surface("lower dam", LOWER) = {lower()};
   Physical Curve("joint", JOINT) = {1};
-  Physical Curve("upstream face", UPSTREAM) = {4};
-  Physical Curve("downstream face", DOWNSTREAM) = {2};
-  Physical Curve("fixed", FIXED) = fixed();
+  Physical Curve("fixed", FIXED) = {fixed()};
   Physical Point("heel", HEEL) = {1};
   Physical Point("toe", TOE) = {2};
-  Physical Point("crest", CREST) = {4};
+  For k In {0 : #known_point() - 1}
+    If(known_x(k) == batter && known_y(k) == dam_height)
+      Physical Point("crest", CREST) = {known_point(k)};
+    EndIf
+  EndFor
+  For k In {0 : #mark_point() - 1}
+    Physical Point(mark_region(k)) = {mark_point(k)};
+  EndFor
+  For i In {0 : #seg_side() - 1}
+    own() = {};
+    If(seg_side(i) == FLOOR)
+      own() += surface_left();
+    ElseIf(seg_side(i) == BED)
+      own() += surface_right();
+    Else
+      For k In {piece_start(i) : piece_start(i + 1) - 1}
+        own() += pieces(k);
+      EndFor
+    EndIf
+    name = StrCat(Str(side_names(seg_side(i))), Sprintf(" %g", i));
+    Physical Curve(Str(name), SEGMENT + i) = {own()};
+  EndFor
 EndIf

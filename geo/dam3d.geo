@@ -5,35 +5,47 @@
 
 Include "dam2d.geo";
 
+sections() = {dam(), foundation(), lower()};
 If(!StrCmp(mesh_pattern, "free"))
-  Extrude {0, 0, thickness} { Surface{dam(), foundation()}; }
+  Extrude {0, 0, thickness} { Surface{sections()}; }
 ElseIf(!StrCmp(mesh_pattern, "split"))
-  Extrude {0, 0, thickness} { Surface{dam(), foundation()}; Layers{n_layers}; }
+  Extrude {0, 0, thickness} { Surface{sections()}; Layers{n_layers}; }
 Else
-  Extrude {0, 0, thickness} { Surface{dam(), foundation()}; Layers{n_layers}; Recombine; }
+  Extrude {0, 0, thickness} { Surface{sections()}; Layers{n_layers}; Recombine; }
 EndIf
 
-// The regions are found again by their place: eps around it, far beyond everything.
+// The regions are found again by their place: in boxes around the segments that have been extruded,
+// eps around them, far beyond everything.
 far = 2 * (dam_base + dam_crest + 2 * found_side + found_depth + dam_height + thickness);
 eps = 1e-7 * far;
-toe_x = dam_base;
 end_x = dam_base + found_side;
 
-joint() = Surface In BoundingBox {-eps, -eps, -far, toe_x + eps, eps, far};
-upstream() = Surface In BoundingBox {-eps, -eps, -far, eps, far, far};
+Macro Around  // the segment from (x0, y0) to (x1, y1): its surfaces around(), its end's curves
+  x_min = (x0 < x1) ? x0 : x1;
+  y_min = (y0 < y1) ? y0 : y1;
+  around() = Surface In BoundingBox {x_min - eps, y_min - eps, -eps,
+                                     x0 + x1 - x_min + eps, y0 + y1 - y_min + eps, thickness + eps};
+  flat() = Surface In BoundingBox {-far, -far, -eps, far, far, eps};
+  around() -= flat();
+  flat() = Surface In BoundingBox {-far, -far, thickness - eps, far, far, far};
+  around() -= flat();
+Return
+
+x0 = heel_x;
+y0 = heel_y;
+x1 = toe_x;
+y1 = toe_y;
+Call Around;
+joint() = {around()};
 left() = Surface In BoundingBox {-far, -far, -far, -found_side + eps, far, far};
 bottom() = Surface In BoundingBox {-far, -far, -far, far, -found_depth + eps, far};
 right() = Surface In BoundingBox {end_x - eps, -far, -far, far, far, far};
 back() = Surface In BoundingBox {-far, -far, -eps, far, far, eps};
 front() = Surface In BoundingBox {-far, -far, thickness - eps, far, far, far};
-dam_volume() = Volume In BoundingBox {-far, -eps, -far, far, far, far};
-foundation_volume() = Volume In BoundingBox {-far, -far, -far, far, eps, far};
-dam_skin() = Boundary { Volume{dam_volume()}; };
-top() = Surface In BoundingBox {-far, dam_height - eps, -far, far, far, far};
-downstream() = dam_skin();
-downstream() -= {joint(), upstream(), back(), front(), top()};
-heel() = Curve In BoundingBox {-eps, -eps, -far, eps, eps, far};
-toe() = Curve In BoundingBox {toe_x - eps, -eps, -far, toe_x + eps, eps, far};
+heel() = Curve In BoundingBox {heel_x - eps, heel_y - eps, -eps,
+                               heel_x + eps, heel_y + eps, thickness + eps};
+toe() = Curve In BoundingBox {toe_x - eps, toe_y - eps, -eps,
+                              toe_x + eps, toe_y + eps, thickness + eps};
 
 If(!StrCmp(mesh_pattern, "free"))
   joint_skin() = Boundary { Surface{joint()}; };
@@ -43,13 +55,51 @@ If(!StrCmp(mesh_pattern, "free"))
   Transfinite Surface {joint()};
 EndIf
 
-Physical Volume("dam", DAM) = dam_volume();
-Physical Volume("foundation", FOUNDATION) = foundation_volume();
-Physical Surface("joint", JOINT) = joint();
-Physical Surface("upstream face", UPSTREAM) = upstream();
-Physical Surface("downstream face", DOWNSTREAM) = downstream();
+// Volumes: each by the plane surface that it began with
+bodies() = Volume In BoundingBox {-far, -far, -far, far, far, far};
+dam_volume() = {};
+foundation_volume() = {};
+lower_volume() = {};
+For k In {0 : #bodies() - 1}
+  skin() = Boundary { Volume{bodies(k)}; };
+  kind = FOUNDATION;
+  For j In {0 : #skin() - 1}
+    kind = (Fabs(skin(j)) == dam(0)) ? DAM : kind;
+    For n In {1 : #lower()}
+      kind = (Fabs(skin(j)) == lower(n - 1)) ? LOWER : kind;
+    EndFor
+  EndFor
+  If(kind == DAM)
+    dam_volume() += bodies(k);
+  ElseIf(kind == LOWER)
+    lower_volume() += bodies(k);
+  Else
+    foundation_volume() += bodies(k);
+  EndIf
+EndFor
+
+Physical Volume("dam", DAM) = {dam_volume()};
+Physical Volume("foundation", FOUNDATION) = {foundation_volume()};
+Physical Volume("lower dam", LOWER) = {lower_volume()};
+Physical Surface("joint", JOINT) = {joint()};
 Physical Surface("fixed", FIXED) = {left(), bottom(), right()};
 Physical Surface("z faces", SIDES) = {back(), front()};
-Physical Curve("heel", HEEL) = heel();
-Physical Curve("toe", TOE) = toe();
-Physical Point("crest", CREST) = {4};
+Physical Curve("heel", HEEL) = {heel()};
+Physical Curve("toe", TOE) = {toe()};
+crest() = Point In BoundingBox {batter - eps, dam_height - eps, -eps,
+                                batter + eps, dam_height + eps, eps};
+Physical Point("crest", CREST) = {crest()};
+For i In {0 : #seg_side() - 1}
+  x0 = seg_x0(i);
+  y0 = seg_y0(i);
+  x1 = seg_x1(i);
+  y1 = seg_y1(i);
+  Call Around;
+  name = StrCat(Str(side_names(seg_side(i))), Sprintf(" %g", i));
+  Physical Surface(Str(name), SEGMENT + i) = {around()};
+EndFor
+For k In {0 : #mark_x() - 1}
+  own() = Curve In BoundingBox {mark_x(k) - eps, mark_y(k) - eps, -eps,
+                                mark_x(k) + eps, mark_y(k) + eps, thickness + eps};
+  Physical Curve(mark_region(k)) = {own()};
+EndFor

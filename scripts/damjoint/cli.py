@@ -148,7 +148,7 @@ def parser() -> argparse.ArgumentParser:
         "--path",
         type=Path,
         required=True,
-        help="CSV with delta_n,delta_t1,delta_t2 [m] and optionally p [Pa]",
+        help="CSV with delta_n,delta_t1,delta_t2 [m] and optionally p [Pa]; row n: step to t = n",
     )
     add("--out", type=Path, help="output CSV (default: standard output)")
     law.set_defaults(call=do_law)

@@ -23,11 +23,32 @@ def random_path(law_name: str, seed: int, case: Case) -> np.ndarray:
     return walk
 
 
+#: Works on the joint: grouted in three of the path's 200 steps, sawn later, grouted once more.
+GROUTED = {"grout_pressure": 5e3, "grout_t": 50.0}
+WORKS = {
+    "untouched": {},
+    "grouted": GROUTED,
+    "sawn": {"saw_thickness": 3e-8, "saw_t": 100.0},
+    "sawn, grouted": {"saw_thickness": 3e-8, "saw_t": 30.0} | GROUTED,
+    "grouted, sawn": {"saw_thickness": 3e-8, "saw_t": 100.0} | GROUTED,
+}
+
+
+@pytest.mark.parametrize("works", WORKS)
+def test_a_worked_joint_agrees_point_by_point(works):
+    """Grouting and sawing in both engines' law, along one path."""
+    laws_agree("rupture", 1, WORKS[works])
+
+
 @pytest.mark.parametrize("law_name", LAWS)
 @pytest.mark.parametrize("seed", range(3))
 def test_laws_agree_point_by_point(law_name, seed):
     """The problem definition's law and the condensed engine's, along one path."""
-    changed = {
+    laws_agree(law_name, seed, {})
+
+
+def laws_agree(law_name, seed, works):
+    changed = works | {
         "K_N": 1e12,
         "K_T": 5e11,
         "mu": 0.35,
@@ -46,26 +67,38 @@ def test_laws_agree_point_by_point(law_name, seed):
     model, memory = LAWS[law_name](case), LAWS[law_name](case).start(1)
     scale = np.abs(expected["sigma_n"]).max()
     for i, jump in enumerate(jumps[:, None, :]):
+        memory = model.stage(memory, i, i + 1)
         traction, _ = model.respond(jump, memory)
         memory = model.remember(jump, memory)
-        found = [*traction[0], *memory.vector[0], memory.scalar[0]]
-        scalar, *vector = law.MEMORY[law_name]
-        wanted = [expected[n][i] for n in ("sigma_n", "tau_1", "tau_2", *vector, scalar)]
+        found = [*traction[0], memory.scalar[0], *memory.vector[0]]
+        if law_name == "rupture":
+            found.append(np.ravel(memory.thickness)[0])
+        wanted = [expected[n][i] for n in ("sigma_n", "tau_1", "tau_2", *law.MEMORY[law_name])]
         assert np.allclose(found[:3], wanted[:3], rtol=1e-9, atol=1e-9 * scale)
         assert np.allclose(found[3:], wanted[3:], rtol=1e-9, atol=1e-9 * np.abs(jumps).max())
         assert model.damage(jump, memory)[0] == pytest.approx(expected["damage"][i], abs=1e-9)
         assert model.open(jump, memory)[0] == expected["open"][i]
 
 
-@pytest.mark.parametrize("law_name", LAWS)
-def test_tangent_is_the_derivative(law_name):
+@pytest.mark.parametrize(
+    "law_name, works",
+    [*((name, {}) for name in LAWS), *(("rupture", works) for works in WORKS.values() if works)],
+)
+def test_tangent_is_the_derivative(law_name, works):
     """Tangent against central differences, away from the law's corners."""
-    settings = {"sigma_max": 1e4, "pena_tang": 1e11, "pena_rupture": -1.0, "G_f": 2e-4, "G_t": 1e-5}
+    settings = works | {
+        "sigma_max": 1e4,
+        "pena_tang": 1e11,
+        "pena_rupture": -1.0,
+        "G_f": 2e-4,
+        "G_t": 1e-5,
+    }
     case = load("ssnp142", settings | {"law": law_name})
     model = LAWS[law_name](case)
     jumps = random_path(law_name, 7, case)
     memory = model.start(len(jumps))
     memory.vector[:] = 0.1 * jumps[:, 1:]
+    memory = model.stage(memory, 49.5, 49.8)
     step = 1e-6 * np.abs(jumps).max()
     _, tangent = model.respond(jumps, memory)
     agree = np.zeros(len(jumps), bool)
@@ -98,6 +131,9 @@ SCENES = {
     "e bond": BOND,
     "f bond": COARSE | BOND,
     # where the weight comes first
+    # the crack grouted, and the level lowered; the bond sawn away
+    "a grouted": {"grout_pressure": 1e4, "grout_t": 3.5, "levels": "3,6,9,9,2"},
+    "a sawn": {"saw_thickness": 1e-6, "saw_t": 2.0, "levels": "3,6,6,8"},
     "g weak": {"mu": 0.06, "adhesion": 0.0, "pena_tang": 0.0, "nu": 0.3, "E": 1e10, "levels": "2"},
     "c stiff, no hardening": {"K_T": 9e14, "mu": 0.06, "pena_tang": 0.0, "levels": "1,2"},
     "i soft, no strength": {"E": 1e10, "sigma_max": 0.0, "K_N": 1e11, "K_T": 5e10, "nu": 0.2},

@@ -124,7 +124,7 @@ def test_drains(tmp_path, engine, level, tail, effectiveness, outlet, at_drains)
 
 def test_drains_where_there_are_none():
     for settings, said in (
-        ({"drain_x": 5.0}, "drain_x = 5: must be < dam_base"),
+        ({"drain_x": 5.0}, "drain_x = 5: must be < the joint's length"),
         ({"drain_level": 1.0, "drive": "heel"}, "drain_level = 1: must be 0"),
     ):
         with pytest.raises(InputError, match=said):

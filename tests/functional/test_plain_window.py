@@ -49,9 +49,12 @@ def press_run(folder, changed):
 @pytest.mark.parametrize(
     "words, said",
     [
-        ("level_2 10.5", "Level 2 = 10.5 m: must be between 0 and the crest (10 m)"),
-        ("tail_level_1 -3", "Tailwater at level 1 = -3 m: must be between 0 and the crest (10 m)"),
-        ("dam_height 8", "Level 4 = 9 m: must be between 0 and the crest (8 m)"),
+        ("level_2 20.5", "Level 2 = 20.5 m: must be between 0 and twice the dam's height (20 m)"),
+        (
+            "tail_level_1 -3",
+            "Tailwater at level 1 = -3 m: must be between 0 and twice the dam's height (20 m)",
+        ),
+        ("dam_height 4.2", "Level 4 = 9 m: must be between 0 and twice the dam's height (8.4 m)"),
     ],
 )
 def test_impossible_levels_are_told_before_anything_runs(plain, words, said):

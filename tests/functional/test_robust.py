@@ -59,7 +59,7 @@ def test_line_of_the_release_is_the_law_inside_it_and_its_extension_outside():
     line, tangent = law.respond(jump, memory, within=np.ones(3, bool))
     np.testing.assert_allclose(line[:, 1], law.K_T * np.array([0.75, 4, -4]) * 1e6 * law.L_CT)
     np.testing.assert_allclose(tangent[:, 1, 0], -law.K_T * 1e6)
-    assert law.side(jump).tolist() == [0, -1, 1]
+    assert law.side(jump, memory).tolist() == [0, -1, 1]
     np.testing.assert_array_equal(line[0], law.respond(jump, memory)[0][0])
 
 

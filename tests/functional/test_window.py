@@ -207,7 +207,7 @@ def test_drawing_follows_geometry_and_can_be_meshed(open_window):
 @pytest.mark.parametrize(
     ("name", "value", "why"),
     [
-        (tree.LEVELS, "3, 60", "levels = 60: must be between 0 and the crest (10 m)"),
+        (tree.LEVELS, "3, 60", "levels = 60: must be between 0 and twice the dam's height (20 m)"),
         (tree.LEVELS, "high", "levels = high: must be a list of levels in metres"),
         (tree.TAIL_LEVELS, "1, 2", "tail_levels = 1,2: must be one level or as many"),
         (tree.STEPS, "0", "steps = 0: must be an integer >= 1"),

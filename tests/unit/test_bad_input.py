@@ -7,7 +7,7 @@ import sys
 import pytest
 
 RUN = "run", "a"
-TO_CREST = "between 0 and the crest (10 m)"
+TO_CREST = "between 0 and twice the dam's height (20 m)"
 
 
 def refuse(command, tmp_path, words, parts):
@@ -51,7 +51,7 @@ def refuse(command, tmp_path, words, parts):
         ("n_joint=2.5", "integer"),
         ("n_joint=0", ">= 1"),
         ("law=glue", "rupture, friction"),
-        ("uplift=some", "none, imposed, drained, flow"),
+        ("uplift=some", "none, imposed, drained, cracked, flow"),
         ("mesh_pattern=odd", "free, regular, layers, split"),
         ("thickness=-1", "> 0"),
     ],
@@ -71,15 +71,15 @@ def test_parameter_out_of_range(command, tmp_path, setting, allowed):
         (("sweep", "a", "--vary", "mu"), ("--vary mu", "NAME=V1,V2")),
         (("sweep", "a", "--vary", "mu=0.1:0.5:-0.1"), ("--vary mu=0.1:0.5:-0.1", "step")),
         (("sweep", "a", "--vary", "mu=-1,1"), ("mu = -1", "> 0")),
-        (("sweep", "a", "--vary", "level=9,12"), ("levels = 12", TO_CREST)),
+        (("sweep", "a", "--vary", "level=9,21"), ("levels = 21", TO_CREST)),
         ((*RUN, "--set", "KN=1e12"), ("KN", "unknown parameter", "K_N")),
         ((*RUN, "--set", "E"), ("--set E", "NAME=VALUE")),
-        ((*RUN, "--levels", "3,11"), ("levels = 11", TO_CREST)),
+        ((*RUN, "--levels", "3,21"), ("levels = 21", TO_CREST)),
         ((*RUN, "--levels", "3,-1"), ("levels = -1", TO_CREST)),
         ((*RUN, "--levels", ""), ("levels = ", "list of levels in metres")),
         ((*RUN, "--levels", "3,,6"), ("levels = 3,,6", "list of levels in metres")),
         ((*RUN, "--levels", "3;6"), ("levels = 3;6", "list of levels in metres")),
-        ((*RUN, "--set", "dam_height=8"), ("levels = 9", "crest (8 m)")),
+        ((*RUN, "--set", "dam_height=4.4"), ("levels = 9", "(8.8 m)")),
         (
             (*RUN, "--tail-levels", "1,2"),
             ("tail_levels = 1,2", "one level or as many as levels (4)"),
@@ -91,6 +91,14 @@ def test_parameter_out_of_range(command, tmp_path, setting, allowed):
         (
             ("run", "f", "--engine", "getdp", "--set", "mesh_pattern=layers"),
             ("mesh_pattern = layers", "free, split"),
+        ),
+        (
+            ("run", "c", "--set", "grout_pressure=5e4"),
+            ("grout_pressure = 50000", "law = friction", "must be 0"),
+        ),
+        (
+            (*RUN, "--set", "saw_thickness=1e-3", "--set", "uplift=flow"),
+            ("saw_thickness = 0.001", "uplift = flow", "must be 0"),
         ),
         ((*RUN, "--steps", "0"), ("steps = 0", "integer >= 1")),
         ((*RUN, "--steps", "-2"), ("steps = -2", "integer >= 1")),

@@ -29,7 +29,7 @@ def test_an_entry_is_found_again(kept):
     found, bodies = cache.cached(load("a", SMALL))
     assert bodies is None and same(found, made)
     assert [shape for shape, _ in found.joint.cells] == [shape for shape, _ in made.joint.cells]
-    assert list(found.pressure) == ["upstream"] and found.width == made.width
+    assert list(found.faces) == ["face2"] and found.width == made.width
 
 
 class Trap:

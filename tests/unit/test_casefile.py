@@ -82,7 +82,7 @@ def test_included_files_come_first_and_can_be_overruled(tmp_path):
         ("default_mu = True;", "must be a number"),
         ('also_uplift = "none none";', "each once"),
         ('also_uplift = "imposed";', "other modes than uplift"),
-        ('also_uplift = "some";', "none, imposed, drained, flow"),
+        ('also_uplift = "some";', "none, imposed, drained, cracked, flow"),
         ("levels() = {1, 2, 3}; tail_levels() = {1, 2};", "tail_levels = 1,2"),
     ],
 )

@@ -40,6 +40,20 @@ def test_path_file_to_standard_output_and_to_a_file(command, tmp_path):
         assert_allclose(table["kappa"], [1e-10, 1.1e-10, 1.1e-10], rtol=1e-9)
 
 
+def test_path_of_a_grouted_joint(command, tmp_path):
+    """Open by 1 mm at t = 1, grouted at t = 2, pressed against the grout at t = 3."""
+    (tmp_path / "path.csv").write_text(
+        "delta_n,delta_t1,delta_t2\n1e-3,0,0\n1e-3,0,0\n9.9995e-4,0,0\n"
+    )
+    settings = "K_N=1e12", "grout_pressure=5e4", "grout_t=2"
+    words = "law", "rupture", "--path", "path.csv", *(w for s in settings for w in ("--set", s))
+    code, out, _ = command(*words)
+    assert code == 0
+    table = columns(out)
+    assert_allclose(table["sigma_n"], [0, -5e4, -1e5], rtol=1e-9)
+    assert_allclose(table["thickness"], [0, 1.00005e-3, 1.00005e-3], rtol=1e-12)
+
+
 def test_friction_without_a_pressure_column(command, tmp_path):
     (tmp_path / "path.csv").write_text("delta_n, delta_t1, delta_t2\n-1e-8, 3e-9, 0\n")
     settings = "K_N=1e12", "K_T=2e12", "mu=0.35", "adhesion=1000", "pena_tang=0"

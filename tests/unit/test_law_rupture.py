@@ -150,3 +150,57 @@ def test_random_walk(settings):
         rtol=1e-9,
         atol=1e-9 * K_N * scale,
     )
+
+
+def test_grouted_joint_closes_on_the_grout():
+    """1 mm open, grouted at 5e4 Pa: contact at the thickness 1 mm + p/K_N, no tension beyond it."""
+    gap, p = 1e-3, 5e4
+    filled = gap + p / K_N
+    openings = np.array([gap, gap, filled - 2 * p / K_N, filled + 1e-6, -p / K_N])
+    answer = along([(d, 0, 0) for d in openings], grout_pressure=p, grout_t=2)
+    assert_allclose(answer["thickness"], [0, *[filled] * 4], rtol=1e-12)
+    contact = K_N * (openings[-1] - filled)
+    assert_allclose(answer["sigma_n"], [0, -p, -2 * p, 0, contact], rtol=1e-9, atol=1e-3)
+
+
+@pytest.mark.parametrize("beta", [0.5, 1])
+def test_grout_is_liquid_until_it_sets(beta):
+    """Half the pressure half a unit before, whatever the opening; a point pressed harder than the
+    grout takes none."""
+    p, stiffness = 5e4, beta * K_N
+    settings = {"grout_pressure": p, "grout_t": 2.5, "pena_contact": beta}
+    answer = along([(d, 0, 0) for d in (1e-3, 2e-3, 3e-3, 3e-3)], **settings)
+    assert_allclose(answer["sigma_n"], [0, -p / 2, -p, -p], rtol=1e-6)
+    assert_allclose(answer["thickness"], [0, 2e-3 + p / 2 / stiffness, *[3e-3 + p / stiffness] * 2])
+    pressed = along([(-2 * p / stiffness, 0, 0)] * 4, **settings)
+    assert_allclose(pressed["sigma_n"], -2 * p, rtol=1e-9)
+    assert_allclose(pressed["thickness"], 0)
+
+
+def test_grout_holds_along_the_joint_from_where_it_was_put():
+    jumps = [(1e-3, 1e-6, 0), (1e-3, 1e-6, 0), (1e-3, 3e-6, -1e-6), (2e-3, 3e-6, 0)]
+    answer = along(jumps, grout_pressure=5e4, grout_t=2)
+    assert_allclose(answer["tau_1"], K_T * np.array([0, 0, 2e-6, 0]), rtol=1e-9, atol=1e-3)
+    assert_allclose(answer["tau_2"], K_T * np.array([0, 0, -1e-6, 0]), rtol=1e-9, atol=1e-3)
+
+
+def test_sawn_joint_has_no_bond_and_closes_later():
+    """2e-10 m sawn at t = 2, half of them at 1.5: contact from there on, no tension anywhere."""
+    saw = 2e-10
+    openings = np.array([0.5 * D_E, 0.5 * D_E, -0.5 * saw, -1.5 * saw])
+    answer = along([(d, 0, 0) for d in openings], saw_thickness=saw, saw_t=2)
+    assert_allclose(answer["sigma_n"], [50, 0, 0, -0.5 * saw * K_N], rtol=1e-9, atol=1e-9)
+    assert_allclose(answer["damage"], [0, 1, 1, 1])
+    halfway = along([(-1.5 * saw, 0, 0)] * 3, saw_thickness=saw, saw_t=2.5)
+    assert_allclose(halfway["sigma_n"], -K_N * saw * np.array([1.5, 1, 0.5]), rtol=1e-9)
+
+
+def test_sawn_between_elastic_blocks():
+    """Blocks of 10 m in all, pushed together by 3e-6 m; 1e-6 m sawn between them takes a third of
+    the stress away (code_aster, SSNP143 C)."""
+    push, saw, beta, young, length = 3e-6, 1e-6, 0.8, 3e12, 10.0
+    soft = 1 / (beta * K_N) + length / young
+    sigma = -np.array([push, push - saw]) / soft
+    jumps = [(-push - s * length / young, 0, 0) for s in sigma]
+    settings = {"sigma_max": 3e6, "pena_contact": beta, "saw_thickness": saw, "saw_t": 2}
+    assert_allclose(along(jumps, **settings)["sigma_n"], sigma, rtol=1e-9)

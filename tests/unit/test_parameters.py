@@ -186,7 +186,7 @@ def test_own_case_file(tmp_path):
     [
         ("default_KN = 1e12;", "KN"),
         ("default_nu = 0.5;", "nu = 0.5"),
-        ("default_dam_height = 10;\nlevels() = {3, 11};", "11"),
+        ("default_dam_height = 10;\nlevels() = {3, 21};", "21"),
         ('default_law = "glue";', "glue"),
         ("default_nu = ;", "must be a number"),
     ],

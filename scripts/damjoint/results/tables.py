@@ -30,10 +30,11 @@ JOINT = {
         "m",
         "rupture: tangential jump at the last free slide; else: plastic slip",
     ),
+    "s": ("m", "distance from the heel along the joint"),
     "sigma_n_eff": ("Pa", "effective normal stress, sigma_n + p"),
 }
 #: One more where water flows.
-FLUX = {"flux": ("kg/(m s)", "mass flux along x, mean of the elements around the node")}
+FLUX = {"flux": ("kg/(m s)", "mass flux towards the toe, mean of the elements around the node")}
 
 #: Columns of history.csv: a row per converged step. Forces are per metre of thickness, in 3D too.
 HISTORY = {

@@ -28,6 +28,8 @@ SHARED = (
     "coarsest",
     "artificial",
     "sudden",
+    "crack_aperture",
+    "crack_most",
 )
 
 #: What pro/section.pro finds of the section: the joint's ends, the faces' segments, the marks where
@@ -180,6 +182,7 @@ def load(
     text = assignments(said.defaults | checked)
     found = parse(text + "".join(listing(n, v) for n, v in lists.items()) + INCLUDE)
     check_energies(found)
+    check_section(found)
     values = {name: known[name].check(found[name][0]) for name in known}
     heights = check_levels("levels", found["levels"], values)
     if tail_levels is not None:
@@ -193,7 +196,8 @@ def load(
         raise InputError(
             f"tail_levels = {told}{whose}: must be one level or as many as levels ({len(heights)})"
         )
-    check_drains(values)
+    check_drains(values, found["joint_length"][0])
+    check_works(values)
     times = tuple(found["times"])
     if steps is not None:
         times = tuple(i + (k + 1) / steps for i in range(len(heights)) for k in range(steps))
@@ -261,19 +265,68 @@ def as_published(path: Path, overrides: Mapping, *loading: str | None) -> bool:
     return own and set(overrides) <= harmless | {"order", "uplift"} and not any(loading)
 
 
-def check_drains(values: Mapping) -> None:
-    """Raise InputError if the drains are not under the dam, or do not suit a driven scene."""
+def check_section(found: Mapping[str, list]) -> None:
+    """Raise InputError if parameters do not make a section, or a force does not act on it."""
+    values = {name: v[0] for name, v in found.items() if v}
+    height, base = values["dam_height"], values["dam_base"]
+    for name in ("batter_height", "neck_height", "joint_height"):
+        within = values[name] <= height if name == "batter_height" else values[name] < height
+        if not within:
+            sign = "<=" if name == "batter_height" else "<"
+            raise InputError(f"{name} = {values[name]:g}: must be {sign} dam_height ({height:g} m)")
+    if not values["batter"] < base:
+        raise InputError(f"batter = {values['batter']:g}: must be < dam_base ({base:g} m)")
+    if not (values["toe_x"] - values["heel_x"] > 0 and values["toe_y"] < height):
+        raise InputError(
+            f"joint_slope = {values['joint_slope']:g}: must let the joint leave the dam below its "
+            f"crest ({height:g} m)"
+        )
+    marks = [int(number) for number in found["mark_region"]]
+    for force, name, region in (
+        ("ice_force", "ice_level", "ICE"),
+        ("force_x", "force_at", "FORCE"),
+        ("force_y", "force_at", "FORCE"),
+        ("anchor_force", "anchor_at", "ANCHOR"),
+    ):
+        if values[force] and int(values[region]) not in marks:
+            face = {"ICE": "the upstream face", "FORCE": f"the {values['force_face']} face"}
+            raise InputError(
+                f"{name} = {values[name]:g}: must lie on {face.get(region, 'the crest')} of the dam"
+            )
+    plain = not (values["batter"] or values["neck_height"] or values["joint_height"] or marks)
+    if values["mesh_pattern"] == "regular" and not plain:
+        raise InputError(
+            "mesh_pattern = regular: must be free, layers or split for a section with batter, "
+            "neck, lift joint or line forces"
+        )
+
+
+def check_drains(values: Mapping, length: float) -> None:
+    """Raise InputError if the drains are not under the dam, or do not suit a driven scene; length:
+    of the joint [m].
+    """
     if values["uplift"] != "drained":
         return
-    if not values["drain_x"] < values["dam_base"]:
+    if not values["drain_x"] < length:
         raise InputError(
-            f"drain_x = {values['drain_x']:g}: must be < dam_base ({values['dam_base']:g} m)"
+            f"drain_x = {values['drain_x']:g}: must be < the joint's length ({length:g} m)"
         )
     if values["drive"] != "level" and values["drain_level"] > 0:
         raise InputError(
             f"drain_level = {values['drain_level']:g}: must be 0 with drive = {values['drive']} "
             "(the pressure has to be linear in the level)"
         )
+
+
+def check_works(values: Mapping) -> None:
+    """Raise InputError if a joint is to be grouted or sawn that does not know it."""
+    known = values["law"] == "rupture" and values["uplift"] in ("none", "imposed", "drained")
+    for name in ("grout_pressure", "saw_thickness"):
+        if values[name] > 0 and not known:
+            raise InputError(
+                f"{name} = {values[name]:g}: must be 0 with law = {values['law']}, uplift = "
+                f"{values['uplift']} (known to law = rupture, and to none, imposed and drained)"
+            )
 
 
 def numbers(name: str, text: str) -> list[float]:
@@ -293,12 +346,13 @@ def numbers(name: str, text: str) -> list[float]:
 def check_levels(name: str, levels: Iterable[float], values: Mapping) -> tuple[float, ...]:
     """Water levels [m].
 
-    Raises InputError if one is negative or above the crest.
+    Raises InputError if one is negative or above twice the dam's height.
     """
     for level in levels:
-        if not 0 <= level <= values["dam_height"]:
+        if not 0 <= level <= 2 * values["dam_height"]:
             raise InputError(
-                f"{name} = {level:g}: must be between 0 and the crest ({values['dam_height']:g} m)"
+                f"{name} = {level:g}: must be between 0 and twice the dam's height "
+                f"({2 * values['dam_height']:g} m)"
             )
     return tuple(levels)
 

@@ -26,9 +26,10 @@ import numpy as np
 from scipy import linalg, sparse
 
 from ...scene.case import Case
-from ...scene.mesh import Body, Mesh
-from .elasticity import body_force, elasticity
-from .elements import Space
+from ...scene.loads import wet
+from ...scene.mesh import SIDES, Body, Face, Mesh
+from .elasticity import Material, body_force, elasticity
+from .elements import Space, points_of
 from .factor import check_memory, dense_memory, schur_complement
 
 #: What the condensed bodies depend on besides the mesh.
@@ -77,25 +78,40 @@ def unknowns(functions: np.ndarray, dim: int, components: list[int] | None = Non
     ).ravel()
 
 
+#: The bodies' weights that a load may need: region and component of its density.
+WEIGHTS = {
+    "dam": (("dam", 0), ("dam", 1)),
+    "foundation": (("lower", 0), ("lower", 1), ("foundation", 1)),
+}
+#: Line forces: where one acts, if it does.
+LINES = ("ice", "force", "anchor")
+
+
+def material_of(case: Case) -> Material:
+    """Elasticity by region; under a lift joint is the dam's concrete."""
+    dam, found = ((case[f"E_{n}"], case[f"nu_{n}"]) for n in ("dam", "found"))
+    return {"dam": dam, "lower": dam, "foundation": found}
+
+
 @dataclass
 class Bodies:
-    """Dam and foundation with their stiffness, before elimination."""
+    """Dam and foundation (with what lies under a lift joint) with their stiffness, before
+    elimination.
+    """
 
     mesh: Mesh
     dim: int
-    dam: Space
-    foundation: Space
-    #: functions of the joint, and of the faces, in the dam's numbering; of the joint in the
-    #: foundation's
-    joint_dam: np.ndarray
-    joint_foundation: np.ndarray
-    faces: dict[str, np.ndarray]
+    #: by body, dam and foundation:
+    spaces: dict[str, Space]
+    #: functions of the joint
+    joint: dict[str, np.ndarray]
     #: unknowns that are held
-    held_dam: np.ndarray
-    held_foundation: np.ndarray
+    held: dict[str, np.ndarray]
     #: stiffness matrices, all unknowns [N/m]
-    stiff_dam: sparse.csr_matrix
-    stiff_foundation: sparse.csr_matrix
+    stiffness: dict[str, sparse.csr_matrix]
+    #: functions of the wet faces and of the lines where forces act, in their body's numbering
+    faces: dict[str, np.ndarray]
+    lines: dict[str, np.ndarray]
     #: wall seconds of their assembly
     seconds: float
 
@@ -107,38 +123,62 @@ class Bodies:
         """
         mesh = Mesh(case)
         start, dim, order = time.perf_counter(), mesh.dim, int(case["order"])
-        space = {name: Space(body, order) for name, body in mesh.bodies.items()}
-        dam, foundation = space["dam"], space["foundation"]
-        held = {"dam": [], "foundation": [unknowns(foundation.find(space["fixed"]), dim)]}
-        if dim == 3 and case["hold_z"]:
-            for name, body in (("dam", dam), ("foundation", foundation)):
-                held[name].append(unknowns(on_sides(body, case["thickness"]), dim, [2]))
-        joined = {
-            n: np.unique(np.concatenate(h)) if h else np.zeros(0, int) for n, h in held.items()
+        spaces = {name: Space(mesh.bodies[name], order) for name in BODIES}
+        part = lambda body: Space(body, order)
+        joint = part(mesh.bodies["joint"])
+        held = {
+            "dam": [],
+            "foundation": [unknowns(spaces["foundation"].find(part(mesh.bodies["fixed"])), dim)],
         }
+        if dim == 3 and case["hold_z"]:
+            for name in BODIES:
+                sides = spaces[name].find(part(within(mesh.bodies["sides"], mesh.bodies[name])))
+                held[name].append(unknowns(sides, dim, [2]))
+        material = material_of(case)
+        lines = {name: mesh.bodies[name] for name in LINES if name in mesh.bodies}
         return Bodies(
             mesh,
             dim,
-            dam,
-            foundation,
-            dam.find(space["joint"]),
-            foundation.find(space["joint"]),
-            {name: dam.find(space[name]) for name in ("upstream", "downstream")},
-            joined["dam"],
-            joined["foundation"],
-            elasticity(dam, dim, case["E_dam"], case["nu_dam"]),
-            elasticity(foundation, dim, case["E_found"], case["nu_found"]),
+            spaces,
+            {name: space.find(joint) for name, space in spaces.items()},
+            {n: np.unique(np.concatenate([*h, np.zeros(0, int)])) for n, h in held.items()},
+            {name: elasticity(space, dim, material) for name, space in spaces.items()},
+            {
+                name: spaces[body_of(face)].find(part(face.surface))
+                for name, face in mesh.faces.items()
+                if wet(case, face)
+            },
+            {n: spaces[bearer(mesh, line)].find(part(line)) for n, line in lines.items()},
             time.perf_counter() - start,
         )
 
 
-def on_sides(space: Space, thickness: float) -> np.ndarray:
-    """Functions that do not vanish on the z faces: nodes there, and edges that lie in a face."""
-    at = [np.abs(space.body.points[:, 2] - z) < 1e-9 * thickness for z in (0, thickness)]
-    edges = [
-        face[space.edges].all(axis=1) if len(space.edges) else np.zeros(0, bool) for face in at
-    ]
-    return np.flatnonzero(np.concatenate([at[0] | at[1], edges[0] | edges[1]]))
+BODIES = ("dam", "foundation")
+
+
+def body_of(face: Face) -> str:
+    """The body a face belongs to."""
+    return "dam" if face.upper else "foundation"
+
+
+def bearer(mesh: Mesh, line: Body) -> str:
+    """The body that a line of the mesh belongs to; the dam where it is one of both."""
+    return "dam" if np.isin(line.node_tags, mesh.bodies["dam"].node_tags).all() else "foundation"
+
+
+def within(surface: Body, body: Body) -> Body:
+    """The part of a surface that belongs to a body."""
+    inside = np.isin(surface.node_tags, body.node_tags)
+    cells = [(shape, table[inside[table].all(axis=1)]) for shape, table in surface.cells]
+    used = np.unique(np.concatenate([table.ravel() for _, table in cells]))
+    place = np.zeros(len(surface.points), int)
+    place[used] = np.arange(len(used))
+    return Body(
+        surface.points[used],
+        surface.node_tags[used],
+        [(shape, place[table]) for shape, table in cells],
+        np.zeros(0, int),
+    )
 
 
 @dataclass
@@ -149,149 +189,195 @@ class Condensed:
 
     dim: int
     order: int
-    base: float
     #: thickness along z [m], 1 in 2D
     width: float
     counts: dict[str, int]
     unknowns: int
     joint: Body
+    #: nodes of the joint at its heel and at its toe; the heel itself
+    heel: np.ndarray
+    toe: np.ndarray
+    heel_line: Body
+    #: the wet faces; of each whether it is the upper body's, its number in SIDES, low and high
     faces: dict[str, Body]
+    kinds: dict[str, np.ndarray]
     #: jump unknowns, dim * joint function + component, that are not held
     free: np.ndarray
     #: S (j, j), see above
     stiffness: np.ndarray
-    #: t_0 per unit of: weight density of dam and of foundation [N/m3] along -y, (j,); force on each
-    #: function of a face along the outward pressure, (j, functions)
-    weight_dam: np.ndarray
-    weight_foundation: np.ndarray
-    pressure: dict[str, np.ndarray]
-    #: the crest's displacement along x: per jump (j,), weight densities, force on a face's
-    #: functions
+    #: t_0 of unit loads (j,), by name: weight densities dam_x, dam_y, lower_x, ... [N/m3] along the
+    #: axes, forces per metre of a line ice_x, ice_y, ... [N/m]
+    units: dict[str, np.ndarray]
+    #: t_0 of unit forces on loaded unknowns (j, m), and which of these belongs to each unknown of a
+    #: face (functions * dim,); -1: none, it is held or never loaded
+    pressure: np.ndarray
+    places: dict[str, np.ndarray]
+    #: the crest's displacement along x: per jump (j,), unit loads, forces on loaded unknowns (m,)
     crest_jump: np.ndarray
-    crest_weight_dam: float
-    crest_weight_foundation: float
-    crest_pressure: dict[str, np.ndarray]
+    crest_units: dict[str, float]
+    crest_pressure: np.ndarray
     #: wall seconds of mesh, assembly and condensation
     seconds: dict[str, float]
 
 
-def push_of_water(case: Case) -> dict[str, dict[int, float]]:
-    """Direction of the water's force on the dam: {face: {component: share}}."""
-    height, lean = case["dam_height"], case["dam_base"] - case["dam_crest"]
-    slope = np.hypot(height, lean)
-    return {"upstream": {0: 1.0}, "downstream": {0: -height / slope, 1: -lean / slope}}
-
-
-def with_weight(
-    stiffness: sparse.csr_matrix, space: Space, dim: int, held: np.ndarray, keep: np.ndarray
-) -> np.ndarray:
-    """Schur complement (k + 1, k + 1) of a body on the k unknowns `keep` and, as one more column,
-    the load of a unit weight density along -y.
+@dataclass
+class Reduced:
+    """A body reduced to its joint unknowns (n of them): stiffness S (n, n); the forces there of
+    unit forces on loaded unknowns (n, l) and of unit loads (n, k). The loaded unknowns move by
+    flexibility (forces - coupling^T u).
     """
-    kept = np.setdiff1d(np.arange(stiffness.shape[0]), held)
-    place = np.full(stiffness.shape[0], -1)
-    place[kept] = np.arange(len(kept))
-    column = sparse.csr_matrix(-body_force(space, dim, 1)[kept][:, None])
-    bordered = sparse.bmat([[stiffness[kept][:, kept], column], [column.T, None]], format="csr")
-    return schur_complement(bordered, np.append(place[keep], len(kept)))
+
+    stiffness: np.ndarray
+    spread: np.ndarray
+    units: np.ndarray
+    coupling: np.ndarray
+    #: K_ll (l, l) and the unit loads on the loaded unknowns (l, k)
+    kept: np.ndarray
+    on_kept: np.ndarray
+
+    @staticmethod
+    def of(
+        stiffness: sparse.csr_matrix,
+        loads: np.ndarray,
+        held: np.ndarray,
+        joint: np.ndarray,
+        loaded: np.ndarray,
+    ) -> Reduced:
+        """Schur complement of a body; loads (unknowns, k): unit loads, carried along as columns."""
+        kept = np.setdiff1d(np.arange(stiffness.shape[0]), held)
+        place = np.full(stiffness.shape[0], -1)
+        place[kept] = np.arange(len(kept))
+        columns = sparse.csr_matrix(loads[kept])
+        bordered = sparse.bmat(
+            [[stiffness[kept][:, kept], columns], [columns.T, None]], format="csr"
+        )
+        n, m, k = len(joint), len(loaded), loads.shape[1]
+        ends = np.concatenate([place[joint], place[loaded], len(kept) + np.arange(k)])
+        schur = schur_complement(bordered, ends)
+        jj, jl, ll = schur[:n, :n], schur[:n, n : n + m], schur[n : n + m, n : n + m]
+        on_joint, on_kept = schur[:n, n + m :], schur[n : n + m, n + m :]
+        if not m:
+            return Reduced(jj.copy(), jl, on_joint.copy(), jl, ll, on_kept)
+        spread = linalg.solve(ll, jl.T, assume_a="pos").T
+        reduced = jj - spread @ jl.T
+        return Reduced(
+            (reduced + reduced.T) / 2, -spread, on_joint - spread @ on_kept, jl, ll, on_kept
+        )
+
+
+def unit_loads(bodies: Bodies, name: str) -> dict[str, np.ndarray]:
+    """The unit loads that can act on a body, as load vectors (unknowns,)."""
+    dim, space, found = bodies.dim, bodies.spaces[name], {}
+    for region, component in WEIGHTS[name]:
+        if region in space.body.regions:
+            found[f"{region}_{'xyz'[component]}"] = body_force(space, dim, component, region)
+    for line, functions in bodies.lines.items():
+        body = bodies.mesh.bodies[line]
+        if bearer(bodies.mesh, body) == name:
+            points = points_of(Space(body, space.order), LINE)
+            for component in (0, 1):
+                column = np.zeros(dim * len(space.place))
+                column[dim * functions + component] = points.values.T @ points.weights
+                found[f"{line}_{'xyz'[component]}"] = column
+    return found
+
+
+#: Points on a line where a force acts; a point in the plane.
+LINE = {"vertex": 1, "line": 4}
 
 
 def condense(case: Case, bodies: Bodies) -> Condensed:
     """Eliminate the bulk of a case."""
     start, dim, mesh = time.perf_counter(), bodies.dim, bodies.mesh
-
-    joint = unknowns(bodies.joint_dam, dim)
-    free_mask = ~np.isin(joint, bodies.held_dam)
+    joint = {name: unknowns(bodies.joint[name], dim) for name in BODIES}
+    free_mask = ~np.isin(joint["dam"], bodies.held["dam"])
     free = np.flatnonzero(free_mask)
-    joint_dam, joint_foundation = (
-        joint[free_mask],
-        unknowns(bodies.joint_foundation, dim)[free_mask],
-    )
+    joint = {name: u[free_mask] for name, u in joint.items()}
+    nj = len(free)
 
-    # Loaded unknowns of the dam besides the joint's: x on the upstream face, x and y on the
-    # downstream face
-    push = push_of_water(case)
-    if not max(case.tail_levels) > 0:
-        del push["downstream"]
-    wanted = np.concatenate(
-        [unknowns(bodies.faces[name], dim, list(c)) for name, c in push.items()]
-    )
-    loaded = np.setdiff1d(wanted, np.concatenate([joint, bodies.held_dam]))
+    # Loaded unknowns besides the joint's: along the normals of the wet faces
+    wanted = {name: [np.zeros(0, int)] for name in BODIES}
+    for name, functions in bodies.faces.items():
+        face = mesh.faces[name]
+        pushed = np.flatnonzero(np.abs(face.surface.normals[:, :dim]).max(axis=0) > 1e-9)
+        wanted[body_of(face)].append(unknowns(functions, dim, list(pushed)))
+    crest = bodies.spaces["dam"].find(Space(mesh.bodies["crest"], 1))[:1] * dim
+    wanted["dam"].append(crest)
+    reduced, loaded, names = {}, {}, {}
+    for name in BODIES:
+        taken = np.concatenate([joint[name], bodies.held[name]])
+        loaded[name] = np.setdiff1d(np.concatenate(wanted[name]), taken)
+        units = unit_loads(bodies, name)
+        names[name], columns = list(units), np.column_stack(list(units.values()))
+        reduced[name] = Reduced.of(
+            bodies.stiffness[name], columns, bodies.held[name], joint[name], loaded[name]
+        )
 
-    schur = with_weight(
-        bodies.stiff_dam, bodies.dam, dim, bodies.held_dam, np.concatenate([joint_dam, loaded])
-    )
-    nj, nl = len(joint_dam), len(loaded)
-    jj, jl, ll = schur[:nj, :nj], schur[:nj, nj : nj + nl], schur[nj : nj + nl, nj : nj + nl]
-    weight_j, weight_l = schur[:nj, -1], schur[nj : nj + nl, -1]
-    spread = linalg.solve(ll, jl.T, assume_a="pos").T  # (j, loaded)
-    dam = jj - spread @ jl.T
-    dam = (dam + dam.T) / 2
-    force_weight = weight_j - spread @ weight_l
-
-    schur = with_weight(
-        bodies.stiff_foundation, bodies.foundation, dim, bodies.held_foundation, joint_foundation
-    )
-    force_weight_foundation = schur[:-1, -1].copy()
-
-    both = linalg.cholesky(schur[:-1, :-1] + dam, lower=True, overwrite_a=True)
+    dam = reduced["dam"].stiffness
+    both = linalg.cholesky(reduced["foundation"].stiffness + dam, lower=True, overwrite_a=True)
     half = linalg.solve_triangular(both, dam, lower=True)  # L^-1 S_d
     stiffness = dam - half.T @ half
 
-    def transmitted(
-        force_dam: np.ndarray, force_foundation: np.ndarray | float = 0.0
-    ) -> np.ndarray:
-        """t_0 of forces on the two lips."""
-        return force_dam - half.T @ linalg.solve_triangular(
-            both, force_dam + force_foundation, lower=True
-        )
+    def transmitted(forces: np.ndarray, upper: bool) -> np.ndarray:
+        """t_0 of forces (j, k) on one of the lips."""
+        through = half.T @ linalg.solve_triangular(both, forces, lower=True)
+        return (forces if upper else 0) - through
 
-    # Water on the faces: a force on a function is one on unknowns of the joint or on loaded ones
-    row_of = {u: i for i, u in enumerate(loaded)}
-    column_of = {u: i for i, u in enumerate(joint_dam)}
-    crest = row_of[
-        dim
-        * int(np.argmin(np.abs(bodies.dam.body.points - [0, case["dam_height"], 0]).sum(axis=1)))
-    ]
-    crest_row = linalg.solve(ll, np.eye(nl)[crest], assume_a="pos")
-    # crest = crest_row (forces - jl^T u_d),  u_d = delta + M^-1 (f_d + f_f - S_d delta)
-    crest_lip = -(jl @ crest_row)
+    # The crest: row (forces on the loaded unknowns - jl^T u_d), with
+    # u_d = delta + M^-1 (f_d + f_f - S_d delta)
+    own = reduced["dam"]
+    row = linalg.solve(own.kept, 1.0 * (loaded["dam"] == crest[0]), assume_a="pos")
+    crest_lip = -(own.coupling @ row)
     crest_both = linalg.cho_solve((both, True), crest_lip)
-    pressure, crest_pressure = {}, {}
-    for name, components in push.items():
-        on_joint = np.zeros((nj, len(bodies.faces[name])))
-        on_loaded = np.zeros((nl, len(bodies.faces[name])))
-        for i, function in enumerate(bodies.faces[name]):
-            for component, share in components.items():
-                u = dim * function + component
-                if u in row_of:
-                    on_loaded[row_of[u], i] += share
-                elif u in column_of:
-                    on_joint[column_of[u], i] += share
-        force = on_joint - spread @ on_loaded
-        pressure[name] = transmitted(force)
-        crest_pressure[name] = crest_row @ on_loaded + crest_both @ force
+
+    pressure, crest_pressure, units, crest_units, column = [], [], {}, {}, {}
+    for name in BODIES:
+        body, upper = reduced[name], name == "dam"
+        # unit forces: on the loaded unknowns, then on those of the joint that are the faces', too
+        ends = np.flatnonzero(np.isin(joint[name], np.concatenate(wanted[name])))
+        forces = np.hstack([body.spread, np.eye(nj)[:, ends]])
+        first = sum(p.shape[1] for p in pressure)
+        pressure.append(transmitted(forces, upper))
+        direct = np.concatenate([row, np.zeros(len(ends))]) if upper else 0
+        crest_pressure.append(direct + crest_both @ forces)
+        order = np.concatenate([loaded[name], joint[name][ends]])
+        column[name] = np.full(bodies.stiffness[name].shape[0], -1)
+        column[name][order] = first + np.arange(len(order))
+        through = transmitted(body.units, upper)
+        direct = row @ body.on_kept if upper else 0
+        moved = direct + crest_both @ body.units
+        units |= {n: through[:, i] for i, n in enumerate(names[name])}
+        crest_units |= {n: float(moved[i]) for i, n in enumerate(names[name])}
+
+    faces = {name: mesh.faces[name] for name in bodies.faces}
+    joint_tags = mesh.bodies["joint"].node_tags
+    total = sum(k.shape[0] for k in bodies.stiffness.values())
     return Condensed(
         dim,
         int(case["order"]),
-        case["dam_base"],
         case["thickness"] if dim == 3 else 1.0,
         mesh.counts,
-        bodies.stiff_dam.shape[0]
-        + bodies.stiff_foundation.shape[0]
-        - len(bodies.held_dam)
-        - len(bodies.held_foundation),
+        total - sum(len(h) for h in bodies.held.values()),
         mesh.bodies["joint"],
-        {name: mesh.bodies[name] for name in push},
+        np.flatnonzero(np.isin(joint_tags, mesh.bodies["heel"].node_tags)),
+        np.flatnonzero(np.isin(joint_tags, mesh.bodies["toe"].node_tags)),
+        mesh.bodies["heel"],
+        {name: face.surface for name, face in faces.items()},
+        {
+            n: np.array([f.upper, SIDES.index(f.side), f.low, f.high], float)
+            for n, f in faces.items()
+        },
         free,
         stiffness,
-        transmitted(force_weight),
-        transmitted(np.zeros(nj), force_weight_foundation),
-        pressure,
+        units,
+        np.hstack(pressure),
+        {
+            name: column[body_of(face)][unknowns(bodies.faces[name], dim)]
+            for name, face in faces.items()
+        },
         crest_lip - dam @ crest_both,
-        float(crest_row @ weight_l + crest_both @ force_weight),
-        float(crest_both @ force_weight_foundation),
-        crest_pressure,
+        crest_units,
+        np.concatenate(crest_pressure),
         {
             "mesh": mesh.seconds,
             "assembly": bodies.seconds,

@@ -20,7 +20,7 @@ from scipy import linalg
 
 from ... import RunError, __version__, data
 from ...scene.case import Case
-from ...scene.mesh import GEOMETRY, Body
+from ...scene.mesh import Body, shares
 from .bulk import MATERIAL, Bodies, Condensed, check_size, condense
 
 #: The cache is kept below this size [bytes]; the files longest unused go first.
@@ -40,7 +40,9 @@ def folder() -> Path | None:
 
 def key_of(case: Case) -> tuple:
     """What condensed bodies depend on."""
-    return (*(case[n] for n in GEOMETRY + MATERIAL), max(case.tail_levels) > 0)
+    highest, tail = max(case.levels), max(case.tail_levels)
+    faces = tail > 0, case["floor_water"], case["crest_water"] and highest > case["dam_height"]
+    return (*shares(case).items(), *(case[n] for n in MATERIAL), *faces)
 
 
 @lru_cache(maxsize=1)
@@ -123,7 +125,7 @@ def packed(made: Condensed) -> dict[str, np.ndarray]:
     return flat
 
 
-BODY = ("points", "node_tags", "element_tags")
+BODY = ("points", "node_tags", "element_tags", "normals")
 
 
 def unpacked(flat: dict[str, np.ndarray]) -> Condensed:

@@ -10,15 +10,23 @@ from scipy import sparse
 
 from .elements import BULK, Space, basis, geometry, nodal, points_of, tabulated
 
+#: Young's modulus [Pa] and Poisson's ratio [-] by region.
+Material = dict[str, tuple[float, float]]
 
-def elasticity(space: Space, dim: int, young: float, poisson: float) -> sparse.csr_matrix:
+
+def lame(young: float, poisson: float) -> tuple[float, float]:
+    """Lame's lambda and mu [Pa]."""
+    return young * poisson / ((1 + poisson) * (1 - 2 * poisson)), young / (2 * (1 + poisson))
+
+
+def elasticity(space: Space, dim: int, material: Material) -> sparse.csr_matrix:
     """Stiffness matrix [N/m] of an isotropic body; unknown dim * function + component.
 
     Plane strain in 2D.
     """
-    lam, mu = young * poisson / ((1 + poisson) * (1 - 2 * poisson)), young / (2 * (1 + poisson))
     points, rows, columns, values = space.body.points[:, :dim], [], [], []
-    for shape, table in space.connectivity:
+    for (shape, table), region in zip(space.connectivity, space.body.regions, strict=True):
+        lam, mu = lame(*material[region])
         _, gradients, nodal_gradients, weights = tabulated(
             shape, space.order, BULK[space.order][shape]
         )
@@ -54,12 +62,15 @@ def elasticity(space: Space, dim: int, young: float, poisson: float) -> sparse.c
     ).tocsr()
 
 
-def body_force(space: Space, dim: int, component: int) -> np.ndarray:
-    """Load vector of a unit force density along a component [m3 per function]."""
-    numbers = {**BULK[space.order]}
-    points = points_of(space, numbers)
+def body_force(space: Space, dim: int, component: int, region: str | None = None) -> np.ndarray:
+    """Load vector of a unit force density along a component [m3 per function], in one of the body's
+    regions only or everywhere.
+    """
+    points = points_of(space, BULK[space.order])
+    sizes = [len(table) for _, table in space.connectivity]
+    inside = np.repeat([region in (None, own) for own in space.body.regions], sizes)
     load = np.zeros((len(space.place), dim))
-    load[:, component] = points.values.T @ points.weights
+    load[:, component] = points.values.T @ (points.weights * inside[points.elements])
     return load.ravel()
 
 
@@ -73,15 +84,15 @@ MIDDLE = {
 }
 
 
-def stress(space: Space, displacements: np.ndarray, young: float, poisson: float) -> np.ndarray:
+def stress(space: Space, displacements: np.ndarray, material: Material) -> np.ndarray:
     """Stress xx, yy, zz, xy, yz, xz (states, elements, 6) at the middle of each element.
 
     displacements: (states, functions, 2 or 3)
     """
-    lam, mu = young * poisson / ((1 + poisson) * (1 - 2 * poisson)), young / (2 * (1 + poisson))
     number, _, dim = displacements.shape
     found = []
-    for shape, table in space.connectivity:
+    for (shape, table), region in zip(space.connectivity, space.body.regions, strict=True):
+        lam, mu = lame(*material[region])
         middle = np.array(MIDDLE[shape], float)
         _, gradients = basis(shape, space.order, middle)
         dn = nodal(shape, middle)[1]

@@ -18,6 +18,7 @@ from ...scene.mesh import Body
 
 #: Edges of the reference elements, by node numbers.
 EDGES = {
+    "vertex": [],
     "line": [(0, 1)],
     "triangle": [(0, 1), (0, 2), (1, 2)],
     "quad": [(0, 1), (0, 3), (1, 2), (2, 3)],
@@ -44,9 +45,14 @@ CORNERS = {"line": [(-1,), (1,)], "quad": [(-1, -1), (1, -1), (1, 1), (-1, 1)]}
 CORNERS["hexahedron"] = [(*c, w) for w in (-1, 1) for c in CORNERS["quad"]]
 
 
+#: Reference corners of a face's shapes.
+REFERENCE = {shape: np.array(CORNERS[shape], float) for shape in ("line", "quad")}
+REFERENCE["triangle"] = np.array([(0, 0), (1, 0), (0, 1)], float)
+
+
 def nodal(shape: str, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Nodal functions (n,) and their reference gradient (n, d) at a reference point u (d,)."""
-    if shape in ("triangle", "tetra"):
+    if shape in ("vertex", "triangle", "tetra"):
         d = len(u)
         return np.array([1 - u.sum(), *u]), np.vstack([-np.ones(d), np.eye(d)])
     if shape == "wedge":
@@ -70,7 +76,7 @@ def basis(shape: str, order: int, u: np.ndarray) -> tuple[np.ndarray, np.ndarray
     n, dn = nodal(shape, np.asarray(u, float))
     if order == 1:
         return n, dn
-    a, b = np.array(EDGES[shape]).T
+    a, b = np.array(EDGES[shape], int).reshape(-1, 2).T
     return np.concatenate([n, n[a] * n[b]]), np.vstack(
         [dn, n[a, None] * dn[b] + n[b, None] * dn[a]]
     )
@@ -130,6 +136,8 @@ def tensor(n: int, d: int) -> tuple[np.ndarray, np.ndarray]:
 
 def rule(shape: str, points: int) -> tuple[np.ndarray, np.ndarray]:
     """Quadrature with a number of points on a reference element: points (n, d), weights (n,)."""
+    if shape == "vertex":
+        return np.zeros((1, 0)), np.ones(1)
     if shape == "line":
         return tensor(points, 1)
     if shape == "triangle":
@@ -162,7 +170,7 @@ BULK = {
     2: {"triangle": 3, "quad": 7, "tetra": 4, "wedge": 21, "hexahedron": 27},
 }
 JOINT = {1: {"line": 2, "triangle": 1, "quad": 4}, 2: {"line": 2, "triangle": 6, "quad": 4}}
-WATER = {"line": 4, "triangle": 6, "quad": 16}
+WATER = {"vertex": 1, "line": 4, "triangle": 6, "quad": 16}
 
 
 @cache
@@ -190,7 +198,10 @@ class Space:
         number = len(body.points)
         self.connectivity = [(shape, cells) for shape, cells in body.cells]
         if order == 2:
-            pairs = [np.sort(cells[:, EDGES[shape]], axis=2) for shape, cells in body.cells]
+            pairs = [
+                np.sort(cells[:, np.array(EDGES[shape], int).reshape(-1, 2)], axis=2)
+                for shape, cells in body.cells
+            ]
             codes = np.concatenate(
                 [(p[..., 0].astype(np.int64) * number + p[..., 1]).ravel() for p in pairs]
             )
@@ -249,8 +260,8 @@ class Points:
     positions: np.ndarray
     #: (q, functions)
     values: sparse.csr_matrix
-    #: (q, functions) for x and for z
-    gradients: tuple[sparse.csr_matrix, sparse.csr_matrix]
+    #: (q, functions) for x, y and z
+    gradients: tuple[sparse.csr_matrix, ...]
     #: element of each point
     elements: np.ndarray
 
@@ -289,6 +300,6 @@ def points_of(space: Space, numbers: dict[str, int], gradients: bool = False) ->
         np.concatenate(weights),
         np.concatenate(positions),
         build(np.concatenate(coefficients)),
-        (build(slope[:, 0]), build(slope[:, 2])) if gradients else (),
+        tuple(build(slope[:, i]) for i in range(3)) if gradients else (),
         np.concatenate(elements),
     )

@@ -1,18 +1,21 @@
 """The equilibrium of the joint with the condensed bodies around it (see bulk.py).
 
-Unknown: the jump. Residual R = N^T W t(jump) - (water in the joint) + S jump - t_0(level) = 0; the
-pressure of flowing water is solved for the jump at hand before every residual, and its derivative
-enters the tangent.
+Unknown: the jump. Residual R = N^T W t(jump) - (water in the joint) + S jump - t_0(loading) = 0;
+the pressure of flowing water is solved for the jump at hand before every residual, and its
+derivative enters the tangent.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
 from ...scene.case import Case
+from ...scene.loads import Loading, quake_column, water_column
+from .faces import WetFace
 from .interface import Change, Interface
 from .laws import LAWS, Memory
 
@@ -39,117 +42,169 @@ class Joint:
 
     def __init__(self, case: Case, interface: Interface) -> None:
         self.case, self.bulk, self.interface = case, interface.bulk, interface
-        self.wet, self.flowing = case["uplift"] != "none", case["uplift"] == "flow"
+        self.wet, self.flowing = case["uplift"] != "none", case["uplift"] in ("flow", "cracked")
+        self.driven = case["drive"] != "level"
         self.unit_weight = case["rho_water"] * case["g"]
         self.law = LAWS[case["law"]](case)
         self.virgin = self.law.respond(np.zeros((1, 3)), self.law.start(1))[1][0]
-        self.known_loads = None, (np.zeros(0), np.zeros(0))  # of the last (level, tail)
+        #: forces on the loaded unknowns and t_0; with the water in the joint: of the last loadings
+        self.pushed = lru_cache(maxsize=4)(self._pushed)
+        self.loads = lru_cache(maxsize=4)(self._loads)
 
     # -- loads
     # ---------------------------------------------------------------------------------------------
 
-    def face_forces(self, name: str, level: float) -> tuple[np.ndarray, np.ndarray]:
-        """Forces of the water on the functions of a face [N] and their derivative with its level.
-
-        With the factor a + b y of pro/loads.pro: exact resultant and moment in spite of the
-        waterline's kink.
+    def face_forces(self, face: WetFace, loading: Loading) -> np.ndarray:
+        """Forces on the functions of a face [N], (functions * dim,): water, and upstream silt and
+        the water's added mass in an earthquake.
         """
-        points, height, base = (
-            self.interface.faces[name],
-            self.case["dam_height"],
-            self.case["dam_base"],
-        )
-        y = points.positions[:, 1]
-        stretch = (
-            1.0 if name == "upstream" else np.hypot(height, base - self.case["dam_crest"]) / height
-        )
-        if self.case["face_load"] == "uniform":
-            pressure, slope = np.full_like(y, level), np.ones_like(y)
-            force, moment = level * height, level * height**2 / 2
-        else:
-            pressure, slope, under = (
-                np.maximum(level - y, 0),
-                (level > y).astype(float),
-                min(level, height),
-            )
-            force, moment = level * under - under**2 / 2, level * under**2 / 2 - under**3 / 3
-        force, moment = force * stretch * self.bulk.width, moment * stretch * self.bulk.width
-        m0, m1, m2 = (points.weights @ (pressure * y**k) for k in range(3))
-        det = m0 * m2 - m1**2
-        b = (m0 * moment - m1 * force) / det if det > 1e-3 * m1**2 else 0.0
-        a = (force - b * m1) / m0 if m0 > 0 else 1.0
-        factor = self.unit_weight * points.weights * (a + b * y)
-        return points.values.T @ (factor * pressure), points.values.T @ (factor * slope)
+        case = self.case
+        level = loading.tail if face.side in ("down", "bed") else loading.level
+        if case["face_load"] == "uniform":
+            pressure = np.full(len(face.y), self.unit_weight * level)
+            return face.spread(-pressure[:, None] * face.normals)
+        shaking = 0.0
+        if face.side == "up" and case["added_mass"]:
+            # Westergaard's pressure, times the part of the acceleration that is normal to the face
+            shaking = 7 / 8 * case["k_h"] * loading.part("quake")
+        floor = self.interface.floor
 
-    def drains(self, level: float, tail: float) -> tuple[float, float, float]:
-        """Where the drains are [m], the head there [m], and its derivative with the level.
+        def height(level: float, y: np.ndarray, tilt: np.ndarray) -> np.ndarray:
+            still = np.maximum(level - y, 0)
+            return still + shaking * tilt * np.sqrt(np.maximum(level - floor, 0) * still)
 
-        Without drains: the middle of a line from heel to toe. Else they take away their part of the
-        head above their outlet or the tailwater (EM 1110-2-2200).
+        def column(level: float, low: float, high: float) -> tuple[float, float]:
+            still, quake = water_column(level, low, high), quake_column(level, low, high, floor)
+            share = shaking * abs(face.normals[0, 0])
+            return tuple(a + share * b for a, b in zip(still, quake, strict=True))
+
+        forces = self.unit_weight * face.press(level, height, column)
+        grown = loading.part("silt") if face.side == "up" else 0.0
+        if grown > 0 and case["silt_height"] > 0:
+            weight = grown * case["rho_silt"] * case["g"] * case["silt_K0"]
+            depth = lambda level, y, _tilt: np.maximum(level - y, 0)
+            silt = face.press(case["silt_height"], depth, water_column).reshape(-1, self.bulk.dim)
+            silt[:, 1:] = 0  # it presses horizontally, on the vertical projection
+            forces += weight * silt.ravel()
+        return forces
+
+    def units_of(self, loading: Loading) -> dict[str, float]:
+        """The unit loads of the bulk that act: weights [N/m3] and line forces [N/m]."""
+        case, quake = self.case, loading.part("quake")
+        g, tilt = case["g"], np.radians(case["anchor_angle"])
+        anchor = case["anchor_force"] * loading.part("anchor")
+        concrete = case["rho_dam"] * g
+        found = {
+            "dam_x": case["k_h"] * quake * concrete,
+            "dam_y": (case["k_v"] * quake - 1) * concrete,
+            "foundation_y": 0.0 if case["in_situ"] else -case["rho_found"] * g,
+            "ice_x": case["ice_force"] * loading.part("ice"),
+            "force_x": case["force_x"] * loading.part("force"),
+            "force_y": case["force_y"] * loading.part("force"),
+            "anchor_x": -np.sin(tilt) * anchor,
+            "anchor_y": -np.cos(tilt) * anchor,
+        }
+        found |= {"lower_x": found["dam_x"], "lower_y": found["dam_y"]}
+        return {name: value for name, value in found.items() if value and name in self.bulk.units}
+
+    def _pushed(self, loading: Loading) -> tuple[np.ndarray, np.ndarray]:
+        """Forces on the loaded unknowns (m,), and t_0 (j,) of them and of the unit loads."""
+        bulk = self.bulk
+        forces = np.zeros(bulk.pressure.shape[1])
+        for name, face in self.interface.faces.items():
+            places = bulk.places[name]
+            np.add.at(forces, places[places >= 0], self.face_forces(face, loading)[places >= 0])
+        total = bulk.pressure @ forces
+        for name, size in self.units_of(loading).items():
+            total += size * bulk.units[name]
+        return forces, total
+
+    def rate(self, of: Callable[[Loading], np.ndarray], loading: Loading) -> np.ndarray:
+        """The derivative with the reservoir level of what is nearly linear in it."""
+        step = 1e-5 * max(self.case["dam_height"], abs(loading.level))
+        above, below = (replace(loading, level=loading.level + s) for s in (step, -step))
+        return (of(above) - of(below)) / (2 * step)
+
+    # -- water in the joint
+    # ---------------------------------------------------------------------------------------------
+
+    def head(self, loading: Loading, matrix: object = None) -> np.ndarray:
+        """Head [m] in a joint that conducts alike everywhere, at the joint's nodes or at places
+        that a matrix of `Along` leads to: linear on the way from the reservoir's level to the
+        tailwater's, at a dry end from that end's own height.
+
+        Drains take away their part of the head above their outlet or the tailwater (EM
+        1110-2-2200).
         """
-        case, base = self.case, self.bulk.base
+        case, along = self.case, self.interface.along
+        fields = along.heel_y, along.toe_y, along.way
+        heel, toe, way = fields if matrix is None else (matrix @ field for field in fields)
+        first, last = np.maximum(loading.level, heel), np.maximum(loading.tail, toe)
         if case["uplift"] != "drained":
-            return base / 2, (level + tail) / 2, 0.5
-        x, left = case["drain_x"], 1 - case["drain_effectiveness"]
-        head, rate = level + (tail - level) * x / base, 1 - x / base
-        outlet = max(case["drain_level"], tail)
-        if head <= outlet:
-            return x, head, rate
-        return x, outlet + left * (head - outlet), left * rate
-
-    def imposed_pressure(self, x: np.ndarray, level: float, tail: float) -> np.ndarray:
-        """Pressure imposed in the joint [Pa]: linear from heel to drains to toe."""
-        at, head, _ = self.drains(level, tail)
-        return self.unit_weight * np.interp(x, (0, at, self.bulk.base), (level, head, tail))
-
-    def imposed_rate(self, x: np.ndarray, level: float, tail: float) -> np.ndarray:
-        """Its derivative with the level [Pa/m]."""
-        at, _, rate = self.drains(level, tail)
-        return self.unit_weight * np.interp(x, (0, at, self.bulk.base), (1, rate, 0))
-
-    def loads(self, level: float, tail: float) -> tuple[np.ndarray, np.ndarray]:
-        """t_0 and the imposed part of the water in the joint together (j,), and their derivative
-        with the level.
-        """
-        if self.known_loads[0] == (level, tail):
-            return self.known_loads[1]
-        case, bulk, interface = self.case, self.bulk, self.interface
-        force, slope = self.face_forces("upstream", level)
-        total = case["g"] * (
-            case["rho_dam"] * bulk.weight_dam + case["rho_found"] * bulk.weight_foundation
+            return first + (last - first) * way
+        at = case["drain_x"] / self.interface.length
+        there = first + (last - first) * at
+        there = there - case["drain_effectiveness"] * np.maximum(
+            there - np.maximum(case["drain_level"], last), 0
         )
-        total = total + bulk.pressure["upstream"] @ force
-        rate = bulk.pressure["upstream"] @ slope
-        if tail > 0:
-            total = total + bulk.pressure["downstream"] @ self.face_forces("downstream", tail)[0]
-        if self.wet:
-            w, x = interface.water_points.weights, interface.water_points.positions[:, 0]
-            total = total + interface.water.T @ (w * self.imposed_pressure(x, level, tail))
-            rate = rate + interface.water.T @ (w * self.imposed_rate(x, level, tail))
-        self.known_loads = (level, tail), (total, rate)
-        return total, rate
-
-    def solve_flow(self, jump: np.ndarray, level: float, tail: float) -> tuple[np.ndarray, object]:
-        """Pressure beyond the linear one at the inner nodes for an opening, and the solution's
-        sensitivity.
-
-        The conductivity w^3 is scaled by aperture_min^-3.
-        """
-        aperture = 1 + np.maximum(self.interface.flow.opening @ jump, 0) / self.case["aperture_min"]
-        return self.interface.flow.solve(
-            aperture**3 * self.interface.points.weights, self.unit_weight * (level - tail)
+        return np.where(
+            way < at,
+            first + (there - first) * way / at,
+            there + (last - there) * (way - at) / (1 - at),
         )
+
+    def imposed(self, loading: Loading, matrix: object, y: np.ndarray) -> np.ndarray:
+        """Pressure imposed [Pa] at places of height y that a matrix of `Along` leads to."""
+        pressure = self.unit_weight * (self.head(loading, matrix) - y)
+        # water that flows is let go below the air's pressure rather than have its equation kinked
+        return pressure if self.flowing else np.maximum(pressure, 0)
+
+    def _loads(self, loading: Loading) -> np.ndarray:
+        """t_0 and the imposed part of the water in the joint together (j,)."""
+        total, interface = self.pushed(loading)[1], self.interface
+        if not self.wet:
+            return total
+        w, y = interface.water_points.weights, interface.water_points.positions[:, 1]
+        pressure = self.imposed(loading, interface.along.at_water, y)
+        return total + interface.water.T @ (w * pressure)
+
+    def aperture(self, jump: np.ndarray, memory: Memory) -> tuple[np.ndarray, np.ndarray, float]:
+        """Conductivity at the law's points over that of the closed joint, its derivative with the
+        opening, and the closed joint's aperture [m].
+
+        flow: cubic law. cracked: likewise, but from the opening on at which the bond is gone, and
+        up to where an open point conducts so well that it holds all of the head.
+        """
+        opening = self.interface.flow.opening @ jump
+        if self.case["uplift"] == "flow":
+            narrowest, most = self.case["aperture_min"], np.inf
+        else:
+            shared = self.case.shared
+            narrowest, most = (shared[f"crack_{n}"][0] for n in ("aperture", "most"))
+            opening = opening - self.law.opens_at(memory)
+        wider = np.maximum(opening, 0) / narrowest
+        factor = 1 + np.minimum(wider, most)
+        growing = (wider > 0) & (wider < most)
+        return factor**3, np.where(growing, 3 / narrowest * factor**2, 0), narrowest
+
+    def solve_flow(
+        self, jump: np.ndarray, memory: Memory, loading: Loading
+    ) -> tuple[np.ndarray, object]:
+        """Pressure beyond the imposed one at the inner nodes, and the solution's sensitivity."""
+        weights = self.interface.points.weights
+        conductivity = self.aperture(jump, memory)[0] * weights
+        return self.interface.flow.solve(conductivity, self.unit_weight * self.head(loading))
 
     def residual(
         self,
         jump: np.ndarray,
         memory: Memory,
-        level: float,
-        tail: float,
+        loading: Loading,
         within: np.ndarray | None = None,
-    ) -> tuple[np.ndarray, Callable[[bool], tuple[Change, np.ndarray]]]:
+    ) -> tuple[np.ndarray, Callable[[bool], tuple[Change, np.ndarray | None]]]:
         """The residual (j,), and a function that gives its derivatives with jump (a change of the
-        virgin joint's, by the law's tangent or by its secant) and level (j,).
+        virgin joint's, by the law's tangent or by its secant) and, where the case is driven by a
+        displacement, with the level (j,).
 
         within: see the law's `respond`.
         """
@@ -161,59 +216,56 @@ class Joint:
             stiffness = self.law.respond(at_points, memory, True)[1] if secant else tangent
             return interface.change(stiffness, self.virgin)
 
-        load, rate = self.loads(level, tail)
-        value = self.bulk.stiffness @ jump - load + interface.forces(traction)
-        if not self.flowing:
-            return value, lambda secant: (law_change(secant), -rate)
-        flow = interface.flow
-        pressure, solution = self.solve_flow(jump, level, tail)
-        value = value - flow.lift @ pressure
+        value = self.bulk.stiffness @ jump - self.loads(loading) + interface.forces(traction)
+        flow, solution = interface.flow if self.flowing else None, None
+        if self.flowing:
+            pressure, solution = self.solve_flow(jump, memory, loading)
+            value = value - flow.lift @ pressure
 
-        def derivatives(secant: bool) -> tuple[Change, np.ndarray]:
-            narrowest = self.case["aperture_min"]
-            opening = flow.opening @ jump
-            growing = (
-                np.where(opening > 0, 3 / narrowest * (1 + opening / narrowest) ** 2, 0)
-                * interface.points.weights
-            )
+        def derivatives(secant: bool) -> tuple[Change, np.ndarray | None]:
             change = law_change(secant)
-            change.pressure, change.columns, per_drop = flow.sensitivity(solution, growing)
-            return change, -rate - flow.lift @ (self.unit_weight * per_drop)
+            if self.flowing:
+                growing = self.aperture(jump, memory)[1] * interface.points.weights
+                change.pressure, change.columns = flow.sensitivity(solution, growing)
+            if not self.driven:
+                return change, None
+            slope = -self.rate(self._loads, loading)
+            if self.flowing:
+                beyond = lambda other: self.solve_flow(jump, memory, other)[0]
+                slope = slope - flow.lift @ self.rate(beyond, loading)
+            return change, slope
 
         return value, derivatives
 
-    def pressure(self, jump: np.ndarray, level: float, tail: float) -> Pressure:
+    def pressure(self, jump: np.ndarray, memory: Memory, loading: Loading) -> Pressure:
         """The water's pressure in the joint for an opening."""
         interface, bulk = self.interface, self.bulk
         place = interface.space.place
         here = [interface.points.positions, interface.water_points.positions, place]
         if not self.wet:
             return Pressure(*(np.zeros(len(x)) for x in here))
-        found = [self.imposed_pressure(x[:, 0], level, tail) for x in here]
+        along = interface.along
+        matrices = along.at_points, along.at_water, along.at_places
+        found = [self.imposed(loading, m, x[:, 1]) for m, x in zip(matrices, here, strict=True)]
         if not self.flowing:
             return Pressure(*found)
-        flow = interface.flow
-        inner = self.solve_flow(jump, level, tail)[0]
-        whole = np.zeros(flow.nodes)
-        whole[flow.inside] = inner
-        steepness = self.unit_weight * (tail - level) / bulk.base
-        aperture = self.case["aperture_min"] + np.maximum(flow.opening @ jump, 0)
-        conductivity = self.case["rho_water"] * aperture**3 / (12 * self.case["visc"])
-        beyond = flow.values @ whole, flow.at_water @ whole, flow.at_nodes @ whole
-        return Pressure(
-            *(p + more for p, more in zip(found, beyond, strict=True)),
-            *flow.flux(conductivity, inner, steepness, self.case["n_joint"], bulk.width),
-        )
+        inner = self.solve_flow(jump, memory, loading)[0]
+        whole = np.zeros(along.nodes)
+        whole[along.inside] = inner
+        found = [p + m @ whole for p, m in zip(found, matrices, strict=True)]
+        if self.case["uplift"] != "flow":
+            return Pressure(*found)
+        factor, _, narrowest = self.aperture(jump, memory)
+        conductivity = self.case["rho_water"] * narrowest**3 * factor / (12 * self.case["visc"])
+        head = self.unit_weight * self.head(loading)
+        return Pressure(*found, *interface.flow.flux(conductivity, inner, head, bulk.width))
 
-    def crest(self, jump: np.ndarray, level: float, tail: float) -> tuple[float, np.ndarray, float]:
+    def crest(self, jump: np.ndarray, loading: Loading) -> tuple[float, np.ndarray, float]:
         """The crest's displacement along x [m], and its derivatives with jump and level."""
-        case, bulk = self.case, self.bulk
-        force, slope = self.face_forces("upstream", level)
-        value = case["g"] * (
-            case["rho_dam"] * bulk.crest_weight_dam
-            + case["rho_found"] * bulk.crest_weight_foundation
-        )
-        value += bulk.crest_pressure["upstream"] @ force + bulk.crest_jump @ jump
-        if tail > 0:
-            value += bulk.crest_pressure["downstream"] @ self.face_forces("downstream", tail)[0]
-        return float(value), bulk.crest_jump, float(bulk.crest_pressure["upstream"] @ slope)
+        bulk = self.bulk
+        value = bulk.crest_pressure @ self.pushed(loading)[0] + bulk.crest_jump @ jump
+        for name, size in self.units_of(loading).items():
+            value += size * bulk.crest_units[name]
+        forces = lambda other: self._pushed(other)[0]
+        rate = bulk.crest_pressure @ self.rate(forces, loading) if self.driven else 0.0
+        return float(value), bulk.crest_jump, float(rate)

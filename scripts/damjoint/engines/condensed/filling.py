@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from copy import copy
+from dataclasses import replace
 
 import numpy as np
 
 from ... import RunError
 from ...results.tables import Results
 from ...scene.case import Case
+from ...scene.loads import STAGED, Loading
 from .equilibrium import Joint
 from .interface import Interface
 from .newton import Attempt, Iterate, Limit, newton
@@ -40,8 +42,8 @@ class Filling:
         measured by.
         """
         joint, virgin = self.joint, State.virgin(self.joint)
-        highest = max(case.levels), max(case.tail_levels)
-        size = np.linalg.norm(joint.residual(virgin.jump, virgin.memory, *highest)[0])
+        highest = Loading(max(case.levels), max(case.tail_levels), (1.0,) * len(STAGED))
+        size = np.linalg.norm(joint.residual(virgin.jump, virgin.memory, highest)[0])
         if not np.isfinite(size):
             raise RunError("loads: are not finite numbers; look at densities, levels and gravity")
         return size
@@ -69,6 +71,8 @@ class Filling:
 
     def run(self) -> Results:
         """Follow all the times of the case that are still to come."""
+        if self.case["weight_first"] and self.state.time == 0:
+            self.rest()
         for target in self.case.times:
             if target > self.state.time and not self.stopped:
                 self.reach(target)
@@ -77,6 +81,22 @@ class Filling:
         if self.stopped:
             self.keep_last()
         return self.results()
+
+    def rest(self) -> bool:
+        """The state under the weight alone, from where displacements count; whether there is one.
+
+        It has no row in the history.
+        """
+        tries = (self.solve(0.0, attempt) for attempt in self.attempts())
+        found = next(filter(None, tries), None)
+        if found is None:
+            return False
+        self.state = found[0]
+        if self.case["weight_first"]:
+            self.record.at_rest = self.state
+        if self.driven:
+            self.displacement = self.driven_displacement(self.state)
+        return True
 
     def keep_last(self) -> None:
         """Make a table of the last converged state, if there is none yet."""
@@ -89,7 +109,7 @@ class Filling:
         The first step holds the weight, too, at any length: it is cut to the weight alone first.
         """
         *attempts, last_resort = self.attempts()
-        cuts, dt, weighed = 0, np.inf, self.state.time > 0
+        cuts, dt, weighed = 0, np.inf, self.state.time > 0 or self.state.jump.any()
         while self.state.time < target and not self.stopped:
             time = min(self.state.time + dt, target)
             time = target if target - time < 1e-9 else time
@@ -97,10 +117,8 @@ class Filling:
             found = next(filter(None, tries), None)
             if found is None and not weighed:
                 weighed = True
-                tries = (self.solve(0.0, attempt) for attempt in (*attempts, last_resort))
-                weight = next(filter(None, tries), None)
-                if weight is not None:
-                    self.state, cuts = weight[0], cuts + 1
+                if self.rest():
+                    cuts += 1
                     continue
             if found is None:
                 tried, smallest = time - self.state.time, self.case["smallest_step"]
@@ -145,13 +163,14 @@ class Filling:
         """
         now, before = self.state, self.before
         if first and before and before.time > 0:
-            new, old = (time, before.time) if self.driven else (level, before.level)
-            here = now.time if self.driven else now.level
+            new, old = (time, before.time) if self.driven else (level, before.loading.level)
+            here = now.time if self.driven else now.loading.level
             ahead = (new - here) / (here - old) if here != old else 0.0
             if 0 < ahead < 4:
                 jump = now.jump + ahead * (now.jump - before.jump)
-                return jump, now.level + ahead * (now.level - before.level) if prescribed else level
-        return now.jump, now.level if prescribed else level
+                rise = now.loading.level - before.loading.level
+                return jump, now.loading.level + ahead * rise if prescribed else level
+        return now.jump, now.loading.level if prescribed else level
 
     def solve(
         self, time: float, attempt: Attempt, first: bool = False
@@ -160,24 +179,28 @@ class Filling:
 
         first: whether it is the first attempt at the step.
         """
-        joint, memory = self.joint, self.state.memory
+        joint, state = self.joint, self.state.staged(self.joint, time)
+        memory = state.memory
         level, tail, prescribed, target = self.water_at(time)
+        asked = Loading.at(self.case, time, level, tail)
         stiff = joint.case["K_N"] * joint.bulk.width
 
         def evaluate(jump: np.ndarray, level: float, last: Iterate | None) -> Iterate:
             side = within = None
             if attempt.release:
-                side = joint.law.side(joint.interface.jumps(joint.interface.at_points, jump))
+                at_points = joint.interface.jumps(joint.interface.at_points, jump)
+                side = joint.law.side(at_points, memory)
                 if last:
                     within = (side * last.side < 0) & ((side < 0) | (attempt.release > 1))
                     side = np.where(within, 0, side)
-            value, derivatives = joint.residual(jump, memory, level, tail, within)
+            loading = replace(asked, level=level)
+            value, derivatives = joint.residual(jump, memory, loading, within)
             size, edge = np.linalg.norm(value), None
             if prescribed:
                 if self.case["drive"] == "heel":
                     found, row, rate = joint.interface.heel @ jump, joint.interface.heel, 0.0
                 else:
-                    found, row, rate = joint.crest(jump, level, tail)
+                    found, row, rate = joint.crest(jump, loading)
                 size, edge = np.hypot(size, stiff * (found - target)), (row, rate, target - found)
 
             def correction(secant: bool) -> tuple[np.ndarray, float]:
@@ -195,9 +218,9 @@ class Filling:
         end, iterations = found
         if np.abs(end.jump).max() > 0.1 * self.case["dam_height"]:
             return None  # the dam has fallen: an equilibrium of small displacements only
-        memories = self.state.remember(joint, end.jump)
+        memories = state.remember(joint, end.jump)
         return (
-            State(time, end.level, tail, end.jump, *memories),
+            State(time, replace(asked, level=end.level), end.jump, *memories),
             iterations,
             end.size / (self.reference or 1.0),
         )
@@ -208,11 +231,17 @@ class Filling:
         self.record.add(state, iterations, cuts, residual)
         if self.driven:
             if state.time < self.case["drive_begin"] + 1e-9:
-                name = "heel" if self.case["drive"] == "heel" else "crest_ux"
-                self.displacement = self.record.rows[name][-1]
+                self.displacement = self.driven_displacement(state)
             if state.time < self.case["drive_end"] + 1e-9:
-                self.left = state.level
+                self.left = state.loading.level
         self.on_step(state.time)
+
+    def driven_displacement(self, state: State) -> float:
+        """The displacement that is prescribed, in a state [m]."""
+        joint = self.joint
+        if self.case["drive"] == "heel":
+            return float(joint.interface.heel @ state.jump)
+        return joint.crest(state.jump, state.loading)[0]
 
     def results(self) -> Results:
         """All tables so far."""

@@ -21,7 +21,8 @@ from scipy import linalg, sparse
 
 from . import elements
 from .bulk import Condensed
-from .flow import Flow
+from .faces import WetFace
+from .flow import Along, Flow
 
 
 @dataclass
@@ -36,6 +37,52 @@ class Change:
     columns: np.ndarray | None = None
 
 
+def frames(normals: np.ndarray) -> np.ndarray:
+    """Normal, tangent 1 (downstream, along x as far as the joint lets it) and tangent 2 (tangent 1
+    x normal; z on a level joint) of elements with these normals: (elements, 3, 3), in rows.
+    """
+    along = np.array([1.0, 0, 0]) - normals[:, :1] * normals
+    # a riser, which x meets at right angles: the normal turned by as much as elsewhere
+    risers = np.linalg.norm(along, axis=1) < 1e-9
+    along[risers] = np.column_stack(
+        [np.zeros(risers.sum()), -normals[risers, 0], np.zeros(risers.sum())]
+    )
+    along /= np.linalg.norm(along, axis=1)[:, None]
+    return np.stack([normals, along, np.cross(along, normals)], axis=1)
+
+
+@dataclass(frozen=True)
+class Chord:
+    """From heel to toe: what resultants refer to. In 3D the means of both lines."""
+
+    toe: np.ndarray
+    #: unit vectors towards the toe and upwards from it, in the x-y plane
+    along: np.ndarray
+    normal: np.ndarray
+    length: float
+
+    @staticmethod
+    def of(bulk: Condensed) -> Chord:
+        """The chord of a joint."""
+        heel, toe = (
+            bulk.joint.points[nodes][:, :2].mean(axis=0) for nodes in (bulk.heel, bulk.toe)
+        )
+        length = float(np.linalg.norm(toe - heel))
+        along = (toe - heel) / length
+        return Chord(toe, along, np.array([-along[1], along[0]]), length)
+
+    def resultants(
+        self, weights: np.ndarray, places: np.ndarray, traction: np.ndarray
+    ) -> tuple[float, float, float]:
+        """N (compression > 0), T (downstream > 0) and M (about the toe, holding down > 0) of a
+        traction (q, 3) along x, y, z at places (q, 3).
+        """
+        force = weights[:, None] * traction[:, :2]
+        total, arm = force.sum(axis=0), places[:, :2] - self.toe
+        moment = np.sum(arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0])
+        return -total @ self.normal, total @ self.along, float(moment)
+
+
 class Interface:
     """Interpolation matrices of the joint from the unknowns, the jumps of `bulk.free`."""
 
@@ -43,28 +90,60 @@ class Interface:
         self.bulk, self.dim = bulk, bulk.dim
         space = self.space = elements.Space(bulk.joint, bulk.order)
         self.points = elements.points_of(space, elements.JOINT[bulk.order])
-        nodes = len(bulk.joint.points)
+        self.frames = frames(bulk.joint.normals)
+        #: jump at the law's points (dim rows each: normal, tangent 1, tangent 2)
+        self.at_points = self._components(self.points.values, self.frames[self.points.elements])
+        self.from_points = self.at_points.T.tocsr()
+        self.touched = self.from_points != 0
+        #: jump at the nodes, in the same way: `at_nodes` has a row for each of `rows`, an index of
+        #: a place and its frame; where the joint bends a node is seen from each of its elements
+        self.rows, seen = self._seen()
+        self.at_nodes = self._components(self._values_at_places()[self.rows], seen)
+        self.water_points = elements.points_of(space, elements.WATER)
+        across = self.frames[self.water_points.elements]
+        #: opening at the water's points
+        self.water = self._components(self.water_points.values, across, 1)
+        self.faces = {
+            name: WetFace(surface, bulk.kinds[name], bulk.order, bulk.dim)
+            for name, surface in bulk.faces.items()
+        }
+        self.heel = self._heel_row()
+        upstream = [f.surface.points[:, 1].min() for f in self.faces.values() if f.side == "up"]
+        #: height of the reservoir's floor [m]
+        self.floor = min(upstream, default=0.0)
+        self.chord = Chord.of(bulk)
+        #: from heel to toe along the joint [m], a mean in 3D
+        self.length = self.points.weights.sum() / bulk.width
+        self._made_for, self._compliance = None, None
+
+    def _values_at_places(self) -> sparse.csr_matrix:
+        """Values at the nodes and at the middles of the edges, from the space's functions."""
+        nodes, space = len(self.bulk.joint.points), self.space
         middles = sparse.eye(len(space.place), format="lil")
         for i, (a, b) in enumerate(
             space.edges
         ):  # the middle of an edge: mean of its ends and a quarter of its function
             middles[nodes + i, nodes + i] = 0.25
             middles[nodes + i, a] = middles[nodes + i, b] = 0.5
-        #: jump at the law's points and at the nodes (dim rows each: normal, tangent 1, tangent 2)
-        self.at_points, self.at_nodes = (
-            self._components(self.points.values),
-            self._components(middles.tocsr()),
-        )
-        self.from_points = self.at_points.T.tocsr()
-        self.touched = self.from_points != 0
-        self.water_points = elements.points_of(space, elements.WATER)
-        self.water = self.water_points.values @ self._select(1)
-        self.faces = {
-            name: elements.points_of(elements.Space(body, bulk.order), elements.WATER)
-            for name, body in bulk.faces.items()
-        }
-        self.heel = self._heel_row()
-        self._made_for, self._compliance = None, None
+        return middles.tocsr()
+
+    def _seen(self) -> tuple[np.ndarray, np.ndarray]:
+        """Places and the frames in which their jumps are seen: one each on a plane joint."""
+        if (self.frames == self.frames[0]).all():
+            number = len(self.space.place)
+            return np.arange(number), np.broadcast_to(self.frames[0], (number, 3, 3))
+        tables = [table for _, table in self.space.connectivity]
+        sizes = np.concatenate([np.full(len(t), t.shape[1]) for t in tables])
+        rows = np.concatenate([t.ravel() for t in tables])
+        return rows, np.repeat(self.frames, sizes, axis=0)
+
+    def at_places(self, values: np.ndarray) -> np.ndarray:
+        """The mean at each place of values by `rows`."""
+        if len(self.rows) == len(self.space.place):
+            return values
+        count = np.bincount(self.rows)
+        mean = lambda column: np.bincount(self.rows, column) / count
+        return np.column_stack([mean(v) for v in values.T]) if values.ndim > 1 else mean(values)
 
     def _select(self, component: int) -> sparse.csr_matrix:
         """A displacement component of the space's functions, from the unknowns."""
@@ -75,14 +154,26 @@ class Interface:
             (len(self.space.place), len(self.bulk.free)),
         )
 
-    def _components(self, values: sparse.csr_matrix) -> sparse.csr_matrix:
-        """Interpolation (q, functions) of the jump's components: point by point, from the
-        unknowns.
+    def _components(
+        self, values: sparse.csr_matrix, frames: np.ndarray, most: int = 3
+    ) -> sparse.csr_matrix:
+        """Interpolation (q, functions) of the jump's components in frames (q, 3, 3), the first
+        `most` of them: point by point, from the unknowns.
         """
+        parts = [values @ self._select(c) for c in range(self.dim)]
+        number = min(self.dim, most)
         stacked = sparse.vstack(
-            [values @ self._select(c) for c in (1, 0, 2)[: self.dim]], format="csr"
+            [
+                sum(
+                    parts[c].multiply(frames[:, k, c, None])
+                    for c in range(self.dim)
+                    if frames[:, k, c].any()
+                )
+                for k in range(number)
+            ],
+            format="csr",
         )
-        return stacked[np.arange(stacked.shape[0]).reshape(self.dim, -1).T.ravel()]
+        return stacked[np.arange(stacked.shape[0]).reshape(number, -1).T.ravel()]
 
     def jumps(self, matrix: sparse.csr_matrix, unknowns: np.ndarray) -> np.ndarray:
         """delta_n, delta_t1, delta_t2 (q, 3) by at_points or at_nodes."""
@@ -93,22 +184,17 @@ class Interface:
         return self.from_points @ (self.points.weights[:, None] * traction[:, : self.dim]).ravel()
 
     def _heel_row(self) -> np.ndarray:
-        """The heel's opening, mean over z, from the unknowns."""
-        corners, weights = self.space.body.points, np.zeros(len(self.space.place))
-        x = np.abs(corners[:, 0]) < 1e-9 * self.bulk.base
-        if self.dim == 2:
-            weights[np.flatnonzero(x)] = 1
-        else:
-            heel = np.flatnonzero(x)
-            heel = heel[np.argsort(corners[heel, 2])]
-            lengths = np.diff(corners[heel, 2]) / self.bulk.width
-            np.add.at(weights, heel[:-1], lengths / 2)
-            np.add.at(weights, heel[1:], lengths / 2)
-            for i, (a, b) in enumerate(self.space.edges):
-                if x[a] and x[b]:
-                    weights[len(x) + i] = abs(corners[a, 2] - corners[b, 2]) / self.bulk.width / 6
+        """The heel's opening, mean along it, from the unknowns."""
+        heel = elements.Space(self.bulk.heel_line, self.bulk.order)
+        points = elements.points_of(heel, {"vertex": 1, "line": 4})
+        functions = self.space.find(heel)
+        tags = self.bulk.joint.node_tags
+        near = [np.isin(tags[t], heel.body.node_tags).any(axis=1) for _, t in self.bulk.joint.cells]
+        normal = self.bulk.joint.normals[np.concatenate(near)].mean(axis=0)
+        weights = np.zeros(len(self.space.place))
+        weights[functions] = points.values.T @ points.weights / points.weights.sum()
         functions, parts = np.divmod(self.bulk.free, self.dim)
-        return np.where(parts == 1, weights[functions], 0)
+        return weights[functions] * normal[parts]
 
     # -- flow
     # ----------------------------------------------------------------------------------------------
@@ -116,9 +202,12 @@ class Interface:
     @cached_property
     def flow(self) -> Flow:
         """The operators of water that flows in the joint."""
-        return Flow(
-            self.bulk, self.space, self.points, self.water_points, self.water, self.at_points
-        )
+        return Flow(self.along, self.points, self.water_points, self.water, self.at_points)
+
+    @cached_property
+    def along(self) -> Along:
+        """Scalar fields along the joint, and how far each place is on the way to the toe."""
+        return Along(self.bulk, self.space)
 
     # -- linear systems
     # ------------------------------------------------------------------------------------

@@ -1,14 +1,15 @@
 """The joint laws of pro/law_*.pro once more, for many points at once: the condensed engine's.
 
-A law is a class with `start`, `respond`, `side` and `remember`, and what its memory means. Arrays:
-jump (q, 3) is delta_n, delta_t1, delta_t2 [m]; traction (q, 3) is sigma_n (effective), tau_1, tau_2
-[Pa]; tangent (q, 3, 3) its derivative [Pa/m]; the memory a scalar (q,) and a vector (q, 2).
+A law is a class with `start`, `stage`, `respond`, `side` and `remember`, and what its memory means.
+Arrays: jump (q, 3) is delta_n, delta_t1, delta_t2 [m]; traction (q, 3) is sigma_n (effective),
+tau_1, tau_2 [Pa]; tangent (q, 3, 3) its derivative [Pa/m]; the memory a scalar (q,) and a vector
+(q, 2).
 Formulas: design of JOINT_MECA_RUPT and JOINT_MECA_FROT (code_aster R7.01.25).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,26 +18,38 @@ from ...scene.case import Case
 
 @dataclass
 class Memory:
-    """What a joint remembers at q points: scalar (q,), vector (q, 2) [m]."""
+    """What a joint remembers at q points: scalar (q,), vector (q, 2) [m]; and what is done to it in
+    the step at hand.
+    """
 
     scalar: np.ndarray
     vector: np.ndarray
+    #: grout that has set (q,) [m]
+    thickness: np.ndarray | float = 0.0
+    #: thickness sawn away [m], and the opening that liquid grout leaves [m]
+    sawn: float = 0.0
+    most: float = np.inf
 
 
 class Law:
-    """What a law has that releases no shear by opening."""
+    """What a law has that knows no works on the joint and releases no shear by opening."""
 
     releases = False
 
-    def side(self, jump: np.ndarray) -> np.ndarray:
+    def stage(self, memory: Memory, begin: float, end: float) -> Memory:
+        """The memory for a step from t = begin to end."""
+        return memory
+
+    def side(self, jump: np.ndarray, memory: Memory) -> np.ndarray:
         """Where a point is in that release: nowhere."""
         return np.zeros(len(jump), int)
 
 
-class Rupture:
-    """Cohesive rupture.
+class Rupture(Law):
+    """Cohesive rupture, with grouting and sawing.
 
-    Memory: kappa, the largest opening so far, and the released slip.
+    Memory: kappa, the largest opening so far, and the released slip. Openings here are those beyond
+    the thickness that grout and saw leave.
     """
 
     def __init__(self, case: Case) -> None:
@@ -55,14 +68,28 @@ class Rupture:
             if case["alpha"] >= 2
             else max(self.L_C * np.tan(case["alpha"] * np.pi / 4), case.shared["sudden"][0])
         )
+        self.grout, self.grout_t = case["grout_pressure"] / self.contact, case["grout_t"]
+        self.saw, self.saw_t = case["saw_thickness"], case["saw_t"]
 
     def start(self, points: int) -> Memory:
         """The virgin joint."""
         return Memory(np.full(points, self.delta_e), np.zeros((points, 2)))
 
-    def broken(self, opening: np.ndarray, kappa: np.ndarray) -> np.ndarray:
+    def stage(self, memory: Memory, begin: float, end: float) -> Memory:
+        """The memory for a step from t = begin to end: grout_in and sawn_at of pro/law.pro."""
+        if not (self.grout or self.saw):
+            return memory
+        liquid = self.grout > 0 and begin < self.grout_t and end > self.grout_t - 1
+        most = -self.grout * min(end - self.grout_t + 1, 1) if liquid else np.inf
+        return replace(memory, sawn=self.saw * min(max(end - self.saw_t + 1, 0), 1), most=most)
+
+    def opening(self, jump: np.ndarray, memory: Memory) -> np.ndarray:
+        """The opening beyond the thickness that grout and saw leave."""
+        return np.minimum(jump[:, 0] - memory.thickness + memory.sawn, memory.most)
+
+    def broken(self, opening: np.ndarray, memory: Memory) -> np.ndarray:
         """Whether the bond has gone."""
-        return (opening >= self.L_C) | (kappa >= self.L_C)
+        return (opening >= self.L_C) | (memory.scalar >= self.L_C) | (memory.sawn > 0)
 
     def tangential(self, opening: np.ndarray) -> np.ndarray:
         """Tangential stiffness [Pa/m]."""
@@ -73,9 +100,10 @@ class Rupture:
         """Whether opening ends the tangential stiffness."""
         return np.isfinite(self.L_CT)
 
-    def side(self, jump: np.ndarray) -> np.ndarray:
+    def side(self, jump: np.ndarray, memory: Memory) -> np.ndarray:
         """Where a point is: before the release of its shear (-1), in it (0), beyond it (1)."""
-        return np.select([jump[:, 0] <= 0, jump[:, 0] < self.L_CT], [-1, 0], 1)
+        opening = self.opening(jump, memory)
+        return np.select([opening <= 0, opening < self.L_CT], [-1, 0], 1)
 
     def respond(
         self,
@@ -89,8 +117,13 @@ class Rupture:
         secant: the positive stiffness that never softens instead of the tangent; within: the points
         whose shear is on the line of its release, wherever they are.
         """
-        opening, kappa, slip = jump[:, 0], memory.scalar, jump[:, 1:] - memory.vector
-        closed, broken = opening <= 0, self.broken(opening, kappa)
+        opening, kappa, slip = (
+            self.opening(jump, memory),
+            memory.scalar,
+            jump[:, 1:] - memory.vector,
+        )
+        closed, broken = opening <= 0, self.broken(opening, memory)
+        liquid = opening >= memory.most
         unloading = opening <= kappa
         with np.errstate(divide="ignore", invalid="ignore"):
             back = self.sigma_c * (1 - kappa / self.L_C) / kappa  # secant stiffness
@@ -105,7 +138,9 @@ class Rupture:
                 else np.full_like(opening, -self.sigma_c / self.L_C if self.L_C else 0)
             )
         stiffness = np.select(
-            [closed, broken, unloading], [self.contact, self.artificial * self.K_N, back], softening
+            [liquid | broken & ~closed, closed, unloading],
+            [self.artificial * self.K_N, self.contact, back],
+            softening,
         )
         shear = self.tangential(opening)
         traction = np.column_stack([normal, shear[:, None] * slip])
@@ -125,10 +160,14 @@ class Rupture:
 
     def remember(self, jump: np.ndarray, memory: Memory) -> Memory:
         """The memory after convergence."""
-        free = self.tangential(jump[:, 0]) <= 0
-        return Memory(
-            np.maximum(memory.scalar, jump[:, 0]),
-            np.where(free[:, None], jump[:, 1:], memory.vector),
+        opening = self.opening(jump, memory)
+        free = self.tangential(opening) <= 0
+        grouted = np.maximum(jump[:, 0] - memory.thickness + memory.sawn - memory.most, 0)
+        return replace(
+            memory,
+            scalar=np.maximum(memory.scalar, opening),
+            vector=np.where(free[:, None], jump[:, 1:], memory.vector),
+            thickness=memory.thickness + grouted,
         )
 
     def damage(self, jump: np.ndarray, memory: Memory) -> np.ndarray:
@@ -142,7 +181,11 @@ class Rupture:
 
     def open(self, jump: np.ndarray, memory: Memory) -> np.ndarray:
         """Whether the point belongs to the crack."""
-        return self.broken(jump[:, 0], memory.scalar) & (memory.scalar > 0)
+        return self.broken(self.opening(jump, memory), memory) & (memory.scalar > 0)
+
+    def opens_at(self, memory: Memory) -> np.ndarray:
+        """The opening from which on a point is open [m]."""
+        return np.where(memory.scalar >= self.L_C, 0.0, self.L_C)
 
     def slid(self, jump: np.ndarray, memory: Memory) -> np.ndarray:
         """Whether the point has let go along the joint."""
@@ -159,7 +202,7 @@ class Friction(Law):
         self.K_N, self.K_T, self.H = case["K_N"], case["K_T"], case["pena_tang"]
         self.mu, self.adhesion = case["mu"], case["adhesion"]
         self.artificial = case.shared["artificial"][0]
-        self.opens_at = self.adhesion / (self.mu * self.K_N)
+        self.cap_opening = self.adhesion / (self.mu * self.K_N)
 
     def start(self, points: int) -> Memory:
         """The virgin joint."""
@@ -167,7 +210,7 @@ class Friction(Law):
 
     def trial(self, jump: np.ndarray, memory: Memory) -> tuple[np.ndarray, ...]:
         """Normal stress, size and direction of the elastic shear stress, slip of this step."""
-        normal = self.K_N * np.minimum(jump[:, 0], self.opens_at)
+        normal = self.K_N * np.minimum(jump[:, 0], self.cap_opening)
         shear = self.K_T * (jump[:, 1:] - memory.vector)
         size = np.linalg.norm(shear, axis=1)
         beyond = size + self.mu * normal - self.H * memory.scalar - self.adhesion
@@ -191,7 +234,7 @@ class Friction(Law):
         """
         normal, size, n, slip = self.trial(jump, memory)
         traction = np.column_stack([normal, (size - self.K_T * slip)[:, None] * n])
-        closed, sliding = jump[:, 0] <= self.opens_at, slip > 0
+        closed, sliding = jump[:, 0] <= self.cap_opening, slip > 0
         tangent = np.zeros((len(jump), 3, 3))
         tangent[:, 0, 0] = np.where(closed, self.K_N, self.artificial * self.K_N)
         left = np.where(sliding, 1 - self.K_T * slip / np.maximum(size, 1e-300), 1.0)
@@ -226,7 +269,11 @@ class Friction(Law):
 
     def open(self, jump: np.ndarray, memory: Memory) -> np.ndarray:
         """Whether the opening is beyond that of the cap adhesion/mu."""
-        return jump[:, 0] > self.opens_at
+        return jump[:, 0] > self.cap_opening
+
+    def opens_at(self, memory: Memory) -> np.ndarray:
+        """The opening from which on a point is open [m]."""
+        return np.full(len(memory.scalar), self.cap_opening)
 
     def slid(self, jump: np.ndarray, memory: Memory) -> np.ndarray:
         """Whether the point has slipped."""
@@ -336,6 +383,11 @@ class Bond(Law):
     def open(self, jump: np.ndarray, memory: Memory) -> np.ndarray:
         """Whether the point is open and its bond gone."""
         return (jump[:, 0] > 0) & ((memory.scalar >= 1) | (self.strength == 0))
+
+    def opens_at(self, memory: Memory) -> np.ndarray:
+        """The opening from which on a point is open [m]."""
+        bonded = (memory.scalar < 1) & (self.strength > 0)
+        return np.where(bonded, self.delta_c, 0.0)
 
     def slid(self, jump: np.ndarray, memory: Memory) -> np.ndarray:
         """Whether the point has slipped."""

@@ -4,12 +4,13 @@ levels.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ...results.tables import HISTORY, Results, history_table, joint_table
 from ...scene.case import Case
+from ...scene.loads import Loading
 from .equilibrium import Joint, Pressure
 from .laws import Memory
 
@@ -24,18 +25,23 @@ class State:
     """
 
     time: float
-    level: float
-    tail: float
+    loading: Loading
     jump: np.ndarray
     memory: Memory
+    #: by `rows` of the interface
     nodes: Memory
 
     @staticmethod
     def virgin(joint: Joint) -> State:
         """Before any load."""
         law, interface = joint.law, joint.interface
-        memories = law.start(len(interface.points.weights)), law.start(len(interface.space.place))
-        return State(0.0, 0.0, 0.0, np.zeros(len(joint.bulk.free)), *memories)
+        memories = law.start(len(interface.points.weights)), law.start(len(interface.rows))
+        return State(0.0, Loading(0.0, 0.0), np.zeros(len(joint.bulk.free)), *memories)
+
+    def staged(self, joint: Joint, time: float) -> State:
+        """The state with the memories for a step that goes on to a time."""
+        memories = (joint.law.stage(m, self.time, time) for m in (self.memory, self.nodes))
+        return replace(self, **dict(zip(("memory", "nodes"), memories, strict=True)))
 
     def remember(self, joint: Joint, jump: np.ndarray) -> tuple[Memory, Memory]:
         """The memories after a step to a jump."""
@@ -50,6 +56,8 @@ class Record:
     """Rows and tables of a loading."""
 
     joint: Joint
+    #: the state under the weight alone, from where displacements count; None: from no load at all
+    at_rest: State | None = None
     #: FOUND, a value per step
     rows: dict[str, list[float]] = field(default_factory=lambda: {name: [] for name in FOUND})
     #: per requested level: the joint's rows, and those extrapolated from element means
@@ -62,7 +70,7 @@ class Record:
     def copy(self) -> Record:
         """Another one, to go on with by itself."""
         rows = {name: list(values) for name, values in self.rows.items()}
-        return Record(self.joint, rows, list(self.tables), list(self.saved), self.pressure)
+        return replace(self, rows=rows, tables=list(self.tables), saved=list(self.saved))
 
     @property
     def saved_until(self) -> float:
@@ -80,28 +88,37 @@ class Record:
         at_points = interface.jumps(interface.at_points, state.jump)
         traction, _ = law.respond(at_points, state.memory)
         weights = interface.points.weights / joint.bulk.width
-        arm = joint.bulk.base - interface.points.positions[:, 0]
-        pressure = self.pressure = joint.pressure(state.jump, state.level, state.tail)
+        frames = interface.frames[interface.points.elements]
+        along_axes = np.einsum("qk,qkc->qc", traction, frames)
+        N, T, M = interface.chord.resultants(weights, interface.points.positions, along_axes)
+        pressure = self.pressure = joint.pressure(state.jump, state.memory, state.loading)
+        lifted = interface.bulk.joint.normals[interface.water_points.elements]
+        uplift = interface.water_points.weights * pressure.water_points / joint.bulk.width
         row = {
             "time": state.time,
-            "level": state.level,
-            "tail_level": state.tail,
+            "level": state.loading.level,
+            "tail_level": state.loading.tail,
             "iterations": iterations,
             "cuts": cuts,
             "residual": residual,
             "crack_length": weights @ law.open(at_points, state.memory),
             "slip_length": weights @ law.slid(at_points, state.memory),
             "max_opening": interface.jumps(interface.at_nodes, state.jump)[:, 0].max(),
-            "crest_ux": joint.crest(state.jump, state.level, state.tail)[0],
-            "N": -weights @ traction[:, 0],
-            "T": weights @ traction[:, 1],
-            "M": -weights @ (traction[:, 0] * arm),
-            "U": interface.water_points.weights @ pressure.water_points / joint.bulk.width,
+            "crest_ux": self.crest(state),
+            "N": N,
+            "T": T,
+            "M": M,
+            "U": uplift @ lifted[:, :2] @ interface.chord.normal,
             "flux": pressure.leakage,
             "heel": interface.heel @ state.jump,
         }
         for name, value in row.items():
             self.rows[name].append(float(value))
+
+    def crest(self, state: State) -> float:
+        """The crest's movement along x [m]."""
+        start = self.at_rest and self.joint.crest(self.at_rest.jump, self.at_rest.loading)[0]
+        return self.joint.crest(state.jump, state.loading)[0] - (start or 0.0)
 
     def save(self, state: State) -> None:
         """The joint at the state last added, node by node; and with jump and stress made from
@@ -112,15 +129,25 @@ class Record:
         pressure = self.pressure
         jump = interface.jumps(interface.at_nodes, state.jump)
         traction, _ = law.respond(jump, state.nodes)
-        traction[:, 0] -= pressure.nodes
+        seen = interface.at_places(
+            np.column_stack(
+                [
+                    jump,
+                    traction,
+                    law.damage(jump, state.nodes),
+                    np.linalg.norm(state.nodes.vector, axis=1),
+                ]
+            )
+        )
+        seen[:, 3] -= pressure.nodes
+        distance = interface.along.at_places @ interface.along.way * interface.length
         columns = [
-            np.full((len(place), 2), (state.time, state.level)),
+            np.full((len(place), 2), (state.time, state.loading.level)),
             place,
-            jump,
-            traction,
+            seen[:, :6],
             pressure.nodes[:, None],
-            law.damage(jump, state.nodes)[:, None],
-            np.linalg.norm(state.nodes.vector, axis=1)[:, None],
+            seen[:, 6:],
+            distance[:, None],
         ]
         if pressure.flux is not None:
             columns.append(self.node_means(pressure.flux[:, None], True))

@@ -43,7 +43,7 @@ def solve(case: Case, on_step: OnStep, _fields: bool) -> Iterator[Outcome]:
             if len(recovered) < len(fillings):
                 from .recover import recover
 
-                recovered[:] = recover(bodies(), [(f.joint, f.record.saved) for f in fillings])
+                recovered[:] = recover(bodies(), [(f.joint, f.record) for f in fillings])
             return recovered[number]
 
         for number, scene in enumerate(case.scenes()):

@@ -12,9 +12,10 @@ from ...scene.case import load
 from ...scene.parameters import assignments, listing, parameter
 from . import process
 
-#: What the scalar and the vector of a law's memory are called, in the output.
+#: What the scalar and the vector of a law's memory are called, in the output; the vector's normal
+#: component last, if it has one.
 MEMORY = {
-    "rupture": ("kappa", "released_1", "released_2"),
+    "rupture": ("kappa", "released_1", "released_2", "thickness"),
     "friction": ("lambda", "slip_1", "slip_2"),
     "bond": ("D", "slip_1", "slip_2"),
 }
@@ -40,8 +41,8 @@ def evaluate(
 ) -> dict[str, np.ndarray]:
     """The law along a path.
 
-    law: rupture, friction or bond; jumps: (n, 3) delta_n, delta_t1, delta_t2 [m], each row one
-    converged step from the virgin state on; pressure: (n,) [Pa], 0 by default; settings:
+    law: rupture, friction or bond; jumps: (n, 3) delta_n, delta_t1, delta_t2 [m], the i-th row one
+    converged step to t = i, from the virgin state on; pressure: (n,) [Pa], 0 by default; settings:
     {parameter: value}.
     Returns columns sigma_n (total), tau_1, tau_2 [Pa] and the law's state. Raises InputError,
     RunError.
@@ -67,10 +68,5 @@ def evaluate(
         )
         process.execute(problem, ["-msh", str(folder / "one.msh"), "-solve", "Path"])
         table = np.loadtxt(folder / "law.txt", ndmin=2)
-    return dict(
-        zip(
-            ("sigma_n", "tau_1", "tau_2", *MEMORY[law], "damage", "open", "slid"),
-            table.T,
-            strict=True,
-        )
-    )
+    names = "sigma_n", "tau_1", "tau_2", "damage", "open", "slid", *MEMORY[law]
+    return dict(zip(names, table.T, strict=False))

@@ -28,7 +28,6 @@ PRINTED = [
     "T",
     "M",
     "heel",
-    "flux_in",
     "flux",
     "U",
 ]
@@ -80,6 +79,12 @@ def saved_times(case: Case, history: dict[str, np.ndarray], stopped: bool) -> di
     return saved
 
 
+def along_joint(case: Case, nodes: np.ndarray) -> np.ndarray:
+    """Distance from the heel of places (n, 3) on the section's joint [m]."""
+    heel, toe = (np.array([case.section[f"{e}_{c}"][0] for c in "xy"]) for e in ("heel", "toe"))
+    return (nodes[:, :2] - heel) @ (toe - heel) / np.linalg.norm(toe - heel)
+
+
 def read_joint(
     case: Case, folder: Path, number: int, time: float, level: float
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -100,7 +105,8 @@ def read_joint(
     if case["uplift"] == "flow":
         flux = [node_means(rows, table("flux", 1)[1], len(nodes))]
     when = np.tile([time, level], (len(nodes), 1))
-    whole = np.hstack([when, nodes, jump[:, order], traction[:, order], state, *flux])
+    distance = along_joint(case, nodes)[:, None]
+    whole = np.hstack([when, nodes, jump[:, order], traction[:, order], state, distance, *flux])
     extra = whole.copy()
     corners, mean_jump = table("mean_jump")
     _, corner_rows = nodes_of(np.vstack([nodes, corners]))
@@ -151,15 +157,21 @@ def pick(numbers: np.ndarray, values: np.ndarray, wanted: np.ndarray) -> np.ndar
     return values[order[np.searchsorted(numbers, wanted, sorter=order)]]
 
 
+def read_rest(path: Path, wanted: np.ndarray) -> np.ndarray | float:
+    """The displacement under the weight alone, from where displacements count; 0 without it."""
+    return pick(*read_values(path), wanted) if path.exists() else 0.0
+
+
 def read_fields(folder: Path, saved: dict[int, float], mesh: Mesh) -> dict[float, Field]:
     """The fields that GetDP has left in a folder, by time; saved: see `read`."""
     found = {}
+    at_rest = {n: read_rest(folder / f"u_{n}_0.txt", mesh.bodies[n].node_tags) for n in BODIES}
     for number, time in saved.items():
         elements, stress = read_values(folder / f"stress_{number}.txt")
         stress = stress[:, [0, 3, 5, 1, 4, 2]]
         displacement = {n: read_values(folder / f"u_{n}_{number}.txt") for n in BODIES}
         found[time] = Field(
-            {n: pick(*displacement[n], mesh.bodies[n].node_tags) for n in BODIES},
+            {n: pick(*displacement[n], mesh.bodies[n].node_tags) - at_rest[n] for n in BODIES},
             {n: pick(elements, stress, mesh.bodies[n].element_tags) for n in BODIES},
         )
     return found

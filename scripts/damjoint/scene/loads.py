@@ -1,0 +1,71 @@
+"""What loads a dam besides its weight: how far each has grown, where water stands, and its columns.
+
+Coordinates: y = 0 at the heel of the base. A column is the pressure per unit weight [m] on a
+straight face, integrated over the height: force [m2] and moment about y = 0 [m3].
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .case import Case
+from .mesh import Face
+
+#: Loads that grow by themselves, to all at t = <name>_t.
+STAGED = ("silt", "ice", "force", "anchor", "quake")
+
+
+@dataclass(frozen=True)
+class Loading:
+    """What acts at a time: reservoir and tailwater level [m], and the part of each staged load that
+    is there, in the order of STAGED.
+    """
+
+    level: float
+    tail: float
+    grown: tuple[float, ...] = (0.0,) * len(STAGED)
+
+    @staticmethod
+    def at(case: Case, time: float, level: float, tail: float) -> Loading:
+        """The loading of a case at a time, with levels of its own."""
+        parts = (min(max(time - case[f"{name}_t"] + 1, 0.0), 1.0) for name in STAGED)
+        return Loading(level, tail, tuple(parts))
+
+    def part(self, name: str) -> float:
+        """How much of a staged load is there, 0 to 1."""
+        return self.grown[STAGED.index(name)]
+
+
+def wet(case: Case, face: Face) -> bool:
+    """Whether water (or silt) may press on a face in a case."""
+    highest = max(case.tail_levels if face.side in ("down", "bed") else case.levels)
+    if face.side == "up":
+        return True
+    if face.side == "down":
+        return highest > face.surface.points[:, 1].min()
+    return bool(case["crest_water" if face.side == "top" else "floor_water"]) and (
+        highest > face.surface.points[:, 1].min()
+    )
+
+
+def water_column(level: float, low: float, high: float) -> tuple[float, float]:
+    """Column of still water up to a level on a face from low to high: p = level - y."""
+    top = max(min(level, high), low)
+    return (
+        level * (top - low) - (top**2 - low**2) / 2,
+        level * (top**2 - low**2) / 2 - (top**3 - low**3) / 3,
+    )
+
+
+def quake_column(level: float, low: float, high: float, floor: float) -> tuple[float, float]:
+    """Column of Westergaard's sqrt(H (H - y')), H = level - floor, y' from the floor, per 7/8 k_h:
+    the parabola of Westergaard (1933), as in EM 1110-2-2200.
+    """
+    depth = level - floor
+    if level <= low or depth <= 0:
+        return 0.0, 0.0
+    # u = level - y from below the surface: int u^(1/2) du and int (level - u) u^(1/2) du
+    most, least = level - low, max(level - high, 0.0)
+    first = 2 / 3 * (most**1.5 - least**1.5)
+    second = 2 / 5 * (most**2.5 - least**2.5)
+    return depth**0.5 * first, depth**0.5 * (level * first - second)
