@@ -9,10 +9,11 @@ from damjoint.scene.mesh import Body
 from numpy.testing import assert_allclose
 
 
-def body(points, *quads):
+def body(points, **quads):
+    """Of some regions."""
     points = np.array([(*p, 0.0) for p in points])
-    cells = [("quad", np.array(quads))]
-    return Body(points, np.arange(len(points)), cells, np.arange(len(quads)))
+    cells = [("quad", np.array(some)) for some in quads.values()]
+    return Body(points, np.arange(len(points)), cells, np.arange(len(quads)), list(quads))
 
 
 @pytest.fixture
@@ -20,12 +21,13 @@ def lift():
     """A dam with a batter 1:4 and a slope 1:1 upon a block of itself on rock; the joint at y = 4
     from x = 1 to x = 8, the crest at y = 8 from 2 to 4."""
     bodies = {
-        "dam": body([(1, 4), (8, 4), (4, 8), (2, 8)], (0, 1, 2, 3)),
-        # clockwise, and with a side in common with the rock
-        "lower": body([(0, 0), (1, 4), (8, 4), (12, 0)], (0, 1, 2, 3)),
+        "dam": body([(1, 4), (8, 4), (4, 8), (2, 8)], dam=[(0, 1, 2, 3)]),
         "foundation": body(
-            [(-5, 0), (0, 0), (12, 0), (20, 0), (20, -3), (12, -3), (0, -3), (-5, -3)],
-            *((0, 7, 6, 1), (1, 6, 5, 2), (2, 5, 4, 3)),
+            [(x, 0) for x in (-5, 0, 12, 20)]
+            + [(x, -3) for x in (20, 12, 0, -5)]
+            + [(1, 4), (8, 4)],
+            foundation=[(0, 7, 6, 1), (1, 6, 5, 2), (2, 5, 4, 3)],
+            lower=[(1, 8, 9, 2)],  # clockwise
         ),
     }
     still = {name: np.zeros_like(b.points) for name, b in bodies.items()}
@@ -47,6 +49,10 @@ def test_outlines_of_a_lift_joint(lift):
     assert_allclose(section.bed, [(20, 0), (12, 0), (8, 4)])
     for plane, lip in section.lips:
         assert_allclose(plane.points[lip], ends)
+    assert {name: len(*tables) for name, tables in section.under.faces.items()} == {
+        "foundation": 3,
+        "lower": 1,
+    }
     assert_allclose(section.dam.centroid[1], 4 + 4 / 3 * (7 + 2 * 2) / (7 + 2))
 
 

@@ -24,10 +24,10 @@ def write_fields(solution: Solution, folder: Path) -> None:
     bodies = {n: solution.bodies[n] for n in next(iter(fields.values())).displacement}
     points = np.concatenate([b.points for b in bodies.values()])
     cells, body, first = [], [], 0
-    for name, own in bodies.items():
+    for own in bodies.values():
         cells += [(shape, table + first) for shape, table in own.cells]
-        number = int(constants()[name.upper()][0])
-        body += [np.full(len(table), number) for _, table in own.cells]
+        for region, (_, table) in zip(own.regions, own.cells, strict=True):
+            body.append(np.full(len(table), int(constants()[region.upper()][0])))
         first += len(own.points)
     cuts = np.cumsum([len(c) for _, c in cells])[:-1]
     entries, joints, moved, stresses = [], {}, {}, {}

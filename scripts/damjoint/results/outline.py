@@ -79,8 +79,8 @@ def boundary(points: np.ndarray, faces: list[np.ndarray]) -> np.ndarray:
 
 @dataclass
 class Plane:
-    """A body, or several glued together, in the plane: places (n, 2) [m] before and after its
-    displacement (exaggerated), faces by body, its outline as point numbers.
+    """A body in the plane: places (n, 2) [m] before and after its displacement (exaggerated), faces
+    by region, its outline as point numbers.
     """
 
     points: np.ndarray
@@ -108,28 +108,22 @@ class Plane:
         return np.roll(self.loop, -first)[: (last - first) % len(self.loop) + 1]
 
 
-def plane_of(
-    bodies: dict[str, Body], displacement: dict[str, np.ndarray], scale: float
-) -> Plane | None:
-    """Bodies glued to one another, at their lowest z; None if they show no face there."""
-    points = np.concatenate([body.points for body in bodies.values()])
-    size = np.ptp(points, axis=0).max()
-    # what is glued has the same places
-    _, at, glued = np.unique(
-        np.round(points / size, 9), axis=0, return_index=True, return_inverse=True
-    )
-    glued, low = glued.ravel(), points[:, 2].min() + 1e-9 * size
-    faces, first = {}, 0
-    for name, body in bodies.items():
-        front = [table[np.all(body.points[table, 2] < low, axis=1)] for table, _ in skin(body)]
-        faces[name] = [glued[table + first] for table in front if len(table)]
-        first += len(body.points)
-    if not any(faces.values()):
+def plane_of(body: Body, displacement: np.ndarray, scale: float) -> Plane | None:
+    """A body at its lowest z; None if it shows no face there."""
+    points = body.points[:, :2]
+    low = body.points[:, 2].min() + 1e-9 * np.ptp(points, axis=0).max()
+    region = np.repeat(body.regions, [len(table) for _, table in body.cells])
+    faces = {}
+    for table, owners in skin(body):
+        front = np.all(body.points[table, 2] < low, axis=1)
+        for name in dict.fromkeys(body.regions):
+            own = front & (region[owners] == name)
+            faces.setdefault(name, []).extend([table[own]] if own.any() else [])
+    tables = [table for some in faces.values() for table in some]
+    if not tables:
         return None
-    points = points[at, :2]
-    moved = np.concatenate([displacement[name] for name in bodies])[at, :2]
-    loop = boundary(points, [table for tables in faces.values() for table in tables])
-    return Plane(points, points + scale * moved, faces, loop)
+    moved = points + scale * displacement[:, :2]
+    return Plane(points, moved, faces, boundary(points, tables))
 
 
 @dataclass
@@ -183,10 +177,8 @@ def section_of(
 
     ends: heel and toe of the joint (2, 2 or 3) [m].
     """
-    dam = plane_of({"dam": bodies["dam"]}, displacement, scale)
-    others = {name: bodies[name] for name in displacement if name != "dam"}
-    under = plane_of(others, displacement, scale)
-    return Section(dam, under, ends[0, :2], ends[1, :2]) if dam and under else None
+    planes = [plane_of(bodies[n], displacement[n], scale) for n in ("dam", "foundation")]
+    return Section(*planes, ends[0, :2], ends[1, :2]) if all(planes) else None
 
 
 def filled(shore: np.ndarray, level: float) -> np.ndarray:

@@ -13,10 +13,10 @@ from matplotlib.figure import FigureBase
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from ..scene.loads import Loading
 from ..scene.parameters import constants
 from .drawing import CONCRETE, DARK, GREEN, GREY, ORANGE, RED, ROCK, SILT, WATER, panels
 from .fields import Solution, distance, nearest_rows, state_of
-from .gravity import grown
 from .outline import Section, section_of
 from .units import FORCES, STRESSES, told
 
@@ -59,9 +59,10 @@ class Drawing:
         time: float,
         rows: dict[str, np.ndarray],
     ) -> None:
-        self.axes, self.section, self.rows, self.time = axes, section, rows, time
+        self.axes, self.section, self.rows = axes, section, rows
         self.case = solution.result.case
         self.state = solution.result.state(time)
+        self.loading = Loading.at(self.case, time, self.state["level"], self.state["tail_level"])
         self.height = np.ptp(section.dam.points[:, 1])
         self.legend: list[tuple[Patch | Line2D, str]] = []
 
@@ -93,7 +94,8 @@ class Drawing:
         left, right = dam[:, 0].min() - beside, dam[:, 0].max() + beside
         bottom = min(self.section.heel[1], self.section.toe[1], self.section.bed[0, 1]) - below
         crest = max(dam[:, 1].max(), self.section.crest[:, 1].max())
-        top = max(crest, self.state["level"]) + 1.3 * ARROW * self.height
+        top = max(crest, self.loading.level) + 1.2 * ARROW * self.height
+        top += 0.05 * (top - bottom)  # words over an arrow
         width, height = self.axes.bbox.size
         bottom -= max((right - left) * height / width - (top - bottom), 0)
         wider = max((top - bottom) * width / height - (right - left), 0) / 2
@@ -105,7 +107,7 @@ class Drawing:
         """Reservoir, tailwater and silt against the deformed faces; a pressure that is uniform as
         arrows.
         """
-        level, tail = self.state["level"], self.state["tail_level"]
+        level, tail = self.loading.level, self.loading.tail
         if self.case["face_load"] == "uniform":
             self.pressure(self.section.upstream, level)
             self.pressure(self.section.downstream, tail)
@@ -118,7 +120,7 @@ class Drawing:
             if height > 0 and len(polygon):
                 self.axes.fill(*polygon.T, color=WATER, alpha=0.4, linewidth=0, zorder=0)
                 self.surface(at, height)
-        silt = self.case["silt_height"] * (grown(self.case, "silt_t", self.time) > 0)
+        silt = self.case["silt_height"] * (self.loading.part("silt") > 0)
         polygon = self.section.reservoir(silt)
         if silt > 0 and len(polygon):
             look = {"facecolor": SILT, "alpha": 0.6, "hatch": "...", "linewidth": 0}
@@ -221,13 +223,13 @@ class Drawing:
                 -case["anchor_force"] * math.cos(lean),
             ),
         ):
-            size = math.hypot(fx, fy) * grown(case, f"{name}_t", self.time)
+            size = math.hypot(fx, fy) * self.loading.part(name)
             region = numbers[name.upper()][0]
             if size and region in section["mark_region"]:
                 i = section["mark_region"].index(region)
                 tip = np.array([section["mark_x"][i], section["mark_y"][i]])
                 self.arrow(self.moved_with_dam(tip), (fx, fy), DARK, f"{name} {told(size, FORCES)}")
-        share = grown(case, "quake_t", self.time)
+        share = self.loading.part("quake")
         if share and (case["k_h"] or case["k_v"]):
             push = np.array([case["k_h"], case["k_v"]])
             ahead = ARROW * self.height * push / np.hypot(*push)

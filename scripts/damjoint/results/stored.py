@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Sequence
 from pathlib import Path
 
 import meshio
@@ -13,7 +14,7 @@ from ..scene.case import SECTION, SHARED, Case
 from ..scene.mesh import Body
 from ..scene.parameters import INCLUDE, assignments, constants, declared, listing, parse
 from .fields import Field, Solution
-from .folder import SCENES, earlier
+from .folder import earlier
 from .tables import Results
 
 #: What is raised where files are not what a run writes; a SyntaxError by XML.
@@ -27,7 +28,8 @@ def runs_in(folder: Path) -> list[Path]:
     """
     if not folder.is_dir() or earlier(folder) is None:
         raise InputError(f"out = {folder}: must be the folder of a run (with its run.json)")
-    return [folder, *(folder / s for s in SCENES if earlier(folder / s) is not None)]
+    scenes = (folder / mode for mode in declared()["uplift"].choices)
+    return [folder, *(scene for scene in scenes if earlier(scene) is not None)]
 
 
 def read(folder: Path) -> Solution:
@@ -109,40 +111,43 @@ def read_csv(path: Path) -> dict[str, np.ndarray]:
 def fields_in(folder: Path, times: np.ndarray) -> tuple[dict[str, Body], dict[float, Field]]:
     """Bodies, and displacement and stress at the times of which there are files."""
     bodies, fields = {}, {}
-    names = {int(constants()[n.upper()][0]): n for n in ("dam", "foundation", "lower")}
     for time in times.tolist():
         path = folder / f"bulk_t{time:g}.vtu"
         if path.is_file():
             # not meshio.read: it leaves the process where a file is damaged
             bulk, joint = (meshio.vtu.read(p) for p in (path, folder / f"joint_t{time:g}.vtu"))
-            parts = {name: part(bulk, number) for number, name in names.items()}
-            bodies = {n: p[0] for n, p in parts.items() if len(p[0].points)}
+            parts = {"dam": part(bulk, "dam"), "foundation": part(bulk, "foundation", "lower")}
+            bodies = {name: body for name, (body, _, _) in parts.items()}
             bodies["joint"] = body_of(joint.points, [(b.type, b.data) for b in joint.cells])
+            moved = bulk.point_data["displacement"]
             fields[time] = Field(
-                {n: bulk.point_data["displacement"][parts[n][1]] for n in parts if n in bodies},
-                {n: parts[n][2] for n in parts if n in bodies},
+                {name: moved[used] for name, (_, used, _) in parts.items()},
+                {name: stress for name, (_, _, stress) in parts.items()},
             )
     return bodies, fields
 
 
-def part(bulk: meshio.Mesh, number: int) -> tuple[Body, np.ndarray, np.ndarray]:
-    """The part of a mesh with a region's number: as a body, its points there, its stress."""
-    blocks, stresses = [], []
-    for block, numbers, stress in zip(
-        bulk.cells, bulk.cell_data["body"], bulk.cell_data["stress"], strict=True
-    ):
-        own = numbers == number
-        if own.any():
-            blocks.append((block.type, block.data[own]))
-            stresses.append(stress[own])
-    if not blocks:
-        return body_of(np.zeros((0, 3)), []), np.zeros(0, int), np.zeros((0, 6))
-    used = np.unique(np.concatenate([table.ravel() for _, table in blocks]))
-    cells = [(shape, np.searchsorted(used, table)) for shape, table in blocks]
-    return body_of(bulk.points[used], cells), used, np.concatenate(stresses)
+def part(bulk: meshio.Mesh, *regions: str) -> tuple[Body, np.ndarray, np.ndarray]:
+    """Some regions of a mesh: as a body, its points there, its stress."""
+    numbers = {constants()[name.upper()][0]: name for name in regions}
+    blocks = [
+        (numbers[number], block.type, block.data[own == number], stress[own == number])
+        for block, own, stress in zip(
+            bulk.cells, bulk.cell_data["body"], bulk.cell_data["stress"], strict=True
+        )
+        for number in numbers
+        if (own == number).any()
+    ]
+    names, shapes, tables, stresses = zip(*blocks, strict=True)
+    used = np.unique(np.concatenate([table.ravel() for table in tables]))
+    cells = [(s, np.searchsorted(used, t)) for s, t in zip(shapes, tables, strict=True)]
+    return body_of(bulk.points[used], cells, names), used, np.concatenate(stresses)
 
 
-def body_of(points: np.ndarray, cells: list[tuple[str, np.ndarray]]) -> Body:
+def body_of(
+    points: np.ndarray, cells: list[tuple[str, np.ndarray]], regions: Sequence[str] = ()
+) -> Body:
     """A body with tags of its own."""
     count = sum(len(table) for _, table in cells)
-    return Body(points, np.arange(1, len(points) + 1), cells, np.arange(1, count + 1))
+    tags, elements = np.arange(1, len(points) + 1), np.arange(1, count + 1)
+    return Body(points, tags, cells, elements, list(regions))

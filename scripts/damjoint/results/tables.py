@@ -158,9 +158,9 @@ def history_table(case: Case, rows: dict[str, np.ndarray]) -> dict[str, np.ndarr
     """
     scheduled = np.array([case.level_at(time) for time in rows["time"]])
     factor = np.divide(rows["level"], scheduled, out=np.ones_like(scheduled), where=scheduled > 0)
-    # where M = N (base - x)
+    # where M = N (length - x)
     arm = np.divide(rows["M"], rows["N"], out=np.full_like(scheduled, np.nan), where=rows["N"] > 0)
-    rows = rows | {"load_factor": factor, "x_resultant": case["dam_base"] - arm}
+    rows = rows | {"load_factor": factor, "x_resultant": case.section["joint_length"][0] - arm}
     return {name: rows[name] for name in HISTORY}
 
 
