@@ -31,7 +31,7 @@ def exaggeration(displacement: dict[str, np.ndarray], height: float) -> float:
 
 
 def draw_section(figure: FigureBase, solution: Solution, time: float) -> None:
-    """The section at a requested time; nothing but a word if there are no fields, or no section."""
+    """The section at a requested time; a word instead if there are no fields, or no section."""
     (axes,) = panels(figure, left=0.6, right=0.1, bottom=1.05).flat
     field = solution.fields.get(time)
     rows = solution.result.at(time)
@@ -42,7 +42,8 @@ def draw_section(figure: FigureBase, solution: Solution, time: float) -> None:
     section = section_of(solution.bodies, moved, scale, ends) if moved else None
     if section is None:
         axes.set_axis_off()
-        axes.text(0.5, 0.5, "no section: no fields were written", ha="center", color=GREY)
+        why = "the mesh shows none" if moved else "no fields were written"
+        axes.text(0.5, 0.5, f"no section: {why}", ha="center", color=GREY)
         return
     Drawing(axes, solution, section, time, rows).draw()
     axes.set_title(f"displacements x {scale:g}; dashed: before them", fontsize=9, loc="left")
