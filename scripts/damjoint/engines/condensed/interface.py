@@ -19,6 +19,7 @@ from functools import cached_property
 import numpy as np
 from scipy import linalg, sparse
 
+from ...scene.mesh import ends_of, heel_normal
 from . import elements
 from .bulk import Condensed
 from .faces import WetFace
@@ -188,13 +189,17 @@ class Interface:
         heel = elements.Space(self.bulk.heel_line, self.bulk.order)
         points = elements.points_of(heel, {"vertex": 1, "line": 4})
         functions = self.space.find(heel)
-        tags = self.bulk.joint.node_tags
-        near = [np.isin(tags[t], heel.body.node_tags).any(axis=1) for _, t in self.bulk.joint.cells]
-        normal = self.bulk.joint.normals[np.concatenate(near)].mean(axis=0)
+        normal = heel_normal(self.bulk.joint, heel.body)
         weights = np.zeros(len(self.space.place))
         weights[functions] = points.values.T @ points.weights / points.weights.sum()
         functions, parts = np.divmod(self.bulk.free, self.dim)
         return weights[functions] * normal[parts]
+
+    @property
+    def section(self) -> dict[str, list[float]]:
+        """The joint's ends and length, by the names of pro/section.pro."""
+        heel = self.chord.toe - self.chord.length * self.chord.along
+        return ends_of(heel, self.chord.toe, self.length)
 
     # -- flow
     # ----------------------------------------------------------------------------------------------
