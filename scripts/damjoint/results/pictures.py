@@ -114,7 +114,7 @@ def draw_joint(figure: FigureBase, result: Results, time: float) -> None:
     jumps, normals, shears = panels(figure, 3, 1, top=0.5, down=0.42).flat
     draw_jumps(jumps, case, curves)
     factor = draw_normal_stress(normals, case, curves)
-    if not validation.references(case):
+    if not (validation.references(case) or case.geometry):
         draw_by_hand(normals, gravity.at(case, time, result.state(time)["level"]), factor)
     draw_shear(shears, case, curves)
     state = state_of(curves)
@@ -249,8 +249,7 @@ def draw_view(figure: FigureBase, solution: Solution, time: float) -> None:
     field = solution.fields.get(time)
     if field is None:
         return
-    height = solution.result.case["dam_height"]
-    scale = exaggeration(field.displacement, height)
+    scale = exaggeration(field.displacement, solution.result.case.size)
     sizes = {name: np.linalg.norm(u, axis=1) for name, u in field.displacement.items()}
     length, factor = unit(list(sizes.values()), LENGTHS)
     polygons, values = [], []
