@@ -39,11 +39,10 @@ def draw_section(figure: FigureBase, solution: Solution, time: float) -> None:
     ends = np.array([[rows[axis][i] for axis in "xyz"] for i in (where.argmin(), where.argmax())])
     moved = field.displacement if field else {}
     scale = exaggeration(moved, case.size)
-    solid = case["dim"] == 3 and case.geometry  # it is not the same at every z
-    section = section_of(solution.bodies, moved, scale, ends) if moved and not solid else None
+    section = section_of(solution.bodies, moved, scale, ends) if moved else None
     if section is None:
         axes.set_axis_off()
-        why = "no section of a geometry in 3D" if solid else "no section: no fields were written"
+        why = "no section: " + ("the mesh shows none" if moved else "no fields were written")
         axes.text(0.5, 0.5, why, ha="center", color=GREY, transform=axes.transAxes)
         return
     Drawing(axes, solution, section, time, rows).draw()

@@ -17,7 +17,6 @@ from .. import InputError, __version__
 from ..results import gravity, pictures, stored
 from ..results.drawing import figure_of
 from ..results.fields import Solution
-from ..results.section_picture import draw_section
 from ..results.tables import Results
 from ..results.units import FLUXES, FORCES, LENGTHS, MOMENTS, Units, unit
 from ..results.verdict import failed, statement, stiffness_ratio
@@ -207,7 +206,7 @@ def pictures_of(solution: Solution) -> list[dict[str, str]]:
     case, time = result.case, pictures.shown_time(result)
     level = result.state(time)["level"]
     section, joint, history = figure_of(5.2, 5.8), figure_of(5.2, 5.8), figure_of(10.6, 2.4)
-    draw_section(section, solution, time)
+    pictures.draw_dam(section, solution, time)
     pictures.draw_joint(joint, result, time)
     pictures.draw_history(history, result)
     found = [
@@ -223,7 +222,7 @@ def pictures_of(solution: Solution) -> list[dict[str, str]]:
     if case["dim"] == 3 and solution.fields:
         solid = figure_of(10.6, 4.4)
         pictures.draw_solid(solid, solution, time)
-        found.append(("whole", solid, "The whole, deformed, and the joint unrolled."))
+        found.append(("whole", solid, "In 3D: deformed, and the joint unrolled."))
     if case["drive"] != "level":
         found.append(("half", pictures.draw_curve(result), "Load against opening."))
     return [{"size": s, "caption": c, "address": embedded(f)} for s, f, c in found]
