@@ -202,7 +202,8 @@ class Drawing:
     def drains(self) -> None:
         """The drains' line, from where it meets the joint down into the ground."""
         case = self.case
-        if case["uplift"] != "drained" and not (case["uplift"] == "cracked" and case["drains"]):
+        with_drains = case["uplift"] in ("cracked", "flow") and case["drains"]
+        if not (case["uplift"] == "drained" or with_drains):
             return
         x, y = self.on_joint(case["drain_x"])
         look = {"color": "#1565c0", "linestyle": "-.", "linewidth": 1.5}
