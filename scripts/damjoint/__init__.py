@@ -17,6 +17,11 @@ from pathlib import Path
 __version__ = "0.2.0"
 
 
+#: Environment variable; 1: Gmsh may run a user's .geo file, a program that can do anything the user
+#: can.
+RUN_GEO = "DAMJOINT_RUN_GEO"
+
+
 class InputError(ValueError):
     """Bad input: one line that names the parameter, its value and what is allowed.
 

@@ -1,14 +1,15 @@
-"""The command line: new | run | check | critical | gui | validate | sweep | bench | law."""
+"""The command line: new, run, check, critical, sweep, plot, report, gui, validate, bench, law."""
 
 from __future__ import annotations
 
 import argparse
+import os
 import re
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from . import InputError, RunError, __version__
+from . import RUN_GEO, InputError, RunError, __version__
 
 if TYPE_CHECKING:
     from .studies.plan import Plan, Row
@@ -53,6 +54,11 @@ def parser() -> argparse.ArgumentParser:
         dest="settings",
         help="change a parameter (repeatable)",
     )
+    settings.add_argument(
+        "--run-geo",
+        action="store_true",
+        help="let Gmsh run the .geo file that the case names as its geometry: it is a program",
+    )
     of_case = "a letter a..k, dam, or the path of a .case file"
     of_engine = "auto, condensed (the bulk eliminated once) or getdp (the plain problem definition)"
 
@@ -96,6 +102,16 @@ def parser() -> argparse.ArgumentParser:
         help="where check.csv and the cases' folders go (default out/check)",
     )
     safety.set_defaults(call=do_check)
+
+    plot = commands.add_parser("plot", help="redraw a run's pictures from its files")
+    plot.add_argument("out", type=Path, metavar="OUT", help="a folder that a run has written")
+    plot.set_defaults(call=do_plot)
+
+    report = commands.add_parser("report", help="one HTML page from the files of runs")
+    add = report.add_argument
+    add("out", type=Path, nargs="+", metavar="OUT", help="folders that runs have written")
+    add("--to", type=Path, default=Path("report.html"), help="the page (default report.html)")
+    report.set_defaults(call=do_report)
 
     window = commands.add_parser("gui", parents=[settings], help="a case in Gmsh's window")
     window.add_argument("case", nargs="?", default="dam", help=of_case)
@@ -263,6 +279,25 @@ def do_check(arguments: argparse.Namespace) -> int:
     return int(any(answer.fails for one in checks for answer in (one.finite_elements, one.gravity)))
 
 
+def do_plot(arguments: argparse.Namespace) -> int:
+    """damjoint plot."""
+    from .results import pictures, stored
+
+    found = [(folder, stored.read(folder)) for folder in stored.runs_in(arguments.out)]
+    for folder, solution in found:
+        print(pictures.draw(solution, folder))
+    return 0
+
+
+def do_report(arguments: argparse.Namespace) -> int:
+    """damjoint report."""
+    from .studies import report
+
+    report.write(arguments.out, arguments.to)
+    print(arguments.to)
+    return 0
+
+
 def do_gui(arguments: argparse.Namespace) -> int:
     """damjoint gui; 0 when the window is closed."""
     from .scene import parameters
@@ -396,6 +431,8 @@ def main(argv: list[str] | None = None) -> int:
             words[i : i + 2] = [f"{words[i]}={words[i + 1]}"]
     try:
         arguments = parser().parse_args(words)
+        if getattr(arguments, "run_geo", False):
+            os.environ[RUN_GEO] = "1"  # for the processes of a sweep, too
         return arguments.call(arguments)
     except InputError as error:
         print(f"damjoint: {error}", file=sys.stderr)

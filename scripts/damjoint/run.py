@@ -15,6 +15,7 @@ from . import __version__
 from .engines import Outcome, engine_of
 from .results import folder as folders
 from .results import tables
+from .results.fields import Solution
 from .scene.case import Case
 
 
@@ -119,15 +120,15 @@ def finish(outcome: Outcome, case: Case, out: Path, fields: bool, picture: bool)
     """Write fields and picture of a scene, and the time that all writing took."""
     start, result = time.perf_counter(), outcome.result
     folder = folders.scene_folder(case, result.case, out)
-    at = outcome.fields()
-    if fields:
+    solution = Solution(result, outcome.mesh().bodies, outcome.fields())
+    if fields and solution.fields:
         from .results.field_files import write_fields
 
-        write_fields(result, outcome.mesh(), at, folder / "fields")
+        write_fields(solution, folder / "fields")
     if picture:
         from .results.pictures import draw
 
-        draw(result, outcome.mesh(), at, folder)
+        draw(solution, folder)
     result.info["wall_seconds"]["post"] += time.perf_counter() - start
     folders.write_info(result, folder, *ended(outcome))
 

@@ -13,9 +13,12 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from ..scene.parameters import constants
+from .drawing import BLUE, GREEN, ORANGE, RED, WATER
+from .fields import along
 from .gravity import GravityMethod
-from .pictures import BLUE, GREEN, ORANGE, RED, STRESSES, WATER, along, heading, unit
+from .pictures import heading
 from .tables import Results
+from .units import STRESSES, unit
 
 CONCRETE, ROCK, SILT = "#c3ccd6", "#e6dcc8", "#a98d5d"
 #: Depth and height of the two diagrams under the joint, over the joint's length.

@@ -8,32 +8,33 @@ import gmsh
 import meshio
 import numpy as np
 
-from ..scene.mesh import Mesh
 from ..scene.parameters import constants, start_gmsh
-from .fields import BODIES, OF_JOINT, Field, joint_data
-from .tables import Results
+from .fields import OF_JOINT, Solution, joint_data
 
 
-def write_fields(result: Results, mesh: Mesh, fields: dict[float, Field], folder: Path) -> None:
-    """Write, below folder, bulk_*.vtu and joint_*.vtu per requested time with fields.pvd
-    (ParaView), and bulk.msh and joint.msh with a view per field, all times in each (Gmsh).
+def write_fields(solution: Solution, folder: Path) -> None:
+    """Write, below folder, for a solution that has fields, bulk_*.vtu and joint_*.vtu per requested
+    time with fields.pvd (ParaView), and bulk.msh and joint.msh with a view per field, all times in
+    each (Gmsh).
 
     Dam and foundation have their own points on the joint, so that the opening shows.
     """
     folder.mkdir(exist_ok=True)
-    dam, foundation, joint = (mesh.bodies[n] for n in (*BODIES, "joint"))
-    points = np.vstack([dam.points, foundation.points])
-    cells = dam.cells + [(shape, c + len(dam.points)) for shape, c in foundation.cells]
-    regions = constants()
-    body = [
-        np.full(len(c), int(regions[n.upper()][0])) for n in BODIES for _, c in mesh.bodies[n].cells
-    ]
+    result, fields, joint = solution.result, solution.fields, solution.bodies["joint"]
+    bodies = {n: solution.bodies[n] for n in next(iter(fields.values())).displacement}
+    points = np.concatenate([b.points for b in bodies.values()])
+    cells, body, first = [], [], 0
+    for own in bodies.values():
+        cells += [(shape, table + first) for shape, table in own.cells]
+        for region, (_, table) in zip(own.regions, own.cells, strict=True):
+            body.append(np.full(len(table), int(constants()[region.upper()][0])))
+        first += len(own.points)
     cuts = np.cumsum([len(c) for _, c in cells])[:-1]
     entries, joints, moved, stresses = [], {}, {}, {}
     for time, field in fields.items():
         joints[time] = joint_data(result, joint, time)
-        moved[time] = np.vstack([field.displacement[n] for n in BODIES])
-        stresses[time] = np.vstack([field.stress[n] for n in BODIES])
+        moved[time] = np.vstack([field.displacement[n] for n in bodies])
+        stresses[time] = np.vstack([field.stress[n] for n in bodies])
         bulk = meshio.Mesh(
             points,
             cells,
@@ -50,8 +51,6 @@ def write_fields(result: Results, mesh: Mesh, fields: dict[float, Field], folder
     (folder / "fields.pvd").write_text(
         f'<VTKFile type="Collection" version="0.1">\n{collection}\n</VTKFile>\n'
     )
-    if not fields:
-        return
     # xx, xy, xz, yx, ...: what Gmsh calls a tensor
     tensor = [0, 3, 5, 3, 1, 4, 5, 4, 2]
     of_bulk = [

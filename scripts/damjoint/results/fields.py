@@ -23,6 +23,15 @@ class Field:
     stress: dict[str, np.ndarray]
 
 
+@dataclass
+class Solution:
+    """A scene solved: its tables, the bodies of its mesh, fields by requested time (or none)."""
+
+    result: Results
+    bodies: dict[str, Body]
+    fields: dict[float, Field]
+
+
 #: Fields of the joint: name, unit, and the columns of joint.csv along x, y, z (or the one column).
 OF_JOINT = {
     "jump": ("m", ("delta_t1", "delta_n", "delta_t2")),
@@ -35,10 +44,39 @@ OF_JOINT = {
 }
 
 
+def distance(rows: dict[str, np.ndarray]) -> np.ndarray:
+    """Distance from the heel along the joint [m]."""
+    return rows.get("s", rows["x"])
+
+
+def along(rows: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """The joint's rows as curves over the distance s from the heel: means over z, of equal parts of
+    the joint where the nodes of a mesh stand in no rows across.
+    """
+    s = np.round(distance(rows), 9)
+    if np.ptp(rows["z"]) > 0 and len(np.unique(s)) > len(s) / 2:
+        part = s.max() / np.sqrt(len(s))
+        s = (s // part + 0.5) * part
+    s, place = np.unique(s, return_inverse=True)
+    number = np.bincount(place)
+    return {name: np.bincount(place, column) / number for name, column in rows.items()} | {"s": s}
+
+
+def state_of(rows: dict[str, np.ndarray]) -> np.ndarray:
+    """Of each row of the joint's table: 2 open or broken, 1 slipped, 0 neither."""
+    return np.where(rows["damage"] >= 1, 2, np.where(rows["slip"] > 0, 1, 0))
+
+
+def nearest_rows(points: np.ndarray, rows: dict[str, np.ndarray]) -> np.ndarray:
+    """For each of some points (n, 3) the row of the joint's table at one time that is nearest."""
+    places = np.column_stack([rows[axis] for axis in "xyz"])
+    # one by one: all distances at once would fill the memory for a fine joint in 3D
+    return np.array([np.argmin(((places - point) ** 2).sum(axis=1)) for point in points], int)
+
+
 def row_of_nodes(body: Body, rows: dict[str, np.ndarray]) -> np.ndarray:
     """For each mesh node of the joint (n,) its row in the joint's table at one time."""
-    far = (body.points[:, None, 0] - rows["x"]) ** 2 + (body.points[:, None, 2] - rows["z"]) ** 2
-    return np.argmin(far, axis=1)
+    return nearest_rows(body.points, rows)
 
 
 def joint_data(result: Results, body: Body, time: float) -> dict[str, np.ndarray]:

@@ -108,6 +108,10 @@ def write_info(results: Results, folder: Path, state: str = "", why: str = "") -
             "levels": case.levels,
             "tail_levels": case.tail_levels,
             "times": case.times,
+            "geometry": str(case.geometry or ""),
+            "section": case.section if case.geometry else {},  # else it follows from parameters
+            "published": case.published,
+            "hardening_asked": case.hardening_asked,
             **results.info,
             "units": {
                 n: unit

@@ -1,5 +1,7 @@
-"""The pictures of a run: the deformed dam, the joint with the published numbers on it, the load
-curve.
+"""The pictures of a run: section, joint, history, in 3D the whole and the joint as maps; the load
+curve of a driven run.
+
+Each is drawn into a figure or a part of one: side by side in CASE.png, alone in a report.
 """
 
 from __future__ import annotations
@@ -9,99 +11,74 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg  # not pyplot: it costs half of a 2D run
-from matplotlib.collections import LineCollection, PolyCollection
-from matplotlib.figure import Figure
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import FigureBase
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from ..scene.case import Case
-from ..scene.mesh import Body, Mesh
-from . import validation
-from .fields import Field, row_of_nodes
+from . import gravity, validation
+from .drawing import BLUE, DARK, GREEN, GREY, ORANGE, RED, WATER, figure_of, legend_above, panels
+from .fields import Solution, along, distance, row_of_nodes, state_of
+from .outline import skin
+from .section_picture import draw_section, exaggeration
 from .tables import Results
+from .units import FLUXES, LENGTHS, STRESSES, unit
 from .verdict import overturning_level, statement
 
-BLUE, ORANGE, WATER, RED, GREEN = "#0b5394", "#cc7a00", "#3d9be0", "#b3261e", "#3c7d3c"
-
-#: Units by size: name, how many of it make one of the base unit.
-LENGTHS = (("m", 1), ("mm", 1e3), ("µm", 1e6), ("nm", 1e9))
-STRESSES = (("MPa", 1e-6), ("kPa", 1e-3), ("Pa", 1))
+DPI = 110
+#: Inches: the whole width, heading, section with joint, history, what 3D has besides.
+WIDTH, HEAD, UPPER, HISTORY, SOLID = 13.0, 0.75, 7.2, 2.5, 4.6
 
 
-def unit(values: list[np.ndarray], units: tuple) -> tuple[str, float]:
-    """The unit in which the largest of the values is at least one, and its factor."""
-    largest = max((np.abs(v).max(initial=0) for v in values), default=0)
-    return next((u for u in units if largest * u[1] >= 1), units[-1])
+def draw(solution: Solution, folder: Path) -> Path:
+    """Draw all into folder/<case>.png and return its path; a driven run's load curve into another.
 
-
-def sides_of(body: Body) -> list[np.ndarray]:
-    """The plane cells of a body, or in 3D the element sides at z = 0, as rows of point numbers."""
-    sides = {
-        "tetra": ([0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]),
-        "wedge": ([0, 1, 2], [3, 4, 5]),
-        "hexahedron": ([0, 1, 2, 3], [4, 5, 6, 7]),
-    }
-    found = []
-    for shape, table in body.cells:
-        for side in sides.get(shape, (slice(None),)):
-            faces = table[:, side]
-            found.append(faces[np.all(np.abs(body.points[faces, 2]) < 1e-9, axis=1)])
-    return found
-
-
-def along(rows: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """The joint's rows as curves over x: means over z."""
-    x, place = np.unique(np.round(rows["x"], 9), return_inverse=True)
-    number = np.bincount(place)
-    return {name: np.bincount(place, column) / number for name, column in rows.items()} | {"x": x}
-
-
-def draw(result: Results, mesh: Mesh, fields: dict[float, Field], folder: Path) -> Path:
-    """Draw the last saved state to folder/<case>.png and return its path; fields: at least the last
-    one.
-
-    Left: the deformed bodies, displacement exaggerated so that it shows. Right: jumps and stresses
-    along the joint (means over z in 3D), with the published values of the case. In 3D below: the
-    joint seen from above.
+    The state drawn is the last one, or that which published numbers belong to.
     """
+    result = solution.result
     case = result.case
-    solid = case["dim"] == 3
-    figure = Figure(figsize=(12, 9.3 if solid else 7))
-    FigureCanvasAgg(figure)
-    bottom = 0.36 if solid else 0.08
-    grid = figure.add_gridspec(
-        2,
-        2,
-        width_ratios=(1, 1.3),
-        left=0.06,
-        right=0.985,
-        bottom=bottom,
-        top=0.88,
-        wspace=0.16,
-        hspace=0.12,
-    )
-    section = figure.add_subplot(grid[:, 0])
-    jumps, stresses = (figure.add_subplot(grid[i, 1]) for i in (0, 1))
-    head = textwrap.fill(heading(result), 105)
-    figure.text(0.06, 0.99, head, fontsize=12.5, va="top", parse_math=False)
-    said = statement(result)
-    if said:
-        figure.text(0.06, 0.94, textwrap.fill(said, 170), fontsize=9, color=RED, va="top")
-    if len(result.joint["time"]):
-        rows = result.at()
-        draw_section(section, result, mesh, fields, rows)
-        draw_joint(jumps, stresses, case, along(rows))
-        if solid:
-            draw_maps(figure, mesh.bodies["joint"], result)
+    states = bool(len(result.joint["time"]))
+    parts = [HEAD, *([UPPER, HISTORY, *([SOLID] if case["dim"] == 3 else [])] if states else [])]
+    figure = figure_of(WIDTH, sum(parts))
+    head, *parts = np.ravel(figure.subfigures(len(parts), 1, height_ratios=parts))
+    write_heading(head, result)
+    if states:
+        time = shown_time(result)
+        left, right = parts[0].subfigures(1, 2, width_ratios=(1, 1.15))
+        draw_dam(left, solution, time)
+        draw_joint(right, result, time)
+        draw_history(parts[1], result)
+        if case["dim"] == 3:
+            draw_solid(parts[2], solution, time)
     if case["drive"] != "level":
-        draw_curve(result, folder / f"{case.name}_curve.png")
+        draw_curve(result).savefig(folder / f"{case.name}_curve.png", dpi=DPI)
     path = folder / f"{case.name}.png"
-    figure.savefig(path, dpi=110)
+    figure.savefig(path, dpi=DPI, pil_kwargs={"compress_level": 2})
     return path
+
+
+def shown_time(result: Results) -> float:
+    """The requested time that is drawn: the last, or that of the published numbers."""
+    times = result.joint["time"]
+    at = validation.read_at(result.case)
+    published = validation.references(result.case) and np.isclose(times, at).any()
+    return at if published else times.max()
+
+
+def write_heading(figure: FigureBase, result: Results) -> None:
+    """What the picture shows, and what the run has said."""
+    width = figure.bbox.width / figure.dpi
+    head = textwrap.fill(heading(result), int(8.5 * width))
+    figure.text(0.7 / width, 0.8, head, fontsize=13, va="top", parse_math=False)
+    said = textwrap.fill(statement(result), int(14 * width))
+    figure.text(0.7 / width, 0.35, said, fontsize=9, color=RED, va="top")
 
 
 def heading(result: Results) -> str:
     """What the picture shows, in a line."""
     case, last = result.case, result.last
+    if len(result.joint["time"]):
+        last = result.state(shown_time(result))
     said = f"{case.title}, uplift {case['uplift']}"
     if not last:
         return said
@@ -113,145 +90,258 @@ def heading(result: Results) -> str:
     return said
 
 
-def draw_section(
-    axes: Axes, result: Results, mesh: Mesh, fields: dict[float, Field], rows: dict[str, np.ndarray]
-) -> None:
-    """The deformed bodies, the water beside them, the open part of the joint in red."""
-    case, last = result.case, result.last
-    base, height = case["dam_base"], case["dam_height"]
-    moved = fields[max(fields)].displacement if fields else {}
-    largest = max((np.abs(u).max() for u in moved.values()), default=0)
-    scale = 0.06 * height / largest if largest > 0 else 1.0
-    for name, color in (("foundation", "#d8c9ae"), ("dam", "#c3ccd6")) if moved else ():
-        body = mesh.bodies[name]
-        place = (body.points + scale * moved[name])[:, :2]
-        for faces in sides_of(body):
-            axes.add_collection(
-                PolyCollection(place[faces], facecolor=color, edgecolor="#5a5a5a", linewidth=0.15)
-            )
-    if "dam" in moved:
-        dam = mesh.bodies["dam"]
-        lip = np.flatnonzero((np.abs(dam.points[:, 1]) < 1e-9) & (np.abs(dam.points[:, 2]) < 1e-9))
-        lip = lip[np.argsort(dam.points[lip, 0])]
-        curves = along(rows)
-        broken = np.interp(dam.points[lip, 0], curves["x"], curves["damage"]) >= 1
-        place = (dam.points + scale * moved["dam"])[lip, :2]
-        open_parts = np.stack([place[:-1], place[1:]], axis=1)[broken[:-1] & broken[1:]]
-        axes.add_collection(LineCollection(open_parts, color=RED, linewidth=2.5))
-    beside = min(case["found_side"], 0.6 * height)
-    axes.fill_between([-beside, 0], 0, last["level"], color=WATER, alpha=0.4, linewidth=0)
-    tail = last["tail_level"]
-    if tail > 0:
-        lean = (base - case["dam_crest"]) / height
-        right = base + beside
-        axes.fill(
-            [base, right, right, base - lean * tail], [0, 0, tail, tail], color=WATER, alpha=0.4
-        )
-    axes.set(
-        xlim=(-1.03 * beside, base + 1.03 * beside),
-        ylim=(-1.03 * min(case["found_depth"], 0.5 * height), 1.1 * height),
-        aspect="equal",
-        xlabel="x [m]",
-        ylabel="y [m]",
-    )
-    axes.set_title(
-        f"displacement x {scale:.2g}" + (", broken or open joint red" if len(rows["x"]) else ""),
-        fontsize=10,
-    )
+def shear_limit(case: Case, rows: dict[str, np.ndarray]) -> tuple[str, np.ndarray] | None:
+    """What the joint holds in shear at each row [Pa], and how it is made up; None for rupture.
+
+    Friction: c - mu sigma' with the hardening of the slip; bond: the cohesion that is left, and
+    friction on contact.
+    """
+    if case["law"] == "rupture":
+        return None
+    pressed = -case["mu"] * rows["sigma_n_eff"]
+    if case["law"] == "bond":
+        left = case["adhesion"] * (1 - rows["damage"])
+        return "limit: cohesion left + mu |sigma'|", left + np.maximum(pressed, 0)
+    said = "limit: c + mu |sigma'|" + (" + H slip" if case.hardening_asked else "")
+    return said, case["adhesion"] + pressed + case["pena_tang"] * rows["slip"]
 
 
-def draw_joint(jumps: Axes, stresses: Axes, case: Case, curves: dict[str, np.ndarray]) -> None:
-    """Jumps and stresses over x, with the published values."""
-    x = curves["x"]
-    slipped = "released slip" if case["law"] == "rupture" else "slip"
-    length, per_m = unit([curves["delta_n"], curves["delta_t1"]], LENGTHS)
-    jumps.plot(x, curves["delta_n"] * per_m, color=BLUE, label="opening")
-    jumps.plot(x, curves["delta_t1"] * per_m, color=ORANGE, label="tangential jump (downstream)")
-    jumps.plot(x, curves["slip"] * per_m, "--", color=ORANGE, label=f"{slipped}, size")
-    stress, per_pa = unit([curves["sigma_n"], curves["tau_1"]], STRESSES)
-    stresses.plot(x, curves["sigma_n"] * per_pa, color=BLUE, label="normal stress, total")
-    if case["uplift"] != "none":
-        effective = curves["sigma_n_eff"] * per_pa
-        stresses.plot(x, effective, "--", color=BLUE, label="normal stress, effective")
-        stresses.plot(x, -curves["p"] * per_pa, ":", color=WATER, label="minus water pressure")
-    stresses.plot(x, curves["tau_1"] * per_pa, color=ORANGE, label="shear stress")
-    marks = {
-        "delta_n": (jumps, per_m, BLUE),
-        "delta_t1": (jumps, per_m, ORANGE),
-        "sigma_n": (stresses, per_pa, BLUE),
-    }
-    published = validation.references(case) if curves["time"][0] == validation.read_at(case) else []
-    for row in published:
-        if row.quantity in marks and row.tolerance is not None:
-            axes, factor, color = marks[row.quantity]
-            spread = abs(row.value * row.tolerance * factor)
-            axes.errorbar(
-                row.x,
-                row.value * factor,
-                spread,
-                fmt="o",
-                markersize=4,
-                color=color,
-                mfc="white",
-                capsize=2,
-            )
-    jumps.set(ylabel=f"jump [{length}]")
-    jumps.tick_params(labelbottom=False)
-    stresses.set(ylabel=f"stress [{stress}]", xlabel="x [m], heel to toe")
-    for axes in (jumps, stresses):
+def draw_joint(figure: FigureBase, result: Results, time: float) -> None:
+    """Jumps, normal stresses and shear along the joint (means over z in 3D), with the published
+    values or, where there are none, the stress of the gravity method.
+    """
+    case, curves = result.case, along(result.at(time))
+    jumps, normals, shears = panels(figure, 3, 1, top=0.5, down=0.42).flat
+    draw_jumps(jumps, case, curves)
+    factor = draw_normal_stress(normals, case, curves)
+    if not (validation.references(case) or case.geometry):
+        draw_by_hand(normals, gravity.at(case, time, result.state(time)["level"]), factor)
+    draw_shear(shears, case, curves)
+    state = state_of(curves)
+    for axes in (jumps, normals, shears):
+        across = axes.get_xaxis_transform()
+        for number, color in ((2, RED), (1, ORANGE)):
+            look = {"color": color, "alpha": 0.07, "linewidth": 0, "transform": across}
+            axes.fill_between(curves["s"], 0, 1, where=state == number, **look)
         axes.axhline(0, color="black", linewidth=0.5)
-        axes.legend(fontsize=8, loc="best")
         axes.grid(alpha=0.3)
+        axes.margins(x=0.01)
+        axes.tick_params(labelbottom=axes is shears)
+        legend_above(axes)
+    shears.set_xlabel("distance from the heel along the joint [m]")
 
 
-def draw_maps(figure: Figure, joint: Body, result: Results) -> None:
-    """The joint seen from above: opening and effective normal stress at its nodes."""
-    rows = result.at()
-    nearest = row_of_nodes(joint, rows)
-    for i, (name, label, units, colors) in enumerate(
-        (
-            ("delta_n", "opening", LENGTHS, "Blues"),
-            ("sigma_n_eff", "effective normal stress", STRESSES, "Blues_r"),
-        )
+def draw_jumps(axes: Axes, case: Case, curves: dict[str, np.ndarray]) -> None:
+    """Opening, tangential jump and slip."""
+    released = "released slip" if case["law"] == "rupture" else "slip"
+    length, factor = unit([curves["delta_n"], curves["delta_t1"]], LENGTHS)
+    for name, style, color, label in (
+        ("delta_n", "-", BLUE, "opening"),
+        ("delta_t1", "-", ORANGE, "tangential (downstream > 0)"),
+        ("slip", "--", ORANGE, f"{released}, size"),
     ):
-        axes = figure.add_axes((0.06 + 0.47 * i, 0.06, 0.37, 0.2))
-        bar = figure.add_axes((0.44 + 0.47 * i, 0.06, 0.012, 0.2))
+        axes.plot(curves["s"], curves[name] * factor, style, color=color, label=label)
+    draw_published(axes, case, curves, {"delta_n": BLUE, "delta_t1": ORANGE}, factor)
+    axes.set_ylabel(f"jump [{length}]")
+
+
+def draw_normal_stress(axes: Axes, case: Case, curves: dict[str, np.ndarray]) -> float:
+    """Total and effective normal stress, and the water pressure between them.
+
+    Returns how many of the unit drawn make a Pa.
+    """
+    stress, factor = unit([curves["sigma_n"], curves["sigma_n_eff"]], STRESSES)
+    s = curves["s"]
+    axes.plot(s, curves["sigma_n"] * factor, color=BLUE, label="total (tension > 0)")
+    if case["uplift"] != "none":
+        effective = curves["sigma_n_eff"] * factor
+        axes.plot(s, effective, "--", color=DARK, label="effective")
+        look = {"color": WATER, "alpha": 0.25, "linewidth": 0}
+        axes.fill_between(s, -curves["p"] * factor, 0, **look, label="uplift")
+    draw_published(axes, case, curves, {"sigma_n": BLUE}, factor)
+    axes.set_ylabel(f"normal stress [{stress}]")
+    return factor
+
+
+def draw_by_hand(axes: Axes, hand: gravity.GravityMethod, factor: float) -> None:
+    """The effective stress by the gravity method: none over the crack, linear beyond it."""
+    if hand.stands:
+        crack, length = hand.crack_length, hand.body.length
+        s, stress = [0, crack, crack, length], [0, 0, hand.tip_stress, hand.sigma_n_eff_toe]
+        axes.plot(
+            s, np.array(stress) * factor, ":", color=GREY, linewidth=1.8, label="gravity method"
+        )
+
+
+def draw_shear(axes: Axes, case: Case, curves: dict[str, np.ndarray]) -> None:
+    """Shear stress, and what the law lets it reach, of both signs where both occur."""
+    limit = shear_limit(case, curves)
+    stress, factor = unit([curves["tau_1"], *([limit[1]] if limit else [])], STRESSES)
+    shear = curves["tau_1"] * factor
+    axes.plot(curves["s"], shear, color=ORANGE, label="shear stress (downstream > 0)")
+    if limit:
+        words, size = limit
+        axes.plot(curves["s"], size * factor, "--", color=GREEN, label=words)
+        if shear.min() < -0.02 * np.ptp(shear):
+            axes.plot(curves["s"], -size * factor, "--", color=GREEN)
+    axes.set_ylabel(f"shear stress [{stress}]")
+
+
+def draw_published(
+    axes: Axes, case: Case, curves: dict[str, np.ndarray], colors: dict[str, str], factor: float
+) -> None:
+    """The published values of some quantities, with their tolerances, at the time they are of."""
+    rows = validation.references(case)
+    if not np.isclose(curves["time"][0], validation.read_at(case)):
+        return
+    for name, color in colors.items():
+        some = [r for r in rows if r.quantity == name and r.tolerance is not None]
+        if some:
+            value = np.array([r.value for r in some]) * factor
+            spread = np.abs(value) * [r.tolerance for r in some]
+            look = {"fmt": "o", "markersize": 4, "color": color, "mfc": "white", "capsize": 2}
+            label = "published" if name != "delta_t1" else None  # beside delta_n: once is enough
+            axes.errorbar([r.x for r in some], value, spread, **look, label=label)
+
+
+def draw_history(figure: FigureBase, result: Results) -> None:
+    """Opening, crest movement, crack and, where water flows, leakage against the level."""
+    history, flowing = result.history, result.case["uplift"] == "flow"
+    shown = [
+        ("largest opening", LENGTHS, [("max_opening", BLUE, "")]),
+        ("crest movement", LENGTHS, [("crest_ux", BLUE, "")]),
+        (
+            "part of the joint",
+            (("%", 100 / joint_length(result)),),
+            [("crack_length", RED, "open or broken"), ("slip_length", ORANGE, "slipped")],
+        ),
+        *([("leakage", FLUXES, [("flux", BLUE, "")])] if flowing else []),
+    ]
+    where = panels(figure, 1, len(shown), left=0.85, across=0.95).flat
+    for axes, (what, units, lines) in zip(where, shown, strict=True):
+        name, factor = unit([history[column] for column, *_ in lines], units)
+        # dashed over the first one: they often coincide
+        for (column, color, label), style in zip(lines, ("o-", "o--"), strict=False):
+            values = history[column] * factor
+            axes.plot(history["level"], values, style, color=color, markersize=3, label=label)
+        axes.set(xlabel="reservoir level [m]", ylabel=f"{what} [{name}]")
+        axes.grid(alpha=0.3)
+        if name == "%":
+            axes.set_ylim(-3, 103)
+        if lines[0][2]:
+            legend_above(axes)
+
+
+def joint_length(result: Results) -> float:
+    """Heel to toe along the joint [m]."""
+    return float(distance(result.joint).max())
+
+
+def own_solid(case: Case) -> bool:
+    """Whether a scene is a user's own geometry in 3D, whose sections differ."""
+    return case["dim"] == 3 and case.geometry is not None
+
+
+def draw_dam(figure: FigureBase, solution: Solution, time: float) -> None:
+    """The section, or the whole where no section stands for it."""
+    draw = draw_view if own_solid(solution.result.case) else draw_section
+    draw(figure, solution, time)
+
+
+def draw_solid(figure: FigureBase, solution: Solution, time: float) -> None:
+    """In 3D: the deformed whole, if it is not drawn yet, and the joint unrolled as maps."""
+    if own_solid(solution.result.case):
+        draw_maps(figure, solution, time)
+        return
+    left, right = figure.subfigures(1, 2, width_ratios=(1, 1.15))
+    draw_view(left, solution, time)
+    draw_maps(right, solution, time)
+
+
+def draw_view(figure: FigureBase, solution: Solution, time: float) -> None:
+    """The skin of all bodies, deformed, in colors of the displacement."""
+    field = solution.fields.get(time)
+    if field is None:
+        return
+    scale = exaggeration(field.displacement, solution.result.case.size)
+    sizes = {name: np.linalg.norm(u, axis=1) for name, u in field.displacement.items()}
+    length, factor = unit(list(sizes.values()), LENGTHS)
+    polygons, values = [], []
+    for name, moved in field.displacement.items():
+        body = solution.bodies[name]
+        place = (body.points + scale * moved) @ TO_VIEW
+        for table, _ in skin(body):
+            polygons += list(place[table])
+            values.append(sizes[name][table].mean(axis=1) * factor)
+    axes = figure.add_axes((0.0, 0.0, 0.86, 0.95), projection="3d", computed_zorder=False)
+    faces = Poly3DCollection(
+        polygons, array=np.concatenate(values), cmap="YlGnBu", edgecolor=GREY, linewidth=0.1
+    )
+    faces.set_rasterized(True)
+    axes.add_collection3d(faces)
+    ends = np.concatenate(polygons)
+    low, high = ends.min(axis=0), ends.max(axis=0)
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
+    axes.set_box_aspect(high - low, zoom=1.05)
+    axes.view_init(elev=30, azim=-35)
+    axes.set_axis_off()
+    bar = figure.add_axes((0.88, 0.2, 0.02, 0.6))
+    figure.colorbar(faces, cax=bar)
+    axes.set_title(f"displacement [{length}], drawn x {scale:g}", fontsize=9, loc="left")
+
+
+#: x, y, z to what matplotlib calls x, y, z: its z is the height.
+TO_VIEW = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]])
+
+
+def draw_maps(figure: FigureBase, solution: Solution, time: float) -> None:
+    """The joint unrolled, heel to toe and across: opening, effective normal stress, shear."""
+    rows, joint = solution.result.at(time), solution.bodies["joint"]
+    nearest = row_of_nodes(joint, rows)
+    places = np.column_stack([distance(rows)[nearest], joint.points[:, 2]])
+    shown = (
+        ("delta_n", "opening", LENGTHS, "Blues"),
+        ("sigma_n_eff", "effective normal stress", STRESSES, "Blues_r"),
+        ("tau_1", "shear stress", STRESSES, "Oranges"),
+    )
+    for axes, (name, label, units, colors) in zip(
+        panels(figure, len(shown), 1, right=0.3, down=0.4).flat, shown, strict=True
+    ):
         size, factor = unit([rows[name]], units)
         values = rows[name][nearest] * factor
         for _, table in joint.cells:
             faces = PolyCollection(
-                joint.points[table][:, :, [0, 2]],
-                array=values[table].mean(axis=1),
-                cmap=colors,
-                edgecolor="face",
+                places[table], array=values[table].mean(axis=1), cmap=colors, edgecolor="face"
             )
-            faces.set_clim(values.min(), values.max())
+            faces.set(clim=(values.min(), values.max()), rasterized=True)
             axes.add_collection(faces)
         axes.autoscale_view()
-        axes.set(xlabel="x [m], heel to toe", ylabel="z [m]")
-        axes.set_title(f"{label} [{size}]", fontsize=10)
-        figure.colorbar(faces, cax=bar)
+        axes.margins(0)
+        axes.set_ylabel("z [m]")
+        axes.set_title(f"{label} [{size}]", fontsize=9, loc="left")
+        axes.tick_params(labelbottom=name == shown[-1][0])
+        figure.colorbar(faces, ax=axes, pad=0.02)
+    axes.set_xlabel("distance from the heel along the joint [m]")
 
 
-def draw_curve(result: Results, path: Path) -> None:
+def draw_curve(result: Results) -> FigureBase:
     """The level against the heel's opening; for a uniform pressure also where the rigid dam turns
     over.
     """
     case, history = result.case, result.history
-    figure = Figure(figsize=(7, 4.5), layout="tight")
-    FigureCanvasAgg(figure)
-    axes = figure.add_subplot()
+    figure = figure_of(7, 4.5)
+    (axes,) = panels(figure, top=0.6).flat
     begin = history["time"] > case["drive_begin"] + 1e-9
     end = history["time"] > case["drive_end"] + 1e-9
     length, factor = unit([result.heel], LENGTHS)
-    for phase, label, style in (
-        (~begin, "level prescribed", "o-"),
-        (begin & ~end, f"{case['drive']} prescribed", "s-"),
-        (end, "level prescribed again", "^-"),
+    for phase, label, style, color in (
+        (~begin, "level prescribed", "o-", BLUE),
+        (begin & ~end, f"{case['drive']} prescribed", "s-", ORANGE),
+        (end, "level prescribed again", "^-", GREEN),
     ):
-        axes.plot(
-            result.heel[phase] * factor, history["level"][phase], style, markersize=4, label=label
-        )
+        steps = np.flatnonzero(phase | np.append(phase[1:], False))  # and the one before
+        opening, level = result.heel[steps] * factor, history["level"][steps]
+        axes.plot(opening, level, style, color=color, markersize=4, label=label)
     if case["face_load"] == "uniform" and case["uplift"] == "none":
         bound = overturning_level(case)
         label = f"rigid dam turns over: {bound:.3f} m"
@@ -260,4 +350,4 @@ def draw_curve(result: Results, path: Path) -> None:
     axes.set_title(textwrap.fill(case.title, 70), parse_math=False)
     axes.legend(fontsize=8)
     axes.grid(alpha=0.3)
-    figure.savefig(path, dpi=110)
+    return figure

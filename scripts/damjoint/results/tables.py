@@ -125,6 +125,11 @@ class Results:
         """As `at`, with jump and stress extrapolated from the integration points."""
         return rows_at(self.extrapolated, time)
 
+    def state(self, time: float) -> dict[str, float]:
+        """The row of the history at a time, or next to it."""
+        row = np.argmin(np.abs(self.history["time"] - time))
+        return {name: float(column[row]) for name, column in self.history.items()}
+
     @property
     def last(self) -> dict[str, float]:
         """The last row of the history; empty before the first step."""
@@ -165,7 +170,7 @@ def history_table(case: Case, rows: dict[str, np.ndarray]) -> dict[str, np.ndarr
     """
     scheduled = np.array([case.level_at(time) for time in rows["time"]])
     factor = np.divide(rows["level"], scheduled, out=np.ones_like(scheduled), where=scheduled > 0)
-    # where M = N (base - x)
+    # where M = N (length - x)
     arm = np.divide(rows["M"], rows["N"], out=np.full_like(scheduled, np.nan), where=rows["N"] > 0)
     rows = rows | {"load_factor": factor, "x_resultant": case.joint_length - arm}
     return {name: rows[name] for name in HISTORY}

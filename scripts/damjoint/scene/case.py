@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from .. import InputError, data
+from .. import RUN_GEO, InputError, data
 from . import casefile
 from .parameters import (
     INCLUDE,
@@ -276,10 +276,6 @@ def load(
         shared,
         {n: found[n] for n in SECTION},
     )
-
-
-#: Set to 1: Gmsh may run a user's .geo file, a program that can do anything the user can.
-RUN_GEO = "DAMJOINT_RUN_GEO"
 
 
 def own_geometry(name: str) -> Path:

@@ -29,7 +29,7 @@ from ..engines.condensed.bulk import Bodies, condense
 from ..engines.condensed.filling import Filling
 from ..engines.condensed.interface import Interface
 from ..results import tables
-from ..results.pictures import along
+from ..results.fields import along
 from ..results.tables import Results
 from ..results.validation import read_at
 from ..results.verdict import statement

@@ -17,9 +17,10 @@ from ..engines import engine_of
 from ..results import folder as folders
 from ..results import gravity, verdict
 from ..results.check_picture import draw_check
+from ..results.fields import along
 from ..results.gravity import GravityMethod
-from ..results.pictures import STRESSES, along, unit
 from ..results.tables import CHECK, Results, write_csv
+from ..results.units import FORCES, MOMENTS, STRESSES, unit
 from ..run import run
 from ..scene.case import Case
 
@@ -29,8 +30,6 @@ DIFFERENCE, REQUIRED = "difference", "required"
 #: The columns of check.csv that are numbers which the two answers share.
 NUMBERS = tuple(CHECK)[list(CHECK).index("level") : list(CHECK).index("OSF") + 1]
 
-FORCES = (("MN/m", 1e-6), ("kN/m", 1e-3), ("N/m", 1))
-MOMENTS = (("MN m/m", 1e-6), ("kN m/m", 1e-3), ("N m/m", 1))
 #: What the printed table shows: heading by column, in groups that share a unit.
 SHOWN = (
     ((("m", 1),), {"level": "level"}),

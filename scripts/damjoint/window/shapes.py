@@ -11,25 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..results.fields import BODIES
+from ..results.outline import skin
 from ..scene.case import Case
 from ..scene.mesh import Body
 from .worker import Scene
 
-#: Faces and edges of cells: corners by shape.
-FACES = {
-    "triangle": ([0, 1, 2],),
-    "quad": ([0, 1, 2, 3],),
-    "tetra": ([0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]),
-    "wedge": ([0, 1, 2], [3, 4, 5], [0, 1, 4, 3], [1, 2, 5, 4], [0, 2, 5, 3]),
-    "hexahedron": (
-        [0, 1, 2, 3],
-        [4, 5, 6, 7],
-        [0, 1, 5, 4],
-        [1, 2, 6, 5],
-        [2, 3, 7, 6],
-        [3, 0, 4, 7],
-    ),
-}
 #: Strips of the water beside a face: it follows the bent face.
 STRIPS = 12
 
@@ -57,30 +43,6 @@ class Pieces:
         count = len(self.points)
         places = self.points.transpose(0, 2, 1).reshape(count, -1)
         return np.hstack([places, self.values.transpose(1, 0, 2, 3).reshape(count, -1)])
-
-
-def skin(body: Body) -> list[tuple[np.ndarray, np.ndarray]]:
-    """What is seen of a body: faces as rows of point numbers, and the element each belongs to.
-
-    In 2D all elements, in 3D the faces that belong to one element only.
-    """
-    found: dict[int, list] = {}
-    first = 0
-    for shape, table in body.cells:
-        for side in FACES[shape]:
-            found.setdefault(len(side), []).append(
-                (table[:, side], np.arange(first, first + len(table)))
-            )
-        first += len(table)
-    parts = []
-    for some in found.values():
-        faces, owners = (np.concatenate(part) for part in zip(*some, strict=True))
-        _, at, count = np.unique(
-            np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True
-        )
-        outer = at[count == 1]
-        parts.append((faces[outer], owners[outer]))
-    return parts
 
 
 def rims(body: Body, faces: list[np.ndarray]) -> np.ndarray:

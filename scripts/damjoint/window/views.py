@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import gmsh
 import numpy as np
 
-from ..results.fields import row_of_nodes
-from ..results.pictures import LENGTHS, STRESSES, along, heading, unit
+from ..results.fields import along, row_of_nodes
+from ..results.pictures import heading
+from ..results.units import LENGTHS, STRESSES, unit
 from ..scene.case import Case
 from .camera import CLIPPED, MAPS, clip
 from .shapes import Deformed, Pieces, frame

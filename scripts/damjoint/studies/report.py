@@ -1,0 +1,267 @@
+"""One HTML page from the files of runs: what an engineer lays before a reviewer."""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+from datetime import datetime
+from pathlib import Path
+
+import gmsh
+import numpy as np
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from matplotlib.figure import Figure
+
+from .. import InputError, __version__
+from ..results import gravity, pictures, stored
+from ..results.drawing import figure_of
+from ..results.fields import Solution
+from ..results.tables import Results
+from ..results.units import FLUXES, FORCES, LENGTHS, MOMENTS, Units, unit
+from ..results.verdict import failed, statement, stiffness_ratio
+from ..scene.case import Case
+from ..scene.parameters import constants, declared, parse
+from .check import Check, by_finite_elements, by_gravity, hand_calculation, picture_table
+
+#: Of the parts of a picture that are dots, not lines.
+DPI = 160
+
+#: Columns of the history at the requested levels: name, head, units.
+SHOWN: tuple[tuple[str, str, Units], ...] = (
+    ("level", "level", LENGTHS[:1]),
+    ("tail_level", "tailwater", LENGTHS[:1]),
+    ("N", "N'", FORCES),
+    ("T", "T", FORCES),
+    ("M", "M", MOMENTS),
+    ("U", "uplift U", FORCES),
+    ("x_resultant", "resultant from the heel", LENGTHS[:1]),
+    ("crack_length", "open or broken", LENGTHS[:1]),
+    ("slip_length", "slipped", LENGTHS[:1]),
+    ("max_opening", "largest opening", LENGTHS),
+    ("crest_ux", "crest movement", LENGTHS),
+    ("flux", "leakage", FLUXES),
+)
+
+
+def write(folders: list[Path], to: Path) -> None:
+    """Write the page from the folders of runs, those of their further scenes included.
+
+    Raises InputError if one of them is no run's folder, or the page can not be written.
+    """
+    runs = [run for folder in folders for run in stored.runs_in(folder)]
+    parts = [part_of(folder, stored.read(folder)) for folder in runs]
+    environment = Environment(
+        loader=FileSystemLoader(Path(__file__).parent),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    page = environment.get_template("report.html.j2").render(
+        runs=parts, version=__version__, now=f"{datetime.now():%Y-%m-%d %H:%M}"
+    )
+    try:
+        to.write_text(page, encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"to = {to}: {error}") from None
+
+
+def part_of(folder: Path, solution: Solution) -> dict:
+    """What the page says of a run, for the template."""
+    result = solution.result
+    case, told = result.case, result.info
+    # the gravity method knows sections by parameters only
+    found = None if case.geometry else check_of(result)
+    fails = [statement(result)] if found is None and failed(result) else []
+    for answer in (found.finite_elements, found.gravity) if found else ():
+        fails += [f"{answer.by}: {why}" for why in answer.fails]
+    if told["state"] in ("failed", "interrupted"):
+        fails.insert(0, told["statement"])
+    made = datetime.fromtimestamp((folder / "run.json").stat().st_mtime)
+    return {
+        "folder": str(folder),
+        "title": case.title,
+        "name": case.name,
+        "verdict": told["verdict"],
+        "fails": fails,
+        "hints": told["hints"],
+        "made": f"{made:%Y-%m-%d %H:%M}",
+        "scene": scene_of(case),
+        "differences": differences(case),
+        "levels": levels_table(result),
+        "loads": loads_table(result) if found else None,
+        "check": check_table(found) if found else None,
+        "notes": found.notes if found else [],
+        "pictures": pictures_of(solution) if len(result.joint["time"]) else [],
+        "facts": facts(result),
+    }
+
+
+def scene_of(case: Case) -> str:
+    """The dam, dimension, law and water in a line."""
+    size = "{dam_height:g} m high, base {dam_base:g} m, crest {dam_crest:g} m".format(**case.values)
+    size = f"geometry {case.geometry.name}" if case.geometry else size
+    solid = "3D" if case.geometry else f"3D, {case['thickness']:g} m thick"
+    plane = "plane strain" if case["dim"] == 2 else solid
+    return f"{size}; {plane}; joint law {case['law']}; water in the joint: {case['uplift']}"
+
+
+def differences(case: Case) -> list[tuple[str, str, str, str, str]]:
+    """Parameters that matter and are not what they would be by themselves: name, meaning, value,
+    unit, default.
+
+    What follows other parameters is compared with what it would follow.
+    """
+    known = declared()
+    values = case.values
+    own = {n: v for n, v in values.items() if not known[n].follows}
+    follow, plain = parse(stored.resolved(own, case.levels)), constants()
+    seen = visible(case)
+    rows = []
+    for name, parameter in known.items():
+        usual = (follow if parameter.follows else plain)[name][0]
+        if name in seen and not same(values[name], usual):
+            meaning, _, measure = parameter.meaning.rpartition(" [")
+            cells = (
+                meaning or measure,
+                said(values[name]),
+                measure.rstrip("]-") if meaning else "",
+            )
+            rows.append((name, *cells, said(usual)))
+    return rows
+
+
+def visible(case: Case) -> set[str]:
+    """The parameters that matter in the scene, as their declarations tell the window."""
+    parse(stored.resolved(case.values, case.levels))
+    entry = lambda p: json.loads(gmsh.onelab.get(p.label))
+    return {name for name, p in declared().items() if entry(p).get("visible", True)}
+
+
+def same(value: float | str, usual: float | str) -> bool:
+    """Whether a parameter is what it would be by itself, but for rounding."""
+    return value == usual if isinstance(value, str) else bool(np.isclose(value, usual, 1e-9, 0))
+
+
+def said(value: float | str) -> str:
+    """A parameter's value as text."""
+    return value if isinstance(value, str) else f"{value:.6g}"
+
+
+def table(columns: list[tuple[str, np.ndarray, Units]]) -> dict:
+    """Heads with units by size, and rows of text."""
+    heads, cells = [], []
+    for head, values, units in columns:
+        name, factor = unit([np.nan_to_num(values)], units)
+        heads.append(f"{head} [{name}]")
+        cells.append([f"{v * factor + 0.0:.4g}" if np.isfinite(v) else "-" for v in values])
+    return {"heads": heads, "rows": list(zip(*cells, strict=True))}
+
+
+def levels_table(result: Results) -> dict:
+    """The history at the requested levels and where the run has stopped; where the resultant is."""
+    history, case = result.history, result.case
+    rows = np.flatnonzero([np.isclose(case.requested, t).any() for t in history["time"]])
+    if len(history["time"]):
+        rows = np.union1d(rows, len(history["time"]) - 1)
+    shown = [
+        (head, history[name][rows], units)
+        for name, head, units in SHOWN
+        if (name != "flux" or case["uplift"] == "flow")
+        and (name != "tail_level" or history[name].any())
+    ]
+    found = table(shown)
+    length = case.joint_length
+    found["heads"].append("N' meets")
+    where = (gravity.position(x, length) for x in history["x_resultant"][rows])
+    found["rows"] = [(*row, at) for row, at in zip(found["rows"], where, strict=True)]
+    return found
+
+
+def loads_table(result: Results) -> dict:
+    """The loads on the body above the joint, and the uplift, at the last level."""
+    rows = hand_calculation(result).table()
+    heads = ("downstream", FORCES), ("upwards", FORCES), ("moment about the toe", MOMENTS)
+    names, *columns = rows.values()
+    found = table([(h, np.array(v), u) for (h, u), v in zip(heads, columns, strict=True)])
+    named = [(name, *row) for name, row in zip(names, found["rows"], strict=True)]
+    return {"heads": ["load", *found["heads"]], "rows": named}
+
+
+def check_of(result: Results) -> Check:
+    """Both answers at the last level."""
+    return Check(by_finite_elements(result), by_gravity(hand_calculation(result)))
+
+
+def check_table(found: Check) -> dict:
+    """The finite elements' answer beside the gravity method's, and what is required."""
+    heads, *rows = picture_table(found)
+    return {"heads": heads, "rows": rows}
+
+
+def pictures_of(solution: Solution) -> list[dict[str, str]]:
+    """The pictures of a run with their captions, as data addresses."""
+    result = solution.result
+    case, time = result.case, pictures.shown_time(result)
+    level = result.state(time)["level"]
+    section, joint, history = figure_of(5.2, 5.8), figure_of(5.2, 5.8), figure_of(10.6, 2.4)
+    pictures.draw_dam(section, solution, time)
+    pictures.draw_joint(joint, result, time)
+    pictures.draw_history(history, result)
+    found = [
+        ("half", section, f"The dam and its loads at level {level:.4g} m, deformed."),
+        (
+            "half",
+            joint,
+            f"The joint at level {level:.4g} m: jumps, normal stress, shear. Red: open or broken; "
+            "orange: slipped.",
+        ),
+        ("whole", history, "All converged steps."),
+    ]
+    if case["dim"] == 3 and solution.fields:
+        solid = figure_of(10.6, 4.4)
+        pictures.draw_solid(solid, solution, time)
+        found.append(("whole", solid, "In 3D: deformed, and the joint unrolled."))
+    if case["drive"] != "level":
+        found.append(("half", pictures.draw_curve(result), "Load against opening."))
+    return [{"size": s, "caption": c, "address": embedded(f)} for s, f, c in found]
+
+
+def embedded(figure: Figure) -> str:
+    """A figure as a data address: SVG, what is dense in it as dots."""
+    file = io.BytesIO()
+    figure.savefig(file, format="svg", dpi=DPI, metadata={"Date": None})
+    return "data:image/svg+xml;base64," + base64.b64encode(file.getvalue()).decode()
+
+
+def facts(result: Results) -> list[tuple[str, str]]:
+    """Mesh, solver, versions, times."""
+    case, told = result.case, result.info
+    mesh, seconds = told["mesh"], told["wall_seconds"]
+    versions = ", ".join(f"{name} {number}" for name, number in told["versions"].items())
+    return [
+        (
+            "mesh",
+            f"{mesh['nodes']} nodes, {mesh['elements']} elements, {mesh['joint_elements']} in the "
+            f"joint ({case['n_joint']:g} from heel to toe), order {case['order']:g}; "
+            f"{told['unknowns']} unknowns",
+        ),
+        (
+            "stiffness of the joint over that of an element, K_N h/E",
+            f"{stiffness_ratio(result):.3g}",
+        ),
+        (
+            "error of the mesh",
+            "not estimated for this dam; repeat the run with twice n_joint to see it",
+        ),
+        (
+            "steps",
+            f"{len(result.history['time'])} converged, {result.history['iterations'].sum():.0f} "
+            f"iterations; largest remaining residual "
+            f"{result.history['residual'].max(initial=0):.1g} of the force of the highest water",
+        ),
+        ("engine", ", ".join(filter(None, [told["engine"], told.get("factorisation")]))),
+        ("seconds", ", ".join(f"{name} {value:.2g}" for name, value in seconds.items())),
+        ("versions", versions),
+    ]

@@ -1,0 +1,134 @@
+"""What a picture takes from the mesh: outlines, faces that water stands against; units by size."""
+
+import numpy as np
+import pytest
+from damjoint.results.fields import along, distance, row_of_nodes
+from damjoint.results.outline import filled, section_of, skin
+from damjoint.results.units import FORCES, LENGTHS, told, unit
+from damjoint.scene.mesh import Body
+from numpy.testing import assert_allclose
+
+
+def body(points, **quads):
+    """Of some regions."""
+    points = np.array([(*p, 0.0) for p in points])
+    cells = [("quad", np.array(some)) for some in quads.values()]
+    return Body(points, np.arange(len(points)), cells, np.arange(len(quads)), list(quads))
+
+
+@pytest.fixture
+def lift():
+    """A dam with a batter 1:4 and a slope 1:1 upon a block of itself on rock; the joint at y = 4
+    from x = 1 to x = 8, the crest at y = 8 from 2 to 4."""
+    bodies = {
+        "dam": body([(1, 4), (8, 4), (4, 8), (2, 8)], dam=[(0, 1, 2, 3)]),
+        "foundation": body(
+            [(x, 0) for x in (-5, 0, 12, 20)]
+            + [(x, -3) for x in (20, 12, 0, -5)]
+            + [(1, 4), (8, 4)],
+            foundation=[(0, 7, 6, 1), (1, 6, 5, 2), (2, 5, 4, 3)],
+            lower=[(1, 8, 9, 2)],  # clockwise
+        ),
+    }
+    still = {name: np.zeros_like(b.points) for name, b in bodies.items()}
+    return bodies, still, np.array([(1.0, 4.0), (8.0, 4.0)])
+
+
+def area(polygon):
+    x, y = polygon.T
+    return abs(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)) / 2
+
+
+def test_outlines_of_a_lift_joint(lift):
+    bodies, still, ends = lift
+    section = section_of(bodies, still, 1.0, ends)
+    assert_allclose(section.upstream, [(2, 8), (1, 4)])
+    assert_allclose(section.downstream, [(8, 4), (4, 8)])
+    assert_allclose(section.crest, [(4, 8), (2, 8)])
+    assert_allclose(section.floor, [(1, 4), (0, 0), (-5, 0)])
+    assert_allclose(section.bed, [(20, 0), (12, 0), (8, 4)])
+    for plane, lip in section.lips:
+        assert_allclose(plane.points[lip], ends)
+    assert {name: len(*tables) for name, tables in section.under.faces.items()} == {
+        "foundation": 3,
+        "lower": 1,
+    }
+    assert_allclose(section.dam.centroid[1], 4 + 4 / 3 * (7 + 2 * 2) / (7 + 2))
+
+
+@pytest.mark.parametrize(
+    "level, held",
+    [(0, 0), (2, 2 * (5 + 2 / 8)), (6, 6 * (5 + 6 / 8)), (9, 8 * (5 + 1) + 5 + 2 + 2)],
+)
+def test_water_up_to_a_level(lift, level, held):
+    """Beside a batter 1:4 from the rock's end on; over the crest as far as it goes."""
+    polygon = section_of(*lift[:2], 1.0, lift[2]).reservoir(level)
+    assert (area(polygon) if len(polygon) else 0) == pytest.approx(held)
+
+
+def test_water_follows_the_dam(lift):
+    """Tailwater beside a slope 1:1 of a dam that has moved by 0.5 m, ten times exaggerated."""
+    bodies, still, ends = lift
+    section = section_of(bodies, still | {"dam": still["dam"] + (0.05, 0, 0)}, 10.0, ends)
+    below, above = 4 * (8 + 2), 2 * (20 - 8 - 0.5 + 1)
+    assert area(section.tailwater(6)) == pytest.approx(below + above)
+    assert_allclose(section.crest[:, 0], (4.5, 2.5))
+
+
+def test_no_section_where_none_is_seen(lift):
+    """A dam that touches the lowest z nowhere with a face."""
+    bodies, still, ends = lift
+    bodies["dam"].points[:2, 2] = 1.0
+    assert section_of(bodies, still, 1.0, ends) is None
+
+
+def test_a_shore_with_an_overhang():
+    shore = np.array([(0.0, 3.0), (1.0, 2.0), (0.0, 1.0), (0.0, 0.0), (-2.0, 0.0)])
+    assert area(filled(shore, 2.0)) == pytest.approx(2 * 2 + 0.5)
+
+
+def test_skin_of_a_solid():
+    """Two tetrahedra that share a face."""
+    points = np.vstack([np.zeros(3), np.eye(3), np.ones(3)])
+    tets = [("tetra", np.array([(0, 1, 2, 3), (4, 1, 2, 3)]))]
+    ((faces, owners),) = skin(Body(points, np.arange(5), tets, np.arange(2)))
+    assert len(faces) == 6 and {1, 2, 3} not in map(set, faces.tolist())
+    assert sorted(owners) == [0, 0, 0, 1, 1, 1]
+
+
+def test_rows_of_a_broken_joint():
+    """A step in the joint: two nodes at the same x and z; curves go by the distance."""
+    rows = {
+        "x": np.array([0, 1, 1, 2.0]),
+        "y": np.array([0, 0, 1, 1.0]),
+        "z": np.zeros(4),
+        "s": np.array([0, 1, 2, 3.0]),
+        "p": np.array([3, 2, 1, 0.0]),
+    }
+    points = np.column_stack([rows[axis] for axis in "xyz"])[::-1]
+    joint = Body(points, np.arange(4), [], np.arange(0))
+    assert row_of_nodes(joint, rows).tolist() == [3, 2, 1, 0]
+    assert_allclose(along(rows)["p"], [3, 2, 1, 0])
+    assert_allclose(distance({"x": rows["x"]}), rows["x"])  # flat: no column of its own
+
+
+def test_curves_of_a_joint_whose_nodes_stand_in_no_rows():
+    """A pressure linear in the distance stays so; the parts are as many as nodes go across."""
+    s, z = np.random.default_rng(1).uniform(size=(2, 400))
+    curves = along({"x": s, "z": z, "s": s, "p": 3 - s})
+    assert len(curves["s"]) == 20
+    assert_allclose(curves["p"], 3 - curves["s"], atol=0.025)
+
+
+@pytest.mark.parametrize(
+    "value, units, said",
+    [
+        (1.2683e7, FORCES, "12.68 MN/m"),
+        (150e3, FORCES, "150 kN/m"),
+        (4.2e-7, LENGTHS, "420 nm"),
+        (0.0, LENGTHS, "0 nm"),
+    ],
+)
+def test_units_by_size(value, units, said):
+    assert told(value, units) == said
+    assert unit([np.array([0, -value])], units)[0] == said.split()[1]
