@@ -34,7 +34,7 @@ def parameters_page() -> str:
         "[cases/ssnp142.case](../cases/ssnp142.case) has those of the verification case. "
         "A parameter whose default is -1 follows others.",
         "The loading is a list in the case file, or an option: `levels() = {30, 40, 45};` "
-        "(`--levels`) [m above the joint], level number i being reached at t = i, from 0 at t = 0; "
+        "(`--levels`) [m above the base], level number i being reached at t = i, from 0 at t = 0; "
         "`tail_levels()` (`--tail-levels`) likewise, one value for all or as many as levels; "
         "`times()` (`--steps` between two levels) the converged steps. Default: two thirds and "
         "eight ninths of the height, and the crest. The Gmsh window has them as numbers, in the "
