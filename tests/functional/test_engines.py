@@ -130,13 +130,30 @@ SCENES = {
     "c without adhesion": {"adhesion": 0.0},
     "e bond": BOND,
     "f bond": COARSE | BOND,
-    # where the weight comes first
     # the crack grouted, and the level lowered; the bond sawn away
     "a grouted": {"grout_pressure": 1e4, "grout_t": 3.5, "levels": "3,6,9,9,2"},
     "a sawn": {"saw_thickness": 1e-6, "saw_t": 2.0, "levels": "3,6,6,8"},
     "g weak": {"mu": 0.06, "adhesion": 0.0, "pena_tang": 0.0, "nu": 0.3, "E": 1e10, "levels": "2"},
     "c stiff, no hardening": {"K_T": 9e14, "mu": 0.06, "pena_tang": 0.0, "levels": "1,2"},
     "i soft, no strength": {"E": 1e10, "sigma_max": 0.0, "K_N": 1e11, "K_T": 5e10, "nu": 0.2},
+}
+#: Sections and loads of the 45 m dam: what changes, levels, tailwater.
+SMALL = {"n_joint": 20.0, "h_dam": 8.0, "h_found": 30.0}
+SHAPE = {"batter": 4.0, "batter_height": 20.0, "neck_height": 6.0}
+STAGED = {"silt_height": 12.0, "ice_force": 1e5, "ice_level": 40.0, "anchor_force": 2e6}
+STAGED |= {"anchor_angle": 10.0, "k_h": 0.1, "k_v": 0.05, "floor_water": 1.0, "force_x": 3e4}
+SOLID = {"dim": 3.0, "thickness": 3.0, "n_layers": 2.0, "mesh_pattern": "split", "n_joint": 10.0}
+SECTIONS = {
+    "all loads": (SHAPE | STAGED, "20,41", "0"),
+    "lift, all loads": (SHAPE | STAGED | {"joint_height": 10.0, "law": "bond"}, "20,41", "0"),
+    "falling base": ({"joint_slope": -4.0, "law": "friction", "adhesion": 4e5}, "30,44", "2"),
+    "sloping lift": ({"joint_height": 20.0, "joint_slope": 3.0} | SHAPE, "30,46.5", "0,24"),
+    "drains, overtopped": ({"uplift": "drained", "joint_slope": 3.0}, "20,46.5", "0,5"),
+    "cracked": ({"uplift": "cracked", "sigma_max": 1e5}, "20,40,45", "0,0,5"),
+    "cracked bond": ({"uplift": "cracked", "law": "bond", "joint_slope": 2.0}, "20,40,46", "0"),
+    "flow driven": ({"uplift": "flow", "drive": "crest", "drive_by": 1e-3}, "20,40", "0"),
+    "solid": (SOLID | SHAPE | {"joint_slope": 4.0, "silt_height": 12.0, "k_h": 0.1}, "20,41", "0"),
+    "solid lift, flow": (SOLID | {"joint_height": 20.0, "uplift": "flow"}, "30,41", "0"),
 }
 
 
@@ -145,7 +162,18 @@ SCENES = {
 def test_engines_agree(scene, tmp_path):
     """Whole loadings to the end: the same joint.csv to 1e-6 of the largest jump, stress, ..."""
     settings = dict(SCENES[scene])
-    case = load(scene[0], settings, settings.pop("levels", None))
+    agree(load(scene[0], settings, settings.pop("levels", None)), tmp_path)
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("scene", SECTIONS)
+def test_engines_agree_on_sections_and_loads(scene, tmp_path):
+    settings, levels, tails = SECTIONS[scene]
+    agree(load("dam", SMALL | {"tolerance": 1e-10} | settings, levels, tails), tmp_path)
+
+
+def agree(case, tmp_path):
+    """The same joint.csv to 1e-6 of the largest jump, stress, ..."""
     plain, fast = (
         run.run(case, tmp_path / name, fields=False, picture=False, progress=False, engine=name)
         for name in ("getdp", "condensed")
