@@ -16,7 +16,7 @@ CLIPPED = 0b111
 
 def clip(case: Case) -> None:
     """Have Gmsh cut a large foundation to what is of interest."""
-    left, right, bottom = frame(case)
+    left, right, bottom, _ = frame(case)
     for i, plane in enumerate(((1, 0, 0, -left), (-1, 0, 0, right), (0, 1, 0, -bottom))):
         beyond = plane[3] + 0.05 * case["dam_height"]  # what is shown whole moves, too
         for name, value in zip("ABCD", (*plane[:3], beyond), strict=True):
@@ -52,7 +52,7 @@ def aim(case: Case, graphs: float) -> None:
     """Place and scale the scene: all of it in the whole window, or its frame on the left of graphs
     of so many pixels.
     """
-    left, right, bottom = frame(case)
+    left, right, bottom, top = frame(case)
     solid = case["dim"] == 3
     if not graphs:
         left, right = -case["found_side"], case["dam_base"] + case["found_side"]
@@ -61,7 +61,7 @@ def aim(case: Case, graphs: float) -> None:
         bottom -= 4 * MAPS * case["dam_height"]
     depth = case["thickness"] if solid else 0.0
     corners = np.array(
-        [(x, y, z) for x in (left, right) for y in (bottom, case["dam_height"]) for z in (0, depth)]
+        [(x, y, z) for x in (left, right) for y in (bottom, top) for z in (0, depth)]
     )
     low, high = (
         np.array([gmsh.option.getNumber(f"General.{end}{axis}") for axis in "XYZ"])

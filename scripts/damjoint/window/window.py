@@ -247,7 +247,7 @@ class Session:
         tree.drop_plain_levels()
         if self.water:
             self.water.close()
-        self.water = views.outline_water(case)
+        self.water = views.show_planned(case)
         self.outline(True)
         camera.turn_to(case["dim"] == 3)
         self.aim(case, False)
