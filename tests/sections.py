@@ -18,7 +18,9 @@ def clip(polygon, point, direction):
         if heights[i] * heights[k] < 0 and min(abs(heights[i]), abs(heights[k])) > 1e-9:
             share = heights[i] / (heights[i] - heights[k])
             found.append(polygon[i] + share * (polygon[k] - polygon[i]))
-    return np.array(found)
+    found = np.array(found)
+    apart = np.linalg.norm(found - np.roll(found, 1, axis=0), axis=1) > 1e-9
+    return found[apart]
 
 
 def outline(case):

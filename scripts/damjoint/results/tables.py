@@ -107,7 +107,7 @@ class Results:
     info: dict = field(default_factory=dict)
 
     def at(self, time: float | None = None) -> dict[str, np.ndarray]:
-        """The joint rows of a requested time, the last one by default, sorted by x and z."""
+        """The joint rows of a requested time, the last one by default, from heel to toe."""
         return rows_at(self.joint, time)
 
     def at_extrapolated(self, time: float | None = None) -> dict[str, np.ndarray]:
@@ -126,18 +126,19 @@ class Results:
 
 
 def rows_at(table: dict[str, np.ndarray], time: float | None = None) -> dict[str, np.ndarray]:
-    """The rows of one time (the last one by default), sorted by x, then z."""
+    """The rows of one time (the last one by default), sorted from heel to toe, then by z."""
     time = table["time"].max() if time is None else time
     rows = np.flatnonzero(np.isclose(table["time"], time))
-    x, z = (np.round(table[n][rows] / max(np.abs(table["x"]).max(), 1e-300), 9) for n in "xz")
-    rows = rows[np.lexsort((z, x))]
+    s, z = (np.round(table[n][rows] / max(np.abs(table["s"]).max(), 1e-300), 9) for n in "sz")
+    rows = rows[np.lexsort((z, s))]
     return {name: column[rows] for name, column in table.items()}
 
 
 def joint_table(case: Case, blocks: list[np.ndarray]) -> dict[str, np.ndarray]:
-    """The joint's table from blocks of rows, one per requested time: time ..
+    """The joint's table from blocks of rows, one per requested time: time .. s, and flux where
+    water flows.
 
-    slip, and flux where water flows.     Adds sigma_n_eff and sorts each block by x, then z.
+    Adds sigma_n_eff and sorts each block from heel to toe, then by z.
     """
     flowing = case["uplift"] == "flow"
     given = [*list(JOINT)[:-1], *(FLUX if flowing else ())]
@@ -160,7 +161,7 @@ def history_table(case: Case, rows: dict[str, np.ndarray]) -> dict[str, np.ndarr
     factor = np.divide(rows["level"], scheduled, out=np.ones_like(scheduled), where=scheduled > 0)
     # where M = N (length - x)
     arm = np.divide(rows["M"], rows["N"], out=np.full_like(scheduled, np.nan), where=rows["N"] > 0)
-    rows = rows | {"load_factor": factor, "x_resultant": case.section["joint_length"][0] - arm}
+    rows = rows | {"load_factor": factor, "x_resultant": case.joint_length - arm}
     return {name: rows[name] for name in HISTORY}
 
 

@@ -45,7 +45,7 @@ def loose_from(results: Results) -> float | None:
     """
     if results.case["law"] == "bond":
         return None
-    history, base = results.history, results.case["dam_base"]
+    history, base = results.history, results.case.joint_length
     gone = np.maximum(history["slip_length"], history["crack_length"]) > base * (1 - 1e-9)
     if gone.any() and gone[-1]:
         return float(history["level"][np.flatnonzero(~gone)[-1] + 1 if not gone.all() else 0])
@@ -64,7 +64,7 @@ def why_stopped(results: Results) -> str:
     remains once it has gone, mu N; or the whole joint has let go.
     """
     case, last = results.case, results.last
-    base = case["dam_base"]
+    base = case.joint_length
     if last["crack_length"] > 0.8 * base or last["M"] < 0.1 * last["N"] * base:
         return "overturning"
     if case["law"] == "friction":
@@ -116,7 +116,7 @@ STIFF = 100
 def stiffness_ratio(results: Results) -> float:
     """K_N h/E: the joint's stiffness over that of the bulk within an element's length h."""
     case = results.case
-    length = case["dam_base"] / case["n_joint"]
+    length = case.joint_length / case["n_joint"]
     return case["K_N"] * length / min(case["E_dam"], case["E_found"])
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -35,7 +36,7 @@ SHARED = (
 #: What pro/section.pro finds of the section: the joint's ends, the faces' segments, the marks where
 #: line forces act.
 SECTION = (
-    *("heel_x", "heel_y", "toe_x", "toe_y", "joint_length", "crest_x", "neck_y"),
+    *("heel_x", "heel_y", "toe_x", "toe_y", "joint_length", "joint_along", "crest_x", "neck_y"),
     *("seg_side", "seg_body", "seg_x0", "seg_y0", "seg_x1", "seg_y1"),
     *("mark_region", "mark_x", "mark_y", "mark_segment"),
 )
@@ -59,6 +60,8 @@ class Case:
     published: bool = False
     #: whether pena_tang has been set: a dam whose whole joint slips is meant to stand on it
     hardening_asked: bool = False
+    #: the user's own geometry instead of the section by parameters
+    geometry: Path | None = None
     #: what the solvers share besides the parameters: {name: values}, from pro/parameters.pro
     shared: dict[str, list[float]] = field(default_factory=dict, compare=False, repr=False)
     #: the section, by the names of pro/section.pro
@@ -66,6 +69,21 @@ class Case:
 
     def __getitem__(self, name: str) -> float | str:
         return self.values[name]
+
+    @property
+    def joint_length(self) -> float:
+        """From heel to toe, straight [m]."""
+        return self.section["joint_length"][0]
+
+    @property
+    def size(self) -> float:
+        """A length of the dam [m]: what is small beside it is small."""
+        return self.joint_length if self.geometry else self["dam_height"]
+
+    @property
+    def joint_along(self) -> float:
+        """From heel to toe along the joint [m]; a mean in 3D."""
+        return self.section["joint_along"][0]
 
     @property
     def requested(self) -> tuple[float, ...]:
@@ -182,12 +200,16 @@ def load(
     text = assignments(said.defaults | checked)
     found = parse(text + "".join(listing(n, v) for n, v in lists.items()) + INCLUDE)
     check_energies(found)
-    check_section(found)
+    geometry = said.texts.get("geometry")
+    geometry = geometry and own_geometry(geometry)
+    if not geometry:
+        check_section(found)
     values = {name: known[name].check(found[name][0]) for name in known}
-    heights = check_levels("levels", found["levels"], values)
+    most = math.inf if geometry else 2 * values["dam_height"]
+    heights = check_levels("levels", found["levels"], most)
     if tail_levels is not None:
         own_tail = numbers("tail_levels", tail_levels)
-    tails = check_levels("tail_levels", own_tail, values)
+    tails = check_levels("tail_levels", own_tail, most)
     if len(set(tails)) == 1:
         tails = tails[:1] * len(heights)
     if len(tails) != len(heights):
@@ -227,9 +249,30 @@ def load(
         also,
         as_published(path, checked, levels, tail_levels),
         bool(found["hardening_asked"][0]),
+        geometry,
         shared,
         {n: found[n] for n in SECTION},
     )
+
+
+#: Set to 1: Gmsh may run a user's .geo file, a program that can do anything the user can.
+RUN_GEO = "DAMJOINT_RUN_GEO"
+
+
+def own_geometry(name: str) -> Path:
+    """The file of a user's own geometry.
+
+    Raises InputError if it is not there, or is a program that nobody has allowed to run.
+    """
+    path = Path(name)
+    if not path.is_file():
+        raise InputError(f"geometry = {name}: must be a file, a mesh that Gmsh reads or a .geo")
+    own = data("geo").resolve() in path.resolve().parents
+    if path.suffix == ".geo" and not own and os.environ.get(RUN_GEO) != "1":
+        raise InputError(
+            f"geometry = {name}: is a program that Gmsh runs; if you trust it, say --run-geo"
+        )
+    return path
 
 
 def check_energies(found: Mapping[str, list]) -> None:
@@ -305,13 +348,14 @@ def check_drains(values: Mapping, length: float) -> None:
     """Raise InputError if the drains are not under the dam, or do not suit a driven scene; length:
     of the joint [m].
     """
-    if values["uplift"] != "drained":
+    drained = values["uplift"] == "drained"
+    if not drained and not (values["drains"] and values["uplift"] in ("cracked", "flow")):
         return
     if not values["drain_x"] < length:
         raise InputError(
             f"drain_x = {values['drain_x']:g}: must be < the joint's length ({length:g} m)"
         )
-    if values["drive"] != "level" and values["drain_level"] > 0:
+    if drained and values["drive"] != "level" and values["drain_level"] > 0:
         raise InputError(
             f"drain_level = {values['drain_level']:g}: must be 0 with drive = {values['drive']} "
             "(the pressure has to be linear in the level)"
@@ -343,17 +387,15 @@ def numbers(name: str, text: str) -> list[float]:
     return found
 
 
-def check_levels(name: str, levels: Iterable[float], values: Mapping) -> tuple[float, ...]:
+def check_levels(name: str, levels: Iterable[float], most: float) -> tuple[float, ...]:
     """Water levels [m].
 
-    Raises InputError if one is negative or above twice the dam's height.
+    Raises InputError if one is negative or above `most`, twice the dam's height.
     """
     for level in levels:
-        if not 0 <= level <= 2 * values["dam_height"]:
-            raise InputError(
-                f"{name} = {level:g}: must be between 0 and twice the dam's height "
-                f"({2 * values['dam_height']:g} m)"
-            )
+        if not 0 <= level <= most:
+            limit = f"between 0 and twice the dam's height ({most:g} m)"
+            raise InputError(f"{name} = {level:g}: must be {limit if most < math.inf else '>= 0'}")
     return tuple(levels)
 
 

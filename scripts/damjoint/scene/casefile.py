@@ -5,6 +5,7 @@ A case is a list of statements, in any layout, with // and /* */ comments:
     Include "other.case";            the statements of another case file, beside this one
     title = "words";
     also_uplift = "none";            further uplift modes the case is published with
+    geometry = "own.msh";            a mesh or .geo of one's own, beside this file
     default_<parameter> = value;     a text; arithmetic with + - * / ^ ( ), Pi, defaults set before
     levels() = {value, ...};         tail_levels() and times() likewise
 """
@@ -23,7 +24,7 @@ from .. import InputError
 from .parameters import assignments, parameter
 
 LISTS = ("levels", "tail_levels", "times")
-TEXTS = ("title", "also_uplift")
+TEXTS = ("title", "also_uplift", "geometry")
 #: Bytes a case file may have, and files that may include one another.
 LONGEST, DEEPEST = 1_000_000, 8
 
@@ -120,7 +121,10 @@ def take(found: CaseText, statement: list, path: Path, depth: int, where: str) -
     elif kinds[:1] == ("name",) and tokens[1:2] == ("=",) and tokens[0] in TEXTS:
         if kinds[2:] != ("text",):
             raise InputError(f'{where}: must be {tokens[0]} = "words"')
-        found.texts[tokens[0]] = tokens[2][1:-1]
+        words = tokens[2][1:-1]
+        found.texts[tokens[0]] = (
+            str((path.parent / words).absolute()) if (tokens[0] == "geometry") else words
+        )
     elif kinds[:1] == ("name",) and tokens[1:2] == ("=",) and tokens[0].startswith("default_"):
         name = tokens[0].removeprefix("default_")
         try:
@@ -135,7 +139,7 @@ def take(found: CaseText, statement: list, path: Path, depth: int, where: str) -
         raise InputError(
             f"{where}: not a statement of a case; allowed: "
             + (f"{near[0]} (did you mean that?), " if near else "")
-            + 'Include "file.case", title, also_uplift, default_<parameter> = value, '
+            + 'Include "file.case", title, also_uplift, geometry, default_<parameter> = value, '
             + "levels() = {...}, tail_levels() = {...}, times() = {...}"
         )
 

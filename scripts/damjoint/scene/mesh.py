@@ -11,7 +11,7 @@ import gmsh
 import numpy as np
 from scipy import sparse
 
-from .. import RunError, data
+from .. import InputError, RunError, data
 from .case import Case
 from .parameters import assignments, constants, start_gmsh
 
@@ -61,6 +61,37 @@ SHAPES = {
 }
 
 
+#: Names of the physical groups of a user's own geometry: bodies and lines, faces by side and body.
+OWN_NAMES = {
+    "dam": "dam",
+    "foundation": "foundation",
+    "lower dam": "lower",
+    "joint": "joint",
+    "fixed": "fixed",
+    "z faces": "sides",
+    "heel": "heel",
+    "toe": "toe",
+    "crest": "crest",
+    "ice": "ice",
+    "force": "force",
+    "anchor": "anchor",
+}
+OWN_FACES = {
+    "upstream": (True, "up"),
+    "downstream": (True, "down"),
+    "crest surface": (True, "top"),
+    "lower upstream": (False, "up"),
+    "lower downstream": (False, "down"),
+    "reservoir floor": (False, "floor"),
+    "tailwater bed": (False, "bed"),
+}
+
+
+def dimension(region: str, dim: int) -> int:
+    """The dimension of a region's elements in 2D or 3D."""
+    return 0 if region == "crest" else dim - REGIONS[region]
+
+
 @dataclass
 class Body:
     """One region of the mesh, or several: points (n, 3), their node tags, cells by shape, element
@@ -103,50 +134,81 @@ def shares(case: Case) -> dict[str, float | str]:
     return {name: case[name] for name in names} | there
 
 
+def heel_normal(joint: Body, heel: Body) -> np.ndarray:
+    """The joint's normal at its heel, a mean of the elements there."""
+    near = [np.isin(joint.node_tags[t], heel.node_tags).any(axis=1) for _, t in joint.cells]
+    return joint.normals[np.concatenate(near)].mean(axis=0)
+
+
+#: The mesh last made, by what it was made of: a user's own one is looked at before it is used.
+LAST: dict[str, tuple] = {}
+
+
+def mesh_of(case: Case) -> Mesh:
+    """The mesh of a case; the last one, if it is that of a user's own geometry and still Gmsh's."""
+    if not case.geometry:
+        return Mesh(case)
+    told = case.geometry.stat()
+    key = case.geometry, told.st_mtime_ns, told.st_size, tuple(case.values.items())
+    if LAST.get("key") != key or LAST["model"] != gmsh.model.getFileName():
+        mesh = Mesh(case)
+        LAST.update(key=key, mesh=mesh, model=gmsh.model.getFileName())
+    return LAST["mesh"]
+
+
+def generate(case: Case) -> None:
+    """Make the mesh of a case Gmsh's current one.
+
+    Raises RunError, and InputError if a user's own geometry can not be read.
+    """
+    start_gmsh()
+    gmsh.clear()
+    gmsh.parser.clear()
+    gmsh.onelab.clear()
+    own = case.geometry
+    with tempfile.NamedTemporaryFile("w", suffix=".geo") as file:
+        path = own or Path(file.name)
+        if not own:
+            file.write(assignments(shares(case)) + f'Include "{data("geo")}/dam.geo";\n')
+        elif own.suffix == ".geo":  # it may take sizes from the case
+            file.write(assignments(case.values) + f'Include "{own}";\n')
+            path = Path(file.name)
+        file.flush()
+        try:
+            gmsh.open(str(path))
+            if not len(gmsh.model.mesh.getElements(int(case["dim"]))[0]):
+                gmsh.model.mesh.generate(int(case["dim"]))
+        except Exception as error:  # what gmsh raises
+            if own:
+                raise InputError(f"geometry = {own}: {error}") from None
+            raise RunError(f"mesh: {error}") from None
+
+
 class Mesh:
     """The mesh of a case: its bodies by the names of REGIONS (foundation: with what lies under a
     lift joint), its faces, and its size.
 
-    Raises RunError with Gmsh's message if there is no mesh for the parameters.
+    Raises RunError with Gmsh's message if there is no mesh for the parameters, InputError if a
+    user's own geometry is not what is needed.
     """
 
     def __init__(self, case: Case) -> None:
         start = time.perf_counter()
-        start_gmsh()
-        gmsh.clear()
-        gmsh.parser.clear()
-        gmsh.onelab.clear()
-        dim = int(case["dim"])
-        with tempfile.NamedTemporaryFile("w", suffix=".geo") as file:
-            file.write(assignments(shares(case)) + f'Include "{data("geo")}/dam.geo";\n')
-            file.flush()
-            try:
-                gmsh.open(file.name)
-                gmsh.model.mesh.generate(dim)
-            except Exception as error:  # what gmsh raises
-                raise RunError(f"mesh: {error}") from None
-        self.dim = dim
+        self.dim, self.own = int(case["dim"]), case.geometry
+        generate(case)
         self._read()
-        numbers = constants()
-        present = {group for _, group in gmsh.model.getPhysicalGroups()}
-        tag_of = {name: int(numbers[name.upper()][0]) for name in REGIONS}
-        there = [n for n in REGIONS if tag_of[n] in present and (n != "sides" or dim == 3)]
-        if missing := [name for name in NEEDED if name not in there]:
-            raise RunError(f"mesh: no {missing[0]}; look at the geometry's proportions")
-        groups = {name: [(name, tag_of[name])] for name in there if name != "lower"}
-        if "lower" in there:
-            groups["foundation"].append(("lower", tag_of["lower"]))
+        regions = self._own_regions() if self.own else self._section_regions(case)
+        bodies, faces = regions
+        groups = {name: [(name, tag)] for name, tag in bodies.items() if name != "lower"}
+        if "lower" in bodies:
+            groups["foundation"].append(("lower", bodies["lower"]))
         self.bodies = {
-            name: self._body(0 if name == "crest" else dim - REGIONS[name], parts)
-            for name, parts in groups.items()
+            name: self._body(dimension(name, self.dim), parts) for name, parts in groups.items()
         }
-        first, section = int(numbers["SEGMENT"][0]), case.section
         self.faces = {}
-        for i, side in enumerate(section["seg_side"]):
-            ends = section["seg_y0"][i], section["seg_y1"][i]
-            upper = section["seg_body"][i] == numbers["UPPER"][0]
-            surface = self._body(dim - 1, [(f"face{i}", first + i)])
-            self.faces[f"face{i}"] = Face(surface, upper, SIDES[int(side)], min(ends), max(ends))
+        for i, (tag, upper, side, low, high) in enumerate(faces):
+            surface = self._body(self.dim - 1, [(f"face{i}", tag)])
+            self.faces[f"face{i}"] = Face(surface, upper, side, low, high)
         self._turn_outwards()
         joint = self.bodies["joint"].element_tags
         if joint.max() >= 1_000_000:  # the keys of the joint's memory in GetDP hold six digits
@@ -155,6 +217,61 @@ class Mesh:
             )
         #: wall seconds it took
         self.seconds = time.perf_counter() - start
+
+    def _section_regions(self, case: Case) -> tuple[dict[str, int], list[tuple]]:
+        """Physical groups of the bodies, and of the faces with what is known of them."""
+        numbers = constants()
+        present = {group for _, group in gmsh.model.getPhysicalGroups()}
+        tag_of = {name: int(numbers[name.upper()][0]) for name in REGIONS}
+        bodies = {
+            n: t for n, t in tag_of.items() if t in present and (n != "sides" or self.dim == 3)
+        }
+        if missing := [name for name in NEEDED if name not in bodies]:
+            raise RunError(f"mesh: no {missing[0]}; look at the geometry's proportions")
+        faces, section = [], case.section
+        for i, side in enumerate(section["seg_side"]):
+            ends = section["seg_y0"][i], section["seg_y1"][i]
+            upper = section["seg_body"][i] == numbers["UPPER"][0]
+            tag = int(numbers["SEGMENT"][0]) + i
+            faces.append((tag, upper, SIDES[int(side)], min(ends), max(ends)))
+        return bodies, faces
+
+    def _own_regions(self) -> tuple[dict[str, int], list[tuple]]:
+        """The same by the names of the physical groups; they get the numbers of the package's
+        own geometries.
+        """
+        numbers, named = constants(), {}
+        for d, tag in gmsh.model.getPhysicalGroups():
+            if name := gmsh.model.getPhysicalName(d, tag).strip().lower():
+                if name not in OWN_NAMES | OWN_FACES:
+                    allowed = ", ".join([*OWN_NAMES, *OWN_FACES])
+                    raise self._bad(f'region "{name}" is not known; allowed: {allowed}')
+                here = d, gmsh.model.getEntitiesForPhysicalGroup(d, tag)
+                named[name] = here
+        missing = [name for name, region in OWN_NAMES.items() if region in NEEDED]
+        missing = [name for name in missing if name not in named]
+        if missing:
+            raise self._bad(f"no region {', '.join(missing)}; the names of physical groups count")
+        gmsh.model.removePhysicalGroups()
+        bodies, faces = {}, []
+        for name, (d, entities) in named.items():
+            region = OWN_NAMES.get(name, "joint")  # a face is as large as the joint
+            if d != dimension(region, self.dim):
+                raise self._bad(
+                    f'region "{name}" has dimension {d}: must be {dimension(region, self.dim)} '
+                    f"with dim = {self.dim}"
+                )
+            if name in OWN_NAMES:
+                tag = bodies[region] = int(numbers[region.upper()][0])
+            else:
+                tag = int(numbers["SEGMENT"][0]) + len(faces)
+                faces.append((tag, *OWN_FACES[name], np.nan, np.nan))
+            gmsh.model.addPhysicalGroup(d, entities, tag)
+        return bodies, faces
+
+    def _bad(self, why: str) -> InputError:
+        """What is wrong with a user's own geometry."""
+        return InputError(f"geometry = {self.own}: {why}")
 
     def _read(self) -> None:
         """Take the nodes of Gmsh's current mesh."""
@@ -182,6 +299,8 @@ class Mesh:
         shapes, start = [], 0
         for (_, kind), block in blocks.items():
             table = np.vstack(block)
+            if kind not in SHAPES:
+                raise self._bad(f"elements of Gmsh's type {kind}: must be of order 1")
             shapes.append((SHAPES[kind], cells[start : start + table.size].reshape(table.shape)))
             start += table.size
         return Body(
@@ -196,13 +315,43 @@ class Mesh:
         """Give joint and faces their normals: the joint's from foundation to dam, a face's out of
         its body.
         """
-        surfaces = {True: [], False: [self.bodies["joint"]]}
-        for face in self.faces.values():
-            surfaces[face.upper].append(face.surface)
-        for upper, some in surfaces.items():
-            body = self.bodies["dam" if upper else "foundation"]
-            for surface in some:
-                surface.normals = outward(surface, body)
+        joint, dam, foundation = (self.bodies[n] for n in ("joint", "dam", "foundation"))
+        if self.own:
+            shared = np.intersect1d(dam.node_tags, foundation.node_tags)
+            apart = np.setdiff1d(shared, joint.node_tags)
+            if len(apart):
+                x, y, z = self._coordinates[self._place[apart[0]]]
+                raise self._bad(
+                    f"dam and foundation also meet beside the joint, at {x:g}, {y:g}, {z:g}"
+                )
+            if np.isin(joint.node_tags, self.bodies["fixed"].node_tags).any():
+                raise self._bad("fixed: must not touch the joint")
+            if outward(joint, dam) is None:
+                raise self._bad(
+                    "joint: its elements must be sides of the dam's (a conforming mesh)"
+                )
+        surfaces = [("joint", joint, foundation)]
+        for name, face in self.faces.items():
+            surfaces.append((name, face.surface, dam if face.upper else foundation))
+        for name, surface, body in surfaces:
+            found = outward(surface, body)
+            if found is None:
+                what = name if name == "joint" else f"a {self.faces[name].side}stream face"
+                raise self._bad(f"{what}: its elements must be sides of its body's (conforming)")
+            surface.normals, turned = found
+            if self.own and turned.any():  # for GetDP, which goes by the elements
+                gmsh.model.mesh.reverseElements(surface.element_tags[turned])
+
+    @property
+    def joint_ends(self) -> dict[str, list[float]]:
+        """Where the joint's heel and toe are, by the names of pro/section.pro."""
+        heel, toe = (self.bodies[n].points[:, :2].mean(axis=0) for n in ("heel", "toe"))
+        return ends_of(heel, toe, area(self.bodies["joint"]) / self.width)
+
+    @property
+    def width(self) -> float:
+        """Extent of the joint along z [m]; 1 in the plane."""
+        return float(np.ptp(self.bodies["joint"].points[:, 2])) if self.dim == 3 else 1.0
 
     @property
     def counts(self) -> dict[str, int]:
@@ -216,6 +365,7 @@ class Mesh:
 
     def write(self, path: Path) -> None:
         """Write the mesh for GetDP (MSH 2.2, binary); only while it is Gmsh's current one."""
+        gmsh.option.setNumber("Mesh.MshFileVersion", 2.2)
         gmsh.option.setNumber("Mesh.Binary", 1)
         gmsh.write(str(path))
 
@@ -230,8 +380,30 @@ def write_mesh(case: Case, path: Path) -> dict[str, int]:
     return mesh.counts
 
 
-def outward(surface: Body, body: Body) -> np.ndarray:
-    """Unit normals (elements, 3) of a surface, out of the body whose skin it is a part of."""
+def ends_of(heel: np.ndarray, toe: np.ndarray, along: float) -> dict[str, list[float]]:
+    """The joint by the names of pro/section.pro, from its ends (2,) and its length [m]."""
+    length = float(np.linalg.norm(toe - heel))
+    values = (*heel, *toe, length, along)
+    names = ("heel_x", "heel_y", "toe_x", "toe_y", "joint_length", "joint_along")
+    return {name: [float(value)] for name, value in zip(names, values, strict=True)}
+
+
+def area(surface: Body) -> float:
+    """Area of a surface, length of a line [m2, m]."""
+    total = 0.0
+    for _, table in surface.cells:
+        edges = surface.points[table[:, 1:]] - surface.points[table[:, :1]]
+        if table.shape[1] == 2:
+            total += np.linalg.norm(edges[:, 0], axis=1).sum()
+        for i in range(edges.shape[1] - 1):
+            total += np.linalg.norm(np.cross(edges[:, i], edges[:, i + 1]), axis=1).sum() / 2
+    return float(total)
+
+
+def outward(surface: Body, body: Body) -> tuple[np.ndarray, np.ndarray] | None:
+    """Unit normals (elements, 3) of a surface, out of the body whose skin it is a part of, and
+    which elements are numbered the other way round; None if not all are sides of the body's.
+    """
     # the body's cells that hold all nodes of an element
     size = int(max(surface.node_tags.max(), body.node_tags.max())) + 1
     rows = [incidence(b, size) for b in (surface, body)]
@@ -240,6 +412,8 @@ def outward(surface: Body, body: Body) -> np.ndarray:
     whole = shared.data == corners[shared.row]
     inside = np.full(len(corners), -1)
     inside[shared.row[whole]] = shared.col[whole]
+    if (inside < 0).any():
+        return None
     middles = surface.middles()
     normals = []
     for _, table in surface.cells:
@@ -253,7 +427,7 @@ def outward(surface: Body, body: Body) -> np.ndarray:
     inwards = np.einsum("ij,ij->i", normals, middles - body.middles()[inside]) < 0
     normals[inwards] *= -1
     # no digits that only the mesh generator has made: a level joint's normal is (0, 1, 0)
-    return np.round(normals, 12) + 0.0
+    return np.round(normals, 12) + 0.0, inwards
 
 
 def incidence(body: Body, size: int) -> sparse.csr_matrix:

@@ -27,7 +27,7 @@ from scipy import linalg, sparse
 
 from ...scene.case import Case
 from ...scene.loads import wet
-from ...scene.mesh import SIDES, Body, Face, Mesh
+from ...scene.mesh import SIDES, Body, Face, Mesh, mesh_of
 from .elasticity import Material, body_force, elasticity
 from .elements import Space, points_of
 from .factor import check_memory, dense_memory, schur_complement
@@ -54,7 +54,7 @@ def bulk_size(case: Case) -> float:
     A triangle has half of the product of the sizes at both ends of the body, order 2 four unknowns
     a triangle. (Prisms and tetrahedra: within a factor of three.)
     """
-    dim, order, near = int(case["dim"]), int(case["order"]), case["dam_base"] / case["n_joint"]
+    dim, order, near = int(case["dim"]), int(case["order"]), case.joint_length / case["n_joint"]
     dam = (case["dam_base"] + case["dam_crest"]) / 2 * case["dam_height"]
     foundation = (case["dam_base"] + 2 * case["found_side"]) * case["found_depth"]
     triangles = 2 * (dam / (near * case["h_dam"]) + foundation / (near * case["h_found"]))
@@ -121,7 +121,7 @@ class Bodies:
 
         Raises RunError (mesh).
         """
-        mesh = Mesh(case)
+        mesh = mesh_of(case)
         start, dim, order = time.perf_counter(), mesh.dim, int(case["order"])
         spaces = {name: Space(mesh.bodies[name], order) for name in BODIES}
         part = lambda body: Space(body, order)
@@ -355,7 +355,7 @@ def condense(case: Case, bodies: Bodies) -> Condensed:
     return Condensed(
         dim,
         int(case["order"]),
-        case["thickness"] if dim == 3 else 1.0,
+        mesh.width,
         mesh.counts,
         total - sum(len(h) for h in bodies.held.values()),
         mesh.bodies["joint"],

@@ -20,7 +20,7 @@ from scipy import linalg
 
 from ... import RunError, __version__, data
 from ...scene.case import Case
-from ...scene.mesh import Body, shares
+from ...scene.mesh import Body, Mesh, mesh_of, shares
 from .bulk import MATERIAL, Bodies, Condensed, check_size, condense
 
 #: The cache is kept below this size [bytes]; the files longest unused go first.
@@ -40,9 +40,24 @@ def folder() -> Path | None:
 
 def key_of(case: Case) -> tuple:
     """What condensed bodies depend on."""
+    shape = fingerprint(mesh_of(case)) if case.geometry else tuple(shares(case).items())
     highest, tail = max(case.levels), max(case.tail_levels)
-    faces = tail > 0, case["floor_water"], case["crest_water"] and highest > case["dam_height"]
-    return (*shares(case).items(), *(case[n] for n in MATERIAL), *faces)
+    crest = case.geometry or highest > case["dam_height"]
+    faces = tail > 0, case["floor_water"], bool(case["crest_water"] and crest)
+    if case.geometry:  # which are under water is not known without their heights
+        faces = (*faces, highest, tail)
+    return (shape, *(case[n] for n in MATERIAL), *faces)
+
+
+def fingerprint(mesh: Mesh) -> str:
+    """A fingerprint of a mesh: its bodies and faces."""
+    surfaces = {name: face.surface for name, face in mesh.faces.items()}
+    digest = hashlib.sha256()
+    for name, body in (mesh.bodies | surfaces).items():
+        digest.update(name.encode() + body.points.tobytes() + body.node_tags.tobytes())
+        for (shape, table), region in zip(body.cells, body.regions, strict=True):
+            digest.update(f"{shape} {region}".encode() + table.tobytes())
+    return digest.hexdigest()
 
 
 @lru_cache(maxsize=1)
@@ -65,7 +80,8 @@ def cached(case: Case) -> tuple[Condensed, Bodies | None]:
     found = read(path, header) if path else None
     if found:
         return found, None
-    check_size(case)
+    if not case.geometry:
+        check_size(case)
     try:
         bodies = Bodies.of(case)
         made = condense(case, bodies)

@@ -44,6 +44,7 @@ class Joint:
         self.case, self.bulk, self.interface = case, interface.bulk, interface
         self.wet, self.flowing = case["uplift"] != "none", case["uplift"] in ("flow", "cracked")
         self.driven = case["drive"] != "level"
+        self.drains = interface.drains(case["drain_x"]) if self.flowing and case["drains"] else None
         self.unit_weight = case["rho_water"] * case["g"]
         self.law = LAWS[case["law"]](case)
         self.virgin = self.law.respond(np.zeros((1, 3)), self.law.start(1))[1][0]
@@ -121,7 +122,7 @@ class Joint:
 
     def rate(self, of: Callable[[Loading], np.ndarray], loading: Loading) -> np.ndarray:
         """The derivative with the reservoir level of what is nearly linear in it."""
-        step = 1e-5 * max(self.case["dam_height"], abs(loading.level))
+        step = 1e-5 * max(self.case.size, abs(loading.level))
         above, below = (replace(loading, level=loading.level + s) for s in (step, -step))
         return (of(above) - of(below)) / (2 * step)
 
@@ -131,7 +132,7 @@ class Joint:
     def head(self, loading: Loading, matrix: object = None) -> np.ndarray:
         """Head [m] in a joint that conducts alike everywhere, at the joint's nodes or at places
         that a matrix of `Along` leads to: linear on the way from the reservoir's level to the
-        tailwater's, at a dry end from that end's own height.
+        tailwater's; a dry end has its own height, or the other end's head if that is lower.
 
         Drains take away their part of the head above their outlet or the tailwater (EM
         1110-2-2200).
@@ -139,7 +140,9 @@ class Joint:
         case, along = self.case, self.interface.along
         fields = along.heel_y, along.toe_y, along.way
         heel, toe, way = fields if matrix is None else (matrix @ field for field in fields)
-        first, last = np.maximum(loading.level, heel), np.maximum(loading.tail, toe)
+        level, tail = loading.level, loading.tail
+        first = np.maximum(level, np.minimum(heel, tail))
+        last = np.maximum(tail, np.minimum(toe, level))
         if case["uplift"] != "drained":
             return first + (last - first) * way
         at = case["drain_x"] / self.interface.length
@@ -153,20 +156,31 @@ class Joint:
             there + (last - there) * (way - at) / (1 - at),
         )
 
-    def imposed(self, loading: Loading, matrix: object, y: np.ndarray) -> np.ndarray:
-        """Pressure imposed [Pa] at places of height y that a matrix of `Along` leads to."""
-        pressure = self.unit_weight * (self.head(loading, matrix) - y)
-        # water that flows is let go below the air's pressure rather than have its equation kinked
-        return pressure if self.flowing else np.maximum(pressure, 0)
+    def uplift(
+        self, loading: Loading, matrix: object, y: np.ndarray, beyond: np.ndarray | float = 0.0
+    ) -> np.ndarray:
+        """Pressure [Pa], never below the air's, at places of height y that a matrix of `Along`
+        leads to; beyond: what flowing water adds there to the pressure imposed.
+        """
+        return np.maximum(self.unit_weight * (self.head(loading, matrix) - y) + beyond, 0)
+
+    def lift(self, loading: Loading, beyond: np.ndarray | float = 0.0) -> np.ndarray:
+        """How the water in the joint pushes its lips apart (j,)."""
+        interface = self.interface
+        weights, y = interface.water_points.weights, interface.water_points.positions[:, 1]
+        pressure = self.uplift(loading, interface.along.at_water, y, beyond)
+        return interface.water.T @ (weights * pressure)
 
     def _loads(self, loading: Loading) -> np.ndarray:
-        """t_0 and the imposed part of the water in the joint together (j,)."""
-        total, interface = self.pushed(loading)[1], self.interface
-        if not self.wet:
-            return total
-        w, y = interface.water_points.weights, interface.water_points.positions[:, 1]
-        pressure = self.imposed(loading, interface.along.at_water, y)
-        return total + interface.water.T @ (w * pressure)
+        """t_0 and, unless it flows, the water in the joint together (j,)."""
+        total = self.pushed(loading)[1]
+        return total + self.lift(loading) if self.wet and not self.flowing else total
+
+    def beyond(self, inner: np.ndarray) -> np.ndarray:
+        """The pressure at all of the joint's nodes from that at the inner ones."""
+        whole = np.zeros(self.interface.along.nodes)
+        whole[self.interface.along.inside] = inner
+        return whole
 
     def aperture(self, jump: np.ndarray, memory: Memory) -> tuple[np.ndarray, np.ndarray, float]:
         """Conductivity at the law's points over that of the closed joint, its derivative with the
@@ -190,10 +204,33 @@ class Joint:
     def solve_flow(
         self, jump: np.ndarray, memory: Memory, loading: Loading
     ) -> tuple[np.ndarray, object]:
-        """Pressure beyond the imposed one at the inner nodes, and the solution's sensitivity."""
-        weights = self.interface.points.weights
-        conductivity = self.aperture(jump, memory)[0] * weights
-        return self.interface.flow.solve(conductivity, self.unit_weight * self.head(loading))
+        """Pressure beyond the imposed one at the inner nodes; and for each solution it is made of
+        its share in it and what its sensitivity wants.
+
+        Drains: of the head that the joint would have there, they take away their part above their
+        outlet or the tailwater; the pressure is that part of one with the outlet's head at the
+        drains, and the rest of one without them. A crack that has reached them takes their effect
+        (EM 1110-2-2200).
+        """
+        case, flow = self.case, self.interface.flow
+        factor = self.aperture(jump, memory)[0]
+        conductivity = factor * self.interface.points.weights
+        head = self.head(loading)
+        free, solution = flow.solve(conductivity, self.unit_weight * head)
+        if self.drains is None:
+            return free, [(1.0, solution)]
+        nodes, points = self.drains
+        outlet = max(case["drain_level"], loading.tail)
+        there = head[nodes] + self.beyond(free)[nodes] / self.unit_weight
+        cracked = case["uplift"] == "cracked" and (factor[points] > 1).any()
+        effect = case["drain_effectiveness"]
+        if cracked or not (there > outlet).all() or effect == 0:
+            return free, [(1.0, solution)]
+        drawn, drained = flow.solve(
+            conductivity, self.unit_weight * head, nodes, (self.unit_weight * outlet)
+        )
+        parts = [(1 - effect, solution), (effect, drained)]
+        return (1 - effect) * free + effect * drawn, parts
 
     def residual(
         self,
@@ -217,22 +254,29 @@ class Joint:
             return interface.change(stiffness, self.virgin)
 
         value = self.bulk.stiffness @ jump - self.loads(loading) + interface.forces(traction)
-        flow, solution = interface.flow if self.flowing else None, None
+
+        def flowing_lift(loading: Loading) -> tuple[np.ndarray, object]:
+            inner, solution = self.solve_flow(jump, memory, loading)
+            return self.lift(loading, interface.along.at_water @ self.beyond(inner)), solution
+
+        solution = None
         if self.flowing:
-            pressure, solution = self.solve_flow(jump, memory, loading)
-            value = value - flow.lift @ pressure
+            lift, solution = flowing_lift(loading)
+            value = value - lift
 
         def derivatives(secant: bool) -> tuple[Change, np.ndarray | None]:
             change = law_change(secant)
             if self.flowing:
                 growing = self.aperture(jump, memory)[1] * interface.points.weights
-                change.pressure, change.columns = flow.sensitivity(solution, growing)
+                found = [interface.flow.sensitivity(part, growing) for _, part in solution]
+                change.columns = found[0][1]
+                shares = (share for share, _ in solution)
+                change.pressure = sum(s * p for s, (p, _) in zip(shares, found, strict=True))
             if not self.driven:
                 return change, None
             slope = -self.rate(self._loads, loading)
             if self.flowing:
-                beyond = lambda other: self.solve_flow(jump, memory, other)[0]
-                slope = slope - flow.lift @ self.rate(beyond, loading)
+                slope = slope - self.rate(lambda other: flowing_lift(other)[0], loading)
             return change, slope
 
         return value, derivatives
@@ -246,19 +290,18 @@ class Joint:
             return Pressure(*(np.zeros(len(x)) for x in here))
         along = interface.along
         matrices = along.at_points, along.at_water, along.at_places
-        found = [self.imposed(loading, m, x[:, 1]) for m, x in zip(matrices, here, strict=True)]
-        if not self.flowing:
-            return Pressure(*found)
-        inner = self.solve_flow(jump, memory, loading)[0]
-        whole = np.zeros(along.nodes)
-        whole[along.inside] = inner
-        found = [p + m @ whole for p, m in zip(found, matrices, strict=True)]
+        inner = self.solve_flow(jump, memory, loading)[0] if self.flowing else 0.0
+        whole = self.beyond(inner)
+        found = [
+            self.uplift(loading, m, x[:, 1], m @ whole) for m, x in zip(matrices, here, strict=True)
+        ]
         if self.case["uplift"] != "flow":
             return Pressure(*found)
         factor, _, narrowest = self.aperture(jump, memory)
         conductivity = self.case["rho_water"] * narrowest**3 * factor / (12 * self.case["visc"])
-        head = self.unit_weight * self.head(loading)
-        return Pressure(*found, *interface.flow.flux(conductivity, inner, head, bulk.width))
+        total = self.unit_weight * self.head(loading) + whole
+        nodes = () if self.drains is None else (self.drains[0],)
+        return Pressure(*found, *interface.flow.flux(conductivity, total, bulk.width, *nodes))
 
     def crest(self, jump: np.ndarray, loading: Loading) -> tuple[float, np.ndarray, float]:
         """The crest's displacement along x [m], and its derivatives with jump and level."""

@@ -216,7 +216,7 @@ class Filling:
         if found is None:
             return None
         end, iterations = found
-        if np.abs(end.jump).max() > 0.1 * self.case["dam_height"]:
+        if np.abs(end.jump).max() > 0.1 * self.case.size:
             return None  # the dam has fallen: an equilibrium of small displacements only
         memories = state.remember(joint, end.jump)
         return (

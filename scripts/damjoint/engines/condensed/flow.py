@@ -18,6 +18,10 @@ def scaled(matrix: sparse.csr_matrix, weights: np.ndarray) -> sparse.csr_matrix:
     )
 
 
+#: No drains.
+NOWHERE = np.zeros(0, int)
+
+
 class Along:
     """Scalar fields of order 1 on the joint, and the way of the water from heel to toe.
 
@@ -90,12 +94,9 @@ class Flow:
         self.lift = (water.T @ scaled(along.at_water[:, self.inside], water_points.weights)).tocsr()
         self.opening = at_points[:: along.dim]
         self.inner_slopes = [g[:, self.inside] for g in along.slopes]
-        way = along.way
         if along.dim == 2:
-            order = np.argsort(way[self.inside])
-            self.inside_way = way[self.inside][order]
-            self.back = np.argsort(order)  # from the order of the way to that of `inside`
-            self.order = np.argsort(way[along.bulk.joint.cells[0][1]].mean(axis=1))
+            #: the elements from heel to toe
+            self.order = np.argsort(along.way[along.bulk.joint.cells[0][1]].mean(axis=1))
             self.lengths = np.bincount(points.elements, points.weights)
         else:
             # the flow matrix is linear in the conductivities: where each point's products of slopes
@@ -113,39 +114,63 @@ class Flow:
                 self.places.append((number * place[:, :, None] + place[:, None, :]).ravel())
             self.places = np.concatenate(self.places)
 
-    def solve(self, conductivity: np.ndarray, imposed: np.ndarray) -> tuple[np.ndarray, object]:
+    def solve(
+        self,
+        conductivity: np.ndarray,
+        imposed: np.ndarray,
+        drains: np.ndarray = NOWHERE,
+        drained: float = 0.0,
+    ) -> tuple[np.ndarray, object]:
         """Pressure [Pa] beyond the one imposed at the inner nodes, for conductivities times weights
         (q,) and the imposed head times the water's weight at the nodes [Pa]; and what `sensitivity`
         wants to know of the solution.
+
+        drains: inner nodes where head times weight is drained [Pa].
         """
-        return (self._in_series if self.dim == 2 else self._in_the_plane)(conductivity, imposed)
+        solve = self._in_series if self.dim == 2 else self._in_the_plane
+        return solve(conductivity, imposed, drains, drained)
 
-    def drop(self, imposed: np.ndarray) -> float:
-        """From heel to toe [Pa], where both are level."""
-        return imposed[self.along.bulk.heel[0]] - imposed[self.along.bulk.toe[0]]
-
-    def _in_series(self, conductivity: np.ndarray, imposed: np.ndarray) -> tuple:
-        """2D: the elements are resistances in series.
+    def _in_series(
+        self, conductivity: np.ndarray, imposed: np.ndarray, drains: np.ndarray, drained: float
+    ) -> tuple:
+        """2D: the elements are resistances in series, between ends and drains of known heads.
 
         No differences of nearly equal numbers, however far the conductivities lie apart (a
         factorised matrix loses the closed joint beside the open one).
         """
-        drop = self.drop(imposed)
-        resistance = self.lengths**2 / np.bincount(self.points.elements, conductivity)
-        ahead = np.zeros(len(resistance) + 1)  # from the heel to each node, in order of x
-        np.cumsum(resistance[self.order], out=ahead[1:])
-        behind = np.zeros_like(ahead)
-        behind[:-1] = np.cumsum(resistance[self.order][::-1])[::-1]
-        total, left, right = ahead[-1], ahead[1:-1], behind[1:-1]
-        per_drop = (right / total - (1 - self.inside_way))[self.back]
-        steepness = (-drop / total * resistance / self.lengths)[self.points.elements]
+        resistance = (self.lengths**2 / np.bincount(self.points.elements, conductivity))[self.order]
+        chain = np.argsort(self.along.way)  # the nodes from heel to toe
+        known = np.flatnonzero(np.isin(chain, [*self.along.ends, *drains]))
+        heads = np.where(np.isin(chain[known], drains), drained, imposed[chain[known]])
+        size, along = len(chain), np.zeros(len(resistance))
+        total, green = np.empty(size), np.zeros((size, size))
+        for i, k, first, last in zip(known[:-1], known[1:], heads[:-1], heads[1:], strict=True):
+            here = resistance[i:k]
+            left = np.concatenate([[0], np.cumsum(here)])
+            right = np.concatenate([np.cumsum(here[::-1])[::-1], [0]])
+            whole = left[-1]
+            total[i : k + 1] = first * right / whole + last * left / whole
+            along[i:k] = (last - first) * here / whole
+            # the inverse of the flow matrix
+            green[i : k + 1, i : k + 1] += (
+                np.minimum.outer(left, left) * np.minimum.outer(right, right) / whole
+            )
+        back = np.empty(size, int)
+        back[chain] = np.arange(size)
+        back = back[self.inside]  # where each inner node stands in the chain
+        steepness = np.empty_like(along)
+        steepness[self.order] = along
+        steepness = (steepness / self.lengths)[self.points.elements]
         # along the element, from heel to toe
         towards = [g @ self.along.way for g in self.along.slopes]
-        size = np.sqrt(sum(t**2 for t in towards))
-        gradients = [steepness * t / size for t in towards]
-        return drop * per_drop, (left, right, total, gradients)
+        length = np.sqrt(sum(t**2 for t in towards))
+        gradients = [steepness * t / length for t in towards]
+        beyond = total[back] - imposed[self.inside]
+        return beyond, (lambda coupling: green[np.ix_(back, back)] @ coupling, gradients)
 
-    def _in_the_plane(self, conductivity: np.ndarray, imposed: np.ndarray) -> tuple:
+    def _in_the_plane(
+        self, conductivity: np.ndarray, imposed: np.ndarray, drains: np.ndarray, drained: float
+    ) -> tuple:
         """3D: one symmetric positive definite system; not a number where the conductivities lie too
         far apart for it.
         """
@@ -156,20 +181,25 @@ class Flow:
                 for rows, product in self.products
             ]
         )
-        matrix = np.bincount(self.places, values, number**2).reshape(number, number)[
-            np.ix_(self.inside, self.inside)
-        ]
+        matrix = np.bincount(self.places, values, number**2).reshape(number, number)
+        free = np.flatnonzero(~np.isin(self.inside, drains))
+        nodes = self.inside[free]
+        known = imposed.copy()
+        known[drains] = drained
         try:
-            factor = linalg.cho_factor(matrix)
+            factor = linalg.cho_factor(matrix[np.ix_(nodes, nodes)])
         except (linalg.LinAlgError, ValueError):
             return np.full(len(self.inside), np.nan), None
-        before = [g @ imposed for g in self.along.slopes]
-        right = sum(
-            g.T @ (conductivity * b) for g, b in zip(self.inner_slopes, before, strict=True)
-        )
-        pressure = -linalg.cho_solve(factor, right)
-        gradients = [g @ pressure + b for g, b in zip(self.inner_slopes, before, strict=True)]
-        return pressure, (factor, gradients)
+        total = known.copy()
+        total[nodes] -= linalg.cho_solve(factor, matrix[nodes] @ known)
+        gradients = [g @ total for g in self.along.slopes]
+
+        def inverse(coupling: np.ndarray) -> np.ndarray:
+            found = np.zeros_like(coupling)
+            found[free] = linalg.cho_solve(factor, coupling[free])
+            return found
+
+        return (total - imposed)[self.inside], (inverse, gradients)
 
     def sensitivity(self, solution: object, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The pressure's derivatives with the unknowns that matter (p, m), and which these are
@@ -177,7 +207,7 @@ class Flow:
 
         rate (q,): how the conductivities times weights grow with the opening.
         """
-        *system, gradients = solution
+        inverse, gradients = solution
         points = np.flatnonzero(rate)
         opening = self.opening[points]
         columns = np.unique(opening.indices)
@@ -185,38 +215,39 @@ class Flow:
             g[points].T @ scaled(opening, rate[points] * d[points])
             for g, d in zip(self.inner_slopes, gradients, strict=True)
         )[:, columns].toarray()
-        if self.dim == 2:
-            left, right, total = system
-            green = (
-                np.minimum.outer(left, left) * np.minimum.outer(right, right) / total
-            )  # the inverse of the flow matrix
-            return -green[np.ix_(self.back, self.back)] @ coupling, columns
-        return -linalg.cho_solve(system[0], coupling), columns
+        return -inverse(coupling), columns
 
     def flux(
-        self, conductivity: np.ndarray, pressure: np.ndarray, imposed: np.ndarray, width: float
+        self,
+        conductivity: np.ndarray,
+        total: np.ndarray,
+        width: float,
+        drains: np.ndarray = NOWHERE,
     ) -> tuple[np.ndarray, float]:
         """Mass flux towards the toe: mean of each joint element [kg/(m s)], and out of the toe per
         metre of thickness.
 
-        conductivity: rho w^3/(12 visc) at the law's points; pressure: beyond the imposed one at the
-        inner nodes; imposed: head times the water's weight at the nodes [Pa]; width: along z [m].
+        conductivity: rho w^3/(12 visc) at the law's points; total: head times the water's weight at
+        the nodes [Pa]; width: along z [m]; drains: nodes where water leaves the joint.
         """
         points = self.points
-        if self.dim == 2:  # the same in every element: the drop over the resistances in series
-            total = np.sum(
-                self.lengths**2 / np.bincount(points.elements, points.weights * conductivity)
-            )
-            flux = self.drop(imposed) / total
-            return np.full(len(self.lengths), flux), flux
-        whole = imposed.copy()
-        whole[self.inside] += pressure
-        towards = [g @ self.along.way for g in self.along.slopes]
-        q = -conductivity * sum(
-            (g @ whole) * t for g, t in zip(self.along.slopes, towards, strict=True)
-        )
-        # the flow's own test function: 1 at the toe, 0 at the heel
-        out = float(points.weights @ q / width)
+        if self.dim == 2:  # the same from end to drain to end: the drop over resistances in series
+            weighted = np.bincount(points.elements, points.weights * conductivity)
+            resistance = (self.lengths**2 / weighted)[self.order]
+            chain = np.argsort(self.along.way)
+            known = np.flatnonzero(np.isin(chain, [*self.along.ends, *drains]))
+            drop = -np.diff(total[chain[known]])
+            means = drop / np.add.reduceat(resistance, known[:-1])
+            flux = np.empty(len(resistance))
+            flux[self.order] = np.repeat(means, np.diff(known))
+            return flux, float(means[-1])
+        slopes = self.along.slopes
+        at_toe = 1.0 * np.isin(np.arange(self.along.nodes), self.along.bulk.toe)
+        # the flow's own test function at the toe
+        out = sum((g @ total) * (g @ at_toe) for g in slopes)
+        out = -float(points.weights @ (conductivity * out)) / width
+        towards = [g @ self.along.way for g in slopes]
         size = np.sqrt(sum(t**2 for t in towards))
-        means = np.bincount(points.elements, points.weights * q / size)
+        along = sum((g @ total) * t for g, t in zip(slopes, towards, strict=True)) / size
+        means = np.bincount(points.elements, -points.weights * conductivity * along)
         return means / np.bincount(points.elements, points.weights), out

@@ -19,6 +19,7 @@ from functools import cached_property
 import numpy as np
 from scipy import linalg, sparse
 
+from ...scene.mesh import ends_of, heel_normal
 from . import elements
 from .bulk import Condensed
 from .faces import WetFace
@@ -188,13 +189,17 @@ class Interface:
         heel = elements.Space(self.bulk.heel_line, self.bulk.order)
         points = elements.points_of(heel, {"vertex": 1, "line": 4})
         functions = self.space.find(heel)
-        tags = self.bulk.joint.node_tags
-        near = [np.isin(tags[t], heel.body.node_tags).any(axis=1) for _, t in self.bulk.joint.cells]
-        normal = self.bulk.joint.normals[np.concatenate(near)].mean(axis=0)
+        normal = heel_normal(self.bulk.joint, heel.body)
         weights = np.zeros(len(self.space.place))
         weights[functions] = points.values.T @ points.weights / points.weights.sum()
         functions, parts = np.divmod(self.bulk.free, self.dim)
         return weights[functions] * normal[parts]
+
+    @property
+    def section(self) -> dict[str, list[float]]:
+        """The joint's ends and length, by the names of pro/section.pro."""
+        heel = self.chord.toe - self.chord.length * self.chord.along
+        return ends_of(heel, self.chord.toe, self.length)
 
     # -- flow
     # ----------------------------------------------------------------------------------------------
@@ -208,6 +213,21 @@ class Interface:
     def along(self) -> Along:
         """Scalar fields along the joint, and how far each place is on the way to the toe."""
         return Along(self.bulk, self.space)
+
+    def drains(self, distance: float) -> tuple[np.ndarray, np.ndarray]:
+        """The nodes nearest to a line at a distance from the heel along the joint [m], and the
+        law's points beside them.
+        """
+        way, tables = self.along.way, [table for _, table in self.bulk.joint.cells]
+        at, near = distance / self.length, []
+        for table in tables:  # in each element that the line crosses, its nearest node
+            low, high = way[table].min(axis=1), way[table].max(axis=1)
+            crossed = table[(low <= at) & (at <= high)]
+            best = np.abs(way[crossed] - at).argmin(axis=1)
+            near.append(crossed[np.arange(len(crossed)), best])
+        nodes = np.intersect1d(np.concatenate(near), self.along.inside)
+        beside = np.concatenate([np.isin(table, nodes).any(axis=1) for table in tables])
+        return nodes, np.flatnonzero(beside[self.points.elements])
 
     # -- linear systems
     # ------------------------------------------------------------------------------------

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import lru_cache, partial
 
 from threadpoolctl import threadpool_limits
 
 from ...results.fields import Field
 from ...scene.case import Case
+from ...scene.mesh import mesh_of
 from .. import OnStep, Outcome
 from . import factor
 from .bulk import Bodies, joint_size
@@ -23,12 +25,14 @@ MANY = 3000
 
 
 def check(case: Case) -> None:
-    """Any case will do."""
+    """Raise InputError if a user's own geometry is not what is needed; any other case will do."""
+    if case.geometry:
+        mesh_of(case)
 
 
 def solve(case: Case, on_step: OnStep, _fields: bool) -> Iterator[Outcome]:
     """The scenes of a case on one condensed mesh; see engines/__init__.py."""
-    with threadpool_limits(1 if joint_size(case) < MANY else None):
+    with threadpool_limits(1 if case.geometry or joint_size(case) < MANY else None):
         start = time.perf_counter()
         bulk, made = cached(case)
         before = bulk.seconds if made else {"cache": time.perf_counter() - start}
@@ -48,6 +52,7 @@ def solve(case: Case, on_step: OnStep, _fields: bool) -> Iterator[Outcome]:
 
         for number, scene in enumerate(case.scenes()):
             begin, error = time.perf_counter(), None
+            scene = replace(scene, section=scene.section | interface.section)
             fillings.append(Filling(scene, interface, partial(on_step, number)))
             try:
                 fillings[-1].run()

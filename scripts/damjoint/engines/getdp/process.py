@@ -11,9 +11,12 @@ import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
+
 from ... import InputError, RunError, data
 from ...scene.case import Case
-from ...scene.parameters import assignments, listing
+from ...scene.mesh import SIDES, Mesh, area, heel_normal
+from ...scene.parameters import assignments, constants, listing
 
 OLDEST = (3, 2)
 #: One process talks to no other: without looking for networks Open MPI starts a quarter of a second
@@ -40,8 +43,32 @@ def find_getdp() -> str:
     return found
 
 
-def write_problem(case: Case, folder: Path, options: dict[str, float] | None = None) -> Path:
-    """Write the problem file of a case into folder (scene.pro); its results go beside it."""
+def own_lists(mesh: Mesh) -> dict[str, list[float]]:
+    """What pro/section.pro has to know of a user's own geometry."""
+    ends, bodies = mesh.joint_ends, mesh.bodies
+    faces = mesh.faces.values()
+    heel = bodies["heel"]
+    length = area(heel) if mesh.dim == 3 else 1.0
+    normal, crest = heel_normal(bodies["joint"], heel), bodies["crest"].points[0]
+    lines = [n for n in ("ice", "force", "anchor") if n in bodies]
+    dam = bodies["dam"].node_tags
+    return {
+        "own_side": [float(SIDES.index(face.side)) for face in faces],
+        "own_body": [float(not face.upper) for face in faces],
+        "own_low": [float(face.surface.points[:, 1].min()) for face in faces],
+        "own_ends": [*(v[0] for v in ends.values()), mesh.width, length, *normal[:2], *crest],
+        "own_mark_region": [constants()[name.upper()][0] for name in lines],
+        "own_mark_body": [float(not np.isin(bodies[name].node_tags, dam).all()) for name in lines],
+    }
+
+
+def write_problem(
+    case: Case, mesh: Mesh | None, folder: Path, options: dict[str, float] | None = None
+) -> Path:
+    """Write the problem file of a case into folder (scene.pro); its results go beside it.
+
+    mesh: of a user's own geometry.
+    """
     wanted = [float(t in case.requested) for t in case.times]
     lists = {
         "levels": case.levels,
@@ -49,6 +76,8 @@ def write_problem(case: Case, folder: Path, options: dict[str, float] | None = N
         "times": case.times,
         "wanted": wanted,
     }
+    if case.geometry:
+        lists |= own_lists(mesh)
     path = folder / "scene.pro"
     path.write_text(
         assignments(case.values)
@@ -127,7 +156,8 @@ def execute(
 
 def fill(
     case: Case,
-    mesh: Path,
+    mesh: Mesh,
+    mesh_file: Path,
     folder: Path,
     fields: bool = False,
     on_step: Callable[[float], None] = lambda time: None,
@@ -137,11 +167,11 @@ def fill(
     Tables are left in folder (see tables.py); returns what `execute` tells.
         fields: also displacement and stress; on_step: called with the time of each converged step.
     """
-    problem = write_problem(case, folder, {"views": 0.0, "fields": float(fields)})
+    problem = write_problem(case, mesh, folder, {"views": 0.0, "fields": float(fields)})
 
     def watch(line: str) -> None:
         if match := re.match(r"step ([\d.e+-]+) ", line):
             on_step(float(match[1]))
 
     threads = 1 if case["dim"] == 2 else 2
-    return execute(problem, ["-msh", str(mesh), "-solve", "Fill"], threads, watch)
+    return execute(problem, ["-msh", str(mesh_file), "-solve", "Fill"], threads, watch)

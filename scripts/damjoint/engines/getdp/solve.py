@@ -8,11 +8,14 @@ import tempfile
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
 
 from ... import InputError
 from ...scene.case import Case
-from ...scene.mesh import Mesh
+from ...scene.mesh import Mesh, mesh_of
 from .. import OnStep, Outcome
 from . import process, tables
 
@@ -28,6 +31,23 @@ def check(case: Case) -> None:
             f"mesh_pattern = {case['mesh_pattern']}: must be one of {', '.join(SOLID)} "
             "with engine = getdp in 3D"
         )
+    if case["drains"] and case["uplift"] in ("cracked", "flow"):
+        raise InputError(f"drains = 1: must be 0 with engine = getdp and uplift = {case['uplift']}")
+    if case.geometry:
+        check_own(mesh_of(case), case)
+
+
+def check_own(mesh: Mesh, case: Case) -> None:
+    """Raise InputError if this engine can not run a user's own geometry."""
+    shapes = {shape for name in ("dam", "foundation") for shape, _ in mesh.bodies[name].cells}
+    if mesh.dim == 3 and shapes != {"tetra"}:
+        raise InputError(f"geometry = {case.geometry}: must have tetrahedra with engine = getdp")
+    level = all(np.ptp(mesh.bodies[n].points[:, 1]) < 1e-9 * case.size for n in ("heel", "toe"))
+    if not level and case["uplift"] != "none":
+        raise InputError(
+            f"uplift = {case['uplift']}: must be none with engine = getdp where heel or toe are "
+            "not level"
+        )
 
 
 def solve(case: Case, on_step: OnStep, fields: bool) -> Iterator[Outcome]:
@@ -36,18 +56,19 @@ def solve(case: Case, on_step: OnStep, fields: bool) -> Iterator[Outcome]:
     See engines/__init__.py.
     """
     start = time.perf_counter()
-    mesh = Mesh(case)
+    mesh = mesh_of(case)
     meshed = time.perf_counter() - start
     with tempfile.TemporaryDirectory(prefix="damjoint-") as name, ThreadPoolExecutor(2) as pool:
         mesh_file = Path(name) / "scene.msh"
         mesh.write(mesh_file)
+        case = replace(case, section=case.section | mesh.joint_ends)
         scenes, waiting = case.scenes(), []
         for number, scene in enumerate(scenes):
             folder = Path(name) / scene["uplift"]
             folder.mkdir()
             watch = lambda now, number=number: on_step(number, now)
             waiting.append(
-                (folder, pool.submit(process.fill, scene, mesh_file, folder, fields, watch))
+                (folder, pool.submit(process.fill, scene, mesh, mesh_file, folder, fields, watch))
             )
         for scene, (folder, future) in zip(scenes, waiting, strict=True):
             error, told = None, {}

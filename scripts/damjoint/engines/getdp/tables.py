@@ -79,12 +79,6 @@ def saved_times(case: Case, history: dict[str, np.ndarray], stopped: bool) -> di
     return saved
 
 
-def along_joint(case: Case, nodes: np.ndarray) -> np.ndarray:
-    """Distance from the heel of places (n, 3) on the section's joint [m]."""
-    heel, toe = (np.array([case.section[f"{e}_{c}"][0] for c in "xy"]) for e in ("heel", "toe"))
-    return (nodes[:, :2] - heel) @ (toe - heel) / np.linalg.norm(toe - heel)
-
-
 def read_joint(
     case: Case, folder: Path, number: int, time: float, level: float
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -105,7 +99,7 @@ def read_joint(
     if case["uplift"] == "flow":
         flux = [node_means(rows, table("flux", 1)[1], len(nodes))]
     when = np.tile([time, level], (len(nodes), 1))
-    distance = along_joint(case, nodes)[:, None]
+    distance = case.joint_along * node_means(rows, table("way", 1)[1], len(nodes))
     whole = np.hstack([when, nodes, jump[:, order], traction[:, order], state, distance, *flux])
     extra = whole.copy()
     corners, mean_jump = table("mean_jump")

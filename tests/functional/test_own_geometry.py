@@ -1,0 +1,172 @@
+"""A geometry of one's own: equilibrium by integrals over its mesh, both engines, and what is said
+of a bad one."""
+
+import gmsh
+import numpy as np
+import pytest
+from damjoint import InputError, run
+from damjoint.engines.condensed.elements import tensor
+from damjoint.scene.case import load
+from damjoint.scene.mesh import Mesh
+from damjoint.scene.parameters import start_gmsh
+
+#: Points and weights on a line and, their products, on a triangle: fine enough for a kink.
+LINE, X, W = tensor(400, 1), *tensor(40, 1)
+
+
+def push(surface, pressure):
+    """Force and place of each small part of a surface under a pressure (y) [Pa]."""
+    for _, table in surface.cells:
+        for place, normal in zip(surface.points[table], surface.normals[: len(table)], strict=True):
+            if len(place) == 2:
+                u, w = (LINE[0] + 1) / 2, LINE[1] / 2 * np.linalg.norm(place[1] - place[0])
+                at = place[0] + u * (place[1] - place[0])
+            else:
+                u, v = np.meshgrid(X[:, 0], X[:, 0])
+                u, v = (u.ravel() + 1) / 2, (v.ravel() + 1) / 2
+                a, b = place[1] - place[0], place[2] - place[0]
+                at = place[0] + u[:, None] * a + (1 - u)[:, None] * v[:, None] * b
+                area = np.linalg.norm(np.cross(a, b))
+                w = np.outer(W, W).ravel() / 4 * (1 - u) * area
+            yield at, -(w * pressure(at[:, 1]))[:, None] * normal
+
+
+def resultants(case, level, tail):
+    """N, T, M of the joint without uplift, by integrals over the mesh."""
+    mesh = Mesh(case)
+    dam, unit = mesh.bodies["dam"], case["rho_water"] * case["g"]
+    parts = []
+    for _, table in dam.cells:
+        corners = dam.points[table][:, :, : mesh.dim]
+        volume = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / (
+            2 if mesh.dim == 2 else 6
+        )
+        down = np.array([0, -case["rho_dam"] * case["g"], 0])
+        parts.append((dam.points[table].mean(axis=1), volume[:, None] * down))
+    for face in mesh.faces.values():
+        surface = tail if face.side == "down" else level
+        parts += push(face.surface, lambda y, top=surface: unit * np.maximum(top - y, 0))
+    place, force = (np.concatenate(both)[:, :2] for both in zip(*parts, strict=True))
+    ends = {name: values[0] for name, values in mesh.joint_ends.items()}
+    chord = np.array([ends["toe_x"] - ends["heel_x"], ends["toe_y"] - ends["heel_y"]])
+    along = chord / np.linalg.norm(chord)
+    across, arm = np.array([-along[1], along[0]]), place - [ends["toe_x"], ends["toe_y"]]
+    total = force.sum(axis=0)
+    moment = np.sum(arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0])
+    return np.array([-total @ across, total @ along, moment]) / mesh.width
+
+
+@pytest.mark.parametrize(
+    "name, tolerance", [("stepped", 1e-6), pytest.param("valley", 1e-5, marks=pytest.mark.heavy)]
+)
+def test_equilibrium(solve, name, tolerance):
+    """The waterline cuts elements; the tolerance in 3D is the test's own integration's."""
+    (result,) = solve(name, "33.3", "6.1" if name == "stepped" else "0", uplift="none")
+    expected = resultants(result.case, 33.3, result.last["tail_level"])
+    found = [result.last[n] for n in "NTM"]
+    assert found == pytest.approx(expected, rel=tolerance)
+    wet = solve(name, "33.3", "6.1" if name == "stepped" else "0", uplift="imposed")[0].last
+    assert wet["N"] + wet["U"] == pytest.approx(result.last["N"], rel=1e-9)
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("uplift", ["imposed", "flow", "cracked"])
+def test_a_bent_joint_in_both_engines(tmp_path, uplift):
+    """At a level where no waterline cuts an element: what the plain engine integrates exactly."""
+    case = load("stepped", {"n_joint": 34, "uplift": uplift, "tolerance": 1e-11}, "45", "4")
+    one, other = (
+        run.run(case, tmp_path / engine, False, False, False, engine)[0].at()
+        for engine in ("condensed", "getdp")
+    )
+    for column in ("s", "delta_n", "delta_t1", "sigma_n", "tau_1", "p"):
+        size = np.abs(one[column]).max()
+        assert other[column] == pytest.approx(one[column], rel=0, abs=1e-6 * size), column
+
+
+def test_the_distance_follows_the_joint(solve):
+    (result,) = solve("stepped", "20", "0", uplift="none")
+    rows = result.at()
+    steps = np.hypot(np.diff(rows["x"]), np.diff(rows["y"]))
+    assert np.diff(rows["s"]) == pytest.approx(steps, rel=1e-6)
+    assert rows["s"][-1] == pytest.approx(38)
+
+
+@pytest.fixture
+def draw(tmp_path):
+    """draw(changes): the case file of a dam of two blocks whose mesh has been changed."""
+
+    def make(rename=(), apart=False, order=1):
+        start_gmsh()
+        gmsh.clear()
+        geo = gmsh.model.geo
+        corners = [(0, 0), (2, 0), (2, 3), (0, 3), (-4, 0), (-4, -4), (6, -4), (6, 0)]
+        p = [geo.addPoint(x, y, 0, 1) for x, y in corners]
+        lines = [geo.addLine(p[i], p[i + 1]) for i in range(3)] + [geo.addLine(p[3], p[0])]
+        under = [(0, 4), (4, 5), (5, 6), (6, 7), (7, 1)]
+        below = [geo.addLine(p[i], p[k]) for i, k in under]
+        lip = geo.addLine(p[0], p[1]) if apart else lines[0]
+        dam = geo.addPlaneSurface([geo.addCurveLoop(lines)])
+        rock = geo.addPlaneSurface([geo.addCurveLoop([*below, -lip])])
+        geo.synchronize()
+        if apart:
+            gmsh.model.mesh.setTransfiniteCurve(lip, 7)
+        regions = {
+            "dam": (2, [dam]),
+            "foundation": (2, [rock]),
+            "joint": (1, [lines[0]]),
+            "upstream": (1, [lines[3]]),
+            "fixed": (1, below[1:4]),
+            "heel": (0, [p[0]]),
+            "toe": (0, [p[1]]),
+            "crest": (0, [p[3]]),
+        }
+        for name, (d, tags) in regions.items():
+            if new := dict(rename).get(name, name):
+                gmsh.model.addPhysicalGroup(d, tags, name=new)
+        gmsh.model.mesh.generate(2)
+        gmsh.model.mesh.setOrder(order)
+        gmsh.write(str(tmp_path / "own.msh"))
+        path = tmp_path / "own.case"
+        path.write_text('geometry = "own.msh";\nlevels() = {1};\n')
+        return path
+
+    return make
+
+
+def test_a_mesh_of_one_s_own(draw, solve):
+    (result,) = solve(str(draw()), uplift="none")
+    assert result.last["T"] == pytest.approx(9810 / 2)
+    assert result.last["N"] == pytest.approx(2400 * 9.81 * 6)
+
+
+@pytest.mark.parametrize(
+    "changes, said",
+    [
+        ({"rename": {"toe": ""}}, "no region toe"),
+        ({"rename": {"upstream": "usptream"}}, 'region "usptream" is not known'),
+        ({"rename": {"fixed": "joint", "joint": "fixed"}}, "also meet beside the joint"),
+        ({"rename": {"upstream": "reservoir floor"}}, "must be sides of its body"),
+        ({"apart": True}, "sides of"),
+        ({"order": 2}, "must be of order 1"),
+    ],
+)
+def test_a_bad_geometry(draw, command, tmp_path, changes, said):
+    path = draw(**changes)
+    before = sorted(tmp_path.rglob("*"))
+    code, out, err = command("run", path)
+    assert (code, out) == (2, "") and len(err.splitlines()) == 1, err
+    assert f"geometry = {tmp_path / 'own.msh'}" in err and said in err
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_the_wrong_dimension(draw):
+    with pytest.raises(InputError, match="has dimension 0: must be 1 with dim = 3"):
+        Mesh(load(str(draw()), {"dim": 3}))
+
+
+def test_a_program_is_not_run_unasked(tmp_path, command):
+    trap = tmp_path / "trap.geo"
+    trap.write_text(f'SystemCall "touch {tmp_path}/run";\nPoint(1) = {{0, 0, 0}};\n')
+    (tmp_path / "own.case").write_text('geometry = "trap.geo";\n')
+    code, _, err = command("run", tmp_path / "own.case")
+    assert code == 2 and "--run-geo" in err and not (tmp_path / "run").exists()
