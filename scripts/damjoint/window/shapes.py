@@ -24,15 +24,6 @@ ARROW = 0.12
 RESERVOIR, OVER, TAIL = ("upstream", "floor"), ("crest",), ("bed", "downstream")
 
 
-def frame(case: Case) -> tuple[float, float, float, float]:
-    """What is shown of a scene: x from, x to, y from, y to [m]; up to the crest or the water."""
-    height, section = case["dam_height"], case.section
-    beside = min(case["found_side"], 0.6 * height)
-    lowest = min(0.0, *section["seg_y0"], *section["seg_y1"])
-    bottom = max(-case["found_depth"], lowest - 0.5 * height)
-    return -beside, case["dam_base"] + beside, bottom, max(height, *case.levels, *case.tail_levels)
-
-
 @dataclass
 class Pieces:
     """Lines or faces: points (n, corners, 3) [m], values (steps, n, corners, components)."""
@@ -111,6 +102,8 @@ def sized(corners: np.ndarray) -> bool:
 
 def planned(case: Case) -> dict[str, Pieces]:
     """What acts on the undeformed section in the end, of that there is: water, silt, forces."""
+    if case.geometry:  # its faces are known with its mesh
+        return {}
     section, depth = case.section, case["thickness"] if case["dim"] == 3 else 0.0
     ends = [[section["seg_x0"], section["seg_y0"]], [section["seg_x1"], section["seg_y1"]]]
     edges = np.array(ends).transpose(2, 0, 1)
@@ -123,7 +116,7 @@ def planned(case: Case) -> dict[str, Pieces]:
     tips = [
         np.array([x, y, depth]) for x, y in zip(section["mark_x"], section["mark_y"], strict=True)
     ]
-    length = ARROW * case["dam_height"]
+    length = ARROW * case.size
     arrows = [arrow(*mark, length) for mark in zip(tips, map(np.array, forces), strict=True)]
     found = {
         "water": in_space(np.concatenate([standing(*part) for part in water]), depth),
@@ -148,10 +141,10 @@ class Deformed:
             for name in BODIES
         }
         largest = max(np.abs(u).max() for u in self.moved.values())
-        exact = 0.06 * case["dam_height"] / largest if largest > 0 else 1.0
+        exact = 0.06 * case.size / largest if largest > 0 else 1.0
         self.scale = float(f"{exact:.1g}")
         self.skins = {name: skin(self.scene.bodies[name]) for name in BODIES}
-        self.depth = case["thickness"] if case["dim"] == 3 else 0.0
+        self.depth = self.scene.bodies["dam"].points[:, 2].max()
         self.rows = [self.scene.result.at(time) for time in self.times]
         states = [self.scene.result.state(time) for time in self.times]
         self.loadings = [
@@ -164,10 +157,12 @@ class Deformed:
         row = nearest_rows(joint.points[near], self.rows[0])
         order = np.argsort(way[row])
         self.lip_tags, self.lip_rows = joint.node_tags[near][order], row[order]
-        #: undeformed, and step by step; None in 3D without plane sides
+        #: undeformed, and step by step; None where one section does not tell all
         ends = np.column_stack([self.rows[0][axis] for axis in "xy"])[[way.argmin(), way.argmax()]]
         self.still, *self.sections = (
-            section_of(self.scene.bodies, fields[time].displacement, scale, ends)
+            None
+            if case.geometry and case["dim"] == 3
+            else section_of(self.scene.bodies, fields[time].displacement, scale, ends)
             for time, scale in [(self.times[0], 0.0), *((t, self.scale) for t in self.times)]
         )
 
@@ -263,7 +258,7 @@ class Deformed:
             if self.still:
                 push = now.part("quake") * np.array([case["k_h"], case["k_v"]])
                 forces.append((np.append(self.sections[i].dam.centroid, self.depth), push))
-            arrows = [arrow(tip, np.array(f), ARROW * case["dam_height"]) for tip, f in forces]
+            arrows = [arrow(tip, np.array(f), ARROW * case.size) for tip, f in forces]
             found.append(np.concatenate([np.zeros((0, 2, 3)), *arrows]))
         return np.array(found)
 

@@ -17,8 +17,8 @@ from ..results.fields import along, distance, row_of_nodes, state_of
 from ..results.pictures import heading
 from ..results.units import LENGTHS, STRESSES, unit
 from ..scene.case import Case
-from .camera import CLIPPED, MAPS, clip
-from .shapes import Deformed, Pieces, frame, planned
+from .camera import CLIPPED, MAPS, clip, frame
+from .shapes import Deformed, Pieces, planned
 from .worker import Scene
 
 Color = tuple[int, int, int, int]
@@ -142,7 +142,7 @@ def show_beside(gallery: Gallery, case: Case, beside: dict[str, Pieces], options
 
 def layer(case: Case, number: int) -> dict[str, float]:
     """Options of a layer: lines and faces in one plane would hide one another."""
-    return {"OffsetZ": number * 5e-4 * case["dam_height"]}
+    return {"OffsetZ": number * 5e-4 * case.size}
 
 
 def show(scene: Scene, before: Sequence[Scene] = ()) -> Gallery:
@@ -241,13 +241,13 @@ def show_maps(gallery: Gallery, deformed: Deformed) -> None:
     if case["uplift"] != "none":
         shown.append((f"water pressure [{stress}]", [r["p"] * per_pa for r in rows], STONE))
     # as wide as the foundation, and deep enough to be seen
-    way, depth = distance(rows[0])[nearest], case["thickness"]
+    way, depth = distance(rows[0])[nearest], joint.points[:, 2].max()
     unrolled, base = np.column_stack([way, 0 * way, joint.points[:, 2]]), way.max()
-    left, right, bottom, _ = frame(case)
+    (left, bottom, _), (right, *_) = frame(case)
     wider = min(2.5, (right - left) / base)
     stretch = np.array([wider, 1.0, max(wider, 0.25 * wider * base / depth)])
     for i, (name, values, colors) in enumerate(shown):
-        below = np.array([0, bottom - (i + 1) * MAPS * case["dam_height"], 0])
+        below = np.array([0, bottom - (i + 1) * MAPS * case.size, 0])
         below += (1 - stretch) * np.array([base / 2, 0, depth])
         points = unrolled * stretch + below
         pieces = [
