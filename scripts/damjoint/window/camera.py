@@ -83,8 +83,8 @@ def aim(case: Case, graphs: float) -> None:
     wide, tall = (max(np.ptp(seen[:, i]), 1e-300) for i in (0, 1))
     size = {name: gmsh.option.getNumber(f"General.{name}") for name in WINDOW}
     window = size["GraphicsWidth"] - size["MenuWidth"], size["GraphicsHeight"]
-    # unscaled, Gmsh fits the diagonal of the box around all into the window
-    per_metre = min(window) / gmsh.option.getNumber("General.BoundingBoxSize")
+    # unscaled, Gmsh fits the diagonal of the box around all, seen along z, into the window
+    per_metre = min(window) / np.hypot(*(high - low)[:2])
     room = window[0] - graphs - 2 * MARGIN, window[1] - ABOVE - BELOW - 2 * MARGIN
     scale = min(room[0] / wide, room[1] / tall) / per_metre
     middle = (seen.min(axis=0) + seen.max(axis=0)) / 2

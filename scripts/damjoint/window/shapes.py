@@ -95,6 +95,11 @@ def arrow(tip: np.ndarray, force: np.ndarray, length: float) -> np.ndarray:
     return np.stack([tip - behind, np.broadcast_to(tip, (3, 3))], axis=1)
 
 
+def extruded(case: Case) -> bool:
+    """Whether one plane section tells all of the geometry."""
+    return not (case.geometry and case["dim"] == 3)
+
+
 def sized(corners: np.ndarray) -> bool:
     """Whether some of the elements (..., corners, 3) are more than points."""
     return bool(np.ptp(corners, axis=-2).any())
@@ -160,9 +165,9 @@ class Deformed:
         #: undeformed, and step by step; None where one section does not tell all
         ends = np.column_stack([self.rows[0][axis] for axis in "xy"])[[way.argmin(), way.argmax()]]
         self.still, *self.sections = (
-            None
-            if case.geometry and case["dim"] == 3
-            else section_of(self.scene.bodies, fields[time].displacement, scale, ends)
+            section_of(self.scene.bodies, fields[time].displacement, scale, ends)
+            if extruded(case)
+            else None
             for time, scale in [(self.times[0], 0.0), *((t, self.scale) for t in self.times)]
         )
 

@@ -18,7 +18,7 @@ from ..results.pictures import heading
 from ..results.units import LENGTHS, STRESSES, unit
 from ..scene.case import Case
 from .camera import CLIPPED, MAPS, clip, frame
-from .shapes import Deformed, Pieces, planned
+from .shapes import Deformed, Pieces, extruded, planned
 from .worker import Scene
 
 Color = tuple[int, int, int, int]
@@ -157,7 +157,8 @@ def show(scene: Scene, before: Sequence[Scene] = ()) -> Gallery:
         show_deformed(gallery, deformed)
         if scene.result.case["dim"] == 3:
             show_maps(gallery, deformed)
-        show_curves(graphs, scene, [other for other in before if other.times.size])
+        if extruded(scene.result.case):
+            show_curves(graphs, scene, [other for other in before if other.times.size])
         gallery.write(20, 52, captions(deformed), DARK, 15)
     if len(scene.result.history["time"]):
         show_history(graphs, scene, before)
@@ -244,7 +245,7 @@ def show_maps(gallery: Gallery, deformed: Deformed) -> None:
     way, depth = distance(rows[0])[nearest], joint.points[:, 2].max()
     unrolled, base = np.column_stack([way, 0 * way, joint.points[:, 2]]), way.max()
     (left, bottom, _), (right, *_) = frame(case)
-    wider = min(2.5, (right - left) / base)
+    wider = 1.0 if case.geometry else min(2.5, (right - left) / base)
     stretch = np.array([wider, 1.0, max(wider, 0.25 * wider * base / depth)])
     for i, (name, values, colors) in enumerate(shown):
         below = np.array([0, bottom - (i + 1) * MAPS * case.size, 0])
