@@ -4,7 +4,7 @@ scene/    what is asked: parameters, case files, meshes
 results/  what comes out: tables, verdict, fields, pictures, comparison with published numbers
 engines/  how it is solved: getdp/ runs the problem definition, condensed/ follows the joint alone
 run.py    one case, solved and written
-studies/  what is done with runs: checks, sweeps, benchmarks, a law along a path
+studies/  what is done with runs: checks, sweeps, critical values, benchmarks, a law along a path
 window/   the Gmsh window, with the condensed engine behind it
 cli.py    the command line
 
@@ -15,6 +15,11 @@ from importlib.resources import files
 from pathlib import Path
 
 __version__ = "0.2.0"
+
+
+#: Environment variable; 1: Gmsh may run a user's .geo file, a program that can do anything the user
+#: can.
+RUN_GEO = "DAMJOINT_RUN_GEO"
 
 
 class InputError(ValueError):

@@ -1,15 +1,18 @@
-"""The command line: damjoint new | run | check | plot | report | gui | validate | sweep | bench |
-law.
-"""
+"""The command line: new, run, check, critical, sweep, plot, report, gui, validate, bench, law."""
 
 from __future__ import annotations
 
 import argparse
+import os
 import re
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from . import InputError, RunError, __version__
+from . import RUN_GEO, InputError, RunError, __version__
+
+if TYPE_CHECKING:
+    from .studies.plan import Plan, Row
 
 
 class Parser(argparse.ArgumentParser):
@@ -24,6 +27,13 @@ def whole(text: str) -> int:
     """An integer of at least 1."""
     if not text.strip().isdigit() or int(text) < 1:
         raise argparse.ArgumentTypeError(f"{text}: must be an integer >= 1")
+    return int(text)
+
+
+def natural(text: str) -> int:
+    """An integer of at least 0."""
+    if not text.strip().isdigit():
+        raise argparse.ArgumentTypeError(f"{text}: must be an integer >= 0")
     return int(text)
 
 
@@ -44,6 +54,11 @@ def parser() -> argparse.ArgumentParser:
         dest="settings",
         help="change a parameter (repeatable)",
     )
+    settings.add_argument(
+        "--run-geo",
+        action="store_true",
+        help="let Gmsh run the .geo file that the case names as its geometry: it is a program",
+    )
     of_case = "a letter a..k, dam, or the path of a .case file"
     of_engine = "auto, condensed (the bulk eliminated once) or getdp (the plain problem definition)"
 
@@ -59,10 +74,14 @@ def parser() -> argparse.ArgumentParser:
         help="coarse (about 3 %%), standard (1 %%) or fine (0.2 %%): chooses mesh, order and steps",
     )
 
-    run = commands.add_parser("run", parents=[settings, water], help="fill the reservoir of a case")
+    loading = Parser(add_help=False, parents=[water])
+    loading.add_argument("--steps", type=whole, help="equal steps between two levels (default 1)")
+
+    run = commands.add_parser(
+        "run", parents=[settings, loading], help="fill the reservoir of a case"
+    )
     add = run.add_argument
     add("case", help=of_case)
-    add("--steps", type=whole, help="equal steps between two levels (default 1)")
     add("--out", type=Path, help="output folder (default out/CASE)")
     add("--no-fields", action="store_true", help="no displacement and stress fields")
     add("--no-picture", action="store_true", help="no PNG")
@@ -111,8 +130,29 @@ def parser() -> argparse.ArgumentParser:
     add("--engine", default="auto", help=of_engine)
     check.set_defaults(call=do_validate)
 
+    limit = commands.add_parser(
+        "critical",
+        parents=[settings],
+        help="the level, strength or parameter at which no equilibrium is left",
+    )
+    add = limit.add_argument
+    add("case", help=of_case)
+    add(
+        "--of",
+        default="level",
+        metavar="WHAT",
+        help="level (default), strength (factor that divides mu, c, f_t and the fracture "
+        "energies), uplift (effectiveness of the drains), k_h or any parameter",
+    )
+    add("--levels", help="water levels [m] on the way; all but a critical level ask for the last")
+    add("--tail-levels", help="tailwater levels [m], one or as many as levels")
+    add("--out", type=Path, help="output folder (default out/CASE_critical)")
+    limit.set_defaults(call=do_critical)
+
     vary = commands.add_parser(
-        "sweep", parents=[settings], help="one row per combination of parameters and levels"
+        "sweep",
+        parents=[settings, loading],
+        help="one row per combination of parameters and levels, or per row of a sample; a chart",
     )
     add = vary.add_argument
     add("case", help=of_case)
@@ -121,7 +161,38 @@ def parser() -> argparse.ArgumentParser:
         action="append",
         default=[],
         metavar="NAME=VALUES",
-        help="NAME=V1,V2,... or NAME=FIRST:LAST:STEP; NAME may be level",
+        help="NAME=V1,V2,... or NAME=FIRST:LAST:STEP; NAME may be level (repeatable)",
+    )
+    add(
+        "--tie",
+        action="append",
+        default=[],
+        metavar="NAME=EXPRESSION",
+        help="arithmetic of the names varied, sampled or tied before: adhesion=2e5*mu (repeatable)",
+    )
+    add(
+        "--sample",
+        nargs="+",
+        metavar=("N", "NAME=DISTRIBUTION"),
+        help="N rows for each combination of --vary, drawn from distributions with scipy.stats' "
+        "names and arguments (shapes, loc, scale): 1000 mu=normal(1.0,0.15)",
+    )
+    add("--design", choices=("latin", "monte-carlo"), default="latin", help="of the sample")
+    add("--seed", type=natural, default=0, help="of the sample (default 0)")
+    add(
+        "--correlate",
+        action="append",
+        default=[],
+        metavar="A,B=R",
+        help="rank correlation of two sampled names (repeatable)",
+    )
+    add(
+        "--critical",
+        nargs="?",
+        const="level",
+        default="",
+        metavar="WHAT",
+        help="also the critical level (default), strength, ... of each row, as damjoint critical",
     )
     add("--jobs", type=whole, help="processes (default: all cores)")
     add("--scheduler", metavar="ADDRESS", help="a dask.distributed scheduler instead")
@@ -281,18 +352,57 @@ def do_validate(arguments: argparse.Namespace) -> int:
     return int(any(c.verdict == "fail" for c in comparisons))
 
 
+def do_critical(arguments: argparse.Namespace) -> int:
+    """damjoint critical; 0, or 1 if there is no critical value, or none that is confirmed."""
+    from .scene import parameters
+    from .studies.critical import critical
+
+    answer, said = critical(
+        arguments.case,
+        arguments.of,
+        parameters.settings(arguments.settings),
+        arguments.levels,
+        arguments.tail_levels,
+        arguments.out,
+    )
+    print("\n".join(said))
+    return int(not answer.confirmed)
+
+
 def do_sweep(arguments: argparse.Namespace) -> int:
     """damjoint sweep."""
     from .scene import parameters
+    from .studies.plan import Loading, plan_of, sample_of
     from .studies.sweep import sweep
 
     out = arguments.out or Path(f"{Path(arguments.case).stem}_sweep.csv")
     settings = parameters.settings(arguments.settings)
-    count = sweep(
-        arguments.case, arguments.vary, settings, out, arguments.jobs, arguments.scheduler
+    how = {name: getattr(arguments, name) for name in ("design", "seed", "correlate")}
+    if not arguments.sample and arguments.correlate:
+        raise InputError(f"--correlate {arguments.correlate[0]}: needs --sample")
+    sample = sample_of(arguments.sample, **how) if arguments.sample else None
+    plan = plan_of(arguments.vary, arguments.tie, sample, settings, arguments.critical)
+    loading = Loading(arguments.levels, arguments.tail_levels, arguments.steps, arguments.accuracy)
+    count, rows = sweep(
+        arguments.case, plan, settings, out, loading, arguments.jobs, arguments.scheduler
     )
     print(f"{count} rows computed; {out}")
+    show(arguments.case, plan, rows, out)
     return 0
+
+
+def show(case: str, plan: Plan, rows: list[Row], out: Path) -> None:
+    """Say what a sweep has found, and draw it beside its rows."""
+    from .studies import chart
+    from .studies.plan import beside
+
+    if plan.sampled:
+        from .studies import outcome  # scipy.stats takes a second to import
+
+        print(outcome.report(plan, rows, out))
+    picture = beside(out, ".png")
+    said = chart.draw(plan, rows, f"{Path(case).stem}: {len(rows)} rows", picture)
+    print(said or picture)
 
 
 def do_bench(arguments: argparse.Namespace) -> int:
@@ -321,6 +431,8 @@ def main(argv: list[str] | None = None) -> int:
             words[i : i + 2] = [f"{words[i]}={words[i + 1]}"]
     try:
         arguments = parser().parse_args(words)
+        if getattr(arguments, "run_geo", False):
+            os.environ[RUN_GEO] = "1"  # for the processes of a sweep, too
         return arguments.call(arguments)
     except InputError as error:
         print(f"damjoint: {error}", file=sys.stderr)

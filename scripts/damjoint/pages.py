@@ -13,7 +13,7 @@ from pathlib import Path
 
 from tabulate import tabulate
 
-from .results.tables import CHECK, FLUX, HISTORY, JOINT, LOADS
+from .results.tables import CHECK, CRITICAL, FLUX, HISTORY, JOINT, LOADS
 from .scene.parameters import declared
 
 REFERENCE = Path("reference")
@@ -34,7 +34,7 @@ def parameters_page() -> str:
         "[cases/ssnp142.case](../cases/ssnp142.case) has those of the verification case. "
         "A parameter whose default is -1 follows others.",
         "The loading is a list in the case file, or an option: `levels() = {30, 40, 45};` "
-        "(`--levels`) [m above the joint], level number i being reached at t = i, from 0 at t = 0; "
+        "(`--levels`) [m above the base], level number i being reached at t = i, from 0 at t = 0; "
         "`tail_levels()` (`--tail-levels`) likewise, one value for all or as many as levels; "
         "`times()` (`--steps` between two levels) the converged steps. Default: two thirds and "
         "eight ninths of the height, and the crest. The Gmsh window has them as numbers, in the "
@@ -65,9 +65,9 @@ def parameters_page() -> str:
 
 def results_page() -> str:
     """reference/results.md: the columns of the tables."""
-    joint, history, check, loads = (
+    joint, history, check, loads, critical = (
         markdown([(f"`{n}`", u, m) for n, (u, m) in columns.items()], ("column", "unit", "meaning"))
-        for columns in (JOINT | FLUX, HISTORY, CHECK, LOADS)
+        for columns in (JOINT | FLUX, HISTORY, CHECK, LOADS, CRITICAL)
     )
     parts = [
         "# Results",
@@ -92,6 +92,21 @@ def results_page() -> str:
         "Of `damjoint check`: the gravity method's resultants, a row per load, the uplift and the "
         "sum.",
         loads,
+        "## critical.csv",
+        "Of `damjoint critical`: a row per equilibrium of each dam that was tried, pushed beyond "
+        "its highest level where it fails.",
+        critical,
+        "## CASE_sweep.csv",
+        "Of `damjoint sweep`, a row per combination, in the order in which they are done: `key`; "
+        "the varied, sampled and tied values (a level as `level_asked`); the last row of "
+        "history.csv; `failed` (1 where `damjoint run` ends with exit code 1), `verdict`, "
+        "`statement`; with `--critical` the critical value, its `mode`, whether it is `confirmed` "
+        "and by what. A row of a sample whose loads are beyond what the joint could hold at most "
+        "says so and has no more. Beside it `_probability.csv` (with the interval of Clopper and "
+        "Pearson; rows without an answer are `undecided`, failures but for the lower limit), "
+        "`_sensitivity.csv` (Spearman's rank correlation of each sampled input with `failed` "
+        "and, over the rows that stand, with crack, opening and crest) and a chart of one or two "
+        "varied numbers or of the sample.",
         "## fields/",
         "`bulk.msh` and `joint.msh` for Gmsh (a view per field with all levels as its steps); "
         "`fields.pvd` with `bulk_t*.vtu` and `joint_t*.vtu` for ParaView. Bulk: `displacement` "

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from closed_forms import BASE, CENTROID, WATER, WEIGHT, slide_level, thrust
 from damjoint import cli
+from damjoint.results import verdict
 from damjoint.results.verdict import statement
 from numpy.testing import assert_allclose
 
@@ -108,3 +109,28 @@ def test_module_entry_point():
         with pytest.raises(SystemExit) as stop:
             cli.main([word])
         assert stop.value.code == 0
+
+
+@pytest.mark.parametrize(
+    "settings, levels, said",
+    [
+        ({"found_side": 20}, "40", "the foundation reaches 20 m: less than 1.5 heights"),
+        (
+            {"K_N": 1e8, "K_T": 1e8, "G_f": 1000},
+            "40",
+            "K_N L/E = 0.136: the joint gives way more than the dam",
+        ),
+        (
+            {"uplift": "drained", "drain_x": 2.0, "drain_effectiveness": 0.1, "sigma_max": 0.0},
+            "40,46",
+            "has passed the drains (2 m)",
+        ),
+        ({}, "45", "the heel is in tension"),
+        ({"law": "friction", "adhesion": 1e4, "mu": 2}, "40,45", "law = bond lets go"),
+        ({}, "30", ""),
+    ],
+)
+def test_what_an_engineer_should_know(solve, settings, levels, said):
+    (result,) = solve("dam", levels, n_joint=40, **settings)
+    found = "\n".join(verdict.hints(result))
+    assert said in found if said else not found

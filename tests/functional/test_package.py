@@ -34,6 +34,8 @@ def test_wheel_in_a_fresh_environment(tmp_path):
         words = "run", "c", "--levels", "6", "--engine", engine, "--out", engine
         call(command, *words, cwd=elsewhere, env=environment)
         assert json.loads((elsewhere / engine / "run.json").read_text())["verdict"] == "stands"
+    call(command, "report", "condensed", cwd=elsewhere, env=environment)
+    assert (elsewhere / "report.html").stat().st_size > 10_000
     said = call(command, "validate", "c", cwd=elsewhere, env=environment)
     assert ", 0 failed, " in said
     where = call(python, "-c", "import damjoint; print(damjoint.data('pro'))", cwd=elsewhere)

@@ -7,6 +7,7 @@ import shutil
 import numpy as np
 import pytest
 from damjoint import cli
+from damjoint.results import stored
 from damjoint.results.pictures import shear_limit
 from numpy.testing import assert_allclose
 from PIL import Image
@@ -53,6 +54,22 @@ def test_plot_of_a_driven_run(command, tmp_path):
     assert command("plot", "out/k")[0] == 0
     for name in ("k.png", "k_curve.png"):
         assert (tmp_path / "out" / "k" / name).stat().st_size > 10_000
+
+
+def test_a_geometry_of_ones_own(command, tmp_path):
+    """Section and page of a stepped base, the joint's ends read back from its mesh; no gravity
+    method, which knows sections by parameters."""
+    few = "--set", "n_joint=20", "--set", "order=1", "--levels", "40", "--tail-levels", "4"
+    assert command("run", "stepped", *few)[0] == 0
+    path = tmp_path / "out/stepped/stepped.png"
+    drawn = path.read_bytes()
+    assert command("plot", "out/stepped")[0] == 0
+    assert path.stat().st_size == pytest.approx(len(drawn), rel=0.01)
+    read = stored.read(tmp_path / "out/stepped")
+    assert read.result.case.joint_length == pytest.approx(np.hypot(34, 4))
+    assert command("report", "out/stepped")[0] == 0
+    page = (tmp_path / "report.html").read_text()
+    assert "geometry stepped.geo" in page and "Beside the gravity method" not in page
 
 
 def damaged(folder, name, text):

@@ -1,12 +1,19 @@
 """Sweeps: each row is the run of its own; a file is resumed."""
 
 import csv
+import os
+import signal
+import subprocess
+import sys
+import time
 
 import pytest
 from closed_forms import slide_level
 from damjoint.scene.case import CASES
 from damjoint.studies import sweep
+from damjoint.studies.plan import plan_of
 from distributed import LocalCluster
+from scipy import stats
 
 
 def rows(path):
@@ -58,6 +65,30 @@ def test_a_sweep_is_resumed(command, tmp_path):
     assert (tmp_path / "sweep.csv").read_text() == after
 
 
+def test_an_interrupted_sweep_ends_at_once_and_keeps_its_rows(tmp_path):
+    """Not after the minute that the other rows would take."""
+    words = "sweep", "c", "--set", "n_joint=20", "--vary", "mu=0.3:0.7:1e-4", "--jobs", "2"
+    out = tmp_path / "c_sweep.csv"
+    with subprocess.Popen(
+        [sys.executable, "-m", "damjoint", *words],
+        cwd=tmp_path,
+        start_new_session=True,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        while not out.exists() or len(out.read_text().splitlines()) < 10:
+            assert process.poll() is None
+            time.sleep(0.05)
+        os.killpg(process.pid, signal.SIGINT)
+        try:
+            _, said = process.communicate(timeout=15)
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+            raise
+    assert process.returncode == 130 and len(said.splitlines()) == 1
+    assert 9 <= len(rows(out)) < 4001
+
+
 def test_a_dam_that_slides_is_a_row_that_says_so(command, tmp_path):
     command(
         "sweep",
@@ -105,15 +136,13 @@ def test_no_level_without_equilibrium(command, tmp_path):
 
 def test_a_scheduler_with_two_workers(tmp_path):
     """The same rows as in this process, from a dask cluster of two processes."""
-    vary = ["mu=0.35,0.4", "level=8,9"]
+    plan = plan_of(["mu=0.35,0.4", "level=8,9"], [], None, {})
     with LocalCluster(
         n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
     ) as cluster:
-        assert (
-            sweep.sweep("c", vary, {}, tmp_path / "far.csv", scheduler=cluster.scheduler_address)
-            == 4
-        )
-    assert sweep.sweep("c", vary, {}, tmp_path / "near.csv", jobs=1) == 4
+        far = sweep.sweep("c", plan, {}, tmp_path / "far.csv", scheduler=cluster.scheduler_address)
+    near = sweep.sweep("c", plan, {}, tmp_path / "near.csv", jobs=1)
+    assert far[0] == near[0] == len(far[1]) == len(near[1]) == 4
     by_key = lambda name: {row["key"]: row for row in rows(tmp_path / name)}
     far, near = by_key("far.csv"), by_key("near.csv")
     assert far.keys() == near.keys()
@@ -136,3 +165,106 @@ def test_a_varied_level_keeps_the_tailwater(command, tmp_path):
         (row,) = rows(tmp_path / out)
         assert float(row["tail_level"]) == pytest.approx(expected)
         assert float(row["level"]) == 7.5
+
+
+#: The 45 m dam without bond at a level at which it slides for mu < 0.6, on a coarse mesh: N and T
+#: are those of any other.
+SLIDES = (
+    *("sweep", "dam", "--levels", "40.619", "--tail-levels", "3", "--set", "n_joint=40"),
+    *("--set", "law=bond", "--set", "sigma_max=0", "--set", "adhesion=0", "--out", "sweep.csv"),
+)
+
+
+def test_the_probability_of_failure_is_the_distributions(command, tmp_path):
+    """A Latin hypercube of the friction coefficient alone has its share below 0.6 to one row."""
+    sample = "--sample", "40", "mu=normal(0.68,0.06)"
+    code, said, _ = command(*SLIDES, *sample)
+    assert code == 0 and "Probability of failure" in said
+    (told,) = rows(tmp_path / "sweep_probability.csv")
+    exact = stats.norm.cdf(0.6, 0.68, 0.06)
+    assert float(told["low"]) < exact < float(told["high"])
+    assert abs(float(told["probability"]) - exact) <= 1 / 40
+    assert (told["rows"], told["undecided"]) == ("40", "0")
+    (of_mu,) = rows(tmp_path / "sweep_sensitivity.csv")
+    assert of_mu["input"] == "mu" and float(of_mu["crest_ux"]) < -0.99
+    for row in rows(tmp_path / "sweep.csv"):
+        assert (row["failed"] == "1") == (float(row["mu"]) < 0.6)
+        assert row["statement"].startswith("sliding: no equilibrium at level 40.619 m") == (
+            row["failed"] == "1"
+        )
+    before = (tmp_path / "sweep.csv").read_text()
+    assert command(*SLIDES, *sample)[1].replace("0 rows", "40 rows") == said
+    assert (tmp_path / "sweep.csv").read_text() == before
+    assert (tmp_path / "sweep.png").stat().st_size > 10_000
+
+
+@pytest.mark.heavy
+def test_what_no_joint_can_hold_is_found_by_the_search_too(command, tmp_path):
+    """The same verdicts without the shortcut of a sample."""
+    assert command(*SLIDES, "--vary", "mu=0.598,0.602")[0] == 0
+    assert sorted((r["mu"], r["verdict"]) for r in rows(tmp_path / "sweep.csv")) == [
+        ("0.598", "sliding"),
+        ("0.602", "stands"),
+    ]
+
+
+def test_ties_loading_and_accuracy(command, solve, tmp_path):
+    """A tied parameter and the loading of the words are those of the run."""
+    loading = "--levels", "6,8", "--tail-levels", "1", "--steps", "2", "--accuracy", "coarse"
+    words = "--vary", "mu=0.35,0.5", "--tie", "adhesion=1e4*mu", "--jobs", "1", "--out", "s.csv"
+    assert command("sweep", "c", *loading, *words)[0] == 0
+    for row in rows(tmp_path / "s.csv"):
+        assert float(row["adhesion"]) == pytest.approx(1e4 * float(row["mu"]))
+        options = "--no-fields", "--no-picture", "--out", row["mu"]
+        values = "--set", f"mu={row['mu']}", "--set", f"adhesion={row['adhesion']}"
+        assert command("run", "c", *loading, *values, *options)[0] == 0
+        last = rows(tmp_path / row["mu"] / "history.csv")[-1]
+        for name in ("time", "level", "tail_level", "max_opening", "crest_ux", "T"):
+            assert float(row[name]) == pytest.approx(float(last[name]), rel=1e-6), name
+
+
+@pytest.mark.heavy
+def test_a_critical_level_is_a_column(command, tmp_path):
+    """That at which the dam slides; the file is not one of the plain sweep."""
+    words = *SLIDES, "--levels", "30", "--set", "n_joint=10", "--vary", "mu=0.6"
+    assert command(*words, "--critical")[0] == 0
+    (row,) = rows(tmp_path / "sweep.csv")
+    assert float(row["critical_level"]) == pytest.approx(40.619, rel=1e-4)
+    assert (row["level"], row["verdict"]) == ("30", "stands")
+    assert (row["mode"], row["confirmed"]) == ("sliding", "1") and row["confirmed_by"]
+    assert (tmp_path / "sweep.png").exists()
+    assert command(*words)[0] == 2
+
+
+def test_a_row_that_fails_says_why_and_the_others_go_on(command, tmp_path, monkeypatch):
+    whole = sweep.filled
+
+    def broken(case, known, interface):
+        if case["mu"] == 0.4:
+            raise MemoryError("no room\nfor it")
+        return whole(case, known, interface)
+
+    monkeypatch.setattr(sweep, "filled", broken)
+    assert command("sweep", "c", "--vary", "mu=0.4,0.5", "--jobs", "1", "--out", "s.csv")[0] == 0
+    bad, good = rows(tmp_path / "s.csv")
+    assert (bad["failed"], bad["verdict"]) == ("1", "failed")
+    assert bad["statement"] == "MemoryError: no room for it"
+    assert good["level"] == "9"
+
+
+@pytest.mark.parametrize(
+    "words, drawn",
+    [
+        (("--vary", "mu=0.4,0.5"), True),
+        (("--vary", "mu=0.4,0.5", "--vary", "uplift=none,imposed"), True),
+        (("--vary", "mu=0.4,0.5", "--vary", "level=8,9"), True),
+        (("--vary", "level=8,9", "--sample", "3", "mu=uniform(0.3,0.2)"), True),
+        (("--sample", "3", "mu=uniform(0.3,0.2)", "adhesion=uniform(0,1e3)"), True),
+        (("--vary", "mu=0.4", "--vary", "level=9", "--vary", "adhesion=1,2"), False),
+    ],
+)
+def test_a_chart_by_itself(command, tmp_path, words, drawn):
+    common = "--set", "n_joint=10", "--jobs", "1", "--out", "s.csv"
+    code, said, _ = command("sweep", "c", *words, *common)
+    assert code == 0 and ("no chart" in said) != drawn
+    assert (tmp_path / "s.png").exists() == drawn

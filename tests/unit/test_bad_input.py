@@ -7,7 +7,7 @@ import sys
 import pytest
 
 RUN = "run", "a"
-TO_CREST = "between 0 and twice the dam's height (20 m)"
+TO_TWICE = "between 0 and 20 m, twice the dam's height"
 
 
 def refuse(command, tmp_path, words, parts):
@@ -71,22 +71,32 @@ def test_parameter_out_of_range(command, tmp_path, setting, allowed):
         (("sweep", "a", "--vary", "mu"), ("--vary mu", "NAME=V1,V2")),
         (("sweep", "a", "--vary", "mu=0.1:0.5:-0.1"), ("--vary mu=0.1:0.5:-0.1", "step")),
         (("sweep", "a", "--vary", "mu=-1,1"), ("mu = -1", "> 0")),
-        (("sweep", "a", "--vary", "level=9,21"), ("levels = 21", TO_CREST)),
+        (("sweep", "a", "--vary", "level=9,22"), ("levels = 22", TO_TWICE)),
+        (("sweep", "a", "--vary", "level=9,x"), ("level = x", "metres")),
+        (("sweep", "a", "--vary", "mu=1", "--critical", "mu"), ("--critical mu", "varied")),
+        (("sweep", "a", "--vary", "mu=1", "--critical", "law"), ("--of law", "must be level")),
+        (("sweep", "a"), ("--vary, --sample", "one must be given")),
+        (("sweep", "a", "--vary", "mu=0.5", "--tie", "adhesion=x()"), ("--tie adhesion=x()",)),
+        (("sweep", "a", "--sample", "5", "mu=normal(0,1)"), ("--sample mu=normal(0,1)", "> 0")),
+        (("sweep", "a", "--sample", "0", "mu=normal(0,1)"), ("--sample 0", "N NAME=")),
+        (("sweep", "a", "--sample", "5", "mu=norm(1)", "--seed", "-1"), ("seed", "-1", ">= 0")),
+        (("sweep", "a", "--vary", "mu=1", "--correlate", "a,b=1"), ("--correlate a,b=1",)),
+        (("sweep", "a", "--vary", "mu=1", "--accuracy", "rough"), ("accuracy = rough", "coarse")),
         ((*RUN, "--set", "KN=1e12"), ("KN", "unknown parameter", "K_N")),
         ((*RUN, "--set", "E"), ("--set E", "NAME=VALUE")),
-        ((*RUN, "--levels", "3,21"), ("levels = 21", TO_CREST)),
-        ((*RUN, "--levels", "3,-1"), ("levels = -1", TO_CREST)),
+        ((*RUN, "--levels", "3,21"), ("levels = 21", TO_TWICE)),
+        ((*RUN, "--levels", "3,-1"), ("levels = -1", TO_TWICE)),
         ((*RUN, "--levels", ""), ("levels = ", "list of levels in metres")),
         ((*RUN, "--levels", "3,,6"), ("levels = 3,,6", "list of levels in metres")),
         ((*RUN, "--levels", "3;6"), ("levels = 3;6", "list of levels in metres")),
-        ((*RUN, "--set", "dam_height=4.4"), ("levels = 9", "(8.8 m)")),
+        ((*RUN, "--set", "dam_height=4"), ("levels = 9", "and 8 m")),
         (
             (*RUN, "--tail-levels", "1,2"),
             ("tail_levels = 1,2", "one level or as many as levels (4)"),
         ),
         ((*RUN, "--levels", "3,6", "--tail-levels", "1,2,3"), ("tail_levels = 1,2,3", "(2)")),
-        ((*RUN, "--tail-levels", "-1"), ("tail_levels = -1", TO_CREST)),
-        ((*RUN, "--tail-levels=-1"), ("tail_levels = -1", TO_CREST)),
+        ((*RUN, "--tail-levels", "-1"), ("tail_levels = -1", TO_TWICE)),
+        ((*RUN, "--tail-levels=-1"), ("tail_levels = -1", TO_TWICE)),
         ((*RUN, "--engine", "fast"), ("engine = fast", "getdp")),
         (
             ("run", "f", "--engine", "getdp", "--set", "mesh_pattern=layers"),
@@ -103,7 +113,7 @@ def test_parameter_out_of_range(command, tmp_path, setting, allowed):
         ((*RUN, "--steps", "0"), ("steps = 0", "integer >= 1")),
         ((*RUN, "--steps", "-2"), ("steps = -2", "integer >= 1")),
         pytest.param((*RUN, "--steps", "1.5"), ("steps", "1.5", "integer >= 1")),
-        pytest.param((*RUN, "--levels", "-1,3"), ("levels = -1", TO_CREST)),
+        pytest.param((*RUN, "--levels", "-1,3"), ("levels = -1", TO_TWICE)),
     ],
 )
 def test_bad_words(command, tmp_path, words, parts):

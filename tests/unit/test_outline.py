@@ -112,6 +112,14 @@ def test_rows_of_a_broken_joint():
     assert_allclose(distance({"x": rows["x"]}), rows["x"])  # flat: no column of its own
 
 
+def test_curves_of_a_joint_whose_nodes_stand_in_no_rows():
+    """A pressure linear in the distance stays so; the parts are as many as nodes go across."""
+    s, z = np.random.default_rng(1).uniform(size=(2, 400))
+    curves = along({"x": s, "z": z, "s": s, "p": 3 - s})
+    assert len(curves["s"]) == 20
+    assert_allclose(curves["p"], 3 - curves["s"], atol=0.025)
+
+
 @pytest.mark.parametrize(
     "value, units, said",
     [

@@ -50,8 +50,14 @@ def distance(rows: dict[str, np.ndarray]) -> np.ndarray:
 
 
 def along(rows: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """The joint's rows as curves over the distance s from the heel: means over z."""
-    s, place = np.unique(np.round(distance(rows), 9), return_inverse=True)
+    """The joint's rows as curves over the distance s from the heel: means over z, of equal parts of
+    the joint where the nodes of a mesh stand in no rows across.
+    """
+    s = np.round(distance(rows), 9)
+    if np.ptp(rows["z"]) > 0 and len(np.unique(s)) > len(s) / 2:
+        part = s.max() / np.sqrt(len(s))
+        s = (s // part + 0.5) * part
+    s, place = np.unique(s, return_inverse=True)
     number = np.bincount(place)
     return {name: np.bincount(place, column) / number for name, column in rows.items()} | {"s": s}
 

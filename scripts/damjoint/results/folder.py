@@ -18,7 +18,7 @@ from .tables import FLUX, HISTORY, JOINT, Results
 from .verdict import hints, statement, verdict
 
 #: Names that a run writes, besides its pictures.
-TABLES = ("joint.csv", "history.csv", "curve.csv", "gravity.csv", "run.json")
+TABLES = ("joint.csv", "history.csv", "curve.csv", "gravity.csv", "critical.csv", "run.json")
 FIELDS = re.compile(r"(bulk|joint)(_t[\w.+-]+\.vtu|\.msh)|fields\.pvd")
 
 
@@ -60,7 +60,8 @@ def clear(folder: Path) -> None:
             remove_if_empty(folder / name)
     if told is None:
         return
-    names = [*TABLES, *(f"{told['case']}{end}" for end in (".png", "_curve.png", "_check.png"))]
+    pictures = ("", "_curve", "_check", "_critical")
+    names = [*TABLES, *(f"{told['case']}{end}.png" for end in pictures)]
     for name in names:
         if Path(name).name == name:
             (folder / name).unlink(missing_ok=True)
@@ -107,6 +108,8 @@ def write_info(results: Results, folder: Path, state: str = "", why: str = "") -
             "levels": case.levels,
             "tail_levels": case.tail_levels,
             "times": case.times,
+            "geometry": str(case.geometry or ""),
+            "section": case.section if case.geometry else {},  # else it follows from parameters
             "published": case.published,
             "hardening_asked": case.hardening_asked,
             **results.info,

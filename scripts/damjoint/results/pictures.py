@@ -45,7 +45,7 @@ def draw(solution: Solution, folder: Path) -> Path:
     if states:
         time = shown_time(result)
         left, right = parts[0].subfigures(1, 2, width_ratios=(1, 1.15))
-        draw_section(left, solution, time)
+        draw_dam(left, solution, time)
         draw_joint(right, result, time)
         draw_history(parts[1], result)
         if case["dim"] == 3:
@@ -114,7 +114,7 @@ def draw_joint(figure: FigureBase, result: Results, time: float) -> None:
     jumps, normals, shears = panels(figure, 3, 1, top=0.5, down=0.42).flat
     draw_jumps(jumps, case, curves)
     factor = draw_normal_stress(normals, case, curves)
-    if not validation.references(case):
+    if not (validation.references(case) or case.geometry):
         draw_by_hand(normals, gravity.at(case, time, result.state(time)["level"]), factor)
     draw_shear(shears, case, curves)
     state = state_of(curves)
@@ -237,8 +237,22 @@ def joint_length(result: Results) -> float:
     return float(distance(result.joint).max())
 
 
+def own_solid(case: Case) -> bool:
+    """Whether a scene is a user's own geometry in 3D, whose sections differ."""
+    return case["dim"] == 3 and case.geometry is not None
+
+
+def draw_dam(figure: FigureBase, solution: Solution, time: float) -> None:
+    """The section, or the whole where no section stands for it."""
+    draw = draw_view if own_solid(solution.result.case) else draw_section
+    draw(figure, solution, time)
+
+
 def draw_solid(figure: FigureBase, solution: Solution, time: float) -> None:
-    """In 3D: the deformed whole, and the joint unrolled as maps."""
+    """In 3D: the deformed whole, if it is not drawn yet, and the joint unrolled as maps."""
+    if own_solid(solution.result.case):
+        draw_maps(figure, solution, time)
+        return
     left, right = figure.subfigures(1, 2, width_ratios=(1, 1.15))
     draw_view(left, solution, time)
     draw_maps(right, solution, time)
@@ -249,8 +263,7 @@ def draw_view(figure: FigureBase, solution: Solution, time: float) -> None:
     field = solution.fields.get(time)
     if field is None:
         return
-    height = solution.result.case["dam_height"]
-    scale = exaggeration(field.displacement, height)
+    scale = exaggeration(field.displacement, solution.result.case.size)
     sizes = {name: np.linalg.norm(u, axis=1) for name, u in field.displacement.items()}
     length, factor = unit(list(sizes.values()), LENGTHS)
     polygons, values = [], []
@@ -269,8 +282,8 @@ def draw_view(figure: FigureBase, solution: Solution, time: float) -> None:
     ends = np.concatenate(polygons)
     low, high = ends.min(axis=0), ends.max(axis=0)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    axes.set_box_aspect(high - low, zoom=1.2)
-    axes.view_init(elev=22, azim=-60)
+    axes.set_box_aspect(high - low, zoom=1.05)
+    axes.view_init(elev=30, azim=-35)
     axes.set_axis_off()
     bar = figure.add_axes((0.88, 0.2, 0.02, 0.6))
     figure.colorbar(faces, cax=bar)

@@ -20,29 +20,30 @@ from .fields import Solution, distance, nearest_rows, state_of
 from .outline import Section, section_of
 from .units import FORCES, STRESSES, told
 
-#: Of the dam's height: the largest displacement drawn, an arrow, what is seen beside and below.
+#: Of the dam's size: the largest displacement drawn, an arrow, what is seen beside and below.
 MOVED, ARROW, BESIDE, BELOW = 0.06, 0.16, 0.6, 0.45
 
 
-def exaggeration(displacement: dict[str, np.ndarray], height: float) -> float:
+def exaggeration(displacement: dict[str, np.ndarray], size: float) -> float:
     """The factor, of one digit, by which displacements are drawn."""
     largest = max((np.abs(u).max(initial=0) for u in displacement.values()), default=0)
-    return float(f"{MOVED * height / largest:.1g}") if largest > 0 else 1.0
+    return float(f"{MOVED * size / largest:.1g}") if largest > 0 else 1.0
 
 
 def draw_section(figure: FigureBase, solution: Solution, time: float) -> None:
-    """The section at a requested time; nothing but a word if there are no fields, or no section."""
+    """The section at a requested time; a word instead if there are no fields, or no section."""
     (axes,) = panels(figure, left=0.6, right=0.1, bottom=1.05).flat
-    field = solution.fields.get(time)
+    case, field = solution.result.case, solution.fields.get(time)
     rows = solution.result.at(time)
     where = distance(rows)
     ends = np.array([[rows[axis][i] for axis in "xyz"] for i in (where.argmin(), where.argmax())])
     moved = field.displacement if field else {}
-    scale = exaggeration(moved, solution.result.case["dam_height"])
+    scale = exaggeration(moved, case.size)
     section = section_of(solution.bodies, moved, scale, ends) if moved else None
     if section is None:
         axes.set_axis_off()
-        axes.text(0.5, 0.5, "no section: no fields were written", ha="center", color=GREY)
+        why = "no section: " + ("the mesh shows none" if moved else "no fields were written")
+        axes.text(0.5, 0.5, why, ha="center", color=GREY, transform=axes.transAxes)
         return
     Drawing(axes, solution, section, time, rows).draw()
     axes.set_title(f"displacements x {scale:g}; dashed: before them", fontsize=9, loc="left")
@@ -201,7 +202,8 @@ class Drawing:
     def drains(self) -> None:
         """The drains' line, from where it meets the joint down into the ground."""
         case = self.case
-        if case["uplift"] != "drained" and not (case["uplift"] == "cracked" and case["drains"]):
+        with_drains = case["uplift"] in ("cracked", "flow") and case["drains"]
+        if not (case["uplift"] == "drained" or with_drains):
             return
         x, y = self.on_joint(case["drain_x"])
         look = {"color": "#1565c0", "linestyle": "-.", "linewidth": 1.5}
@@ -242,7 +244,8 @@ class Drawing:
             *(self.section.toe - self.section.heel)
         )
         down = np.array([along[1], -along[0]])
-        self.arrow(self.on_joint(at), normal * down + shear * along, GREEN, "", 2.5)
+        place = self.on_joint(at / self.case.joint_length * length)
+        self.arrow(place, normal * down + shear * along, GREEN, "", 2.5)
         where = f"resultant {told(math.hypot(normal, shear), FORCES)}, {at:.3g} m from the heel"
         self.legend.append((arrow_handle(GREEN), where))
 

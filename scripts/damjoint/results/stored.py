@@ -91,7 +91,8 @@ def case_of(told: dict) -> Case:
         published=bool(told["published"]),
         hardening_asked=bool(told["hardening_asked"]),
         shared={n: found[n] for n in SHARED},
-        section={n: found[n] for n in SECTION},
+        geometry=Path(told["geometry"]) if told["geometry"] else None,
+        section={n: found[n] for n in SECTION} | told["section"],
     )
 
 

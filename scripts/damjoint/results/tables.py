@@ -14,8 +14,8 @@ from ..scene.case import Case
 #: Columns of joint.csv: a row per joint node and requested level.
 JOINT = {
     "time": ("-", "t of the requested level"),
-    "level": ("m", "reservoir level above the joint"),
-    "x": ("m", "place of the node: 0 at the heel, along the joint"),
+    "level": ("m", "reservoir level above the base (y = 0)"),
+    "x": ("m", "place of the node: downstream"),
     "y": ("m", "place of the node: height"),
     "z": ("m", "place of the node: across, 3D"),
     "delta_n": ("m", "normal jump, opening > 0"),
@@ -39,7 +39,7 @@ FLUX = {"flux": ("kg/(m s)", "mass flux towards the toe, mean of the elements ar
 #: Columns of history.csv: a row per converged step. Forces are per metre of thickness, in 3D too.
 HISTORY = {
     "time": ("-", "t of the step"),
-    "level": ("m", "reservoir level above the joint"),
+    "level": ("m", "reservoir level above the base (y = 0)"),
     "load_factor": ("-", "level over the level prescribed for this t"),
     "iterations": ("-", "Newton iterations of the step"),
     "cuts": ("-", "how often the step was shortened"),
@@ -52,9 +52,20 @@ HISTORY = {
     "T": ("N/m", "shear force on the joint, downstream > 0"),
     "M": ("N m/m", "moment of N about the toe, holding the dam down > 0"),
     "flux": ("kg/(m s)", "leakage: mass flux out of the toe"),
-    "tail_level": ("m", "tailwater level above the joint"),
+    "tail_level": ("m", "tailwater level above the base"),
     "U": ("N/m", "uplift: resultant of the water pressure in the joint"),
     "x_resultant": ("m", "where N meets the joint, from the heel"),
+}
+
+#: Columns of critical.csv: a row per equilibrium of each dam that was tried.
+CRITICAL = {
+    "trial": ("-", "number of the dam that was tried"),
+    "value": ("", "what was varied: level [m], strength, or the parameter"),
+    "stands": ("-", "1: there is an equilibrium with this value, 0: none was found"),
+    "driven": ("-", "0: the level was prescribed, 1: a displacement, and the level found"),
+    **{n: HISTORY[n] for n in ("level", "crest_ux", "crack_length", "slip_length", "N", "T", "M")},
+    "pushed": ("m", "how far the dam was pushed where a displacement was prescribed"),
+    "compression": ("Pa", "total compression at the toe"),
 }
 
 #: Columns of gravity.csv: a row per load on the body above the joint, and their sum.

@@ -8,9 +8,17 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from .. import InputError, data
+from .. import RUN_GEO, InputError, data
 from . import casefile
-from .parameters import INCLUDE, assignments, declared, listing, parse
+from .parameters import (
+    INCLUDE,
+    assignments,
+    constants,
+    declared,
+    independent,
+    listing,
+    parse,
+)
 
 CASES = data("cases")
 
@@ -115,6 +123,21 @@ class Case:
             times=tuple(t for t in self.times if t <= before),
         )
 
+    def changed(self, values: Mapping[str, float | str]) -> Case:
+        """The case with other values of independent parameters, as `load` makes it, without
+        Gmsh's parser.
+
+        Raises InputError.
+        """
+        checked = {name: declared()[name].check(value) for name, value in values.items()}
+        if not checked.keys() <= independent():
+            raise KeyError(*checked.keys() - independent())
+        values = self.values | checked
+        check_energies({name: [v] for name, v in values.items()} | {"softening_twice": [0.0]})
+        check_drains(values, self.joint_length)
+        check_works(values)
+        return replace(self, values=values, published=False)
+
     def scenes(self) -> list[Case]:
         """The case itself, then the other uplift modes it is published with."""
         others = (
@@ -205,11 +228,11 @@ def load(
     if not geometry:
         check_section(found)
     values = {name: known[name].check(found[name][0]) for name in known}
-    most = math.inf if geometry else 2 * values["dam_height"]
-    heights = check_levels("levels", found["levels"], most)
+    highest = math.inf if geometry else ceiling(values)
+    heights = check_levels("levels", found["levels"], highest)
     if tail_levels is not None:
         own_tail = numbers("tail_levels", tail_levels)
-    tails = check_levels("tail_levels", own_tail, most)
+    tails = check_levels("tail_levels", own_tail, highest)
     if len(set(tails)) == 1:
         tails = tails[:1] * len(heights)
     if len(tails) != len(heights):
@@ -253,10 +276,6 @@ def load(
         shared,
         {n: found[n] for n in SECTION},
     )
-
-
-#: Set to 1: Gmsh may run a user's .geo file, a program that can do anything the user can.
-RUN_GEO = "DAMJOINT_RUN_GEO"
 
 
 def own_geometry(name: str) -> Path:
@@ -387,15 +406,22 @@ def numbers(name: str, text: str) -> list[float]:
     return found
 
 
-def check_levels(name: str, levels: Iterable[float], most: float) -> tuple[float, ...]:
-    """Water levels [m].
+def ceiling(values: Mapping) -> float:
+    """The highest water level that a dam may have [m]."""
+    return constants()["highest_level"][0] * values["dam_height"]
 
-    Raises InputError if one is negative or above `most`, twice the dam's height.
+
+def check_levels(name: str, levels: Iterable[float], highest: float) -> tuple[float, ...]:
+    """Water levels [m]; above the crest the dam is overtopped.
+
+    Raises InputError if one is negative or above the highest one.
     """
     for level in levels:
-        if not 0 <= level <= most:
-            limit = f"between 0 and twice the dam's height ({most:g} m)"
-            raise InputError(f"{name} = {level:g}: must be {limit if most < math.inf else '>= 0'}")
+        if not 0 <= level <= highest:
+            limit = f"between 0 and {highest:g} m, twice the dam's height"
+            raise InputError(
+                f"{name} = {level:g}: must be {limit if highest < math.inf else '>= 0'}"
+            )
     return tuple(levels)
 
 

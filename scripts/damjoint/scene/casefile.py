@@ -12,15 +12,13 @@ A case is a list of statements, in any layout, with // and /* */ comments:
 
 from __future__ import annotations
 
-import ast
 import difflib
-import math
-import operator
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from .. import InputError
+from .arithmetic import parsed, value_of
 from .parameters import assignments, parameter
 
 LISTS = ("levels", "tail_levels", "times")
@@ -34,15 +32,6 @@ TOKEN = re.compile(
     |(?P<mark>[-+*/^(){},;=]) |(?P<other>.)""",
     re.X | re.S,
 )
-OPERATORS = {
-    ast.Add: operator.add,
-    ast.Sub: operator.sub,
-    ast.Mult: operator.mul,
-    ast.Div: operator.truediv,
-    ast.Pow: operator.pow,
-    ast.UAdd: operator.pos,
-    ast.USub: operator.neg,
-}
 
 
 @dataclass
@@ -165,30 +154,11 @@ def numbers(tokens: tuple[str, ...], found: CaseText, where: str) -> list[float]
 
 def evaluate(tokens: tuple[str, ...], found: CaseText, where: str) -> float:
     """The value of an arithmetic expression."""
-    bad = InputError(
-        f"{where}: must be a number, or arithmetic with + - * / ^ ( ), Pi and defaults set before"
-    )
-
-    def value(node: ast.expr) -> float:
-        if isinstance(node, ast.Constant) and type(node.value) in (int, float):
-            return float(node.value)
-        if isinstance(node, ast.Name):
-            known = math.pi if node.id == "Pi" else None
-            known = found.defaults.get(node.id.removeprefix("default_"), known)
-            if isinstance(known, float) and (node.id == "Pi" or node.id.startswith("default_")):
-                return known
-        if isinstance(node, ast.BinOp) and type(node.op) in OPERATORS:
-            return OPERATORS[type(node.op)](value(node.left), value(node.right))
-        if isinstance(node, ast.UnaryOp) and type(node.op) in OPERATORS:
-            return OPERATORS[type(node.op)](value(node.operand))
-        raise bad
-
+    known = {f"default_{n}": v for n, v in found.defaults.items() if isinstance(v, float)}
     try:
-        number = value(ast.parse(" ".join(tokens).replace("^", "**"), mode="eval").body)
-    except (SyntaxError, ArithmeticError, ValueError, RecursionError, MemoryError):
-        raise bad from None
-    if not isinstance(number, float) or not math.isfinite(
-        number
-    ):  # complex: a root of a negative number
-        raise bad
-    return number
+        return value_of(parsed(" ".join(tokens)), known)
+    except ValueError:
+        raise InputError(
+            f"{where}: must be a number, or arithmetic with + - * / ^ ( ), Pi and defaults set "
+            "before"
+        ) from None

@@ -149,7 +149,7 @@ def mesh_of(case: Case) -> Mesh:
     if not case.geometry:
         return Mesh(case)
     told = case.geometry.stat()
-    key = case.geometry, told.st_mtime_ns, told.st_size, tuple(case.values.items())
+    key = case.geometry, told.st_mtime_ns, told.st_size, tuple(shares(case).items())
     if LAST.get("key") != key or LAST["model"] != gmsh.model.getFileName():
         mesh = Mesh(case)
         LAST.update(key=key, mesh=mesh, model=gmsh.model.getFileName())

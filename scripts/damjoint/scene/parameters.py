@@ -159,6 +159,17 @@ def declared() -> dict[str, Parameter]:
     return parameters
 
 
+@lru_cache(maxsize=1)
+def independent() -> frozenset[str]:
+    """Names of the numbers that nothing follows, neither another parameter nor the section: they
+    stand nowhere in the declarations but in their own.
+    """
+    texts = (DECLARATIONS, DECLARATIONS.with_name("section.pro"))
+    rest = "".join(DECLARED.sub("", re.sub(r"//[^\n]*", "", t.read_text())) for t in texts)
+    used = set(re.findall(r"\w+", rest))
+    return frozenset(n for n, p in declared().items() if n not in used and not p.text)
+
+
 def in_words(condition: str) -> str:
     """A Visible clause of the declarations in words."""
     words = re.sub(r'!StrCmp\((\w+), "(\w+)"\)', r"\1 = \2", condition)

@@ -35,7 +35,8 @@ from ..results.validation import read_at
 from ..results.verdict import statement
 from ..run import run
 from ..scene.case import ACCURACIES, Case, load
-from .sweep import filled, interface_of
+from .bodies import interface_of
+from .sweep import filled
 
 #: code_aster 15.2, sequential, on a 2-core machine: seconds of wall time of the whole job without
 #: meshing.

@@ -17,10 +17,9 @@ from .. import InputError, __version__
 from ..results import gravity, pictures, stored
 from ..results.drawing import figure_of
 from ..results.fields import Solution
-from ..results.section_picture import draw_section
 from ..results.tables import Results
 from ..results.units import FLUXES, FORCES, LENGTHS, MOMENTS, Units, unit
-from ..results.verdict import stiffness_ratio
+from ..results.verdict import failed, statement, stiffness_ratio
 from ..scene.case import Case
 from ..scene.parameters import constants, declared, parse
 from .check import Check, by_finite_elements, by_gravity, hand_calculation, picture_table
@@ -72,9 +71,11 @@ def part_of(folder: Path, solution: Solution) -> dict:
     """What the page says of a run, for the template."""
     result = solution.result
     case, told = result.case, result.info
-    found = Check(by_finite_elements(result), by_gravity(hand_calculation(result)))
-    answers = found.finite_elements, found.gravity
-    fails = [f"{answer.by}: {why}" for answer in answers for why in answer.fails]
+    # the gravity method knows sections by parameters only
+    found = None if case.geometry else check_of(result)
+    fails = [statement(result)] if found is None and failed(result) else []
+    for answer in (found.finite_elements, found.gravity) if found else ():
+        fails += [f"{answer.by}: {why}" for why in answer.fails]
     if told["state"] in ("failed", "interrupted"):
         fails.insert(0, told["statement"])
     made = datetime.fromtimestamp((folder / "run.json").stat().st_mtime)
@@ -89,9 +90,9 @@ def part_of(folder: Path, solution: Solution) -> dict:
         "scene": scene_of(case),
         "differences": differences(case),
         "levels": levels_table(result),
-        "loads": loads_table(result),
-        "check": check_table(found),
-        "notes": found.notes,
+        "loads": loads_table(result) if found else None,
+        "check": check_table(found) if found else None,
+        "notes": found.notes if found else [],
         "pictures": pictures_of(solution) if len(result.joint["time"]) else [],
         "facts": facts(result),
     }
@@ -100,7 +101,9 @@ def part_of(folder: Path, solution: Solution) -> dict:
 def scene_of(case: Case) -> str:
     """The dam, dimension, law and water in a line."""
     size = "{dam_height:g} m high, base {dam_base:g} m, crest {dam_crest:g} m".format(**case.values)
-    plane = "plane strain" if case["dim"] == 2 else f"3D, {case['thickness']:g} m thick"
+    size = f"geometry {case.geometry.name}" if case.geometry else size
+    solid = "3D" if case.geometry else f"3D, {case['thickness']:g} m thick"
+    plane = "plane strain" if case["dim"] == 2 else solid
     return f"{size}; {plane}; joint law {case['law']}; water in the joint: {case['uplift']}"
 
 
@@ -169,7 +172,7 @@ def levels_table(result: Results) -> dict:
         and (name != "tail_level" or history[name].any())
     ]
     found = table(shown)
-    length = result.case.section["joint_length"][0]
+    length = case.joint_length
     found["heads"].append("N' meets")
     where = (gravity.position(x, length) for x in history["x_resultant"][rows])
     found["rows"] = [(*row, at) for row, at in zip(found["rows"], where, strict=True)]
@@ -186,6 +189,11 @@ def loads_table(result: Results) -> dict:
     return {"heads": ["load", *found["heads"]], "rows": named}
 
 
+def check_of(result: Results) -> Check:
+    """Both answers at the last level."""
+    return Check(by_finite_elements(result), by_gravity(hand_calculation(result)))
+
+
 def check_table(found: Check) -> dict:
     """The finite elements' answer beside the gravity method's, and what is required."""
     heads, *rows = picture_table(found)
@@ -198,7 +206,7 @@ def pictures_of(solution: Solution) -> list[dict[str, str]]:
     case, time = result.case, pictures.shown_time(result)
     level = result.state(time)["level"]
     section, joint, history = figure_of(5.2, 5.8), figure_of(5.2, 5.8), figure_of(10.6, 2.4)
-    draw_section(section, solution, time)
+    pictures.draw_dam(section, solution, time)
     pictures.draw_joint(joint, result, time)
     pictures.draw_history(history, result)
     found = [
@@ -214,7 +222,7 @@ def pictures_of(solution: Solution) -> list[dict[str, str]]:
     if case["dim"] == 3 and solution.fields:
         solid = figure_of(10.6, 4.4)
         pictures.draw_solid(solid, solution, time)
-        found.append(("whole", solid, "The whole, deformed, and the joint unrolled."))
+        found.append(("whole", solid, "In 3D: deformed, and the joint unrolled."))
     if case["drive"] != "level":
         found.append(("half", pictures.draw_curve(result), "Load against opening."))
     return [{"size": s, "caption": c, "address": embedded(f)} for s, f, c in found]

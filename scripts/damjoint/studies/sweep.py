@@ -1,112 +1,30 @@
-"""Sweeps: one row per combination of parameters and water levels, resumable, on all cores or a dask
-cluster.
-"""
+"""Sweeps: one row per combination of a plan's values, resumable, on all cores or a dask cluster."""
 
 from __future__ import annotations
 
 import csv
 import hashlib
-import itertools
-import math
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from .. import InputError, RunError, __version__
-from ..engines.condensed import cache
 from ..engines.condensed.filling import Filling
 from ..engines.condensed.interface import Interface
 from ..results.tables import HISTORY
-from ..results.verdict import statement, verdict
-from ..scene import parameters
-from ..scene.case import Case, load
-
-
-def values_of(text: str) -> tuple[str, list[str]]:
-    """('name', ['v1', ...]) from 'name=v1,v2,...' or 'name=first:last:step'.
-
-    Raises InputError.
-    """
-    name, equals, values = text.partition("=")
-    bad = InputError(
-        f"--vary {text}: must be NAME=V1,V2,... or NAME=FIRST:LAST:STEP with a step that leads "
-        "from first to last"
-    )
-    if not equals or not values:
-        raise bad
-    if ":" not in values:
-        found = [v.strip() for v in values.split(",")]
-    else:
-        try:
-            first, last, step = (float(v) for v in values.split(":"))
-        except ValueError:
-            raise bad from None
-        if not np.isfinite([first, last, step]).all() or step == 0 or (last - first) / step < 0:
-            raise bad
-        if (last - first) / step >= MOST_ROWS:
-            raise InputError(f"--vary {text}: must give at most {MOST_ROWS} values")
-        found = [f"{first + i * step:.12g}" for i in range(int((last - first) / step + 1e-9) + 1)]
-    if name.strip() == "level":
-        try:
-            [float(v) for v in found]
-        except ValueError:
-            raise bad from None
-    else:
-        for value in found:
-            parameters.parameter(name.strip()).check(value)
-    return name.strip(), found
-
-
-def combinations(
-    case: str, vary: list[str], settings: dict
-) -> Iterator[tuple[dict[str, str], Case]]:
-    """All combinations: the varied values, and the case with them.
-
-    level: the last level; the case's levels below it come first. Raises InputError.
-    """
-    axes = [values_of(text) for text in vary]
-    names = [name for name, _ in axes]
-    for name in names:
-        if names.count(name) > 1 or name in settings:
-            raise InputError(f"--vary {name}: must be given once, and not by --set as well")
-    if math.prod(len(values) for _, values in axes) > MOST_ROWS:
-        raise InputError(f"--vary: must give at most {MOST_ROWS} rows in all")
-    base = load(case, settings)
-    for values in itertools.product(*(v for _, v in axes)):
-        chosen = dict(zip((n for n, _ in axes), values, strict=True))
-        changed = {n: parameters.parameter(n).check(v) for n, v in chosen.items() if n != "level"}
-        levels = tails = None
-        if "level" in chosen:
-            top = float(chosen["level"])
-            levels, tails = up_to(base, top)
-        yield chosen, load(case, settings | changed, levels, tails)
-
-
-def up_to(base: Case, top: float) -> tuple[str, str]:
-    """Levels and tailwater of a case up to a last level: those of its levels that lie below come
-    first.
-
-    The tailwater of the last level is the case's own where it first reaches that level (or its last
-    one).
-    """
-    below = [i for i, level in enumerate(base.levels) if level < top]
-    first = next((i for i, level in enumerate(base.levels) if level >= top), None)
-    tail = base.tail_levels[-1]
-    if first is not None and len(set(base.tail_levels)) > 1:
-        before = base.levels[first - 1] if first else 0.0
-        share = (
-            (top - before) / (base.levels[first] - before) if base.levels[first] > before else 1.0
-        )
-        tail = base.tail_at(first + share)
-    levels = [*(base.levels[i] for i in below), top]
-    tails = [*(base.tail_levels[i] for i in below), tail]
-    return tuple(",".join(f"{v:.12g}" for v in values) for values in (levels, tails))
+from ..results.verdict import failed, statement, verdict
+from ..scene.case import Case, mesh_for
+from .bodies import interface_of
+from .critical import Search
+from .limit import mechanism
+from .plan import AS_IT_IS, Loading, Plan, Row, cases_of, column_of
 
 
 def key_of(case: Case) -> str:
@@ -118,25 +36,18 @@ def key_of(case: Case) -> str:
     ).hexdigest()[:16]
 
 
-#: Rows of a sweep at most.
-MOST_ROWS = 1_000_000
+#: What a row says of its run as a whole: whether it fails (1, the exit code of `damjoint run`) or
+#: stands (0), and how, in words.
+SAID = ("failed", "verdict", "statement")
 
-#: What a row says in words.
-SAID = ("verdict", "statement")
+#: The verdict of a row whose computation has failed.
+ERROR = "failed"
+
+#: Verdicts that do not tell whether there is an equilibrium.
+UNDECIDED = (ERROR, "no convergence", "interrupted")
 
 #: Rows that are computed together at most: they share the steps up to the levels where they part.
 MOST = 8
-
-_LAST: dict[tuple, Interface] = {}
-
-
-def interface_of(case: Case) -> Interface:
-    """The joint of a case with its condensed bodies; the last one used stays in memory."""
-    key = cache.key_of(case)
-    if key not in _LAST:
-        _LAST.clear()
-        _LAST[key] = Interface(cache.cached(case)[0])
-    return _LAST[key]
 
 
 def filled(case: Case, known: dict[tuple, Filling], interface: Interface) -> Filling:
@@ -154,35 +65,84 @@ def filled(case: Case, known: dict[tuple, Filling], interface: Interface) -> Fil
     return known[key]
 
 
-def last_rows(cases: list[Case]) -> list[dict[str, float | str]]:
-    """For cases that differ in levels only: the columns of history.csv at the last level, and what
-    it says in words.
+@dataclass(frozen=True)
+class Task:
+    """What one row asks for."""
+
+    case: Case
+    #: no search for the last equilibrium of a dam whose loads are beyond what its joint can hold
+    quick: bool
+    #: what `critical.Search` takes, if a critical value is asked for
+    search: tuple = ()
+    #: columns of that value
+    columns: Sequence[str] = ()
+
+
+def last_rows(tasks: list[Task]) -> list[dict[str, float | str]]:
+    """For cases that differ in levels only: the columns of history.csv at the last level (empty if
+    there is no equilibrium), what it says in words, and the critical value.
     """
-    found, known = [], {}
+    known = {}
     with threadpool_limits(1):
-        for case in cases:
-            try:
-                filling = filled(case, known, interface_of(case))
-            except RunError as error:
-                failed = {"verdict": "failed", "statement": str(error)}
-                found.append(dict.fromkeys(HISTORY, "") | failed)
-                continue
-            result = filling.results()
-            last = {
-                name: f"{column[-1]:.12g}" if len(column) else ""
-                for name, column in result.history.items()
-            }
-            found.append(last | {"verdict": verdict(result), "statement": statement(result)})
-    return found
+        return [last_row(task, known) | critical_value(task) for task in tasks]
 
 
-def bundles(cases: dict[str, Case]) -> list[list[str]]:
+def last_row(task: Task, known: dict[tuple, Filling]) -> dict[str, float | str]:
+    """The row of a case; one whose computation fails, in whatever way, says why: the others go
+    on.
+    """
+    row = dict.fromkeys((*HISTORY, *SAID), "")
+    try:
+        interface = interface_of(task.case)
+        found, why = mechanism(task.case, interface) if task.quick else ("", "")
+        if found:
+            return row | dict(zip(SAID, (1, found, why), strict=True))
+        result = filled(task.case, known, interface).results()
+    except Exception as error:
+        return row | dict(zip(SAID, (1, ERROR, in_words(error)), strict=True))
+    last = {name: f"{value:.12g}" for name, value in result.last.items()}
+    said = int(failed(result)), verdict(result), statement(result)
+    return row | last | dict(zip(SAID, said, strict=True))
+
+
+def in_words(error: Exception) -> str:
+    """Why a computation has failed, in a line."""
+    kind = "" if isinstance(error, RunError) else f"{type(error).__name__}: "
+    return " ".join(f"{kind}{error}".split())
+
+
+def critical_value(task: Task) -> dict[str, float | str]:
+    """The columns of a critical value; where the search fails it says why."""
+    if not task.search:
+        return {}
+    try:
+        answer = Search(*task.search).run()
+    except Exception as error:
+        return dict(zip(task.columns, ("", "", 0, in_words(error)), strict=True))
+    value = "" if answer.value is None else f"{answer.value:.12g}"
+    said = value, answer.mode, int(answer.confirmed), answer.why or answer.doubt
+    return dict(zip(task.columns, said, strict=True))
+
+
+def search_for(
+    case: str, plan: Plan, settings: dict, loading: Loading, row: Row, one: Case
+) -> tuple:
+    """What `Search` takes for the critical value of a row of a plan, whose case is given."""
+    if not plan.critical:
+        return ()
+    mesh = mesh_for(loading.accuracy, one) if loading.accuracy else ()
+    changed = settings | {n: one[n] for n in (*mesh, *row) if n != "level"}
+    levels, tails = (",".join(map(repr, v)) for v in (one.levels, one.tail_levels))
+    return case, plan.critical, changed, levels, tails
+
+
+def bundles(tasks: dict[str, Task]) -> list[list[str]]:
     """The keys of cases that differ in levels only, together; at most MOST of them, for rows to
     come in time.
     """
     groups: dict[tuple, list[str]] = {}
-    for key, case in cases.items():
-        groups.setdefault(tuple(sorted(case.values.items())), []).append(key)
+    for key, task in tasks.items():
+        groups.setdefault(tuple(sorted(task.case.values.items())), []).append(key)
     return [keys[i : i + MOST] for keys in groups.values() for i in range(0, len(keys), MOST)]
 
 
@@ -206,10 +166,10 @@ def read_done(path: Path, columns: list[str]) -> set[str]:
     return {row[0] for row in rows[1:] if len(row) == len(columns)}
 
 
-def spread(cases: dict[str, Case], jobs: int, scheduler: str | None) -> Iterator[tuple[str, dict]]:
-    """(key, row) of each case as it is done: here, in `jobs` processes, or on a dask scheduler."""
-    work = bundles(cases)
-    chosen = [[cases[key] for key in keys] for keys in work]
+def spread(tasks: dict[str, Task], jobs: int, scheduler: str | None) -> Iterator[tuple[str, dict]]:
+    """(key, row) of each task as it is done: here, in `jobs` processes, or on a dask scheduler."""
+    work = bundles(tasks)
+    chosen = [[tasks[key] for key in keys] for keys in work]
     if scheduler:
         try:
             from dask.distributed import Client
@@ -242,51 +202,62 @@ def spread(cases: dict[str, Case], jobs: int, scheduler: str | None) -> Iterator
             try:
                 for future in as_completed(waiting):
                     yield from zip(waiting[future], future.result(), strict=True)
+            except BrokenProcessPool:
+                raise RunError(
+                    "sweep: a process was killed (out of memory?); what has been finished is "
+                    "saved, the same command goes on; --jobs 1 takes least memory"
+                ) from None
             except BaseException:
-                pool.shutdown(wait=False, cancel_futures=True)
+                pool.shutdown(cancel_futures=True)  # waits: a pool that has gone cancels nothing
                 raise
 
 
 def sweep(
     case: str,
-    vary: list[str],
+    plan: Plan,
     settings: dict,
     out: Path,
+    loading: Loading = AS_IT_IS,
     jobs: int | None = None,
     scheduler: str | None = None,
     progress: Callable = tqdm,
-) -> int:
-    """Compute what is missing in out (CSV) and return the number of rows computed.
+) -> tuple[int, list[Row]]:
+    """Compute what is missing in out (CSV); the number of rows computed, and all rows of the plan.
 
-    Columns: key, the varied names (a varied level as level_asked), the columns of history.csv,
-    verdict and statement. Each row is written whole when it is done; a sweep that is interrupted
-    goes on where it was. Raises InputError.
+    Columns: key, the plan's names (level as level_asked), the columns of history.csv, whether it
+    failed, verdict and statement, the critical value. Each row is written whole when it is done; a
+    sweep that is interrupted goes on where it was. Raises InputError, RunError.
     """
     if jobs is not None and jobs < 1:
         raise InputError(f"jobs = {jobs}: must be an integer >= 1")
-    if not vary:
-        raise InputError("--vary: must be given at least once, such as mu=0.3:0.8:0.05")
     if not out.parent.is_dir():
         raise InputError(f"out = {out}: must be a file in an existing folder")
-    chosen, cases = {}, {}
-    for values, one in combinations(case, vary, settings):
-        chosen[key_of(one)], cases[key_of(one)] = values, one
-    names = [f"{n}_asked" if n == "level" else n for n in next(iter(chosen.values()))]
-    columns = ["key", *names, *HISTORY, *SAID]
+    chosen, tasks, keys = {}, {}, []
+    for values, one in cases_of(case, plan, settings, loading):
+        search = search_for(case, plan, settings, loading, values, one)
+        keys.append(key_of(one))
+        chosen[keys[-1]] = values
+        tasks[keys[-1]] = Task(one, bool(plan.sampled), search, plan.critical_columns)
+    results = [*HISTORY, *SAID, *plan.critical_columns]
+    columns = ["key", *map(column_of, plan.names), *results]
     done = read_done(out, columns)
-    missing = {key: one for key, one in cases.items() if key not in done}
-    if not missing:
-        return 0
-    interface_of(next(iter(missing.values())))  # condensed once, before the processes start
+    missing = {key: task for key, task in tasks.items() if key not in done}
+    if missing:
+        first = next(iter(missing.values()))
+        if first.search:
+            Search(*first.search)  # what is asked for is checked here
+        interface_of(first.case)  # condensed once, before the processes start
     fresh = not out.exists() or not out.stat().st_size
     with out.open("a", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         if fresh:
             writer.writerow(columns)
-        rows = spread(missing, jobs or os.cpu_count() or 1, scheduler)
+        rows = spread(missing, jobs or os.cpu_count() or 1, scheduler) if missing else ()
         for key, row in progress(
             rows, total=len(missing), desc=f"sweep {case}", disable=not sys.stderr.isatty()
         ):
-            writer.writerow([key, *chosen[key].values(), *(row[c] for c in (*HISTORY, *SAID))])
+            writer.writerow([key, *chosen[key].values(), *(row[c] for c in results)])
             file.flush()
-    return len(missing)
+    with out.open(newline="") as file:
+        found = {row["key"]: row for row in csv.DictReader(file)}
+    return len(missing), [found[key] for key in keys]

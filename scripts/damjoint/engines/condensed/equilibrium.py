@@ -43,7 +43,6 @@ class Joint:
     def __init__(self, case: Case, interface: Interface) -> None:
         self.case, self.bulk, self.interface = case, interface.bulk, interface
         self.wet, self.flowing = case["uplift"] != "none", case["uplift"] in ("flow", "cracked")
-        self.driven = case["drive"] != "level"
         self.drains = interface.drains(case["drain_x"]) if self.flowing and case["drains"] else None
         self.unit_weight = case["rho_water"] * case["g"]
         self.law = LAWS[case["law"]](case)
@@ -238,10 +237,9 @@ class Joint:
         memory: Memory,
         loading: Loading,
         within: np.ndarray | None = None,
-    ) -> tuple[np.ndarray, Callable[[bool], tuple[Change, np.ndarray | None]]]:
-        """The residual (j,), and a function that gives its derivatives with jump (a change of the
-        virgin joint's, by the law's tangent or by its secant) and, where the case is driven by a
-        displacement, with the level (j,).
+    ) -> tuple[np.ndarray, Callable[[bool], Change], Callable[[], np.ndarray]]:
+        """The residual (j,), and functions that give its derivatives with jump (a change of the
+        virgin joint's, by the law's tangent or by its secant) and with the level (j,).
 
         within: see the law's `respond`.
         """
@@ -264,7 +262,7 @@ class Joint:
             lift, solution = flowing_lift(loading)
             value = value - lift
 
-        def derivatives(secant: bool) -> tuple[Change, np.ndarray | None]:
+        def by_jump(secant: bool) -> Change:
             change = law_change(secant)
             if self.flowing:
                 growing = self.aperture(jump, memory)[1] * interface.points.weights
@@ -272,14 +270,15 @@ class Joint:
                 change.columns = found[0][1]
                 shares = (share for share, _ in solution)
                 change.pressure = sum(s * p for s, (p, _) in zip(shares, found, strict=True))
-            if not self.driven:
-                return change, None
+            return change
+
+        def by_level() -> np.ndarray:
             slope = -self.rate(self._loads, loading)
             if self.flowing:
                 slope = slope - self.rate(lambda other: flowing_lift(other)[0], loading)
-            return change, slope
+            return slope
 
-        return value, derivatives
+        return value, by_jump, by_level
 
     def pressure(self, jump: np.ndarray, memory: Memory, loading: Loading) -> Pressure:
         """The water's pressure in the joint for an opening."""
@@ -303,12 +302,15 @@ class Joint:
         nodes = () if self.drains is None else (self.drains[0],)
         return Pressure(*found, *interface.flow.flux(conductivity, total, bulk.width, *nodes))
 
-    def crest(self, jump: np.ndarray, loading: Loading) -> tuple[float, np.ndarray, float]:
-        """The crest's displacement along x [m], and its derivatives with jump and level."""
+    def crest(self, jump: np.ndarray, loading: Loading) -> float:
+        """The crest's displacement along x [m]."""
         bulk = self.bulk
         value = bulk.crest_pressure @ self.pushed(loading)[0] + bulk.crest_jump @ jump
         for name, size in self.units_of(loading).items():
             value += size * bulk.crest_units[name]
-        forces = lambda other: self._pushed(other)[0]
-        rate = bulk.crest_pressure @ self.rate(forces, loading) if self.driven else 0.0
-        return float(value), bulk.crest_jump, float(rate)
+        return float(value)
+
+    def crest_rate(self, loading: Loading) -> float:
+        """Its derivative with the level."""
+        forces = self.rate(lambda other: self._pushed(other)[0], loading)
+        return float(self.bulk.crest_pressure @ forces)

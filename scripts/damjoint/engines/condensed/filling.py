@@ -26,6 +26,8 @@ class Filling:
     def __init__(
         self, case: Case, interface: Interface, on_step: Callable[[float], None] = lambda time: None
     ) -> None:
+        if case.geometry:  # where its joint is, only the mesh knows
+            case = replace(case, section=case.section | interface.section)
         self.case, self.joint, self.on_step = case, Joint(case, interface), on_step
         self.driven = case["drive"] != "level"
         self.record = Record(self.joint)
@@ -71,8 +73,6 @@ class Filling:
 
     def run(self) -> Results:
         """Follow all the times of the case that are still to come."""
-        if self.case["weight_first"] and self.state.time == 0:
-            self.rest()
         for target in self.case.times:
             if target > self.state.time and not self.stopped:
                 self.reach(target)
@@ -108,6 +108,8 @@ class Filling:
 
         The first step holds the weight, too, at any length: it is cut to the weight alone first.
         """
+        if self.case["weight_first"] and self.state.time == 0 and not self.state.jump.any():
+            self.rest()
         *attempts, last_resort = self.attempts()
         cuts, dt, weighed = 0, np.inf, self.state.time > 0 or self.state.jump.any()
         while self.state.time < target and not self.stopped:
@@ -194,19 +196,19 @@ class Filling:
                     within = (side * last.side < 0) & ((side < 0) | (attempt.release > 1))
                     side = np.where(within, 0, side)
             loading = replace(asked, level=level)
-            value, derivatives = joint.residual(jump, memory, loading, within)
+            value, by_jump, by_level = joint.residual(jump, memory, loading, within)
             size, edge = np.linalg.norm(value), None
             if prescribed:
                 if self.case["drive"] == "heel":
                     found, row, rate = joint.interface.heel @ jump, joint.interface.heel, 0.0
                 else:
-                    found, row, rate = joint.crest(jump, loading)
+                    found, row = joint.crest(jump, loading), joint.bulk.crest_jump
+                    rate = joint.crest_rate(loading)
                 size, edge = np.hypot(size, stiff * (found - target)), (row, rate, target - found)
 
             def correction(secant: bool) -> tuple[np.ndarray, float]:
-                change, slope = derivatives(secant)
-                border = edge and (slope, *edge)
-                return joint.interface.solve(joint.virgin, change, -value, border)
+                border = edge and (by_level(), *edge)
+                return joint.interface.solve(joint.virgin, by_jump(secant), -value, border)
 
             return Iterate(jump, level, value, size, correction, side)
 
@@ -241,7 +243,7 @@ class Filling:
         joint = self.joint
         if self.case["drive"] == "heel":
             return float(joint.interface.heel @ state.jump)
-        return joint.crest(state.jump, state.loading)[0]
+        return joint.crest(state.jump, state.loading)
 
     def results(self) -> Results:
         """All tables so far."""

@@ -214,6 +214,11 @@ class Interface:
         """Scalar fields along the joint, and how far each place is on the way to the toe."""
         return Along(self.bulk, self.space)
 
+    @cached_property
+    def way(self) -> np.ndarray:
+        """How far each place is on the way from heel (0) to toe (1)."""
+        return self.along.at_places @ self.along.way
+
     def drains(self, distance: float) -> tuple[np.ndarray, np.ndarray]:
         """The nodes nearest to a line at a distance from the heel along the joint [m], and the
         law's points beside them.

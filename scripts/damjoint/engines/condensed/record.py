@@ -117,8 +117,8 @@ class Record:
 
     def crest(self, state: State) -> float:
         """The crest's movement along x [m]."""
-        start = self.at_rest and self.joint.crest(self.at_rest.jump, self.at_rest.loading)[0]
-        return self.joint.crest(state.jump, state.loading)[0] - (start or 0.0)
+        start = self.at_rest and self.joint.crest(self.at_rest.jump, self.at_rest.loading)
+        return self.joint.crest(state.jump, state.loading) - (start or 0.0)
 
     def save(self, state: State) -> None:
         """The joint at the state last added, node by node; and with jump and stress made from
@@ -140,14 +140,13 @@ class Record:
             )
         )
         seen[:, 3] -= pressure.nodes
-        distance = interface.along.at_places @ interface.along.way * interface.length
         columns = [
             np.full((len(place), 2), (state.time, state.loading.level)),
             place,
             seen[:, :6],
             pressure.nodes[:, None],
             seen[:, 6:],
-            distance[:, None],
+            interface.way[:, None] * interface.length,
         ]
         if pressure.flux is not None:
             columns.append(self.node_means(pressure.flux[:, None], True))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from dataclasses import replace
 from functools import lru_cache, partial
 
 from threadpoolctl import threadpool_limits
@@ -52,7 +51,6 @@ def solve(case: Case, on_step: OnStep, _fields: bool) -> Iterator[Outcome]:
 
         for number, scene in enumerate(case.scenes()):
             begin, error = time.perf_counter(), None
-            scene = replace(scene, section=scene.section | interface.section)
             fillings.append(Filling(scene, interface, partial(on_step, number)))
             try:
                 fillings[-1].run()

@@ -1,0 +1,447 @@
+"""The level, the strength or any parameter at which a dam has no equilibrium left.
+
+A value stands if an equilibrium is found up to the case's last level, and fails if its branch (see
+branch.py) ends below. Between the two the value is halved to the precision; a level needs no
+halving, it is read from the branch itself.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from itertools import chain, zip_longest
+from pathlib import Path
+
+import numpy as np
+from scipy.optimize import bisect
+from threadpoolctl import threadpool_limits
+from tqdm import tqdm
+
+from .. import InputError
+from ..engines import Outcome
+from ..results import folder as folders
+from ..results import gravity
+from ..results.tables import CRITICAL, Results, write_csv
+from ..results.verdict import bound, statement
+from ..run import save
+from ..scene.case import Case, ceiling, load
+from ..scene.parameters import parameter
+from .bodies import interface_of
+from .branch import PRECISION, ROUGH, SURE, Branch, Point
+
+#: What is divided by the strength reduction factor. The fracture energies, too: the jumps at which
+#: a bond has gone stay as they are, and its whole curve is lowered.
+STRENGTH = ("sigma_max", "adhesion", "mu", "G_f", "G_t")
+
+#: Few attempts at a step of the level: where it fails the dam is pushed instead.
+QUICK = {"smallest_step": 1.0, "max_iterations": 15.0, "burst_iterations": 15.0}
+
+#: What says how the loading is driven.
+DRIVE = ("drive", "drive_begin", "drive_end", "drive_by")
+
+#: The smallest value of a parameter that has to be positive.
+TINY = 1e-30
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A value, and the branch of the dam that has it."""
+
+    value: float
+    branch: Branch
+
+    @property
+    def stands(self) -> bool:
+        """Whether there is an equilibrium at the level asked for."""
+        return self.branch.reached
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What has been found."""
+
+    #: the largest load (or smallest strength) with an equilibrium; None if there is no limit
+    value: float | None
+    mode: str
+    #: what confirms it, and what does not; one of them is empty
+    why: str
+    doubt: str
+    #: the last equilibrium
+    point: Point | None
+    #: the same by the gravity method; None if it gives none
+    gravity: float | None = None
+
+    @property
+    def confirmed(self) -> bool:
+        """Whether there is a critical value, with an equilibrium below and a mechanism above it."""
+        return self.value is not None and bool(self.why)
+
+    def lines(self, search: Search) -> list[str]:
+        """The answer in words."""
+        of, name, unit = search.of, search.own.name, search.unit
+        if self.value is None:
+            found = [f"{name}: no critical {of} found: {self.doubt}"]
+        else:
+            mode = f" ({self.mode})" if self.mode else ""
+            found = [f"{name}: critical {of} {self.value:.6g}{unit}{mode}"]
+            found.append(self.why or f"not confirmed: {self.doubt}")
+        if self.point and self.point.filling.case["pena_tang"] and search.own.hardening_asked:
+            found += filter(None, [statement(last_state(search, self.point))])
+        if self.gravity is not None:
+            found.append(f"gravity method: {self.gravity:.6g}{unit}")
+        return found
+
+
+class Search:
+    """The search for a critical value."""
+
+    def __init__(
+        self,
+        case: str,
+        of: str,
+        settings: dict | None = None,
+        levels: str | None = None,
+        tail_levels: str | None = None,
+        say: Callable[[str], None] = lambda _: None,
+    ) -> None:
+        """case, settings, levels, tail_levels: as in scene.case.load; of: level, strength, uplift
+        or a parameter; say: is told how far it is. Raises InputError.
+        """
+        self.asked = case, levels, tail_levels
+        self.of, self.name = of, {"uplift": "drain_effectiveness"}.get(of, of)
+        own = load(case, settings, levels, tail_levels)
+        self.settings = QUICK | dict(settings or {}) | {"drive": "level"}
+        if own["law"] == "friction" and not own.hardening_asked:
+            self.settings["pena_tang"] = 0.0
+        self.own, self.say = own, say
+        self.trials: list[Trial] = []
+        self.check()
+
+    def check(self) -> None:
+        """Raise InputError if the case has nothing to vary."""
+        own = self.own
+        drained = own["uplift"] == "drained" or (own["uplift"] == "cracked" and own["drains"])
+        if self.of == "uplift" and not drained:
+            raise InputError(
+                f"--of uplift: needs drains; uplift = {own['uplift']}: must be drained, or cracked "
+                "with drains = 1"
+            )
+        if self.of in ("level", "strength"):
+            return
+        varied = parameter(self.name)
+        if varied.text or varied.choices or varied.integer or varied.group == "Solver":
+            raise InputError(
+                f"--of {self.of}: must be level, strength, uplift or a parameter that is a number "
+                "without steps"
+            )
+
+    @property
+    def unit(self) -> str:
+        """The unit of what is varied, with a blank before it."""
+        if self.of in ("level", "strength"):
+            return " m" if self.of == "level" else ""
+        unit = parameter(self.name).meaning.rpartition("[")[2].rstrip("]")
+        return "" if unit == "-" else f" {unit.replace(' per ', '/')}"
+
+    # -- one value
+    # ----------------------------------------------------------------------------------------------
+
+    def case_at(self, value: float) -> Case:
+        """The case with a value.
+
+        Raises InputError.
+        """
+        name, levels, tails = self.asked
+        if self.of == "strength":
+            changed = {n: self.own[n] / value for n in STRENGTH} | {"pena_rupture": -1.0}
+        else:
+            changed = {self.name: value}
+        return load(name, self.settings | changed, levels, tails)
+
+    def branch(self, value: float, case: Case, target: float | None = None) -> Branch:
+        """The branch of a case, followed until a first opinion; one more trial."""
+        told = lambda level: self.say(f"{self.of} {value:.6g}{self.unit}: level {level:.6g} m")
+        highest = max(target or 0, *case.levels)  # water may press on the crest
+        bodies = interface_of(replace(case, levels=(*case.levels[:-1], highest)))
+        found = Branch(case, bodies, target, told)
+        self.trials.append(Trial(value, found))
+        found.follow(ROUGH)
+        return found
+
+    def trial(self, value: float) -> Trial:
+        """A value tried."""
+        self.branch(value, self.case_at(value))
+        return self.trials[-1]
+
+    # -- the search
+    # ----------------------------------------------------------------------------------------------
+
+    def run(self) -> Answer:
+        """Search."""
+        with threadpool_limits(1):
+            return self.level() if self.of == "level" else self.value()
+
+    def level(self) -> Answer:
+        """The highest level of the branch from the case's highest level on."""
+        name, *_ = self.asked
+        last = int(np.argmax(self.own.levels)) + 1
+        lists = (self.own.levels[:last], self.own.tail_levels[:last])
+        texts = (",".join(map(repr, values)) for values in lists)
+        case = load(name, self.settings, *texts)
+        branch = self.branch(max(case.levels), case, ceiling(case.values))
+        branch.follow(SURE)
+        branch.refine()
+        if branch.reached:
+            beyond = f"{branch.target:g} m, twice the dam's height"
+            return Answer(None, "", "", f"there is an equilibrium at {beyond}", branch.points[-1])
+        point = branch.points[branch.top] if branch.points else None
+        return self.answer(point and point.level, branch, point)
+
+    def value(self) -> Answer:
+        """Outwards from the case's own value until the answer changes, then halved."""
+        found = self.trial(1.0 if self.of == "strength" else self.own[self.name])
+        other = self.change(found)
+        if other is None:
+            return self.no_change(found)
+        stands, fails = (found, other) if found.stands else (other, found)
+        while True:
+            stands, fails = self.halved(stands, fails)
+            fails.branch.follow(SURE)
+            fails.branch.refine()
+            if not fails.stands:
+                return self.answer(stands.value, fails.branch, arrived(stands))
+            step = fails.value - stands.value  # pushed further it does stand: on from there
+            stands = fails
+            while fails.stands:
+                step *= 2
+                fails = self.trial(stands.value + step)
+
+    def no_change(self, found: Trial) -> Answer:
+        """The answer where all values that have been tried end as one of them does."""
+        tried = [t.value for t in self.trials]
+        ends = "stands" if found.stands else "fails"
+        doubt = f"{ends} with all that was tried, {min(tried):.6g} to {max(tried):.6g}{self.unit}"
+        point = arrived(found) if found.stands else None
+        return Answer(None, found.branch.mode, "", doubt, point)
+
+    def change(self, first: Trial) -> Trial | None:
+        """The first trial outwards from one that ends otherwise."""
+        for value in self.outwards(first):
+            try:
+                found = self.trial(value)
+            except InputError:  # the case allows no such value
+                continue
+            if found.stands != first.stands:
+                return found
+        return None
+
+    def outwards(self, first: Trial) -> Iterator[float]:
+        """Values ever further from the first: towards failure if it stands and else from it; in
+        both directions by turns where that is not known.
+        """
+        low, high = TINY, np.inf
+        if self.of != "strength":
+            low, high = parameter(self.name).minimum, parameter(self.name).maximum
+        up, down = outwards(first.value, high), outwards(first.value, low)
+        worse = {"strength": up, "k_h": up, "uplift": down}.get(self.of)
+        if worse is None:
+            by_turns = chain.from_iterable(zip_longest(up, down))
+            return (value for value in by_turns if value is not None)
+        return worse if first.stands else (down if worse is up else up)
+
+    def halved(self, stands: Trial, fails: Trial) -> tuple[Trial, Trial]:
+        """The two, as near to each other as the precision asks for; halved every third time at
+        least.
+        """
+        ends, turn = (stands.value, fails.value), 0
+        while abs(ends[0] - ends[1]) > PRECISION * max(map(abs, ends)):
+            value = self.foreseen(*ends) if turn % 3 else None
+            found = self.trial(middle(*ends) if value is None else value)
+            stands, fails = (found, fails) if found.stands else (stands, found)
+            ends, turn = (stands.value, fails.value), turn + 1
+        return stands, fails
+
+    def foreseen(self, stands: float, fails: float) -> float | None:
+        """A value just before the one at which the highest levels of the last two trials that
+        failed say that the dam just fails, or just beyond it; None if they say nothing.
+        """
+        known = [t for t in self.trials if not t.stands and t.branch.points][-2:]
+        values = [t.value for t in known]
+        missing = [t.branch.target - t.branch.highest for t in known]
+        if len(set(missing)) < 2:
+            return None
+        root = values[1] - missing[1] * np.diff(values)[0] / np.diff(missing)[0]
+        aside = np.sign(fails - stands) * 0.4 * PRECISION * abs(root)
+        low, high = sorted((stands, fails))
+        return next((v for v in (root - aside, root + aside) if low < v < high), None)
+
+    def so_far(self) -> Answer:
+        """What is known when the search is interrupted."""
+        standing = [t for t in self.trials if t.stands]
+        ends = [f"{t.value:.6g} {'stands' if t.stands else 'fails'}" for t in self.trials[-2:]]
+        doubt = f"interrupted: {', '.join(ends)}" if ends else "interrupted"
+        return Answer(None, "", "", doubt, arrived(standing[-1]) if standing else None)
+
+    def answer(self, value: float | None, failing: Branch, point: Point | None) -> Answer:
+        """The answer, with what the failing branch shows."""
+        why, doubt = "", "no further equilibrium is found, but no mechanism either"
+        if not failing.points:
+            doubt = "no equilibrium is found even at the first step"
+        elif failing.crushed_at_top:
+            why = f"beyond it the toe's compression passes f_c = {failing.case['f_c']:g} Pa"
+        elif failing.settled(SURE):
+            top, knee = failing.points[failing.top], failing.points[failing.knee]
+            far = failing.points[-1].pushed / (knee.pushed or failing.size)
+            why = (
+                f"beyond it, pushed {far:.2g} times as far, the dam holds {top.level:.6g} m at most"
+            )
+            if reached := bound(failing.case, top.last):
+                why += f"; there {reached}"
+        beside = None if value is None else self.by_gravity(value)
+        return Answer(value, failing.mode, why, "" if why else doubt, point, beside)
+
+    # -- beside it
+    # ----------------------------------------------------------------------------------------------
+
+    def by_gravity(self, value: float) -> float | None:
+        """The critical value of the gravity method that is nearest to one of the finite elements;
+        None if there is none near.
+        """
+        here = self.rigid_block_stands(value)
+        for share in (0.02, 0.05, 0.1, 0.2, 0.5, 0.9):
+            for other in (value * (1 + share), value * (1 - share)):
+                there = self.rigid_block_stands(other)
+                if there is not None and there != here:
+                    sign = lambda v: 1.0 if self.rigid_block_stands(v) == here else -1.0
+                    return float(bisect(sign, value, other, rtol=PRECISION / 1000))
+        return None
+
+    def rigid_block_stands(self, value: float) -> bool | None:
+        """Whether the gravity method finds an equilibrium, with friction if the law has it, and a
+        toe that is not crushed; None if the case allows no such value.
+        """
+        try:
+            case = self.own if self.of == "level" else self.case_at(value)
+        except InputError:
+            return None
+        method = gravity.at(case, case.times[-1], value if self.of == "level" else None)
+        slides = case["law"] != "rupture" and method.SSF < 1
+        crushed = 0 < case["f_c"] < -method.sigma_n_toe
+        return method.stands and not slides and not crushed
+
+
+def arrived(trial: Trial) -> Point:
+    """The equilibrium of a trial that stands."""
+    branch = trial.branch
+    if branch.points[branch.arrival].control != "level":
+        branch.refine()
+    return branch.points[branch.arrival]
+
+
+def middle(a: float, b: float) -> float:
+    """Between two values: where they differ by more than a factor 2, of their orders."""
+    far = a * b > 0 and not 0.5 <= a / b <= 2
+    return float(np.sign(a) * np.sqrt(a * b)) if far else (a + b) / 2
+
+
+def outwards(value: float, end: float) -> Iterator[float]:
+    """Values ever further from one: nearer to an end by shares, to 0 or away from it by factors."""
+    if np.isfinite(end) and abs(end) > TINY:
+        yield from (value + (end - value) * 2.0**-k for k in range(7, -1, -1) if value != end)
+    elif value == 0:
+        yield from (float(np.sign(end)) * 10.0**k for k in range(-3, 10) if end)
+    elif np.isfinite(end) or (end > 0) != (value > 0):
+        yield from (value * 2.0**-k for k in range(1, 11))
+        yield from [0.0] * (end != TINY)
+    else:
+        yield from (value * 2.0**k for k in range(1, 13))
+
+
+# -- the whole study
+# --------------------------------------------------------------------------------------------------
+
+
+def critical(
+    case: str,
+    of: str,
+    settings: dict | None = None,
+    levels: str | None = None,
+    tail_levels: str | None = None,
+    out: Path | None = None,
+) -> tuple[Answer, list[str]]:
+    """Find a critical value and write what belongs to it below out (default out/CASE_critical).
+
+    Returns the answer, and in words. An interrupted search leaves what it has found. Raises
+    InputError, RunError.
+    """
+    shown = tqdm(bar_format="{desc} {elapsed}", disable=not sys.stderr.isatty(), leave=False)
+    search = Search(case, of, settings, levels, tail_levels, shown.set_description_str)
+    out = out or Path("out") / f"{search.own.name}_critical"
+    folders.check_writable(out)
+    start = time.perf_counter()
+    try:
+        answer = search.run()
+    except KeyboardInterrupt:
+        write(search, search.so_far(), out, time.perf_counter() - start)
+        raise
+    finally:
+        shown.close()
+    write(search, answer, out, time.perf_counter() - start)
+    return answer, answer.lines(search)
+
+
+def table(search: Search) -> dict[str, np.ndarray]:
+    """critical.csv: the equilibria of all trials."""
+    rows = [
+        {"trial": number, "value": trial.value, "stands": float(trial.stands)} | point.row
+        for number, trial in enumerate(search.trials, 1)
+        for point in trial.branch.points
+    ]
+    return {name: np.array([row[name] for row in rows]) for name in CRITICAL}
+
+
+def last_state(search: Search, point: Point) -> Results:
+    """The results of an equilibrium and of what led there, with the parameters as they were asked
+    for.
+    """
+    case = point.filling.case
+    asked = {n: search.own[n] for n in (*QUICK, *DRIVE)}
+    filling = point.filling.fork(replace(case, values=case.values | asked))
+    filling.keep_last()
+    return filling.results()
+
+
+def write(search: Search, answer: Answer, out: Path, seconds: float) -> None:
+    """Write the last equilibrium as `damjoint run` does, critical.csv and its picture below out, in
+    place of an earlier run's files.
+    """
+    from .critical_picture import Found, draw
+
+    case = search.own
+    folders.clear(out)
+    folders.say(case, out, "complete", answer.doubt)
+    if answer.point:
+        result = last_state(search, answer.point)
+        result.info = {"critical": told(search, answer), "wall_seconds": {"search": seconds}}
+        save(Outcome(result, mesh=lambda: None, fields=dict), case, out)
+    write_csv(out / "critical.csv", table(search))
+    trials = [(t.value, t.stands, t.branch) for t in search.trials]
+    what = case.title, search.of, search.unit, trials
+    shown = Found(*what, answer.value, answer.gravity, answer.mode)
+    draw(shown, out / f"{case.name}_critical.png")
+
+
+def told(search: Search, answer: Answer) -> dict:
+    """What run.json says of the answer."""
+    return {
+        "of": search.of,
+        "value": answer.value,
+        "unit": search.unit.strip(),
+        "mode": answer.mode,
+        "confirmed": answer.why,
+        "doubt": answer.doubt,
+        "gravity_method": answer.gravity,
+        "trials": len(search.trials),
+    }

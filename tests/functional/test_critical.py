@@ -1,0 +1,173 @@
+"""Critical values: closed forms, mechanisms that confirm them, and what must not be taken for
+one."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+from closed_forms import BASE, CENTROID, HEIGHT, WATER, WEIGHT, slide_level
+from damjoint.studies import branch
+from damjoint.studies.critical import Search, critical
+from scipy.optimize import brentq
+
+#: A real dam, 45 m high, on a mesh that is enough for limits of the rigid block.
+DAM = {"E_dam": 2e10, "E_found": 3e10, "n_joint": 20.0}
+#: Friction alone.
+PLAIN = {"law": "bond", "sigma_max": 0.0, "adhesion": 0.0}
+
+
+def found(case, of="level", settings=None, levels=None, tail_levels=None):
+    search = Search(case, of, settings, levels, tail_levels)
+    return search, search.run()
+
+
+@pytest.mark.parametrize("uplift", ["none", "imposed"])
+def test_sliding_level(uplift):
+    """T = mu N + c L, 7.45784 m dry and 6.63399 m with uplift, by both methods."""
+    _, answer = found("c", settings={"pena_tang": 0.0, "uplift": uplift})
+    limit = slide_level(0.35, 1000, uplift == "imposed")
+    assert answer.value == pytest.approx(limit, rel=branch.PRECISION)
+    assert answer.gravity == pytest.approx(limit, rel=branch.PRECISION)
+    assert answer.mode == "sliding" and answer.confirmed and "reaches mu N + c L" in answer.why
+
+
+@pytest.mark.parametrize("wet", [False, True])
+def test_overturning_level(wet):
+    """Without tension, above the crest by the trapezoid of pressure: 11.687 m dry, 10.019 m with
+    uplift, where N stands at the toe; here it can not go beyond the last point of integration.
+    """
+
+    def moment(level, arm):
+        depth = min(level, HEIGHT)
+        thrust = WATER * (level * depth**2 / 2 - depth**3 / 3)
+        normal = WEIGHT - wet * WATER * BASE * level / 2
+        about_toe = WEIGHT * (BASE - CENTROID) - thrust - wet * WATER * BASE**2 * level / 3
+        return about_toe - normal * arm
+
+    uplift = {"uplift": "imposed" if wet else "none"}
+    settings = {"sigma_max": 0.0, "crest_water": 0.0, "n_joint": 20.0}
+    _, answer = found("i", settings=uplift | settings)
+    arm = (1 - 1 / np.sqrt(3)) / 2 * BASE / 20
+    assert answer.value == pytest.approx(brentq(moment, 5, 15, arm), rel=branch.PRECISION)
+    assert answer.gravity == pytest.approx(brentq(moment, 5, 15, 0.0), rel=branch.PRECISION)
+    assert answer.mode == "overturning" and answer.confirmed
+
+
+@pytest.mark.parametrize("mu, level", [(0.6, 40.619), (0.7, 43.161)])
+def test_friction_alone(mu, level):
+    """Of a real dam with linear uplift and a tailwater of 3 m."""
+    _, answer = found("dam", settings=DAM | PLAIN | {"mu": mu}, tail_levels="3")
+    assert answer.value == pytest.approx(level, abs=1e-3)
+    assert answer.gravity == pytest.approx(level, abs=1e-3)
+
+
+def test_strength():
+    """(mu N + c L) / T at 45 m: (12683 + 34 x 200) / 9888, fracture energies and all."""
+    settings = DAM | {"law": "friction", "mu": 1.0, "adhesion": 2e5}
+    search, answer = found("dam", "strength", settings, tail_levels="3")
+    assert answer.value == pytest.approx((12683 + 34 * 200) / 9888, rel=2e-4)
+    assert answer.point.level == pytest.approx(45, rel=branch.PRECISION)
+    ends = [t.value for t in search.trials if not t.stands]
+    assert 0 < min(ends) / answer.value - 1 < 1.1 * branch.PRECISION
+
+
+@pytest.mark.heavy
+def test_drains():
+    """The less they take away, the less the dam holds."""
+    settings = DAM | PLAIN | {"mu": 0.7, "uplift": "drained"}
+    _, answer = found("dam", "uplift", settings, tail_levels="3")
+    assert 0 < answer.value < 0.5
+    assert answer.value == pytest.approx(answer.gravity, rel=5e-4)
+
+
+@pytest.mark.heavy
+def test_any_parameter_whatever_its_direction():
+    """T = mu N at 45 m: no equilibrium with less."""
+    _, answer = found("dam", "mu", DAM | PLAIN, tail_levels="3")
+    assert answer.value == pytest.approx(9888 / 12683, rel=2e-4)
+
+
+@pytest.mark.heavy
+def test_a_burst_is_passed():
+    """A bond that breaks through at once: the level falls by metres, and no push finds it again."""
+    settings = DAM | {"law": "bond", "sigma_max": 3e5, "n_joint": 100.0}
+    search, answer = found("dam", settings=settings, tail_levels="3")
+    (trial,) = search.trials
+    after = trial.branch.points[-1].level
+    assert answer.confirmed and answer.mode == "sliding" and after < answer.value - 5
+
+
+def test_hardening_is_no_limit():
+    """Asked for, it carries the dam beyond T = mu N + c L, and it is said; else it is left out."""
+    _, hard = found("c")
+    assert hard.value > 1.4 * slide_level(0.35, 1000, True) and "mu N" not in hard.why
+    settings = DAM | {"law": "friction", "mu": 0.6, "adhesion": 0.0}
+    _, answer = found("dam", settings=settings, tail_levels="3")
+    assert answer.value == pytest.approx(40.619, abs=1e-3)
+
+
+def test_crushed_toe():
+    _, answer = found("dam", settings=DAM | {"f_c": 5e6}, tail_levels="3")
+    assert answer.mode == "crushed toe" and "f_c = 5e+06" in answer.why
+    assert 0.999 * 5e6 < answer.point.compression <= 5e6
+
+
+def test_what_no_push_confirms_is_not_confirmed(monkeypatch, command):
+    monkeypatch.setattr(branch.Branch, "pushes", lambda self: ())
+    code, out, _ = command("critical", "c", "--set", "pena_tang=0", "--levels", "6,8")
+    assert code == 1 and "not confirmed: no further equilibrium is found" in out
+
+
+def test_no_limit_is_said(command):
+    words = ("critical", "c", "--of", "visc", "--levels", "3")
+    code, out, _ = command(*words)
+    assert code == 1 and "no critical visc found: stands with all that was tried" in out
+
+
+@pytest.mark.parametrize(
+    "words, said",
+    [
+        (("--of", "law"), "--of law: must be level, strength, uplift or"),
+        (("--of", "n_joint"), "--of n_joint: must be level, strength, uplift or"),
+        (("--of", "uplift"), "--of uplift: needs drains; uplift = imposed: must be drained"),
+        (("--of", "mus"), "mus: unknown parameter"),
+        (("--levels", "21"), "levels = 21: must be between 0 and 20 m"),
+    ],
+)
+def test_bad_input(command, tmp_path, words, said):
+    code, _, err = command("critical", "c", *words)
+    assert code == 2 and said in err and len(err.splitlines()) == 1
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_is_written(command, tmp_path):
+    words = ("critical", "c", "--set", "pena_tang=0")
+    code, out, _ = command(*words)
+    assert code == 0 and out.startswith("c: critical level 6.63399 m (sliding)\n")
+    folder = tmp_path / "out/c_critical"
+    names = {"run.json", "joint.csv", "history.csv", "critical.csv", "c_critical.png"}
+    assert {path.name for path in folder.iterdir()} == names
+    told = json.loads((folder / "run.json").read_text())
+    assert told["critical"]["mode"] == "sliding" and told["critical"]["of"] == "level"
+    assert told["parameters"]["drive"] == "level"
+    with (folder / "critical.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert max(float(row["level"]) for row in rows) == pytest.approx(told["critical"]["value"])
+    assert {row["driven"] for row in rows} == {"0", "1"}
+
+
+def test_an_interrupted_search_leaves_what_it_has_found(monkeypatch, tmp_path):
+    go_on, calls = branch.Branch.go_on, []
+
+    def interrupted(self):
+        calls.append(self)
+        if len(calls) > 3:
+            raise KeyboardInterrupt
+        go_on(self)
+
+    monkeypatch.setattr(branch.Branch, "go_on", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        critical("c", "level", {"pena_tang": 0.0}, out=tmp_path / "out")
+    assert (tmp_path / "out/critical.csv").read_text().count("\n") > 4
+    assert "interrupted" in json.loads((tmp_path / "out/run.json").read_text())["statement"]

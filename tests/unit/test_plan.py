@@ -1,0 +1,109 @@
+"""What a sweep goes over: ties are arithmetic and nothing else, samples are those of scipy."""
+
+import math
+
+import numpy as np
+import pytest
+from damjoint import InputError
+from damjoint.studies import sampling
+from damjoint.studies.plan import plan_of, sample_of
+from scipy import stats
+
+MU = ["mu=0.6:1.0:0.2"]
+
+
+def test_ties_follow_what_stands_before():
+    plan = plan_of(MU, ["adhesion=2e5*mu", "sigma_max=(adhesion/2)^1"], None, {})
+    rows = [[float(row[n]) for n in plan.names] for row in plan.rows()]
+    assert np.allclose(rows, [[m, 2e5 * m, 1e5 * m] for m in (0.6, 0.8, 1.0)])
+
+
+@pytest.mark.parametrize(
+    "tie, said",
+    [
+        ("adhesion=__import__('os').getpid()", "arithmetic"),
+        ("adhesion=().__class__", "arithmetic"),
+        ("adhesion=mu if mu else 1", "arithmetic"),
+        ("adhesion=K_N", "names varied"),
+        ("adhesion=1/(mu-mu)", "arithmetic"),
+        ("adhesion=9^9^9^9", "arithmetic"),
+        ("adhesion=" + "(" * 5000 + "1" + ")" * 5000, "arithmetic"),
+        ("adhesion=-mu", "adhesion = -0.6: must be"),
+        ("adhesion", "NAME=EXPRESSION"),
+        ("mu=2", "given once"),
+        ("K_N=1e11", "given once"),
+    ],
+)
+def test_anything_else_is_refused(tie, said):
+    with pytest.raises(InputError) as refused:
+        list(plan_of(MU, [tie], None, {"K_N": 1e12}).rows())
+    assert said in str(refused.value)
+
+
+def test_every_combination_has_the_whole_sample():
+    sample = sample_of(["5", "adhesion = uniform(1e5, scale=1e5)"], seed=3)
+    rows = list(plan_of(MU, ["sigma_max=adhesion"], sample, {}).rows())
+    assert len(rows) == 15 and rows[0]["adhesion"] == rows[5]["adhesion"] == rows[5]["sigma_max"]
+    again = list(plan_of(MU, ["sigma_max=adhesion"], sample, {}).rows())
+    other = sample_of(["5", "adhesion=uniform(1e5,1e5)"], seed=4)
+    assert again == rows != list(plan_of(MU, ["sigma_max=adhesion"], other, {}).rows())
+
+
+@pytest.mark.parametrize(
+    "words, said",
+    [
+        (["mu=normal(1,0.1)", "3"], "N NAME=DISTRIBUTION"),
+        (["3"], "N NAME=DISTRIBUTION"),
+        (["3", "mu"], "N NAME=DISTRIBUTION"),
+        (["3", "mu=normal"], "scipy.stats with numbers"),
+        (["3", "mu=normal(1,__import__('os'))"], "scipy.stats with numbers"),
+        (["3", "mu=stats.norm(1,0.1)"], "scipy.stats with numbers"),
+        (["3", "mu=rvs(1)"], "rvs is none"),
+        (["3", "mu=__import__(1)"], "__import__ is none"),
+        (["3", "mu=normal(1,0)"], "normal(loc, scale)"),
+        (["3", "mu=lognorm(1,-2,3,4)"], "lognorm(s, loc, scale)"),
+        (["9", "mu=normal(0,1)"], "draws mu = -"),
+        (["3", "friction=normal(1,0.1)"], "unknown parameter"),
+        (["3", "mu=normal(1,0.1)", "mu=normal(1,0.1)"], "given once"),
+    ],
+)
+def test_a_bad_sample_is_refused(words, said):
+    with pytest.raises(InputError) as refused:
+        plan_of([], [], sample_of(words), {})
+    assert said in str(refused.value)
+
+
+def test_a_latin_hypercube_has_one_value_in_each_part():
+    """Of equal probability; also where the inputs are correlated."""
+    laws = {"mu": "normal(1.0, 0.15)", "adhesion": "lognorm(0.3, scale=2e5)"}
+    drawn = sampling.draw(400, laws, "latin", 0, ["adhesion,mu=-0.5"])
+    for name, law in (("mu", stats.norm(1.0, 0.15)), ("adhesion", stats.lognorm(0.3, scale=2e5))):
+        assert np.array_equal(np.sort(np.floor(law.cdf(drawn[name]) * 400)), np.arange(400))
+    assert sampling.sensitivity(drawn["mu"], drawn["adhesion"]) == pytest.approx(-0.5, abs=0.1)
+
+
+@pytest.mark.parametrize("text", ["mu=0.5", "mu,mu=0.5", "mu,K_N=0.5", "mu,adhesion=1", "mu,E=x"])
+def test_a_bad_correlation_is_refused(text):
+    laws = {"mu": "normal(1,0.1)", "adhesion": "normal(1,0.1)"}
+    with pytest.raises(InputError, match="--correlate"):
+        sampling.draw(3, laws, "monte-carlo", 0, [text])
+
+
+def test_correlations_have_to_hold_together():
+    laws = dict.fromkeys("abc", "normal(1,0.1)")
+    with pytest.raises(InputError, match="hold together"):
+        sampling.draw(3, laws, "latin", 0, ["a,b=0.9", "b,c=0.9", "a,c=-0.9"])
+
+
+def test_the_interval_of_a_probability():
+    """Clopper and Pearson's closed form without failures; what has not ended counts as a failure,
+    but not for the lower limit."""
+    share, low, high = sampling.probability(0, 0, 50)
+    assert (share, low) == (0, 0) and high == pytest.approx(1 - 0.025 ** (1 / 50))
+    share, low, high = sampling.probability(0, 50, 50)
+    assert (share, low, high) == (1, 0, 1)
+
+
+def test_a_constant_outcome_has_no_sensitivity():
+    assert math.isnan(sampling.sensitivity(np.arange(4.0), np.ones(4)))
+    assert sampling.sensitivity(np.arange(4.0), np.array([5, 4, 1, np.nan])) == -1
