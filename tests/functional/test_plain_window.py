@@ -55,7 +55,10 @@ def press_run(folder, changed):
         ("batter 5", "batter = 5: must be below dam_base (5 m)"),
         ("neck_height 10", "neck_height = 10: must be below dam_height (10 m)"),
         ("joint_height 11", "joint_height = 11: must be below dam_height (10 m)"),
-        ("joint_slope 60", "joint_slope = 60: must let the joint leave the dam below its crest"),
+        (
+            "joint_slope 60 -setnumber dam_base 6",
+            "joint_slope = 60: must let the joint leave the dam below its crest",
+        ),
         ("force_x 1 -setnumber force_at 3", "force_at, anchor_at: must lie on the dam's faces"),
     ],
 )
