@@ -52,9 +52,17 @@ def press_run(folder, changed):
         ("level_2 20.5", "Level 2 = 20.5 m: must be between 0 and 20 m"),
         ("tail_level_1 -3", "Tailwater at level 1 = -3 m: must be between 0 and 20 m"),
         ("dam_height 4", "Level 4 = 9 m: must be between 0 and 8 m"),
+        ("batter 5", "batter = 5: must be below dam_base (5 m)"),
+        ("neck_height 10", "neck_height = 10: must be below dam_height (10 m)"),
+        ("joint_height 11", "joint_height = 11: must be below dam_height (10 m)"),
+        (
+            "joint_slope 60 -setnumber dam_base 6",
+            "joint_slope = 60: must let the joint leave the dam below its crest",
+        ),
+        ("force_x 1 -setnumber force_at 3", "force_at, anchor_at: must lie on the dam's faces"),
     ],
 )
-def test_impossible_levels_are_told_before_anything_runs(plain, words, said):
+def test_impossible_sections_are_told_before_anything_runs(plain, words, said):
     """In Gmsh and in GetDP: one line with the level, its value and what is allowed."""
     gmsh_command = [sys.executable, "-c", GMSH, str(plain / "a.geo"), "-", "-v", "2"]
     for command in (gmsh_command, [find_getdp(), str(plain / "a.pro"), "-v", "2"]):

@@ -12,7 +12,7 @@ import gmsh
 import numpy as np
 import pytest
 from damjoint.window import tree
-from damjoint.window.sheet import Request
+from damjoint.window.sheet import Request, titles
 from damjoint.window.window import ACTION, Session
 
 SMALL = {"n_joint": 10.0, "h_dam": 3.0, "h_found": 4.0}
@@ -93,7 +93,7 @@ def test_all_parameters_with_what_is_allowed_and_no_dead_button(open_window):
                 choices in ([], [0, 1]) or len(entry["valueLabels"]) == len(choices)
             )
     assert hand.entry(tree.CASE)["valueLabels"].keys() >= {"dam: own dam", "open a case file ..."}
-    assert len(hand.entry(tree.CASE)["choices"]) == 13
+    assert len(hand.entry(tree.CASE)["choices"]) == len(hand.session.tree.titles) + 1
     assert tree.get_text(tree.LEVELS) == "3, 6, 8, 9"
 
 
@@ -214,7 +214,7 @@ def test_drawing_follows_geometry_and_can_be_meshed(open_window):
         (tree.STEPS, "two", "steps = two: must be an integer >= 1"),
         (tree.ACCURACY, "best", "accuracy = best: must be one of coarse, standard, fine"),
         (tree.FILE, "nowhere.case", "case nowhere.case: unknown"),
-        (tree.CASE, 12.0, "case file: choose it"),
+        (tree.CASE, float(len(titles())), "case file: choose it"),
         ("nu", 0.6, "nu = 0.6: must be"),
         ("n_joint", 10.5, "n_joint = 10.5: must be an integer"),
         ("law", "glue", "law = glue: must be one of rupture, friction"),
@@ -335,6 +335,49 @@ def test_3d_shows_the_joint_as_a_surface(open_window):
     assert hand.run().startswith("done in")
     for start in ("opening of the joint", "joint: closed, slipped, open", "water pressure"):
         assert any(view.startswith(start) for view in hand.views), start
+
+
+#: A batter, a neck, an inclined joint or a lift joint; water over the crest and below the dam.
+SECTION = {"batter": 1.0, "batter_height": 5.0, "neck_height": 2.0}
+LOADS = {"silt_height": 2.0, "ice_force": 1e3, "ice_level": 7.0, "anchor_force": 1e3, "k_h": 0.02}
+
+
+@pytest.mark.parametrize("joint", [{"joint_slope": 5.0}, {"joint_height": 4.0}])
+def test_water_and_loads_of_any_section(open_window, joint):
+    """Before the run the water's area is that of the section's own outline; after it a bit more or
+    less, as the faces are drawn displaced."""
+    hand = open_window("e", **SMALL, **SECTION, **joint, **LOADS, uplift="imposed")
+    hand.type(tree.LEVELS, "6, 10.5")
+    hand.type(tree.TAIL_LEVELS, "0, 3")
+    assert hand.views == ["water", "silt", "forces"]
+    case = hand.session.tree.sheet.case
+    base, side, bed = 5.0, case["found_side"], joint.get("joint_slope", 0.0)
+    bed = base * np.tan(np.radians(bed))
+    slope = (base - 2.5) / (8 - bed)  # downstream, from the bed to the neck
+    expected = {
+        # floor, batter, crest; bed and slope
+        "water": 10.5 * side
+        + 1 * (10.5 - 2.5)
+        + 1.5 * 0.5
+        + (3 - bed) * side
+        + slope * (3 - bed) ** 2 / 2,
+        "silt": 2 * side + 2 * 0.4 / 2,
+    }
+    tags = dict(zip(hand.views, gmsh.view.getTags(), strict=True))
+    for name, size in expected.items():
+        _, (count,), (values,) = gmsh.view.getListData(tags[name])
+        x, y, _ = values.reshape(count, -1)[:, :12].reshape(count, 3, 4).transpose(1, 0, 2)
+        doubled = np.sum(x * np.roll(y, -1, 1) - np.roll(x, -1, 1) * y, axis=1)
+        assert np.abs(doubled).sum() / 2 == pytest.approx(size, rel=1e-9), name
+    assert not hand.run().startswith("failed")
+    for name in ("water", "silt", "forces"):
+        assert name in hand.views
+    rows = hand.session.scenes[0].result.at()
+    graph = next(
+        t for t in gmsh.view.getTags() if "shear stress" in gmsh.view.option.getString(t, "Name")
+    )
+    _, (count,), (values,) = gmsh.view.getListData(graph)
+    assert values.reshape(count, -1)[:, 1].max() == pytest.approx(rows["s"].max(), rel=1e-6)
 
 
 def test_no_display_and_bad_input_are_one_line(command, monkeypatch):

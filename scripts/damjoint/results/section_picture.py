@@ -13,7 +13,7 @@ from matplotlib.figure import FigureBase
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from ..scene.loads import Loading
+from ..scene.loads import Loading, line_forces
 from ..scene.parameters import constants
 from .drawing import CONCRETE, DARK, GREEN, GREY, ORANGE, RED, ROCK, SILT, WATER, panels
 from .fields import Solution, distance, nearest_rows, state_of
@@ -215,17 +215,8 @@ class Drawing:
     def forces(self) -> None:
         """Arrows for ice, another force, anchor, earthquake: those that are on."""
         case, section, numbers = self.case, self.case.section, constants()
-        lean = math.radians(case["anchor_angle"])
-        for name, fx, fy in (
-            ("ice", case["ice_force"], 0.0),
-            ("force", case["force_x"], case["force_y"]),
-            (
-                "anchor",
-                -case["anchor_force"] * math.sin(lean),
-                -case["anchor_force"] * math.cos(lean),
-            ),
-        ):
-            size = math.hypot(fx, fy) * self.loading.part(name)
+        for name, (fx, fy) in line_forces(case, self.loading).items():
+            size = math.hypot(fx, fy)
             region = numbers[name.upper()][0]
             if size and region in section["mark_region"]:
                 i = section["mark_region"].index(region)

@@ -6,6 +6,7 @@ straight face, integrated over the height: force [m2] and moment about y = 0 [m3
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from .case import Case
@@ -34,6 +35,21 @@ class Loading:
     def part(self, name: str) -> float:
         """How much of a staged load is there, 0 to 1."""
         return self.grown[STAGED.index(name)]
+
+
+def line_forces(case: Case, loading: Loading) -> dict[str, tuple[float, float]]:
+    """The line forces that a case has, in the order of the section's marks: how large each is at a
+    loading, along x and y [N/m].
+    """
+    lean = math.radians(case["anchor_angle"])
+    whole = {
+        "ice": (case["ice_force"], 0.0),
+        "force": (case["force_x"], case["force_y"]),
+        "anchor": tuple(-case["anchor_force"] * f(lean) for f in (math.sin, math.cos)),
+    }
+    return {
+        n: tuple(loading.part(n) * f for f in force) for n, force in whole.items() if any(force)
+    }
 
 
 def wet(case: Case, face: Face) -> bool:

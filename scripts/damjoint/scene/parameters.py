@@ -142,7 +142,7 @@ def declared() -> dict[str, Parameter]:
         if follower:
             minimum = 0.0 if follower[2] == ">=" else 1e-30
         default = re.search(rf"default_{name} = ([^,\]]*?)\s*[,\]]", text)[1]
-        visible = re.search(r"Visible\s+(!?\w*\([^)]*\))", rest)
+        visible = re.search(r"Visible\s+(.*?),\s*Name", rest)
         parameters[name] = Parameter(
             name,
             label,
@@ -172,14 +172,11 @@ def independent() -> frozenset[str]:
 
 def in_words(condition: str) -> str:
     """A Visible clause of the declarations in words."""
-    if match := re.search(r'!StrCmp\((\w+), "(\w+)"\)', condition):
-        return f"{match[1]} = {match[2]}"
-    if match := re.search(r'StrCmp\((\w+), "(\w+)"\)', condition):
-        return f"{match[1]} not {match[2]}"
-    words = re.search(r"\((.*)\)", condition)[1]
+    words = re.sub(r'!StrCmp\((\w+), "(\w+)"\)', r"\1 = \2", condition)
+    words = re.sub(r'StrCmp\((\w+), "(\w+)"\)', r"\1 not \2", words)
     for mark, word in (("==", "="), ("!= 0", "not 0"), ("||", "or")):
         words = words.replace(mark, word)
-    return words
+    return words.strip("()")
 
 
 def parameter(name: str) -> Parameter:

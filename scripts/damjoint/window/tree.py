@@ -106,7 +106,8 @@ def listed(levels: tuple[float, ...]) -> str:
 def level_texts(case: Case) -> dict[str, str]:
     """Levels and tailwater of a case in the tree."""
     tails = case.tail_levels
-    return {LEVELS: listed(case.levels), TAIL_LEVELS: listed(tails[: len(set(tails))])}
+    tails = tails[:1] if len(set(tails)) == 1 else tails
+    return {LEVELS: listed(case.levels), TAIL_LEVELS: listed(tails)}
 
 
 class Tree:

@@ -13,12 +13,12 @@ from dataclasses import dataclass
 import gmsh
 import numpy as np
 
-from ..results.fields import along, row_of_nodes
+from ..results.fields import along, distance, row_of_nodes, state_of
 from ..results.pictures import heading
 from ..results.units import LENGTHS, STRESSES, unit
 from ..scene.case import Case
-from .camera import CLIPPED, MAPS, clip
-from .shapes import Deformed, Pieces, frame
+from .camera import CLIPPED, MAPS, clip, frame
+from .shapes import Deformed, Pieces, extruded, planned
 from .worker import Scene
 
 Color = tuple[int, int, int, int]
@@ -31,6 +31,7 @@ DARK: Color = (60, 60, 60, 255)
 GREY: Color = (150, 150, 150, 255)
 LAKE: Color = (61, 155, 224, 255)
 WATER: Color = (*LAKE[:3], 130)
+SILT: Color = (140, 110, 70, 150)
 #: From little to much displacement, and from pressed to free.
 STONE = ((226, 222, 212), (168, 187, 205), (88, 137, 186), (11, 60, 120))
 FIRE = ((11, 60, 120), (88, 137, 186), (226, 222, 212), (200, 60, 30))
@@ -120,28 +121,28 @@ def paint(tag: int, colors: Sequence[tuple]) -> None:
     gmsh.parser.clear()
 
 
-def outline_water(case: Case) -> Gallery:
-    """The water of the highest levels beside the undeformed dam: what is seen before a run."""
+#: What acts on the dam, by the names in shapes: color and layer. Water is behind the bodies, since
+#: it reaches under what leans over it.
+BESIDE = {"water": (WATER, -2), "silt": (SILT, -1), "forces": (DARK, 3)}
+
+
+def show_planned(case: Case) -> Gallery:
+    """What acts on the undeformed dam in the end: what is seen before a run."""
     gallery = Gallery()
-    depth = case["thickness"] if case["dim"] == 3 else 0.0
-    height = case["dam_height"]
-    lean = (case["dam_base"] - case["dam_crest"]) / height
-    far = frame(case)
-    faces = []
-    for level, x, slope, end in (
-        (max(case.levels), 0.0, 0.0, far[0]),
-        (max(case.tail_levels), case["dam_base"], lean, far[1]),
-    ):
-        corners = [(end, 0), (x, 0), (x - slope * level, level), (end, level)]
-        faces += [[(*corner, z) for corner in corners] for z in {0.0, depth} if level > 0]
-        if depth and level > 0:
-            top = (end, 0.0), (corners[2][0], 0.0), (corners[2][0], depth), (end, depth)
-            faces.append([(at, level, z) for at, z in top])
-    if faces:
-        points = np.array(faces, float)
-        pieces = Pieces(points, np.ones((1, *points.shape[:2], 1)))
-        gallery.add("water", [pieces], [WATER], ShowScale=0, Light=0)
+    show_beside(gallery, case, planned(case), {"ShowScale": 0, "Light": 0})
     return gallery
+
+
+def show_beside(gallery: Gallery, case: Case, beside: dict[str, Pieces], options: dict) -> None:
+    """Water, silt and forces, each in its layer."""
+    for name, pieces in beside.items():
+        color, number = BESIDE[name]
+        gallery.add(name, [pieces], [color], **options, **layer(case, number), LineWidth=3)
+
+
+def layer(case: Case, number: int) -> dict[str, float]:
+    """Options of a layer: lines and faces in one plane would hide one another."""
+    return {"OffsetZ": number * 5e-4 * case.size}
 
 
 def show(scene: Scene, before: Sequence[Scene] = ()) -> Gallery:
@@ -156,7 +157,8 @@ def show(scene: Scene, before: Sequence[Scene] = ()) -> Gallery:
         show_deformed(gallery, deformed)
         if scene.result.case["dim"] == 3:
             show_maps(gallery, deformed)
-        show_curves(graphs, scene, [other for other in before if other.times.size])
+        if extruded(scene.result.case):
+            show_curves(graphs, scene, [other for other in before if other.times.size])
         gallery.write(20, 52, captions(deformed), DARK, 15)
     if len(scene.result.history["time"]):
         show_history(graphs, scene, before)
@@ -175,11 +177,10 @@ def captions(deformed: Deformed) -> list[str]:
     """A line per step: level, opening, crack."""
     result, lines = deformed.scene.result, []
     for time in deformed.times:
-        row = int(np.argmin(np.abs(result.history["time"] - time)))
-        now = {name: float(column[row]) for name, column in result.history.items()}
+        now = result.state(time)
         tail = f", tailwater {now['tail_level']:.4g} m" if now["tail_level"] > 0 else ""
         opened = now["max_opening"]
-        said = f"largest opening {in_unit(opened)}" if opened > 0 else "closed"
+        said = f"opening {in_unit(opened)}" if opened > 0 else "closed"
         lines.append(f"level {now['level']:.4g} m{tail}: {said}, crack {now['crack_length']:.3g} m")
     return lines
 
@@ -192,8 +193,8 @@ def in_unit(length: float) -> str:
 
 def show_deformed(gallery: Gallery, deformed: Deformed) -> None:
     """Dam and foundation, their outline, water, crack and slip, all displaced by one factor."""
-    height = deformed.scene.result.case["dam_height"]
-    clip(deformed.scene.result.case)
+    case = deformed.scene.result.case
+    clip(case)
     moves = {"VectorType": 5, "DisplacementFactor": deformed.scale, "Clip": CLIPPED}
     scale = scale_at(0)
     gallery.add("displacement [m]", deformed.bodies(), STONE, **moves, **scale, Light=0)
@@ -209,11 +210,10 @@ def show_deformed(gallery: Gallery, deformed: Deformed) -> None:
         )
     )
     flat = {**moves, "ShowScale": 0, "Light": 0}
-    gallery.add("water", [deformed.water()], [WATER], **flat)
-    above = {**flat, "OffsetZ": 1e-3 * height}  # or lines and faces in one plane hide one another
-    gallery.add("outline", [deformed.outline()], [DARK], **above, LineWidth=1.5)
+    show_beside(gallery, case, deformed.beside(), flat)
+    gallery.add("outline", [deformed.outline()], [DARK], **flat, **layer(case, 1), LineWidth=1.5)
     marks = deformed.marks()
-    above |= {"LineWidth": 3, "OffsetZ": 2e-3 * height}
+    above = {**flat, **layer(case, 2), "LineWidth": 3}
     slipped = gallery.add("slipped joint", [marks["slipped"]], [ORANGE], **above)
     broken = gallery.add("open or broken joint", [marks["open"]], [RED], **above)
     label(broken, 20, 76, ["red: joint open or broken"], 13)
@@ -229,13 +229,12 @@ def scale_at(place: int) -> dict[str, float]:
 
 def show_maps(gallery: Gallery, deformed: Deformed) -> None:
     """In 3D, the joint laid out below the foundation: opening, pressure, state."""
-    scene = deformed.scene
+    scene, rows = deformed.scene, deformed.rows
     case, joint = scene.result.case, scene.bodies["joint"]
-    rows = [scene.result.at(time) for time in deformed.times]
     nearest = row_of_nodes(joint, rows[0])
     length, per_m = unit([r["delta_n"] for r in rows], LENGTHS)
     stress, per_pa = unit([r["p"] for r in rows], STRESSES)
-    state = [np.where(r["damage"] >= 1, 2.0, np.where(r["slip"] > 0, 1.0, 0.0)) for r in rows]
+    state = [state_of(r) for r in rows]
     shown = [
         (f"opening of the joint [{length}]", [r["delta_n"] * per_m for r in rows], STONE),
         ("joint: closed, slipped, open", state, (STONE[0], ORANGE, RED)),
@@ -243,14 +242,15 @@ def show_maps(gallery: Gallery, deformed: Deformed) -> None:
     if case["uplift"] != "none":
         shown.append((f"water pressure [{stress}]", [r["p"] * per_pa for r in rows], STONE))
     # as wide as the foundation, and deep enough to be seen
-    base, depth = case["dam_base"], case["thickness"]
-    left, right, bottom = frame(case)
-    wider = min(2.5, (right - left) / base)
+    way, depth = distance(rows[0])[nearest], joint.points[:, 2].max()
+    unrolled, base = np.column_stack([way, 0 * way, joint.points[:, 2]]), way.max()
+    (left, bottom, _), (right, *_) = frame(case)
+    wider = 1.0 if case.geometry else min(2.5, (right - left) / base)
     stretch = np.array([wider, 1.0, max(wider, 0.25 * wider * base / depth)])
     for i, (name, values, colors) in enumerate(shown):
-        below = np.array([0, bottom - (i + 1) * MAPS * case["dam_height"], 0])
+        below = np.array([0, bottom - (i + 1) * MAPS * case.size, 0])
         below += (1 - stretch) * np.array([base / 2, 0, depth])
-        points = joint.points * stretch + below
+        points = unrolled * stretch + below
         pieces = [
             Pieces(points[table], np.array(values)[:, nearest][:, table, None])
             for _, table in joint.cells
@@ -290,11 +290,11 @@ def show_curves(graphs: Graphs, scene: Scene, before: Sequence[Scene]) -> None:
     for title, units, parts in shown:
         first = parts[0][1]
         curves = [
-            Curve(name, rows[0]["x"], np.array([r[column] for r in rows]), color)
+            Curve(name, rows[0]["s"], np.array([r[column] for r in rows]), color)
             for name, column, color in parts
         ]
-        curves += [Curve(BEFORE, old["x"], old[first][None], GREY) for old in olds]
-        graphs.add(title, units, "x [m], heel to toe", curves)
+        curves += [Curve(BEFORE, old["s"], old[first][None], GREY) for old in olds]
+        graphs.add(title, units, "s [m], heel to toe", curves)
 
 
 def show_history(graphs: Graphs, scene: Scene, before: Sequence[Scene]) -> None:
@@ -375,8 +375,9 @@ class Graphs:
 
 def span(values: np.ndarray) -> tuple[float, float]:
     """The range of some values, zero in it; never empty."""
-    low, high = min(0.0, float(values.min())), max(0.0, float(values.max()))
-    return (low, high) if high > low else (0.0, 1.0)
+    ends = np.array([min(0.0, values.min()), max(0.0, values.max())])
+    ends[np.abs(ends) < 1e-9 * np.abs(ends).max()] = 0  # what round-off leaves
+    return (ends[0], ends[1]) if ends[1] > ends[0] else (0.0, 1.0)
 
 
 def pieces_of(curve: Curve, factor: float, x_range: tuple, beyond: float) -> Pieces:

@@ -16,8 +16,8 @@ import gmsh
 
 from .. import InputError, RunError, data
 from ..scene.case import Case
-from ..scene.mesh import GEOMETRY
-from ..scene.parameters import assignments, start_gmsh
+from ..scene.mesh import shares
+from ..scene.parameters import assignments, listing, start_gmsh
 from . import camera, tree, views
 from .sheet import Request, Sheet
 from .worker import Engine, Scene
@@ -239,15 +239,18 @@ class Session:
 
     def draw(self, case: Case) -> None:
         """The undeformed outline, to be meshed by Gmsh's key, and the water; results are hidden."""
-        name = Path(self.folder.name) / f"{case.name}.geo"
-        values = {parameter: case[parameter] for parameter in GEOMETRY}
-        name.write_text(f'{assignments(values)}Include "{data("geo")}/dam.geo";\n')
+        source = drawing = case.geometry or data("geo") / "dam.geo"
+        if drawing.suffix == ".geo":  # it may take sizes from the case
+            values = case.values if case.geometry else shares(case)
+            text = assignments(values) + listing("levels", case.levels)
+            drawing = Path(self.folder.name) / f"{case.name}.geo"
+            drawing.write_text(f'{text}Include "{source}";\n')
         gmsh.model.remove()
-        gmsh.open(str(name))
+        gmsh.open(str(drawing))
         tree.drop_plain_levels()
         if self.water:
             self.water.close()
-        self.water = views.outline_water(case)
+        self.water = views.show_planned(case)
         self.outline(True)
         camera.turn_to(case["dim"] == 3)
         self.aim(case, False)
@@ -262,7 +265,8 @@ class Session:
 
     def aim(self, case: Case, beside_graphs: bool) -> None:
         """Place the scene in the window anew when it has changed, else leave it to the user."""
-        if self.aimed != (key := (beside_graphs, *(case[name] for name in GEOMETRY))):
+        key = beside_graphs, camera.frame(case, not beside_graphs).tolist()
+        if self.aimed != key:
             self.aimed = key
             gmsh.graphics.draw()  # or the box around all is that of before
             camera.aim(case, views.GRAPHS_WIDTH if beside_graphs else 0)
@@ -336,10 +340,15 @@ def button(what: tuple[str, str]) -> dict:
     return {"type": "string", "name": BUTTON, "values": list(what), "visible": False}
 
 
+#: What the drawing shows besides mesh and water.
+ACTING = "crest_water", "silt_height", "force_x", "force_y", "anchor_angle"
+
+
 def drawing_of(sheet: Sheet) -> tuple:
     """What the drawing depends on."""
     case = sheet.case
-    return (sheet.path, *(case[n] for n in GEOMETRY), max(case.levels), max(case.tail_levels))
+    acting = [case[name] for name in ACTING]
+    return sheet.path, shares(case), max(case.levels), max(case.tail_levels), acting
 
 
 def gui(request: Request) -> None:
