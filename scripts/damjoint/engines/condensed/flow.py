@@ -186,12 +186,12 @@ class Flow:
         nodes = self.inside[free]
         known = imposed.copy()
         known[drains] = drained
+        total = known.copy()
         try:
             factor = linalg.cho_factor(matrix[np.ix_(nodes, nodes)])
+            total[nodes] -= linalg.cho_solve(factor, matrix[nodes] @ known)
         except (linalg.LinAlgError, ValueError):
             return np.full(len(self.inside), np.nan), None
-        total = known.copy()
-        total[nodes] -= linalg.cho_solve(factor, matrix[nodes] @ known)
         gradients = [g @ total for g in self.along.slopes]
 
         def inverse(coupling: np.ndarray) -> np.ndarray:
