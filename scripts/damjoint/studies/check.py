@@ -251,6 +251,11 @@ def check(cases: list[Case], out: Path) -> list[Check]:
     for case in cases:
         if names.count(case.name) > 1:
             raise InputError(f"case {case.name}: must be given once, by a name of its own")
+        if case.geometry:
+            raise InputError(
+                f"case {case.name}: must have a section by parameters, which the gravity method "
+                "needs; damjoint critical finds the limits of any geometry"
+            )
         engine_of(case, "auto")
     checks = []
     for case in cases:

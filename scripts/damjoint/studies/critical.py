@@ -320,8 +320,11 @@ class Search:
 
     def rigid_block_stands(self, value: float) -> bool | None:
         """Whether the gravity method finds an equilibrium, with friction if the law has it, and a
-        toe that is not crushed; None if the case allows no such value.
+        toe that is not crushed; None if the case allows no such value, or its geometry no gravity
+        method.
         """
+        if self.own.geometry:
+            return None
         try:
             case = self.own if self.of == "level" else self.case_at(value)
         except InputError:
