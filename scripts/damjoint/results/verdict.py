@@ -13,7 +13,8 @@ from .tables import Results
 
 
 def verdict(results: Results) -> str:
-    """One of: stands, sliding, overturning, no convergence, no equilibrium, interrupted.
+    """One of: stands, sliding, overturning, out of range, no convergence, no equilibrium,
+    interrupted.
 
     "no equilibrium": not even at the first step. "sliding" also where the whole joint has slipped
     or opened and the dam stands on nothing but the joint's hardening.
@@ -56,8 +57,10 @@ def loose_from(results: Results) -> float | None:
 
 
 def why_stopped(results: Results) -> str:
-    """Overturning, sliding or no convergence, from the last converged state.
+    """Out of range, overturning, sliding or no convergence, from the last converged state.
 
+    Out of range: a driven run whose level would, in one more step like its last, be below 0 or
+    above the highest that is allowed.
     Overturning: the crack has crossed most of the base, or the resultant is in its last tenth.
     Sliding: the shear is within 2 % of what the joint can hold, T <= mu N + c L + H (mean slip) L
     (N holds the tension c/mu of open points, so that c acts on all of L), for a bond beyond what
@@ -65,6 +68,9 @@ def why_stopped(results: Results) -> str:
     """
     case, last = results.case, results.last
     base = case["dam_base"]
+    ahead = 2 * last["level"] - [0.0, *results.history["level"]][-2]
+    if case["drive"] != "level" and not 0 <= ahead <= case.highest_level:
+        return "out of range"
     if last["crack_length"] > 0.8 * base or last["M"] < 0.1 * last["N"] * base:
         return "overturning"
     if case["law"] == "friction":
@@ -74,7 +80,9 @@ def why_stopped(results: Results) -> str:
             return "sliding"
     if case["law"] == "bond" and last["T"] > 0.98 * case["mu"] * last["N"]:
         return "sliding"
-    return "sliding" if last["slip_length"] > 0.98 * base else "no convergence"
+    if last["slip_length"] > 0.98 * base:
+        return "sliding"
+    return "no convergence"
 
 
 def mean_slip(results: Results) -> float:
@@ -95,6 +103,11 @@ def statement(results: Results) -> str:
     if results.stopped:
         hint = stiff_joint(results) if found == "no convergence" else ""
         where = f"level {last['level']:.6g} m (t = {last['time']:.6g})"
+        if found == "out of range":
+            return (
+                f"out of range: the displacement asks for a level below 0 or above "
+                f"{case.highest_level:g} m beyond {where}; the last converged state is saved"
+            )
         return f"{found}{hint}: no equilibrium beyond {where}; the last converged state is saved"
     if found == "stands":
         return ""

@@ -38,7 +38,7 @@ class Loading:
 
 def wet(case: Case, face: Face) -> bool:
     """Whether water (or silt) may press on a face in a case."""
-    highest = max(case.tail_levels if face.side in ("down", "bed") else case.levels)
+    highest = max(case.tail_levels) if face.side in ("down", "bed") else case.reached
     if face.side == "up":
         return True
     if face.side == "down":

@@ -40,7 +40,7 @@ def folder() -> Path | None:
 
 def key_of(case: Case) -> tuple:
     """What condensed bodies depend on."""
-    highest, tail = max(case.levels), max(case.tail_levels)
+    highest, tail = case.reached, max(case.tail_levels)
     faces = tail > 0, case["floor_water"], case["crest_water"] and highest > case["dam_height"]
     return (*shares(case).items(), *(case[n] for n in MATERIAL), *faces)
 

@@ -71,7 +71,8 @@ class Filling:
 
     def run(self) -> Results:
         """Follow all the times of the case that are still to come."""
-        if self.case["weight_first"] and self.state.time == 0:
+        from_weight = self.driven and self.case["drive_begin"] == 0
+        if (self.case["weight_first"] or from_weight) and self.state.time == 0:
             self.rest()
         for target in self.case.times:
             if target > self.state.time and not self.stopped:
@@ -218,6 +219,8 @@ class Filling:
         end, iterations = found
         if np.abs(end.jump).max() > 0.1 * self.case["dam_height"]:
             return None  # the dam has fallen: an equilibrium of small displacements only
+        if prescribed and not 0 <= end.level <= self.case.highest_level:
+            return None  # no reservoir has that level
         memories = state.remember(joint, end.jump)
         return (
             State(time, replace(asked, level=end.level), end.jump, *memories),
