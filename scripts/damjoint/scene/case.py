@@ -82,7 +82,7 @@ class Case:
 
     @property
     def reached(self) -> float:
-        """The highest level that the reservoir may have [m]: any that is allowed if it is driven."""
+        """The highest level of the reservoir [m]; if it is driven, the highest it may have."""
         return max(self.levels) if self["drive"] == "level" else self.highest_level
 
     def level_at(self, time: float) -> float:

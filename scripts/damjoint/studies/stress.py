@@ -27,7 +27,9 @@ COLUMNS = (
     *("steps", "iterations", "cuts", "seconds", "command"),
 )
 #: What becomes of a scene.
-VERIFIED, JUSTIFIED, DEFECT = "converged and verified", "stopped and justified", "defect"
+CLASSES = VERIFIED, JUSTIFIED, UNDECIDED, DEFECT = (
+    *("converged and verified", "stopped and justified", "stopped, undecided", "defect"),
+)
 
 #: Seconds after which a scene counts as one that does not end.
 PATIENCE = 300
@@ -220,13 +222,13 @@ def judged(scene: Scene, folder: Path) -> dict[str, object]:
     except (OSError, KeyError):
         last = (done.stderr.strip().splitlines() or ["nothing said"])[-1]
         return told | {"class": DEFECT, "found": f"exit code {done.returncode}: {last}"}
-    found = violations(run)
-    found += [why] if run.stopped and (why := unjustified(run)) else []
-    fine = JUSTIFIED if run.stopped else VERIFIED
+    broken = violations(run)
+    wrong, why = unjustified(run) if run.stopped else (False, "")
+    fine = UNDECIDED if why else JUSTIFIED if run.stopped else VERIFIED
     history = run.history
     return told | {
-        "class": DEFECT if found else fine,
-        "found": "; ".join(found),
+        "class": DEFECT if broken or wrong else fine,
+        "found": "; ".join(filter(None, [*broken, why])),
         "verdict": said,
         "level": f"{history['level'].max(initial=0):.6g}",
         "steps": len(history["time"]),
@@ -288,4 +290,4 @@ def read_rows(path: Path) -> list[dict[str, str]]:
 
 def counts(rows: list[dict[str, str]]) -> dict[str, int]:
     """How many scenes are of each class."""
-    return {name: sum(r["class"] == name for r in rows) for name in (VERIFIED, JUSTIFIED, DEFECT)}
+    return {name: sum(row["class"] == name for row in rows) for name in CLASSES}

@@ -221,9 +221,10 @@ class Filling:
             return None  # the dam has fallen: an equilibrium of small displacements only
         if prescribed and not 0 <= end.level <= self.case.highest_level:
             return None  # no reservoir has that level
-        memories = state.remember(joint, end.jump)
+        memories, loading = state.remember(joint, end.jump), replace(asked, level=end.level)
+        pressure = joint.pressure(end.jump, memory, loading)
         return (
-            State(time, replace(asked, level=end.level), end.jump, *memories),
+            State(time, loading, end.jump, *memories, pressure),
             iterations,
             end.size / (self.reference or 1.0),
         )
