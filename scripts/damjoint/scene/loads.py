@@ -43,9 +43,15 @@ def wet(case: Case, face: Face) -> bool:
         return True
     if face.side == "down":
         return highest > face.surface.points[:, 1].min()
-    return bool(case["crest_water" if face.side == "top" else "floor_water"]) and (
-        highest > face.surface.points[:, 1].min()
-    )
+    if face.side == "top":
+        return overtopped(case)
+    return bool(case["floor_water"]) and highest > face.surface.points[:, 1].min()
+
+
+def overtopped(case: Case) -> bool:
+    """Whether water may stand on the crest; a uniform pressure is one of the faces only."""
+    deep = case["crest_water"] and case["face_load"] == "hydrostatic"
+    return bool(deep and case.reached > case["dam_height"])
 
 
 def water_column(level: float, low: float, high: float) -> tuple[float, float]:

@@ -19,7 +19,7 @@ from tqdm import tqdm
 from .. import InputError
 from ..scene.case import Case, load
 from .sweep import read_done
-from .verification import Written, unjustified, violations
+from .verification import STIFF, Written, stiffness_ratio, unjustified, violations
 
 #: Columns of the result file.
 COLUMNS = (
@@ -214,7 +214,12 @@ def judged(scene: Scene, folder: Path) -> dict[str, object]:
             timeout=PATIENCE,
         )
     except subprocess.TimeoutExpired:
-        return told | {"class": DEFECT, "found": f"no end after {PATIENCE} s", "seconds": PATIENCE}
+        stiff = stiffness_ratio(case)
+        return told | {
+            "class": UNDECIDED if stiff >= STIFF else DEFECT,
+            "found": f"no end after {PATIENCE} s, K_N h/E = {stiff:.3g}",
+            "seconds": PATIENCE,
+        }
     told["seconds"] = f"{time.perf_counter() - start:.2f}"
     run = Written(case, folder / "out", done.returncode)
     try:

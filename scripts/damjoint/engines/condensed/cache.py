@@ -20,6 +20,7 @@ from scipy import linalg
 
 from ... import RunError, __version__, data
 from ...scene.case import Case
+from ...scene.loads import overtopped
 from ...scene.mesh import Body, shares
 from .bulk import MATERIAL, Bodies, Condensed, check_size, condense
 
@@ -40,8 +41,7 @@ def folder() -> Path | None:
 
 def key_of(case: Case) -> tuple:
     """What condensed bodies depend on."""
-    highest, tail = case.reached, max(case.tail_levels)
-    faces = tail > 0, case["floor_water"], case["crest_water"] and highest > case["dam_height"]
+    faces = max(case.tail_levels) > 0, case["floor_water"], overtopped(case)
     return (*shares(case).items(), *(case[n] for n in MATERIAL), *faces)
 
 
