@@ -158,7 +158,8 @@ ASKED = """\
   that the block is within 10 % of.
 
 *Undecided* is a stop that these bounds neither prove right nor wrong: a displacement that leads no
-further, or a joint that is too stiff for its mesh ($K_N h/E \\ge 100$), which the run says."""
+further, or a joint that is too stiff for its mesh ($K_N h/E \\ge 100$), which the run says.
+A command that does not end in time is a defect."""
 
 
 def trust_page(results: Path) -> str:

@@ -370,12 +370,12 @@ def unjustified(run: Written) -> tuple[bool, str]:
     if run.told["state"] != "stopped":
         return True, run.told["statement"]
     undecided = said in ("no convergence", "no equilibrium")
+    if run.case["drive"] == "level" and certain(run):
+        return True, f"{said}, where an equilibrium is certain"
     if undecided and stiffness_ratio(run.case) >= STIFF:
         return False, f"{said}, K_N h/E = {stiffness_ratio(run.case):.3g}"
     if run.case["drive"] != "level":
         return False, f"{said} of a driven run" if undecided else ""
-    if certain(run):
-        return True, f"{said}, where an equilibrium is certain"
     reason = "no convergence" if undecided else said
     if any(reached(run, block)[reason] for block in blocks(run)):
         return False, ""
