@@ -41,8 +41,9 @@ For i In {0 : #seg_side() - 1}
       EndIf
     EndFor
     If(before < 1)
-      x = seg_x0(i) + share * dx;
-      y = seg_y0(i) + share * dy;
+      // a corner exactly: others ask for it by its coordinates
+      x = (share == 1) ? seg_x1(i) : seg_x0(i) + share * dx;
+      y = (share == 1) ? seg_y1(i) : seg_y0(i) + share * dy;
       point = 0;
       For k In {0 : #known_point() - 1}
         If((known_x(k) - x)^2 + (known_y(k) - y)^2 < (1e-9 * dam_height)^2)

@@ -1,4 +1,4 @@
-"""The command line: new, run, check, critical, sweep, plot, report, gui, validate, bench, law."""
+"""The command line: the commands of `damjoint --help`."""
 
 from __future__ import annotations
 
@@ -198,6 +198,21 @@ def parser() -> argparse.ArgumentParser:
     add("--scheduler", metavar="ADDRESS", help="a dask.distributed scheduler instead")
     add("--out", type=Path, help="result file, resumed if it exists (default CASE_sweep.csv)")
     vary.set_defaults(call=do_sweep)
+
+    trial = commands.add_parser(
+        "stress", help="random scenes verified from their files; exit code 1 if one is a defect"
+    )
+    add = trial.add_argument
+    add("count", nargs="?", type=whole, default=500, metavar="N", help="scenes (default 500)")
+    add("--seed", type=whole, default=1, help="of the random numbers (default 1)")
+    add("--jobs", type=whole, help="processes (default: all cores)")
+    add(
+        "--out",
+        type=Path,
+        default=Path("stress.csv"),
+        help="result file, resumed if it exists (default stress.csv)",
+    )
+    trial.set_defaults(call=do_stress)
 
     speed = commands.add_parser("bench", help="time, error, growth and costs")
     add = speed.add_argument
@@ -403,6 +418,19 @@ def show(case: str, plan: Plan, rows: list[Row], out: Path) -> None:
     picture = beside(out, ".png")
     said = chart.draw(plan, rows, f"{Path(case).stem}: {len(rows)} rows", picture)
     print(said or picture)
+
+
+def do_stress(arguments: argparse.Namespace) -> int:
+    """damjoint stress; 1 if a scene is a defect."""
+    from .studies.stress import DEFECT, counts, stress
+
+    rows = stress(arguments.count, arguments.seed, arguments.out, arguments.jobs)
+    for row in rows:
+        if row["class"] == DEFECT:
+            print(f"{row['scene']}: {row['found']}\n  {row['command']}")
+    found = counts(rows)
+    print("; ".join(f"{number} {name}" for name, number in found.items()), arguments.out, sep="; ")
+    return int(found[DEFECT] > 0)
 
 
 def do_bench(arguments: argparse.Namespace) -> int:

@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 from closed_forms import BASE, CENTROID, WATER, WEIGHT, slide_level, thrust
 from damjoint import cli
-from damjoint.results import verdict
-from damjoint.results.verdict import statement
+from damjoint.results.verdict import hints, statement, verdict
 from numpy.testing import assert_allclose
 
 
@@ -132,5 +131,29 @@ def test_module_entry_point():
 )
 def test_what_an_engineer_should_know(solve, settings, levels, said):
     (result,) = solve("dam", levels, n_joint=40, **settings)
-    found = "\n".join(verdict.hints(result))
+    found = "\n".join(hints(result))
     assert said in found if said else not found
+
+
+@pytest.mark.parametrize("weight_first", [0, 1])
+def test_driven_from_an_empty_reservoir(solve, weight_first):
+    """The thrust has no slope at level 0; the displacement counts from the dam under its weight."""
+    settings = {"drive": "heel", "uplift": "none", "weight_first": weight_first}
+    (driven,) = solve("ssnp142", "9", **settings)
+    (weighed,) = solve("ssnp142", "1e-3", uplift="none", weight_first=1)
+    assert not driven.stopped
+    assert driven.heel[-1] - weighed.heel[-1] == pytest.approx(1e-6, rel=1e-6)
+    (filled,) = solve("ssnp142", f"5,{driven.last['level']:.12g}", uplift="none")
+    assert filled.heel[-1] == pytest.approx(driven.heel[-1], rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    "by, settings, nearly", [(-1e-7, {}, 0), (1e-3, {"sigma_max": 1e7, "uplift": "none"}, 20)]
+)
+def test_driven_out_of_the_reservoir(solve, by, settings, nearly):
+    """Below an empty reservoir, or beyond twice the dam's height."""
+    drive = {"drive": "heel" if by < 0 else "crest", "drive_by": by}
+    (result,) = solve("ssnp142", "2,9", steps=8, **drive, **settings)
+    assert result.stopped and verdict(result) == "out of range"
+    assert result.last["level"] == pytest.approx(nearly, abs=0.7)
+    assert 0 <= result.last["level"] <= 20

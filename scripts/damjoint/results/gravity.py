@@ -241,10 +241,10 @@ class Uplift:
         places, heads = [0.0, crack, self.length], [h1, h1, h2]
         at = case["drain_x"]
         if drained and crack <= at < self.length:
-            gallery = case["drain_level"] - (body.heel[1] + at * body.along[1])
+            outlet = max(case["drain_level"], tail) - (body.heel[1] + at * body.along[1])
             undrained = float(np.interp(at, places[1:], heads[1:]))
             places.insert(2, at)
-            heads.insert(2, drained_head(case, undrained, gallery, h2))
+            heads.insert(2, drained_head(case, undrained, max(outlet, 0.0)))
         weight = case["rho_water"] * case["g"] if mode != "none" else 0.0
         self.s, self.p = np.array(places), weight * np.array(heads)
 
@@ -261,11 +261,10 @@ class Uplift:
         return float(np.sum(np.diff(self.s) * parts) / 6)
 
 
-def drained_head(case: Case, undrained: float, gallery: float, tail: float) -> float:
-    """Head left at the drains [m]: they take their part of what stands above the gallery or, if
-    higher, the tailwater; all heads above the joint.
+def drained_head(case: Case, undrained: float, outlet: float) -> float:
+    """Head left at the drains [m]: they take their part of what stands above their outlet, the
+    gallery or, if higher, the tailwater; all heads above the joint at the drains.
     """
-    outlet = max(gallery, tail)
     return undrained - case["drain_effectiveness"] * max(undrained - outlet, 0.0)
 
 

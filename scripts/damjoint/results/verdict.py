@@ -13,7 +13,8 @@ from .tables import Results
 
 
 def verdict(results: Results) -> str:
-    """One of: stands, sliding, overturning, no convergence, no equilibrium, interrupted.
+    """One of: stands, sliding, overturning, out of range, no convergence, no equilibrium,
+    interrupted.
 
     "no equilibrium": not even at the first step. "sliding" also where the whole joint has slipped
     or opened and the dam stands on nothing but the joint's hardening.
@@ -56,16 +57,23 @@ def loose_from(results: Results) -> float | None:
 
 
 def why_stopped(results: Results) -> str:
-    """Overturning, sliding or no convergence, from the last converged state.
+    """Out of range, overturning, sliding or no convergence, from the last converged state.
 
-    Overturning: the crack has crossed most of the base, or the resultant is in its last tenth.
+    Out of range: a driven run whose level would, in one more step like its last, be below 0 or
+    above the highest that is allowed.
+    Overturning: the resultant is in the base's last tenth, or, where the crack has crossed most of
+    it, in its last fifth.
     Sliding: the shear is within 2 % of what the joint can hold, T <= mu N + c L + H (mean slip) L
     (N holds the tension c/mu of open points, so that c acts on all of L), for a bond beyond what
     remains once it has gone, mu N; or the whole joint has let go.
     """
     case, last = results.case, results.last
     base = case.joint_length
-    if last["crack_length"] > 0.8 * base or last["M"] < 0.1 * last["N"] * base:
+    ahead = 2 * last["level"] - [0.0, *results.history["level"]][-2]
+    if case["drive"] != "level" and not 0 <= ahead <= case.highest_level:
+        return "out of range"
+    cracked = last["crack_length"] > 0.8 * base
+    if last["M"] < (0.2 if cracked else 0.1) * last["N"] * base:
         return "overturning"
     if case["law"] == "friction":
         hardened = case["pena_tang"] * mean_slip(results) * base
@@ -74,7 +82,9 @@ def why_stopped(results: Results) -> str:
             return "sliding"
     if case["law"] == "bond" and last["T"] > 0.98 * case["mu"] * last["N"]:
         return "sliding"
-    return "sliding" if last["slip_length"] > 0.98 * base else "no convergence"
+    if last["slip_length"] > 0.98 * base:
+        return "sliding"
+    return "no convergence"
 
 
 def movement(case: Case, crack_length: float, x: np.ndarray, moved: np.ndarray) -> str:
@@ -130,6 +140,11 @@ def statement(results: Results) -> str:
     if results.stopped:
         hint = stiff_joint(results) if found == "no convergence" else ""
         where = f"level {last['level']:.6g} m (t = {last['time']:.6g})"
+        if found == "out of range":
+            return (
+                f"out of range: the displacement asks for a level below 0 or above "
+                f"{case.highest_level:g} m beyond {where}; the last converged state is saved"
+            )
         return f"{found}{hint}: no equilibrium beyond {where}; the last converged state is saved"
     if found == "stands":
         return ""

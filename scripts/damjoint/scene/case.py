@@ -101,6 +101,16 @@ class Case:
         ends = {self["drive_end"]} if self["drive"] != "level" else set()
         return tuple(t for t in self.times if t == round(t) or t in ends or t == self.times[-1])
 
+    @property
+    def highest_level(self) -> float:
+        """The highest water level that is allowed [m]."""
+        return math.inf if self.geometry else ceiling(self.values)
+
+    @property
+    def reached(self) -> float:
+        """The highest level of the reservoir [m]; if it is driven, the highest it may have."""
+        return max(self.levels) if self["drive"] == "level" else self.highest_level
+
     def level_at(self, time: float) -> float:
         """Reservoir level [m] at a time, linear between the levels, from 0 at t = 0."""
         return between(self.levels, time)

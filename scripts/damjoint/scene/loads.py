@@ -54,14 +54,23 @@ def line_forces(case: Case, loading: Loading) -> dict[str, tuple[float, float]]:
 
 def wet(case: Case, face: Face) -> bool:
     """Whether water (or silt) may press on a face in a case."""
-    highest = max(case.tail_levels if face.side in ("down", "bed") else case.levels)
+    highest = max(case.tail_levels) if face.side in ("down", "bed") else case.reached
     if face.side == "up":
         return True
     if face.side == "down":
         return highest > face.surface.points[:, 1].min()
-    return bool(case["crest_water" if face.side == "top" else "floor_water"]) and (
-        highest > face.surface.points[:, 1].min()
+    if face.side == "top" and not overtopped(case):
+        return False
+    return (
+        bool(face.side == "top" or case["floor_water"])
+        and highest > face.surface.points[:, 1].min()
     )
+
+
+def overtopped(case: Case) -> bool:
+    """Whether water may stand on the crest; a uniform pressure is one of the faces only."""
+    deep = case["crest_water"] and case["face_load"] == "hydrostatic"
+    return bool(deep and (case.geometry or case.reached > case["dam_height"]))
 
 
 def water_column(level: float, low: float, high: float) -> tuple[float, float]:

@@ -77,7 +77,7 @@ class Point:
         joint, state, pressure = (
             self.filling.joint,
             self.filling.state,
-            self.filling.record.pressure.nodes,
+            self.filling.state.pressure.nodes,
         )
         interface = joint.interface
         jump = interface.jumps(interface.at_nodes, state.jump)

@@ -26,7 +26,7 @@ from ..results import gravity
 from ..results.tables import CRITICAL, Results, write_csv
 from ..results.verdict import bound, statement
 from ..run import save
-from ..scene.case import Case, ceiling, load
+from ..scene.case import Case, load
 from ..scene.parameters import parameter
 from .bodies import interface_of
 from .branch import PRECISION, ROUGH, SURE, Branch, Point
@@ -190,7 +190,7 @@ class Search:
         lists = (self.own.levels[:last], self.own.tail_levels[:last])
         texts = (",".join(map(repr, values)) for values in lists)
         case = load(name, self.settings, *texts)
-        branch = self.branch(max(case.levels), case, ceiling(case.values))
+        branch = self.branch(max(case.levels), case, case.highest_level)
         branch.follow(SURE)
         branch.refine()
         if branch.reached:

@@ -20,6 +20,7 @@ from scipy import linalg
 
 from ... import RunError, __version__, data
 from ...scene.case import Case
+from ...scene.loads import overtopped
 from ...scene.mesh import Body, Mesh, mesh_of, shares
 from .bulk import MATERIAL, Bodies, Condensed, check_size, condense
 
@@ -41,11 +42,9 @@ def folder() -> Path | None:
 def key_of(case: Case) -> tuple:
     """What condensed bodies depend on."""
     shape = fingerprint(mesh_of(case)) if case.geometry else tuple(shares(case).items())
-    highest, tail = max(case.levels), max(case.tail_levels)
-    crest = case.geometry or highest > case["dam_height"]
-    faces = tail > 0, case["floor_water"], bool(case["crest_water"] and crest)
+    faces = max(case.tail_levels) > 0, case["floor_water"], overtopped(case)
     if case.geometry:  # which are under water is not known without their heights
-        faces = (*faces, highest, tail)
+        faces = (*faces, case.reached, max(case.tail_levels))
     return (shape, *(case[n] for n in MATERIAL), *faces)
 
 

@@ -120,9 +120,15 @@ class Joint:
         return forces, total
 
     def rate(self, of: Callable[[Loading], np.ndarray], loading: Loading) -> np.ndarray:
-        """The derivative with the reservoir level of what is nearly linear in it."""
-        step = 1e-5 * max(self.case.size, abs(loading.level))
-        above, below = (replace(loading, level=loading.level + s) for s in (step, -step))
+        """The derivative with the reservoir level of what is nearly linear in it.
+
+        An empty reservoir's thrust has none, which would leave a driven step without a direction:
+        it is that of a tenth of the dam's height.
+        """
+        height = self.case.size
+        step = 1e-5 * max(height, abs(loading.level))
+        level = loading.level if abs(loading.level) > 1e-3 * height else 0.1 * height
+        above, below = (replace(loading, level=level + s) for s in (step, -step))
         return (of(above) - of(below)) / (2 * step)
 
     # -- water in the joint
@@ -133,8 +139,8 @@ class Joint:
         that a matrix of `Along` leads to: linear on the way from the reservoir's level to the
         tailwater's; a dry end has its own height, or the other end's head if that is lower.
 
-        Drains take away their part of the head above their outlet or the tailwater (EM
-        1110-2-2200).
+        Drains take away their part of the head above their outlet, the tailwater or their own
+        height (EM 1110-2-2200).
         """
         case, along = self.case, self.interface.along
         fields = along.heel_y, along.toe_y, along.way
@@ -146,9 +152,8 @@ class Joint:
             return first + (last - first) * way
         at = case["drain_x"] / self.interface.length
         there = first + (last - first) * at
-        there = there - case["drain_effectiveness"] * np.maximum(
-            there - np.maximum(case["drain_level"], last), 0
-        )
+        outlet = np.maximum(heel + (toe - heel) * at, max(case["drain_level"], loading.tail))
+        there = there - case["drain_effectiveness"] * np.maximum(there - outlet, 0)
         return np.where(
             way < at,
             first + (there - first) * way / at,

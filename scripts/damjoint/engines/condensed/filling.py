@@ -108,7 +108,9 @@ class Filling:
 
         The first step holds the weight, too, at any length: it is cut to the weight alone first.
         """
-        if self.case["weight_first"] and self.state.time == 0 and not self.state.jump.any():
+        # what is driven from t = 0 on counts from the weight alone, too
+        first = self.case["weight_first"] or (self.driven and self.case["drive_begin"] == 0)
+        if first and self.state.time == 0 and not self.state.jump.any():
             self.rest()
         *attempts, last_resort = self.attempts()
         cuts, dt, weighed = 0, np.inf, self.state.time > 0 or self.state.jump.any()
@@ -220,9 +222,12 @@ class Filling:
         end, iterations = found
         if np.abs(end.jump).max() > 0.1 * self.case.size:
             return None  # the dam has fallen: an equilibrium of small displacements only
-        memories = state.remember(joint, end.jump)
+        if prescribed and not 0 <= end.level <= self.case.highest_level:
+            return None  # no reservoir has that level
+        memories, loading = state.remember(joint, end.jump), replace(asked, level=end.level)
+        pressure = joint.pressure(end.jump, memory, loading)
         return (
-            State(time, replace(asked, level=end.level), end.jump, *memories),
+            State(time, loading, end.jump, *memories, pressure),
             iterations,
             end.size / (self.reference or 1.0),
         )

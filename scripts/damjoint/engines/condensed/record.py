@@ -30,6 +30,8 @@ class State:
     memory: Memory
     #: by `rows` of the interface
     nodes: Memory
+    #: of the water it is in equilibrium with: what had broken before lets in
+    pressure: Pressure | None = None
 
     @staticmethod
     def virgin(joint: Joint) -> State:
@@ -64,8 +66,6 @@ class Record:
     tables: list[tuple[np.ndarray, np.ndarray]] = field(default_factory=list)
     #: the states of the tables
     saved: list[State] = field(default_factory=list)
-    #: the water's pressure in the state last added
-    pressure: Pressure | None = None
 
     def copy(self) -> Record:
         """Another one, to go on with by itself."""
@@ -91,7 +91,7 @@ class Record:
         frames = interface.frames[interface.points.elements]
         along_axes = np.einsum("qk,qkc->qc", traction, frames)
         N, T, M = interface.chord.resultants(weights, interface.points.positions, along_axes)
-        pressure = self.pressure = joint.pressure(state.jump, state.memory, state.loading)
+        pressure = state.pressure
         lifted = interface.bulk.joint.normals[interface.water_points.elements]
         uplift = interface.water_points.weights * pressure.water_points / joint.bulk.width
         row = {
@@ -126,7 +126,7 @@ class Record:
         """
         joint, law, interface = self.joint, self.joint.law, self.joint.interface
         place, corners = interface.space.place, len(joint.bulk.joint.points)
-        pressure = self.pressure
+        pressure = state.pressure
         jump = interface.jumps(interface.at_nodes, state.jump)
         traction, _ = law.respond(jump, state.nodes)
         seen = interface.at_places(

@@ -1,0 +1,119 @@
+"""Random scenes verified from their files; and that the verification finds what is wrong."""
+
+import csv
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+from damjoint import pages, run
+from damjoint.results.tables import write_csv
+from damjoint.scene.case import load
+from damjoint.studies import stress, verification
+from damjoint.studies.verification import Written, read_table, unjustified, violations
+
+SCENES = {
+    "rupture": {"law": "rupture", "uplift": "flow", "sigma_max": 1e4, "G_f": 10.0},
+    "friction": {"law": "friction", "uplift": "cracked", "pena_tang": 0.0, "adhesion": 1e4},
+    "bond": {"law": "bond", "uplift": "imposed"},
+}
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """written(law): a run of that law with cracks, as the command leaves it."""
+    done = {}
+
+    def once(law):
+        if law not in done:
+            case = load("dam", SCENES[law] | {"n_joint": 20.0}, "30,44,35", "3")
+            folder = tmp_path_factory.mktemp(law)
+            run.run(case, folder, fields=False, picture=False, progress=False)
+            done[law] = Written(case, folder, 0)
+        return done[law]
+
+    return once
+
+
+@pytest.mark.parametrize("law", SCENES)
+def test_what_a_run_has_written_stands_every_test(written, law):
+    assert violations(written(law)) == []
+
+
+@pytest.mark.parametrize("law", SCENES)
+@pytest.mark.parametrize(
+    "table, column, change, said",
+    [
+        ("history", "N", lambda v: v * 1.001, "N + U"),
+        ("history", "T", lambda v: v * 1.001, "T ="),
+        ("history", "M", lambda v: v * 1.001, "M ="),
+        ("history", "level", lambda v: v + 1e-3, "not at the level"),
+        ("history", "slip_length", lambda v: 1 - v[0] + [0, -0.1, -0.2], "slip_length falls"),
+        ("joint", "p", lambda v: v * 1.01, "the integral of p"),
+        ("joint", "sigma_n_eff", lambda v: v + 1e6, "tension"),
+        ("joint", "sigma_n_eff", lambda v: v * 1.01, "contact"),
+        ("joint", "tau_1", lambda v: v * 100 + 1e6, "shear"),
+    ],
+)
+def test_what_is_wrong_is_found(written, tmp_path, law, table, column, change, said):
+    whole = written(law)
+    shutil.copytree(whole.folder, tmp_path, dirs_exist_ok=True)
+    path = tmp_path / f"{table}.csv"
+    changed = read_table(path)
+    changed[column] = change(changed[column])
+    write_csv(path, changed)
+    found = violations(Written(whole.case, tmp_path, 0))
+    assert any(line.startswith(said) or said in line for line in found), found
+
+
+def test_a_wrong_exit_code_is_found(written):
+    whole = written("rupture")
+    assert violations(Written(whole.case, whole.folder, 1)) == [
+        "exit code 1 with state complete, verdict stands"
+    ]
+
+
+@pytest.mark.parametrize(
+    "level, mu, said, wrong",
+    [
+        (30, 0.8, "sliding", "where an equilibrium is certain"),
+        (44, 0.6, "sliding", ""),
+        (44, 0.6, "overturning", "which the rigid block does not explain"),
+    ],
+)
+def test_a_stop_is_laid_beside_the_rigid_block(tmp_path, level, mu, said, wrong):
+    """The shear is within 40.6 m of what mu = 0.6 holds (T = mu N), the resultant well inside."""
+    settings = {"law": "friction", "adhesion": 0.0, "mu": mu, "pena_tang": 0.0, "n_joint": 20.0}
+    case = load("dam", settings, str(level), "3")
+    run.run(case, tmp_path, fields=False, picture=False, progress=False)
+    told = json.loads((tmp_path / "run.json").read_text())
+    told |= {"state": "stopped", "verdict": said}
+    (tmp_path / "run.json").write_text(json.dumps(told))
+    found, why = unjustified(Written(case, tmp_path, 1))
+    assert found == bool(wrong) and why.endswith(wrong) and bool(why) == bool(wrong)
+
+
+def test_stress_is_seeded_resumed_and_has_a_page(command, monkeypatch):
+    monkeypatch.setattr(stress, "PATIENCE", 60)
+    code, out, _ = command("stress", 2, "--seed", 3, "--out", "s.csv")
+    assert code == 0 and "0 defect; s.csv" in out
+    before = Path("s.csv").read_text()
+    command("stress", 2, "--seed", 3, "--out", "s.csv")
+    assert Path("s.csv").read_text() == before
+    rows = list(csv.DictReader(before.splitlines()))
+    assert {row["scene"] for row in rows} == {"3-0", "3-1"}
+    assert stress.random_scene(3, 1) == stress.random_scene(3, 1) != stress.random_scene(3, 0)
+    page = pages.trust_page(Path("s.csv"))
+    assert "2 random scenes" in page and stress.VERIFIED in page
+
+
+@pytest.mark.heavy
+def test_random_scenes(tmp_path):
+    """Those of the page have other numbers; minutes."""
+    rows = stress.stress(60, 60, tmp_path / "stress.csv")
+    assert len(rows) == 60
+    assert [row["found"] + " " + row["command"] for row in rows if row["class"] == "defect"] == []
+
+
+def test_verification_knows_no_engine():
+    assert "engines" not in Path(verification.__file__).read_text()
