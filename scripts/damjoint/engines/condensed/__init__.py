@@ -3,6 +3,7 @@
 elements.py, elasticity.py  finite elements: functions, rules, stiffness, stress
 factor.py                   factorisation of large sparse matrices
 bulk.py, cache.py           both bodies eliminated, and kept on disk
+faces.py                    what presses on the faces, exact in spite of the waterline
 interface.py, flow.py       the joint's interpolations and linear systems; water that flows in it
 laws.py                     the joint laws of pro/law_*.pro, many points at once
 equilibrium.py, newton.py   residual and tangent; Newton's method
