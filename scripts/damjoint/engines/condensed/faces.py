@@ -8,6 +8,7 @@ waterline cuts are integrated over their wet part alone.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 
 import numpy as np
 
@@ -31,8 +32,12 @@ class WetFace:
         self.normals = surface.normals[self.points.elements][:, :dim]
         self.y, self.tilt = self.points.positions[:, 1], np.abs(self.normals[:, 0])
         self.straight = self.high > self.low
-        self.elements = [(shape, row) for shape, table in self.space.connectivity for row in table]
         self.flat = np.ptp(surface.points[:, 1]) < 1e-9 * np.abs(surface.points).max()
+
+    @cached_property
+    def elements(self) -> list[tuple[str, np.ndarray]]:
+        """Shape and functions of each element."""
+        return [(shape, row) for shape, table in self.space.connectivity for row in table]
 
     def spread(self, traction: np.ndarray) -> np.ndarray:
         """Forces of a traction (q, dim) [Pa]."""
