@@ -12,10 +12,8 @@ from damjoint.engines.condensed import solve as condensed
 from damjoint.scene.case import load
 
 #: A dam of ordinary stiffness that slips and opens at its heel.
-DAM = {
-    **{"E_dam": 2e10, "E_found": 3e10, "K_N": 1e11, "K_T": 1e11, "law": "friction"},
-    **{"adhesion": 1e5, "mu": 1.0},
-}
+DAM = {"E_dam": 2e10, "E_found": 3e10, "K_N": 1e11, "K_T": 1e11}
+DAM |= {"law": "friction", "adhesion": 1e5, "mu": 1.0}
 PLAIN = "--no-fields", "--no-picture"
 
 

@@ -1,8 +1,8 @@
 """Sweeps: each row is the run of its own; a file is resumed."""
 
 import csv
-import re
 import os
+import re
 import signal
 import subprocess
 import sys
