@@ -63,8 +63,8 @@ class Estimate:
     value: float
     #: the largest error at the levels that were compared
     error: float
-    #: what the error is relative to: the largest value at those levels; of an opening the largest
-    #: normal jump, closure included
+    #: what the error is relative to: the largest value at those levels; of an opening the joint's
+    #: largest jump, in whatever direction
     scale: float
     #: an error that is let pass because the quantity is counted in elements
     slack: float = 0.0
@@ -188,11 +188,10 @@ def estimates(tried: list[Results]) -> list[Estimate]:
             continue
         scale, slack = float(np.abs(table).max()), 0.0
         if name == "max_opening":
-            rows = np.isin(last.joint["time"], times)
-            scale = float(np.abs(last.joint["delta_n"][rows]).max())
+            scale = max(largest_jump(last, t) for t in times)
         error = float(left(table, name in LENGTHS).max())
         if name in LENGTHS and scale:
-            error = max(error, element / 2)
+            error = max(error, element)
             # a little more, for lengths that differ by just an element
             slack = 1.001 * element if case.accuracy * case["n_joint"] >= 1 else 0.0
         used = name != "toe_stress" or stiffness_ratio(tried[0]) <= SOFT
@@ -219,6 +218,13 @@ def read(result: Results, times: list[float]) -> dict[str, list[float]]:
     found["slip"] = [trapezoid(m["delta_t1"], m["s"]) / m["s"][-1] for m in means]
     found["toe_stress"] = [m["sigma_n"][-1] for m in means]
     return {name: found[name] for name in QUANTITIES if name in found}
+
+
+def largest_jump(result: Results, time: float) -> float:
+    """Of the joint's nodes, in whatever direction, at a requested time [m]."""
+    rows = result.at(time)
+    jumps = [rows[name] for name in ("delta_n", "delta_t1", "delta_t2")]
+    return float(np.linalg.norm(jumps, axis=0).max())
 
 
 def left(values: np.ndarray, counted: bool) -> np.ndarray:

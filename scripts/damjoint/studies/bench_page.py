@@ -205,7 +205,7 @@ def of_estimates(estimates: Table) -> list[str]:
         "## Estimated and true errors",
         "What `--accuracy` says of its errors, and what they are, in percent: estimated / true, "
         "the worst of all levels, of dams with E = 20 and 30 GPa, K_N 1e11 or 1e12 Pa/m. A length "
-        "is counted in elements; an opening's error is relative to the largest normal jump.",
+        "is counted in elements; an opening's error is relative to the joint's largest jump.",
         as_text(estimates),
     ]
 
