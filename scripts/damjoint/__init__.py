@@ -3,6 +3,7 @@
 scene/    what is asked: parameters, case files, meshes
 results/  what comes out: tables, verdict, fields, pictures, comparison with published numbers
 engines/  how it is solved: getdp/ runs the problem definition, condensed/ follows the joint alone
+accuracy.py  the mesh that an accuracy asks for, and what is still wrong on it
 run.py    one case, solved and written
 studies/  what is done with runs: checks, sweeps, critical values, benchmarks, a law along a path
 window/   the Gmsh window, with the condensed engine behind it

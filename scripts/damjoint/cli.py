@@ -71,7 +71,9 @@ def parser() -> argparse.ArgumentParser:
     )
     add(
         "--accuracy",
-        help="coarse (about 3 %%), standard (1 %%) or fine (0.2 %%): chooses mesh, order and steps",
+        metavar="PERCENT",
+        help="coarse (3 %%), standard (1 %%), fine (0.2 %%) or any percentage, such as 0.5%%: "
+        "refines the mesh until the results' estimated error is smaller",
     )
 
     loading = Parser(add_help=False, parents=[water])
@@ -272,7 +274,8 @@ def do_run(arguments: argparse.Namespace) -> int:
         )
         if case["drive"] != "level":
             print(path_statement(result))
-        for said in filter(None, [statement(result), *hints(result)]):
+        estimate = result.info.get("error_estimate", {}).get("statement", "")
+        for said in filter(None, [statement(result), *hints(result), estimate]):
             print(said)
         code = max(code, int(failed(result)))
     return code
@@ -290,7 +293,8 @@ def do_check(arguments: argparse.Namespace) -> int:
     if any(case["dim"] == 3 for case in cases):
         warn_if_slow()
     checks = check(cases, arguments.out)
-    print(f"{text_table(checks)}\n\n{arguments.out / 'check.csv'}")
+    said = [f"{one.gravity.case.name}: {one.accuracy}" for one in checks if one.accuracy]
+    print("\n\n".join([text_table(checks), *said, str(arguments.out / "check.csv")]))
     return int(any(answer.fails for one in checks for answer in (one.finite_elements, one.gravity)))
 
 
@@ -388,7 +392,7 @@ def do_sweep(arguments: argparse.Namespace) -> int:
     """damjoint sweep."""
     from .scene import parameters
     from .studies.plan import Loading, plan_of, sample_of
-    from .studies.sweep import sweep
+    from .studies.sweep import meshed, sweep
 
     out = arguments.out or Path(f"{Path(arguments.case).stem}_sweep.csv")
     settings = parameters.settings(arguments.settings)
@@ -398,6 +402,9 @@ def do_sweep(arguments: argparse.Namespace) -> int:
     sample = sample_of(arguments.sample, **how) if arguments.sample else None
     plan = plan_of(arguments.vary, arguments.tie, sample, settings, arguments.critical)
     loading = Loading(arguments.levels, arguments.tail_levels, arguments.steps, arguments.accuracy)
+    if loading.accuracy:
+        settings, loading, said = meshed(arguments.case, settings, loading)
+        print(f"one mesh for all rows, that of the case itself: {said}")
     count, rows = sweep(
         arguments.case, plan, settings, out, loading, arguments.jobs, arguments.scheduler
     )

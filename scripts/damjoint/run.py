@@ -11,7 +11,7 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from . import __version__
+from . import __version__, accuracy
 from .engines import Outcome, engine_of
 from .results import folder as folders
 from .results import tables
@@ -60,7 +60,7 @@ def run(
     folders.say(case, out, "running")
     bar, found = Progress(case, progress), []
     try:
-        for outcome in chosen.solve(case, bar.step, fields or picture):
+        for outcome in accuracy.solve(case, chosen, bar.step, fields or picture):
             save(outcome, case, out)
             found.append(outcome)
             if outcome.error:

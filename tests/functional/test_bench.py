@@ -10,7 +10,7 @@ import pytest
 def test_short_form(command, tmp_path):
     assert command("bench", "--short", "--out", "bench")[0] == 0
     text = (tmp_path / "bench" / "benchmarks.md").read_text()
-    assert text.startswith("# Benchmarks\n") and text.count("\n## ") == 7
+    assert text.startswith("# Benchmarks\n") and text.count("\n## ") == 8
     assert (tmp_path / "bench" / "accuracy.png").read_bytes()[:4] == b"\x89PNG"
     assert len((tmp_path / "bench" / "modelings.md").read_text().splitlines()) == 13
 

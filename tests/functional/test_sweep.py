@@ -2,6 +2,7 @@
 
 import csv
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -208,16 +209,25 @@ def test_what_no_joint_can_hold_is_found_by_the_search_too(command, tmp_path):
     ]
 
 
+#: A mesh that --accuracy chooses, but for its fineness.
+MESH = "mesh_pattern=free", "n_layers=1", "h_dam=-1", "h_found=-1"
+
+
 def test_ties_loading_and_accuracy(command, solve, tmp_path):
-    """A tied parameter and the loading of the words are those of the run."""
-    loading = "--levels", "6,8", "--tail-levels", "1", "--steps", "2", "--accuracy", "coarse"
+    """A tied parameter and the loading of the words are those of the run; one mesh for all rows,
+    that of the case as it is.
+    """
+    loading = "--levels", "6,8", "--tail-levels", "1", "--steps", "2"
     words = "--vary", "mu=0.35,0.5", "--tie", "adhesion=1e4*mu", "--jobs", "1", "--out", "s.csv"
-    assert command("sweep", "c", *loading, *words)[0] == 0
+    code, said, _ = command("sweep", "c", *loading, "--accuracy", "coarse", *words)
+    assert code == 0 and said.startswith("one mesh for all rows")
+    n = re.search(r"n_joint = (\d+)", said)[1]
+    mesh = [part for name in (f"n_joint={n}", "order=2", *MESH) for part in ("--set", name)]
     for row in rows(tmp_path / "s.csv"):
         assert float(row["adhesion"]) == pytest.approx(1e4 * float(row["mu"]))
         options = "--no-fields", "--no-picture", "--out", row["mu"]
         values = "--set", f"mu={row['mu']}", "--set", f"adhesion={row['adhesion']}"
-        assert command("run", "c", *loading, *values, *options)[0] == 0
+        assert command("run", "c", *loading, *mesh, *values, *options)[0] == 0
         last = rows(tmp_path / row["mu"] / "history.csv")[-1]
         for name in ("time", "level", "tail_level", "max_opening", "crest_ux", "T"):
             assert float(row[name]) == pytest.approx(float(last[name]), rel=1e-6), name

@@ -325,7 +325,7 @@ def test_both_uplifts_of_a_published_case(open_window):
 def test_accuracy_chooses_the_mesh(open_window):
     hand = open_window("a")
     hand.type(tree.ACCURACY, "coarse")
-    assert (hand.entry("n_joint")["values"], hand.entry("order")["values"]) == ([40], [2])
+    assert (hand.entry("n_joint")["values"], hand.entry("order")["values"]) == ([32], [2])
     hand.type(tree.ACCURACY, tree.OWN)
     assert (hand.entry("n_joint")["values"], hand.entry("order")["values"]) == ([50], [1])
 

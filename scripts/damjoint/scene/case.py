@@ -68,6 +68,8 @@ class Case:
     published: bool = False
     #: whether pena_tang has been set: a dam whose whole joint slips is meant to stand on it
     hardening_asked: bool = False
+    #: the relative error asked for; None: the mesh is as it is
+    accuracy: float | None = None
     #: the user's own geometry instead of the section by parameters
     geometry: Path | None = None
     #: what the solvers share besides the parameters: {name: values}, from pro/parameters.pro
@@ -176,24 +178,46 @@ def case_file(case: str) -> Path:
     raise InputError(f"case {case}: unknown; allowed: {names}, or the path of a .case file")
 
 
-#: For an accuracy: elements along the joint, and layers in 3D where something varies along z.
-ACCURACIES = {"coarse": (40, 1), "standard": (100, 2), "fine": (200, 4)}
+#: Relative errors by name.
+ACCURACIES = {"coarse": 0.03, "standard": 0.01, "fine": 0.002}
 
 
-def mesh_for(accuracy: str, case: Case) -> dict[str, float | str]:
-    """Mesh and order for an accuracy of about 3 % (coarse), 1 % (standard) or 0.2 % (fine).
+def relative_error(accuracy: str) -> float:
+    """The relative error that an accuracy stands for: coarse, standard, fine or a percentage.
 
-    Measured by `damjoint bench`. Order 2, triangles, in 3D extruded and cut into tetrahedra: these
-    contain the plane fields exactly, however thick they are. Raises InputError.
+    Raises InputError.
     """
-    if accuracy not in ACCURACIES:
-        raise InputError(f"accuracy = {accuracy}: must be one of {', '.join(ACCURACIES)}")
-    (n, layers), solid = ACCURACIES[accuracy], case["dim"] == 3
-    plane = case["hold_z"] or max(case["nu_dam"], case["nu_found"]) == 0
+    if accuracy in ACCURACIES:
+        return ACCURACIES[accuracy]
+    try:
+        found = float(accuracy.removesuffix("%")) / 100 if accuracy.endswith("%") else math.nan
+    except ValueError:
+        found = math.nan
+    if not 0 < found < 1:
+        raise InputError(
+            f"accuracy = {accuracy}: must be one of {', '.join(ACCURACIES)}, or a percentage "
+            "> 0 and < 100, such as 0.5%"
+        )
+    return found
+
+
+def has_plane_fields(case: Case) -> bool:
+    """Whether nothing varies along z."""
+    return case["dim"] == 2 or bool(case["hold_z"]) or max(case["nu_dam"], case["nu_found"]) == 0
+
+
+def first_mesh(case: Case) -> dict[str, float | str]:
+    """Mesh and order from which an accuracy is looked for.
+
+    Order 2, triangles, in 3D extruded and cut into tetrahedra: these contain the plane fields
+    exactly, however thick they are.
+    """
+    solid = case["dim"] == 3
+    n = 32 if not solid else 16 if has_plane_fields(case) else 8
     return {
         "order": 2.0,
         "mesh_pattern": "split" if solid else "free",
-        "n_layers": 1.0 if plane else float(layers),
+        "n_layers": 1.0,
         "n_joint": float(n),
         "h_dam": -1.0,
         "h_found": -1.0,
@@ -211,13 +235,15 @@ def load(
     """Read a case, apply overrides and check everything.
 
     case: letter, name or path; overrides: {name: value}; levels, tail_levels: 'a,b,c' in metres,
-    reached at t = 1, 2, 3; steps: equal steps between two levels; accuracy: coarse, standard or
-    fine, chooses mesh and order (overrides win) and one step per level. Raises InputError.
+    reached at t = 1, 2, 3; steps: equal steps between two levels; accuracy: coarse, standard, fine
+    or a percentage, chooses order, first mesh (overrides win) and one step per level. Raises
+    InputError.
     """
     path, overrides = case_file(case), dict(overrides or {})
+    asked = None
     if accuracy is not None:
-        plain = load(case, overrides)
-        overrides = mesh_for(accuracy, plain) | overrides
+        asked, plain = relative_error(accuracy), load(case, overrides)
+        overrides = first_mesh(plain) | overrides
         steps = steps or (1 if plain["drive"] == "level" else None)
     if steps is not None and not 1 <= steps <= MOST_STEPS:
         raise InputError(f"steps = {steps}: must be an integer >= 1 and <= {MOST_STEPS}")
@@ -237,6 +263,11 @@ def load(
     geometry = geometry and own_geometry(geometry)
     if not geometry:
         check_section(found)
+    elif asked and geometry.suffix != ".geo":
+        raise InputError(
+            f"accuracy = {accuracy}: must not be asked of a mesh of one's own ({geometry.name}), "
+            "which is as fine as it is"
+        )
     values = {name: known[name].check(found[name][0]) for name in known}
     highest = math.inf if geometry else ceiling(values)
     heights = check_levels("levels", found["levels"], highest)
@@ -282,6 +313,7 @@ def load(
         also,
         as_published(path, checked, levels, tail_levels),
         bool(found["hardening_asked"][0]),
+        asked,
         geometry,
         shared,
         {n: found[n] for n in SECTION},

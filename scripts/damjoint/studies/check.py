@@ -135,6 +135,8 @@ class Check:
 
     finite_elements: Answer
     gravity: Answer
+    #: the estimated errors of a mesh that was chosen for an accuracy, in words
+    accuracy: str = ""
 
     @property
     def comparable(self) -> bool:
@@ -261,7 +263,8 @@ def check(cases: list[Case], out: Path) -> list[Check]:
     for case in cases:
         for result in run(case, out / case.name):
             method = hand_calculation(result)
-            checks.append(Check(by_finite_elements(result), by_gravity(method)))
+            estimate = result.info.get("error_estimate", {}).get("statement", "")
+            checks.append(Check(by_finite_elements(result), by_gravity(method), estimate))
             folder = folders.scene_folder(case, result.case, out / case.name)
             write_csv(folder / "gravity.csv", method.table())
             draw_check(result, method, picture_table(checks[-1]), checks[-1].why, folder)

@@ -9,18 +9,19 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
-from .. import InputError, RunError, __version__
+from .. import InputError, RunError, __version__, accuracy
+from ..engines import engine_of
 from ..engines.condensed.filling import Filling
 from ..engines.condensed.interface import Interface
 from ..results.tables import HISTORY
 from ..results.verdict import failed, statement, verdict
-from ..scene.case import Case, mesh_for
+from ..scene.case import Case, first_mesh, load
 from .bodies import interface_of
 from .critical import Search
 from .limit import mechanism
@@ -130,8 +131,7 @@ def search_for(
     """What `Search` takes for the critical value of a row of a plan, whose case is given."""
     if not plan.critical:
         return ()
-    mesh = mesh_for(loading.accuracy, one) if loading.accuracy else ()
-    changed = settings | {n: one[n] for n in (*mesh, *row) if n != "level"}
+    changed = settings | {n: one[n] for n in row if n != "level"}
     levels, tails = (",".join(map(repr, v)) for v in (one.levels, one.tail_levels))
     return case, plan.critical, changed, levels, tails
 
@@ -210,6 +210,24 @@ def spread(tasks: dict[str, Task], jobs: int, scheduler: str | None) -> Iterator
             except BaseException:
                 pool.shutdown(cancel_futures=True)  # waits: a pool that has gone cancels nothing
                 raise
+
+
+def meshed(case: str, settings: dict, loading: Loading) -> tuple[dict, Loading, str]:
+    """Settings and loading of a sweep on one mesh, that which the loading's accuracy asks for of
+    the case before anything is varied; and its errors there, in words.
+
+    Raises InputError, RunError.
+    """
+    one = load(case, settings, **vars(loading))
+    (outcome, *_) = accuracy.solve(
+        replace(one, also_uplift=()), engine_of(one, "auto"), lambda *_: None, False
+    )
+    if outcome.error:
+        raise outcome.error
+    mesh = first_mesh(one) | settings | {n: outcome.result.case[n] for n in accuracy.REFINED}
+    steps = loading.steps or (1 if one["drive"] == "level" else None)
+    said = outcome.result.info["error_estimate"]["statement"]
+    return mesh, replace(loading, steps=steps, accuracy=None), said
 
 
 def sweep(

@@ -13,8 +13,9 @@ from dataclasses import dataclass, field, replace
 import gmsh
 
 from .. import InputError
+from ..accuracy import REFINED
 from ..scene import casefile
-from ..scene.case import CASES, Case, case_file, load, mesh_for
+from ..scene.case import CASES, Case, case_file, first_mesh, load
 from ..scene.parameters import declared
 
 
@@ -23,7 +24,7 @@ class Request:
     """What the user asks for: a case (letter, name or path) and what differs from it.
 
     levels, tail_levels: 'a,b,c' [m]; steps: equal steps between two levels; accuracy: coarse,
-    standard or fine. None: the case's own.
+    standard, fine or a percentage. None: the case's own.
     """
 
     case: str
@@ -88,12 +89,15 @@ def titles() -> dict[str, str]:
     return dict(sorted(found.items(), key=lambda item: (len(item[0]), item)))
 
 
-def case_text(sheet: Sheet) -> str:
-    """The case file that repeats a request: all that differs from the declarations' defaults."""
+def case_text(sheet: Sheet, run: Case) -> str:
+    """The case file that repeats a request, all that differs from the declarations' defaults; run:
+    the case as it was solved, on the mesh that its accuracy has asked for.
+    """
     case, request = sheet.case, sheet.request
     said = casefile.read(case_file(request.case))
-    said.defaults |= mesh_for(request.accuracy, case) if request.accuracy else {}
+    said.defaults |= first_mesh(case) if request.accuracy else {}
     said.defaults |= request.overrides
+    said.defaults |= {name: run[name] for name in REFINED} if request.accuracy else {}
     said.texts = {"title": case.title}
     if case.also_uplift:
         said.texts["also_uplift"] = " ".join(case.also_uplift)

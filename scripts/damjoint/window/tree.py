@@ -16,7 +16,7 @@ import numpy as np
 
 from .. import InputError
 from ..results.verdict import verdict
-from ..scene.case import Case, numbers
+from ..scene.case import ACCURACIES, Case, numbers
 from ..scene.parameters import AUTOMATIC, Parameter
 from .sheet import Request, Sheet
 from .worker import Scene
@@ -152,8 +152,9 @@ class Tree:
             text(
                 ACCURACY,
                 request.accuracy or OWN,
-                choices=[OWN, "coarse", "standard", "fine"],
-                help="coarse: about 3 %, standard: 1 %, fine: 0.2 %; chooses mesh, order and steps",
+                choices=[OWN, *ACCURACIES],
+                help="coarse: 3 %, standard: 1 %, fine: 0.2 %, or any percentage; refines the mesh "
+                "until the results' estimated error is smaller",
             ),
             *map(self.entry, sheet.entries),
         )

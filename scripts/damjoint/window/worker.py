@@ -19,9 +19,9 @@ from types import FrameType
 
 import numpy as np
 
-from .. import InputError, RunError
+from .. import InputError, RunError, accuracy
 from ..engines import Outcome
-from ..engines.condensed.solve import solve
+from ..engines.condensed import solve as engine
 from ..results.fields import Field
 from ..results.tables import Results
 from ..results.verdict import failed, statement
@@ -139,7 +139,7 @@ def follow(sheet: Sheet, pipe: Connection, stop: Stop) -> list[Outcome]:
 
     stop.wanted, stop.at_once = False, True
     try:
-        for outcome in solve(sheet.case, on_step, True):
+        for outcome in accuracy.solve(sheet.case, engine, on_step, True):
             outcomes.append(outcome)
             if outcome.error:
                 break
@@ -159,7 +159,7 @@ def save(folder: str, last: tuple[Sheet, list[Outcome]] | None) -> None:
         raise InputError("nothing to save yet: press Run first")
     sheet, outcomes = last
     keep(sheet.case, outcomes, Path(folder))
-    (Path(folder) / f"{sheet.case.name}.case").write_text(case_text(sheet))
+    (Path(folder) / f"{sheet.case.name}.case").write_text(case_text(sheet, outcomes[0].result.case))
 
 
 class Engine:
