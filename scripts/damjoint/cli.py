@@ -245,7 +245,8 @@ def parser() -> argparse.ArgumentParser:
 
 def do_run(arguments: argparse.Namespace) -> int:
     """damjoint run; 0, or 1 if the dam does not stand or the run stopped before its last level."""
-    from .results.verdict import failed, hints, path_statement, statement
+    from .results import summary
+    from .results.verdict import failed, hints, path_statement, statement, verdict
     from .run import run
     from .scene import parameters
     from .scene.case import load
@@ -264,19 +265,18 @@ def do_run(arguments: argparse.Namespace) -> int:
     if case["dim"] == 3 and arguments.engine != "getdp":
         warn_if_slow()
     for result in run(case, out, fields, picture, engine=arguments.engine):
-        history, last = result.history, result.last
+        history = result.history
         print(
-            f"{case.name}, uplift {result.case['uplift']}: {len(history['time'])} steps, "
-            f"{history['iterations'].sum():.0f} iterations, {history['cuts'].sum():.0f} cuts; "
-            f"level {last.get('level', 0):g} m, "
-            f"largest opening {last.get('max_opening', 0):.4g} m; "
-            f"{result.info.get('factorisation', 'GetDP')}; {out}"
+            f"{case.name}, uplift {result.case['uplift']}: {verdict(result)}; "
+            f"{len(history['time'])} steps, {history['iterations'].sum():.0f} iterations; {out}"
         )
-        if case["drive"] != "level":
-            print(path_statement(result))
-        estimate = result.info.get("error_estimate", {}).get("statement", "")
-        for said in filter(None, [statement(result), *hints(result), estimate]):
-            print(said)
+        if result.last:
+            print(f"\n{summary.text(result)}")
+        driven = case["drive"] != "level"
+        said = [path_statement(result) if driven else "", statement(result), *hints(result)]
+        said.append(result.info.get("error_estimate", {}).get("statement", ""))
+        if any(said):
+            print("", *filter(None, said), sep="\n")
         code = max(code, int(failed(result)))
     return code
 

@@ -1,13 +1,14 @@
-"""The pages that are made from the code: python -m damjoint.pages {parameters,results,bench,trust,
-all}.
+"""The pages that are made from the code: python -m damjoint.pages NAME.
 
-Run from the checkout: `make pages`, `make bench`.
+Run from the checkout: `make pages` (parameters, results, tour, validation: all), `make bench`.
 """
 
 from __future__ import annotations
 
 import re
+import shlex
 import shutil
+import subprocess
 import sys
 import tempfile
 from pathlib import Path
@@ -35,11 +36,11 @@ def parameters_page() -> str:
         "[cases/ssnp142.case](../cases/ssnp142.case) has those of the verification case. "
         "A parameter whose default is -1 follows others.",
         "The loading is a list in the case file, or an option: `levels() = {30, 40, 45};` "
-        "(`--levels`) [m above the base], level number i being reached at t = i, from 0 at t = 0; "
-        "`tail_levels()` (`--tail-levels`) likewise, one value for all or as many as levels; "
-        "`times()` (`--steps` between two levels) the converged steps. Default: two thirds and "
-        "eight ninths of the height, and the crest. The Gmsh window has them as numbers, in the "
-        "group Water levels.",
+        "(`--levels`) [m above the base's heel], level number i being reached at t = i, from 0 at "
+        "t = 0; `tail_levels()` (`--tail-levels`) likewise, one value for all or as many as "
+        "levels; `times()` (`--steps` between two levels) the converged steps. Default: two "
+        "thirds and eight ninths of the height, and the crest. The Gmsh window has them as "
+        "numbers, in the group Water levels.",
     ]
     groups: dict[str, list[tuple]] = {}
     for parameter in declared().values():
@@ -146,6 +147,34 @@ def validation_page() -> str:
     )
 
 
+def tour_page() -> str:
+    """reference/tour.md with its commands run anew, one after the other in a temporary folder."""
+    page = (REFERENCE / "tour.md").read_text()
+    with tempfile.TemporaryDirectory() as folder:
+        play = lambda block: f"```\n{played(block[1], Path(folder))}```"
+        return re.sub(r"^```\n(.*?)^```$", play, page, flags=re.S | re.M)
+
+
+def played(block: str, folder: Path) -> str:
+    """A block of code of the tour: below each line `$ damjoint ...` what it prints; one that begins
+    with `// NAME.case` becomes that file.
+
+    Raises ValueError if a command ends with an error of the input.
+    """
+    if file := re.match(r"// (\S+\.case)\n", block):
+        (folder / file[1]).write_text(block)
+        return block
+    said = ""
+    for command in re.findall(r"^\$ damjoint (?:.*\\\n)*.*\n", block, flags=re.M):
+        words = [sys.executable, "-m", *shlex.split(command[2:].replace("\\\n", ""))]
+        done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)
+        if done.returncode not in (0, 1):
+            raise ValueError(f"{command}{done.stderr}")
+        printed = "\n".join(line.rstrip() for line in done.stdout.splitlines())
+        said += f"{command}{printed}\n" + f"(exit code {done.returncode})\n" * done.returncode
+    return said
+
+
 def take_bench(out: Path) -> None:
     """Page, picture and the modelings' table of README.md from a benchmark's folder."""
     shutil.copy(out / "benchmarks.md", REFERENCE)
@@ -231,6 +260,8 @@ def main(words: list[str]) -> None:
         (REFERENCE / "parameters.md").write_text(parameters_page())
     if words[0] in ("results", "all"):
         (REFERENCE / "results.md").write_text(results_page())
+    if words[0] in ("tour", "all"):
+        (REFERENCE / "tour.md").write_text(tour_page())
     if words[0] in ("validation", "all"):
         (REFERENCE / "ssnp142.md").write_text(validation_page())
 

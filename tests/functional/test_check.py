@@ -8,7 +8,13 @@ import matplotlib.image
 import pytest
 from damjoint.results import folder as folders
 from damjoint.results import gravity
-from damjoint.studies.check import by_finite_elements, by_gravity, hand_calculation
+from damjoint.studies.check import (
+    Check,
+    by_finite_elements,
+    by_gravity,
+    hand_calculation,
+    text_table,
+)
 
 #: SSNP142's dam on a coarse mesh: what load combinations share.
 COMMON = """
@@ -133,6 +139,17 @@ def test_resultants(solve, name, levels, tail_levels, settings):
         for column in ("level", "tail_level", "N", "T", "M", "U", "x_resultant", "OSF"):
             expected = pytest.approx(by_hand.numbers[column], rel=1e-6, abs=1e-9)
             assert computed.numbers[column] == expected, column
+
+
+def test_a_difference_beyond_the_digits_of_the_table_is_not_shown(solve):
+    computed = by_finite_elements(solve("c", None, "1,2,3,4")[0])
+    for much, shown in ((1e-7, "0"), (1e-3, "-")):
+        more = computed.numbers["N"] * (1 + much)
+        other = replace(computed, numbers={**computed.numbers, "N": more})
+        found = Check(computed, other)
+        assert found.rows[2]["N"] < 0
+        (line,) = (line for line in text_table([found]).splitlines() if "difference" in line)
+        assert line.split()[3].startswith(shown)
 
 
 def test_resultants_with_flow(solve):

@@ -27,7 +27,9 @@ def folder(command, tmp_path):
         "run", "a", "--levels", "6,9", "--steps", "2", "--out", "here/out", "--set", "n_joint=20"
     )
     assert (code, err) == (0, "")
-    assert "uplift imposed: 4 steps" in out and "uplift none: 4 steps" in out
+    assert "uplift imposed: stands; 4 steps" in out and "uplift none: stands; 4 steps" in out
+    firsts = [line.split()[0] for line in out.splitlines() if line.startswith("   ")]
+    assert [first for first in firsts if first.isdigit()] == ["6", "9"] * 2
     return tmp_path / "here" / "out"
 
 

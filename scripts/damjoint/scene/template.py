@@ -14,7 +14,7 @@ HEAD = """// {name} - a dam on rock. It runs as it is: damjoint run {name}
 
 title = "{title}";
 
-// Reservoir and tailwater [m above the base], reached at t = 1, 2, ... from 0; they may go down.
+// Reservoir and tailwater [m above the base's heel] at t = 1, 2, ..., from 0; they may go down.
 levels() = {{30, 40, 45}};
 tail_levels() = {{0, 0, 3}};
 """

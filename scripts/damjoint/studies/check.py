@@ -33,9 +33,9 @@ NUMBERS = tuple(CHECK)[list(CHECK).index("level") : list(CHECK).index("OSF") + 1
 #: What the printed table shows: heading by column, in groups that share a unit.
 SHOWN = (
     ((("m", 1),), {"level": "level"}),
-    (FORCES, {"N": "N", "T": "T", "U": "U"}),
+    (FORCES, {"N": "N'", "T": "T", "U": "U"}),
     (MOMENTS, {"M": "M"}),
-    ((("m", 1),), {"x_resultant": "N at x"}),
+    ((("m", 1),), {"x_resultant": "N' at x"}),
     (STRESSES, {"sigma_n_eff_heel": "eff. heel", "sigma_n_eff_toe": "eff. toe"}),
     ((("m", 1),), {"crack_length": "crack"}),
     ((("-", 1),), {"SSF": "SSF", "OSF": "OSF"}),
@@ -203,18 +203,22 @@ def difference(one: float, other: float) -> float:
 def text_table(checks: list[Check]) -> str:
     """The table as text, in units by size, and below it why a row fails and what to know."""
     rows = [row for check in checks for row in check.shown]
+    less = np.array([row["answer"] == DIFFERENCE for row in rows])
     columns, heads = [], []
     for units, names in SHOWN:
         values = np.array([[row[name] for row in rows] for name in names], dtype=float)
-        size, factor = unit([values[np.isfinite(values)]], units)
+        finite = values[np.isfinite(values)]
+        size, factor = unit([finite], units)
+        # a difference beyond the digits that are shown
+        values[less & (np.abs(values) < 1e-5 * np.abs(finite).max(initial=0))] = 0
         heads += [f"{title}\n[{size}]" for title in names.values()]
-        show = [signed if row["answer"] == DIFFERENCE else number for row in rows]
+        show = [signed if is_less else number for is_less in less]
         columns += [[f(v * factor) for f, v in zip(show, line, strict=True)] for line in values]
     told = ([row[name] for row in rows] for name in ("position", "verdict"))
     names, answers = [label(checks, row) for row in rows], [row["answer"] for row in rows]
     table = tabulate(
         zip(names, answers, *columns, *told, strict=True),
-        ["case", "", *heads, "N in", ""],
+        ["case", "", *heads, "N' in", ""],
         disable_numparse=True,
         colalign=("left", "left", *("right" for _ in columns), "left", "left"),
     )

@@ -21,6 +21,7 @@ from tqdm import tqdm
 
 from .. import InputError
 from ..engines import Outcome
+from ..engines.condensed.solve import about
 from ..results import folder as folders
 from ..results import gravity
 from ..results.tables import CRITICAL, Results, write_csv
@@ -427,7 +428,8 @@ def write(search: Search, answer: Answer, out: Path, seconds: float) -> None:
     folders.say(case, out, "complete", answer.doubt)
     if answer.point:
         result = last_state(search, answer.point)
-        result.info = {"critical": told(search, answer), "wall_seconds": {"search": seconds}}
+        found = {"critical": told_of(search, answer), "wall_seconds": {"search": seconds}}
+        result.info = about(answer.point.filling.joint.bulk) | found
         save(Outcome(result, mesh=lambda: None, fields=dict), case, out)
     write_csv(out / "critical.csv", table(search))
     trials = [(t.value, t.stands, t.branch) for t in search.trials]
@@ -436,7 +438,7 @@ def write(search: Search, answer: Answer, out: Path, seconds: float) -> None:
     draw(shown, out / f"{case.name}_critical.png")
 
 
-def told(search: Search, answer: Answer) -> dict:
+def told_of(search: Search, answer: Answer) -> dict:
     """What run.json says of the answer."""
     return {
         "of": search.of,

@@ -70,5 +70,6 @@ def report(plan: Plan, rows: list[Row], out: Path) -> str:
             writer = csv.DictWriter(file, table[0], lineterminator="\n")
             writer.writeheader()
             writer.writerows(table)
-        said.append(f"{told}\n{tabulate(table, 'keys', floatfmt='.4g')}")
+        cells = [{n: "-" if v != v else v for n, v in row.items()} for row in table]  # nan
+        said.append(f"{told}\n{tabulate(cells, 'keys', floatfmt='.4g')}")
     return "\n\n".join(said)

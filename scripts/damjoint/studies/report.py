@@ -14,11 +14,12 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from matplotlib.figure import Figure
 
 from .. import InputError, __version__
-from ..results import gravity, pictures, stored
+from ..results import pictures, stored
 from ..results.drawing import figure_of
 from ..results.fields import Solution
+from ..results.summary import levels_table, table
 from ..results.tables import Results
-from ..results.units import FLUXES, FORCES, LENGTHS, MOMENTS, Units, unit
+from ..results.units import FORCES, MOMENTS
 from ..results.verdict import failed, statement, stiffness_ratio
 from ..scene.case import Case
 from ..scene.parameters import constants, declared, parse
@@ -26,22 +27,6 @@ from .check import Check, by_finite_elements, by_gravity, hand_calculation, pict
 
 #: Of the parts of a picture that are dots, not lines.
 DPI = 160
-
-#: Columns of the history at the requested levels: name, head, units.
-SHOWN: tuple[tuple[str, str, Units], ...] = (
-    ("level", "level", LENGTHS[:1]),
-    ("tail_level", "tailwater", LENGTHS[:1]),
-    ("N", "N'", FORCES),
-    ("T", "T", FORCES),
-    ("M", "M", MOMENTS),
-    ("U", "uplift U", FORCES),
-    ("x_resultant", "resultant from the heel", LENGTHS[:1]),
-    ("crack_length", "open or broken", LENGTHS[:1]),
-    ("slip_length", "slipped", LENGTHS[:1]),
-    ("max_opening", "largest opening", LENGTHS),
-    ("crest_ux", "crest movement", LENGTHS),
-    ("flux", "leakage", FLUXES),
-)
 
 
 def write(folders: list[Path], to: Path) -> None:
@@ -149,36 +134,6 @@ def said(value: float | str) -> str:
     return value if isinstance(value, str) else f"{value:.6g}"
 
 
-def table(columns: list[tuple[str, np.ndarray, Units]]) -> dict:
-    """Heads with units by size, and rows of text."""
-    heads, cells = [], []
-    for head, values, units in columns:
-        name, factor = unit([np.nan_to_num(values)], units)
-        heads.append(f"{head} [{name}]")
-        cells.append([f"{v * factor + 0.0:.4g}" if np.isfinite(v) else "-" for v in values])
-    return {"heads": heads, "rows": list(zip(*cells, strict=True))}
-
-
-def levels_table(result: Results) -> dict:
-    """The history at the requested levels and where the run has stopped; where the resultant is."""
-    history, case = result.history, result.case
-    rows = np.flatnonzero([np.isclose(case.requested, t).any() for t in history["time"]])
-    if len(history["time"]):
-        rows = np.union1d(rows, len(history["time"]) - 1)
-    shown = [
-        (head, history[name][rows], units)
-        for name, head, units in SHOWN
-        if (name != "flux" or case["uplift"] == "flow")
-        and (name != "tail_level" or history[name].any())
-    ]
-    found = table(shown)
-    length = case.joint_length
-    found["heads"].append("N' meets")
-    where = (gravity.position(x, length) for x in history["x_resultant"][rows])
-    found["rows"] = [(*row, at) for row, at in zip(found["rows"], where, strict=True)]
-    return found
-
-
 def loads_table(result: Results) -> dict:
     """The loads on the body above the joint, and the uplift, at the last level."""
     rows = hand_calculation(result).table()
@@ -235,12 +190,24 @@ def embedded(figure: Figure) -> str:
     return "data:image/svg+xml;base64," + base64.b64encode(file.getvalue()).decode()
 
 
+def critical_of(found: dict | None) -> list[tuple[str, str]]:
+    """What `damjoint critical` has found, if it is its folder."""
+    if not found or found["value"] is None:
+        return []
+    unit, by_hand = found["unit"], found["gravity_method"]
+    said = [f"{found['value']:.6g} {unit}".strip(), found["mode"]]
+    said += [f"not confirmed: {found['doubt']}"] if found["doubt"] else []
+    said += [f"gravity method {by_hand:.6g} {unit}".strip()] if by_hand is not None else []
+    return [(f"critical {found['of']}, and the last state before it", "; ".join(said))]
+
+
 def facts(result: Results) -> list[tuple[str, str]]:
     """Mesh, solver, versions, times."""
     case, told = result.case, result.info
     mesh, seconds = told["mesh"], told["wall_seconds"]
     versions = ", ".join(f"{name} {number}" for name, number in told["versions"].items())
     return [
+        *critical_of(told.get("critical")),
         (
             "mesh",
             f"{mesh['nodes']} nodes, {mesh['elements']} elements, {mesh['joint_elements']} in the "

@@ -13,7 +13,7 @@ from ...scene.case import Case
 from ...scene.mesh import mesh_of
 from .. import OnStep, Outcome
 from . import factor
-from .bulk import Bodies, joint_size
+from .bulk import Bodies, Condensed, joint_size
 from .cache import cached
 from .filling import Filling
 from .interface import Interface
@@ -27,6 +27,16 @@ def check(case: Case) -> None:
     """Raise InputError if a user's own geometry is not what is needed; any other case will do."""
     if case.geometry:
         mesh_of(case)
+
+
+def about(bulk: Condensed) -> dict:
+    """What run.json says of the engine and its mesh."""
+    return {
+        "engine": "condensed",
+        "factorisation": factor.name(),
+        "mesh": bulk.counts,
+        "unknowns": bulk.unknowns,
+    }
 
 
 def solve(case: Case, on_step: OnStep, _fields: bool) -> Iterator[Outcome]:
@@ -59,11 +69,6 @@ def solve(case: Case, on_step: OnStep, _fields: bool) -> Iterator[Outcome]:
                 if fillings[-1].record.complete(fillings[-1].state):
                     fillings[-1].keep_last()
             result = fillings[-1].results()
-            result.info = {
-                "engine": "condensed",
-                "factorisation": factor.name(),
-                "mesh": bulk.counts,
-                "unknowns": bulk.unknowns,
-                "wall_seconds": before | {"solve": time.perf_counter() - begin},
-            }
+            seconds = before | {"solve": time.perf_counter() - begin}
+            result.info = about(bulk) | {"wall_seconds": seconds}
             yield Outcome(result, lambda: bodies().mesh, partial(fields, number), error)
