@@ -144,4 +144,4 @@ def test_a_joint_stiff_for_its_mesh_is_said(command, tmp_path):
     code, out, _ = command("run", "c", *small, *stiff, "--levels", "3")
     assert code == 0 and "K_N h/E = 5e+03" in out
     told = json.loads((tmp_path / "out/c/run.json").read_text())
-    assert len(told["hints"]) == 1
+    assert told["hints"][0] in out and "oscillate" in told["hints"][0]
