@@ -107,13 +107,5 @@ def test_stress_is_seeded_resumed_and_has_a_page(command, monkeypatch):
     assert "2 random scenes" in page and stress.VERIFIED in page
 
 
-@pytest.mark.heavy
-def test_random_scenes(tmp_path):
-    """Those of the page have other numbers; minutes."""
-    rows = stress.stress(60, 60, tmp_path / "stress.csv")
-    assert len(rows) == 60
-    assert [row["found"] + " " + row["command"] for row in rows if row["class"] == "defect"] == []
-
-
 def test_verification_knows_no_engine():
     assert "engines" not in Path(verification.__file__).read_text()
