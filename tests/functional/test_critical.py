@@ -82,6 +82,16 @@ def test_drains():
 
 
 @pytest.mark.heavy
+def test_earthquake():
+    """It comes with the only level: too strong a one lets no first step be found, but halves of it.
+    T = mu N, whatever the crack."""
+    settings = DAM | {"law": "friction", "mu": 0.6, "adhesion": 0.0, "uplift": "none"}
+    _, answer = found("dam", "k_h", settings, levels="30", tail_levels="0")
+    assert answer.confirmed and answer.mode == "sliding"
+    assert answer.value == pytest.approx(answer.gravity, rel=1e-3)
+
+
+@pytest.mark.heavy
 def test_any_parameter_whatever_its_direction():
     """T = mu N at 45 m: no equilibrium with less."""
     _, answer = found("dam", "mu", DAM | PLAIN, tail_levels="3")

@@ -114,7 +114,9 @@ class Branch:
         self.case, self.on_step = case, on_step
         self.points: list[Point] = []
         filling = Filling(case, interface, lambda _: self.add(Point(kept(filling))))
-        filling.reach(case.times[0])
+        # from the weight alone on steps can be halved; else the first one holds it at any length
+        if not (case["weight_first"] and filling.rest()):
+            filling.reach(case.times[0])
         if not filling.stopped:
             fill(filling)
         ahead = [v for t, v in enumerate(case.levels, 1) if t >= filling.state.time]
@@ -197,7 +199,7 @@ class Branch:
         """How the dam fails; empty if it is not seen."""
         if self.crushed_at_top:
             return "crushed toe"
-        if self.knee + 1 >= len(self.points):
+        if not self.points or self.knee + 1 >= len(self.points):
             return ""
         knee, last = self.points[self.knee].filling, self.points[-1].filling
         interface = last.joint.interface
@@ -323,7 +325,7 @@ def kept(filling: Filling) -> Filling:
 def fill(filling: Filling) -> None:
     """Go on through the times of a filling's case until some steps have failed."""
     failures, length = 0, np.inf
-    for target in filling.case.times[1:]:
+    for target in filling.case.times:
         while filling.state.time < target:
             ahead = min(length, target - filling.state.time)
             if not solved(filling, filling.state.time + ahead, 1):
