@@ -202,6 +202,7 @@ def test_window_shows_a_complete_run(window, plain):
 def test_window_shows_where_a_run_stops(window, plain):
     """A dam that slides without hardening: red, with the level."""
     words = "-setstring law friction -setstring uplift none -setnumber pena_tang 0"
+    words += " -setnumber n_joint 10"  # where it slides does not depend on the mesh
     picture = window(*words.split())("stopped")
     assert pixels(picture, RED) > 500 and not pixels(picture, GREEN) > 500
     assert "stopped_at = 7.4" in (plain / "res/a/stopped.geo").read_text()
