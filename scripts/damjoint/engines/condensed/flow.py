@@ -94,9 +94,15 @@ class Flow:
         self.lift = (water.T @ scaled(along.at_water[:, self.inside], water_points.weights)).tocsr()
         self.opening = at_points[:: along.dim]
         self.inner_slopes = [g[:, self.inside] for g in along.slopes]
+        slopes = [g @ along.way for g in along.slopes]
+        size = np.sqrt(sum(t**2 for t in slopes))
+        #: unit vectors towards the toe at the law's points
+        self.towards = [t / size for t in slopes]
         if along.dim == 2:
-            #: the elements from heel to toe
+            #: the elements and the nodes from heel to toe, and where each inner node stands there
             self.order = np.argsort(along.way[along.bulk.joint.cells[0][1]].mean(axis=1))
+            self.chain = np.argsort(along.way)
+            self.stands = np.argsort(self.chain)[self.inside]
             self.lengths = np.bincount(points.elements, points.weights)
         else:
             # the flow matrix is linear in the conductivities: where each point's products of slopes
@@ -130,6 +136,15 @@ class Flow:
         solve = self._in_series if self.dim == 2 else self._in_the_plane
         return solve(conductivity, imposed, drains, drained)
 
+    def resistances(self, conductivity: np.ndarray) -> np.ndarray:
+        """2D: of the elements from heel to toe, for conductivities times weights (q,)."""
+        whole = np.bincount(self.points.elements, conductivity)
+        return (self.lengths**2 / whole)[self.order]
+
+    def known(self, drains: np.ndarray) -> np.ndarray:
+        """2D: where in the chain ends and drains stand."""
+        return np.flatnonzero(np.isin(self.chain, [*self.along.ends, *drains]))
+
     def _in_series(
         self, conductivity: np.ndarray, imposed: np.ndarray, drains: np.ndarray, drained: float
     ) -> tuple:
@@ -138,12 +153,9 @@ class Flow:
         No differences of nearly equal numbers, however far the conductivities lie apart (a
         factorised matrix loses the closed joint beside the open one).
         """
-        resistance = (self.lengths**2 / np.bincount(self.points.elements, conductivity))[self.order]
-        chain = np.argsort(self.along.way)  # the nodes from heel to toe
-        known = np.flatnonzero(np.isin(chain, [*self.along.ends, *drains]))
+        resistance, known, chain = self.resistances(conductivity), self.known(drains), self.chain
         heads = np.where(np.isin(chain[known], drains), drained, imposed[chain[known]])
-        size, along = len(chain), np.zeros(len(resistance))
-        total, green = np.empty(size), np.zeros((size, size))
+        total, along, parts = np.empty(len(chain)), np.empty(len(resistance)), []
         for i, k, first, last in zip(known[:-1], known[1:], heads[:-1], heads[1:], strict=True):
             here = resistance[i:k]
             left = np.concatenate([[0], np.cumsum(here)])
@@ -151,22 +163,21 @@ class Flow:
             whole = left[-1]
             total[i : k + 1] = first * right / whole + last * left / whole
             along[i:k] = (last - first) * here / whole
-            # the inverse of the flow matrix
-            green[i : k + 1, i : k + 1] += (
-                np.minimum.outer(left, left) * np.minimum.outer(right, right) / whole
-            )
-        back = np.empty(size, int)
-        back[chain] = np.arange(size)
-        back = back[self.inside]  # where each inner node stands in the chain
+            parts.append((i, k, left, right, whole))
         steepness = np.empty_like(along)
         steepness[self.order] = along
         steepness = (steepness / self.lengths)[self.points.elements]
-        # along the element, from heel to toe
-        towards = [g @ self.along.way for g in self.along.slopes]
-        length = np.sqrt(sum(t**2 for t in towards))
-        gradients = [steepness * t / length for t in towards]
-        beyond = total[back] - imposed[self.inside]
-        return beyond, (lambda coupling: green[np.ix_(back, back)] @ coupling, gradients)
+
+        def inverse(coupling: np.ndarray) -> np.ndarray:
+            """Of the flow matrix; only Newton's tangent asks for it."""
+            green = np.zeros((len(chain),) * 2)
+            for i, k, left, right, whole in parts:
+                products = np.minimum.outer(left, left) * np.minimum.outer(right, right)
+                green[i : k + 1, i : k + 1] += products / whole
+            return green[np.ix_(self.stands, self.stands)] @ coupling
+
+        gradients = [steepness * t for t in self.towards]
+        return total[self.stands] - imposed[self.inside], (inverse, gradients)
 
     def _in_the_plane(
         self, conductivity: np.ndarray, imposed: np.ndarray, drains: np.ndarray, drained: float
@@ -232,11 +243,9 @@ class Flow:
         """
         points = self.points
         if self.dim == 2:  # the same from end to drain to end: the drop over resistances in series
-            weighted = np.bincount(points.elements, points.weights * conductivity)
-            resistance = (self.lengths**2 / weighted)[self.order]
-            chain = np.argsort(self.along.way)
-            known = np.flatnonzero(np.isin(chain, [*self.along.ends, *drains]))
-            drop = -np.diff(total[chain[known]])
+            resistance = self.resistances(points.weights * conductivity)
+            known = self.known(drains)
+            drop = -np.diff(total[self.chain[known]])
             means = drop / np.add.reduceat(resistance, known[:-1])
             flux = np.empty(len(resistance))
             flux[self.order] = np.repeat(means, np.diff(known))
@@ -246,8 +255,6 @@ class Flow:
         # the flow's own test function at the toe
         out = sum((g @ total) * (g @ at_toe) for g in slopes)
         out = -float(points.weights @ (conductivity * out)) / width
-        towards = [g @ self.along.way for g in slopes]
-        size = np.sqrt(sum(t**2 for t in towards))
-        along = sum((g @ total) * t for g, t in zip(slopes, towards, strict=True)) / size
+        along = sum((g @ total) * t for g, t in zip(slopes, self.towards, strict=True))
         means = np.bincount(points.elements, -points.weights * conductivity * along)
         return means / np.bincount(points.elements, points.weights), out
