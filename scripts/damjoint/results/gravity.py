@@ -20,6 +20,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from ..scene.case import Case
+from ..scene.loads import Loading, line_forces
 from ..scene.parameters import constants
 from .tables import LOADS
 
@@ -159,11 +160,6 @@ class Body:
         return force(name, fx, fy, place) if place else force(name, 0.0, 0.0, (0.0, 0.0))
 
 
-def grown(case: Case, name: str, time: float) -> float:
-    """How much of a load is there at a time; name: of the time at which all of it is."""
-    return min(max(time - case[name] + 1, 0.0), 1.0)
-
-
 def fluid_on(segments: list[Segment], weight: float, surface: float) -> list[Load]:
     """A fluid of a weight [N/m3] up to a surface [m above the toe] on segments."""
     wet = [part for s in segments if (part := s.below(surface))]
@@ -204,19 +200,15 @@ def loads_on(case: Case, body: Body, time: float, level: float, tail: float) -> 
     weight = case["rho_dam"] * case["g"] * area
     up, down, top = (body.segments(side) for side in ("UP", "DOWN", "TOP"))
     on_crest = case["crest_water"] and case["face_load"] == "hydrostatic"
-    lean = math.radians(case["anchor_angle"])
-    pull = -case["anchor_force"] * math.sin(lean), -case["anchor_force"] * math.cos(lean)
-    silt, ice, other, anchor, quake = (
-        grown(case, f"{name}_t", time) for name in ("silt", "ice", "force", "anchor", "quake")
-    )
+    loading = Loading.at(case, time, level, tail)
+    lines = line_forces(case, loading)
+    quake = loading.part("quake")
     loads = (
         water_on("reservoir", up, case, body, level),
         water_on("tailwater", down, case, body, tail),
         water_on("water on the crest", top if on_crest else [], case, body, level),
-        silt_on(case, body).times(silt),
-        body.force_at("ICE", "ice", case["ice_force"], 0.0).times(ice),
-        body.force_at("FORCE", "force", case["force_x"], case["force_y"]).times(other),
-        body.force_at("ANCHOR", "anchor", *pull).times(anchor),
+        silt_on(case, body).times(loading.part("silt")),
+        *(body.force_at(name.upper(), name, *lines[name]) for name in lines),
         force("earthquake", case["k_h"] * weight, case["k_v"] * weight, centroid).times(quake),
         added_pressure(case, body, level).times(quake),
     )

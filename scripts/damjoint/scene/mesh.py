@@ -44,6 +44,8 @@ REGIONS = {
     "force": 2,
     "anchor": 2,
 }
+#: Where line forces act, if they do.
+LINES = ("ice", "force", "anchor")
 #: Those that every geometry has.
 NEEDED = ("dam", "foundation", "joint", "fixed", "heel", "toe", "crest")
 #: What stands before a face, in the order of the numbers in pro/section.pro.
@@ -72,9 +74,7 @@ OWN_NAMES = {
     "heel": "heel",
     "toe": "toe",
     "crest": "crest",
-    "ice": "ice",
-    "force": "force",
-    "anchor": "anchor",
+    **{name: name for name in LINES},
 }
 OWN_FACES = {
     "upstream": (True, "up"),
@@ -197,8 +197,7 @@ class Mesh:
         self.dim, self.own = int(case["dim"]), case.geometry
         generate(case)
         self._read()
-        regions = self._own_regions() if self.own else self._section_regions(case)
-        bodies, faces = regions
+        bodies, faces = self._own_regions() if self.own else self._section_regions(case)
         groups = {name: [(name, tag)] for name, tag in bodies.items() if name != "lower"}
         if "lower" in bodies:
             groups["foundation"].append(("lower", bodies["lower"]))
@@ -246,11 +245,9 @@ class Mesh:
                 if name not in OWN_NAMES | OWN_FACES:
                     allowed = ", ".join([*OWN_NAMES, *OWN_FACES])
                     raise self._bad(f'region "{name}" is not known; allowed: {allowed}')
-                here = d, gmsh.model.getEntitiesForPhysicalGroup(d, tag)
-                named[name] = here
-        missing = [name for name, region in OWN_NAMES.items() if region in NEEDED]
-        missing = [name for name in missing if name not in named]
-        if missing:
+                named[name] = d, gmsh.model.getEntitiesForPhysicalGroup(d, tag)
+        needed = [name for name, region in OWN_NAMES.items() if region in NEEDED]
+        if missing := [name for name in needed if name not in named]:
             raise self._bad(f"no region {', '.join(missing)}; the names of physical groups count")
         gmsh.model.removePhysicalGroups()
         bodies, faces = {}, []
@@ -341,6 +338,11 @@ class Mesh:
             surface.normals, turned = found
             if self.own and turned.any():  # for GetDP, which goes by the elements
                 gmsh.model.mesh.reverseElements(surface.element_tags[turned])
+
+    def bearer(self, line: str) -> str:
+        """The body that bears the force on one of LINES: the dam where it is a line of both."""
+        dam = self.bodies["dam"].node_tags
+        return "dam" if np.isin(self.bodies[line].node_tags, dam).all() else "foundation"
 
     @property
     def joint_ends(self) -> dict[str, list[float]]:

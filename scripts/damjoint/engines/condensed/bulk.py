@@ -27,9 +27,9 @@ from scipy import linalg, sparse
 
 from ...scene.case import Case
 from ...scene.loads import wet
-from ...scene.mesh import SIDES, Body, Face, Mesh, mesh_of
+from ...scene.mesh import LINES, SIDES, Body, Face, Mesh, mesh_of
 from .elasticity import Material, body_force, elasticity
-from .elements import Space, points_of
+from .elements import WATER, Space, points_of
 from .factor import check_memory, dense_memory, schur_complement
 
 #: What the condensed bodies depend on besides the mesh.
@@ -83,8 +83,6 @@ WEIGHTS = {
     "dam": (("dam", 0), ("dam", 1)),
     "foundation": (("lower", 0), ("lower", 1), ("foundation", 1)),
 }
-#: Line forces: where one acts, if it does.
-LINES = ("ice", "force", "anchor")
 
 
 def material_of(case: Case) -> Material:
@@ -135,7 +133,7 @@ class Bodies:
                 sides = spaces[name].find(part(within(mesh.bodies["sides"], mesh.bodies[name])))
                 held[name].append(unknowns(sides, dim, [2]))
         material = material_of(case)
-        lines = {name: mesh.bodies[name] for name in LINES if name in mesh.bodies}
+        lines = [name for name in LINES if name in mesh.bodies]
         return Bodies(
             mesh,
             dim,
@@ -148,7 +146,7 @@ class Bodies:
                 for name, face in mesh.faces.items()
                 if wet(case, face)
             },
-            {n: spaces[bearer(mesh, line)].find(part(line)) for n, line in lines.items()},
+            {n: spaces[mesh.bearer(n)].find(part(mesh.bodies[n])) for n in lines},
             time.perf_counter() - start,
         )
 
@@ -159,11 +157,6 @@ BODIES = ("dam", "foundation")
 def body_of(face: Face) -> str:
     """The body a face belongs to."""
     return "dam" if face.upper else "foundation"
-
-
-def bearer(mesh: Mesh, line: Body) -> str:
-    """The body that a line of the mesh belongs to; the dam where it is one of both."""
-    return "dam" if np.isin(line.node_tags, mesh.bodies["dam"].node_tags).all() else "foundation"
 
 
 def within(surface: Body, body: Body) -> Body:
@@ -198,7 +191,7 @@ class Condensed:
     heel: np.ndarray
     toe: np.ndarray
     heel_line: Body
-    #: the wet faces; of each whether it is the upper body's, its number in SIDES, low and high
+    #: the wet faces; of each its number in SIDES, low and high
     faces: dict[str, Body]
     kinds: dict[str, np.ndarray]
     #: jump unknowns, dim * joint function + component, that are not held
@@ -272,18 +265,13 @@ def unit_loads(bodies: Bodies, name: str) -> dict[str, np.ndarray]:
         if region in space.body.regions:
             found[f"{region}_{'xyz'[component]}"] = body_force(space, dim, component, region)
     for line, functions in bodies.lines.items():
-        body = bodies.mesh.bodies[line]
-        if bearer(bodies.mesh, body) == name:
-            points = points_of(Space(body, space.order), LINE)
+        if bodies.mesh.bearer(line) == name:
+            points = points_of(Space(bodies.mesh.bodies[line], space.order), WATER)
             for component in (0, 1):
                 column = np.zeros(dim * len(space.place))
                 column[dim * functions + component] = points.values.T @ points.weights
                 found[f"{line}_{'xyz'[component]}"] = column
     return found
-
-
-#: Points on a line where a force acts; a point in the plane.
-LINE = {"vertex": 1, "line": 4}
 
 
 def condense(case: Case, bodies: Bodies) -> Condensed:
@@ -363,10 +351,7 @@ def condense(case: Case, bodies: Bodies) -> Condensed:
         np.flatnonzero(np.isin(joint_tags, mesh.bodies["toe"].node_tags)),
         mesh.bodies["heel"],
         {name: face.surface for name, face in faces.items()},
-        {
-            n: np.array([f.upper, SIDES.index(f.side), f.low, f.high], float)
-            for n, f in faces.items()
-        },
+        {n: np.array([SIDES.index(f.side), f.low, f.high]) for n, f in faces.items()},
         free,
         stiffness,
         units,

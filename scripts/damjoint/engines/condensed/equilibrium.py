@@ -14,7 +14,7 @@ from functools import lru_cache
 import numpy as np
 
 from ...scene.case import Case
-from ...scene.loads import Loading, quake_column, water_column
+from ...scene.loads import Loading, line_forces, quake_column, water_column
 from .faces import WetFace
 from .interface import Change, Interface
 from .laws import LAWS, Memory
@@ -91,20 +91,15 @@ class Joint:
     def units_of(self, loading: Loading) -> dict[str, float]:
         """The unit loads of the bulk that act: weights [N/m3] and line forces [N/m]."""
         case, quake = self.case, loading.part("quake")
-        g, tilt = case["g"], np.radians(case["anchor_angle"])
-        anchor = case["anchor_force"] * loading.part("anchor")
-        concrete = case["rho_dam"] * g
+        concrete = case["rho_dam"] * case["g"]
         found = {
             "dam_x": case["k_h"] * quake * concrete,
             "dam_y": (case["k_v"] * quake - 1) * concrete,
-            "foundation_y": 0.0 if case["in_situ"] else -case["rho_found"] * g,
-            "ice_x": case["ice_force"] * loading.part("ice"),
-            "force_x": case["force_x"] * loading.part("force"),
-            "force_y": case["force_y"] * loading.part("force"),
-            "anchor_x": -np.sin(tilt) * anchor,
-            "anchor_y": -np.cos(tilt) * anchor,
+            "foundation_y": 0.0 if case["in_situ"] else -case["rho_found"] * case["g"],
         }
         found |= {"lower_x": found["dam_x"], "lower_y": found["dam_y"]}
+        for name, force in line_forces(case, loading).items():
+            found |= {f"{name}_{axis}": part for axis, part in zip("xy", force, strict=True)}
         return {name: value for name, value in found.items() if value and name in self.bulk.units}
 
     def _pushed(self, loading: Loading) -> tuple[np.ndarray, np.ndarray]:

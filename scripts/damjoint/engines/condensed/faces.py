@@ -25,8 +25,8 @@ class WetFace:
     """A face with its quadrature; forces are (functions * dim,)."""
 
     def __init__(self, surface: Body, kind: np.ndarray, order: int, dim: int) -> None:
-        self.upper, self.side, self.dim = bool(kind[0]), SIDES[int(kind[1])], dim
-        self.low, self.high = kind[2:]
+        self.side, self.dim = SIDES[int(kind[0])], dim
+        self.low, self.high = kind[1:]
         self.surface, self.space = surface, elements.Space(surface, order)
         self.points = elements.points_of(self.space, elements.WATER)
         self.normals = surface.normals[self.points.elements][:, :dim]

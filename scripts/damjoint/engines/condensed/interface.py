@@ -187,7 +187,7 @@ class Interface:
     def _heel_row(self) -> np.ndarray:
         """The heel's opening, mean along it, from the unknowns."""
         heel = elements.Space(self.bulk.heel_line, self.bulk.order)
-        points = elements.points_of(heel, {"vertex": 1, "line": 4})
+        points = elements.points_of(heel, elements.WATER)
         functions = self.space.find(heel)
         normal = heel_normal(self.bulk.joint, heel.body)
         weights = np.zeros(len(self.space.place))

@@ -6,7 +6,7 @@ import numpy as np
 from scipy import sparse
 
 from ...results.fields import Field
-from .bulk import Bodies, material_of, unit_loads, unknowns
+from .bulk import Bodies, body_of, material_of, unit_loads, unknowns
 from .elasticity import stress
 from .equilibrium import Joint
 from .factor import solve_symmetric
@@ -53,8 +53,7 @@ def recover(bodies: Bodies, scenes: list[tuple[Joint, Record]]) -> list[dict[flo
         jumps[i, lips["dam"][joint.bulk.free]] = state.jump
         load = {"dam": -stiff_dam @ jumps[i], "foundation": np.zeros(sizes[1])}
         for name, face in joint.interface.faces.items():
-            body = "dam" if face.upper else "foundation"
-            places = unknowns(bodies.faces[name], dim)
+            body, places = body_of(bodies.mesh.faces[name]), unknowns(bodies.faces[name], dim)
             np.add.at(load[body], places, joint.face_forces(face, state.loading))
         for name, size in joint.units_of(state.loading).items():
             for body, columns in units.items():

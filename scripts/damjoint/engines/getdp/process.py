@@ -11,11 +11,9 @@ import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
-
 from ... import InputError, RunError, data
 from ...scene.case import Case
-from ...scene.mesh import SIDES, Mesh, area, heel_normal
+from ...scene.mesh import LINES, SIDES, Mesh, area, heel_normal
 from ...scene.parameters import assignments, constants, listing
 
 OLDEST = (3, 2)
@@ -50,15 +48,14 @@ def own_lists(mesh: Mesh) -> dict[str, list[float]]:
     heel = bodies["heel"]
     length = area(heel) if mesh.dim == 3 else 1.0
     normal, crest = heel_normal(bodies["joint"], heel), bodies["crest"].points[0]
-    lines = [n for n in ("ice", "force", "anchor") if n in bodies]
-    dam = bodies["dam"].node_tags
+    lines = [name for name in LINES if name in bodies]
     return {
         "own_side": [float(SIDES.index(face.side)) for face in faces],
         "own_body": [float(not face.upper) for face in faces],
         "own_low": [float(face.surface.points[:, 1].min()) for face in faces],
         "own_ends": [*(v[0] for v in ends.values()), mesh.width, length, *normal[:2], *crest],
         "own_mark_region": [constants()[name.upper()][0] for name in lines],
-        "own_mark_body": [float(not np.isin(bodies[name].node_tags, dam).all()) for name in lines],
+        "own_mark_body": [float(mesh.bearer(name) != "dam") for name in lines],
     }
 
 
