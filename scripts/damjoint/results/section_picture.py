@@ -13,6 +13,7 @@ from matplotlib.figure import FigureBase
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from ..scene.case import has_drains
 from ..scene.loads import Loading, line_forces
 from ..scene.parameters import constants
 from .drawing import CONCRETE, DARK, GREEN, GREY, ORANGE, RED, ROCK, SILT, WATER, panels
@@ -202,8 +203,7 @@ class Drawing:
     def drains(self) -> None:
         """The drains' line, from where it meets the joint down into the ground."""
         case = self.case
-        with_drains = case["uplift"] in ("cracked", "flow") and case["drains"]
-        if not (case["uplift"] == "drained" or with_drains):
+        if not has_drains(case):
             return
         x, y = self.on_joint(case["drain_x"])
         look = {"color": "#1565c0", "linestyle": "-.", "linewidth": 1.5}

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..scene.case import Case
+from ..scene.case import Case, has_drains
 from . import gravity
 from .tables import Results
 
@@ -217,10 +217,7 @@ def hints(results: Results) -> list[str]:
 def seen_in(results: Results, last: dict[str, float]) -> list[str]:
     """What the last state shows: drains in the crack, tension at the heel."""
     case, found, crack = results.case, [], last["crack_length"]
-    drained = case["uplift"] == "drained" or (
-        case["drains"] and case["uplift"] in ("cracked", "flow")
-    )
-    if drained and crack > case["drain_x"]:
+    if has_drains(case) and crack > case["drain_x"]:
         kept = "" if case["uplift"] == "cracked" else "; their effect is kept all the same"
         found.append(
             f"the crack ({crack:.3g} m) has passed the drains ({case['drain_x']:g} m){kept}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import operator
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
@@ -201,6 +202,16 @@ def relative_error(accuracy: str) -> float:
     return found
 
 
+def flows(values: Mapping | Case) -> bool:
+    """Whether the water in the joint is computed, from the opening."""
+    return values["uplift"] in ("cracked", "flow")
+
+
+def has_drains(values: Mapping | Case) -> bool:
+    """Whether drains draw on the water in the joint."""
+    return values["uplift"] == "drained" or bool(flows(values) and values["drains"])
+
+
 def has_plane_fields(case: Case) -> bool:
     """Whether nothing varies along z."""
     return case["dim"] == 2 or bool(case["hold_z"]) or max(case["nu_dam"], case["nu_found"]) == 0
@@ -373,10 +384,12 @@ def check_section(found: Mapping[str, list]) -> None:
     """Raise InputError if parameters do not make a section, or a force does not act on it."""
     values = {name: v[0] for name, v in found.items() if v}
     height, base = values["dam_height"], values["dam_base"]
-    for name in ("batter_height", "neck_height", "joint_height"):
-        within = values[name] <= height if name == "batter_height" else values[name] < height
-        if not within:
-            sign = "<=" if name == "batter_height" else "<"
+    for name, sign, holds in (
+        ("batter_height", "<=", operator.le),
+        ("neck_height", "<", operator.lt),
+        ("joint_height", "<", operator.lt),
+    ):
+        if not holds(values[name], height):
             raise InputError(f"{name} = {values[name]:g}: must be {sign} dam_height ({height:g} m)")
     if not values["batter"] < base:
         raise InputError(f"batter = {values['batter']:g}: must be < dam_base ({base:g} m)")
@@ -409,14 +422,13 @@ def check_drains(values: Mapping, length: float) -> None:
     """Raise InputError if the drains are not under the dam, or do not suit a driven scene; length:
     of the joint [m].
     """
-    drained = values["uplift"] == "drained"
-    if not drained and not (values["drains"] and values["uplift"] in ("cracked", "flow")):
+    if not has_drains(values):
         return
     if not values["drain_x"] < length:
         raise InputError(
             f"drain_x = {values['drain_x']:g}: must be < the joint's length ({length:g} m)"
         )
-    if drained and values["drive"] != "level" and values["drain_level"] > 0:
+    if not flows(values) and values["drive"] != "level" and values["drain_level"] > 0:
         raise InputError(
             f"drain_level = {values['drain_level']:g}: must be 0 with drive = {values['drive']} "
             "(the pressure has to be linear in the level)"
@@ -425,7 +437,7 @@ def check_drains(values: Mapping, length: float) -> None:
 
 def check_works(values: Mapping) -> None:
     """Raise InputError if a joint is to be grouted or sawn that does not know it."""
-    known = values["law"] == "rupture" and values["uplift"] in ("none", "imposed", "drained")
+    known = values["law"] == "rupture" and not flows(values)
     for name in ("grout_pressure", "saw_thickness"):
         if values[name] > 0 and not known:
             raise InputError(

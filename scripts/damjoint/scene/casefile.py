@@ -111,9 +111,9 @@ def take(found: CaseText, statement: list, path: Path, depth: int, where: str) -
         if kinds[2:] != ("text",):
             raise InputError(f'{where}: must be {tokens[0]} = "words"')
         words = tokens[2][1:-1]
-        found.texts[tokens[0]] = (
-            str((path.parent / words).absolute()) if (tokens[0] == "geometry") else words
-        )
+        if tokens[0] == "geometry":  # beside the file that names it
+            words = str((path.parent / words).absolute())
+        found.texts[tokens[0]] = words
     elif kinds[:1] == ("name",) and tokens[1:2] == ("=",) and tokens[0].startswith("default_"):
         name = tokens[0].removeprefix("default_")
         try:

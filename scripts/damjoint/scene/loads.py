@@ -54,17 +54,11 @@ def line_forces(case: Case, loading: Loading) -> dict[str, tuple[float, float]]:
 
 def wet(case: Case, face: Face) -> bool:
     """Whether water (or silt) may press on a face in a case."""
-    highest = max(case.tail_levels) if face.side in ("down", "bed") else case.reached
     if face.side == "up":
         return True
-    if face.side == "down":
-        return highest > face.surface.points[:, 1].min()
-    if face.side == "top" and not overtopped(case):
-        return False
-    return (
-        bool(face.side == "top" or case["floor_water"])
-        and highest > face.surface.points[:, 1].min()
-    )
+    highest = max(case.tail_levels) if face.side in ("down", "bed") else case.reached
+    loaded = {"down": True, "top": overtopped(case)}.get(face.side, bool(case["floor_water"]))
+    return loaded and highest > face.surface.points[:, 1].min()
 
 
 def overtopped(case: Case) -> bool:

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..engines.condensed.filling import Filling
 from ..engines.condensed.interface import Interface
-from ..scene.case import Case
+from ..scene.case import Case, flows
 
 #: Parameters of which N, T, M do not depend, with values that make a joint of the law `friction`
 #: elastic under any load.
@@ -46,7 +46,7 @@ def mechanism(case: Case, interface: Interface) -> tuple[str, str]:
     takes from its shear, T <= mu N + c L; and no stress above f holds the dam down by more than
     f L^2/2 about the toe.
     """
-    if case["uplift"] in ("flow", "cracked") or case["drive"] != "level":
+    if flows(case) or case["drive"] != "level":
         return "", ""
     history, length = resultants(case, interface), case.section["joint_length"][0]
     law, mu, cohesion = case["law"], case["mu"], case["adhesion"]

@@ -12,9 +12,6 @@ from ..scene.arithmetic import call_of
 LAWS = {name: law for name, law in vars(stats).items() if isinstance(law, stats.rv_continuous)}
 LAWS["normal"] = stats.norm
 
-#: Latin hypercube (McKay, Beckman, Conover 1979) and plain Monte Carlo.
-DESIGNS = "latin", "monte-carlo"
-
 #: Of the intervals of a probability.
 CONFIDENCE = 0.95
 
@@ -65,7 +62,8 @@ def correlation(text: str, names: list[str]) -> tuple[int, int, float]:
 def draw(
     number: int, laws: dict[str, str], design: str, seed: int, correlations: list[str]
 ) -> dict[str, np.ndarray]:
-    """`number` values of each name, whose distributions are texts; correlations: 'A,B=R' each.
+    """`number` values of each name, whose distributions are texts; correlations: 'A,B=R' each;
+    design: latin (hypercube: McKay, Beckman, Conover 1979) or monte-carlo, plain.
 
     Raises InputError.
     """

@@ -19,7 +19,7 @@ import numpy as np
 from scipy.spatial import Delaunay
 
 from ..results import gravity
-from ..scene.case import Case
+from ..scene.case import Case, flows
 
 #: Forces and moments agree to this part of the dam's weight (times its base): what a run may leave
 #: out of balance (`coarsest` of pro/parameters.pro), summed over the joint.
@@ -304,7 +304,7 @@ def blocks(run: Written) -> tuple[Block, Block]:
     time = min(start + case["smallest_step"], case.times[-1])
     hand = run.by_hand(time)
     moment = hand.resultant.moment
-    if case["uplift"] in ("cracked", "flow"):
+    if flows(case):
         least = water_resultants(run, run.joint[-1]) if run.joint else (0.0, 0.0)
         pressure = max(hand.uplift.p.max(), 0.0)
         most = pressure * run.length, pressure * run.length**2 / 2

@@ -13,7 +13,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from ...scene.case import Case
+from ...scene.case import Case, flows, has_drains
 from ...scene.loads import Loading, line_forces, quake_column, water_column
 from .faces import WetFace
 from .interface import Change, Interface
@@ -42,8 +42,10 @@ class Joint:
 
     def __init__(self, case: Case, interface: Interface) -> None:
         self.case, self.bulk, self.interface = case, interface.bulk, interface
-        self.wet, self.flowing = case["uplift"] != "none", case["uplift"] in ("flow", "cracked")
-        self.drains = interface.drains(case["drain_x"]) if self.flowing and case["drains"] else None
+        self.wet, self.flowing = case["uplift"] != "none", flows(case)
+        #: where drains take from the water that flows
+        drained = self.flowing and has_drains(case)
+        self.drains = interface.drains(case["drain_x"]) if drained else None
         self.unit_weight = case["rho_water"] * case["g"]
         self.law = LAWS[case["law"]](case)
         self.virgin = self.law.respond(np.zeros((1, 3)), self.law.start(1))[1][0]

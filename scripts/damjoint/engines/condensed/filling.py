@@ -55,7 +55,9 @@ class Filling:
         on from there.
         """
         other = copy(self)
-        other.case, other.reference, other.record = case, self.unbalanced(case), self.record.copy()
+        if case is not self.case:
+            other.case, other.reference = case, self.unbalanced(case)
+        other.record = self.record.copy()
         return other
 
     def attempts(self) -> list[Attempt]:

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from ... import InputError
-from ...scene.case import Case
+from ...scene.case import Case, flows, has_drains
 from ...scene.mesh import Mesh, mesh_of
 from .. import OnStep, Outcome
 from . import process, tables
@@ -31,7 +31,7 @@ def check(case: Case) -> None:
             f"mesh_pattern = {case['mesh_pattern']}: must be one of {', '.join(SOLID)} "
             "with engine = getdp in 3D"
         )
-    if case["drains"] and case["uplift"] in ("cracked", "flow"):
+    if flows(case) and has_drains(case):
         raise InputError(f"drains = 1: must be 0 with engine = getdp and uplift = {case['uplift']}")
     if case.geometry:
         check_own(mesh_of(case), case)
