@@ -327,14 +327,15 @@ class Mesh:
                 raise self._bad(
                     "joint: its elements must be sides of the dam's (a conforming mesh)"
                 )
+        kinds = {kind: name for name, kind in OWN_FACES.items()}
         surfaces = [("joint", joint, foundation)]
-        for name, face in self.faces.items():
-            surfaces.append((name, face.surface, dam if face.upper else foundation))
+        for face in self.faces.values():
+            body = dam if face.upper else foundation
+            surfaces.append((kinds[face.upper, face.side], face.surface, body))
         for name, surface, body in surfaces:
             found = outward(surface, body)
             if found is None:
-                what = name if name == "joint" else f"a {self.faces[name].side}stream face"
-                raise self._bad(f"{what}: its elements must be sides of its body's (conforming)")
+                raise self._bad(f"{name}: its elements must be sides of its body's (conforming)")
             surface.normals, turned = found
             if self.own and turned.any():  # for GetDP, which goes by the elements
                 gmsh.model.mesh.reverseElements(surface.element_tags[turned])
