@@ -36,7 +36,9 @@ For i In {0 : #seg_side() - 1}
     share = (stop == 0) ? 0 : 1;
     For k In {0 : #mark_x() - 1}
       mark_share = ((mark_x(k) - seg_x0(i)) * dx + (mark_y(k) - seg_y0(i)) * dy) / (dx^2 + dy^2);
-      If(stop > 0 && mark_segment(k) == i && mark_share > before + 1e-9 && mark_share < share)
+      // one that rounding has put beside a corner is at the corner
+      If(stop > 0 && mark_segment(k) == i &&
+          mark_share > before + 1e-9 && mark_share < share - 1e-9)
         share = mark_share;
       EndIf
     EndFor

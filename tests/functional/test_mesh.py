@@ -53,3 +53,9 @@ def test_area_of_dam_and_foundation(tmp_path, settings):
             for tags in gmsh.model.mesh.getElements(dim, entity)[1]
         )
         assert size == pytest.approx(area * (0.5 if dim == 3 else 1), rel=1e-9)
+
+
+def test_a_force_at_the_end_of_the_crest():
+    """Where rounding puts it 5e-16 m beside the corner: the corner is both."""
+    found = mesh.Mesh(load("dam", {"batter": 0.6, "dam_crest": 3.5, "force_x": 1e4, "n_joint": 5}))
+    assert (found.bodies["force"].node_tags == found.bodies["crest"].node_tags).all()

@@ -182,6 +182,9 @@ def generate(case: Case) -> None:
             if own:
                 raise InputError(f"geometry = {own}: {error}") from None
             raise RunError(f"mesh: {error}") from None
+    if own:  # tags from 1 on: tables by tag stay small, and so do the keys of GetDP's memory
+        gmsh.model.mesh.renumberNodes()
+        gmsh.model.mesh.renumberElements()
 
 
 class Mesh:
@@ -320,6 +323,11 @@ class Mesh:
                 x, y, z = self._coordinates[self._place[apart[0]]]
                 raise self._bad(
                     f"dam and foundation also meet beside the joint, at {x:g}, {y:g}, {z:g}"
+                )
+            heel, toe = (self.joint_ends[name][0] for name in ("heel_x", "toe_x"))
+            if toe < heel:
+                raise self._bad(
+                    f"toe at x = {toe:g}, heel at {heel:g}: x must point downstream (mirror it)"
                 )
             if np.isin(joint.node_tags, self.bodies["fixed"].node_tags).any():
                 raise self._bad("fixed: must not touch the joint")
