@@ -15,7 +15,7 @@ from pathlib import Path
 
 from tabulate import tabulate
 
-from .results.tables import CHECK, CRITICAL, FLUX, HISTORY, JOINT, LOADS
+from .results.tables import CHECK, CRITICAL, FLUX, HARDENING, HISTORY, JOINT, LOADS
 from .scene.parameters import declared
 
 REFERENCE = Path("reference")
@@ -69,7 +69,7 @@ def results_page() -> str:
     """reference/results.md: the columns of the tables."""
     joint, history, check, loads, critical = (
         markdown([(f"`{n}`", u, m) for n, (u, m) in columns.items()], ("column", "unit", "meaning"))
-        for columns in (JOINT | FLUX, HISTORY, CHECK, LOADS, CRITICAL)
+        for columns in (JOINT | HARDENING | FLUX, HISTORY, CHECK, LOADS, CRITICAL)
     )
     parts = [
         "# Results",
@@ -78,7 +78,7 @@ def results_page() -> str:
         "## joint.csv",
         "A row per joint node and requested level, sorted by level, x and z; order 2 lists the "
         "middles of the edges, too. Every row obeys the joint law: nodes have a memory of their "
-        "own. `flux` where water flows.",
+        "own. `lambda` with law = friction, `flux` where water flows.",
         joint,
         "## history.csv",
         "A row per converged step. Forces are per metre of thickness, in 3D too.",
@@ -191,12 +191,13 @@ ASKED = """\
   table, are those of the [gravity method](theory.md#gravity-method)'s closed forms, to 1e-5 of the
   dam's weight (times its base).
 - *Water*: $U$ is the integral of `p`, and the closed form where there is one; heads lie between
-  the reservoir's and the tailwater's; in 2D the flux is the same at every node.
+  the reservoir's and the tailwater's; in 2D the flux is the same at every node, but for what drains
+  take.
 - *The law*: at every node of `joint.csv` a closed point is pressed by $K_N$ times its overlap, an
-  open one is not, there is no more tension than the damage leaves, and no more shear than friction
-  and cohesion hold (where friction hardens, its cumulated slip is not written, and its shear is not
-  checked). Damage, crack (rupture) and slipped length never fall.
-- *The command*: parameters, times, levels and exit code are those that were asked for.
+  open one is not, there is no more tension than the damage leaves, and no more shear than friction,
+  cohesion and what has hardened hold. Damage, cumulated slip (friction), crack (rupture) and
+  slipped length never fall.
+- *The command*: parameters, times, levels, tailwater and exit code are those that were asked for.
 - *A stop*: no equilibrium is certain beyond it (a rigid block without strength but friction, under
   the most uplift that a crack can bring, 5 % on the safe side), and the reason given is a limit
   that the block is within 10 % of.

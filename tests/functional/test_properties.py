@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 import pytest
 from damjoint import InputError, run
-from damjoint.results.tables import FLUX, HISTORY, JOINT
+from damjoint.results.tables import FLUX, HARDENING, HISTORY, JOINT
 from damjoint.scene.case import load
 from damjoint.scene.parameters import declared
 from hypothesis import Phase, given, settings
@@ -36,7 +36,7 @@ levels = st.floats(28, 44)
 
 #: Columns that are as large as the largest of them, and those that only count.
 GROUPS = [
-    ("delta_n", "delta_t1", "delta_t2", "slip"),
+    ("delta_n", "delta_t1", "delta_t2", "slip", "lambda"),
     ("sigma_n", "tau_1", "tau_2", "p", "sigma_n_eff"),
 ]
 COUNTS = "iterations", "cuts", "residual"
@@ -45,7 +45,7 @@ COUNTS = "iterations", "cuts", "residual"
 def differences(one, other):
     """Of each column of two tables, over the largest value of its group."""
     group = {name: group for group in GROUPS for name in group}
-    size = {n: max(np.abs(one[g]).max() for g in group.get(n, [n])) for n in one}
+    size = {n: max(np.abs(one[g]).max() for g in group.get(n, [n]) if g in one) for n in one}
     return {n: np.abs(one[n] - other[n]).max() / max(size[n], 1e-300) for n in one}
 
 
@@ -116,7 +116,7 @@ def in_units(case, units):
     told = lambda heights: ",".join(repr(height * factor("m")) for height in heights)
     case = load("dam", values, told(case.levels), told(case.tail_levels))
     lengths = {n: [case.shared[n][0] * factor("m")] for n in ("sudden", "crack_aperture")}
-    columns = (JOINT | FLUX | HISTORY).items()
+    columns = (JOINT | HARDENING | FLUX | HISTORY).items()
     scaled = {name: partial(np.multiply, factor(unit)) for name, (unit, _) in columns}
     return replace(case, shared=case.shared | lengths), scaled
 

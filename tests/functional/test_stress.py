@@ -5,6 +5,7 @@ import json
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 from damjoint import pages, run
 from damjoint.results.tables import write_csv
@@ -14,30 +15,32 @@ from damjoint.studies.verification import Written, read_table, unjustified, viol
 
 SCENES = {
     "rupture": {"law": "rupture", "uplift": "flow", "sigma_max": 1e4, "G_f": 10.0},
-    "friction": {"law": "friction", "uplift": "cracked", "pena_tang": 0.0, "adhesion": 1e4},
+    "friction": {"law": "friction", "uplift": "cracked", "pena_tang": 5e9, "adhesion": 1e4},
     "bond": {"law": "bond", "uplift": "imposed"},
 }
+DRAINED = {"drains": 1.0, "drain_x": 6.8}
 
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
-    """written(law): a run of that law with cracks, as the command leaves it."""
+    """written(law, drained): a run of that law with cracks, as the command leaves it."""
     done = {}
 
-    def once(law):
-        if law not in done:
-            case = load("dam", SCENES[law] | {"n_joint": 20.0}, "30,44,35", "3")
+    def once(law, drained=False):
+        if (law, drained) not in done:
+            settings = SCENES[law] | {"n_joint": 20.0} | (DRAINED if drained else {})
+            case = load("dam", settings, "30,44,35", "3")
             folder = tmp_path_factory.mktemp(law)
             run.run(case, folder, fields=False, picture=False, progress=False)
-            done[law] = Written(case, folder, 0)
-        return done[law]
+            done[law, drained] = Written(case, folder, 0)
+        return done[law, drained]
 
     return once
 
 
-@pytest.mark.parametrize("law", SCENES)
-def test_what_a_run_has_written_stands_every_test(written, law):
-    assert violations(written(law)) == []
+@pytest.mark.parametrize("law, drained", [*((law, False) for law in SCENES), ("rupture", True)])
+def test_what_a_run_has_written_stands_every_test(written, law, drained):
+    assert violations(written(law, drained)) == []
 
 
 @pytest.mark.parametrize("law", SCENES)
@@ -56,14 +59,61 @@ def test_what_a_run_has_written_stands_every_test(written, law):
     ],
 )
 def test_what_is_wrong_is_found(written, tmp_path, law, table, column, change, said):
-    whole = written(law)
-    shutil.copytree(whole.folder, tmp_path, dirs_exist_ok=True)
-    path = tmp_path / f"{table}.csv"
+    found = violations(tampered(written(law), tmp_path, table, column, change))
+    assert any(said in line for line in found), found
+
+
+def tampered(whole, folder, table, column, change):
+    """A run's files with a column of a table changed."""
+    shutil.copytree(whole.folder, folder, dirs_exist_ok=True)
+    path = folder / f"{table}.csv"
     changed = read_table(path)
     changed[column] = change(changed[column])
     write_csv(path, changed)
-    found = violations(Written(whole.case, tmp_path, 0))
-    assert any(line.startswith(said) or said in line for line in found), found
+    return Written(whole.case, folder, 0)
+
+
+def falling(column):
+    """Nothing left in the last of three tables."""
+    return np.where(np.arange(len(column)) < len(column) * 2 // 3, column, 0)
+
+
+@pytest.mark.parametrize(
+    "law, table, column, change, said",
+    [
+        ("rupture", "joint", "damage", falling, "damage falls"),
+        ("bond", "joint", "damage", falling, "damage falls"),
+        ("bond", "joint", "damage", lambda v: v + 1, "damage is out of its range"),
+        ("friction", "joint", "lambda", falling, "lambda falls"),
+        ("friction", "joint", "lambda", lambda v: 0.999 * v, "shear: beyond the law"),
+        ("friction", "joint", "lambda", lambda v: 0.999 * v, "slip is more than lambda"),
+        ("friction", "joint", "lambda", np.negative, "lambda is out of its range"),
+        ("rupture", "joint", "p", lambda v: v + 1e6, "pressure above the reservoir's head"),
+        ("rupture", "joint", "p", lambda v: 0 * v + 1, "pressure below the tailwater's head"),
+        ("rupture", "joint", "flux", lambda v: v * np.linspace(1, 1.01, len(v)), "flux varies"),
+        ("bond", "joint", "sigma_n_eff", np.negative, "contact: off"),
+        ("bond", "history", "tail_level", lambda v: v + 1e-3, "not at the tailwater"),
+        ("bond", "history", "time", lambda v: v[::-1], "times do not increase"),
+    ],
+)
+def test_what_no_law_does_is_found(written, tmp_path, law, table, column, change, said):
+    found = violations(tampered(written(law), tmp_path, table, column, change))
+    assert any(said in line for line in found), found
+
+
+@pytest.mark.parametrize(
+    "change, said",
+    [
+        (lambda v, s: np.where(s == s.min(), 1.01 * v, v), "flux varies"),
+        (lambda v, s: np.where(s < 6.8, 0, v), "drains give"),
+    ],
+)
+def test_drains_take_a_part_of_the_flux(written, tmp_path, change, said):
+    """As much is taken in everywhere before them, and no less than leaks."""
+    whole = written("rupture", drained=True)
+    s = read_table(whole.folder / "joint.csv")["s"]
+    found = violations(tampered(whole, tmp_path, "joint", "flux", lambda v: change(v, s)))
+    assert found and all(said in line for line in found), found
 
 
 def test_a_wrong_exit_code_is_found(written):

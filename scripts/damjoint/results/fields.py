@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..scene.mesh import Body
-from .tables import FLUX, Results
+from .tables import FLUX, HARDENING, Results
 
 BODIES = ("dam", "foundation")
 
@@ -40,7 +40,7 @@ OF_JOINT = {
     "p": ("Pa", ("p",)),
     "damage": ("-", ("damage",)),
     "slip": ("m", ("slip",)),
-    "flux": (FLUX["flux"][0], ("flux",)),
+    **{name: (unit, (name,)) for name, (unit, _) in (HARDENING | FLUX).items()},
 }
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from .. import InputError, __version__
 from ..scene.case import Case
 from ..scene.parameters import declared
-from .tables import FLUX, HISTORY, JOINT, Results
+from .tables import HISTORY, Results, joint_columns
 from .verdict import hints, statement, verdict
 
 #: Names that a run writes, besides its pictures.
@@ -94,7 +94,6 @@ def write_info(results: Results, folder: Path, state: str = "", why: str = "") -
     state: interrupted or failed, and why; else it is stopped or complete.
     """
     case = results.case
-    flowing = case["uplift"] == "flow"
     write_json(
         folder,
         {
@@ -113,10 +112,7 @@ def write_info(results: Results, folder: Path, state: str = "", why: str = "") -
             "published": case.published,
             "hardening_asked": case.hardening_asked,
             **results.info,
-            "units": {
-                n: unit
-                for n, (unit, _) in {**JOINT, **HISTORY, **(FLUX if flowing else {})}.items()
-            },
+            "units": {n: unit for n, (unit, _) in (joint_columns(case) | HISTORY).items()},
         },
     )
 

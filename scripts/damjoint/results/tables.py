@@ -33,6 +33,8 @@ JOINT = {
     "s": ("m", "distance from the heel along the joint"),
     "sigma_n_eff": ("Pa", "effective normal stress, sigma_n + p"),
 }
+#: One more where friction hardens with it.
+HARDENING = {"lambda": ("m", "friction: cumulated plastic slip, which hardens")}
 #: One more where water flows.
 FLUX = {"flux": ("kg/(m s)", "mass flux towards the toe, mean of the elements around the node")}
 
@@ -105,7 +107,7 @@ class Results:
     case: Case
     #: a row per converged step, columns HISTORY
     history: dict[str, np.ndarray]
-    #: a row per joint node and requested level, columns JOINT, and FLUX where water flows
+    #: a row per joint node and requested level, columns `joint_columns`
     joint: dict[str, np.ndarray]
     #: the same rows with jumps and stresses extrapolated from element means, as published codes
     #: print them
@@ -145,18 +147,24 @@ def rows_at(table: dict[str, np.ndarray], time: float | None = None) -> dict[str
     return {name: column[rows] for name, column in table.items()}
 
 
-def joint_table(case: Case, blocks: list[np.ndarray]) -> dict[str, np.ndarray]:
-    """The joint's table from blocks of rows, one per requested time: time .. s, and flux where
-    water flows.
+def joint_columns(case: Case) -> dict[str, tuple[str, str]]:
+    """The columns of a case's joint.csv: unit and meaning."""
+    hardening, flux = case["law"] == "friction", case["uplift"] == "flow"
+    return JOINT | (HARDENING if hardening else {}) | (FLUX if flux else {})
 
-    Adds sigma_n_eff and sorts each block from heel to toe, then by z.
+
+def joint_table(case: Case, blocks: list[np.ndarray]) -> dict[str, np.ndarray]:
+    """The joint's table from blocks of rows, one per requested time: its columns in their order,
+    but for sigma_n_eff.
+
+    Adds that one and sorts each block from heel to toe, then by z.
     """
-    flowing = case["uplift"] == "flow"
-    given = [*list(JOINT)[:-1], *(FLUX if flowing else ())]
+    columns = joint_columns(case)
+    given = [name for name in columns if name != "sigma_n_eff"]
     rows = np.vstack(blocks) if blocks else np.zeros((0, len(given)))
     table = dict(zip(given, rows.T, strict=True))
     table["sigma_n_eff"] = table["sigma_n"] + table["p"]
-    table = {name: table[name] for name in [*JOINT, *(FLUX if flowing else ())]}
+    table = {name: table[name] for name in columns}
     times = list(dict.fromkeys(table["time"]))
     parts = [rows_at(table, time) for time in times]
     return {

@@ -17,7 +17,7 @@ import numpy as np
 from tqdm import tqdm
 
 from .. import InputError
-from ..scene.case import Case, load
+from ..scene.case import Case, has_drains, load
 from .sweep import read_done
 from .verification import Written, unjustified, violations
 
@@ -107,8 +107,17 @@ def random_scene(seed: int, number: int) -> Scene:
     if dice.happens(0.15):
         settings["drive"] = dice.one_of("heel", "crest")
         settings["drive_by"] = dice.size(1e-6, 1e-3) * height / 10
-    told = ",".join(f"{level:g}" for level in levels)
-    return Scene(settings, told, f"{tail:g}", int(dice.one_of(1, 1, 2, 4)))
+    steps, tails = int(dice.one_of(1, 1, 2, 4)), [tail]
+    # what was thought of later is drawn last: the scenes without it stay what they were
+    settings |= drains(dice, settings)
+    if not plain and "joint_height" in settings and dice.happens(0.5):
+        settings["joint_slope"] = dice.between(-5, 5)
+    if not plain and dice.happens(0.15):
+        settings["force_x"] = dice.size(5 * height**2, 150 * height**2)  # up to 3 % of the thrust
+    if tail and dice.happens(0.3):
+        tails = [dice.between(0, 0.3 * height) for _ in levels]
+    water = (",".join(f"{level:g}" for level in heights) for heights in (levels, tails))
+    return Scene(settings, *water, steps)
 
 
 def mesh(dice: Dice, height: float, solid: bool, plain: bool) -> dict[str, float | str]:
@@ -175,6 +184,21 @@ def joint(dice: Dice) -> dict[str, float | str]:
         found["G_f"] = dice.size(1.5, 100) * max(found["sigma_max"] ** 2 / 2 / found["K_N"], 1)
         found["G_t"] = dice.size(1.5, 100) * max(found["adhesion"] ** 2 / 2 / found["K_T"], 1)
         found |= {name: float(f"{found[name]:.4g}") for name in ("G_f", "G_t")}
+    return found
+
+
+def drains(dice: Dice, settings: dict[str, float | str]) -> dict[str, float | str]:
+    """Drains where the water flows, and where they stand, what they take away and down to which
+    level, wherever there are any.
+    """
+    found = {"drains": 1} if settings["uplift"] == "flow" and dice.happens(0.4) else {}
+    if not has_drains({"drains": 0} | settings | found) or dice.happens(0.5):
+        return found
+    base, height = settings["dam_base"], settings["dam_height"]
+    found["drain_x"] = dice.between(0.05 * base, 0.4 * base)
+    found["drain_effectiveness"] = dice.between(0, 1)
+    if "drive" not in settings:
+        found["drain_level"] = dice.between(0, 0.3 * height)
     return found
 
 

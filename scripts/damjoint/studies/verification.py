@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import csv
 import json
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -19,7 +18,7 @@ import numpy as np
 from scipy.spatial import Delaunay
 
 from ..results import gravity
-from ..scene.case import Case, flows
+from ..scene.case import Case, flows, has_drains
 
 #: Forces and moments agree to this part of the dam's weight (times its base): what a run may leave
 #: out of balance (`coarsest` of pro/parameters.pro), summed over the joint.
@@ -123,6 +122,9 @@ def bookkeeping(run: Written) -> Iterator[str]:
         asked = np.array([case.level_at(t) for t in history["time"]])
         if np.abs(history["level"] - asked).max(initial=0) > DIGITS * case["dam_height"]:
             yield "history.csv: not at the level asked for"
+    tails = np.array([case.tail_at(t) for t in history["time"]])
+    if np.abs(history["tail_level"] - tails).max(initial=0) > DIGITS * case["dam_height"]:
+        yield "history.csv: not at the tailwater asked for"
     if (history["level"] < -DIGITS * case["dam_height"]).any():
         yield f"level {history['level'].min():.4g} m is below 0"
 
@@ -205,8 +207,8 @@ def water(run: Written) -> Iterator[str]:
         heel, toe = (case.section[name][0] for name in ("heel_y", "toe_y"))
         ends = max(row["level"], heel), max(row["tail_level"], toe)
         highest, lowest = max(ends), min(ends)
-        if case["uplift"] == "drained" or case["drains"]:
-            lowest = -math.inf
+        if has_drains(case):  # down to their outlet: the tailwater, or the joint's own height
+            lowest = min(lowest, max(row["tail_level"], min(heel, toe)))
         head = rows["y"] + rows["p"] / unit
         room = DIGITS * case["dam_height"]
         lifted = rows["p"] > 0  # elsewhere the air's pressure is the least
@@ -215,9 +217,25 @@ def water(run: Written) -> Iterator[str]:
         if (head[lifted] < lowest - room).any():
             yield f"pressure below the tailwater's head at t = {time:g}"
         if "flux" in rows and case["dim"] == 2:
-            off = np.abs(rows["flux"] - row["flux"]).max()
-            if off > DIGITS * abs(row["flux"]):
-                yield f"flux varies along the joint by {off:.3g} kg/(m s) at t = {time:g}"
+            yield from flux(run, rows, row["flux"])
+
+
+def flux(run: Written, rows: dict[str, np.ndarray], leakage: float) -> Iterator[str]:
+    """Water that flows in a plane joint is as much everywhere as leaks at the toe, but for what
+    drains take at the node nearest to them.
+    """
+    case, s, flux, time = run.case, rows["s"], rows["flux"], rows["time"][0]
+    near, size = run.length / case["n_joint"], DIGITS * np.abs(flux).max()
+    before, after = np.zeros(len(s), bool), np.ones(len(s), bool)
+    if has_drains(case):
+        before, after = s < case["drain_x"] - near, s > case["drain_x"] + near
+    taken_in = flux[before].mean() if before.any() else leakage
+    for part, wanted in ((before, taken_in), (after, leakage)):
+        off = np.abs(flux[part] - wanted).max(initial=0)
+        if off > size:
+            yield f"flux varies along the joint by {off:.3g} kg/(m s) at t = {time:g}"
+    if taken_in < leakage - size:
+        yield f"drains give {leakage - taken_in:.3g} kg/(m s) at t = {time:g}"
 
 
 def contact(run: Written) -> Iterator[str]:
@@ -250,11 +268,7 @@ def admissible(run: Written) -> Iterator[str]:
 
 
 def limits(run: Written, rows: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """The largest tension and shear [Pa] at the nodes: of the law and its written memory.
-
-    Friction that hardens does so with the cumulated slip, which is not written: its shear has no
-    bound here.
-    """
+    """The largest tension and shear [Pa] at the nodes: of the law and its written memory."""
     case, normal = run.case, rows["sigma_n_eff"]
     left = 1 - rows["damage"]
     if case["law"] == "rupture":
@@ -263,9 +277,8 @@ def limits(run: Written, rows: dict[str, np.ndarray]) -> tuple[np.ndarray, np.nd
     pressed = -case["mu"] * np.minimum(normal, 0)
     if case["law"] == "bond":
         return case["sigma_max"] * left, case["adhesion"] * left + pressed
-    hardened = math.inf if case["pena_tang"] > 0 else 0.0
     cap = np.full_like(normal, case["adhesion"] / case["mu"])
-    return cap, case["adhesion"] - case["mu"] * normal + hardened
+    return cap, case["adhesion"] - case["mu"] * normal + case["pena_tang"] * rows["lambda"]
 
 
 def memory(run: Written) -> Iterator[str]:
@@ -275,10 +288,15 @@ def memory(run: Written) -> Iterator[str]:
     for name in lasting:
         if (np.diff(history[name]) < -DIGITS * run.length).any():
             yield f"{name} falls"
-    if case["law"] != "friction":
-        for before, after in zip(run.joint, run.joint[1:], strict=False):
-            if (after["damage"] < before["damage"] - DIGITS).any():
-                yield f"damage falls before t = {after['time'][0]:g}"
+    name = "lambda" if case["law"] == "friction" else "damage"
+    for rows in run.joint:
+        if (rows[name] < 0).any() or (rows["damage"] > 1).any():
+            yield f"{name} is out of its range at t = {rows['time'][0]:g}"
+        if case["law"] == "friction" and (rows["slip"] > rows[name] * (1 + DIGITS)).any():
+            yield f"slip is more than lambda at t = {rows['time'][0]:g}"
+    for before, after in zip(run.joint, run.joint[1:], strict=False):
+        if (after[name] < before[name] - DIGITS * before[name].max()).any():
+            yield f"{name} falls before t = {after['time'][0]:g}"
 
 
 # -- why a run has stopped
@@ -335,7 +353,7 @@ def reached(run: Written, block: Block) -> dict[str, bool]:
     case, length = run.case, run.length
     cohesion, tension = 0.0, case["sigma_max"]
     if case["law"] == "friction":
-        slip = run.joint[-1]["slip"].max() if run.joint else 0.0
+        slip = run.joint[-1]["lambda"].max() if run.joint else 0.0
         cohesion = case["adhesion"] + case["pena_tang"] * slip
         tension = case["adhesion"] / case["mu"]
     holds = case["mu"] * block.N + cohesion * length

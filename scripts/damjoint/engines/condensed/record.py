@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ...results.tables import HISTORY, Results, history_table, joint_table
+from ...results.tables import HISTORY, Results, history_table, joint_columns, joint_table
 from ...scene.case import Case
 from ...scene.loads import Loading
 from .equilibrium import Joint, Pressure
@@ -148,6 +148,8 @@ class Record:
             seen[:, 6:],
             interface.way[:, None] * interface.length,
         ]
+        if "lambda" in joint_columns(joint.case):
+            columns.append(interface.at_places(state.nodes.scalar)[:, None])
         if pressure.flux is not None:
             columns.append(self.node_means(pressure.flux[:, None], True))
         table = np.hstack(columns)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ...results.fields import Field
-from ...results.tables import Results, history_table, joint_table
+from ...results.tables import FLUX, HARDENING, Results, history_table, joint_columns, joint_table
 from ...scene.case import Case
 from ...scene.mesh import Mesh
 
@@ -95,12 +95,14 @@ def read_joint(
     nodes, rows = nodes_of(points)
     found = jump, table("traction")[1], table("state")[1]
     jump, traction, state = (node_means(rows, values, len(nodes)) for values in found)
-    flux = []
-    if case["uplift"] == "flow":
-        flux = [node_means(rows, table("flux", 1)[1], len(nodes))]
+    more = [
+        node_means(rows, table(name, 1)[1], len(nodes))
+        for name in joint_columns(case)
+        if name in HARDENING | FLUX
+    ]
     when = np.tile([time, level], (len(nodes), 1))
     distance = case.joint_along * node_means(rows, table("way", 1)[1], len(nodes))
-    whole = np.hstack([when, nodes, jump[:, order], traction[:, order], state, distance, *flux])
+    whole = np.hstack([when, nodes, jump[:, order], traction[:, order], state, distance, *more])
     extra = whole.copy()
     corners, mean_jump = table("mean_jump")
     _, corner_rows = nodes_of(np.vstack([nodes, corners]))
