@@ -173,6 +173,18 @@ def test_drains_in_what_the_crack_has_left(solve, effectiveness):
     assert result.last["crack_length"] == pytest.approx(hand.crack_length, abs=0.05)
 
 
+@pytest.mark.parametrize("uplift", ["cracked", "flow"])
+def test_drains_of_a_closed_lift_joint(solve, uplift):
+    """Their outlet, the base's heel, is below them: they draw no deeper than their own height, as
+    they do with uplift = drained; they stand on a node."""
+    lift = {"joint_height": 20, "joint_slope": -3, "n_joint": 20}
+    lift |= {"drains": 1, "drain_effectiveness": 0.8}
+    lift["drain_x"] = 0.2 * load("dam", lift).joint_length
+    flowing, drained = (solve("dam", "40", uplift=u, **lift)[0] for u in (uplift, "drained"))
+    assert flowing.at()["p"] == pytest.approx(drained.at()["p"], rel=1e-6, abs=1)
+    assert flowing.last["U"] == pytest.approx(drained.last["U"], rel=1e-6)
+
+
 @pytest.mark.parametrize("name", ["e", pytest.param("f", marks=pytest.mark.heavy)])
 def test_drains_where_water_flows(solve, name):
     """They take a part of the flow: what is left of it leaves at the toe, and the same in 2D and

@@ -209,9 +209,9 @@ class Joint:
         its share in it and what its sensitivity wants.
 
         Drains: of the head that the joint would have there, they take away their part above their
-        outlet or the tailwater; the pressure is that part of one with the outlet's head at the
-        drains, and the rest of one without them. A crack that has reached them takes their effect
-        (EM 1110-2-2200).
+        outlet, the tailwater or their own height; the pressure is that part of one with the
+        outlet's head at the drains, and the rest of one without them. A crack that has reached them
+        takes their effect (EM 1110-2-2200).
         """
         case, flow = self.case, self.interface.flow
         factor = self.aperture(jump, memory)[0]
@@ -221,14 +221,15 @@ class Joint:
         if self.drains is None:
             return free, [(1.0, solution)]
         nodes, points = self.drains
-        outlet = max(case["drain_level"], loading.tail)
+        own = self.bulk.joint.points[nodes, 1]
+        outlet = np.maximum(own, max(case["drain_level"], loading.tail))
         there = head[nodes] + self.beyond(free)[nodes] / self.unit_weight
         cracked = case["uplift"] == "cracked" and (factor[points] > 1).any()
         effect = case["drain_effectiveness"]
         if cracked or not (there > outlet).all() or effect == 0:
             return free, [(1.0, solution)]
         drawn, drained = flow.solve(
-            conductivity, self.unit_weight * head, nodes, (self.unit_weight * outlet)
+            conductivity, self.unit_weight * head, nodes, self.unit_weight * outlet
         )
         parts = [(1 - effect, solution), (effect, drained)]
         return (1 - effect) * free + effect * drawn, parts

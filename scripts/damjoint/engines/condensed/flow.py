@@ -125,7 +125,7 @@ class Flow:
         conductivity: np.ndarray,
         imposed: np.ndarray,
         drains: np.ndarray = NOWHERE,
-        drained: float = 0.0,
+        drained: np.ndarray | float = 0.0,
     ) -> tuple[np.ndarray, object]:
         """Pressure [Pa] beyond the one imposed at the inner nodes, for conductivities times weights
         (q,) and the imposed head times the water's weight at the nodes [Pa]; and what `sensitivity`
@@ -146,7 +146,11 @@ class Flow:
         return np.flatnonzero(np.isin(self.chain, [*self.along.ends, *drains]))
 
     def _in_series(
-        self, conductivity: np.ndarray, imposed: np.ndarray, drains: np.ndarray, drained: float
+        self,
+        conductivity: np.ndarray,
+        imposed: np.ndarray,
+        drains: np.ndarray,
+        drained: np.ndarray | float,
     ) -> tuple:
         """2D: the elements are resistances in series, between ends and drains of known heads.
 
@@ -180,7 +184,11 @@ class Flow:
         return total[self.stands] - imposed[self.inside], (inverse, gradients)
 
     def _in_the_plane(
-        self, conductivity: np.ndarray, imposed: np.ndarray, drains: np.ndarray, drained: float
+        self,
+        conductivity: np.ndarray,
+        imposed: np.ndarray,
+        drains: np.ndarray,
+        drained: np.ndarray | float,
     ) -> tuple:
         """3D: one symmetric positive definite system; not a number where the conductivities lie too
         far apart for it.
