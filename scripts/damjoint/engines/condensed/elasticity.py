@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
-from .elements import BULK, Space, basis, geometry, nodal, points_of, tabulated
+from .elements import BULK, Space, basis, corners_of, geometry, nodal, points_of, tabulated
 
 #: Young's modulus [Pa] and Poisson's ratio [-] by region.
 Material = dict[str, tuple[float, float]]
@@ -74,16 +74,6 @@ def body_force(space: Space, dim: int, component: int, region: str | None = None
     return load.ravel()
 
 
-#: The middle of each reference element.
-MIDDLE = {
-    "triangle": (1 / 3, 1 / 3),
-    "quad": (0, 0),
-    "tetra": (0.25,) * 3,
-    "wedge": (1 / 3, 1 / 3, 0),
-    "hexahedron": (0, 0, 0),
-}
-
-
 def stress(space: Space, displacements: np.ndarray, material: Material) -> np.ndarray:
     """Stress xx, yy, zz, xy, yz, xz (states, elements, 6) at the middle of each element.
 
@@ -93,7 +83,7 @@ def stress(space: Space, displacements: np.ndarray, material: Material) -> np.nd
     found = []
     for (shape, table), region in zip(space.connectivity, space.body.regions, strict=True):
         lam, mu = lame(*material[region])
-        middle = np.array(MIDDLE[shape], float)
+        middle = corners_of(shape).mean(axis=0)
         _, gradients = basis(shape, space.order, middle)
         dn = nodal(shape, middle)[1]
         _, inverse = geometry(space.body.points[:, :dim], table[:, : len(dn)], dn)

@@ -40,12 +40,7 @@ class Along:
         self.at_points = at.values
         self.slopes = [g for g in at.gradients[: bulk.dim] if np.abs(g.data).max() > 1e-12]
         self.at_water = elements.points_of(space, elements.WATER).values
-        edges = joint.edges
-        ends = sparse.csr_matrix(
-            (np.full(2 * len(edges), 0.5), (np.repeat(np.arange(len(edges)), 2), edges.ravel())),
-            (len(edges), number),
-        )
-        self.at_places = sparse.vstack([sparse.eye(number), ends], format="csr")
+        self.at_places = joint.at_places(1)
         laplace = sum(g.T @ scaled(g, at.weights) for g in self.slopes).tocsc()
         self.ends = np.concatenate([bulk.heel, bulk.toe])
         self.inside = np.setdiff1d(np.arange(number), self.ends)

@@ -99,7 +99,7 @@ class Interface:
         #: jump at the nodes, in the same way: `at_nodes` has a row for each of `rows`, an index of
         #: a place and its frame; where the joint bends a node is seen from each of its elements
         self.rows, seen = self._seen()
-        self.at_nodes = self._components(self._values_at_places()[self.rows], seen)
+        self.at_nodes = self._components(space.at_places(bulk.order)[self.rows], seen)
         self.water_points = elements.points_of(space, elements.WATER)
         across = self.frames[self.water_points.elements]
         #: opening at the water's points
@@ -116,17 +116,6 @@ class Interface:
         #: from heel to toe along the joint [m], a mean in 3D
         self.length = self.points.weights.sum() / bulk.width
         self._made_for, self._compliance = None, None
-
-    def _values_at_places(self) -> sparse.csr_matrix:
-        """Values at the nodes and at the middles of the edges, from the space's functions."""
-        nodes, space = len(self.bulk.joint.points), self.space
-        middles = sparse.eye(len(space.place), format="lil")
-        for i, (a, b) in enumerate(
-            space.edges
-        ):  # the middle of an edge: mean of its ends and a quarter of its function
-            middles[nodes + i, nodes + i] = 0.25
-            middles[nodes + i, a] = middles[nodes + i, b] = 0.5
-        return middles.tocsr()
 
     def _seen(self) -> tuple[np.ndarray, np.ndarray]:
         """Places and the frames in which their jumps are seen: one each on a plane joint."""
