@@ -35,7 +35,7 @@ def elasticity(space: Space, dim: int, material: Material) -> sparse.csr_matrix:
         products = np.einsum("q,qak,qbl->qabkl", weights, gradients, gradients).reshape(
             len(weights), n * n, dim * dim
         )
-        if shape in ("triangle", "tetra"):  # straight: one Jacobian serves all points
+        if affine(points, cells, nodal_gradients):  # one Jacobian serves all points
             products, nodal_gradients = products.sum(axis=0, keepdims=True), nodal_gradients[:1]
         block = np.zeros((n * n, len(table) * dim * dim))
         for product, dn in zip(products, nodal_gradients, strict=True):
@@ -60,6 +60,23 @@ def elasticity(space: Space, dim: int, material: Material) -> sparse.csr_matrix:
     return sparse.coo_matrix(
         (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), (size, size)
     ).tocsr()
+
+
+#: What Gmsh's meshes are straight to, relative to the largest element.
+DIGITS = 1e-9
+
+
+def affine(points: np.ndarray, cells: np.ndarray, nodal_gradients: np.ndarray) -> bool:
+    """Whether none of some elements is distorted: simplices, parallelograms, straight prisms.
+
+    nodal_gradients: (q, m, d) at several points.
+    """
+    change = nodal_gradients[1:] - nodal_gradients[:1]
+    if not change.any():
+        return True
+    here = points[cells] - points[cells[:, :1]]
+    distorted = np.abs(np.einsum("qmd,eml->qedl", change, here)).max()
+    return bool(distorted < DIGITS * np.abs(here).max())
 
 
 def body_force(space: Space, dim: int, component: int, region: str | None = None) -> np.ndarray:
