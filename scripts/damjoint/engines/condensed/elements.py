@@ -159,13 +159,20 @@ def rule(shape: str, points: int) -> tuple[np.ndarray, np.ndarray]:
     return np.array(x, float), np.array(w, float)
 
 
-#: Points of the rules, by order and shape. Quadrangles of the joint with order 2 take 2 x 2 points
-#: (published: 3 x 3), so that layers repeat the plane scene exactly.
+#: Points of the rules, by order and shape.
 BULK = {
     1: {"triangle": 1, "quad": 4, "tetra": 1, "wedge": 6, "hexahedron": 8},
     2: {"triangle": 3, "quad": 9, "tetra": 4, "wedge": 21, "hexahedron": 27},
 }
-JOINT = {1: {"line": 2, "triangle": 1, "quad": 4}, 2: {"line": 2, "triangle": 6, "quad": 4}}
+#: Of the joint, by quadrature, too. Published quadrangles of order 2 have 3 x 3 points; they take 2
+#: x 2 here, so that layers repeat the plane scene.
+JOINT = {
+    "full": {1: {"line": 2, "triangle": 3, "quad": 4}, 2: {"line": 3, "triangle": 6, "quad": 9}},
+    "published": {
+        1: {"line": 2, "triangle": 1, "quad": 4},
+        2: {"line": 2, "triangle": 6, "quad": 4},
+    },
+}
 WATER = {"vertex": 1, "line": 4, "triangle": 6, "quad": 16}
 
 

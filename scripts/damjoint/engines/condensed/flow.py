@@ -30,10 +30,10 @@ class Along:
     that a node lies between: harmonic, too, and nothing else where they are level.
     """
 
-    def __init__(self, bulk: Condensed, joint: elements.Space) -> None:
+    def __init__(self, bulk: Condensed, joint: elements.Space, rule: dict[str, int]) -> None:
         space = elements.Space(bulk.joint, 1)
         number = len(bulk.joint.points)
-        at = elements.points_of(space, elements.JOINT[bulk.order], gradients=True)
+        at = elements.points_of(space, rule, gradients=True)
         self.bulk, self.dim, self.nodes = bulk, bulk.dim, number
         #: fields at the law's points, their slopes there along x, y, z, and fields at the water's
         #: points and at all places, from their values at the nodes

@@ -87,10 +87,12 @@ class Chord:
 class Interface:
     """Interpolation matrices of the joint from the unknowns, the jumps of `bulk.free`."""
 
-    def __init__(self, bulk: Condensed) -> None:
+    def __init__(self, bulk: Condensed, quadrature: str) -> None:
         self.bulk, self.dim = bulk, bulk.dim
         space = self.space = elements.Space(bulk.joint, bulk.order)
-        self.points = elements.points_of(space, elements.JOINT[bulk.order])
+        #: how many points of the law each shape has
+        self.rule = elements.JOINT[quadrature][bulk.order]
+        self.points = elements.points_of(space, self.rule)
         self.frames = frames(bulk.joint.normals)
         #: jump at the law's points (dim rows each: normal, tangent 1, tangent 2)
         self.at_points = self._components(self.points.values, self.frames[self.points.elements])
@@ -201,7 +203,7 @@ class Interface:
     @cached_property
     def along(self) -> Along:
         """Scalar fields along the joint, and how far each place is on the way to the toe."""
-        return Along(self.bulk, self.space)
+        return Along(self.bulk, self.space, self.rule)
 
     @cached_property
     def way(self) -> np.ndarray:
