@@ -77,8 +77,8 @@ def results_page() -> str:
         "[theory.md](theory.md). Made by `make pages`.",
         "## joint.csv",
         "A row per joint node and requested level, sorted by level, x and z; order 2 lists the "
-        "middles of the edges, too. Every row obeys the joint law: nodes have a memory of their "
-        "own. `lambda` with law = friction, `flux` where water flows.",
+        "middles of the edges and of rectangles, too. Every row obeys the joint law: nodes have a "
+        "memory of their own. `lambda` with law = friction, `flux` where water flows.",
         joint,
         "## history.csv",
         "A row per converged step. Forces are per metre of thickness, in 3D too.",

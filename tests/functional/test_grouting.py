@@ -34,7 +34,7 @@ def test_published_openings_of_a_grouted_joint():
     space, face = block()
     stiffness = elasticity(space, 2, {"dam": (3e12, 0.25)})
     weight = -2400 * 9.81 * body_force(space, 2, 1)
-    points, functions = points_of(face, JOINT[2]), len(space.place)
+    points, functions = points_of(face, JOINT["published"][2]), len(space.place)
     # the joint opens by twice what the face moves
     pick = sparse.csr_matrix(
         (np.ones(len(face.place)), (range(len(face.place)), 2 * space.find(face))),

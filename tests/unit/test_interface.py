@@ -20,7 +20,7 @@ def interface(request):
         else {"dim": 2.0}
     )
     case = load("e", SMALL | solid)
-    return Interface(condense(case, Bodies.of(case)))
+    return Interface(condense(case, Bodies.of(case)), case["quadrature"])
 
 
 @pytest.mark.parametrize("flowing", [False, True])

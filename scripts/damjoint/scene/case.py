@@ -229,6 +229,7 @@ def first_mesh(case: Case) -> dict[str, float | str]:
         "order": 2.0,
         "mesh_pattern": "split" if solid else "free",
         "n_layers": 1.0,
+        "quadrature": "full",
         "n_joint": float(n),
         "h_dam": -1.0,
         "h_found": -1.0,

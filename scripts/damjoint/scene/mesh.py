@@ -377,6 +377,8 @@ class Mesh:
     def write(self, path: Path) -> None:
         """Write the mesh for GetDP (MSH 2.2, binary); only while it is Gmsh's current one."""
         gmsh.option.setNumber("Mesh.MshFileVersion", 2.2)
+        # else elements are numbered anew, shape by shape
+        gmsh.option.setNumber("Mesh.PreserveNumberingMsh2", 1)
         gmsh.option.setNumber("Mesh.Binary", 1)
         gmsh.write(str(path))
 

@@ -170,7 +170,7 @@ def measure(case: Case) -> tuple[Results, dict[str, float]]:
     """
     bulk = condense(case, Bodies.of(case))
     begin = time.perf_counter()
-    result = Filling(case, Interface(bulk)).run()
+    result = Filling(case, Interface(bulk, case["quadrature"])).run()
     done = time.perf_counter()
     with tempfile.TemporaryDirectory() as folder:
         tables.write(result, Path(folder))
@@ -531,7 +531,8 @@ def switches(short: bool) -> Table:
 
     table, dry = Table("option", "with", "without", "ratio"), {"uplift": "none"}
     with threadpool_limits(1), tempfile.TemporaryDirectory() as folder:
-        joint = Interface(condense(load("e"), Bodies.of(load("e"))))
+        e = load("e")
+        joint = Interface(condense(e, Bodies.of(e)), e["quadrature"])
         for option, with_it, without in bar(
             [
                 ("pressure unknowns (flow instead of none)", filling({}, "9"), filling(dry, "9")),
@@ -597,7 +598,8 @@ def sweeps(short: bool) -> Table:
         ]
         first, above = (load(name, main, levels) for levels in ends)
         with threadpool_limits(1):
-            joint, known, spent = Interface(condense(case, Bodies.of(case))), {}, []
+            bulk, known, spent = condense(case, Bodies.of(case)), {}, []
+            joint = Interface(bulk, case["quadrature"])
             runs = [partial(filled, one, known, joint) for one in (first, above)]
             runs += [Filling(load(name, main | s), joint).run for s in (weaker, stiffer)]
             for run_it in runs:

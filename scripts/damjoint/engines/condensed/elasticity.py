@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
-from .elements import BULK, Space, basis, geometry, nodal, points_of, tabulated
+from .elements import BULK, Space, basis, corners_of, geometry, nodal, points_of, tabulated
 
 #: Young's modulus [Pa] and Poisson's ratio [-] by region.
 Material = dict[str, tuple[float, float]]
@@ -35,7 +35,7 @@ def elasticity(space: Space, dim: int, material: Material) -> sparse.csr_matrix:
         products = np.einsum("q,qak,qbl->qabkl", weights, gradients, gradients).reshape(
             len(weights), n * n, dim * dim
         )
-        if shape in ("triangle", "tetra"):  # straight: one Jacobian serves all points
+        if affine(points, cells, nodal_gradients):  # one Jacobian serves all points
             products, nodal_gradients = products.sum(axis=0, keepdims=True), nodal_gradients[:1]
         block = np.zeros((n * n, len(table) * dim * dim))
         for product, dn in zip(products, nodal_gradients, strict=True):
@@ -62,6 +62,23 @@ def elasticity(space: Space, dim: int, material: Material) -> sparse.csr_matrix:
     ).tocsr()
 
 
+#: How straight Gmsh's meshes are, relative to the element.
+DIGITS = 1e-9
+
+
+def affine(points: np.ndarray, cells: np.ndarray, nodal_gradients: np.ndarray) -> bool:
+    """Whether none of some elements is distorted: simplices, parallelograms, straight prisms.
+
+    nodal_gradients: (q, m, d) at several points.
+    """
+    change = nodal_gradients[1:] - nodal_gradients[:1]
+    if not change.any():
+        return True
+    here = points[cells] - points[cells[:, :1]]
+    distortion = np.abs(np.einsum("qmd,eml->eqdl", change, here)).max(axis=(1, 2, 3))
+    return bool((distortion < DIGITS * np.abs(here).max(axis=(1, 2))).all())
+
+
 def body_force(space: Space, dim: int, component: int, region: str | None = None) -> np.ndarray:
     """Load vector of a unit force density along a component [m3 per function], in one of the body's
     regions only or everywhere.
@@ -74,16 +91,6 @@ def body_force(space: Space, dim: int, component: int, region: str | None = None
     return load.ravel()
 
 
-#: The middle of each reference element.
-MIDDLE = {
-    "triangle": (1 / 3, 1 / 3),
-    "quad": (0, 0),
-    "tetra": (0.25,) * 3,
-    "wedge": (1 / 3, 1 / 3, 0),
-    "hexahedron": (0, 0, 0),
-}
-
-
 def stress(space: Space, displacements: np.ndarray, material: Material) -> np.ndarray:
     """Stress xx, yy, zz, xy, yz, xz (states, elements, 6) at the middle of each element.
 
@@ -93,7 +100,7 @@ def stress(space: Space, displacements: np.ndarray, material: Material) -> np.nd
     found = []
     for (shape, table), region in zip(space.connectivity, space.body.regions, strict=True):
         lam, mu = lame(*material[region])
-        middle = np.array(MIDDLE[shape], float)
+        middle = corners_of(shape).mean(axis=0)
         _, gradients = basis(shape, space.order, middle)
         dn = nodal(shape, middle)[1]
         _, inverse = geometry(space.body.points[:, :dim], table[:, : len(dn)], dn)

@@ -1,7 +1,7 @@
 """Finite elements of the condensed engine: shape functions, quadrature, interpolation on a body.
 
-The same spaces as pro/spaces.pro: nodal functions N_a of order 1; order 2 adds N_a N_b for every
-edge ab, on the same straight mesh. The quadrature rules are those of pro/spaces.pro, so that both
+The same spaces as pro/spaces.pro: nodal functions N_a of order 1; order 2 adds the products
+N_a N_b, on the same straight mesh. The quadrature rules are those of pro/spaces.pro, so that both
 engines solve one discrete problem. Wedges and hexahedra are this engine's alone.
 """
 
@@ -9,45 +9,54 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from itertools import product
+from itertools import combinations, product
 
 import numpy as np
 from scipy import sparse
 
 from ...scene.mesh import Body
 
-#: Edges of the reference elements, by node numbers.
-EDGES = {
-    "vertex": [],
-    "line": [(0, 1)],
-    "triangle": [(0, 1), (0, 2), (1, 2)],
-    "quad": [(0, 1), (0, 3), (1, 2), (2, 3)],
-    "tetra": [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)],
-    "wedge": [(0, 1), (0, 2), (1, 2), (0, 3), (1, 4), (2, 5), (3, 4), (3, 5), (4, 5)],
-    "hexahedron": [
-        (0, 1),
-        (0, 3),
-        (0, 4),
-        (1, 2),
-        (1, 5),
-        (2, 3),
-        (2, 6),
-        (3, 7),
-        (4, 5),
-        (4, 7),
-        (5, 6),
-        (6, 7),
-    ],
+#: Corners of the reference elements, by node number.
+CORNERS = {
+    "vertex": [()],
+    "line": [(-1,), (1,)],
+    "triangle": [(0, 0), (1, 0), (0, 1)],
+    "quad": [(-1, -1), (1, -1), (1, 1), (-1, 1)],
+    "tetra": [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)],
 }
-
-#: Corners of the tensor elements: quad in (u, v), hexahedron in (u, v, w).
-CORNERS = {"line": [(-1,), (1,)], "quad": [(-1, -1), (1, -1), (1, 1), (-1, 1)]}
+CORNERS["wedge"] = [(*c, w) for w in (-1, 1) for c in CORNERS["triangle"]]
 CORNERS["hexahedron"] = [(*c, w) for w in (-1, 1) for c in CORNERS["quad"]]
 
 
-#: Reference corners of a face's shapes.
-REFERENCE = {shape: np.array(CORNERS[shape], float) for shape in ("line", "quad")}
-REFERENCE["triangle"] = np.array([(0, 0), (1, 0), (0, 1)], float)
+@cache
+def corners_of(shape: str) -> np.ndarray:
+    """Corners of a reference element (n, d)."""
+    return np.array(CORNERS[shape], float)
+
+
+@cache
+def pairs_of(shape: str) -> np.ndarray:
+    """The pairs of nodes whose products N_a N_b are the functions that order 2 adds to an element,
+    (n, k, 2): k pairs with the same product; fewer are repeated.
+
+    Pairs with the same middle have it: an edge's ends; both diagonals of a quadrangular face; the
+    four of a hexahedron. With these the functions span all products of quadratic ones of the
+    coordinates: on simplices the full quadratic space, on other elements one that contains it.
+    """
+    corners, found = corners_of(shape), {}
+    for a, b in combinations(range(len(corners)), 2):
+        found.setdefault(tuple(corners[a] + corners[b]), []).append((a, b))
+    most = max(map(len, found.values()), default=1)
+    repeated = [(pairs * most)[:most] for pairs in found.values()]
+    return np.array(repeated, int).reshape(-1, most, 2)
+
+
+@cache
+def places_of(shape: str, order: int) -> np.ndarray:
+    """Where the functions of an order are, (n, d): the nodes, then the middles of pairs."""
+    corners = corners_of(shape)
+    middles = corners[pairs_of(shape)[:, 0]].mean(axis=1)
+    return np.concatenate([corners, middles]) if order == 2 else corners
 
 
 def nodal(shape: str, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -61,7 +70,7 @@ def nodal(shape: str, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         values = np.concatenate([flat * low, flat * high])
         up = np.concatenate([-flat, flat]) / 2
         return values, np.column_stack([np.vstack([flat_gradient * low, flat_gradient * high]), up])
-    corners = np.array(CORNERS[shape], float)
+    corners = corners_of(shape)
     factors = (1 + corners * u) / 2
     gradient = np.empty_like(corners)
     for i in range(len(u)):
@@ -76,7 +85,7 @@ def basis(shape: str, order: int, u: np.ndarray) -> tuple[np.ndarray, np.ndarray
     n, dn = nodal(shape, np.asarray(u, float))
     if order == 1:
         return n, dn
-    a, b = np.array(EDGES[shape], int).reshape(-1, 2).T
+    a, b = pairs_of(shape)[:, 0].T
     return np.concatenate([n, n[a] * n[b]]), np.vstack(
         [dn, n[a, None] * dn[b] + n[b, None] * dn[a]]
     )
@@ -113,17 +122,6 @@ TRIANGLE = {
 }
 # Tetrahedron with 4 points (degree 2)
 _A4, _B4 = 0.1381966011250105, 0.5854101966249685
-# Quadrangle with 7 points (degree 5)
-_Q = [
-    (0, 0),
-    (-0.683130051064, -0.683130051064),
-    (0.683130051064, 0.683130051064),
-    (0.890654421782, -0.374256642286),
-    (-0.890654421782, 0.374256642286),
-    (0.374256642286, -0.890654421782),
-    (-0.374256642286, 0.890654421782),
-]
-_QW = [1.142857142857] + [0.595238095238] * 2 + [0.416666666666] * 4
 
 
 def tensor(n: int, d: int) -> tuple[np.ndarray, np.ndarray]:
@@ -143,9 +141,7 @@ def rule(shape: str, points: int) -> tuple[np.ndarray, np.ndarray]:
     if shape == "triangle":
         x, w = TRIANGLE[points]
     elif shape == "quad":
-        if points != 7:
-            return tensor(round(points**0.5), 2)
-        x, w = _Q, _QW
+        return tensor(round(points**0.5), 2)
     elif shape == "tetra":
         x, w = (
             ([(0.25,) * 3], [1 / 6])
@@ -163,13 +159,20 @@ def rule(shape: str, points: int) -> tuple[np.ndarray, np.ndarray]:
     return np.array(x, float), np.array(w, float)
 
 
-#: Points of the rules, by order and shape. Quadrangles of the joint with order 2 take 2 x 2 points
-#: (published: 3 x 3), so that layers repeat the plane scene exactly.
+#: Points of the rules, by order and shape.
 BULK = {
     1: {"triangle": 1, "quad": 4, "tetra": 1, "wedge": 6, "hexahedron": 8},
-    2: {"triangle": 3, "quad": 7, "tetra": 4, "wedge": 21, "hexahedron": 27},
+    2: {"triangle": 3, "quad": 9, "tetra": 4, "wedge": 21, "hexahedron": 27},
 }
-JOINT = {1: {"line": 2, "triangle": 1, "quad": 4}, 2: {"line": 2, "triangle": 6, "quad": 4}}
+#: Of the joint, by quadrature, too. Published quadrangles of order 2 have 3 x 3 points; they take 2
+#: x 2 here, so that layers repeat the plane scene.
+JOINT = {
+    "full": {1: {"line": 2, "triangle": 3, "quad": 4}, 2: {"line": 3, "triangle": 6, "quad": 9}},
+    "published": {
+        1: {"line": 2, "triangle": 1, "quad": 4},
+        2: {"line": 2, "triangle": 6, "quad": 4},
+    },
+}
 WATER = {"vertex": 1, "line": 4, "triangle": 6, "quad": 16}
 
 
@@ -186,35 +189,28 @@ def tabulated(
 
 
 class Space:
-    """The scalar functions of an order on a body: nodes first, then (order 2) edges.
+    """The scalar functions of an order on a body: nodes first, then (order 2) products of two.
 
-    place: (n, 3) the node, or the middle of the edge, of each function.
+    place: (n, 3) the node, or the middle of the edge, face or element, of each function.
     """
 
     def __init__(self, body: Body, order: int) -> None:
-        self.body, self.order = body, order
+        self.body, self.order, self.connectivity = body, order, body.cells
         self.place = body.points
-        self.edges = np.zeros((0, 2), int)
-        number = len(body.points)
-        self.connectivity = [(shape, cells) for shape, cells in body.cells]
+        #: what tells a product from others, on this body and on its parts, sorted
+        self.codes = np.zeros(0, np.int64)
         if order == 2:
-            pairs = [
-                np.sort(cells[:, np.array(EDGES[shape], int).reshape(-1, 2)], axis=2)
-                for shape, cells in body.cells
+            pairs = [cells[:, pairs_of(shape)] for shape, cells in body.cells]
+            codes = np.concatenate([codes_of(body.node_tags[p]).ravel() for p in pairs])
+            middles = [body.points[p].mean(axis=(2, 3)).reshape(-1, 3) for p in pairs]
+            self.codes, first, inverse = np.unique(codes, return_index=True, return_inverse=True)
+            self.place = np.vstack([body.points, np.concatenate(middles)[first]])
+            cuts = np.cumsum([m.size // 3 for m in middles])[:-1]
+            products = np.split(len(body.points) + inverse, cuts)
+            self.connectivity = [
+                (shape, np.hstack([cells, own.reshape(p.shape[:2])]))
+                for (shape, cells), p, own in zip(body.cells, pairs, products, strict=True)
             ]
-            codes = np.concatenate(
-                [(p[..., 0].astype(np.int64) * number + p[..., 1]).ravel() for p in pairs]
-            )
-            unique, inverse = np.unique(codes, return_inverse=True)
-            self.edges = np.column_stack([unique // number, unique % number])
-            self.place = np.vstack([body.points, body.points[self.edges].mean(axis=1)])
-            start, tables = 0, []
-            for (shape, cells), p in zip(body.cells, pairs, strict=True):
-                count = p.shape[0] * p.shape[1]
-                table = inverse[start : start + count].reshape(p.shape[:2]) + number
-                tables.append((shape, np.hstack([cells, table])))
-                start += count
-            self.connectivity = tables
 
     def find(self, part: Space) -> np.ndarray:
         """The functions of this space that are those of a part (a face, an edge of the body, the
@@ -222,18 +218,32 @@ class Space:
         """
         place = {t: i for i, t in enumerate(self.body.node_tags)}
         nodes = np.array([place[t] for t in part.body.node_tags], int)
-        if self.order == 1:
-            return nodes
-        number = len(self.body.points)
-        codes = self.edges[:, 0].astype(np.int64) * number + self.edges[:, 1]
-        pairs = np.sort(nodes[part.edges], axis=1)
-        return np.concatenate(
-            [
-                nodes,
-                number
-                + np.searchsorted(codes, pairs[:, 0].astype(np.int64) * number + pairs[:, 1]),
-            ]
-        )
+        products = np.searchsorted(self.codes, part.codes)
+        return np.concatenate([nodes, len(self.body.points) + products])
+
+    def at_places(self, order: int) -> sparse.csr_matrix:
+        """Values at the places, from the functions up to an order (places, functions)."""
+        rows, matrices = [], []
+        for shape, table in self.connectivity:
+            local = [basis(shape, order, u)[0] for u in places_of(shape, self.order)]
+            columns = np.repeat(table[:, : len(local[0])], len(local), axis=0)
+            pointers = columns.shape[1] * np.arange(len(columns) + 1)
+            data = np.tile(np.ravel(local), len(table))
+            size = len(columns), len(self.place) if order == 2 else len(self.body.points)
+            matrices.append(sparse.csr_matrix((data, columns.ravel(), pointers), size))
+            rows.append(table.ravel())
+        _, first = np.unique(np.concatenate(rows), return_index=True)
+        values = sparse.vstack(matrices, format="csr")[first]
+        values.eliminate_zeros()
+        return values
+
+
+def codes_of(pairs: np.ndarray) -> np.ndarray:
+    """A number for each product (..., n), from the tags of its pairs (..., n, k, 2): the same for
+    all elements that share an edge or a face.
+    """
+    ends = np.sort(pairs.astype(np.int64), axis=-1)
+    return (ends[..., 0] << 32 | ends[..., 1]).min(axis=-1)
 
 
 def geometry(

@@ -91,7 +91,7 @@ class WetFace:
     def add_wet_part(self, forces: np.ndarray, element: int, level: float, height: Height) -> None:
         """Add what presses on an element below the waterline, a straight line on a flat element."""
         shape, functions = self.elements[element]
-        corners = elements.REFERENCE[shape]
+        corners = elements.corners_of(shape)
         place = self.surface.points[functions[: len(corners)]]
         normal = self.surface.normals[element, : self.dim]
         of_functions = forces.reshape(-1, self.dim)

@@ -30,22 +30,17 @@ class Along:
     that a node lies between: harmonic, too, and nothing else where they are level.
     """
 
-    def __init__(self, bulk: Condensed, joint: elements.Space) -> None:
+    def __init__(self, bulk: Condensed, joint: elements.Space, rule: dict[str, int]) -> None:
         space = elements.Space(bulk.joint, 1)
         number = len(bulk.joint.points)
-        at = elements.points_of(space, elements.JOINT[bulk.order], gradients=True)
+        at = elements.points_of(space, rule, gradients=True)
         self.bulk, self.dim, self.nodes = bulk, bulk.dim, number
         #: fields at the law's points, their slopes there along x, y, z, and fields at the water's
         #: points and at all places, from their values at the nodes
         self.at_points = at.values
         self.slopes = [g for g in at.gradients[: bulk.dim] if np.abs(g.data).max() > 1e-12]
         self.at_water = elements.points_of(space, elements.WATER).values
-        edges = joint.edges
-        ends = sparse.csr_matrix(
-            (np.full(2 * len(edges), 0.5), (np.repeat(np.arange(len(edges)), 2), edges.ravel())),
-            (len(edges), number),
-        )
-        self.at_places = sparse.vstack([sparse.eye(number), ends], format="csr")
+        self.at_places = joint.at_places(1)
         laplace = sum(g.T @ scaled(g, at.weights) for g in self.slopes).tocsc()
         self.ends = np.concatenate([bulk.heel, bulk.toe])
         self.inside = np.setdiff1d(np.arange(number), self.ends)

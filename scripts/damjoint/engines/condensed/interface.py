@@ -87,10 +87,12 @@ class Chord:
 class Interface:
     """Interpolation matrices of the joint from the unknowns, the jumps of `bulk.free`."""
 
-    def __init__(self, bulk: Condensed) -> None:
+    def __init__(self, bulk: Condensed, quadrature: str) -> None:
         self.bulk, self.dim = bulk, bulk.dim
         space = self.space = elements.Space(bulk.joint, bulk.order)
-        self.points = elements.points_of(space, elements.JOINT[bulk.order])
+        #: how many points of the law each shape has
+        self.rule = elements.JOINT[quadrature][bulk.order]
+        self.points = elements.points_of(space, self.rule)
         self.frames = frames(bulk.joint.normals)
         #: jump at the law's points (dim rows each: normal, tangent 1, tangent 2)
         self.at_points = self._components(self.points.values, self.frames[self.points.elements])
@@ -99,7 +101,7 @@ class Interface:
         #: jump at the nodes, in the same way: `at_nodes` has a row for each of `rows`, an index of
         #: a place and its frame; where the joint bends a node is seen from each of its elements
         self.rows, seen = self._seen()
-        self.at_nodes = self._components(self._values_at_places()[self.rows], seen)
+        self.at_nodes = self._components(space.at_places(bulk.order)[self.rows], seen)
         self.water_points = elements.points_of(space, elements.WATER)
         across = self.frames[self.water_points.elements]
         #: opening at the water's points
@@ -116,17 +118,6 @@ class Interface:
         #: from heel to toe along the joint [m], a mean in 3D
         self.length = self.points.weights.sum() / bulk.width
         self._made_for, self._compliance = None, None
-
-    def _values_at_places(self) -> sparse.csr_matrix:
-        """Values at the nodes and at the middles of the edges, from the space's functions."""
-        nodes, space = len(self.bulk.joint.points), self.space
-        middles = sparse.eye(len(space.place), format="lil")
-        for i, (a, b) in enumerate(
-            space.edges
-        ):  # the middle of an edge: mean of its ends and a quarter of its function
-            middles[nodes + i, nodes + i] = 0.25
-            middles[nodes + i, a] = middles[nodes + i, b] = 0.5
-        return middles.tocsr()
 
     def _seen(self) -> tuple[np.ndarray, np.ndarray]:
         """Places and the frames in which their jumps are seen: one each on a plane joint."""
@@ -212,7 +203,7 @@ class Interface:
     @cached_property
     def along(self) -> Along:
         """Scalar fields along the joint, and how far each place is on the way to the toe."""
-        return Along(self.bulk, self.space)
+        return Along(self.bulk, self.space, self.rule)
 
     @cached_property
     def way(self) -> np.ndarray:

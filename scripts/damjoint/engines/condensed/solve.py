@@ -45,7 +45,7 @@ def solve(case: Case, on_step: OnStep, _fields: bool) -> Iterator[Outcome]:
         start = time.perf_counter()
         bulk, made = cached(case)
         before = bulk.seconds if made else {"cache": time.perf_counter() - start}
-        interface, fillings, recovered = Interface(bulk), [], []
+        interface, fillings, recovered = Interface(bulk, case["quadrature"]), [], []
 
         @lru_cache
         def bodies() -> Bodies:

@@ -49,11 +49,13 @@ def own_lists(mesh: Mesh) -> dict[str, list[float]]:
     length = area(heel) if mesh.dim == 3 else 1.0
     normal, crest = heel_normal(bodies["joint"], heel), bodies["crest"].points[0]
     lines = [name for name in LINES if name in bodies]
+    shapes = {shape for name in ("dam", "foundation") for shape, _ in bodies[name].cells}
     return {
         "own_side": [float(SIDES.index(face.side)) for face in faces],
         "own_body": [float(not face.upper) for face in faces],
         "own_low": [float(face.surface.points[:, 1].min()) for face in faces],
         "own_ends": [*(v[0] for v in ends.values()), mesh.width, length, *normal[:2], *crest],
+        "own_quadrangles": [float("quad" in shapes)],
         "own_mark_region": [constants()[name.upper()][0] for name in lines],
         "own_mark_body": [float(mesh.bearer(name) != "dam") for name in lines],
     }

@@ -1,0 +1,119 @@
+"""The functions of order 2: how many they are, that they fit together, that a quadratic field is
+theirs."""
+
+import numpy as np
+import pytest
+from damjoint.engines.condensed.elasticity import body_force, elasticity, stress
+from damjoint.engines.condensed.elements import CORNERS, Space, basis, corners_of
+from damjoint.scene.mesh import Body
+from scipy.sparse.linalg import spsolve
+
+#: Numbers of functions: simplices have the quadratic ones, the others products of such.
+FUNCTIONS = {"vertex": 1, "line": 3, "triangle": 6, "quad": 9, "tetra": 10, "wedge": 18}
+FUNCTIONS["hexahedron"] = 27
+YOUNG, POISSON = 3e10, 0.2
+#: What a unit cell of a grid is divided into, by its corners.
+CELLS = {
+    "quad": [[0, 1, 2, 3]],
+    "triangle": [[0, 1, 2], [0, 2, 3]],
+    "hexahedron": [[0, 1, 2, 3, 4, 5, 6, 7]],
+    "wedge": [[0, 1, 2, 4, 5, 6], [0, 2, 3, 4, 6, 7]],
+    "tetra": [[0, 1, 2, 6], [0, 2, 3, 6], [0, 3, 7, 6], [0, 7, 4, 6], [0, 4, 5, 6], [0, 5, 1, 6]],
+}
+#: The same element, its nodes counted from another corner.
+TURNED = {"quad": [1, 2, 3, 0], "hexahedron": [1, 2, 3, 0, 5, 6, 7, 4], "wedge": [1, 2, 0, 4, 5, 3]}
+
+
+def grid(shape, shake=0.2, size=2):
+    """A body of cells, distorted by as much, some of them numbered from another corner; tags in
+    disorder."""
+    rng = np.random.default_rng(142)
+    corners = corners_of("quad" if shape in ("quad", "triangle") else "hexahedron")
+    dim = corners.shape[1]
+    places = np.stack(np.meshgrid(*[np.arange(size + 1)] * dim, indexing="ij"), axis=-1)
+    places = places.reshape(-1, dim)
+    inside = ((places > 0) & (places < size)).all(axis=1)
+    cells = places[(places < size).all(axis=1)][:, None] + (corners + 1).astype(int) // 2
+    cells = np.ravel_multi_index(np.moveaxis(cells, 2, 0), (size + 1,) * dim)
+    table = np.concatenate([cells[:, part] for part in CELLS[shape]])
+    if shape in TURNED:
+        table[::2] = table[::2][:, TURNED[shape]]
+    points = np.zeros((len(places), 3))
+    points[:, :dim] = places + shake * rng.uniform(-1, 1, places.shape) * inside[:, None]
+    tags = 1 + rng.permutation(len(points))
+    return Body(points, tags, [(shape, table)], np.arange(len(table)), ["dam"]), dim
+
+
+def quadratic(dim):
+    """A full quadratic displacement (points) -> (n, dim) and its second derivatives (component,
+    dim, dim)."""
+    rng = np.random.default_rng(7)
+    second = rng.normal(size=(dim, dim, dim))
+    second += second.swapaxes(1, 2)
+    first, constant = rng.normal(size=(dim, dim)), rng.normal(size=dim)
+
+    def field(points):
+        x = points[:, :dim]
+        return constant + x @ first.T + np.einsum("cij,ni,nj->nc", second, x, x) / 2
+
+    return field, second
+
+
+@pytest.mark.parametrize("shape", CORNERS)
+def test_dimension_of_the_space(shape):
+    """The functions are independent; at the nodes only the nodal ones count."""
+    rng = np.random.default_rng(1)
+    dim = corners_of(shape).shape[1]
+    values = np.array([basis(shape, 2, u)[0] for u in rng.uniform(-1, 1, (60, dim))])
+    assert values.shape[1] == FUNCTIONS[shape] == np.linalg.matrix_rank(values, tol=1e-9)
+    at_nodes = np.array([basis(shape, 2, u)[0] for u in corners_of(shape)])
+    assert at_nodes == pytest.approx(np.eye(*at_nodes.shape), abs=1e-15)
+
+
+@pytest.mark.parametrize("shake", [0, 0.2])
+@pytest.mark.parametrize("shape", CELLS)
+def test_patch_test_of_order_2(shape, shake):
+    """A quadratic displacement given on the boundary, with the body force that it needs, is found
+    inside a mesh to round-off, also of distorted elements; so is its stress."""
+    body, dim = grid(shape, shake)
+    space = Space(body, 2)
+    field, second = quadratic(dim)
+    lam = YOUNG * POISSON / ((1 + POISSON) * (1 - 2 * POISSON))
+    mu = YOUNG / (2 * (1 + POISSON))
+    # -div sigma of a linear strain
+    density = -mu * np.einsum("cii->c", second) - (lam + mu) * np.einsum("iic->c", second)
+    load = sum(density[c] * body_force(space, dim, c) for c in range(dim))
+    stiffness = elasticity(space, dim, {"dam": (YOUNG, POISSON)})
+    wanted = spsolve(space.at_places(2).tocsc(), field(space.place))
+    size = body.points[:, :dim].max()
+    outside = np.isclose(space.place[:, :dim] * (size - space.place[:, :dim]), 0).any(axis=1)
+    free = np.flatnonzero(np.repeat(~outside, dim))
+    found = wanted.ravel().copy()
+    found[free] = 0
+    assert len(free) > dim
+    found[free] = spsolve(stiffness[free][:, free].tocsc(), (load - stiffness @ found)[free])
+    assert found == pytest.approx(wanted.ravel(), abs=1e-11 * np.abs(wanted).max())
+
+    middles = np.pad(body.middles()[:, :dim], ((0, 0), (0, 3 - dim)))
+    step = np.eye(3)[:dim] * 1e-3  # central differences of a quadratic field are exact
+    slope = np.stack([(field(middles + h) - field(middles - h)) / 2e-3 for h in step], axis=2)
+    shear = mu * (slope[:, 0, 1] + slope[:, 1, 0])
+    given = stress(space, found.reshape(1, -1, dim), {"dam": (YOUNG, POISSON)})[0, :, 3]
+    assert given == pytest.approx(shear, abs=1e-9 * np.abs(shear).max())
+
+
+@pytest.mark.parametrize("shape, corners", [("hexahedron", [0, 1, 5, 4]), ("wedge", [0, 1, 4, 3])])
+def test_a_face_finds_its_functions(shape, corners):
+    """Counted from any corner: they are where the body's are, and have the same values."""
+    body, _ = grid(shape)
+    cells = np.roll(body.cells[0][1][3:4, corners], 1, axis=1)
+    used = np.unique(cells)
+    quads = [("quad", np.searchsorted(used, cells))]
+    face = Body(body.points[used], body.node_tags[used], quads, used[:1])
+    whole, part = Space(body, 2), Space(face, 2)
+    found = whole.find(part)
+    assert len(np.unique(found)) == len(part.place) == 9
+    assert whole.place[found] == pytest.approx(part.place, abs=1e-12)
+    here = whole.at_places(2)[found].toarray()
+    assert here[:, found] == pytest.approx(part.at_places(2).toarray(), abs=1e-15)
+    assert np.abs(here).sum() == pytest.approx(np.abs(here[:, found]).sum())
