@@ -2,6 +2,8 @@
 # PYTHON=python3.12 make setup chooses the interpreter.
 
 BIN = .venv/bin
+# a file of tests in one process, as its tests share what they have computed
+PARALLEL = --numprocesses auto --dist loadfile
 
 .PHONY: setup run check test test-all bench pages clean
 
@@ -20,10 +22,10 @@ check: setup
 
 # The tests but for the minutes-long ones; all of them in CI
 test: check
-	$(BIN)/pytest -q $(if $(CI),,-m "not heavy")
+	$(BIN)/pytest -q $(PARALLEL) $(if $(CI),,-m "not heavy")
 
 test-all: check
-	$(BIN)/pytest -q
+	$(BIN)/pytest -q $(PARALLEL)
 
 # Twenty minutes; refreshes reference/benchmarks.md, its picture and the modelings' table in README.md
 bench: setup

@@ -50,8 +50,8 @@ SOFT = 1.0
 #: Change of a quantity over the change before it: at best that of order 2; above the largest one,
 #: where it hardly converges, the error is taken for three times the change.
 BEST, WORST = 0.25, 0.75
-#: Roache's factor of safety.
-SAFETY = 1.25
+#: Roache's factors of safety, for three meshes and for two.
+SAFETY, OF_TWO = 1.25, 3.0
 
 
 @dataclass(frozen=True)
@@ -232,12 +232,12 @@ def left(values: np.ndarray, counted: bool) -> np.ndarray:
 
     Richardson's extrapolation with a factor of safety and the order that three values show, held
     between BEST and WORST, and no less than what order 2 leaves of the change before: two values
-    may agree by accident. Two values are taken for order 1, which leaves the change; of those
+    may agree by accident. Two values leave the change at order 1, with a larger factor; of those
     counted in elements it is the last change itself.
     """
     changes = np.abs(np.diff(values, axis=0))
     if counted or len(changes) == 1:
-        return (1 if counted else SAFETY) * changes[-1]
+        return (1 if counted else OF_TWO) * changes[-1]
     before, last = changes
     ratio = np.divide(last, before, out=np.full_like(last, BEST), where=before > 0)
     ratio = np.clip(ratio, BEST, WORST)

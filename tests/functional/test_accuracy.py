@@ -32,9 +32,9 @@ def test_the_error_left_of_a_power(order):
     values = np.array([[3.0, -2.0]]) + np.array([[1.0, -0.2]]) * h**order
     for some in (values, values[1:]):
         true = np.abs(some[-1] - [3.0, -2.0])
-        change = np.abs(some[-1] - some[-2])
+        change = np.abs(some[-1] - some[-2]) * (1.25 if len(some) > 2 else 3)
         found = accuracy.left(some, counted=False)
-        assert np.all(found >= true * (1 - 1e-12)) and np.all(found <= 1.25 * change * (1 + 1e-12))
+        assert np.all(found >= true * (1 - 1e-12)) and np.all(found <= change * (1 + 1e-12))
 
 
 def test_two_values_that_agree_by_accident():

@@ -125,7 +125,7 @@ def test_module_entry_point():
             "has passed the drains (2 m)",
         ),
         ({}, "45", "the heel is in tension"),
-        ({"law": "friction", "adhesion": 1e4, "mu": 2}, "40,45", "law = bond lets go"),
+        ({"law": "friction", "adhesion": 1e4, "mu": 2}, "40,46", "law = bond lets go"),
         ({}, "30", ""),
     ],
 )

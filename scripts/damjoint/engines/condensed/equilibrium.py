@@ -18,6 +18,7 @@ from ...scene.loads import Loading, line_forces, quake_column, water_column
 from .faces import WetFace
 from .interface import Change, Interface
 from .laws import LAWS, Memory
+from .newton import Drag
 
 
 @dataclass
@@ -240,6 +241,7 @@ class Joint:
         memory: Memory,
         loading: Loading,
         within: np.ndarray | None = None,
+        drag: Drag | None = None,
     ) -> tuple[np.ndarray, Callable[[bool], Change], Callable[[], np.ndarray]]:
         """The residual (j,), and functions that give its derivatives with jump (a change of the
         virgin joint's, by the law's tangent or by its secant) and with the level (j,).
@@ -249,9 +251,14 @@ class Joint:
         interface = self.interface
         at_points = interface.jumps(interface.at_points, jump)
         traction, tangent = self.law.respond(at_points, memory, within=within)
+        held = drag.size * np.eye(3) if drag else 0.0
+        if drag:
+            moved = at_points - interface.jumps(interface.at_points, drag.jump)
+            traction = traction + drag.size * moved
 
         def law_change(secant: bool) -> Change:
             stiffness = self.law.respond(at_points, memory, True)[1] if secant else tangent
+            stiffness = stiffness + held
             return interface.change(stiffness, self.virgin)
 
         value = self.bulk.stiffness @ jump - self.loads(loading) + interface.forces(traction)

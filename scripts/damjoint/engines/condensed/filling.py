@@ -14,8 +14,11 @@ from ...scene.case import Case
 from ...scene.loads import STAGED, Loading
 from .equilibrium import Joint
 from .interface import Interface
-from .newton import Attempt, Iterate, Limit, newton
+from .newton import Attempt, Drag, Iterate, Limit, newton, relax
 from .record import Record, State
+
+#: How many attempts are for before giving up.
+LAST = 2
 
 
 class Filling:
@@ -61,17 +64,18 @@ class Filling:
         return other
 
     def attempts(self) -> list[Attempt]:
-        """The attempts at a step, in order; the last one, with the secant, is for before giving
-        up.
+        """The attempts at a step, in order; the LAST ones, with the secant for long and with a
+        drag, are for before giving up.
         """
         parts = ("growth", "secant", "release", "iterations")
         of_each = zip(*(self.case.shared[f"attempt_{n}"] for n in parts), strict=True)
         halvings, most = int(self.case["max_halvings"]), 2 if self.joint.law.releases else 1
-        return [
+        found = [
             Attempt(growth, int(secant), int(release), int(iterations), halvings)
             for growth, secant, release, iterations in of_each
             if release <= most
         ]
+        return [*found, replace(found[-1], secant=0, drag=1.0)]
 
     def run(self) -> Results:
         """Follow all the times of the case that are still to come."""
@@ -114,7 +118,8 @@ class Filling:
         first = self.case["weight_first"] or (self.driven and self.case["drive_begin"] == 0)
         if first and self.state.time == 0 and not self.state.jump.any():
             self.rest()
-        *attempts, last_resort = self.attempts()
+        every = self.attempts()
+        attempts, last_resorts = every[:-LAST], every[-LAST:]
         cuts, dt, weighed = 0, np.inf, self.state.time > 0 or self.state.jump.any()
         while self.state.time < target and not self.stopped:
             time = min(self.state.time + dt, target)
@@ -130,7 +135,8 @@ class Filling:
                 tried, smallest = time - self.state.time, self.case["smallest_step"]
                 dt, cuts = max(self.case.shared["cut"][0] * tried, smallest), cuts + 1
                 if tried < smallest * (1 + 1e-9):
-                    time, found = target, self.solve(target, last_resort)
+                    time, tries = target, (self.solve(target, last) for last in last_resorts)
+                    found = next(filter(None, tries), None)
                     self.stopped = found is None
             if found:
                 dt = 2 * (time - self.state.time)
@@ -191,7 +197,9 @@ class Filling:
         asked = Loading.at(self.case, time, level, tail)
         stiff = joint.case["K_N"] * joint.bulk.width
 
-        def evaluate(jump: np.ndarray, level: float, last: Iterate | None) -> Iterate:
+        def evaluate(
+            jump: np.ndarray, level: float, last: Iterate | None, drag: Drag | None = None
+        ) -> Iterate:
             side = within = None
             if attempt.release:
                 at_points = joint.interface.jumps(joint.interface.at_points, jump)
@@ -200,7 +208,7 @@ class Filling:
                     within = (side * last.side < 0) & ((side < 0) | (attempt.release > 1))
                     side = np.where(within, 0, side)
             loading = replace(asked, level=level)
-            value, by_jump, by_level = joint.residual(jump, memory, loading, within)
+            value, by_jump, by_level = joint.residual(jump, memory, loading, within, drag)
             size, edge = np.linalg.norm(value), None
             if prescribed:
                 if self.case["drive"] == "heel":
@@ -218,7 +226,10 @@ class Filling:
 
         with np.errstate(over="ignore", invalid="ignore"):  # an attempt that flies off is dropped
             start = evaluate(*self.start(time, level, prescribed, first), None)
-            found = newton(evaluate, start, self.limit, attempt)
+            if attempt.drag:
+                found = relax(evaluate, start, self.limit, attempt, self.case["K_N"])
+            else:
+                found = newton(evaluate, start, self.limit, attempt)
         if found is None:
             return None
         end, iterations = found

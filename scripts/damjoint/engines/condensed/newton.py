@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import linalg
@@ -22,6 +22,16 @@ class Attempt:
     release: int
     iterations: int
     halvings: int
+    #: the drag of the first step of a relaxation over the joint's stiffness; 0: none
+    drag: float = 0.0
+
+
+@dataclass(frozen=True)
+class Drag:
+    """A traction that holds the joint back: size [Pa/m] times what it has moved from a jump."""
+
+    size: float
+    jump: np.ndarray
 
 
 @dataclass
@@ -38,8 +48,8 @@ class Iterate:
     side: np.ndarray | None = None
 
 
-#: The iterate at a jump and a level, that follows another one or none.
-Evaluate = Callable[[np.ndarray, float, "Iterate | None"], Iterate]
+#: The iterate at a jump and a level, that follows another one or none, under a drag or none.
+Evaluate = Callable[..., Iterate]
 
 
 @dataclass(frozen=True)
@@ -66,6 +76,10 @@ class Limit:
         return now.size <= self.round_off * noise(now, evaluate)
 
 
+#: A residual that does not change by more than this part in DRIFT iterations: something slides or
+#: falls, and nothing will hold it.
+STILL, DRIFT = 1e-6, 4
+
 #: x rounded to 43 of its 53 bits is x (2^10 + 1) - (x (2^10 + 1) - x): Veltkamp's splitting.
 SPLITTER = 2.0**10
 
@@ -90,8 +104,7 @@ def newton(
     for iterations in range(attempt.iterations + 1):
         if limit.met(now, sizes[-1] if sizes else np.inf, evaluate):
             return now, iterations
-        circle = any(abs(now.size - other) <= 1e-10 * now.size for other in sizes)
-        if circle or not np.isfinite(now.size) or iterations == attempt.iterations:
+        if not np.isfinite(now.size) or iterations == attempt.iterations or hopeless(now, sizes):
             return None
         sizes.append(now.size)
         try:
@@ -105,4 +118,41 @@ def newton(
                 break
             fraction /= 2
         now = tried
+    return None
+
+
+def hopeless(now: Iterate, sizes: list[float]) -> bool:
+    """Whether an iterate has been there before, or its residual drifts along unchanged."""
+    near = [abs(now.size - size) / now.size for size in sizes]
+    return min(near, default=1.0) <= 1e-10 or (len(near) >= DRIFT and max(near[-DRIFT:]) <= STILL)
+
+
+def relax(
+    evaluate: Evaluate, start: Iterate, limit: Limit, attempt: Attempt, stiffness: float
+) -> tuple[Iterate, int] | None:
+    """As `newton`, by following the joint as a drag lets it move: implicit steps in a time of no
+    meaning, in which a joint that breaks at once breaks point by point, up to where it holds again.
+
+    That is pseudo-transient continuation [Kelley and Keyes 1998]: a step that is solved easily is
+    followed by one with less drag, one that is not is tried again with more. stiffness: [Pa/m].
+    """
+    now, drag, spent = start, attempt.drag * stiffness, 0
+    step = replace(attempt, iterations=12)
+    while spent < attempt.iterations:
+        held = Drag(drag, now.jump)
+        goal = replace(limit, size=max(limit.size, 1e-3 * now.size))
+        found = newton(
+            lambda jump, level, last, held=held: evaluate(jump, level, last, held),
+            evaluate(now.jump, now.level, None, held),
+            goal,
+            step,
+        )
+        spent += found[1] if found else step.iterations
+        if found is None:
+            drag *= 8
+            continue
+        now = evaluate(found[0].jump, found[0].level, None)
+        if limit.met(now, np.inf, evaluate):
+            return now, spent
+        drag /= 4 if found[1] <= 6 else 2
     return None
