@@ -210,7 +210,7 @@ def test_what_no_joint_can_hold_is_found_by_the_search_too(command, tmp_path):
 
 
 #: A mesh that --accuracy chooses, but for its fineness.
-MESH = "mesh_pattern=free", "n_layers=1", "h_dam=-1", "h_found=-1"
+MESH = "mesh_pattern=free", "quadrature=full", "n_layers=1", "h_dam=-1", "h_found=-1"
 
 
 def test_ties_loading_and_accuracy(command, solve, tmp_path):
