@@ -225,7 +225,11 @@ def flux(run: Written, rows: dict[str, np.ndarray], leakage: float) -> Iterator[
     drains take at the node nearest to them.
     """
     case, s, flux, time = run.case, rows["s"], rows["flux"], rows["time"][0]
-    near, size = run.length / case["n_joint"], DIGITS * np.abs(flux).max()
+    near = run.length / case["n_joint"]
+    # what the whole head drives through the closed joint: without a head there is rounding alone
+    closed = case["rho_water"] * case["aperture_min"] ** 3 / (12 * case["visc"])
+    slope = case["rho_water"] * case["g"] * max(case.levels) / run.length
+    size = DIGITS * max(np.abs(flux).max(), closed * slope)
     before, after = np.zeros(len(s), bool), np.ones(len(s), bool)
     if has_drains(case):
         before, after = s < case["drain_x"] - near, s > case["drain_x"] + near
