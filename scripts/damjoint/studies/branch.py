@@ -360,10 +360,8 @@ def moved(filling: Filling, case: Case, control: str, by: float, end: float) -> 
 
 def solved(filling: Filling, time: float, most: int = 3) -> Filling | None:
     """A filling gone on with to a time by one step; None if so many attempts do not find it."""
-    attempts = filling.attempts()[:most]
-    for attempt in attempts:
-        found = filling.solve(time, attempt, attempt is attempts[0])
-        if found:
-            filling.accept(0, *found)
-            return filling
-    return None
+    found = filling.solve_by(filling.attempts()[:most], time, ahead=True)
+    if found is None:
+        return None
+    filling.accept(0, *found)
+    return filling

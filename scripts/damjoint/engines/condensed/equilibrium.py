@@ -246,19 +246,19 @@ class Joint:
         """The residual (j,), and functions that give its derivatives with jump (a change of the
         virgin joint's, by the law's tangent or by its secant) and with the level (j,).
 
-        within: see the law's `respond`.
+        within: see the law's `respond`; drag: what holds the joint back, besides the law.
         """
         interface = self.interface
         at_points = interface.jumps(interface.at_points, jump)
         traction, tangent = self.law.respond(at_points, memory, within=within)
-        held = drag.size * np.eye(3) if drag else 0.0
         if drag:
             moved = at_points - interface.jumps(interface.at_points, drag.jump)
             traction = traction + drag.size * moved
 
         def law_change(secant: bool) -> Change:
             stiffness = self.law.respond(at_points, memory, True)[1] if secant else tangent
-            stiffness = stiffness + held
+            if drag:
+                stiffness = stiffness + drag.size * np.eye(3)
             return interface.change(stiffness, self.virgin)
 
         value = self.bulk.stiffness @ jump - self.loads(loading) + interface.forces(traction)

@@ -75,7 +75,7 @@ class Filling:
             for growth, secant, release, iterations in of_each
             if release <= most
         ]
-        return [*found, replace(found[-1], secant=0, drag=1.0)]
+        return [*found, replace(found[-1], secant=0, drag=True)]
 
     def run(self) -> Results:
         """Follow all the times of the case that are still to come."""
@@ -93,8 +93,7 @@ class Filling:
 
         It has no row in the history.
         """
-        tries = (self.solve(0.0, attempt) for attempt in self.attempts())
-        found = next(filter(None, tries), None)
+        found = self.solve_by(self.attempts(), 0.0)
         if found is None:
             return False
         self.state = found[0]
@@ -124,8 +123,7 @@ class Filling:
         while self.state.time < target and not self.stopped:
             time = min(self.state.time + dt, target)
             time = target if target - time < 1e-9 else time
-            tries = (self.solve(time, attempt, attempt is attempts[0]) for attempt in attempts)
-            found = next(filter(None, tries), None)
+            found = self.solve_by(attempts, time, ahead=True)
             if found is None and not weighed:
                 weighed = True
                 if self.rest():
@@ -135,8 +133,7 @@ class Filling:
                 tried, smallest = time - self.state.time, self.case["smallest_step"]
                 dt, cuts = max(self.case.shared["cut"][0] * tried, smallest), cuts + 1
                 if tried < smallest * (1 + 1e-9):
-                    time, tries = target, (self.solve(target, last) for last in last_resorts)
-                    found = next(filter(None, tries), None)
+                    time, found = target, self.solve_by(last_resorts, target)
                     self.stopped = found is None
             if found:
                 dt = 2 * (time - self.state.time)
@@ -183,6 +180,16 @@ class Filling:
                 rise = now.loading.level - before.loading.level
                 return jump, now.loading.level + ahead * rise if prescribed else level
         return now.jump, now.loading.level if prescribed else level
+
+    def solve_by(
+        self, attempts: list[Attempt], time: float, ahead: bool = False
+    ) -> tuple[State, int, float] | None:
+        """A step by the first of some attempts that finds it, see `solve`.
+
+        ahead: whether the very first one starts extrapolated.
+        """
+        tries = (self.solve(time, one, ahead and one is attempts[0]) for one in attempts)
+        return next(filter(None, tries), None)
 
     def solve(
         self, time: float, attempt: Attempt, first: bool = False

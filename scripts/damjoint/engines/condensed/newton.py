@@ -22,8 +22,8 @@ class Attempt:
     release: int
     iterations: int
     halvings: int
-    #: the drag of the first step of a relaxation over the joint's stiffness; 0: none
-    drag: float = 0.0
+    #: whether the joint goes as a drag lets it (`relax`)
+    drag: bool = False
 
 
 @dataclass(frozen=True)
@@ -134,9 +134,11 @@ def relax(
     meaning, in which a joint that breaks at once breaks point by point, up to where it holds again.
 
     That is pseudo-transient continuation [Kelley and Keyes 1998]: a step that is solved easily is
-    followed by one with less drag, one that is not is tried again with more. stiffness: [Pa/m].
+    followed by one with less drag, one that is not is tried again with more.
+
+    stiffness: the joint's, which is the first drag [Pa/m].
     """
-    now, drag, spent = start, attempt.drag * stiffness, 0
+    now, drag, spent = start, stiffness, 0
     step = replace(attempt, iterations=12)
     while spent < attempt.iterations:
         held = Drag(drag, now.jump)
