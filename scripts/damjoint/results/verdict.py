@@ -61,8 +61,8 @@ def why_stopped(results: Results) -> str:
 
     Out of range: a driven run whose level would, in one more step like its last, be below 0 or
     above the highest that is allowed.
-    Overturning: the resultant is in the base's last tenth, or, where the crack has crossed most of
-    it, in its last fifth.
+    Overturning: the resultant of the compression is in the base's last tenth, or, where the crack
+    has crossed most of it, in its last fifth; an open point of friction pulls with c/mu.
     Sliding: the shear is within 2 % of what the joint can hold, T <= mu N + c L + H (mean slip) L
     (N holds the tension c/mu of open points, so that c acts on all of L), for a bond beyond what
     remains once it has gone, mu N; or the whole joint has let go.
@@ -72,8 +72,10 @@ def why_stopped(results: Results) -> str:
     ahead = 2 * last["level"] - [0.0, *results.history["level"]][-2]
     if case["drive"] != "level" and not 0 <= ahead <= case.highest_level:
         return "out of range"
-    cracked = last["crack_length"] > 0.8 * base
-    if last["M"] < (0.2 if cracked else 0.1) * last["N"] * base:
+    crack = last["crack_length"]
+    pull = case["adhesion"] / case["mu"] * crack if case["law"] == "friction" else 0.0
+    arm = 0.2 if crack > 0.8 * base else 0.1
+    if last["M"] + pull * (base - crack / 2) < arm * base * (last["N"] + pull):
         return "overturning"
     if case["law"] == "friction":
         hardened = case["pena_tang"] * mean_slip(results) * base

@@ -85,6 +85,23 @@ class Point:
         toe = interface.way > 1 - 1e-9
         return float((pressure - effective)[toe].max())
 
+    @cached_property
+    def slides(self) -> bool:
+        """Whether a flat joint holds the shear by its whole strength, which slip cannot raise: more
+        water has no equilibrium, it pushes more and presses less.
+        """
+        joint, state = self.filling.joint, self.filling.state
+        interface = joint.interface
+        if not interface.flat:
+            return False
+        jump = interface.jumps(interface.at_points, state.jump)
+        strength = joint.law.shear_strength(jump, state.memory)
+        if strength is None:
+            return False
+        shear = np.linalg.norm(joint.law.respond(jump, state.memory)[0][:, 1:], axis=1)
+        weights = interface.points.weights
+        return bool(weights @ shear >= (1 - PRECISION / 2) * (weights @ strength))
+
     @property
     def last(self) -> dict[str, float]:
         """What an engine has found there: columns of history.csv, and the heel's opening."""
@@ -187,6 +204,11 @@ class Branch:
         """Whether it is the compression that ends it."""
         return self.crushed and self.top + 2 == len(self.points)
 
+    @property
+    def slides(self) -> bool:
+        """Whether nothing of the joint's strength is left at its highest level."""
+        return bool(self.points) and self.points[self.top].slides
+
     def settled(self, factor: float) -> bool:
         """Whether the level has risen no more since the dam had been pushed so many times less."""
         far = self.points[-1].pushed / factor
@@ -199,6 +221,8 @@ class Branch:
         """How the dam fails; empty if it is not seen."""
         if self.crushed_at_top:
             return "crushed toe"
+        if self.slides:
+            return "sliding"
         if not self.points or self.knee + 1 >= len(self.points):
             return ""
         knee, last = self.points[self.knee].filling, self.points[-1].filling
@@ -212,11 +236,14 @@ class Branch:
     # ----------------------------------------------------------------------------------------------
 
     def follow(self, factor: float) -> None:
-        """Push the dam until the target is reached, the level has settled or no push is found.
+        """Push the dam until the target is reached, it slides, the level has settled or no push is
+        found.
 
         A highest level that is not far below the target is looked at more closely.
         """
-        while not (self.stuck or self.reached or self.crushed or self.settled(factor)):
+        while not (
+            self.stuck or self.reached or self.crushed or self.slides or self.settled(factor)
+        ):
             self.go_on()
             self.stuck |= len(self.points) >= MOST_POINTS
         if not self.reached:
@@ -257,7 +284,7 @@ class Branch:
         """Look at the branch's end to the precision: at its highest level, or where it passes the
         target or f_c; no closer than needed to see that a wanted level is out of reach.
         """
-        for _ in range(MOST_LOOKS):
+        for _ in range(0 if self.slides else MOST_LOOKS):
             left, share, possible = self.unknown()
             known = not possible - self.highest > PRECISION / 2 * possible
             if known or possible < wanted < np.inf:

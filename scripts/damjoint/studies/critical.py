@@ -292,6 +292,9 @@ class Search:
             doubt = "no equilibrium is found even at the first step"
         elif failing.crushed_at_top:
             why = f"beyond it the toe's compression passes f_c = {failing.case['f_c']:g} Pa"
+        elif failing.slides:
+            last = failing.points[failing.top].last
+            why = f"there the whole joint slips: T = {last['T']:.5g} N/m is all that it holds"
         elif failing.settled(SURE):
             top, knee = failing.points[failing.top], failing.points[failing.knee]
             far = failing.points[-1].pushed / (knee.pushed or failing.size)

@@ -117,6 +117,8 @@ class Interface:
         self.chord = Chord.of(bulk)
         #: from heel to toe along the joint [m], a mean in 3D
         self.length = self.points.weights.sum() / bulk.width
+        #: whether it is a plane
+        self.flat = np.allclose(self.frames, self.frames[0])
         self._made_for, self._compliance = None, None
 
     def _seen(self) -> tuple[np.ndarray, np.ndarray]:

@@ -44,6 +44,9 @@ class Law:
         """Where a point is in that release: nowhere."""
         return np.zeros(len(jump), int)
 
+    def shear_strength(self, jump: np.ndarray, memory: Memory) -> np.ndarray | None:
+        """The shear stress (q,) that slip cannot raise [Pa]; None if there is no such bound."""
+
 
 class Rupture(Law):
     """Cohesive rupture, with grouting and sawing.
@@ -258,6 +261,11 @@ class Friction(Law):
         tangent[:, 1:, 0] = coupling[:, None] * n
         return traction, tangent
 
+    def shear_strength(self, jump: np.ndarray, memory: Memory) -> np.ndarray | None:
+        """adhesion - mu sigma_n, if nothing hardens."""
+        normal, *_ = self.trial(jump, memory)
+        return None if self.H else self.adhesion - self.mu * normal
+
     def remember(self, jump: np.ndarray, memory: Memory) -> Memory:
         """The memory after convergence."""
         _, _, n, slip = self.trial(jump, memory)
@@ -370,6 +378,11 @@ class Bond(Law):
             + self.artificial * eye
         )
         return traction, tangent
+
+    def shear_strength(self, jump: np.ndarray, memory: Memory) -> np.ndarray:
+        """The cohesion that is left, and friction."""
+        pressed = self.K_N * np.minimum(jump[:, 0], 0)
+        return self.cohesion * (1 - memory.scalar) - self.mu * pressed
 
     def remember(self, jump: np.ndarray, memory: Memory) -> Memory:
         """The memory after convergence."""
