@@ -98,3 +98,18 @@ def test_3d_contains_the_plane_solution(solve, pattern, flat):
     (three,) = solve("a", "6,9", **size, dim=3, mesh_pattern=pattern, thickness=5, hold_z=1)
     assert max(differences(two, three)) < 1e-8
     assert_allclose(three.history["crest_ux"], two.history["crest_ux"], rtol=1e-8)
+
+
+@pytest.mark.parametrize(
+    "law, uplift", [("rupture", "flow"), ("bond", "flow"), ("friction", "cracked")]
+)
+def test_a_slice_takes_the_iterations_of_the_plane_scene(solve, law, uplift):
+    """A joint that opens or slips: as many in every step, on the same mesh drawn out along z."""
+    scene = {"law": law, "uplift": uplift, "sigma_max": 1e4, "adhesion": 5e4, "mu": 0.8}
+    scene |= {"E_dam": 2e10, "E_found": 3e10, "K_N": 1e11, "n_joint": 20, "h_dam": 8, "h_found": 30}
+    (two,) = solve("dam", "30,40,45", **scene)
+    layer = {"dim": 3, "mesh_pattern": "layers", "n_layers": 1, "thickness": 2, "hold_z": 1}
+    (three,) = solve("dam", "30,40,45", **scene, **layer)
+    assert three.history["iterations"].tolist() == two.history["iterations"].tolist()
+    assert two.history["iterations"][-1] > 3
+    assert max(differences(two, three)) < 1e-8
