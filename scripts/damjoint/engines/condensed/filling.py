@@ -14,7 +14,7 @@ from ...scene.case import Case
 from ...scene.loads import STAGED, Loading
 from .equilibrium import Joint
 from .interface import Interface
-from .newton import Attempt, Drag, Iterate, Limit, newton, relax
+from .newton import Attempt, Drag, Fallen, Iterate, Limit, newton, relax
 from .record import Record, State
 
 #: How many attempts are for before giving up.
@@ -123,16 +123,17 @@ class Filling:
         while self.state.time < target and not self.stopped:
             time = min(self.state.time + dt, target)
             time = target if target - time < 1e-9 else time
-            found = self.solve_by(attempts, time, ahead=True)
+            smallest = time - self.state.time < self.case["smallest_step"] * (1 + 1e-9)
+            found = self.solve_by(attempts, time, ahead=True, insist=smallest)
             if found is None and not weighed:
                 weighed = True
                 if self.rest():
                     cuts += 1
                     continue
             if found is None:
-                tried, smallest = time - self.state.time, self.case["smallest_step"]
-                dt, cuts = max(self.case.shared["cut"][0] * tried, smallest), cuts + 1
-                if tried < smallest * (1 + 1e-9):
+                tried, cuts = time - self.state.time, cuts + 1
+                dt = max(self.case.shared["cut"][0] * tried, self.case["smallest_step"])
+                if smallest:
                     time, found = target, self.solve_by(last_resorts, target)
                     self.stopped = found is None
             if found:
@@ -162,6 +163,7 @@ class Filling:
             self.case["tolerance"] * reference,
             shared["coarsest"][0] * reference,
             shared["round_off"][0],
+            0.1 * self.case.size,
         )
 
     def start(
@@ -182,21 +184,30 @@ class Filling:
         return now.jump, now.loading.level if prescribed else level
 
     def solve_by(
-        self, attempts: list[Attempt], time: float, ahead: bool = False
+        self, attempts: list[Attempt], time: float, ahead: bool = False, insist: bool = True
     ) -> tuple[State, int, float] | None:
         """A step by the first of some attempts that finds it, see `solve`.
 
-        ahead: whether the very first one starts extrapolated.
+        ahead: whether the very first one starts extrapolated; insist: whether the others are tried,
+        too, once one sees the dam fall.
         """
-        tries = (self.solve(time, one, ahead and one is attempts[0]) for one in attempts)
-        return next(filter(None, tries), None)
+        for one in attempts:
+            try:
+                found = self.solve(time, one, ahead and one is attempts[0])
+            except Fallen:
+                if not insist:
+                    return None
+                continue
+            if found:
+                return found
+        return None
 
     def solve(
         self, time: float, attempt: Attempt, first: bool = False
     ) -> tuple[State, int, float] | None:
         """A step from the last state: the new one, iterations, residual over reference; or None.
 
-        first: whether it is the first attempt at the step.
+        first: whether it is the first attempt at the step. Raises Fallen.
         """
         joint, state = self.joint, self.state.staged(self.joint, time)
         memory = state.memory
@@ -240,8 +251,8 @@ class Filling:
         if found is None:
             return None
         end, iterations = found
-        if np.abs(end.jump).max() > 0.1 * self.case.size:
-            return None  # the dam has fallen: an equilibrium of small displacements only
+        if np.abs(end.jump).max() > self.limit.farthest:
+            raise Fallen  # an equilibrium of small displacements only
         if prescribed and not 0 <= end.level <= self.case.highest_level:
             return None  # no reservoir has that level
         memories, loading = state.remember(joint, end.jump), replace(asked, level=end.level)

@@ -9,6 +9,10 @@ import numpy as np
 from scipy import linalg
 
 
+class Fallen(Exception):
+    """An iterate has gone so far that nothing is likely to hold it."""
+
+
 @dataclass(frozen=True)
 class Attempt:
     """One way of trying a step."""
@@ -66,6 +70,8 @@ class Limit:
     #: residual up to which rounding is an excuse, and how many times the noise
     coarsest: float
     round_off: float
+    #: the largest jump that a dam that stands can have [m]
+    farthest: float
 
     def met(self, now: Iterate, before: float, evaluate: Evaluate) -> bool:
         """Whether an iterate has converged; before: size of the residual one iteration ago."""
@@ -96,6 +102,8 @@ def newton(
 ) -> tuple[Iterate, int] | None:
     """The iterate that meets the limit, and the number of iterations; None if it is not found.
 
+    Raises Fallen.
+
     A correction is halved only while it makes the residual grow more than attempt.growth times:
     while points open or break the residual has to rise, and a monotone line search would creep
     there.
@@ -106,6 +114,8 @@ def newton(
             return now, iterations
         if not np.isfinite(now.size) or iterations == attempt.iterations or hopeless(now, sizes):
             return None
+        if np.abs(now.jump).max() > limit.farthest:
+            raise Fallen
         sizes.append(now.size)
         try:
             jump, level = now.correction(iterations < attempt.secant)
@@ -136,7 +146,7 @@ def relax(
     That is pseudo-transient continuation [Kelley and Keyes 1998]: a step that is solved easily is
     followed by one with less drag, one that is not is tried again with more.
 
-    stiffness: the joint's, which is the first drag [Pa/m].
+    stiffness: the joint's, which is the first drag [Pa/m]. Raises Fallen.
     """
     now, drag, spent = start, stiffness, 0
     step = replace(attempt, iterations=12)
