@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import os
 import re
+import signal
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -458,8 +459,18 @@ def do_law(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def heed_signals() -> None:
+    """Let SIGTERM, and a terminal that is closed, end a command as Ctrl-C does; what is ignored
+    (nohup) stays so.
+    """
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(number) == signal.SIG_DFL:
+            signal.signal(number, signal.default_int_handler)
+
+
 def main(argv: list[str] | None = None) -> int:
     """Entry point: 0 done, 1 failed, 2 bad input, 130 interrupted."""
+    heed_signals()
     words = list(sys.argv[1:] if argv is None else argv)
     for i in reversed(range(len(words) - 1)):
         if words[i] in ("--levels", "--tail-levels"):  # a list that begins with a minus sign

@@ -208,17 +208,6 @@ def test_getdp_leaves_nothing_in_the_temporary_folder(command, tmp_path, monkeyp
     assert list((tmp_path / "tmp").iterdir()) == []
 
 
-def test_a_full_disk_is_one_line(command, tmp_path, monkeypatch):
-    from damjoint.results import tables
-
-    def full(*words):
-        raise OSError(28, "No space left on device", "joint.csv")
-
-    monkeypatch.setattr(tables, "write_csv", full)
-    code, _, err = command("run", "c", *BARE)
-    assert code == 1 and "No space left on device" in err and len(err.splitlines()) == 1
-
-
 def test_a_run_that_fails_early_does_not_leave_an_earlier_ones_results(command, tmp_path):
     """A mesh that can not be: one line, and run.json says so."""
     assert command("run", "c", *BARE, "--out", "out")[0] == 0

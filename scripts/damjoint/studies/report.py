@@ -23,6 +23,7 @@ from ..results.units import FORCES, MOMENTS
 from ..results.verdict import failed, statement, stiffness_ratio
 from ..scene.case import Case
 from ..scene.parameters import constants, declared, parse
+from ..storage import whole
 from .check import Check, by_finite_elements, by_gravity, hand_calculation, picture_table
 
 #: Of the parts of a picture that are dots, not lines.
@@ -47,7 +48,8 @@ def write(folders: list[Path], to: Path) -> None:
         runs=parts, version=__version__, now=f"{datetime.now():%Y-%m-%d %H:%M}"
     )
     try:
-        to.write_text(page, encoding="utf-8")
+        with whole(to) as path:
+            path.write_text(page, encoding="utf-8")
     except OSError as error:
         raise InputError(f"to = {to}: {error}") from None
 
