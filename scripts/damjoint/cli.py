@@ -26,14 +26,14 @@ class Parser(argparse.ArgumentParser):
 
 def whole(text: str) -> int:
     """An integer of at least 1."""
-    if not text.strip().isdigit() or int(text) < 1:
+    if not text.strip().isdecimal() or int(text) < 1:
         raise argparse.ArgumentTypeError(f"{text}: must be an integer >= 1")
     return int(text)
 
 
 def natural(text: str) -> int:
     """An integer of at least 0."""
-    if not text.strip().isdigit():
+    if not text.strip().isdecimal():
         raise argparse.ArgumentTypeError(f"{text}: must be an integer >= 0")
     return int(text)
 

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 
+import pytest
 from damjoint.storage import held, whole
 
 BARE = ("--set", "n_joint=10", "--set", "h_dam=3", "--set", "h_found=4", "--no-fields")
