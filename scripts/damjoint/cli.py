@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import io
 import os
 import re
 import signal
@@ -459,6 +460,17 @@ def do_law(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def check_text(word: str) -> None:
+    """Raise InputError if a word of the command has bytes that are no text in the locale."""
+    try:
+        word.encode()
+    except UnicodeEncodeError:
+        raise InputError(
+            f"{word!a}: must be text in the locale's encoding ({sys.getfilesystemencoding()}); "
+            "LANG=C.UTF-8 knows all letters"
+        ) from None
+
+
 def heed_signals() -> None:
     """Let SIGTERM, and a terminal that is closed, end a command as Ctrl-C does; what is ignored
     (nohup) stays so.
@@ -471,11 +483,15 @@ def heed_signals() -> None:
 def main(argv: list[str] | None = None) -> int:
     """Entry point: 0 done, 1 failed, 2 bad input, 130 interrupted."""
     heed_signals()
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="replace")  # a locale without a mu for the micrometres
     words = list(sys.argv[1:] if argv is None else argv)
     for i in reversed(range(len(words) - 1)):
         if words[i] in ("--levels", "--tail-levels"):  # a list that begins with a minus sign
             words[i : i + 2] = [f"{words[i]}={words[i + 1]}"]
     try:
+        for word in words:
+            check_text(word)
         arguments = parser().parse_args(words)
         if getattr(arguments, "run_geo", False):
             os.environ[RUN_GEO] = "1"  # for the processes of a sweep, too

@@ -118,3 +118,26 @@ def test_another_sweep_into_the_file(command, tmp_path):
         code, _, err = command(*words)
         assert code == 2 and "mu.csv: another damjoint is writing there" in err
     assert command(*words)[0] == 0
+
+
+def test_a_damaged_run_json(command, tmp_path):
+    assert command(*RUN)[0] == 0
+    file = tmp_path / "out" / "c" / "run.json"
+    whole_one = json.loads(file.read_text())
+    for changed in ({"mesh": None}, {"hints": None}, {"wall_seconds": {"solve": "long"}}):
+        file.write_text(json.dumps(whole_one | changed))
+        code, _, err = command("report", "out/c")
+        assert code == 2 and "out = out/c: damaged" in err and len(err.splitlines()) == 1
+        assert not (tmp_path / "report.html").exists()
+
+
+def test_a_locale_without_all_letters(tmp_path):
+    """Of the table's units."""
+    locale = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    done = subprocess.run(
+        [sys.executable, "-m", "damjoint", *RUN, "--set", "E=1e10"],
+        cwd=tmp_path,
+        env=os.environ | locale,
+        capture_output=True,
+    )
+    assert (done.returncode, done.stderr) == (0, b"") and b"[?m]" in done.stdout

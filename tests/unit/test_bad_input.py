@@ -111,6 +111,7 @@ def test_parameter_out_of_range(command, tmp_path, setting, allowed):
             (*RUN, "--set", "saw_thickness=1e-3", "--set", "uplift=flow"),
             ("saw_thickness = 0.001", "uplift = flow", "must be 0"),
         ),
+        ((*RUN, "--out", "o\udcff"), (r"'o\udcff'", "must be text", "LANG=C.UTF-8")),
         ((*RUN, "--steps", "0"), ("steps = 0", "integer >= 1")),
         ((*RUN, "--steps", "-2"), ("steps = -2", "integer >= 1")),
         pytest.param((*RUN, "--steps", "1.5"), ("steps", "1.5", "integer >= 1")),

@@ -36,7 +36,7 @@ def write(folders: list[Path], to: Path) -> None:
     Raises InputError if one of them is no run's folder, or the page can not be written.
     """
     runs = [run for folder in folders for run in stored.runs_in(folder)]
-    parts = [part_of(folder, stored.read(folder)) for folder in runs]
+    parts = [read_part(folder) for folder in runs]
     environment = Environment(
         loader=FileSystemLoader(Path(__file__).parent),
         autoescape=True,
@@ -52,6 +52,18 @@ def write(folders: list[Path], to: Path) -> None:
             path.write_text(page, encoding="utf-8")
     except OSError as error:
         raise InputError(f"to = {to}: {error}") from None
+
+
+def read_part(folder: Path) -> dict:
+    """What the page says of the run in a folder.
+
+    Raises InputError if its files are not what a run writes.
+    """
+    solution = stored.read(folder)
+    try:
+        return part_of(folder, solution)
+    except stored.DAMAGED as error:
+        raise InputError(f"out = {folder}: damaged: {error!r}") from None
 
 
 def part_of(folder: Path, solution: Solution) -> dict:
@@ -72,7 +84,7 @@ def part_of(folder: Path, solution: Solution) -> dict:
         "name": case.name,
         "verdict": told["verdict"],
         "fails": fails,
-        "hints": told["hints"],
+        "hints": [*told["hints"]],
         "made": f"{made:%Y-%m-%d %H:%M}",
         "scene": scene_of(case),
         "differences": differences(case),
