@@ -1,5 +1,6 @@
 """Concrete gravity dams on a thin joint that opens, breaks, slides and lets water in.
 
+storage.py  files written whole or not at all, by one process at a time
 scene/    what is asked: parameters, case files, meshes
 results/  what comes out: tables, verdict, fields, pictures, comparison with published numbers
 engines/  how it is solved: getdp/ runs the problem definition, condensed/ follows the joint alone

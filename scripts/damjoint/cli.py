@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import argparse
+import io
 import os
 import re
+import signal
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -25,14 +27,14 @@ class Parser(argparse.ArgumentParser):
 
 def whole(text: str) -> int:
     """An integer of at least 1."""
-    if not text.strip().isdigit() or int(text) < 1:
+    if not text.strip().isdecimal() or int(text) < 1:
         raise argparse.ArgumentTypeError(f"{text}: must be an integer >= 1")
     return int(text)
 
 
 def natural(text: str) -> int:
     """An integer of at least 0."""
-    if not text.strip().isdigit():
+    if not text.strip().isdecimal():
         raise argparse.ArgumentTypeError(f"{text}: must be an integer >= 0")
     return int(text)
 
@@ -458,13 +460,38 @@ def do_law(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def check_text(word: str) -> None:
+    """Raise InputError if a word of the command has bytes that are no text in the locale."""
+    try:
+        word.encode()
+    except UnicodeEncodeError:
+        raise InputError(
+            f"{word!a}: must be text in the locale's encoding ({sys.getfilesystemencoding()}); "
+            "LANG=C.UTF-8 knows all letters"
+        ) from None
+
+
+def heed_signals() -> None:
+    """Let SIGTERM, and a terminal that is closed, end a command as Ctrl-C does; what is ignored
+    (nohup) stays so.
+    """
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(number) == signal.SIG_DFL:
+            signal.signal(number, signal.default_int_handler)
+
+
 def main(argv: list[str] | None = None) -> int:
     """Entry point: 0 done, 1 failed, 2 bad input, 130 interrupted."""
+    heed_signals()
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="replace")  # a locale without a mu for the micrometres
     words = list(sys.argv[1:] if argv is None else argv)
     for i in reversed(range(len(words) - 1)):
         if words[i] in ("--levels", "--tail-levels"):  # a list that begins with a minus sign
             words[i : i + 2] = [f"{words[i]}={words[i + 1]}"]
     try:
+        for word in words:
+            check_text(word)
         arguments = parser().parse_args(words)
         if getattr(arguments, "run_geo", False):
             os.environ[RUN_GEO] = "1"  # for the processes of a sweep, too

@@ -55,24 +55,22 @@ def run(
     leaves what has converged. Raises InputError, RunError.
     """
     chosen = engine_of(case, engine)
-    folders.check_writable(out)
-    folders.clear(out)  # only now: bad input leaves an earlier run as it is
-    folders.say(case, out, "running")
     bar, found = Progress(case, progress), []
-    try:
-        for outcome in accuracy.solve(case, chosen, bar.step, fields or picture):
-            save(outcome, case, out)
-            found.append(outcome)
-            if outcome.error:
-                raise outcome.error
-    except BaseException as error:
-        if not found:
-            state = "failed" if isinstance(error, Exception) else "interrupted"
-            folders.say(case, out, state, str(error) or "nothing had converged")
-        raise
-    bar.bar.close()
-    for outcome in found if fields or picture else []:
-        finish(outcome, case, out, fields, picture)
+    with folders.taken(case, out):  # only now: bad input leaves an earlier run as it is
+        try:
+            for outcome in accuracy.solve(case, chosen, bar.step, fields or picture):
+                save(outcome, case, out)
+                found.append(outcome)
+                if outcome.error:
+                    raise outcome.error
+        except BaseException as error:
+            if not found:
+                state = "failed" if isinstance(error, Exception) else "interrupted"
+                folders.say(case, out, state, str(error) or "nothing had converged")
+            raise
+        bar.bar.close()
+        for outcome in found if fields or picture else []:
+            finish(outcome, case, out, fields, picture)
     return [outcome.result for outcome in found]
 
 
@@ -81,13 +79,11 @@ def keep(case: Case, outcomes: list[Outcome], out: Path) -> None:
 
     Raises InputError if out can not be written.
     """
-    folders.check_writable(out)
-    folders.clear(out)
-    folders.say(case, out, "running")
-    for outcome in outcomes:
-        save(outcome, case, out)
-    for outcome in outcomes:
-        finish(outcome, case, out, fields=True, picture=True)
+    with folders.taken(case, out):
+        for outcome in outcomes:
+            save(outcome, case, out)
+        for outcome in outcomes:
+            finish(outcome, case, out, fields=True, picture=True)
 
 
 def save(outcome: Outcome, case: Case, out: Path) -> None:

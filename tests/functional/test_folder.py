@@ -1,9 +1,11 @@
 """The output folder: what a run leaves there, and what it must never do to what is there."""
 
 import json
+import tempfile
 
 import numpy as np
 import pytest
+from damjoint.engines.getdp import process
 from damjoint.scene.case import CASES
 from test_output import read
 
@@ -144,26 +146,66 @@ def test_an_interrupted_run_keeps_what_has_converged(tmp_path, monkeypatch, engi
     assert told["state"] == told["verdict"] == "interrupted" and "after level" in told["statement"]
 
 
-@pytest.mark.parametrize("printed", ["rubbish", "step abc", "Error   : it hurts"])
-def test_a_getdp_that_prints_rubbish(command, tmp_path, monkeypatch, printed):
-    fake = tmp_path / "getdp"
-    fake.write_text(f"#!/bin/sh\necho '{printed}'\nexit 3\n")
-    fake.chmod(0o755)
-    monkeypatch.setenv("GETDP", str(fake))
+@pytest.fixture
+def fake_getdp(tmp_path, monkeypatch):
+    """fake_getdp(script, version): a shell script that stands for GetDP."""
+
+    def make(script, version="3.2.0"):
+        fake = tmp_path / "getdp"
+        fake.write_text(f'#!/bin/sh\n[ "$1" = --version ] && echo {version} && exit\n{script}\n')
+        fake.chmod(0o755)
+        monkeypatch.setenv("GETDP", str(fake))
+        process.version_of.cache_clear()
+
+    yield make
+    process.version_of.cache_clear()
+
+
+@pytest.mark.parametrize("printed", ["rubbish", "step abc", "step 1e+-.5 x", "Error   : it hurts"])
+def test_a_getdp_that_prints_rubbish(command, tmp_path, fake_getdp, printed):
+    fake_getdp(f"echo '{printed}'; exit 3")
     code, _, err = command("run", "c", *BARE, "--engine", "getdp")
     assert code == 1 and len(err.splitlines()) == 1 and printed in err
     assert json.loads((tmp_path / "out/c/run.json").read_text())["state"] == "failed"
 
 
-def test_a_full_disk_is_one_line(command, tmp_path, monkeypatch):
-    from damjoint.results import tables
+@pytest.mark.parametrize(
+    "left, said",
+    [
+        ("true", "ended without saying how far it went"),
+        ("echo 0 > status.txt; touch history.txt", "no step at t = 4"),
+        ("echo 0 > status.txt; echo step 1 3 x y z 1 1 1 1 1 1 1 1 1 1 > history.txt", "'x'"),
+        ("echo 0 > status.txt; head -c 900 /dev/urandom > history.txt", "tables can not be read"),
+        ("echo 1 > status.txt; echo step 1 3 1 1 1 1 1 1 1 1 1 1 1 1 1 > history.txt", "jump_1"),
+        ("head -c 3000000 /dev/zero", "ended without saying how far it went"),
+    ],
+)
+def test_a_getdp_that_leaves_rubbish(command, tmp_path, fake_getdp, left, said):
+    """It ends as if all were well, as on a full disk."""
+    fake_getdp(left)
+    code, out, err = command("run", "c", *BARE, "--engine", "getdp")
+    assert (code, out) == (1, "") and len(err.splitlines()) == 1 and said in err
+    assert json.loads((tmp_path / "out/c/run.json").read_text())["state"] == "failed"
 
-    def full(*words):
-        raise OSError(28, "No space left on device", "joint.csv")
 
-    monkeypatch.setattr(tables, "write_csv", full)
-    code, _, err = command("run", "c", *BARE)
-    assert code == 1 and "No space left on device" in err and len(err.splitlines()) == 1
+@pytest.mark.parametrize("version", ["2.11.3", "rubbish"])
+def test_another_getdp_leaves_an_earlier_run_alone(command, tmp_path, fake_getdp, version):
+    assert command("run", "c", *BARE, "--levels", "6")[0] == 0
+    before = {p: p.read_bytes() for p in (tmp_path / "out/c").iterdir()}
+    fake_getdp("exit 1", version)
+    code, _, err = command("run", "c", *BARE, "--levels", "6", "--engine", "getdp")
+    assert code == 2 and "version" in err and "GetDP >= 3.2" in err and len(err.splitlines()) == 1
+    assert {p: p.read_bytes() for p in (tmp_path / "out/c").iterdir()} == before
+
+
+def test_getdp_leaves_nothing_in_the_temporary_folder(command, tmp_path, monkeypatch):
+    """Nor does Open MPI below it."""
+    (tmp_path / "tmp").mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "tmp"))
+    monkeypatch.setenv("TMPDIR", str(tmp_path / "tmp"))
+    process.version_of.cache_clear()
+    assert command("run", "c", *BARE, "--levels", "6", "--engine", "getdp")[0] == 0
+    assert list((tmp_path / "tmp").iterdir()) == []
 
 
 def test_a_run_that_fails_early_does_not_leave_an_earlier_ones_results(command, tmp_path):

@@ -168,9 +168,29 @@ def test_the_wrong_dimension(draw):
         Mesh(load(str(draw()), {"dim": 3}))
 
 
-def test_a_program_is_not_run_unasked(tmp_path, command):
-    trap = tmp_path / "trap.geo"
-    trap.write_text(f'SystemCall "touch {tmp_path}/run";\nPoint(1) = {{0, 0, 0}};\n')
-    (tmp_path / "own.case").write_text('geometry = "trap.geo";\n')
+@pytest.mark.parametrize("name", ["trap.geo", "trap.GEO", "trap.msh", "trap.txt", "trap.msh.gz"])
+def test_a_program_is_not_run_unasked(tmp_path, command, name):
+    """Gmsh runs whatever it does not know, under any name."""
+    (tmp_path / name).write_text(f'SystemCall "touch {tmp_path}/run";\nPoint(1) = {{0, 0, 0}};\n')
+    (tmp_path / "own.case").write_text(f'geometry = "{name}";\n')
     code, _, err = command("run", tmp_path / "own.case")
     assert code == 2 and "--run-geo" in err and not (tmp_path / "run").exists()
+
+
+def test_options_beside_a_mesh_are_not_run(draw, tmp_path):
+    """Gmsh would read own.msh.opt after own.msh."""
+    case = load(str(draw()))
+    (tmp_path / "own.msh.opt").write_text(f'SystemCall "touch {tmp_path}/run";\n')
+    assert Mesh(case).nodes and not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize("kept", [11, 20, 300, 0.5])
+def test_a_truncated_mesh(draw, command, tmp_path, kept):
+    """And the next one is read."""
+    path, mesh = draw(), tmp_path / "own.msh"
+    whole = mesh.read_bytes()
+    mesh.write_bytes(whole[: int(kept * len(whole)) if kept < 1 else kept])
+    code, _, err = command("run", path)
+    assert code == 2 and len(err.splitlines()) == 1 and f"geometry = {mesh}" in err
+    mesh.write_bytes(whole)
+    assert Mesh(load(str(path))).nodes

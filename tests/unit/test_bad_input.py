@@ -79,6 +79,7 @@ def test_parameter_out_of_range(command, tmp_path, setting, allowed):
         (("sweep", "a", "--vary", "mu=0.5", "--tie", "adhesion=x()"), ("--tie adhesion=x()",)),
         (("sweep", "a", "--sample", "5", "mu=normal(0,1)"), ("--sample mu=normal(0,1)", "> 0")),
         (("sweep", "a", "--sample", "0", "mu=normal(0,1)"), ("--sample 0", "N NAME=")),
+        (("sweep", "a", "--sample", "²", "mu=normal(0,1)"), ("--sample ²", "N NAME=")),
         (("sweep", "a", "--sample", "5", "mu=norm(1)", "--seed", "-1"), ("seed", "-1", ">= 0")),
         (("sweep", "a", "--vary", "mu=1", "--correlate", "a,b=1"), ("--correlate a,b=1",)),
         (("sweep", "a", "--vary", "mu=1", "--accuracy", "rough"), ("accuracy = rough", "coarse")),
@@ -110,6 +111,7 @@ def test_parameter_out_of_range(command, tmp_path, setting, allowed):
             (*RUN, "--set", "saw_thickness=1e-3", "--set", "uplift=flow"),
             ("saw_thickness = 0.001", "uplift = flow", "must be 0"),
         ),
+        ((*RUN, "--out", "o\udcff"), (r"'o\udcff'", "must be text", "LANG=C.UTF-8")),
         ((*RUN, "--steps", "0"), ("steps = 0", "integer >= 1")),
         ((*RUN, "--steps", "-2"), ("steps = -2", "integer >= 1")),
         pytest.param((*RUN, "--steps", "1.5"), ("steps", "1.5", "integer >= 1")),
@@ -237,6 +239,12 @@ except InputError:
 def test_more_than_the_memory_is_refused_before_meshing(command, setting):
     code, _, err = command("run", "dam", "--set", setting, "--no-fields", "--no-picture")
     assert code == 1 and "need about" in err and len(err.splitlines()) == 1
+
+
+@pytest.mark.parametrize("setting", ["E=1e308", "dam_height=1e-12"])
+def test_numbers_that_can_not_be_computed_with(command, setting):
+    code, out, err = command("run", "a", "--set", setting, "--set", "h_found=4", "--levels", "0")
+    assert (code, out) == (1, "") and len(err.splitlines()) == 1 and "eliminated" in err
 
 
 def test_too_many_steps_and_rows(command):

@@ -1,5 +1,7 @@
 """Case files are data: what they may say, and that nothing in them is ever executed."""
 
+import os
+
 import gmsh
 import pytest
 from damjoint import InputError
@@ -103,6 +105,16 @@ def test_files_that_are_no_cases(command, tmp_path):
     for name, said in (("binary", "decode"), ("itself", "includes itself"), ("enormous", "bytes")):
         code, _, err = command("run", f"{name}.case")
         assert code == 2 and said in err and len(err.splitlines()) == 1
+
+
+@pytest.mark.parametrize("text", ['Include "other.case";' * 51, 'Include "pipe.case";'])
+def test_inclusion_that_would_not_end(command, tmp_path, text):
+    """Of many files in few lines; of what can be read for ever."""
+    write(tmp_path, "", "other.case")
+    os.mkfifo(tmp_path / "pipe.case")
+    code, _, err = command("run", write(tmp_path, text))
+    assert code == 2 and len(err.splitlines()) == 1
+    assert "must be a file" in err or "more than 50 files" in err
 
 
 def test_levels_without_times_are_all_reached(tmp_path):

@@ -9,8 +9,8 @@ from damjoint import pages
 
 PACKAGE = Path(damjoint.__file__).parent
 #: Each part uses only those before it.
-PARTS = ["", "scene", "results", "engines", "accuracy", "run", "studies", "pages", "window", "cli"]
-PARTS += ["__main__"]
+PARTS = ["", "storage", "scene", "results", "engines", "accuracy", "run", "studies", "pages"]
+PARTS += ["window", "cli", "__main__"]
 
 
 def part_of(path):

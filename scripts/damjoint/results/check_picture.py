@@ -13,7 +13,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from ..scene.parameters import constants
-from .drawing import BLUE, GREEN, ORANGE, RED, WATER
+from .drawing import BLUE, GREEN, ORANGE, RED, WATER, write_picture
 from .fields import along
 from .gravity import GravityMethod
 from .pictures import heading
@@ -49,7 +49,7 @@ def draw_check(
     beside.axis("off")
     draw_cells(beside, cells)
     path = folder / f"{method.case.name}_check.png"
-    figure.savefig(path, dpi=130)
+    write_picture(figure, path, 130)
     return path
 
 

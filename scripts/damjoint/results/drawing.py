@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg  # not pyplot: it costs half of a 2D run
 from matplotlib.figure import Figure, FigureBase
+
+from ..storage import whole
 
 BLUE, ORANGE, WATER, RED, GREEN = "#0b5394", "#cc7a00", "#3d9be0", "#b3261e", "#2e7d32"
 GREY, DARK, CONCRETE, ROCK, SILT = "#8a8a8a", "#333333", "#c3ccd6", "#d8c9ae", "#a1866f"
@@ -16,6 +20,12 @@ def figure_of(width: float, height: float) -> Figure:
     figure = Figure(figsize=(width, height))
     FigureCanvasAgg(figure)
     return figure
+
+
+def write_picture(figure: Figure, path: Path, dpi: int, **how: int) -> None:
+    """Write a figure; how: what PIL takes."""
+    with whole(path) as part:
+        figure.savefig(part, dpi=dpi, format="png", pil_kwargs=how)
 
 
 def panels(

@@ -9,6 +9,7 @@ import meshio
 import numpy as np
 
 from ..scene.parameters import constants, start_gmsh
+from ..storage import whole
 from .fields import OF_JOINT, Solution, joint_data
 
 
@@ -42,27 +43,30 @@ def write_fields(solution: Solution, folder: Path) -> None:
             cell_data={"stress": np.split(stresses[time], cuts), "body": body},
         )
         names = f"bulk_t{time:g}.vtu", f"joint_t{time:g}.vtu"
-        bulk.write(folder / names[0], compression=None)
+        with whole(folder / names[0]) as path:
+            bulk.write(path, compression=None)
         lips = meshio.Mesh(joint.points, joint.cells, point_data=joints[time])
-        lips.write(folder / names[1], compression=None)
+        with whole(folder / names[1]) as path:
+            lips.write(path, compression=None)
         entries += [(time, part, name) for part, name in enumerate(names)]
     lines = "".join(f'<DataSet timestep="{t!r}" part="{k}" file="{n}"/>\n' for t, k, n in entries)
     collection = f"<Collection>\n{lines}</Collection>"
-    (folder / "fields.pvd").write_text(
-        f'<VTKFile type="Collection" version="0.1">\n{collection}\n</VTKFile>\n'
-    )
+    with whole(folder / "fields.pvd") as path:
+        path.write_text(f'<VTKFile type="Collection" version="0.1">\n{collection}\n</VTKFile>\n')
     # xx, xy, xz, yx, ...: what Gmsh calls a tensor
     tensor = [0, 3, 5, 3, 1, 4, 5, 4, 2]
     of_bulk = [
         ("displacement [m]", "NodeData", moved),
         ("stress [Pa]", "ElementData", {t: s[:, tensor] for t, s in stresses.items()}),
     ]
-    write_views(folder / "bulk.msh", points, cells, of_bulk)
+    with whole(folder / "bulk.msh") as path:
+        write_views(path, points, cells, of_bulk)
     of_joint = [
         (f"{name} [{OF_JOINT[name][0]}]", "NodeData", {t: d[name] for t, d in joints.items()})
         for name in next(iter(joints.values()))
     ]
-    write_views(folder / "joint.msh", joint.points, joint.cells, of_joint)
+    with whole(folder / "joint.msh") as path:
+        write_views(path, joint.points, joint.cells, of_joint)
 
 
 #: Gmsh's numbers of the shapes of order 1.

@@ -6,14 +6,17 @@ removed.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 from .. import InputError, __version__
 from ..scene.case import Case
 from ..scene.parameters import declared
+from ..storage import PART, held, whole
 from .tables import HISTORY, Results, joint_columns
 from .verdict import hints, statement, verdict
 
@@ -23,12 +26,38 @@ FIELDS = re.compile(r"(bulk|joint)(_t[\w.+-]+\.vtu|\.msh)|fields\.pvd")
 
 
 def check_writable(folder: Path) -> None:
-    """Raise InputError if the output folder can not be made or written; makes nothing."""
+    """Raise InputError if the output folder can not be made or written, or what stands in it would
+    lead a run out of it; makes nothing.
+    """
     existing = folder
-    while not existing.exists():
-        existing = existing.parent
-    if not existing.is_dir() or not os.access(existing, os.W_OK | os.X_OK):
-        raise InputError(f"out = {folder}: must be a folder that can be written")
+    try:
+        while not (existing.exists() or existing.is_symlink()):
+            existing = existing.parent
+        if not existing.is_dir() or not os.access(existing, os.W_OK | os.X_OK):
+            raise InputError(f"out = {folder}: must be a folder that can be written")
+        for name in ("fields", *declared()["uplift"].choices):
+            inner = folder / name
+            if inner.is_symlink() or (inner.exists() and not inner.is_dir()):
+                raise InputError(f"out = {folder}: its {name} must be a folder, and not a link")
+        for name in TABLES:
+            if (folder / name).exists() and not (folder / name).is_file():
+                raise InputError(f"out = {folder}: its {name} must be a file")
+    except OSError as error:  # too long a name, a circle of links
+        raise InputError(f"out = {folder}: {error.strerror}") from None
+
+
+@contextlib.contextmanager
+def taken(case: Case, folder: Path) -> Iterator[None]:
+    """Take a folder for a run of a case, in place of an earlier one's results.
+
+    Raises InputError if that can not be, and leaves an earlier run as it is.
+    """
+    check_writable(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    with held(folder):
+        clear(folder)
+        say(case, folder, "running")
+        yield
 
 
 def scene_folder(case: Case, scene: Case, out: Path) -> Path:
@@ -43,7 +72,7 @@ def earlier(folder: Path) -> dict | None:
     written.
     """
     try:
-        told = json.loads((folder / "run.json").read_text())
+        told = json.loads((folder / "run.json").read_text(encoding="utf-8"))
         return told if "damjoint" in told["versions"] and isinstance(told["case"], str) else None
     except (OSError, ValueError, KeyError, TypeError):
         return None
@@ -64,11 +93,12 @@ def clear(folder: Path) -> None:
     names = [*TABLES, *(f"{told['case']}{end}.png" for end in pictures)]
     for name in names:
         if Path(name).name == name:
-            (folder / name).unlink(missing_ok=True)
+            for mark in ("", PART):
+                (folder / (mark + name)).unlink(missing_ok=True)
     fields = folder / "fields"
     if fields.is_dir() and not fields.is_symlink():
         for file in fields.iterdir():
-            if FIELDS.fullmatch(file.name):
+            if FIELDS.fullmatch(file.name.removeprefix(PART)):
                 file.unlink()
         remove_if_empty(fields)
 
@@ -118,7 +148,6 @@ def write_info(results: Results, folder: Path, state: str = "", why: str = "") -
 
 
 def write_json(folder: Path, told: dict) -> None:
-    """Write run.json whole or not at all."""
-    part = folder / "run.json.part"
-    part.write_text(json.dumps(told, indent=2) + "\n")
-    part.replace(folder / "run.json")
+    """Write run.json."""
+    with whole(folder / "run.json") as path:
+        path.write_text(json.dumps(told, indent=2) + "\n")

@@ -17,7 +17,19 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from ..scene.case import Case
 from . import gravity, validation
-from .drawing import BLUE, DARK, GREEN, GREY, ORANGE, RED, WATER, figure_of, legend_above, panels
+from .drawing import (
+    BLUE,
+    DARK,
+    GREEN,
+    GREY,
+    ORANGE,
+    RED,
+    WATER,
+    figure_of,
+    legend_above,
+    panels,
+    write_picture,
+)
 from .fields import Solution, along, distance, row_of_nodes, state_of
 from .outline import skin
 from .section_picture import draw_section, exaggeration
@@ -51,9 +63,9 @@ def draw(solution: Solution, folder: Path) -> Path:
         if case["dim"] == 3:
             draw_solid(parts[2], solution, time)
     if case["drive"] != "level":
-        draw_curve(result).savefig(folder / f"{case.name}_curve.png", dpi=DPI)
+        write_picture(draw_curve(result), folder / f"{case.name}_curve.png", DPI)
     path = folder / f"{case.name}.png"
-    figure.savefig(path, dpi=DPI, pil_kwargs={"compress_level": 2})
+    write_picture(figure, path, DPI, compress_level=2)
     return path
 
 

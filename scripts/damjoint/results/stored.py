@@ -85,7 +85,7 @@ def case_of(told: dict) -> Case:
     found = parse(resolved(values, lists["levels"]))
     return Case(
         name,
-        str(told["title"]),
+        str(told["title"]).encode(errors="replace").decode(),
         values,
         **lists,
         published=bool(told["published"]),

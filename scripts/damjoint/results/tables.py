@@ -10,6 +10,7 @@ from typing import TextIO
 import numpy as np
 
 from ..scene.case import Case
+from ..storage import whole
 
 #: Columns of joint.csv: a row per joint node and requested level.
 JOINT = {
@@ -189,7 +190,7 @@ def write_csv(target: Path | TextIO, table: dict[str, np.ndarray | list]) -> Non
     texts as they are.
     """
     if isinstance(target, Path):
-        with target.open("w", newline="") as file:
+        with whole(target) as path, path.open("w", newline="") as file:
             write_csv(file, table)
         return
     writer = csv.writer(target, lineterminator="\n")

@@ -335,17 +335,33 @@ def load(
 def own_geometry(name: str) -> Path:
     """The file of a user's own geometry.
 
-    Raises InputError if it is not there, or is a program that nobody has allowed to run.
+    Raises InputError if it is not there, or may be a program and nobody has allowed it to run.
     """
     path = Path(name)
     if not path.is_file():
         raise InputError(f"geometry = {name}: must be a file, a mesh that Gmsh reads or a .geo")
     own = data("geo").resolve() in path.resolve().parents
-    if path.suffix == ".geo" and not own and os.environ.get(RUN_GEO) != "1":
+    if not (own or is_mesh(path)) and os.environ.get(RUN_GEO) != "1":
         raise InputError(
-            f"geometry = {name}: is a program that Gmsh runs; if you trust it, say --run-geo"
+            f"geometry = {name}: is a program that Gmsh runs (a mesh ends in .msh and begins with "
+            f"{MESH.decode()}); if you trust it, say --run-geo"
         )
     return path
+
+
+#: What a mesh in Gmsh's format begins with.
+MESH = b"$MeshFormat"
+
+
+def is_mesh(path: Path) -> bool:
+    """Whether a file can be nothing but data to Gmsh, which runs what it does not know as a .geo,
+    whatever its name, and unpacks it before.
+    """
+    try:
+        with path.open("rb") as file:
+            return path.suffix == ".msh" and file.read(len(MESH)) == MESH
+    except OSError as error:
+        raise InputError(f"geometry = {path}: {error.strerror}") from None
 
 
 def check_energies(found: Mapping[str, list]) -> None:

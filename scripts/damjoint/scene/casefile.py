@@ -23,8 +23,8 @@ from .parameters import assignments, parameter
 
 LISTS = ("levels", "tail_levels", "times")
 TEXTS = ("title", "also_uplift", "geometry")
-#: Bytes a case file may have, and files that may include one another.
-LONGEST, DEEPEST = 1_000_000, 8
+#: Bytes a case file may have, and files that a case may be made of.
+LONGEST, MOST_FILES = 1_000_000, 50
 
 TOKEN = re.compile(
     r"""(?P<nothing>\s+|//[^\n]*|/\*.*?\*/) |(?P<text>"[^"\\\n]*")
@@ -41,6 +41,8 @@ class CaseText:
     defaults: dict[str, float | str] = field(default_factory=dict)
     lists: dict[str, list[float]] = field(default_factory=dict)
     texts: dict[str, str] = field(default_factory=dict)
+    #: how many files have been read
+    files: int = field(default=0, compare=False)
 
 
 def read(path: Path) -> CaseText:
@@ -49,7 +51,7 @@ def read(path: Path) -> CaseText:
     Raises InputError, naming file, line and statement, for anything else than the statements above.
     """
     found = CaseText()
-    read_into(found, path, 0)
+    read_into(found, path)
     return found
 
 
@@ -62,15 +64,16 @@ def written(said: CaseText) -> str:
     return "".join([*lines, assignments(said.defaults), *lists])
 
 
-def read_into(found: CaseText, path: Path, depth: int) -> None:
-    """Add the statements of a case file; depth: of inclusion."""
+def read_into(found: CaseText, path: Path) -> None:
+    """Add the statements of a case file."""
     if path.suffix != ".case":
         raise InputError(f'Include "{path.name}": must be a .case file')
-    if depth > DEEPEST:
-        raise InputError(
-            f"case {path}: includes itself, or more than {DEEPEST} files one in another"
-        )
+    found.files += 1
+    if found.files > MOST_FILES:
+        raise InputError(f"case {path}: includes itself, or is one of more than {MOST_FILES} files")
     try:
+        if path.exists() and not path.is_file():  # a pipe, a device: reading may not end
+            raise InputError(f"case {path}: must be a file")
         if path.stat().st_size > LONGEST:
             raise InputError(f"case {path}: must be a text of at most {LONGEST} bytes")
         text = path.read_text(encoding="utf-8-sig")
@@ -87,7 +90,7 @@ def read_into(found: CaseText, path: Path, depth: int) -> None:
         if kind == "other":
             raise InputError(f"{where}: {said(statement)}: {token!r} is not part of a case")
         if token == ";":
-            take(found, statement[:-1], path, depth, where)
+            take(found, statement[:-1], path, where)
             statement = []
     if statement:
         raise InputError(f"{where}: {said(statement)}: does not end with a semicolon")
@@ -99,12 +102,12 @@ def said(statement: list[tuple[str, str]]) -> str:
     return words if len(words) < 60 else words[:57] + "..."
 
 
-def take(found: CaseText, statement: list, path: Path, depth: int, where: str) -> None:
+def take(found: CaseText, statement: list, path: Path, where: str) -> None:
     """Carry out one statement: enter what it sets into `found`."""
     kinds, tokens = zip(*statement, strict=True) if statement else ((), ())
     where = f"{where}: {said(statement)}"
     if tokens[:1] == ("Include",) and kinds[1:] == ("text",):
-        read_into(found, path.parent / tokens[1][1:-1], depth + 1)
+        read_into(found, path.parent / tokens[1][1:-1])
     elif kinds[:1] == ("name",) and tokens[1:4] == ("(", ")", "=") and tokens[0] in LISTS:
         found.lists[tokens[0]] = numbers(tokens[4:], found, where)
     elif kinds[:1] == ("name",) and tokens[1:2] == ("=",) and tokens[0] in TEXTS:

@@ -166,20 +166,22 @@ def generate(case: Case) -> None:
     gmsh.parser.clear()
     gmsh.onelab.clear()
     own = case.geometry
-    with tempfile.NamedTemporaryFile("w", suffix=".geo") as file:
-        path = own or Path(file.name)
+    # in a folder of its own: beside a file Gmsh looks for options, FILE.opt, and runs them
+    with tempfile.TemporaryDirectory(prefix="damjoint-") as folder:
+        path = Path(folder) / f"scene{own.suffix if own else '.geo'}"
         if not own:
-            file.write(assignments(shares(case)) + f'Include "{data("geo")}/dam.geo";\n')
+            path.write_text(assignments(shares(case)) + f'Include "{data("geo")}/dam.geo";\n')
         elif own.suffix == ".geo":  # it may take sizes from the case
-            file.write(assignments(case.values) + f'Include "{own}";\n')
-            path = Path(file.name)
-        file.flush()
+            path.write_text(assignments(case.values) + f'Include "{own}";\n')
+        else:
+            path.symlink_to(own)
         try:
             gmsh.open(str(path))
             if not len(gmsh.model.mesh.getElements(int(case["dim"]))[0]):
                 gmsh.model.mesh.generate(int(case["dim"]))
         except Exception as error:  # what gmsh raises
             if own:
+                gmsh.finalize()  # which else stays busy for ever with what it could not read
                 raise InputError(f"geometry = {own}: {error}") from None
             raise RunError(f"mesh: {error}") from None
     if own:  # tags from 1 on: tables by tag stay small, and so do the keys of GetDP's memory
@@ -277,7 +279,7 @@ class Mesh:
         """Take the nodes of Gmsh's current mesh."""
         tags, coordinates, _ = gmsh.model.mesh.getNodes()
         self.nodes = len(tags)
-        self._place = np.zeros(int(tags.max()) + 1, int)
+        self._place = np.zeros(int(tags.max(initial=0)) + 1, int)
         self._place[tags] = np.arange(len(tags))
         self._coordinates = coordinates.reshape(-1, 3)
 

@@ -8,7 +8,9 @@ import difflib
 import json
 import math
 import re
+import signal
 import tempfile
+import threading
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
@@ -28,7 +30,11 @@ AUTOMATIC = -1.0
 def start_gmsh() -> None:
     """Start Gmsh once per process, quietly and without reading the user's settings."""
     if not gmsh.isInitialized():
+        handlers = {n: signal.getsignal(n) for n in (signal.SIGTERM, signal.SIGHUP)}
         gmsh.initialize(readConfigFiles=False, interruptible=False)
+        if threading.current_thread() is threading.main_thread():
+            for number, handler in handlers.items():  # Gmsh has put back the system's
+                signal.signal(number, handler)
         gmsh.option.setNumber("General.Verbosity", 0)  # what goes wrong is raised, told in one line
 
 

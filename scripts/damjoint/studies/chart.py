@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg  # as in results/pictures.py
 from matplotlib.figure import Figure
 
+from ..results.drawing import write_picture
 from ..results.pictures import BLUE, LENGTHS, ORANGE, RED, unit
 from ..scene import parameters
 from .plan import Plan, Row, column_of, numbers
@@ -40,7 +41,7 @@ def draw(plan: Plan, rows: list[Row], title: str, path: Path) -> str:
     FigureCanvasAgg(figure)
     figure.suptitle(textwrap.fill(title, 100), fontsize=11, parse_math=False)
     drawing(figure, plan, rows, axes)
-    figure.savefig(path, dpi=110)
+    write_picture(figure, path, 110)
     return ""
 
 

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from ..results.drawing import write_picture
 from ..results.pictures import BLUE, GREEN, LENGTHS, ORANGE, RED, unit
 from .branch import Branch, Point
 
@@ -44,7 +45,7 @@ def draw(found: Found, path: Path) -> None:
     for axes in (*left, right):
         axes.grid(alpha=0.3)
         axes.legend(fontsize=8)
-    figure.savefig(path, dpi=110)
+    write_picture(figure, path, 110)
 
 
 def heading(found: Found) -> str:

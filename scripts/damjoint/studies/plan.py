@@ -120,7 +120,7 @@ def sample_of(words: list[str], **how: object) -> Sample:
         f"--sample {' '.join(words)}: must be N NAME=DISTRIBUTION ..., such as "
         "1000 mu=normal(1.0,0.15)"
     )
-    if not number.isdigit() or not 1 <= int(number) <= MOST_ROWS or not laws:
+    if not number.isdecimal() or not 1 <= int(number) <= MOST_ROWS or not laws:
         raise bad
     found = {}
     for text in laws:

@@ -23,6 +23,7 @@ from ..results.units import FORCES, MOMENTS
 from ..results.verdict import failed, statement, stiffness_ratio
 from ..scene.case import Case
 from ..scene.parameters import constants, declared, parse
+from ..storage import whole
 from .check import Check, by_finite_elements, by_gravity, hand_calculation, picture_table
 
 #: Of the parts of a picture that are dots, not lines.
@@ -35,7 +36,7 @@ def write(folders: list[Path], to: Path) -> None:
     Raises InputError if one of them is no run's folder, or the page can not be written.
     """
     runs = [run for folder in folders for run in stored.runs_in(folder)]
-    parts = [part_of(folder, stored.read(folder)) for folder in runs]
+    parts = [read_part(folder) for folder in runs]
     environment = Environment(
         loader=FileSystemLoader(Path(__file__).parent),
         autoescape=True,
@@ -47,9 +48,22 @@ def write(folders: list[Path], to: Path) -> None:
         runs=parts, version=__version__, now=f"{datetime.now():%Y-%m-%d %H:%M}"
     )
     try:
-        to.write_text(page, encoding="utf-8")
+        with whole(to) as path:
+            path.write_text(page, encoding="utf-8")
     except OSError as error:
         raise InputError(f"to = {to}: {error}") from None
+
+
+def read_part(folder: Path) -> dict:
+    """What the page says of the run in a folder.
+
+    Raises InputError if its files are not what a run writes.
+    """
+    solution = stored.read(folder)
+    try:
+        return part_of(folder, solution)
+    except stored.DAMAGED as error:
+        raise InputError(f"out = {folder}: damaged: {error!r}") from None
 
 
 def part_of(folder: Path, solution: Solution) -> dict:
@@ -70,7 +84,7 @@ def part_of(folder: Path, solution: Solution) -> dict:
         "name": case.name,
         "verdict": told["verdict"],
         "fails": fails,
-        "hints": told["hints"],
+        "hints": [*told["hints"]],
         "made": f"{made:%Y-%m-%d %H:%M}",
         "scene": scene_of(case),
         "differences": differences(case),

@@ -9,7 +9,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,7 +18,8 @@ from tqdm import tqdm
 
 from .. import InputError
 from ..scene.case import Case, has_drains, load
-from .sweep import read_done
+from ..storage import lock
+from .sweep import pool_of, read_done
 from .verification import Written, unjustified, violations
 
 #: Columns of the result file.
@@ -270,7 +271,7 @@ def one(seed: int, number: int) -> dict[str, object]:
 
 def spread(seed: int, numbers: list[int], jobs: int) -> Iterator[dict[str, object]]:
     """The rows of scenes as they are done."""
-    with ProcessPoolExecutor(jobs) as pool:
+    with pool_of(jobs) as pool:
         waiting = [pool.submit(one, seed, number) for number in numbers]
         try:
             yield from (future.result() for future in as_completed(waiting))
@@ -291,10 +292,10 @@ def stress(
         raise InputError(f"out = {out}: must be a file in an existing folder")
     done = read_done(out, list(COLUMNS))
     missing = [number for number in range(count) if f"{seed}-{number}" not in done]
-    fresh = not out.exists() or not out.stat().st_size
     with out.open("a", newline="") as file:
+        lock(file.fileno(), out)
         writer = csv.DictWriter(file, COLUMNS, restval="", lineterminator="\n")
-        if fresh:
+        if not file.tell():
             writer.writeheader()
         rows = spread(seed, missing, jobs or os.cpu_count() or 1)
         for row in progress(

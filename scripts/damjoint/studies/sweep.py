@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import csv
 import hashlib
+import multiprocessing
 import os
 import sys
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -22,6 +24,7 @@ from ..engines.condensed.interface import Interface
 from ..results.tables import HISTORY
 from ..results.verdict import failed, statement, verdict
 from ..scene.case import Case, first_mesh, load
+from ..storage import lock
 from .bodies import interface_of
 from .critical import Search
 from .limit import mechanism
@@ -166,6 +169,21 @@ def read_done(path: Path, columns: list[str]) -> set[str]:
     return {row[0] for row in rows[1:] if len(row) == len(columns)}
 
 
+def pool_of(jobs: int) -> ProcessPoolExecutor:
+    """Processes that end with this one, even where it is killed."""
+    return ProcessPoolExecutor(jobs, initializer=end_with_parent)
+
+
+def end_with_parent() -> None:
+    """End this process when the one that has started it is gone."""
+
+    def wait() -> None:
+        multiprocessing.parent_process().join()
+        os._exit(1)
+
+    threading.Thread(target=wait, daemon=True).start()
+
+
 def spread(tasks: dict[str, Task], jobs: int, scheduler: str | None) -> Iterator[tuple[str, dict]]:
     """(key, row) of each task as it is done: here, in `jobs` processes, or on a dask scheduler."""
     work = bundles(tasks)
@@ -195,7 +213,7 @@ def spread(tasks: dict[str, Task], jobs: int, scheduler: str | None) -> Iterator
         for keys, some in zip(work, chosen, strict=True):
             yield from zip(keys, last_rows(some), strict=True)
     else:
-        with ProcessPoolExecutor(jobs) as pool:
+        with pool_of(jobs) as pool:
             waiting = {
                 pool.submit(last_rows, some): keys for keys, some in zip(work, chosen, strict=True)
             }
@@ -265,10 +283,10 @@ def sweep(
         if first.search:
             Search(*first.search)  # what is asked for is checked here
         interface_of(first.case)  # condensed once, before the processes start
-    fresh = not out.exists() or not out.stat().st_size
     with out.open("a", newline="") as file:
+        lock(file.fileno(), out)
         writer = csv.writer(file, lineterminator="\n")
-        if fresh:
+        if not file.tell():
             writer.writerow(columns)
         rows = spread(missing, jobs or os.cpu_count() or 1, scheduler) if missing else ()
         for key, row in progress(

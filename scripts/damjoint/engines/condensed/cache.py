@@ -82,8 +82,9 @@ def cached(case: Case) -> tuple[Condensed, Bodies | None]:
     if not case.geometry:
         check_size(case)
     try:
-        bodies = Bodies.of(case)
-        made = condense(case, bodies)
+        with np.errstate(over="raise", invalid="raise"):
+            bodies = Bodies.of(case)
+            made = condense(case, bodies)
     except (ArithmeticError, RuntimeError, linalg.LinAlgError) as error:
         if isinstance(error, RunError):
             raise

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ... import data
+from ... import RunError, data
 from ...scene.case import load
 from ...scene.parameters import assignments, listing, parameter
 from . import process
@@ -67,6 +67,9 @@ def evaluate(
             + f'out_dir = "./";\nInclude "{data("pro")}/law_path.pro";\n'
         )
         process.execute(problem, ["-msh", str(folder / "one.msh"), "-solve", "Path"])
-        table = np.loadtxt(folder / "law.txt", ndmin=2)
+        try:
+            table = np.loadtxt(folder / "law.txt", ndmin=2)
+        except (OSError, ValueError) as damage:
+            raise RunError(f"GetDP: its table can not be read: {damage}") from None
     names = "sigma_n", "tau_1", "tau_2", "damage", "open", "slid", *MEMORY[law]
     return dict(zip(names, table.T, strict=False))

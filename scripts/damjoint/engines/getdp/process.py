@@ -8,7 +8,9 @@ import os
 import re
 import shutil
 import subprocess
+import tempfile
 from collections.abc import Callable
+from functools import lru_cache
 from pathlib import Path
 
 from ... import InputError, RunError, data
@@ -24,21 +26,58 @@ ALONE = {
     "OMPI_MCA_btl": "self",
     "OMPI_MCA_pml": "ob1",
 }
+#: Seconds in which a program has to say its version.
+PATIENCE = 60
+
+
+#: A number that GetDP prints.
+NUMBER = r"(\d+\.?\d*(?:e[+-]?\d+)?)"
 
 
 def find_getdp() -> str:
     """The GetDP program: $GETDP, then PATH.
 
-    Raises InputError if there is none.
+    Raises InputError if there is none that can be used.
     """
     program = os.environ.get("GETDP") or "getdp"
     found = shutil.which(program)
-    if not found:
-        raise InputError(
-            f"GETDP = {program}: no such program; allowed: a GetDP >= 3.2 in $GETDP or on the PATH "
-            "(Debian, Ubuntu: apt-get install getdp)"
-        )
-    return found
+    why = "no such program"
+    if found:
+        told = version_of(found)
+        if tuple(map(int, re.findall(r"\d+", told)[:2])) >= OLDEST:
+            return found
+        why = f"version {told}" if told else "does not say a version"
+    raise InputError(
+        f"GETDP = {program}: {why}; allowed: a GetDP >= 3.2 in $GETDP or on the PATH "
+        "(Debian, Ubuntu: apt-get install getdp)"
+    )
+
+
+@lru_cache
+def version_of(program: str) -> str:
+    """The version that a GetDP says it has; empty if it says none."""
+    with tempfile.TemporaryDirectory(prefix="damjoint-") as folder:
+        try:
+            done = subprocess.run(
+                [program, "--version"],
+                cwd=folder,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+                env=environment(Path(folder)),
+                timeout=PATIENCE,
+            )
+        except (OSError, subprocess.TimeoutExpired):
+            return ""
+    told = re.search(r"^\d+\.\d+[\w.-]*", done.stdout.decode(errors="replace"), re.M)
+    return told[0] if told else ""
+
+
+def environment(folder: Path, threads: int = 1) -> dict[str, str]:
+    """The environment of a GetDP that works in a folder; what Open MPI leaves stays there."""
+    number = str(threads)
+    own = {"TMPDIR": str(folder), "OPENBLAS_NUM_THREADS": number, "OMP_NUM_THREADS": number}
+    return {**ALONE, **os.environ, **own}
 
 
 def own_lists(mesh: Mesh) -> dict[str, list[float]]:
@@ -109,11 +148,10 @@ def execute(
     line printed. Raises RunError with GetDP's first error line, and its last lines where it ended
     without one.
     """
-    number = str(threads)
-    environment = {**ALONE, **os.environ, "OPENBLAS_NUM_THREADS": number, "OMP_NUM_THREADS": number}
-    command = [find_getdp(), problem.name, *arguments, "-v", "4"]
+    program = find_getdp()
+    command = [program, problem.name, *arguments, "-v", "4"]
     errors, last = [], []
-    told = {"version": "", "unknowns": 0, "wall": 0.0, "memory": 0.0}
+    told = {"version": version_of(program), "unknowns": 0, "wall": 0.0, "memory": 0.0}
     process = subprocess.Popen(
         command,
         cwd=problem.parent,
@@ -121,7 +159,7 @@ def execute(
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
-        env=environment,
+        env=environment(problem.parent, threads),
         errors="replace",
     )
     RUNNING.append(process)
@@ -130,19 +168,15 @@ def execute(
             last = [*last[-2:], line.strip()]
             if line.startswith(("Error", "Fatal", "Warning")) or "Error   :" in line:
                 errors.append(line.strip())
-            elif match := re.search(r"\[GetDP ([\d.]+)", line):
-                told["version"] = match[1]
             elif match := re.search(r"System 1/\d+: (\d+) Dofs", line):
                 told["unknowns"] = int(match[1])
-            elif match := re.search(r"Stopped.*Wall = ([\d.e+-]+)s.*Mem = ([\d.e+-]+)Mb", line):
+            elif match := re.search(rf"Stopped.*Wall = {NUMBER}s.*Mem = {NUMBER}Mb", line):
                 told["wall"], told["memory"] = float(match[1]), float(match[2])
             on_line(line)
         process.wait()
     finally:  # also where on_line has been interrupted
         process.kill()
         RUNNING.remove(process)
-    if told["version"] and tuple(int(v) for v in told["version"].split(".")[:2]) < OLDEST:
-        raise InputError(f"GETDP = {command[0]}: version {told['version']}; allowed: 3.2 or newer")
     if process.returncode or errors:
         why = (
             errors[0]
@@ -169,8 +203,11 @@ def fill(
     problem = write_problem(case, mesh, folder, {"views": 0.0, "fields": float(fields)})
 
     def watch(line: str) -> None:
-        if match := re.match(r"step ([\d.e+-]+) ", line):
+        if match := re.match(rf"step {NUMBER} ", line):
             on_step(float(match[1]))
 
     threads = 1 if case["dim"] == 2 else 2
-    return execute(problem, ["-msh", str(mesh_file), "-solve", "Fill"], threads, watch)
+    told = execute(problem, ["-msh", str(mesh_file), "-solve", "Fill"], threads, watch)
+    if not (folder / "status.txt").exists():
+        raise RunError("GetDP: ended without saying how far it went")
+    return told

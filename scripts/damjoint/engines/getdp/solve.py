@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ... import InputError
+from ... import InputError, RunError
 from ...scene.case import Case, flows, has_drains
 from ...scene.mesh import Mesh, mesh_of
 from .. import OnStep, Outcome
@@ -78,7 +78,11 @@ def solve(case: Case, on_step: OnStep, fields: bool) -> Iterator[Outcome]:
                 error = caught
                 if not isinstance(caught, Exception):  # interrupted: the others need not go on
                     process.stop_all()
-            result, saved = tables.read(scene, folder)
+            try:
+                result, saved = tables.read(scene, folder)
+                found = tables.read_fields(folder, saved, mesh) if fields and not error else {}
+            except (OSError, ValueError, IndexError) as damage:
+                raise error or RunError(f"GetDP: its tables can not be read: {damage}") from None
             result.info = {
                 "engine": "getdp",
                 "mesh": mesh.counts,
@@ -86,6 +90,4 @@ def solve(case: Case, on_step: OnStep, fields: bool) -> Iterator[Outcome]:
                 "wall_seconds": {"mesh": meshed, "solve": told.get("wall")},
                 "getdp": {"version": told.get("version"), "peak_memory_mb": told.get("memory")},
             }
-
-            found = tables.read_fields(folder, saved, mesh) if fields and not error else {}
             yield Outcome(result, lambda: mesh, lambda found=found: found, error)

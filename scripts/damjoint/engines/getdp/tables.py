@@ -61,7 +61,8 @@ def node_means(rows: np.ndarray, values: np.ndarray, number: int) -> np.ndarray:
 def read_history(case: Case, folder: Path) -> dict[str, np.ndarray]:
     """The rows of history.txt that are complete, {column of PRINTED: values}, and tail_level."""
     file = folder / "history.txt"
-    lines = file.read_text().splitlines() if file.exists() else []
+    # what stands behind the last end of a line is not whole
+    lines = file.read_text().split("\n")[:-1] if file.exists() else []
     rows = [line.split()[1:] for line in lines]
     steps = np.array([row for row in rows if len(row) == len(PRINTED)], float)
     printed = dict(zip(PRINTED, steps.reshape(-1, len(PRINTED)).T, strict=True))
@@ -120,12 +121,15 @@ def read(case: Case, folder: Path) -> tuple[Results, dict[int, float]]:
     """Read what GetDP has left in a folder, complete or not: everything up to the last converged
     step.
 
-    Returns the results, and the times of the files by their number.
+    Returns the results, and the times of the files by their number. Raises OSError, ValueError if
+    what should be whole is not.
     """
     history = read_history(case, folder)
     status = folder / "status.txt"
     finished = status.exists()
     stopped = finished and status.read_text().strip() != "0"
+    if finished and not stopped and not np.isclose(history["time"], case.times[-1]).any():
+        raise ValueError(f"no step at t = {case.times[-1]:g}, where it says to be")
     blocks, saved = [], {}
     for number, time in saved_times(case, history, stopped).items():
         level = history["level"][np.flatnonzero(history["time"] == time)[0]]

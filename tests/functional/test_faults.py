@@ -1,0 +1,143 @@
+"""What can go wrong around a run: signals, full disks, links, another run in the same place."""
+
+import contextlib
+import fcntl
+import json
+import os
+import resource
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from damjoint.storage import held, whole
+
+BARE = ("--set", "n_joint=10", "--set", "h_dam=3", "--set", "h_found=4", "--no-fields")
+RUN = ("run", "c", *BARE, "--no-picture", "--levels", "6")
+
+
+def wait_for(what, seconds=30):
+    """Until it is true."""
+    end = time.monotonic() + seconds
+    while not what():
+        assert time.monotonic() < end
+        time.sleep(0.05)
+
+
+def test_a_run_that_is_told_to_end(tmp_path):
+    """By SIGTERM as by Ctrl-C, with the GetDP it waits for; nothing is left behind."""
+    fake, told = tmp_path / "getdp", tmp_path / "out" / "run.json"
+    version = '[ "$1" = --version ] && echo 3.2.0 && exit'
+    fake.write_text(f"#!/bin/sh\n{version}\ntouch begun\nexec sleep 60\n")
+    fake.chmod(0o755)
+    (tmp_path / "tmp").mkdir()
+    process = subprocess.Popen(
+        [sys.executable, "-m", "damjoint", *RUN, "--engine", "getdp", "--out", told.parent],
+        env=os.environ | {"GETDP": str(fake), "TMPDIR": str(tmp_path / "tmp")},
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    wait_for(lambda: list((tmp_path / "tmp").glob("*/*/begun")))
+    process.send_signal(signal.SIGTERM)
+    _, said = process.communicate(timeout=30)
+    assert process.returncode == 130 and len(said.splitlines()) == 1
+    assert json.loads(told.read_text())["state"] == "interrupted"
+    assert not any((tmp_path / "tmp").iterdir())
+    with pytest.raises(ProcessLookupError):
+        os.killpg(process.pid, 0)
+
+
+def test_processes_end_with_the_one_that_has_started_them(tmp_path):
+    script = """
+import os, time
+from damjoint.studies.sweep import pool_of
+pool = pool_of(2)
+print(*{pool.submit(os.getppid).result(), *pool._processes}, flush=True)
+time.sleep(600)
+"""
+    command = [sys.executable, "-c", script]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, start_new_session=True) as process:
+        process.stdout.readline()
+        process.kill()
+    # those that are dead, but not yet buried by init, can still be told
+    alive = ["ps", "-o", "stat=", "--sid", str(process.pid)]
+    wait_for(lambda: not subprocess.run(alive, capture_output=True).stdout.strip(b" Z\n"))
+
+
+def test_a_full_disk(command, tmp_path):
+    """One line with the file's name, no half of one, and a second try works."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (2000, hard))
+    try:
+        code, _, err = command(*RUN, "--levels", "3,4,5,6")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert code == 1 and "File too large: 'out/c/" in err and len(err.splitlines()) == 1
+    assert not list((tmp_path / "out" / "c").glob(".*"))
+    assert command(*RUN)[0] == 0
+
+
+def test_a_file_is_whole_or_as_it_was(tmp_path):
+    path = tmp_path / "table.csv"
+    path.write_text("old")
+    with contextlib.suppress(KeyboardInterrupt), whole(path) as part:
+        part.write_text("ne")
+        raise KeyboardInterrupt
+    assert path.read_text() == "old" and list(tmp_path.iterdir()) == [path]
+
+
+def test_links_lead_nowhere(command, tmp_path):
+    """Out of the output folder nothing is written."""
+    (tmp_path / "mine.csv").write_text("mine")
+    out = tmp_path / "out" / "c"
+    out.mkdir(parents=True)
+    (out / "joint.csv").symlink_to(tmp_path / "mine.csv")
+    assert command(*RUN)[0] == 0
+    assert (tmp_path / "mine.csv").read_text() == "mine" and not (out / "joint.csv").is_symlink()
+    (out / "fields").symlink_to(tmp_path)
+    code, _, err = command(*RUN)
+    assert code == 2 and "fields must be a folder, and not a link" in err
+
+
+def test_another_run_in_the_folder(command, tmp_path):
+    assert command(*RUN)[0] == 0
+    before = {p: p.read_bytes() for p in (tmp_path / "out" / "c").iterdir()}
+    with held(tmp_path / "out" / "c"):
+        code, _, err = command(*RUN)
+    assert code == 2 and "out/c: another damjoint is writing there" in err
+    assert {p: p.read_bytes() for p in (tmp_path / "out" / "c").iterdir()} == before
+    assert command(*RUN)[0] == 0
+
+
+def test_another_sweep_into_the_file(command, tmp_path):
+    words = "sweep", "c", *BARE[:-1], "--vary", "mu=0.5", "--out", "mu.csv"
+    with (tmp_path / "mu.csv").open("a") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        code, _, err = command(*words)
+        assert code == 2 and "mu.csv: another damjoint is writing there" in err
+    assert command(*words)[0] == 0
+
+
+def test_a_damaged_run_json(command, tmp_path):
+    assert command(*RUN)[0] == 0
+    file = tmp_path / "out" / "c" / "run.json"
+    whole_one = json.loads(file.read_text())
+    for changed in ({"mesh": None}, {"hints": None}, {"wall_seconds": {"solve": "long"}}):
+        file.write_text(json.dumps(whole_one | changed))
+        code, _, err = command("report", "out/c")
+        assert code == 2 and "out = out/c: damaged" in err and len(err.splitlines()) == 1
+        assert not (tmp_path / "report.html").exists()
+
+
+def test_a_locale_without_all_letters(tmp_path):
+    """Of the table's units."""
+    locale = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    done = subprocess.run(
+        [sys.executable, "-m", "damjoint", *RUN, "--set", "E=1e10"],
+        cwd=tmp_path,
+        env=os.environ | locale,
+        capture_output=True,
+    )
+    assert (done.returncode, done.stderr) == (0, b"") and b"[?m]" in done.stdout
