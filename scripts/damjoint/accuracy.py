@@ -130,7 +130,7 @@ def refined(case: Case, once: Callable[[Case], Outcome]) -> Outcome:
         except (RunError, MemoryError, KeyboardInterrupt) as caught:
             error = caught
         if error:
-            why = f"n_joint = {meshed['n_joint']:g}: {error or type(error).__name__}"
+            why = f"n_joint = {meshed['n_joint']:g}: {str(error) or type(error).__name__}"
             if not isinstance(error, Exception):
                 outcome = replace(outcome, error=error)
             break

@@ -183,4 +183,5 @@ def test_an_interrupted_search_leaves_what_it_has_found(monkeypatch, tmp_path):
     with pytest.raises(KeyboardInterrupt):
         critical("c", "level", {"pena_tang": 0.0}, out=tmp_path / "out")
     assert (tmp_path / "out/critical.csv").read_text().count("\n") > 4
-    assert "interrupted" in json.loads((tmp_path / "out/run.json").read_text())["statement"]
+    told = json.loads((tmp_path / "out/run.json").read_text())
+    assert told["state"] == "interrupted" in told["statement"]

@@ -143,7 +143,7 @@ def rows_at(table: dict[str, np.ndarray], time: float | None = None) -> dict[str
     """The rows of one time (the last one by default), sorted from heel to toe, then by z."""
     time = table["time"].max() if time is None else time
     rows = np.flatnonzero(np.isclose(table["time"], time))
-    s, z = (np.round(table[n][rows] / max(np.abs(table["s"]).max(), 1e-300), 9) for n in "sz")
+    s, z = (np.round(table[n][rows] / (np.abs(table["s"]).max() or 1.0), 9) for n in "sz")
     rows = rows[np.lexsort((z, s))]
     return {name: column[rows] for name, column in table.items()}
 

@@ -218,8 +218,14 @@ def hints(results: Results) -> list[str]:
 
 
 def seen_in(results: Results, last: dict[str, float]) -> list[str]:
-    """What the last state shows: drains in the crack, tension at the heel."""
+    """What the last state shows: a crack counted in elements, drains in it, tension at the heel."""
     case, found, crack = results.case, [], last["crack_length"]
+    element = case.joint_length / case["n_joint"]
+    if crack > 0 and not (case.accuracy or case.geometry):
+        found.append(
+            f"the crack ({crack:.3g} m) ends somewhere in an element of {element:.2g} m; "
+            "--accuracy 3% finds the mesh, and says how wrong it is"
+        )
     if has_drains(case) and crack > case["drain_x"]:
         kept = "" if case["uplift"] == "cracked" else "; their effect is kept all the same"
         found.append(

@@ -73,6 +73,8 @@ class Answer:
     point: Point | None
     #: the same by the gravity method; None if it gives none
     gravity: float | None = None
+    #: what has ended the search before its time
+    error: BaseException | None = None
 
     @property
     def confirmed(self) -> bool:
@@ -278,12 +280,13 @@ class Search:
         low, high = sorted((stands, fails))
         return next((v for v in (root - aside, root + aside) if low < v < high), None)
 
-    def so_far(self) -> Answer:
+    def so_far(self, error: BaseException) -> Answer:
         """What is known when the search is interrupted."""
         standing = [t for t in self.trials if t.stands]
         ends = [f"{t.value:.6g} {'stands' if t.stands else 'fails'}" for t in self.trials[-2:]]
         doubt = f"interrupted: {', '.join(ends)}" if ends else "interrupted"
-        return Answer(None, "", "", doubt, arrived(standing[-1]) if standing else None)
+        point = arrived(standing[-1]) if standing else None
+        return Answer(None, "", "", doubt, point, error=error)
 
     def answer(self, value: float | None, failing: Branch, point: Point | None) -> Answer:
         """The answer, with what the failing branch shows."""
@@ -390,8 +393,8 @@ def critical(
     start = time.perf_counter()
     try:
         answer = search.run()
-    except KeyboardInterrupt:
-        write(search, search.so_far(), out, time.perf_counter() - start)
+    except KeyboardInterrupt as caught:
+        write(search, search.so_far(caught), out, time.perf_counter() - start)
         raise
     finally:
         shown.close()
@@ -427,18 +430,18 @@ def write(search: Search, answer: Answer, out: Path, seconds: float) -> None:
     from .critical_picture import Found, draw
 
     case = search.own
-    folders.clear(out)
-    folders.say(case, out, "complete", answer.doubt)
-    if answer.point:
-        result = last_state(search, answer.point)
-        found = {"critical": told_of(search, answer), "wall_seconds": {"search": seconds}}
-        result.info = about(answer.point.filling.joint.bulk) | found
-        save(Outcome(result, mesh=lambda: None, fields=dict), case, out)
-    write_csv(out / "critical.csv", table(search))
     trials = [(t.value, t.stands, t.branch) for t in search.trials]
     what = case.title, search.of, search.unit, trials
     shown = Found(*what, answer.value, answer.gravity, answer.mode)
-    draw(shown, out / f"{case.name}_critical.png")
+    with folders.taken(case, out):
+        folders.say(case, out, "interrupted" if answer.error else "complete", answer.doubt)
+        if answer.point:
+            result = last_state(search, answer.point)
+            found = {"critical": told_of(search, answer), "wall_seconds": {"search": seconds}}
+            result.info = about(answer.point.filling.joint.bulk) | found
+            save(Outcome(result, lambda: None, dict, answer.error), case, out)
+        write_csv(out / "critical.csv", table(search))
+        draw(shown, out / f"{case.name}_critical.png")
 
 
 def told_of(search: Search, answer: Answer) -> dict:
