@@ -51,7 +51,7 @@ def test_what_a_run_has_written_stands_every_test(written, law, drained):
         ("history", "T", lambda v: v * 1.001, "T ="),
         ("history", "M", lambda v: v * 1.001, "M ="),
         ("history", "level", lambda v: v + 1e-3, "not at the level"),
-        ("history", "slip_length", lambda v: 1 - v[0] - 0.1 * np.arange(len(v)), "slip_length falls"),
+        ("history", "slip_length", lambda v: 1 - 0.1 * np.arange(len(v)), "slip_length falls"),
         ("joint", "p", lambda v: v * 1.01, "the integral of p"),
         ("joint", "sigma_n_eff", lambda v: v + 1e6, "tension"),
         ("joint", "sigma_n_eff", lambda v: v * 1.01, "contact"),
