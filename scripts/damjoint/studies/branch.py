@@ -284,7 +284,7 @@ class Branch:
         """Look at the branch's end to the precision: at its highest level, or where it passes the
         target or f_c; no closer than needed to see that a wanted level is out of reach.
         """
-        for _ in range(0 if self.slides else MOST_LOOKS):
+        for _ in range(MOST_LOOKS):
             left, share, possible = self.unknown()
             known = not possible - self.highest > PRECISION / 2 * possible
             if known or possible < wanted < np.inf:
@@ -305,6 +305,8 @@ class Branch:
             right = len(self.points) - 1 if self.crushed else self.arrival
             ends = [p.level for p in self.points[max(right - 1, 0) : right + 1]]
             return right - 1, 0.5, self.highest + max(ends) - min(ends)
+        if self.slides:
+            return self.top, 0.5, self.highest
         inner = (i for i in (self.top - 1, self.top) if 0 <= i < len(self.points) - 1)
         sides = [(i, *self.summit(i)) for i in inner if self.points[i + 1].pushed]
         return max(sides, key=lambda side: side[2], default=(self.top, 0.5, self.highest))

@@ -213,7 +213,7 @@ class Filling:
         memory = state.memory
         level, tail, prescribed, target = self.water_at(time)
         asked = Loading.at(self.case, time, level, tail)
-        stiff = joint.case["K_N"] * joint.bulk.width
+        stiff, limit = joint.case["K_N"] * joint.bulk.width, self.limit
 
         def evaluate(
             jump: np.ndarray, level: float, last: Iterate | None, drag: Drag | None = None
@@ -245,13 +245,13 @@ class Filling:
         with np.errstate(over="ignore", invalid="ignore"):  # an attempt that flies off is dropped
             start = evaluate(*self.start(time, level, prescribed, first), None)
             if attempt.drag:
-                found = relax(evaluate, start, self.limit, attempt, self.case["K_N"])
+                found = relax(evaluate, start, limit, attempt, self.case["K_N"])
             else:
-                found = newton(evaluate, start, self.limit, attempt)
+                found = newton(evaluate, start, limit, attempt)
         if found is None:
             return None
         end, iterations = found
-        if np.abs(end.jump).max() > self.limit.farthest:
+        if np.abs(end.jump).max() > limit.farthest:
             raise Fallen  # an equilibrium of small displacements only
         if prescribed and not 0 <= end.level <= self.case.highest_level:
             return None  # no reservoir has that level

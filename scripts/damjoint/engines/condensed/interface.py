@@ -94,6 +94,8 @@ class Interface:
         self.rule = elements.JOINT[quadrature][bulk.order]
         self.points = elements.points_of(space, self.rule)
         self.frames = frames(bulk.joint.normals)
+        #: whether it is a plane, but for the rounding of its nodes
+        self.flat = np.allclose(self.frames, self.frames[0], rtol=0, atol=1e-9)
         #: jump at the law's points (dim rows each: normal, tangent 1, tangent 2)
         self.at_points = self._components(self.points.values, self.frames[self.points.elements])
         self.from_points = self.at_points.T.tocsr()
@@ -117,13 +119,11 @@ class Interface:
         self.chord = Chord.of(bulk)
         #: from heel to toe along the joint [m], a mean in 3D
         self.length = self.points.weights.sum() / bulk.width
-        #: whether it is a plane
-        self.flat = np.allclose(self.frames, self.frames[0])
         self._made_for, self._compliance = None, None
 
     def _seen(self) -> tuple[np.ndarray, np.ndarray]:
         """Places and the frames in which their jumps are seen: one each on a plane joint."""
-        if (self.frames == self.frames[0]).all():
+        if self.flat:
             number = len(self.space.place)
             return np.arange(number), np.broadcast_to(self.frames[0], (number, 3, 3))
         tables = [table for _, table in self.space.connectivity]
