@@ -15,7 +15,6 @@ from dataclasses import dataclass, replace
 from types import ModuleType
 
 import numpy as np
-from scipy.integrate import trapezoid
 
 from . import RunError
 from .engines import OnStep, Outcome
@@ -207,6 +206,8 @@ def reached(result: Results) -> set[float]:
 
 def read(result: Results, times: list[float]) -> dict[str, list[float]]:
     """QUANTITIES at some requested times; the level also where the run has ended."""
+    from scipy.integrate import trapezoid  # half of a run's start
+
     case, states = result.case, [result.state(t) for t in times]
     means = [along(result.at(t)) for t in times]
     found = {

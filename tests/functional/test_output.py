@@ -2,6 +2,8 @@
 
 import csv
 import json
+import subprocess
+import sys
 
 import meshio
 import numpy as np
@@ -145,3 +147,13 @@ def test_a_joint_stiff_for_its_mesh_is_said(command, tmp_path):
     assert code == 0 and "K_N h/E = 5e+03" in out
     told = json.loads((tmp_path / "out/c/run.json").read_text())
     assert told["hints"][0] in out and "oscillate" in told["hints"][0]
+
+
+def test_a_plain_run_loads_no_library_it_does_not_need(tmp_path):
+    """Optimisation, statistics and plotting take longer to load than a published case to solve."""
+    words = ["run", "c", "--no-fields", "--no-picture", "--out", str(tmp_path / "out")]
+    heavy = ["scipy.optimize", "scipy.stats", "scipy.integrate", "matplotlib"]
+    tell = f"import sys; from damjoint import cli; cli.main({words})"
+    tell += f"; print([m for m in {heavy} if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", tell], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "[]"

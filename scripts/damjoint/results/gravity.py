@@ -17,7 +17,6 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq
 
 from ..scene.case import Case
 from ..scene.loads import Loading, line_forces
@@ -426,5 +425,8 @@ def at(case: Case, time: float, level: float | None = None) -> GravityMethod:
     tips = tips[tips <= body.length]
     for before, after in itertools.pairwise(tips):
         if excess(after) <= 0:
-            return state(float(brentq(excess, before, after, xtol=1e-12 * body.length)))
+            while after - before > 1e-12 * body.length:  # scipy's roots are half of a run's start
+                middle = (before + after) / 2
+                before, after = (middle, after) if excess(middle) > 0 else (before, middle)
+            return state(float(after))
     return state(body.length)

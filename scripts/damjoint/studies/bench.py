@@ -4,7 +4,9 @@ each option costs.
 
 from __future__ import annotations
 
+import contextlib
 import csv
+import hashlib
 import json
 import os
 import platform
@@ -13,8 +15,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterable
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import product
@@ -24,7 +25,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
-from .. import RunError
+from .. import RunError, data
 from .. import accuracy as on_request
 from ..engines import engine_of
 from ..engines.condensed import factor
@@ -38,8 +39,9 @@ from ..results.validation import read_at
 from ..results.verdict import statement
 from ..run import run
 from ..scene.case import ACCURACIES, Case, load
+from ..storage import whole
 from .bodies import interface_of
-from .sweep import filled
+from .sweep import filled, pool_of
 
 #: code_aster 15.2, sequential, on a 2-core machine: seconds of wall time of the whole job without
 #: meshing.
@@ -63,6 +65,9 @@ QUANTITIES = ("heel_opening", "toe_stress", "crack_tip", "slip", "leakage")
 
 #: Where the seconds of a run go; start: Python, libraries, reading the case.
 PARTS = ("start", "mesh", "assembly", "condensation", "newton", "post")
+
+#: What run.json calls a part that has another name here.
+PART_OF_RUN = {"newton": "solve"}
 
 
 def cold(arguments: list[str]) -> tuple[float, dict]:
@@ -103,16 +108,70 @@ def cold(arguments: list[str]) -> tuple[float, dict]:
         return wall, told
 
 
+class Kept:
+    """What a benchmark has measured so far, a line of JSON each: one that was interrupted goes on
+    where it was.
+
+    The first line names code and machine; what another has measured is not taken.
+    """
+
+    def __init__(self, path: Path, short: bool) -> None:
+        self.path, self.short = path, short
+        first = [short, sources(), machine()]
+        lines = path.read_text().splitlines() if path.exists() else []
+        self.known: dict[str, object] = {}
+        with contextlib.suppress(ValueError):  # a half-written last line
+            if lines and json.loads(lines[0]) == first:
+                for line in lines[1:]:
+                    key, value = json.loads(line)
+                    self.known[json.dumps(key)] = value
+        pairs = [[json.loads(key), value] for key, value in self.known.items()]
+        with whole(path) as part:
+            part.write_text("".join(json.dumps(one) + "\n" for one in (first, *pairs)))
+
+    def has(self, key: tuple) -> bool:
+        """Whether something was measured under a key."""
+        return json.dumps(key) in self.known
+
+    def once(self, key: tuple, measured: Callable[[], object]) -> object:
+        """What was measured under a key; measured now if it was not. JSON's types alone."""
+        name = json.dumps(key)
+        if not self.has(key):
+            self.known[name] = plain(measured())
+            with self.path.open("a") as file:
+                file.write(json.dumps([key, self.known[name]]) + "\n")
+        return self.known[name]
+
+
+def plain(value: object) -> object:
+    """A value of JSON's types: numpy's numbers as Python's, tuples and arrays as lists."""
+    if isinstance(value, (list, tuple, np.ndarray)):
+        return [plain(one) for one in value]
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def sources() -> str:
+    """A fingerprint of the code."""
+    files = [*Path(__file__).parents[1].rglob("*.py"), *data("pro").rglob("*.pro")]
+    files += data("geo").glob("*.geo")
+    return hashlib.sha256(b"".join(path.read_bytes() for path in sorted(files))).hexdigest()
+
+
 class Table(dict):
     """Columns of a table, {name: values}, filled row by row."""
 
-    def __init__(self, *names: str) -> None:
-        super().__init__({name: [] for name in names})
+    def __init__(self, name: str, *columns: str) -> None:
+        super().__init__({column: [] for column in columns})
+        self.name = name
 
     def add(self, *values: object) -> None:
         """One more row."""
         for column, value in zip(self.values(), values, strict=True):
             column.append(value)
+
+    def once(self, kept: Kept, key: tuple, cells: Callable[[], Sequence]) -> None:
+        """One more row: a key of its first columns, and the cells that are measured under it."""
+        self.add(*key, *kept.once((self.name, *key), cells))
 
     def rows(self, *where: object) -> np.ndarray:
         """Indices of the rows whose first columns have these values."""
@@ -126,31 +185,23 @@ def bar(things: Iterable, title: str, total: int | None = None) -> Iterable:
     return tqdm(things, desc=title, total=total, disable=not sys.stderr.isatty())
 
 
-def cases(short: bool) -> Table:
+def cases(kept: Kept) -> Table:
     """Each modeling, all its scenes, published steps, meshes of the document's size: seconds and
     where they went, MB, ratio to the published code; unless short, the plain engine's, too.
     """
-    table = Table(
-        "case", "seconds", *PARTS, "MB", "published", "times faster", "GetDP", "times faster, GetDP"
-    )
-    for name in bar(PUBLISHED, "cases"):
+    columns = "seconds", *PARTS, "MB", "published", "times faster", "GetDP", "times faster, GetDP"
+    table = Table("cases", "case", *columns)
+
+    def one(name: str) -> tuple:
         wall, told = cold([name])
-        spent = [
-            told["wall_seconds"][part]
-            for part in ("mesh", "assembly", "condensation", "solve", "post")
-        ]
-        plain = float("nan") if short else cold([name, "--engine", "getdp"])[0]
-        table.add(
-            name,
-            wall,
-            wall - sum(spent),
-            *spent,
-            told["peak_memory_mb"],
-            PUBLISHED[name],
-            PUBLISHED[name] / wall,
-            plain,
-            PUBLISHED[name] / plain,
-        )
+        spent = [told["wall_seconds"][PART_OF_RUN.get(part, part)] for part in PARTS[1:]]
+        getdp = float("nan") if kept.short else cold([name, "--engine", "getdp"])[0]
+        published = PUBLISHED[name]
+        faster = published, published / wall, getdp, published / getdp
+        return wall, wall - sum(spent), *spent, told["peak_memory_mb"], *faster
+
+    for name in bar(PUBLISHED, "cases"):
+        table.once(kept, (name,), partial(one, name))
     total = {n: sum(c) for n, c in table.items() if n != "case"}
     table.add(
         "sum",
@@ -229,35 +280,25 @@ def settings(
     return {"order": float(order), "n_joint": float(n), "mesh_pattern": pattern, **sizes, **solid}
 
 
-def overkill(short: bool) -> tuple[dict[str, np.ndarray], Table]:
+def overkill(kept: Kept) -> tuple[dict[str, np.ndarray], Table]:
     """QUANTITIES of each modeling's main scene on the finest mesh, {case: values}, and for SCENES
     how they got there: observed order and remaining error by extrapolation.
 
     Plane strain of order 2, 640 elements along the joint (80 if short), twice finer than --accuracy
     far away; the 3D modelings are plane, too (nu = 0, nothing varies along z).
     """
-    sizes = (20, 40, 80) if short else (160, 320, 640)
-    exact, table = (
-        {},
-        Table(
-            "scene",
-            "quantity",
-            *(f"n = {n}" for n in sizes),
-            "observed order",
-            "remaining error [%]",
-        ),
-    )
-    for name in bar(SCENES.values() if short else PUBLISHED, "overkill"):
+    sizes = (20, 40, 80) if kept.short else (160, 320, 640)
+    columns = *(f"n = {n}" for n in sizes), "observed order", "remaining error [%]"
+    exact, table = {}, Table("overkill", "scene", "quantity", *columns)
+
+    def one(name: str, n: int) -> np.ndarray:
+        chosen = settings(2, n, 0.5, "free", 2) | {"uplift": main_uplift(name)}
+        return read_off(measure(load(name, chosen))[0])
+
+    for name in bar(SCENES.values() if kept.short else PUBLISHED, "overkill"):
         wanted = sizes if name in SCENES.values() else sizes[-1:]
-        found = [
-            read_off(
-                measure(load(name, settings(2, n, 0.5, "free", 2) | {"uplift": main_uplift(name)}))[
-                    0
-                ]
-            )
-            for n in wanted
-        ]
-        exact[name] = found[-1]
+        found = [kept.once(("overkill", name, n), partial(one, name, n)) for n in wanted]
+        exact[name] = np.array(found[-1])
         if len(found) == 1:
             continue
         scene = next(s for s, c in SCENES.items() if c == name)
@@ -271,93 +312,69 @@ def overkill(short: bool) -> tuple[dict[str, np.ndarray], Table]:
     return exact, table
 
 
-def accuracy(short: bool, exact: dict[str, np.ndarray], start: float) -> Table:
+def accuracy(kept: Kept, exact: dict[str, np.ndarray], start: float) -> Table:
     """Error of QUANTITIES against the overkill solution, and the seconds spent: a row per scene and
     mesh, published steps, and for one mesh other numbers of steps.
     """
-    table = Table(
-        "scene",
-        "dim",
-        "pattern",
-        "order",
-        "n_joint",
-        "grading",
-        "steps",
-        "unknowns",
-        "seconds",
-        *PARTS,
-        *(f"error_{q}" for q in QUANTITIES),
-        "worst",
-    )
-    numbers = (10, 20) if short else (10, 20, 40, 80, 160, 320)
-    gradings = (1.0,) if short else (2.0, 1.0, 0.5)
+    mesh = "dim", "pattern", "order", "n_joint", "grading", "steps"
+    found = "unknowns", "seconds", *PARTS, *(f"error_{q}" for q in QUANTITIES), "worst"
+    table = Table("accuracy", "scene", *mesh, *found)
+    numbers = (10, 20) if kept.short else (10, 20, 40, 80, 160, 320)
+    gradings = (1.0,) if kept.short else (2.0, 1.0, 0.5)
+    published = "published"
     runs = [
-        (2, "free", order, n, grading, None)
+        (2, "free", order, n, grading, published)
         for order in (1, 2)
         for n in numbers
         for grading in gradings
     ]
-    runs += [(2, "regular", order, n, 1.0, None) for order in (1, 2) for n in numbers]
+    runs += [(2, "regular", order, n, 1.0, published) for order in (1, 2) for n in numbers]
     runs += [
-        (3, pattern, order, n, 1.0, None)
+        (3, pattern, order, n, 1.0, published)
         for pattern, most in (("layers", 80), ("split", 160), ("free", 40))
         for order in (1, 2)
         for n in numbers
         if n <= most
     ]
     runs += [(2, "free", 2, numbers[-2], 1.0, steps) for steps in (1, 2, 4)]
+
+    def one(name: str, chosen: tuple) -> tuple:
+        dim, pattern, order, n, grading, steps = chosen
+        asked = settings(order, n, grading, pattern, dim) | {"uplift": main_uplift(name)}
+        case = load(name, asked, steps=None if steps == published else steps)
+        result, spent = measure(case)
+        spent["start"] = start
+        parts = [spent[p] for p in PARTS]
+        off = errors(read_off(result), exact[name])
+        return spent["unknowns"], sum(parts), *parts, *off, max(off)
+
     for scene, name in SCENES.items():
-        main = {"uplift": main_uplift(name)}
-        for dim, pattern, order, n, grading, steps in bar(runs, scene):
-            chosen = settings(order, n, grading, pattern, dim) | main
-            result, spent = measure(load(name, chosen, steps=steps))
-            spent["start"] = start
-            off = errors(read_off(result), exact[name])
-            table.add(
-                scene,
-                dim,
-                pattern,
-                order,
-                n,
-                grading,
-                steps or "published",
-                spent["unknowns"],
-                sum(spent[p] for p in PARTS),
-                *(spent[p] for p in PARTS),
-                *off,
-                max(off),
-            )
+        for chosen in bar(runs, scene):
+            table.once(kept, (scene, *chosen), partial(one, name, chosen))
     return table
 
 
-def recommended(short: bool, exact: dict[str, np.ndarray]) -> Table:
+def recommended(kept: Kept, exact: dict[str, np.ndarray]) -> Table:
     """Each modeling's main scene: worst error of the published mesh and steps, and error and
     seconds of --accuracy.
     """
-    levels = list(ACCURACIES)[: 1 if short else None]
-    table = Table(
-        "case",
-        "published: error [%]",
-        "published",
-        *(
-            f"{level}: {what}"
-            for level in levels
-            for what in ("error [%]", "seconds", "of these start")
-        ),
-    )
-    for name in bar(list(exact), "accuracy"):
+    levels = list(ACCURACIES)[: 1 if kept.short else None]
+    told = "error [%]", "seconds", "of these start"
+    columns = (f"{level}: {what}" for level in levels for what in told)
+    table = Table("recommended", "case", "published: error [%]", "published", *columns)
+
+    def one(name: str) -> list:
         main = {"uplift": main_uplift(name)}
         row = [100 * worst(read_off(measure(load(name, main))[0]), exact[name]), PUBLISHED[name]]
         for level in levels:
-            case = load(name, main, accuracy=level)
-            result = accurate(case)
+            result = accurate(load(name, main, accuracy=level))
             wall, told = cold([name, "--accuracy", level, "--set", f"uplift={main['uplift']}"])
-            row += [
-                100 * worst(read_off(result), exact[name]),
-                wall,
-                wall - sum(told["wall_seconds"].values()),
-            ]
-        table.add(name, *row)
+            error = 100 * worst(read_off(result), exact[name])
+            row += [error, wall, wall - sum(told["wall_seconds"].values())]
+        return row
+
+    for name in bar(list(exact), "accuracy"):
+        table.once(kept, (name,), partial(one, name))
     table.add(
         "sum, worst", *(max(c) if "error" in n else sum(c) for n, c in table.items() if n != "case")
     )
@@ -395,27 +412,32 @@ DAMS = {
 }
 
 
-def estimates(short: bool) -> Table:
+def estimates(kept: Kept) -> Table:
     """Errors in percent that --accuracy estimates of DAMS, and the true ones, "estimated / true",
     by the same mesh rule with 1024 elements along the joint (256 if short), in 3D with 96.
     """
-    finest, levels = (256.0, ["coarse"]) if short else (1024.0, ["coarse", "standard"])
+    finest, levels = (256.0, ["coarse"]) if kept.short else (1024.0, ["coarse", "standard"])
     columns = [n for n in on_request.QUANTITIES if n not in ("level", "toe_stress")]
-    table = Table("scene", "accuracy", "reached", "n_joint", *columns)
-    for scene, (name, differs, stiffness, water) in bar(DAMS.items(), "estimates"):
-        if short and "imposed" not in scene:
-            continue
+    table = Table("estimates", "scene", "accuracy", "reached", "n_joint", *columns)
+
+    def one(scene: str) -> list[list]:
+        name, differs, stiffness, water = DAMS[scene]
         chosen = ROCK | {"K_N": stiffness, "K_T": stiffness} | differs
-        exact = None
         solid = chosen.get("dim") == 3
+        rows, exact = [], None
         for level in levels[:1] if solid else levels:
             case = load(name, chosen, water, accuracy=level)
             result = accurate(case)
             exact = exact or measure(on_finest(case, 96.0 if solid else finest))[0]
             told = result.info["error_estimate"]
             cells = [off(n, told["quantities"], result, exact) for n in columns]
-            reached = "yes" if told["reached"] else "no"
-            table.add(scene, level, reached, told["n_joint"][-1], *cells)
+            rows.append([level, "yes" if told["reached"] else "no", told["n_joint"][-1], *cells])
+        return rows
+
+    for scene in bar(DAMS, "estimates"):
+        if not kept.short or "imposed" in scene:
+            for row in kept.once(("estimates", scene), partial(one, scene)):
+                table.add(scene, *row)
     return table
 
 
@@ -452,15 +474,16 @@ def front(seconds: np.ndarray, error: np.ndarray, gain: float = 1.0) -> np.ndarr
     return np.array(chosen)
 
 
-def growth(short: bool) -> Table:
+def growth(kept: Kept) -> Table:
     """Seconds and memory against the number of unknowns, each size in a process of its own."""
-    table = Table("dim", "order", "n_joint", "unknowns", "seconds", "MB")
-    sizes = [(2, n) for n in ((50, 100) if short else (50, 100, 200, 400))]
-    sizes += [(3, n) for n in ((20,) if short else (20, 40, 60, 90, 125))]
-    for dim, n in bar(sizes, "growth"):
+    table = Table("growth", "dim", "order", "n_joint", "unknowns", "seconds", "MB")
+    sizes = [(2, 2, n) for n in ((50, 100) if kept.short else (50, 100, 200, 400))]
+    sizes += [(3, 1, n) for n in ((20,) if kept.short else (20, 40, 60, 90, 125))]
+
+    def one(dim: int, order: int, n: int) -> tuple:
         chosen = {
             "dim": dim,
-            "order": 2 if dim == 2 else 1,
+            "order": order,
             "n_joint": n,
             "mesh_pattern": "free",
             "uplift": "imposed",
@@ -473,7 +496,10 @@ def growth(short: bool) -> Table:
         )
         pairs = [part for k, v in chosen.items() for part in ("--set", f"{k}={v}")]
         wall, told = cold(["a", *pairs, "--levels", "9"])
-        table.add(dim, chosen["order"], n, told["unknowns"], wall, told["peak_memory_mb"])
+        return told["unknowns"], wall, told["peak_memory_mb"]
+
+    for size in bar(sizes, "growth"):
+        table.once(kept, size, partial(one, *size))
     return table
 
 
@@ -507,18 +533,22 @@ def exponents(table: Table) -> list[str]:
     return lines
 
 
-def switches(short: bool) -> Table:
+def switches(kept: Kept) -> Table:
     """What a scene pays for each thing it may need: seconds with and without, in one process, best
     of three.
     """
 
     def best(call: Callable[[], object]) -> float:
         spent = []
-        for _ in range(1 if short else 3):
+        for _ in range(1 if kept.short else 3):
             start = time.perf_counter()
             call()
             spent.append(time.perf_counter() - start)
         return min(spent)
+
+    def ratio(*calls: Callable[[], object]) -> tuple[float, float, float]:
+        seconds = [best(call) for call in calls]
+        return *seconds, seconds[0] / seconds[1]
 
     def filling(*about: object) -> Callable[[], object]:
         return lambda: Filling(load("e", *about), joint).run()
@@ -529,7 +559,7 @@ def switches(short: bool) -> Table:
     def written(fields: bool, picture: bool) -> Callable[[], object]:
         return lambda: run(load("a"), Path(folder), fields, picture, False)
 
-    table, dry = Table("option", "with", "without", "ratio"), {"uplift": "none"}
+    table, dry = Table("switches", "option", "with", "without", "ratio"), {"uplift": "none"}
     with threadpool_limits(1), tempfile.TemporaryDirectory() as folder:
         e = load("e")
         joint = Interface(condense(e, Bodies.of(e)), e["quadrature"])
@@ -562,30 +592,19 @@ def switches(short: bool) -> Table:
             ],
             "switches",
         ):
-            seconds = best(with_it), best(without)
-            table.add(option, *seconds, seconds[0] / seconds[1])
+            table.once(kept, (option,), partial(ratio, with_it, without))
     return table
 
 
-def sweeps(short: bool) -> Table:
+def sweeps(kept: Kept) -> Table:
     """What a sweep pays for one row more on a mesh that is condensed: a level between the last two
     (one step per level, as sweeps of levels take), and with published steps a joint that is weaker
     (sigma_max or mu), one that is stiffer (K_N, K_T); main scenes, published meshes, one thread.
     """
-    table = Table(
-        "case",
-        "dim",
-        "first run",
-        "another level",
-        "steps",
-        "another strength",
-        "another stiffness",
-    )
-    for name in bar("ac" if short else PUBLISHED, "sweeps"):
-        main = {"uplift": main_uplift(name)}
-        case = load(name, main)
-        if case["drive"] != "level":
-            continue
+    rows = "first run", "another level", "steps", "another strength", "another stiffness"
+    table = Table("sweeps", "case", "dim", *rows)
+
+    def one(name: str, case: Case, main: dict) -> tuple:
         weaker = (
             {"sigma_max": 0.9 * case["sigma_max"]}
             if case["law"] == "rupture"
@@ -606,14 +625,18 @@ def sweeps(short: bool) -> Table:
                 start = time.perf_counter()
                 run_it()
                 spent.append(time.perf_counter() - start)
-        table.add(name, int(case["dim"]), *spent[:2], len(case.times), *spent[2:])
+        return *spent[:2], len(case.times), *spent[2:]
+
+    for name in bar("ac" if kept.short else PUBLISHED, "sweeps"):
+        main = {"uplift": main_uplift(name)}
+        case = load(name, main)
+        if case["drive"] == "level":
+            table.once(kept, (name, int(case["dim"])), partial(one, name, case, main))
     return table
 
 
 def one_of_the_grid(values: tuple) -> tuple:
-    """A combination of the stress grid: values, how it ended, the last level, iterations, cuts,
-    seconds.
-    """
+    """A combination of the stress grid: how it ended, the last level, iterations, cuts, seconds."""
     law, aperture, stiffness, young = values
     case = load(
         "e" if law == "rupture" else "g",
@@ -634,10 +657,10 @@ def one_of_the_grid(values: tuple) -> tuple:
     history = result.history
     level = history["level"][-1] if len(history["level"]) else 0.0
     end = statement(result).split(":")[0].replace(" (", ", ") or "converged"
-    return (*values, end, level, history["iterations"].sum(), history["cuts"].sum(), spent)
+    return (end, level, history["iterations"].sum(), history["cuts"].sum(), spent)
 
 
-def stress(short: bool) -> Table:
+def stress(kept: Kept) -> Table:
     """The flow to its limits: closed aperture, joint and bulk stiffness over many decades, the
     reservoir filled to the crest.
     """
@@ -646,19 +669,28 @@ def stress(short: bool) -> Table:
             ("rupture", "friction"), (1e-9, 1e-8, 1e-6, 1e-4), (1e9, 1e12, 1e14), (1e10, 3e11, 3e12)
         )
     )
-    grid = grid[::18] if short else grid
-    table = Table(
-        "law", "aperture_min", "K_N", "E", "end", "level", "iterations", "cuts", "seconds"
-    )
-    with ProcessPoolExecutor() as pool:
-        for row in bar(pool.map(one_of_the_grid, grid), "stress", len(grid)):
-            table.add(*row)
+    grid = grid[::18] if kept.short else grid
+    found = "end", "level", "iterations", "cuts", "seconds"
+    table = Table("stress", "law", "aperture_min", "K_N", "E", *found)
+    with pool_of(os.cpu_count() or 1) as pool:
+        ends = {
+            values: pool.submit(one_of_the_grid, values)
+            for values in grid
+            if not kept.has((table.name, *values))
+        }
+        for values in bar(grid, "stress"):
+            table.once(kept, values, lambda v=values: ends[v].result())
     return table
 
 
-def checks(short: bool) -> list[str]:
+def checks(kept: Kept) -> list[str]:
     """What holds to machine precision, on a fine mesh: equilibrium and mass balance."""
-    case = load("g", settings(2, 80 if short else 320, 1.0, "free", 2))
+    return kept.once(("checks",), partial(precision, 80 if kept.short else 320))
+
+
+def precision(n: int) -> list[str]:
+    """`checks` with n elements along the joint."""
+    case = load("g", settings(2, n, 1.0, "free", 2))
     result, spent = measure(case)
     last = {n: c[-1] for n, c in result.history.items()}
     thrust = case["rho_water"] * case["g"] * last["level"] ** 2 / 2

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections import Counter
+from functools import partial
 from itertools import product
 from pathlib import Path
 
@@ -13,9 +14,10 @@ from threadpoolctl import threadpool_limits
 
 from ..results import validation
 from ..run import run
-from ..scene.case import load
+from ..scene.case import Case, load
+from ..storage import held
 from . import bench as measured
-from .bench import PARTS, QUANTITIES, SCENES, Table, front
+from .bench import PARTS, QUANTITIES, SCENES, Kept, Table, front
 
 STYLES = {
     (2, "free"): ("o", "triangles"),
@@ -90,7 +92,7 @@ def efficient(table: Table) -> Table:
     a third.
     """
     heads = "scene", "dim", "pattern", "order", "n_joint", "grading", "unknowns", "seconds"
-    chosen = Table(*heads, "worst error [%]")
+    chosen = Table("efficient", *heads, "worst error [%]")
     published = np.array([steps == "published" for steps in table["steps"]])
     error, seconds = (np.array(table[n]) for n in ("worst", "seconds"))
     for scene, dim in product(SCENES, (2, 3)):
@@ -111,22 +113,24 @@ def step_spread(table: Table) -> float:
     return 100 * spread
 
 
-def modelings(cases: Table) -> Table:
+def modelings(kept: Kept, cases: Table) -> Table:
     """For README: what each modeling shows, the worst difference of its judged rows, and the
     seconds.
     """
-    table = Table(
-        "case", "shows", "rows", "worst difference", "seconds", "published code", "times faster"
-    )
-    for i, name in enumerate(cases["case"][:-1]):
-        case = load(name)
+    told = "shows", "rows", "worst difference", "seconds", "published code", "times faster"
+    table = Table("modelings", "case", *told)
+
+    def one(row: int, case: Case) -> tuple:
         with tempfile.TemporaryDirectory() as folder:
             found = run(case, Path(folder), False, False, False)
         judged = [c for result in found for c in validation.compare(result) if c.verdict != "info"]
         difference = 100 * max(abs(c.difference) for c in judged)
         shows = case.title.split(": ", 1)[1]
-        spent = (cases[n][i] for n in ("seconds", "published", "times faster"))
-        table.add(name.upper(), shows, len(judged), f"{difference:.1f} %", *spent)
+        spent = (cases[n][row] for n in ("seconds", "published", "times faster"))
+        return shows, len(judged), f"{difference:.1f} %", *spent
+
+    for row, name in enumerate(cases["case"][:-1]):
+        table.once(kept, (name.upper(),), partial(one, row, load(name)))
     return table
 
 
@@ -243,26 +247,31 @@ def of_stress(grid: Table) -> list[str]:
 def bench(out: Path, short: bool) -> None:
     """Run everything; write tables (CSV), benchmarks.md, modelings.md and accuracy.png into out;
     print the page.
+
+    What is measured is kept in out/measured.jsonl until the page is written.
     """
     out.mkdir(parents=True, exist_ok=True)
-    tables = {
-        "cases": measured.cases(short),
-        "switches": measured.switches(short),
-        "sweeps": measured.sweeps(short),
-        "growth": measured.growth(short),
-        "stress": measured.stress(short),
-    }
-    tables["modelings"] = modelings(tables["cases"])
-    with threadpool_limits(1):
-        exact, tables["overkill"] = measured.overkill(short)
-        tables["accuracy"] = measured.accuracy(short, exact, tables["cases"]["start"][0])
-        tables["recommended"] = measured.recommended(short, exact)
-        tables["estimates"] = measured.estimates(short)
-        precise = measured.checks(short)
-    for name, table in tables.items():
-        measured.write_table(table, out / f"{name}.csv")
-    draw(tables["accuracy"], out / "accuracy.png")
-    (out / "modelings.md").write_text(as_text(tables["modelings"]) + "\n")
-    text = page(tables, precise, measured.beyond_memory(), short)
-    (out / "benchmarks.md").write_text(text)
+    with held(out):
+        kept = Kept(out / "measured.jsonl", short)
+        tables, precise = measure(kept)
+        for name, table in tables.items():
+            measured.write_table(table, out / f"{name}.csv")
+        draw(tables["accuracy"], out / "accuracy.png")
+        (out / "modelings.md").write_text(as_text(tables["modelings"]) + "\n")
+        text = page(tables, precise, measured.beyond_memory(), short)
+        (out / "benchmarks.md").write_text(text)
+        kept.path.unlink()
     print(text)
+
+
+def measure(kept: Kept) -> tuple[dict[str, Table], list[str]]:
+    """All tables by name, and what holds to machine precision."""
+    each = "cases", "switches", "sweeps", "growth", "stress"
+    tables = {name: getattr(measured, name)(kept) for name in each}
+    tables["modelings"] = modelings(kept, tables["cases"])
+    with threadpool_limits(1):
+        exact, tables["overkill"] = measured.overkill(kept)
+        tables["accuracy"] = measured.accuracy(kept, exact, tables["cases"]["start"][0])
+        tables["recommended"] = measured.recommended(kept, exact)
+        tables["estimates"] = measured.estimates(kept)
+        return tables, measured.checks(kept)

@@ -273,11 +273,7 @@ def spread(seed: int, numbers: list[int], jobs: int) -> Iterator[dict[str, objec
     """The rows of scenes as they are done."""
     with pool_of(jobs) as pool:
         waiting = [pool.submit(one, seed, number) for number in numbers]
-        try:
-            yield from (future.result() for future in as_completed(waiting))
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+        yield from (future.result() for future in as_completed(waiting))
 
 
 def stress(

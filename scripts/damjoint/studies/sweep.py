@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import hashlib
 import multiprocessing
@@ -169,9 +170,17 @@ def read_done(path: Path, columns: list[str]) -> set[str]:
     return {row[0] for row in rows[1:] if len(row) == len(columns)}
 
 
-def pool_of(jobs: int) -> ProcessPoolExecutor:
-    """Processes that end with this one, even where it is killed."""
-    return ProcessPoolExecutor(jobs, initializer=end_with_parent)
+@contextlib.contextmanager
+def pool_of(jobs: int) -> Iterator[ProcessPoolExecutor]:
+    """Processes that end with this one, even where it is killed; once one fails, or the caller,
+    nothing more is begun.
+    """
+    with ProcessPoolExecutor(jobs, initializer=end_with_parent) as pool:
+        try:
+            yield pool
+        except BaseException:
+            pool.shutdown(cancel_futures=True)  # waits: a pool that has gone cancels nothing
+            raise
 
 
 def end_with_parent() -> None:
@@ -225,9 +234,6 @@ def spread(tasks: dict[str, Task], jobs: int, scheduler: str | None) -> Iterator
                     "sweep: a process was killed (out of memory?); what has been finished is "
                     "saved, the same command goes on; --jobs 1 takes least memory"
                 ) from None
-            except BaseException:
-                pool.shutdown(cancel_futures=True)  # waits: a pool that has gone cancels nothing
-                raise
 
 
 def meshed(case: str, settings: dict, loading: Loading) -> tuple[dict, Loading, str]:
