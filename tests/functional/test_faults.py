@@ -141,3 +141,18 @@ def test_a_locale_without_all_letters(tmp_path):
         capture_output=True,
     )
     assert (done.returncode, done.stderr) == (0, b"") and b"[?m]" in done.stdout
+
+
+@pytest.mark.parametrize("damage", [b"half", b"\xff", b'"', b"1,2"])
+def test_a_damaged_sweep(command, tmp_path, damage):
+    """It says where, and changes nothing."""
+    words = "sweep", "c", *BARE[:-1], "--vary", "mu=0.5", "--out", "mu.csv"
+    assert command(*words)[0] == 0
+    file = tmp_path / "mu.csv"
+    head, row = file.read_bytes().splitlines()
+    cells = row.split(b",")
+    cells[2] = damage  # the time
+    file.write_bytes(damaged := head + b"\n" + b",".join(cells) + b"\n")
+    code, _, err = command(*words)
+    assert code == 2 and "mu.csv: line 2 is damaged" in err
+    assert len(err.splitlines()) == 1 and file.read_bytes() == damaged

@@ -24,6 +24,8 @@ def refuse(command, tmp_path, words, parts):
     "setting, allowed",
     [
         ("E=abc", "> 0"),
+        ("E=1_000", "> 0"),
+        ("E=\u0663", "> 0"),  # a digit of another script
         ("E=0", "> 0"),
         ("E=-3e12", "> 0"),
         ("E=nan", "> 0"),
@@ -87,6 +89,8 @@ def test_parameter_out_of_range(command, tmp_path, setting, allowed):
         ((*RUN, "--set", "E"), ("--set E", "NAME=VALUE")),
         ((*RUN, "--levels", "3,21"), ("levels = 21", TO_TWICE)),
         ((*RUN, "--levels", "3,-1"), ("levels = -1", TO_TWICE)),
+        ((*RUN, "--levels", "3,\u0663"), ("levels = 3,\u0663", "list of levels in metres")),
+        ((*RUN, "--levels", "3," * 12000 + "3"), ("levels: are 12001", "at most 10000")),
         ((*RUN, "--levels", ""), ("levels = ", "list of levels in metres")),
         ((*RUN, "--levels", "3,,6"), ("levels = 3,,6", "list of levels in metres")),
         ((*RUN, "--levels", "3;6"), ("levels = 3;6", "list of levels in metres")),

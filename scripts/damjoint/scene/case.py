@@ -18,6 +18,7 @@ from .parameters import (
     declared,
     independent,
     listing,
+    number,
     parse,
 )
 
@@ -25,6 +26,9 @@ CASES = data("cases")
 
 #: Steps between two levels at most.
 MOST_STEPS = 100_000
+
+#: Levels that are asked for at most: each has its table.
+MOST_LEVELS = 10_000
 
 
 #: Values of pro/parameters.pro that the engines share and nobody sets.
@@ -191,7 +195,7 @@ def relative_error(accuracy: str) -> float:
     if accuracy in ACCURACIES:
         return ACCURACIES[accuracy]
     try:
-        found = float(accuracy.removesuffix("%")) / 100 if accuracy.endswith("%") else math.nan
+        found = number(accuracy.removesuffix("%")) / 100 if accuracy.endswith("%") else math.nan
     except ValueError:
         found = math.nan
     if not 0 < found < 1:
@@ -469,7 +473,7 @@ def numbers(name: str, text: str) -> list[float]:
     Raises InputError if empty or malformed.
     """
     try:
-        found = [float(v) for v in text.replace("_", "?").split(",")]
+        found = [number(v) for v in text.split(",")]
     except ValueError:
         found = []
     if not found or not all(map(math.isfinite, found)):
@@ -485,15 +489,18 @@ def ceiling(values: Mapping) -> float:
 def check_levels(name: str, levels: Iterable[float], highest: float) -> tuple[float, ...]:
     """Water levels [m]; above the crest the dam is overtopped.
 
-    Raises InputError if one is negative or above the highest one.
+    Raises InputError if one is negative or above the highest one, or if they are too many.
     """
+    levels = tuple(levels)
+    if len(levels) > MOST_LEVELS:
+        raise InputError(f"{name}: are {len(levels)}, must be at most {MOST_LEVELS}")
     for level in levels:
         if not 0 <= level <= highest:
             limit = f"between 0 and {highest:g} m, twice the dam's height"
             raise InputError(
                 f"{name} = {level:g}: must be {limit if highest < math.inf else '>= 0'}"
             )
-    return tuple(levels)
+    return levels
 
 
 def check_times(times: tuple[float, ...], last: int) -> None:

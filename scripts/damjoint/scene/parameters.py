@@ -38,6 +38,16 @@ def start_gmsh() -> None:
         gmsh.option.setNumber("General.Verbosity", 0)  # what goes wrong is raised, told in one line
 
 
+def number(text: str) -> float:
+    """A number as Gmsh reads it: Python alone knows 1_000, or the digits of other scripts.
+
+    Raises ValueError.
+    """
+    if "_" in text or not text.isascii():
+        raise ValueError(text)
+    return float(text)
+
+
 @dataclass(frozen=True)
 class Parameter:
     """One declared parameter: ONELAB label with its unit, range or choices."""
@@ -89,16 +99,16 @@ class Parameter:
                 raise bad
             return value
         try:
-            number = float(str(value).replace("_", "?"))  # Python would take 1_000 for a number
+            found = number(str(value))
         except ValueError:
             raise bad from None
-        if self.follows and number == AUTOMATIC:
-            return number
-        if not (math.isfinite(number) and self.minimum <= number <= self.maximum):
+        if self.follows and found == AUTOMATIC:
+            return found
+        if not (math.isfinite(found) and self.minimum <= found <= self.maximum):
             raise bad
-        if (self.choices and number not in self.choices) or (self.integer and number % 1):
+        if (self.choices and found not in self.choices) or (self.integer and found % 1):
             raise bad
-        return number
+        return found
 
 
 def parse(text: str) -> dict[str, list[float] | list[str]]:

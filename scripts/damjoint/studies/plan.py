@@ -74,7 +74,7 @@ def check(name: str, value: str) -> None:
         parameters.parameter(name).check(value)
         return
     try:
-        finite = math.isfinite(float(value.replace("_", "?")))
+        finite = math.isfinite(parameters.number(value))
     except ValueError:
         finite = False
     if not finite:
@@ -97,7 +97,7 @@ def values_of(text: str) -> tuple[str, list[str]]:
         found = [v.strip() for v in values.split(",")]
     else:
         try:
-            first, last, step = (float(v) for v in values.split(":"))
+            first, last, step = (parameters.number(v) for v in values.split(":"))
         except ValueError:
             raise bad from None
         if not np.isfinite([first, last, step]).all() or step == 0 or (last - first) / step < 0:
@@ -197,7 +197,7 @@ def tie(name: str, expression: str, row: Row) -> str:
     known = {}
     for other, value in row.items():
         try:
-            known[other] = float(value)
+            known[other] = parameters.number(value)
         except ValueError:  # a text, such as a law
             continue
     try:

@@ -286,7 +286,7 @@ def stress(
     """
     if not out.parent.is_dir():
         raise InputError(f"out = {out}: must be a file in an existing folder")
-    done = read_done(out, list(COLUMNS))
+    done = read_done(out, list(COLUMNS), ("dim", "seconds"))
     missing = [number for number in range(count) if f"{seed}-{number}" not in done]
     with out.open("a", newline="") as file:
         lock(file.fileno(), out)
@@ -305,8 +305,7 @@ def stress(
 
 def read_rows(path: Path) -> list[dict[str, str]]:
     """The rows of a result file."""
-    with path.open() as file:
-        return list(csv.DictReader(file))
+    return list(read_done(path, list(COLUMNS), ()).values())
 
 
 def counts(rows: list[dict[str, str]]) -> dict[str, int]:

@@ -150,24 +150,42 @@ def bundles(tasks: dict[str, Task]) -> list[list[str]]:
     return [keys[i : i + MOST] for keys in groups.values() for i in range(0, len(keys), MOST)]
 
 
-def read_done(path: Path, columns: list[str]) -> set[str]:
-    """The keys of the complete rows of a result file; a half-written last line is cut off.
+def read_done(path: Path, columns: list[str], numeric: Sequence[str]) -> dict[str, Row]:
+    """The complete rows of a result file by key, its first column; a half-written last line is cut
+    off.
 
-    Raises InputError.
+    numeric: the columns that hold nothing but numbers. Raises InputError.
     """
     if not path.exists() or not path.stat().st_size:
-        return set()
-    text = path.read_text()
+        return {}
+    damaged = f"out = {path}: line {{}} is damaged; take it away, and its row is computed again"
+    try:
+        text = path.read_text()
+    except UnicodeDecodeError as error:
+        lines = path.read_bytes()[: error.start].count(b"\n")
+        raise InputError(damaged.format(lines + 1)) from None
     whole = text[: text.rfind("\n") + 1]
-    rows = list(csv.reader(whole.splitlines()))
-    if not rows or rows[0] != columns:
+    rows = csv.DictReader(whole.splitlines(), restval=None, strict=True)
+    if rows.fieldnames != columns:
         raise InputError(
             f"out = {path}: must be a new file or one of the same sweep "
             f"(columns {','.join(columns)})"
         )
+    done = {}
+    try:
+        for row in rows:
+            if None in row or None in row.values():
+                raise ValueError
+            for name in numeric:
+                float(row[name] or "nan")
+            done[row[columns[0]]] = row
+    except ValueError:
+        raise InputError(damaged.format(rows.line_num)) from None
+    except csv.Error:  # of the row after the last one that was read
+        raise InputError(damaged.format(rows.line_num + 1)) from None
     if whole != text:
         path.write_text(whole)
-    return {row[0] for row in rows[1:] if len(row) == len(columns)}
+    return done
 
 
 @contextlib.contextmanager
@@ -282,7 +300,7 @@ def sweep(
         tasks[keys[-1]] = Task(one, bool(plan.sampled), search, plan.critical_columns)
     results = [*HISTORY, *SAID, *plan.critical_columns]
     columns = ["key", *map(column_of, plan.names), *results]
-    done = read_done(out, columns)
+    done = read_done(out, columns, (*HISTORY, "failed"))
     missing = {key: task for key, task in tasks.items() if key not in done}
     if missing:
         first = next(iter(missing.values()))
@@ -300,6 +318,5 @@ def sweep(
         ):
             writer.writerow([key, *chosen[key].values(), *(row[c] for c in results)])
             file.flush()
-    with out.open(newline="") as file:
-        found = {row["key"]: row for row in csv.DictReader(file)}
+    found = read_done(out, columns, ())
     return len(missing), [found[key] for key in keys]
