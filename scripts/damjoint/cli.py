@@ -220,7 +220,7 @@ def parser() -> argparse.ArgumentParser:
 
     speed = commands.add_parser("bench", help="time, error, growth and costs")
     add = speed.add_argument
-    add("--short", action="store_true", help="a minute instead of twenty")
+    add("--short", action="store_true", help="two minutes instead of thirty")
     add(
         "--out",
         type=Path,
