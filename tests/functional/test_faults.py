@@ -17,7 +17,7 @@ BARE = ("--set", "n_joint=10", "--set", "h_dam=3", "--set", "h_found=4", "--no-f
 RUN = ("run", "c", *BARE, "--no-picture", "--levels", "6")
 
 
-def wait_for(what, seconds=30):
+def wait_for(what, seconds=120):
     """Until it is true."""
     end = time.monotonic() + seconds
     while not what():
@@ -29,7 +29,7 @@ def test_a_run_that_is_told_to_end(tmp_path):
     """By SIGTERM as by Ctrl-C, with the GetDP it waits for; nothing is left behind."""
     fake, told = tmp_path / "getdp", tmp_path / "out" / "run.json"
     version = '[ "$1" = --version ] && echo 3.2.0 && exit'
-    fake.write_text(f"#!/bin/sh\n{version}\ntouch begun\nexec sleep 60\n")
+    fake.write_text(f"#!/bin/sh\n{version}\ntouch begun\nexec sleep 600\n")
     fake.chmod(0o755)
     (tmp_path / "tmp").mkdir()
     process = subprocess.Popen(
@@ -41,7 +41,7 @@ def test_a_run_that_is_told_to_end(tmp_path):
     )
     wait_for(lambda: list((tmp_path / "tmp").glob("*/*/begun")))
     process.send_signal(signal.SIGTERM)
-    _, said = process.communicate(timeout=30)
+    _, said = process.communicate(timeout=120)
     assert process.returncode == 130 and len(said.splitlines()) == 1
     assert json.loads(told.read_text())["state"] == "interrupted"
     assert not any((tmp_path / "tmp").iterdir())
@@ -53,13 +53,13 @@ def test_processes_end_with_the_one_that_has_started_them(tmp_path):
     script = """
 import os, time
 from damjoint.studies.sweep import pool_of
-pool = pool_of(2)
-print(*{pool.submit(os.getppid).result(), *pool._processes}, flush=True)
-time.sleep(600)
+with pool_of(2) as pool:
+    print(*{pool.submit(os.getppid).result(), *pool._processes}, flush=True)
+    time.sleep(600)
 """
     command = [sys.executable, "-c", script]
     with subprocess.Popen(command, stdout=subprocess.PIPE, start_new_session=True) as process:
-        process.stdout.readline()
+        assert len(process.stdout.readline().split()) == 3
         process.kill()
     # those that are dead, but not yet buried by init, can still be told
     alive = ["ps", "-o", "stat=", "--sid", str(process.pid)]
