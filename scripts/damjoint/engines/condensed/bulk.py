@@ -236,21 +236,18 @@ class Reduced:
         joint: np.ndarray,
         loaded: np.ndarray,
     ) -> Reduced:
-        """Schur complement of a body; loads (unknowns, k): unit loads, carried along as columns."""
+        """Schur complement of a body; loads (unknowns, k): unit loads."""
         kept = np.setdiff1d(np.arange(stiffness.shape[0]), held)
         place = np.full(stiffness.shape[0], -1)
         place[kept] = np.arange(len(kept))
-        columns = sparse.csr_matrix(loads[kept])
-        bordered = sparse.bmat(
-            [[stiffness[kept][:, kept], columns], [columns.T, None]], format="csr"
+        n, ends = len(joint), np.concatenate([place[joint], place[loaded]])
+        schur, on_ends = schur_complement(stiffness[kept][:, kept], ends, loads[kept])
+        jj, jl, ll, on_joint, on_kept = (
+            *(schur[:n, :n], schur[:n, n:], schur[n:, n:]),
+            *(on_ends[:n], on_ends[n:]),
         )
-        n, m, k = len(joint), len(loaded), loads.shape[1]
-        ends = np.concatenate([place[joint], place[loaded], len(kept) + np.arange(k)])
-        schur = schur_complement(bordered, ends)
-        jj, jl, ll = schur[:n, :n], schur[:n, n : n + m], schur[n : n + m, n : n + m]
-        on_joint, on_kept = schur[:n, n + m :], schur[n : n + m, n + m :]
-        if not m:
-            return Reduced(jj.copy(), jl, on_joint.copy(), jl, ll, on_kept)
+        if not len(loaded):
+            return Reduced(jj, jl, on_joint, jl, ll, on_kept)
         spread = linalg.solve(ll, jl.T, assume_a="pos").T
         reduced = jj - spread @ jl.T
         return Reduced(
