@@ -62,7 +62,7 @@ def bulk_size(case: Case) -> float:
 
 
 #: Memory of a factorised body [bytes per unknown], as `damjoint bench` finds it in 2D.
-PER_UNKNOWN = 2000
+PER_UNKNOWN = 2400
 
 
 def check_size(case: Case) -> None:
