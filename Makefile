@@ -27,7 +27,8 @@ test: check
 test-all: check
 	$(BIN)/pytest -q $(PARALLEL)
 
-# Half an hour, which an interruption does not cost again; refreshes reference/benchmarks.md, its picture and the modelings' table in README.md
+# Half an hour, which an interruption does not cost again; refreshes reference/benchmarks.md, its
+# picture and the modelings' table in README.md
 bench: setup
 	$(BIN)/damjoint bench
 	$(BIN)/python -m damjoint.pages bench out/bench

@@ -212,7 +212,8 @@ def hints(results: Results) -> list[str]:
             f"the foundation reaches {reach:g} m: less than {FOUNDATION:g} heights of the dam make "
             "the crack too long"
         )
-    if verdict(results) == "no convergence" and case["law"] == "rupture" and case["alpha"] < 2:
+    releases = case["law"] == "rupture" and case["alpha"] < 2
+    if releases and verdict(results) == "no convergence":
         found.append(
             f"where it opens, law = rupture with alpha = {case['alpha']:g} lets go of its shear, "
             "and no friction takes it: the crack runs on at once; alpha = 2 keeps it, law = bond "

@@ -136,7 +136,7 @@ class Kept:
     def once(self, key: tuple, measured: Callable[[], object]) -> object:
         """What was measured under a key; measured now if it was not. JSON's types alone."""
         name = json.dumps(key)
-        if not self.has(key):
+        if name not in self.known:
             self.known[name] = plain(measured())
             with self.path.open("a") as file:
                 file.write(json.dumps([key, self.known[name]]) + "\n")
@@ -180,9 +180,9 @@ class Table(dict):
         )
 
 
-def bar(things: Iterable, title: str, total: int | None = None) -> Iterable:
-    """The things with a progress bar, on a terminal; total: their number if they do not know it."""
-    return tqdm(things, desc=title, total=total, disable=not sys.stderr.isatty())
+def bar(things: Iterable, title: str) -> Iterable:
+    """The things with a progress bar, on a terminal."""
+    return tqdm(things, desc=title, disable=not sys.stderr.isatty())
 
 
 def cases(kept: Kept) -> Table:

@@ -266,12 +266,12 @@ def bench(out: Path, short: bool) -> None:
 
 def measure(kept: Kept) -> tuple[dict[str, Table], list[str]]:
     """All tables by name, and what holds to machine precision."""
-    each = "cases", "switches", "sweeps", "growth", "stress"
-    tables = {name: getattr(measured, name)(kept) for name in each}
-    tables["modelings"] = modelings(kept, tables["cases"])
+    found = [cases := measured.cases(kept)]
+    studies = measured.switches, measured.sweeps, measured.growth, measured.stress
+    found += [study(kept) for study in studies]
+    found.append(modelings(kept, cases))
     with threadpool_limits(1):
-        exact, tables["overkill"] = measured.overkill(kept)
-        tables["accuracy"] = measured.accuracy(kept, exact, tables["cases"]["start"][0])
-        tables["recommended"] = measured.recommended(kept, exact)
-        tables["estimates"] = measured.estimates(kept)
-        return tables, measured.checks(kept)
+        exact, overkill = measured.overkill(kept)
+        found += [overkill, measured.accuracy(kept, exact, cases["start"][0])]
+        found += [measured.recommended(kept, exact), measured.estimates(kept)]
+        return {table.name: table for table in found}, measured.checks(kept)

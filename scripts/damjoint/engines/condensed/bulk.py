@@ -242,10 +242,8 @@ class Reduced:
         place[kept] = np.arange(len(kept))
         n, ends = len(joint), np.concatenate([place[joint], place[loaded]])
         schur, on_ends = schur_complement(stiffness[kept][:, kept], ends, loads[kept])
-        jj, jl, ll, on_joint, on_kept = (
-            *(schur[:n, :n], schur[:n, n:], schur[n:, n:]),
-            *(on_ends[:n], on_ends[n:]),
-        )
+        jj, jl, ll = schur[:n, :n], schur[:n, n:], schur[n:, n:]
+        on_joint, on_kept = on_ends[:n], on_ends[n:]
         if not len(loaded):
             return Reduced(jj, jl, on_joint, jl, ll, on_kept)
         spread = linalg.solve(ll, jl.T, assume_a="pos").T
