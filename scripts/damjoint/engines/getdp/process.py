@@ -176,6 +176,7 @@ def execute(
         process.wait()
     finally:  # also where on_line has been interrupted
         process.kill()
+        process.wait()  # its folder is removed next
         RUNNING.remove(process)
     if process.returncode or errors:
         why = (
