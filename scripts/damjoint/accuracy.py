@@ -233,16 +233,20 @@ def left(values: np.ndarray, counted: bool) -> np.ndarray:
 
     Richardson's extrapolation with a factor of safety and the order that three values show, held
     between BEST and WORST, and no less than what order 2 leaves of the change before: two values
-    may agree by accident. Two values leave the change at order 1, with a larger factor; of those
-    counted in elements it is the last change itself.
+    may agree by accident. Values that go to and fro show no order: half of their range is left
+    (Stern et al., J. Fluids Eng. 123, 2001). Two values leave the change at order 1, with a larger
+    factor; of those counted in elements it is the last change itself.
     """
-    changes = np.abs(np.diff(values, axis=0))
+    steps = np.diff(values, axis=0)
+    changes = np.abs(steps)
     if counted or len(changes) == 1:
         return (1 if counted else OF_TWO) * changes[-1]
     before, last = changes
     ratio = np.divide(last, before, out=np.full_like(last, BEST), where=before > 0)
     ratio = np.clip(ratio, BEST, WORST)
-    return SAFETY * np.maximum(last * ratio / (1 - ratio), before * BEST**2 / (1 - BEST))
+    error = np.maximum(last * ratio / (1 - ratio), before * BEST**2 / (1 - BEST))
+    to_and_fro = steps[0] * steps[1] < 0
+    return SAFETY * np.where(to_and_fro, np.maximum(before, last) / 2, error)
 
 
 def told(accuracy: float, tried: list[Results], found: list[Estimate], why: str) -> dict:
