@@ -349,8 +349,8 @@ def certain(run: Written) -> bool:
 def reached(run: Written, block: Block) -> dict[str, bool]:
     """For each reason, whether the rigid block is near that limit.
 
-    Overturning: about the toe, or about the heel, against the largest tension, which a bond that is
-    about to break at one end no longer has; sliding: against friction, a bond's cohesion being
+    Overturning: about the toe, or about the heel, against the largest tension, which a bond has
+    only where it has not broken, and not if it is about to break at one end; sliding: against friction, a bond's cohesion being
     gone, or friction's cohesion and what its slip has hardened. No convergence: one of these, or a
     bond that is about to break at an end of the joint, after which nothing may hold.
     """
@@ -365,7 +365,10 @@ def reached(run: Written, block: Block) -> dict[str, bool]:
     # linear stress at both ends, as in the gravity method; a bond that breaks there pulls no more
     ends = [(2 * block.N * length - 6 * arm) / length**2 for arm in lever]
     breaks = case["law"] != "friction" and max(ends) > NEAR * tension
-    held = min(lever) + (0.0 if breaks else tension * length**2 / 2)
+    bonded = length
+    if case["law"] != "friction":
+        bonded -= run.history["crack_length"][-1:].sum()
+    held = min(lever) + (0.0 if breaks else tension * bonded**2 / 2)
     found = {
         "overturning": held < (1 - NEAR) * abs(block.N) * length,
         "sliding": case["law"] != "rupture" and abs(block.T) > NEAR * holds,
