@@ -350,9 +350,10 @@ def reached(run: Written, block: Block) -> dict[str, bool]:
     """For each reason, whether the rigid block is near that limit.
 
     Overturning: about the toe, or about the heel, against the largest tension, which a bond has
-    only where it has not broken, and not if it is about to break at one end; sliding: against friction, a bond's cohesion being
-    gone, or friction's cohesion and what its slip has hardened. No convergence: one of these, or a
-    bond that is about to break at an end of the joint, after which nothing may hold.
+    only where it has not broken, and not if it is about to break at one end; sliding: against
+    friction, a bond's cohesion being gone, or friction's cohesion and what its slip has hardened.
+    No convergence: one of these, or a bond that is about to break at an end of the joint, after
+    which nothing may hold.
     """
     case, length = run.case, run.length
     cohesion, tension = 0.0, case["sigma_max"]
