@@ -234,7 +234,8 @@ def trust_page(results: Path) -> str:
                 "verified from its files by code that shares nothing with the engines: dams from "
                 "5 to 150 m, $E$ from 1e9 to 1e13 Pa, $K_N$ from 1e8 to 1e15 Pa/m, all laws and "
                 "uplifts, sections with batter, neck, sloping and lift joint, silt, ice, anchor "
-                "and earthquake, water up and down. Made by `python -m damjoint.pages trust FILE` "
+                "and earthquake, water up and down; one plane scene in ten is a slender dam of "
+                "real stiffness on a brittle joint. Made by `python -m damjoint.pages trust FILE` "
                 "from its result file.",
                 "## What is asked of each",
                 ASKED,

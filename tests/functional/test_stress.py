@@ -160,7 +160,7 @@ def test_stress_is_seeded_resumed_and_has_a_page(command, monkeypatch):
 @pytest.mark.heavy
 def test_random_scenes(tmp_path):
     """Sixty scenes of the page's seed: each is verified, or its stop is justified."""
-    rows = stress.stress(60, 5, tmp_path / "stress.csv")
+    rows = stress.stress(60, 7, tmp_path / "stress.csv")
     bad = [row for row in rows if row["class"] == stress.DEFECT]
     assert len(rows) == 60 and not bad, bad
 

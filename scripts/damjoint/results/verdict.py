@@ -212,8 +212,13 @@ def hints(results: Results) -> list[str]:
             f"the foundation reaches {reach:g} m: less than {FOUNDATION:g} heights of the dam make "
             "the crack too long"
         )
+    if levels := results.info.get("ran_on"):
+        found.append(
+            f"at {min(levels):.4g} m the joint breaks in a burst: where it comes to rest from then "
+            "on depends on steps and mesh"
+        )
     releases = case["law"] == "rupture" and case["alpha"] < 2
-    if releases and verdict(results) == "no convergence":
+    if releases and (levels or verdict(results) == "no convergence"):
         found.append(
             f"where it opens, law = rupture with alpha = {case['alpha']:g} lets go of its shear, "
             "and no friction takes it: the crack runs on at once; alpha = 2 keeps it, law = bond "

@@ -117,8 +117,34 @@ def random_scene(seed: int, number: int) -> Scene:
         settings["force_x"] = dice.size(5 * height**2, 150 * height**2)  # up to 3 % of the thrust
     if tail and dice.happens(0.3):
         tails = [dice.between(0, 0.3 * height) for _ in levels]
+    if not solid and dice.happens(0.1):
+        settings, tails = slender(dice, height), [0.0]
+        levels = sorted(dice.between(0.6 * height, height) for _ in levels)
     water = (",".join(f"{level:g}" for level in heights) for heights in (levels, tails))
     return Scene(settings, *water, steps)
+
+
+def slender(dice: Dice, height: float) -> dict[str, float | str]:
+    """A slender dam of real stiffness on a joint that lets go of its shear where it opens: under
+    uplift its crack runs on at once.
+    """
+    base = dice.between(0.68, 0.78) * height
+    return {
+        "dam_height": height,
+        "dam_base": base,
+        "dam_crest": dice.between(0.05 * base, 0.2 * base),
+        "n_joint": dice.one_of(20, 40, 80),
+        "E": dice.size(1e10, 4e10),
+        "found_side": height,
+        "found_depth": height,
+        "law": "rupture",
+        "K_N": dice.size(1e11, 1e13),
+        "K_T": dice.size(1e11, 1e13),
+        "sigma_max": dice.one_of(0, dice.size(1e2, 1e5)),
+        "alpha": dice.one_of(0, 0.5, 1, 1.5),
+        "uplift": dice.one_of("imposed", "cracked", "flow"),
+        "weight_first": 1,
+    }
 
 
 def mesh(dice: Dice, height: float, solid: bool, plain: bool) -> dict[str, float | str]:

@@ -18,7 +18,6 @@ from ...scene.loads import Loading, line_forces, quake_column, water_column
 from .faces import WetFace
 from .interface import Change, Interface
 from .laws import LAWS, Memory
-from .newton import Drag
 
 
 @dataclass
@@ -235,46 +234,47 @@ class Joint:
         parts = [(1 - effect, solution), (effect, drained)]
         return (1 - effect) * free + effect * drawn, parts
 
+    def flowing_lift(
+        self, jump: np.ndarray, memory: Memory, loading: Loading
+    ) -> tuple[np.ndarray, object]:
+        """How flowing water pushes the joint's lips apart (j,), and its flow's solution."""
+        inner, solution = self.solve_flow(jump, memory, loading)
+        return self.lift(loading, self.interface.along.at_water @ self.beyond(inner)), solution
+
     def residual(
         self,
         jump: np.ndarray,
         memory: Memory,
         loading: Loading,
         within: np.ndarray | None = None,
-        drag: Drag | None = None,
+        held_lift: np.ndarray | None = None,
     ) -> tuple[np.ndarray, Callable[[bool], Change], Callable[[], np.ndarray]]:
         """The residual (j,), and functions that give its derivatives with jump (a change of the
         virgin joint's, by the law's tangent or by its secant) and with the level (j,).
 
-        within: see the law's `respond`; drag: what holds the joint back, besides the law.
+        within: see the law's `respond`; held_lift: what takes the place of the flowing water's
+        lift, whatever the jump.
         """
         interface = self.interface
         at_points = interface.jumps(interface.at_points, jump)
         traction, tangent = self.law.respond(at_points, memory, within=within)
-        if drag:
-            moved = at_points - interface.jumps(interface.at_points, drag.jump)
-            traction = traction + drag.size * moved
 
         def law_change(secant: bool) -> Change:
             stiffness = self.law.respond(at_points, memory, True)[1] if secant else tangent
-            if drag:
-                stiffness = stiffness + drag.size * np.eye(3)
             return interface.change(stiffness, self.virgin)
 
         value = self.bulk.stiffness @ jump - self.loads(loading) + interface.forces(traction)
 
-        def flowing_lift(loading: Loading) -> tuple[np.ndarray, object]:
-            inner, solution = self.solve_flow(jump, memory, loading)
-            return self.lift(loading, interface.along.at_water @ self.beyond(inner)), solution
-
-        solution = None
-        if self.flowing:
-            lift, solution = flowing_lift(loading)
+        flowing, solution = self.flowing and held_lift is None, None
+        if flowing:
+            lift, solution = self.flowing_lift(jump, memory, loading)
             value = value - lift
+        elif held_lift is not None:
+            value = value - held_lift
 
         def by_jump(secant: bool) -> Change:
             change = law_change(secant)
-            if self.flowing:
+            if flowing:
                 growing = self.aperture(jump, memory)[1] * interface.points.weights
                 found = [interface.flow.sensitivity(part, growing) for _, part in solution]
                 change.columns = found[0][1]
@@ -284,8 +284,9 @@ class Joint:
 
         def by_level() -> np.ndarray:
             slope = -self.rate(self._loads, loading)
-            if self.flowing:
-                slope = slope - self.rate(lambda other: flowing_lift(other)[0], loading)
+            if flowing:
+                lifted = lambda other: self.flowing_lift(jump, memory, other)[0]
+                slope = slope - self.rate(lifted, loading)
             return slope
 
         return value, by_jump, by_level

@@ -14,11 +14,14 @@ from ...scene.case import Case
 from ...scene.loads import STAGED, Loading
 from .equilibrium import Joint
 from .interface import Interface
-from .newton import Attempt, Drag, Fallen, Iterate, Limit, newton, relax
+from .newton import Attempt, Fallen, Iterate, Limit, newton, repeated
 from .record import Record, State
 
-#: How many attempts are for before giving up.
-LAST = 2
+#: After how many rounds a burst that has not come to rest is given up.
+ROUNDS = 100
+
+#: Part of a residual by which that of another round must differ not to be the same state again.
+SAME = 1e-6
 
 
 class Filling:
@@ -41,6 +44,8 @@ class Filling:
         #: the prescribed displacement at drive_begin, and the level at drive_end
         self.displacement = self.left = 0.0
         self.stopped = False
+        #: the levels at which the joint ran on, to a state that depends on the way there
+        self.ran_on: tuple[float, ...] = ()
 
     def unbalanced(self, case: Case) -> float:
         """Norm of the residual of the untouched joint under the highest water: what convergence is
@@ -64,18 +69,17 @@ class Filling:
         return other
 
     def attempts(self) -> list[Attempt]:
-        """The attempts at a step, in order; the LAST ones, with the secant for long and with a
-        drag, are for before giving up.
+        """The attempts at a step, in order; the last one, with the secant for long, is for before
+        giving up.
         """
         parts = ("growth", "secant", "release", "iterations")
         of_each = zip(*(self.case.shared[f"attempt_{n}"] for n in parts), strict=True)
         halvings, most = int(self.case["max_halvings"]), 2 if self.joint.law.releases else 1
-        found = [
+        return [
             Attempt(growth, int(secant), int(release), int(iterations), halvings)
             for growth, secant, release, iterations in of_each
             if release <= most
         ]
-        return [*found, replace(found[-1], secant=0, drag=True)]
 
     def run(self) -> Results:
         """Follow all the times of the case that are still to come."""
@@ -117,24 +121,28 @@ class Filling:
         first = self.case["weight_first"] or (self.driven and self.case["drive_begin"] == 0)
         if first and self.state.time == 0 and not self.state.jump.any():
             self.rest()
-        every = self.attempts()
-        attempts, last_resorts = every[:-LAST], every[-LAST:]
+        *attempts, last_resort = self.attempts()
         cuts, dt, weighed = 0, np.inf, self.state.time > 0 or self.state.jump.any()
         while self.state.time < target and not self.stopped:
             time = min(self.state.time + dt, target)
             time = target if target - time < 1e-9 else time
             smallest = time - self.state.time < self.case["smallest_step"] * (1 + 1e-9)
-            found = self.solve_by(attempts, time, ahead=True, insist=smallest)
+            likely = attempts[:1] if self.ran_on and not smallest else attempts
+            found = self.solve_by(likely, time, ahead=True, insist=smallest)
             if found is None and not weighed:
                 weighed = True
                 if self.rest():
                     cuts += 1
                     continue
+            breaks = self.joint.law.breaks
+            if found is None and (breaks or self.joint.flowing):
+                known = self.ran_on or smallest or cuts > 0
+                found = self.burst(time, wherever=breaks and bool(known))
             if found is None:
                 tried, cuts = time - self.state.time, cuts + 1
                 dt = max(self.case.shared["cut"][0] * tried, self.case["smallest_step"])
                 if smallest:
-                    time, found = target, self.solve_by(last_resorts, target)
+                    time, found = target, self.solve_by([last_resort], target)
                     self.stopped = found is None
             if found:
                 dt = 2 * (time - self.state.time)
@@ -183,17 +191,81 @@ class Filling:
                 return jump, now.loading.level + ahead * rise if prescribed else level
         return now.jump, now.loading.level if prescribed else level
 
+    def burst(self, time: float, wherever: bool) -> tuple[State, int, float] | None:
+        """A step over a burst, see `solve`: Newton's method from where the joint comes to rest when
+        it runs on; if that does not find it and `wherever`, the state of rest itself.
+
+        Both are in equilibrium. What has run on has let go of more than the step's own law has.
+        """
+        at_rest = self.run_on(time)
+        if at_rest is None:
+            return None
+        state, spent, residual = at_rest
+        start = state.jump, state.loading.level
+        first, *others = self.attempts()
+        attempts = [first, *(one for one in others if one.release)]
+        found = self.solve_by(attempts, time, insist=False, start=start)
+        if found:
+            return found[0], spent + found[1], found[2]
+        if not wherever:
+            return None
+        self.ran_on += (state.loading.level,)
+        return state, spent, residual
+
+    def run_on(self, time: float) -> tuple[State, int, float] | None:
+        """Where the joint comes to rest when it runs on under the loading of a time, see `solve`.
+
+        It moves while nothing breaks or lets go, which it then does where it has opened or slid, by
+        turns, until the law is in equilibrium. Where the flow cannot be solved for together with
+        the jump its pressure waits for that, too: a crack opens, and then the water follows.
+        """
+        joint, begin, spent, sizes = self.joint, self.state, 0, []
+        attempts = [one for one in self.attempts()[:-1] if not one.release]
+        level, tail, prescribed, _ = self.water_at(time)
+        try:
+            for _ in range(ROUNDS):
+                self.state = state = self.state.staged(joint, time).held(joint)
+                found = self.solve_by(attempts[:1], time, insist=False)
+                if found is None:
+                    lift = None
+                    if joint.flowing:
+                        level = state.loading.level if prescribed else level
+                        loading = Loading.at(self.case, time, level, tail)
+                        lift, _ = joint.flowing_lift(state.jump, state.memory, loading)
+                    found = self.solve_by(attempts, time, insist=False, held_lift=lift)
+                if found is None:
+                    return None
+                state, iterations, _ = found
+                spent += iterations
+                self.state = replace(state, time=begin.time)
+                memory = self.state.staged(joint, time).memory
+                size = np.linalg.norm(joint.residual(state.jump, memory, state.loading)[0])
+                if size <= self.limit.size:
+                    pressure = joint.pressure(state.jump, memory, state.loading)
+                    return replace(state, pressure=pressure), spent, size / (self.reference or 1.0)
+                if repeated(size, sizes, SAME):
+                    return None
+                sizes.append(size)
+        finally:
+            self.state = begin
+        return None
+
     def solve_by(
-        self, attempts: list[Attempt], time: float, ahead: bool = False, insist: bool = True
+        self,
+        attempts: list[Attempt],
+        time: float,
+        ahead: bool = False,
+        insist: bool = True,
+        **given: object,
     ) -> tuple[State, int, float] | None:
         """A step by the first of some attempts that finds it, see `solve`.
 
         ahead: whether the very first one starts extrapolated; insist: whether the others are tried,
-        too, once one sees the dam fall.
+        too, once one sees the dam fall; given: see `solve`.
         """
         for one in attempts:
             try:
-                found = self.solve(time, one, ahead and one is attempts[0])
+                found = self.solve(time, one, ahead and one is attempts[0], **given)
             except Fallen:
                 if not insist:
                     return None
@@ -203,11 +275,17 @@ class Filling:
         return None
 
     def solve(
-        self, time: float, attempt: Attempt, first: bool = False
+        self,
+        time: float,
+        attempt: Attempt,
+        first: bool = False,
+        start: tuple[np.ndarray, float] | None = None,
+        held_lift: np.ndarray | None = None,
     ) -> tuple[State, int, float] | None:
         """A step from the last state: the new one, iterations, residual over reference; or None.
 
-        first: whether it is the first attempt at the step. Raises Fallen.
+        first: whether it is the first attempt at the step; start: the jump and level that Newton
+        starts with, if not those; held_lift: see `Joint.residual`. Raises Fallen.
         """
         joint, state = self.joint, self.state.staged(self.joint, time)
         memory = state.memory
@@ -215,9 +293,7 @@ class Filling:
         asked = Loading.at(self.case, time, level, tail)
         stiff, limit = joint.case["K_N"] * joint.bulk.width, self.limit
 
-        def evaluate(
-            jump: np.ndarray, level: float, last: Iterate | None, drag: Drag | None = None
-        ) -> Iterate:
+        def evaluate(jump: np.ndarray, level: float, last: Iterate | None) -> Iterate:
             side = within = None
             if attempt.release:
                 at_points = joint.interface.jumps(joint.interface.at_points, jump)
@@ -226,7 +302,7 @@ class Filling:
                     within = (side * last.side < 0) & ((side < 0) | (attempt.release > 1))
                     side = np.where(within, 0, side)
             loading = replace(asked, level=level)
-            value, by_jump, by_level = joint.residual(jump, memory, loading, within, drag)
+            value, by_jump, by_level = joint.residual(jump, memory, loading, within, held_lift)
             size, edge = np.linalg.norm(value), None
             if prescribed:
                 if self.case["drive"] == "heel":
@@ -243,11 +319,8 @@ class Filling:
             return Iterate(jump, level, value, size, correction, side)
 
         with np.errstate(over="ignore", invalid="ignore"):  # an attempt that flies off is dropped
-            start = evaluate(*self.start(time, level, prescribed, first), None)
-            if attempt.drag:
-                found = relax(evaluate, start, limit, attempt, self.case["K_N"])
-            else:
-                found = newton(evaluate, start, limit, attempt)
+            begin = evaluate(*(start or self.start(time, level, prescribed, first)), None)
+            found = newton(evaluate, begin, limit, attempt)
         if found is None:
             return None
         end, iterations = found

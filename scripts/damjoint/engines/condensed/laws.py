@@ -1,6 +1,7 @@
 """The joint laws of pro/law_*.pro once more, for many points at once: the condensed engine's.
 
-A law is a class with `start`, `stage`, `respond`, `side` and `remember`, and what its memory means.
+A law is a class with `start`, `stage`, `respond`, `side`, `hold` and `remember`, and what its
+memory means.
 Arrays: jump (q, 3) is delta_n, delta_t1, delta_t2 [m]; traction (q, 3) is sigma_n (effective),
 tau_1, tau_2 [Pa]; tangent (q, 3, 3) its derivative [Pa/m]; the memory a scalar (q,) and a vector
 (q, 2).
@@ -29,12 +30,17 @@ class Memory:
     #: thickness sawn away [m], and the opening that liquid grout leaves [m]
     sawn: float = 0.0
     most: float = np.inf
+    #: while a burst is followed, in which nothing breaks or lets go any further (see `hold`): the
+    #: share of the shear stiffness that is left (q,)
+    held: np.ndarray | None = None
 
 
 class Law:
-    """What a law has that knows no works on the joint and releases no shear by opening."""
+    """What a law has that knows no works on the joint, releases no shear by opening, and does not
+    break.
+    """
 
-    releases = False
+    releases = breaks = False
 
     def stage(self, memory: Memory, begin: float, end: float) -> Memory:
         """The memory for a step from t = begin to end."""
@@ -43,6 +49,12 @@ class Law:
     def side(self, jump: np.ndarray, memory: Memory) -> np.ndarray:
         """Where a point is in that release: nowhere."""
         return np.zeros(len(jump), int)
+
+    def hold(self, jump: np.ndarray, memory: Memory) -> Memory:
+        """The memory with which nothing breaks or lets go beyond what it has at a jump; the next
+        memory that it leads to holds nothing.
+        """
+        return memory
 
     def shear_strength(self, jump: np.ndarray, memory: Memory) -> np.ndarray | None:
         """The shear stress (q,) that slip cannot raise [Pa]; None if there is no such bound."""
@@ -54,6 +66,8 @@ class Rupture(Law):
     Memory: kappa, the largest opening so far, and the released slip. Openings here are those beyond
     the thickness that grout and saw leave.
     """
+
+    breaks = True
 
     def __init__(self, case: Case) -> None:
         self.K_N, self.K_T, self.contact = (
@@ -92,11 +106,18 @@ class Rupture(Law):
 
     def broken(self, opening: np.ndarray, memory: Memory) -> np.ndarray:
         """Whether the bond has gone."""
-        return (opening >= self.L_C) | (memory.scalar >= self.L_C) | (memory.sawn > 0)
+        before = (memory.scalar >= self.L_C) | (memory.sawn > 0)
+        return before | (opening >= self.L_C) if memory.held is None else before
 
-    def tangential(self, opening: np.ndarray) -> np.ndarray:
-        """Tangential stiffness [Pa/m]."""
-        return np.where(opening <= 0, self.K_T, self.K_T * np.maximum(1 - opening / self.L_CT, 0))
+    def share(self, opening: np.ndarray, memory: Memory) -> np.ndarray:
+        """What is left of the tangential stiffness, 0 to 1."""
+        if memory.held is not None:
+            return memory.held
+        return np.where(opening <= 0, 1, np.maximum(1 - opening / self.L_CT, 0))
+
+    def hold(self, jump: np.ndarray, memory: Memory) -> Memory:
+        """See `Law`: the shear's share as it is, and no larger opening counts as one."""
+        return replace(memory, held=self.share(self.opening(jump, memory), memory))
 
     @property
     def releases(self) -> bool:
@@ -127,7 +148,7 @@ class Rupture(Law):
         )
         closed, broken = opening <= 0, self.broken(opening, memory)
         liquid = opening >= memory.most
-        unloading = opening <= kappa
+        unloading = opening <= (kappa if memory.held is None else np.inf)
         with np.errstate(divide="ignore", invalid="ignore"):
             back = self.sigma_c * (1 - kappa / self.L_C) / kappa  # secant stiffness
             normal = np.select(
@@ -145,14 +166,14 @@ class Rupture(Law):
             [self.artificial * self.K_N, self.contact, back],
             softening,
         )
-        shear = self.tangential(opening)
+        shear = self.K_T * self.share(opening, memory)
         traction = np.column_stack([normal, shear[:, None] * slip])
         tangent = np.zeros((len(jump), 3, 3))
         tangent[:, 0, 0] = (
             np.maximum(stiffness, self.artificial * self.K_N) if secant else stiffness
         )
         tangent[:, 1, 1] = tangent[:, 2, 2] = np.maximum(shear, self.artificial * self.K_T)
-        if not secant:
+        if not secant and memory.held is None:
             falling = np.where((opening > 0) & (opening < self.L_CT), -self.K_T / self.L_CT, 0)
             tangent[:, 1:, 0] = falling[:, None] * slip
         if within is not None and within.any():
@@ -164,13 +185,14 @@ class Rupture(Law):
     def remember(self, jump: np.ndarray, memory: Memory) -> Memory:
         """The memory after convergence."""
         opening = self.opening(jump, memory)
-        free = self.tangential(opening) <= 0
+        free = self.share(opening, memory) <= 0
         grouted = np.maximum(jump[:, 0] - memory.thickness + memory.sawn - memory.most, 0)
         return replace(
             memory,
             scalar=np.maximum(memory.scalar, opening),
             vector=np.where(free[:, None], jump[:, 1:], memory.vector),
             thickness=memory.thickness + grouted,
+            held=None,
         )
 
     def damage(self, jump: np.ndarray, memory: Memory) -> np.ndarray:
@@ -294,6 +316,8 @@ class Bond(Law):
     Memory: the damage D of tension and cohesion, and the slip.
     """
 
+    breaks = True
+
     def __init__(self, case: Case) -> None:
         self.K_N, self.K_T = case["K_N"], case["K_T"]
         self.strength, self.cohesion, self.mu = case["sigma_max"], case["adhesion"], case["mu"]
@@ -312,18 +336,28 @@ class Bond(Law):
         share = (opening - self.delta_e) / (self.delta_c - self.delta_e)
         return np.maximum(damage, np.clip(share, 0, 1))
 
+    def softening(self, memory: Memory) -> tuple[float, float]:
+        """The stiffness in slip, and the damage per slip [1/m]."""
+        return (self.K_soft, self.per_slip) if memory.held is None else (self.K_T, 0.0)
+
+    def hold(self, jump: np.ndarray, memory: Memory) -> Memory:
+        """See `Law`: the damage stays, and a point that slides does not soften."""
+        return replace(memory, held=1 - memory.scalar)
+
     def trial(self, jump: np.ndarray, memory: Memory) -> tuple[np.ndarray, ...]:
         """Size and direction of the elastic shear stress, damage by the opening, slip of this step,
         new damage, and whether the bond is gone.
         """
+        K_soft, per_slip = self.softening(memory)
         shear = self.K_T * (jump[:, 1:] - memory.vector)
         size = np.linalg.norm(shear, axis=1)
         excess = size + self.mu * self.K_N * np.minimum(jump[:, 0], 0)
-        opened = self.opened(jump[:, 0], memory.scalar)
-        softened = np.maximum((excess - self.cohesion * (1 - opened)) / self.K_soft, 0)
-        gone = opened + self.per_slip * softened >= 1
+        held = memory.held is not None
+        opened = memory.scalar if held else self.opened(jump[:, 0], memory.scalar)
+        softened = np.maximum((excess - self.cohesion * (1 - opened)) / K_soft, 0)
+        gone = opened + per_slip * softened >= 1
         slip = np.where(gone, np.maximum(excess / self.K_T, 0), softened)
-        damage = np.where(gone, 1.0, opened + self.per_slip * softened)
+        damage = np.where(gone, 1.0, opened + per_slip * softened)
         return size, shear / np.maximum(size, 1e-300)[:, None], opened, slip, damage, gone
 
     def back(self, damage: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -345,6 +379,7 @@ class Bond(Law):
         secant: a positive stiffness that never softens instead of the tangent; within: none here.
         """
         size, n, opened, slip, damage, gone = self.trial(jump, memory)
+        K_soft, per_slip = self.softening(memory)
         opening, sliding = jump[:, 0], slip > 0
         closed = opening <= 0
         slope, d_slope = self.back(damage)
@@ -361,14 +396,14 @@ class Bond(Law):
         growing = (opened > memory.scalar) & (opened < 1)
         d_opened = np.where(growing, 1 / (self.delta_c - self.delta_e), 0)
         pressing = self.mu * self.K_N * (opening < 0)
-        with_size = np.where(gone, 1.0, self.K_T / self.K_soft) * sliding
-        softening = (pressing + self.cohesion * d_opened) / self.K_soft
+        with_size = np.where(gone, 1.0, self.K_T / K_soft) * sliding
+        softening = (pressing + self.cohesion * d_opened) / K_soft
         with_opening = np.where(gone, pressing / self.K_T, softening) * sliding
-        d_damage = np.where(gone, 0, d_opened + self.per_slip * with_opening)
+        d_damage = np.where(gone, 0, d_opened + per_slip * with_opening)
         open_stiffness = slope + opening * d_slope * d_damage
         broken = (damage >= 1) | (self.strength == 0)
         tangent[:, 0, 0] = np.select([closed, broken], [self.K_N, weak], open_stiffness)
-        by_slip = opening * d_slope * np.where(gone, 0, self.per_slip * with_size)
+        by_slip = opening * d_slope * np.where(gone, 0, per_slip * with_size)
         tangent[:, 0, 1:] = np.where(closed | broken, 0, by_slip)[:, None] * n
         tangent[:, 1:, 0] = (-self.K_T * with_opening)[:, None] * n
         outer, eye = n[:, :, None] * n[:, None, :], np.eye(2)
@@ -387,6 +422,9 @@ class Bond(Law):
     def remember(self, jump: np.ndarray, memory: Memory) -> Memory:
         """The memory after convergence."""
         _, n, _, slip, damage, _ = self.trial(jump, memory)
+        if memory.held is not None:
+            softened = self.opened(jump[:, 0], damage) + self.per_slip * slip
+            damage = np.minimum(softened, 1)
         return Memory(damage, memory.vector + slip[:, None] * n)
 
     def damage(self, jump: np.ndarray, memory: Memory) -> np.ndarray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import linalg
@@ -26,16 +26,6 @@ class Attempt:
     release: int
     iterations: int
     halvings: int
-    #: whether the joint goes as a drag lets it (`relax`)
-    drag: bool = False
-
-
-@dataclass(frozen=True)
-class Drag:
-    """A traction that holds the joint back: size [Pa/m] times what it has moved from a jump."""
-
-    size: float
-    jump: np.ndarray
 
 
 @dataclass
@@ -52,7 +42,7 @@ class Iterate:
     side: np.ndarray | None = None
 
 
-#: The iterate at a jump and a level, that follows another one or none, under a drag or none.
+#: The iterate at a jump and a level, that follows another one or none.
 Evaluate = Callable[..., Iterate]
 
 
@@ -133,38 +123,12 @@ def newton(
 
 def hopeless(now: Iterate, sizes: list[float]) -> bool:
     """Whether an iterate has been there before, or its residual drifts along unchanged."""
-    near = [abs(now.size - size) / now.size for size in sizes]
-    return min(near, default=1.0) <= 1e-10 or (len(near) >= DRIFT and max(near[-DRIFT:]) <= STILL)
+    drifts = len(sizes) >= DRIFT and all(
+        repeated(now.size, [size], STILL) for size in sizes[-DRIFT:]
+    )
+    return drifts or repeated(now.size, sizes, 1e-10)
 
 
-def relax(
-    evaluate: Evaluate, start: Iterate, limit: Limit, attempt: Attempt, stiffness: float
-) -> tuple[Iterate, int] | None:
-    """As `newton`, by following the joint as a drag lets it move: implicit steps in a time of no
-    meaning, in which a joint that breaks at once breaks point by point, up to where it holds again.
-
-    That is pseudo-transient continuation [Kelley and Keyes 1998]: a step that is solved easily is
-    followed by one with less drag, one that is not is tried again with more.
-
-    stiffness: the joint's, which is the first drag [Pa/m]. Raises Fallen.
-    """
-    now, drag, spent = start, stiffness, 0
-    step = replace(attempt, iterations=12)
-    while spent < attempt.iterations:
-        held = Drag(drag, now.jump)
-        goal = replace(limit, size=max(limit.size, 1e-3 * now.size))
-        found = newton(
-            lambda jump, level, last, held=held: evaluate(jump, level, last, held),
-            evaluate(now.jump, now.level, None, held),
-            goal,
-            step,
-        )
-        spent += found[1] if found else step.iterations
-        if found is None:
-            drag *= 8
-            continue
-        now = evaluate(found[0].jump, found[0].level, None)
-        if limit.met(now, np.inf, evaluate):
-            return now, spent
-        drag /= 4 if found[1] <= 6 else 2
-    return None
+def repeated(size: float, sizes: list[float], part: float) -> bool:
+    """Whether a residual's size is one of earlier ones, but for a part of it."""
+    return any(abs(size - earlier) <= part * size for earlier in sizes)

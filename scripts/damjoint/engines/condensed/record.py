@@ -45,6 +45,14 @@ class State:
         memories = (joint.law.stage(m, self.time, time) for m in (self.memory, self.nodes))
         return replace(self, **dict(zip(("memory", "nodes"), memories, strict=True)))
 
+    def held(self, joint: Joint) -> State:
+        """The state with memories with which nothing breaks or lets go any further."""
+        law, interface = joint.law, joint.interface
+        at_points = interface.jumps(interface.at_points, self.jump)
+        at_nodes = interface.jumps(interface.at_nodes, self.jump)
+        memory, nodes = law.hold(at_points, self.memory), law.hold(at_nodes, self.nodes)
+        return replace(self, memory=memory, nodes=nodes)
+
     def remember(self, joint: Joint, jump: np.ndarray) -> tuple[Memory, Memory]:
         """The memories after a step to a jump."""
         law, interface = joint.law, joint.interface

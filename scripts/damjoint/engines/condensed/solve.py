@@ -71,4 +71,6 @@ def solve(case: Case, on_step: OnStep, _fields: bool) -> Iterator[Outcome]:
             result = fillings[-1].results()
             seconds = before | {"solve": time.perf_counter() - begin}
             result.info = about(bulk) | {"wall_seconds": seconds}
+            if fillings[-1].ran_on:
+                result.info["ran_on"] = fillings[-1].ran_on
             yield Outcome(result, lambda: bodies().mesh, partial(fields, number), error)
