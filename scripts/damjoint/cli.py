@@ -39,6 +39,13 @@ def natural(text: str) -> int:
     return int(text)
 
 
+def path(text: str) -> Path:
+    """A path that has been named: an empty one would be the folder one happens to be in."""
+    if not text.strip():
+        raise argparse.ArgumentTypeError(f"{text!r}: must be a path")
+    return Path(text)
+
+
 def parser() -> argparse.ArgumentParser:
     """The argument parser of the command."""
     top = Parser(
@@ -86,7 +93,7 @@ def parser() -> argparse.ArgumentParser:
     )
     add = run.add_argument
     add("case", help=of_case)
-    add("--out", type=Path, help="output folder (default out/CASE)")
+    add("--out", type=path, help="output folder (default out/CASE)")
     add("--no-fields", action="store_true", help="no displacement and stress fields")
     add("--no-picture", action="store_true", help="no PNG")
     add("--engine", default="auto", help=of_engine)
@@ -101,20 +108,20 @@ def parser() -> argparse.ArgumentParser:
     add("cases", nargs="+", metavar="CASE", help=f"load combinations: {of_case}")
     add(
         "--out",
-        type=Path,
+        type=path,
         default=Path("out/check"),
         help="where check.csv and the cases' folders go (default out/check)",
     )
     safety.set_defaults(call=do_check)
 
     plot = commands.add_parser("plot", help="redraw a run's pictures from its files")
-    plot.add_argument("out", type=Path, metavar="OUT", help="a folder that a run has written")
+    plot.add_argument("out", type=path, metavar="OUT", help="a folder that a run has written")
     plot.set_defaults(call=do_plot)
 
     report = commands.add_parser("report", help="one HTML page from the files of runs")
     add = report.add_argument
-    add("out", type=Path, nargs="+", metavar="OUT", help="folders that runs have written")
-    add("--to", type=Path, default=Path("report.html"), help="the page (default report.html)")
+    add("out", type=path, nargs="+", metavar="OUT", help="folders that runs have written")
+    add("--to", type=path, default=Path("report.html"), help="the page (default report.html)")
     report.set_defaults(call=do_report)
 
     window = commands.add_parser("gui", parents=[settings], help="a case in Gmsh's window")
@@ -122,7 +129,7 @@ def parser() -> argparse.ArgumentParser:
     window.set_defaults(call=do_gui)
 
     new = commands.add_parser("new", help="write a commented case file to begin with")
-    new.add_argument("path", type=Path, metavar="MY.case", help="the file to write")
+    new.add_argument("path", type=path, metavar="MY.case", help="the file to write")
     new.set_defaults(call=do_new)
 
     check = commands.add_parser(
@@ -130,7 +137,7 @@ def parser() -> argparse.ArgumentParser:
     )
     add = check.add_argument
     add("cases", nargs="*", metavar="CASE", help="letters; default: all")
-    add("--out", type=Path, default=Path("out"), help="where the cases' folders go (default out)")
+    add("--out", type=path, default=Path("out"), help="where the cases' folders go (default out)")
     add("--engine", default="auto", help=of_engine)
     check.set_defaults(call=do_validate)
 
@@ -150,7 +157,7 @@ def parser() -> argparse.ArgumentParser:
     )
     add("--levels", help="water levels [m] on the way; all but a critical level ask for the last")
     add("--tail-levels", help="tailwater levels [m], one or as many as levels")
-    add("--out", type=Path, help="output folder (default out/CASE_critical)")
+    add("--out", type=path, help="output folder (default out/CASE_critical)")
     limit.set_defaults(call=do_critical)
 
     vary = commands.add_parser(
@@ -200,7 +207,7 @@ def parser() -> argparse.ArgumentParser:
     )
     add("--jobs", type=whole, help="processes (default: all cores)")
     add("--scheduler", metavar="ADDRESS", help="a dask.distributed scheduler instead")
-    add("--out", type=Path, help="result file, resumed if it exists (default CASE_sweep.csv)")
+    add("--out", type=path, help="result file, resumed if it exists (default CASE_sweep.csv)")
     vary.set_defaults(call=do_sweep)
 
     trial = commands.add_parser(
@@ -212,7 +219,7 @@ def parser() -> argparse.ArgumentParser:
     add("--jobs", type=whole, help="processes (default: all cores)")
     add(
         "--out",
-        type=Path,
+        type=path,
         default=Path("stress.csv"),
         help="result file, resumed if it exists (default stress.csv)",
     )
@@ -223,7 +230,7 @@ def parser() -> argparse.ArgumentParser:
     add("--short", action="store_true", help="two minutes instead of thirty")
     add(
         "--out",
-        type=Path,
+        type=path,
         default=Path("out/bench"),
         help="folder of page, tables and picture (default out/bench)",
     )
@@ -236,11 +243,11 @@ def parser() -> argparse.ArgumentParser:
     add("law", help="rupture, friction or bond")
     add(
         "--path",
-        type=Path,
+        type=path,
         required=True,
         help="CSV with delta_n,delta_t1,delta_t2 [m] and optionally p [Pa]; row n: step to t = n",
     )
-    add("--out", type=Path, help="output CSV (default: standard output)")
+    add("--out", type=path, help="output CSV (default: standard output)")
     law.set_defaults(call=do_law)
     return top
 

@@ -287,6 +287,44 @@ def test_nothing_to_save_before_a_run(open_window, tmp_path):
     assert hand.session.status == "nothing to save yet: press Run first"
 
 
+def test_a_case_of_ones_own_is_not_overwritten(open_window, tmp_path):
+    """Nor is a file that a link leads to; what the window itself has saved is."""
+    hand = open_window("c", **SMALL)
+    hand.run()
+    own, behind = tmp_path / "own" / "c.case", tmp_path / "behind.txt"
+    for folder in ("own", "linked", "new"):
+        (tmp_path / folder).mkdir()
+    own.write_text("// mine\n")
+    behind.write_text("mine, too\n")
+    (tmp_path / "linked" / "c.case").symlink_to(behind)
+    for folder in ("own", "linked"):
+        gmsh.onelab.setString(tree.FOLDER, [str(tmp_path / folder)])
+        hand.press(tree.SAVE_ACTION)
+        hand.wait()
+        assert hand.session.status.endswith("has a c.case of its own: choose another folder")
+        assert [p.name for p in (tmp_path / folder).iterdir()] == ["c.case"]
+    assert own.read_text() == "// mine\n" and behind.read_text() == "mine, too\n"
+    hand.save(tmp_path / "new")
+    hand.save(tmp_path / "new")
+    gmsh.onelab.setString(tree.FOLDER, [""])
+    hand.press(tree.SAVE_ACTION)
+    hand.wait()
+    assert hand.session.status == "out: name a folder"
+
+
+def test_an_engine_that_dies_is_started_again(open_window):
+    """Killed while it works, as by a machine without memory."""
+    hand = open_window("e", **SMALL)
+    hand.type(tree.STEPS, "2000")
+    hand.press("run")
+    hand.wait(lambda session: "level 3." in session.status)
+    hand.session.engine.process.kill()
+    hand.wait()
+    assert hand.session.status == "the engine has ended (-9); press Run"
+    hand.type(tree.STEPS, "1")
+    assert hand.run().startswith("done in")
+
+
 def test_a_run_that_stops_says_why(open_window):
     hand = open_window("c", **SMALL, pena_tang=0.0)
     status = hand.run()
@@ -307,6 +345,8 @@ def test_other_cases_and_files(open_window, tmp_path):
     assert tree.get_text(tree.LEVELS) == "15, 18" and "mine" in hand.entry(tree.CASE)["valueLabels"]
     hand.type("dam_height", 21.0)
     assert hand.session.tree.sheet.case.name == "mine"
+    assert "unknown; allowed" in hand.type(tree.FILE, 5000 * "x")
+    hand.type(tree.FILE, "")  # nothing is chosen: the case stays
     assert hand.run().startswith("done in")
 
 

@@ -177,7 +177,7 @@ def case_file(case: str) -> Path:
     Raises InputError if there is none.
     """
     for path in (CASES / f"{case.lower()}.case", Path(case)):
-        if path.suffix == ".case" and path.is_file():
+        if path.suffix == ".case" and os.path.isfile(path):  # False for any name, however odd
             return path
     names = ", ".join(path.stem for path in sorted(CASES.glob("*.case")))
     raise InputError(f"case {case}: unknown; allowed: {names}, or the path of a .case file")

@@ -215,7 +215,7 @@ class Tree:
         """
         request, shown = self.sheet.request, self.shown
         case, file = get_number(CASE), get_text(FILE)
-        if file != shown[FILE]:
+        if file not in (shown[FILE], ""):
             return Request(file)
         if case != shown[CASE]:
             names = list(self.titles)

@@ -173,10 +173,9 @@ class Session:
         """A run, or what else was under way, has failed."""
         self.free(why, tree.BAD)
 
-    def on_died(self, code: int | None) -> None:
+    def on_died(self, why: str) -> None:
         """The engine's process is gone, by a second Stop or by itself."""
-        stopped = "stopped at once, nothing kept"
-        self.free(stopped if code == -9 else f"the engine has ended ({code}); press Run", tree.BAD)
+        self.free(why, tree.BAD)
 
     def on_step(self, at: tuple[int, float]) -> None:
         """A step has converged; said a few times a second, since drawing costs more than a step."""

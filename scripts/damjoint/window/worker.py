@@ -28,7 +28,11 @@ from ..results.verdict import failed, statement
 from ..run import ended, keep
 from ..scene.mesh import Body
 from ..scene.parameters import declared
+from ..storage import whole
 from .sheet import Request, Sheet, case_text, fill, titles
+
+#: What a case file begins with that a save may replace.
+SAVED = "// Saved by the window of damjoint, which writes it anew when a run is saved here again.\n"
 
 
 @dataclass
@@ -151,15 +155,22 @@ def follow(sheet: Sheet, pipe: Connection, stop: Stop) -> list[Outcome]:
 
 
 def save(folder: str, last: tuple[Sheet, list[Outcome]] | None) -> None:
-    """Write the last run and the case file that repeats it.
+    """Write the last run and the case file that repeats it, in place of one that the window has
+    written before.
 
-    Raises InputError if there is none, or the folder can not be written.
+    Raises InputError if there is none, or no folder, or it can not be written.
     """
     if last is None:
         raise InputError("nothing to save yet: press Run first")
+    if not folder.strip():
+        raise InputError("out: name a folder")
     sheet, outcomes = last
+    file = Path(folder) / f"{sheet.case.name}.case"
+    if file.exists() and not file.read_bytes().startswith(SAVED.encode()):
+        raise InputError(f"out = {folder}: has a {file.name} of its own: choose another folder")
     keep(sheet.case, outcomes, Path(folder))
-    (Path(folder) / f"{sheet.case.name}.case").write_text(case_text(sheet, outcomes[0].result.case))
+    with whole(file) as part:
+        part.write_text(SAVED + case_text(sheet, outcomes[0].result.case), encoding="utf-8")
 
 
 class Engine:
@@ -175,7 +186,7 @@ class Engine:
         self.process = context.Process(target=serve, args=(other,), daemon=True)
         self.process.start()
         other.close()
-        self.interrupted = False
+        self.interrupted = self.killed = False
 
     def send(self, kind: str, asked: Request | str) -> None:
         """Ask for something: see serve."""
@@ -186,7 +197,7 @@ class Engine:
     def messages(self, wait: float = 0.0) -> Iterator[tuple]:
         """What has come back; wait: at most so many seconds for a first one.
 
-        A process that has died gives ("died", exit code), and another one is started.
+        A process that has died gives ("died", why), and another one is started.
         """
         try:
             while self.pipe.poll(wait):
@@ -194,13 +205,15 @@ class Engine:
                 wait = 0.0
         except (EOFError, OSError):
             self.process.join(1)
-            code = self.process.exitcode
+            why = f"the engine has ended ({self.process.exitcode}); press Run"
+            why = "stopped at once, nothing kept" if self.killed else why
             self.start()
-            yield "died", code
+            yield "died", why
 
     def stop(self) -> None:
         """End a run after what has converged; the second time, at once and with nothing kept."""
         if self.interrupted:
+            self.killed = True
             self.process.kill()
         else:
             os.kill(self.process.pid, signal.SIGINT)
