@@ -251,8 +251,10 @@ def test_numbers_that_can_not_be_computed_with(command, setting):
     assert (code, out) == (1, "") and len(err.splitlines()) == 1 and "eliminated" in err
 
 
-def test_too_many_steps_and_rows(command):
+def test_arguments_are_refused_by_name(command):
+    """Too many steps and rows, a parameter given twice, no folder: it would be the present one."""
     for words, said in (
+        (("run", "a", "--out", ""), "out = '': must be a path"),
         (("run", "a", "--steps", "99999999999"), "steps = 99999999999"),
         (("sweep", "a", "--vary", "mu=0:1:1e-12"), "at most"),
         (("sweep", "a", "--vary", "mu=0.5", "--vary", "mu=0.6"), "--vary mu"),
