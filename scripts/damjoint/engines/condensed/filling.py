@@ -225,13 +225,12 @@ class Filling:
         try:
             for _ in range(ROUNDS):
                 self.state = state = self.state.staged(joint, time).held(joint)
-                found = self.solve_by(attempts[:1], time, insist=False)
-                if found is None:
-                    lift = None
-                    if joint.flowing:
-                        level = state.loading.level if prescribed else level
-                        loading = Loading.at(self.case, time, level, tail)
-                        lift, _ = joint.flowing_lift(state.jump, state.memory, loading)
+                coupled = attempts[:1] if joint.flowing else attempts
+                found = self.solve_by(coupled, time, insist=False)
+                if found is None and joint.flowing:
+                    level = state.loading.level if prescribed else level
+                    loading = Loading.at(self.case, time, level, tail)
+                    lift, _ = joint.flowing_lift(state.jump, state.memory, loading)
                     found = self.solve_by(attempts, time, insist=False, held_lift=lift)
                 if found is None:
                     return None

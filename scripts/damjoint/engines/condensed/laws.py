@@ -31,7 +31,7 @@ class Memory:
     sawn: float = 0.0
     most: float = np.inf
     #: while a burst is followed, in which nothing breaks or lets go any further (see `hold`): the
-    #: share of the shear stiffness that is left (q,)
+    #: share (q,) that is left of the shear stiffness (rupture) or of the bond (bond)
     held: np.ndarray | None = None
 
 

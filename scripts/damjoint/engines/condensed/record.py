@@ -47,18 +47,20 @@ class State:
 
     def held(self, joint: Joint) -> State:
         """The state with memories with which nothing breaks or lets go any further."""
-        law, interface = joint.law, joint.interface
-        at_points = interface.jumps(interface.at_points, self.jump)
-        at_nodes = interface.jumps(interface.at_nodes, self.jump)
-        memory, nodes = law.hold(at_points, self.memory), law.hold(at_nodes, self.nodes)
+        at_points, at_nodes = seen(joint, self.jump)
+        memory, nodes = joint.law.hold(at_points, self.memory), joint.law.hold(at_nodes, self.nodes)
         return replace(self, memory=memory, nodes=nodes)
 
     def remember(self, joint: Joint, jump: np.ndarray) -> tuple[Memory, Memory]:
         """The memories after a step to a jump."""
-        law, interface = joint.law, joint.interface
-        at_points = interface.jumps(interface.at_points, jump)
-        at_nodes = interface.jumps(interface.at_nodes, jump)
-        return law.remember(at_points, self.memory), law.remember(at_nodes, self.nodes)
+        at_points, at_nodes = seen(joint, jump)
+        return joint.law.remember(at_points, self.memory), joint.law.remember(at_nodes, self.nodes)
+
+
+def seen(joint: Joint, jump: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The jump as the law's points and the nodes see it, (q, 3) each."""
+    interface = joint.interface
+    return tuple(interface.jumps(m, jump) for m in (interface.at_points, interface.at_nodes))
 
 
 @dataclass
