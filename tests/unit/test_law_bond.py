@@ -71,6 +71,17 @@ def test_shear_takes_its_share_of_the_tensile_strength():
     assert_allclose([answer["tau_1"][0], answer["sigma_n"][1]], [0.75 * C, 0.75 * F], rtol=1e-9)
 
 
+@pytest.mark.parametrize("steps", [1, 4, 16, 64])
+def test_damage_is_the_larger_of_the_opening_s_and_the_slip_s(steps):
+    """Opened by a half of delta_c while it slips by a quarter of lambda_c, in any number of steps:
+    damage 1/2, not 3/4; and the other way round."""
+    ramp = np.linspace(0, 1, steps + 1)[1:, None]
+    opened = along(ramp * [D_E + (D_C - D_E) / 2, 0.25 * LAMBDA_C + C / 2 / K_T, 0])
+    assert_allclose(opened["D"][-1], 0.5, rtol=1e-4)
+    slid = along(ramp * [D_E + (D_C - D_E) / 4, LAMBDA_C / 2 + C / 2 / K_T, 0])
+    assert_allclose(slid["D"][-1], 0.5, rtol=5e-3)
+
+
 def test_slip_follows_the_shear_in_3d():
     way = np.array([0.6, -0.8])
     answer = along([(-1e-6, *(1e-3 * way))])

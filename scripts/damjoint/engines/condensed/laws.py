@@ -341,24 +341,28 @@ class Bond(Law):
         return (self.K_soft, self.per_slip) if memory.held is None else (self.K_T, 0.0)
 
     def hold(self, jump: np.ndarray, memory: Memory) -> Memory:
-        """See `Law`: the damage stays, and a point that slides does not soften."""
-        return replace(memory, held=1 - memory.scalar)
+        """See `Law`: the damage stays what it is there, and a point that slides does not soften."""
+        return replace(memory, held=1 - self.opened(jump[:, 0], memory.scalar))
 
     def trial(self, jump: np.ndarray, memory: Memory) -> tuple[np.ndarray, ...]:
-        """Size and direction of the elastic shear stress, damage by the opening, slip of this step,
-        new damage, and whether the bond is gone.
+        """Size and direction of the elastic shear stress, slip of this step, new damage, whether
+        it is the opening's, and whether the bond is gone by the slip.
+
+        The new damage is the larger of the opening's and the slip's, D + slip/lambda_c.
         """
         K_soft, per_slip = self.softening(memory)
         shear = self.K_T * (jump[:, 1:] - memory.vector)
         size = np.linalg.norm(shear, axis=1)
         excess = size + self.mu * self.K_N * np.minimum(jump[:, 0], 0)
-        held = memory.held is not None
-        opened = memory.scalar if held else self.opened(jump[:, 0], memory.scalar)
-        softened = np.maximum((excess - self.cohesion * (1 - opened)) / K_soft, 0)
-        gone = opened + per_slip * softened >= 1
-        slip = np.where(gone, np.maximum(excess / self.K_T, 0), softened)
-        damage = np.where(gone, 1.0, opened + per_slip * softened)
-        return size, shear / np.maximum(size, 1e-300)[:, None], opened, slip, damage, gone
+        before, held = memory.scalar, memory.held
+        opened = self.opened(jump[:, 0], before) if held is None else 1 - held
+        if_opening = np.maximum((excess - self.cohesion * (1 - opened)) / self.K_T, 0)
+        if_slip = (excess - self.cohesion * (1 - before)) / K_soft
+        by_opening = before + per_slip * if_opening <= opened
+        gone = ~by_opening & (before + per_slip * if_slip >= 1)
+        slip = np.select([by_opening, gone], [if_opening, excess / self.K_T], if_slip)
+        damage = np.select([by_opening, gone], [opened, 1.0], before + per_slip * if_slip)
+        return size, shear / np.maximum(size, 1e-300)[:, None], slip, damage, by_opening, gone
 
     def back(self, damage: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Slope of the line to the origin in tension, and its derivative with the damage."""
@@ -378,7 +382,7 @@ class Bond(Law):
 
         secant: a positive stiffness that never softens instead of the tangent; within: none here.
         """
-        size, n, opened, slip, damage, gone = self.trial(jump, memory)
+        size, n, slip, damage, by_opening, gone = self.trial(jump, memory)
         K_soft, per_slip = self.softening(memory)
         opening, sliding = jump[:, 0], slip > 0
         closed = opening <= 0
@@ -393,17 +397,19 @@ class Bond(Law):
             shear = self.K_T * np.maximum(left, self.artificial)
             tangent[:, 1, 1] = tangent[:, 2, 2] = shear
             return traction, tangent
-        growing = (opened > memory.scalar) & (opened < 1)
+        growing = by_opening & (damage > memory.scalar) & (damage < 1)
         d_opened = np.where(growing, 1 / (self.delta_c - self.delta_e), 0)
+        softens = ~(by_opening | gone)  # slip does the damage
+        stiffness = np.where(softens, K_soft, self.K_T)
+        with_size = self.K_T / stiffness * sliding
         pressing = self.mu * self.K_N * (opening < 0)
-        with_size = np.where(gone, 1.0, self.K_T / K_soft) * sliding
-        softening = (pressing + self.cohesion * d_opened) / K_soft
-        with_opening = np.where(gone, pressing / self.K_T, softening) * sliding
-        d_damage = np.where(gone, 0, d_opened + per_slip * with_opening)
+        with_opening = (pressing + self.cohesion * d_opened) / stiffness * sliding
+        per_slip = per_slip * softens
+        d_damage = d_opened + per_slip * with_opening
         open_stiffness = slope + opening * d_slope * d_damage
         broken = (damage >= 1) | (self.strength == 0)
         tangent[:, 0, 0] = np.select([closed, broken], [self.K_N, weak], open_stiffness)
-        by_slip = opening * d_slope * np.where(gone, 0, per_slip * with_size)
+        by_slip = opening * d_slope * per_slip * with_size
         tangent[:, 0, 1:] = np.where(closed | broken, 0, by_slip)[:, None] * n
         tangent[:, 1:, 0] = (-self.K_T * with_opening)[:, None] * n
         outer, eye = n[:, :, None] * n[:, None, :], np.eye(2)
@@ -421,10 +427,10 @@ class Bond(Law):
 
     def remember(self, jump: np.ndarray, memory: Memory) -> Memory:
         """The memory after convergence."""
-        _, n, _, slip, damage, _ = self.trial(jump, memory)
+        _, n, slip, damage, *_ = self.trial(jump, memory)
         if memory.held is not None:
-            softened = self.opened(jump[:, 0], damage) + self.per_slip * slip
-            damage = np.minimum(softened, 1)
+            by_slip = np.minimum(memory.scalar + self.per_slip * slip, 1)
+            damage = np.maximum(self.opened(jump[:, 0], memory.scalar), by_slip)
         return Memory(damage, memory.vector + slip[:, None] * n)
 
     def damage(self, jump: np.ndarray, memory: Memory) -> np.ndarray:
