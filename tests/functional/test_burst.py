@@ -39,7 +39,7 @@ def test_a_burst_is_told(solve):
     """A run whose state depends on its way says so, and what helps."""
     (ran_on,) = solve("ssnp142", "40", uplift="flow", **SLENDER)
     assert verdict(ran_on) == "stands" and min(ran_on.info["ran_on"]) <= 40
-    assert any("breaks in a burst" in hint for hint in hints(ran_on))
+    assert any("depends on steps and mesh" in hint for hint in hints(ran_on))
     assert any("alpha = 2 keeps it, law = bond slides" in hint for hint in hints(ran_on))
     (kept,) = solve("ssnp142", "40", uplift="flow", alpha=2, **SLENDER)
     assert kept.last["level"] == 40 and not any("alpha" in hint for hint in hints(kept))

@@ -171,15 +171,15 @@ def test_what_is_written(command, tmp_path):
 
 
 def test_an_interrupted_search_leaves_what_it_has_found(monkeypatch, tmp_path):
-    go_on, calls = branch.Branch.go_on, []
+    advance, calls = branch.Branch.advance, []
 
     def interrupted(self):
         calls.append(self)
         if len(calls) > 3:
             raise KeyboardInterrupt
-        go_on(self)
+        advance(self)
 
-    monkeypatch.setattr(branch.Branch, "go_on", interrupted)
+    monkeypatch.setattr(branch.Branch, "advance", interrupted)
     with pytest.raises(KeyboardInterrupt):
         critical("c", "level", {"pena_tang": 0.0}, out=tmp_path / "out")
     assert (tmp_path / "out/critical.csv").read_text().count("\n") > 4

@@ -13,8 +13,8 @@ from .tables import Results
 
 
 def verdict(results: Results) -> str:
-    """One of: stands, sliding, overturning, out of range, no convergence, no equilibrium,
-    interrupted.
+    """One of: stands, sliding, overturning, broken through, out of range, not converged, no
+    equilibrium, interrupted.
 
     "no equilibrium": not even at the first step. "sliding" also where the whole joint has slipped
     or opened and the dam stands on nothing but the joint's hardening.
@@ -57,36 +57,30 @@ def loose_from(results: Results) -> float | None:
 
 
 def why_stopped(results: Results) -> str:
-    """Out of range, overturning, sliding or no convergence, from the last converged state.
+    """Out of range, sliding, overturning, broken through or not converged.
 
     Out of range: a driven run whose level would, in one more step like its last, be below 0 or
-    above the highest that is allowed.
-    Overturning: the resultant of the compression is in the base's last tenth, or, where the crack
-    has crossed most of it, in its last fifth; an open point of friction pulls with c/mu.
-    Sliding: the shear is within 2 % of what the joint can hold, T <= mu N + c L + H (mean slip) L
-    (N holds the tension c/mu of open points, so that c acts on all of L), for a bond beyond what
-    remains once it has gone, mu N; or the whole joint has let go.
+    above the highest that is allowed. A failure is named where the equilibrium path has shown the
+    mechanism or where the last converged state has reached a bound of statics; else the run has not
+    converged.
     """
     case, last = results.case, results.last
-    base = case.joint_length
     ahead = 2 * last["level"] - [0.0, *results.history["level"]][-2]
     if case["drive"] != "level" and not 0 <= ahead <= case.highest_level:
         return "out of range"
-    crack = last["crack_length"]
-    pull = case["adhesion"] / case["mu"] * crack if case["law"] == "friction" else 0.0
-    arm = 0.2 if crack > 0.8 * base else 0.1
-    if last["M"] + pull * (base - crack / 2) < arm * base * (last["N"] + pull):
-        return "overturning"
-    if case["law"] == "friction":
-        hardened = case["pena_tang"] * mean_slip(results) * base
-        holds = case["mu"] * last["N"] + case["adhesion"] * base + hardened
-        if last["T"] > 0.98 * holds:
-            return "sliding"
-    if case["law"] == "bond" and last["T"] > 0.98 * case["mu"] * last["N"]:
-        return "sliding"
-    if last["slip_length"] > 0.98 * base:
-        return "sliding"
-    return "no convergence"
+    shown = results.info.get("mechanism") or {}
+    return shown.get("mode") or bound(results)[0] or "not converged"
+
+
+def held(results: Results) -> float:
+    """What the joint holds along itself apart from mu N, from the last saved state [N/m]: a bond's
+    cohesion that damage has left; friction's adhesion, on all of the joint as N holds the tension
+    c/mu of its open points, and what slip has hardened.
+    """
+    case = results.case
+    if case["law"] == "bond":
+        return case["adhesion"] * (1 - mean(results, "damage")) * case.joint_along
+    return (case["adhesion"] + case["pena_tang"] * mean(results, "slip")) * case.joint_along
 
 
 def movement(case: Case, crack_length: float, x: np.ndarray, moved: np.ndarray) -> str:
@@ -103,35 +97,41 @@ def movement(case: Case, crack_length: float, x: np.ndarray, moved: np.ndarray) 
     return "overturning" if -rotation > abs(moved[:, 1].mean()) else "sliding"
 
 
-#: How near to a bound of the rigid block counts as there, relatively.
-AT_BOUND = 1e-3
+#: How near to a bound of statics a state counts as there, relatively: a run's last step is found
+#: to 1/1024 of the way between two levels.
+AT_BOUND = 5e-3
 
 
-def bound(case: Case, last: dict[str, float]) -> str:
-    """Which bound of the rigid block resultants have reached, in words; empty if none.
+def bound(results: Results) -> tuple[str, str]:
+    """Which bound of statics the last state has reached, sliding or overturning, and in words; both
+    empty if none.
 
-    Friction without hardening and bond hold T <= mu N + c L, a joint without tension M >= 0.
+    A rigid block on a joint without
+    tension has M >= 0; on elements the compression ends within the last one at the toe. Friction's
+    tension c/mu of the open part is no compression.
     """
-    length = case.joint_along
-    holds = case["mu"] * last["N"] + case["adhesion"] * length
-    bounded = case["law"] == "bond" or (case["law"] == "friction" and not case["pena_tang"])
-    if bounded and last["T"] >= (1 - AT_BOUND) * holds:
-        return f"T = {last['T']:.5g} N/m reaches mu N + c L"
-    arm = last["M"] / last["N"] if last["N"] > 0 else 0.0
-    if arm < 0.01 * length:
+    case, last = results.case, results.last
+    length, holds = case.joint_along, case["mu"] * last["N"] + held(results)
+    crack = last["crack_length"]
+    pull = case["adhesion"] / case["mu"] * crack if case["law"] == "friction" else 0.0
+    normal, moment = last["N"] + pull, last["M"] + pull * (length - crack / 2)
+    arm = moment / normal if normal > 0 else 0.0
+    if arm < max(0.01, 0.5 / case["n_joint"]) * length:
         side = "from" if arm >= 0 else "beyond"
-        return f"the resultant is {abs(arm):.3g} m {side} the toe"
-    return ""
+        return "overturning", f"the resultant is {abs(arm):.3g} m {side} the toe"
+    if case["law"] != "rupture" and last["T"] >= (1 - AT_BOUND) * holds:
+        return "sliding", f"T = {last['T']:.5g} N/m of the {holds:.5g} N/m that the joint holds"
+    return "", ""
 
 
-def mean_slip(results: Results) -> float:
-    """Mean slip along the joint at the last saved state [m]."""
+def mean(results: Results, column: str) -> float:
+    """The mean of a column along the joint at the last saved state; 0 if there is none."""
     if not len(results.joint["time"]):
         return 0.0
     rows = results.at()
     place, inverse = np.unique(rows["x"].round(9), return_inverse=True)
-    slip = np.bincount(inverse, rows["slip"]) / np.bincount(inverse)
-    return float(np.sum((slip[1:] + slip[:-1]) / 2 * np.diff(place)) / np.ptp(place))
+    values = np.bincount(inverse, rows[column]) / np.bincount(inverse)
+    return float(np.sum((values[1:] + values[:-1]) / 2 * np.diff(place)) / np.ptp(place))
 
 
 def statement(results: Results) -> str:
@@ -140,14 +140,13 @@ def statement(results: Results) -> str:
     if found == "no equilibrium":
         return "no equilibrium even at the first step"
     if results.stopped:
-        hint = stiff_joint(results) if found == "no convergence" else ""
         where = f"level {last['level']:.6g} m (t = {last['time']:.6g})"
         if found == "out of range":
             return (
                 f"out of range: the displacement asks for a level below 0 or above "
                 f"{case.highest_level:g} m beyond {where}; the last converged state is saved"
             )
-        return f"{found}{hint}: no equilibrium beyond {where}; the last converged state is saved"
+        return f"{found}: {why_there(results)}; the last converged state is saved"
     if found == "stands":
         return ""
     said = (
@@ -158,6 +157,23 @@ def statement(results: Results) -> str:
     asked = "" if case.hardening_asked else ", a default that no joint has; set it if yours hardens"
     return (
         f"{said}; the dam stands on the hardening pena_tang = {case['pena_tang']:.4g} Pa/m{asked}"
+    )
+
+
+def why_there(results: Results) -> str:
+    """In words, what shows that a run has stopped for a reason, or that nothing does."""
+    case, last, shown = results.case, results.last, results.info.get("mechanism")
+    where = f"level {last['level']:.6g} m (t = {last['time']:.6g})"
+    if shown:
+        pushed = f", pushed {shown['pushed']:.2g} times as far" if shown["pushed"] > 1 else ""
+        most = f"the dam{pushed} holds {shown['level']:.6g} m at most"
+        return f"no equilibrium beyond {where}: {most}"
+    if reached := bound(results)[1]:
+        return f"no equilibrium beyond {where}: {reached}"
+    arm = case.joint_along - last["x_resultant"]
+    return (
+        f"no equilibrium is found beyond {where}, and no mechanism either{stiff_joint(results)}; "
+        f"there the resultant is {arm:.3g} m from the toe, T/N' = {last['T'] / last['N']:.3g}"
     )
 
 
@@ -214,11 +230,16 @@ def hints(results: Results) -> list[str]:
         )
     if levels := results.info.get("ran_on"):
         found.append(
-            f"at {min(levels):.4g} m the joint breaks in a burst: where it comes to rest from then "
-            "on depends on steps and mesh"
+            f"unstable crack growth at level {min(levels):.4g} m: the state after it depends on "
+            "steps and mesh"
+        )
+    for limit, lowest in results.info.get("snapped", ()):
+        found.append(
+            f"unstable crack growth at level {limit:.4g} m: along the equilibrium path the level "
+            f"falls to {lowest:.4g} m before it rises again"
         )
     releases = case["law"] == "rupture" and case["alpha"] < 2
-    if releases and (levels or verdict(results) == "no convergence"):
+    if releases and (levels or verdict(results) == "not converged"):
         found.append(
             f"where it opens, law = rupture with alpha = {case['alpha']:g} lets go of its shear, "
             "and no friction takes it: the crack runs on at once; alpha = 2 keeps it, law = bond "

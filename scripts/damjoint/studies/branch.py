@@ -1,51 +1,23 @@
 """One dam followed to the end of its equilibria.
 
-The levels are prescribed as far as a step is found. From there on the crest's displacement is
-prescribed instead (or, where it turns back, the heel's opening), and the level is found with it:
-peaks, plateaus and bursts are passed, where steps of the level would only fail. A branch whose
-level rises no more, however far the dam is pushed, is a mechanism.
+The levels are prescribed as far as a step is found, then its equilibrium path is followed (see
+engines/condensed/path.py), and where it ends is looked at to the precision.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
-from functools import cached_property
+from collections.abc import Callable
 
 import numpy as np
 
 from ..engines.condensed.filling import Filling
 from ..engines.condensed.interface import Interface
+from ..engines.condensed.path import PRECISION, Path, Point
 from ..results.tables import CRITICAL
-from ..results.verdict import movement
 from ..scene.case import Case
-
-#: Relative precision of a critical value.
-PRECISION = 1e-4
-
-#: First push over the displacement so far; each one over the one before, at least and at most.
-FIRST, SHRINKING, GROWTH = 0.05, 0.25, 2.0
-
-#: A push that fails is tried at these parts of its length, but for what is smaller than this part
-#: of the displacement so far; then over a burst in which the dam springs back, these parts of it.
-PARTS, SMALLEST, JUMPS = (1, 1 / 4, 1 / 16), 1e-4, (0.01, 0.05, 0.25)
 
 #: How many steps of the level may fail, each one half of the one before, until the dam is pushed.
 FAILURES = 2
-
-#: By how much a push should raise the level, relatively: the highest level of a joint that softens
-#: depends on the steps by some hundredths of that.
-RISE = 0.005
-
-#: How many times as far a dam is pushed before its level counts as risen no more: for a first
-#: opinion, and for sure.
-ROUGH, SURE = 1.5, 4.0
-
-#: Levels that differ relatively by less are the same.
-PLATEAU = 1e-7
-
-#: Equilibria at most on a branch.
-MOST_POINTS = 500
 
 #: Looks at most at a branch's end.
 MOST_LOOKS = 30
@@ -55,67 +27,14 @@ MOST_LOOKS = 30
 TICK = 1e-3
 
 
-@dataclass(frozen=True)
-class Point:
-    """An equilibrium, with all that led there."""
-
-    filling: Filling
-    #: how far the dam has been pushed, with its displacement before the first push [m]; 0 where the
-    #: level is prescribed
-    pushed: float = 0.0
-    #: what was prescribed: level, crest or heel
-    control: str = "level"
-
-    @property
-    def level(self) -> float:
-        """The reservoir's level [m]."""
-        return self.filling.state.loading.level
-
-    @cached_property
-    def compression(self) -> float:
-        """Largest total compression at the toe [Pa]."""
-        joint, state, pressure = (
-            self.filling.joint,
-            self.filling.state,
-            self.filling.state.pressure.nodes,
-        )
-        interface = joint.interface
-        jump = interface.jumps(interface.at_nodes, state.jump)
-        effective = interface.at_places(joint.law.respond(jump, state.nodes)[0][:, 0])
-        toe = interface.way > 1 - 1e-9
-        return float((pressure - effective)[toe].max())
-
-    @cached_property
-    def slides(self) -> bool:
-        """Whether a flat joint holds the shear by its whole strength, which slip cannot raise: more
-        water has no equilibrium, it pushes more and presses less.
-        """
-        joint, state = self.filling.joint, self.filling.state
-        interface = joint.interface
-        if not interface.flat:
-            return False
-        jump = interface.jumps(interface.at_points, state.jump)
-        strength = joint.law.shear_strength(jump, state.memory)
-        if strength is None:
-            return False
-        shear = np.linalg.norm(joint.law.respond(jump, state.memory)[0][:, 1:], axis=1)
-        weights = interface.points.weights
-        return bool(weights @ shear >= (1 - PRECISION / 2) * (weights @ strength))
-
-    @property
-    def last(self) -> dict[str, float]:
-        """What an engine has found there: columns of history.csv, and the heel's opening."""
-        return {name: values[-1] for name, values in self.filling.record.rows.items()}
-
-    @property
-    def row(self) -> dict[str, float]:
-        """What critical.csv says of it, but for trial and value."""
-        found = {name: value for name, value in self.last.items() if name in CRITICAL}
-        driven = float(self.control != "level")
-        return found | {"driven": driven, "pushed": self.pushed, "compression": self.compression}
+def row(point: Point) -> dict[str, float]:
+    """What critical.csv says of a point, but for trial and value."""
+    found = {name: value for name, value in point.last.items() if name in CRITICAL}
+    driven = float(point.control != "level")
+    return found | {"driven": driven, "pushed": point.pushed, "compression": point.compression}
 
 
-class Branch:
+class Branch(Path):
     """The equilibria of a case up to a level, if there is one there."""
 
     def __init__(
@@ -130,7 +49,7 @@ class Branch:
         """
         self.case, self.on_step = case, on_step
         self.points: list[Point] = []
-        filling = Filling(case, interface, lambda _: self.add(Point(kept(filling))))
+        filling = Filling(case, interface, lambda _: self.add(Point(filling.fork(case))))
         # from the weight alone on steps can be halved; else the first one holds it at any length
         if not (case["weight_first"] and filling.rest()):
             filling.reach(case.times[0])
@@ -138,11 +57,7 @@ class Branch:
             fill(filling)
         ahead = [v for t, v in enumerate(case.levels, 1) if t >= filling.state.time]
         self.target = max(ahead) if target is None else target
-        #: whether no further push has been found
-        self.stuck = not self.points
-        #: the largest displacement of joint and crest before the first push, and the next push [m]
-        self.size = displacement(self.points[-1]) if self.points else 0.0
-        self.push = FIRST * self.size
+        super().__init__(self.points, len(case.levels), TICK)
 
     def add(self, point: Point) -> None:
         """One more equilibrium, if none before it is crushed."""
@@ -167,8 +82,7 @@ class Branch:
         """The number of the first point at the target, or pushed above it; None if there is none
         yet.
         """
-        sound = self.points[:-1] if self.crushed else self.points
-        for number, point in enumerate(sound):
+        for number, point in enumerate(self.sound):
             complete = point.control != "level" or point.filling.state.time == self.case.times[-1]
             if complete and point.level >= self.target:
                 return number
@@ -180,24 +94,9 @@ class Branch:
         return self.arrival is not None
 
     @property
-    def top(self) -> int:
-        """The number of the point with the highest level that is not crushed; of a plateau, the
-        first.
-        """
-        sound = self.points[:-1] if self.crushed else self.points
-        levels = np.array([p.level for p in sound])
-        return int(np.argmax(levels >= (1 - PLATEAU) * levels.max())) if sound else 0
-
-    @property
-    def highest(self) -> float:
-        """Its highest level [m]; nan if there is none."""
-        return self.points[self.top].level if self.points else np.nan
-
-    @property
-    def knee(self) -> int:
-        """The number of the point from which on the level rises by less than the precision."""
-        levels = np.array([p.level for p in self.points])
-        return int(np.argmax(levels >= (1 - PRECISION / 2) * self.highest))
+    def sound(self) -> list[Point]:
+        """The points that are not crushed."""
+        return self.points[:-1] if self.crushed else self.points
 
     @property
     def crushed_at_top(self) -> bool:
@@ -205,32 +104,9 @@ class Branch:
         return self.crushed and self.top + 2 == len(self.points)
 
     @property
-    def slides(self) -> bool:
-        """Whether nothing of the joint's strength is left at its highest level."""
-        return bool(self.points) and self.points[self.top].slides
-
-    def settled(self, factor: float) -> bool:
-        """Whether the level has risen no more since the dam had been pushed so many times less."""
-        far = self.points[-1].pushed / factor
-        early = [p.level for p in self.points if (p.pushed or self.size) <= far]
-        highest = self.points[self.top].level
-        return bool(early) and highest <= max(early) * (1 + PRECISION / 2)
-
-    @property
     def mode(self) -> str:
         """How the dam fails; empty if it is not seen."""
-        if self.crushed_at_top:
-            return "crushed toe"
-        if self.slides:
-            return "sliding"
-        if not self.points or self.knee + 1 >= len(self.points):
-            return ""
-        knee, last = self.points[self.knee].filling, self.points[-1].filling
-        interface = last.joint.interface
-        moved = interface.jumps(interface.at_nodes, last.state.jump - knee.state.jump)
-        along = interface.way * interface.length
-        crack = self.points[-1].last["crack_length"]
-        return movement(self.case, crack, along, interface.at_places(moved))
+        return "crushed toe" if self.crushed_at_top else super().mode
 
     # -- following it
     # ----------------------------------------------------------------------------------------------
@@ -244,38 +120,9 @@ class Branch:
         while not (
             self.stuck or self.reached or self.crushed or self.slides or self.settled(factor)
         ):
-            self.go_on()
-            self.stuck |= len(self.points) >= MOST_POINTS
+            self.advance()
         if not self.reached:
             self.refine(self.target)
-
-    def go_on(self) -> None:
-        """The next push."""
-        last = self.points[-1]
-        for control, push in self.pushes():
-            found = self.pushed(last, push, control)
-            if found:
-                rise = max((found.level - last.level) / found.level, 1e-12)
-                self.push = push * min(max(RISE / rise, SHRINKING), GROWTH)
-                self.add(found)
-                return
-        self.stuck = True
-
-    def pushes(self) -> Iterator[tuple[str, float]]:
-        """What is tried for a push: of the crest; of the heel, where the crest turns back; of the
-        crest, over a burst in which both turn back.
-        """
-        far = self.points[-1].pushed or self.size
-        for control in ("crest", "heel"):
-            wanted = (part * self.push for part in PARTS)
-            yield from ((control, push) for push in wanted if push > SMALLEST * far)
-        yield from (("crest", part * far) for part in JUMPS)
-
-    def pushed(self, point: Point, by: float, control: str) -> Point | None:
-        """The equilibrium at which the crest or the heel has moved further [m]."""
-        end = max(point.filling.state.time, len(self.case.levels)) + TICK
-        found = moved(point.filling, self.case, control, by, end)
-        return found and Point(found, (point.pushed or self.size) + by, control)
 
     # -- its end, more closely
     # ----------------------------------------------------------------------------------------------
@@ -340,15 +187,8 @@ class Branch:
         if b.pushed:
             return self.pushed(a, share * (b.pushed - (a.pushed or self.size)), b.control)
         times = a.filling.state.time, b.filling.state.time
-        found = solved(kept(a.filling), times[0] + share * (times[1] - times[0]))
-        return found and Point(found)
-
-
-def kept(filling: Filling) -> Filling:
-    """A filling as it is now, to be gone on with by itself."""
-    found = filling.fork(filling.case)
-    found.on_step = lambda _: None
-    return found
+        filling = a.filling.fork(self.case)
+        return Point(filling) if filling.step(times[0] + share * (times[1] - times[0])) else None
 
 
 def fill(filling: Filling) -> None:
@@ -357,40 +197,7 @@ def fill(filling: Filling) -> None:
     for target in filling.case.times:
         while filling.state.time < target:
             ahead = min(length, target - filling.state.time)
-            if not solved(filling, filling.state.time + ahead, 1):
+            if not filling.step(filling.state.time + ahead):
                 failures, length = failures + 1, ahead / 2
             if failures > FAILURES:
                 return
-
-
-def displacement(point: Point) -> float:
-    """The largest displacement of joint and crest [m]."""
-    return max(np.abs(point.filling.state.jump).max(), abs(point.last["crest_ux"]))
-
-
-def moved(filling: Filling, case: Case, control: str, by: float, end: float) -> Filling | None:
-    """A filling gone on with by one push of the crest or the heel [m], until a time."""
-    begin, level, tail = filling.state.time, case.levels[-1], case.tail_levels[-1]
-    drive = {"drive": control, "drive_begin": begin, "drive_end": end, "drive_by": by}
-    driven = filling.fork(
-        replace(
-            case,
-            values=case.values | drive,
-            levels=(*case.levels, level),
-            tail_levels=(*case.tail_levels, tail),
-            times=(*(t for t in case.times if t <= begin), end),
-        )
-    )
-    if not driven.driven:  # no extrapolation from one control to the other
-        driven.driven, driven.before = True, None
-    driven.displacement = driven.driven_displacement(driven.state)
-    return solved(driven, end)
-
-
-def solved(filling: Filling, time: float, most: int = 3) -> Filling | None:
-    """A filling gone on with to a time by one step; None if so many attempts do not find it."""
-    found = filling.solve_by(filling.attempts()[:most], time, ahead=True)
-    if found is None:
-        return None
-    filling.accept(0, *found)
-    return filling

@@ -21,6 +21,7 @@ from tqdm import tqdm
 
 from .. import InputError
 from ..engines import Outcome
+from ..engines.condensed.path import PRECISION, ROUGH, SURE, Point
 from ..engines.condensed.solve import about
 from ..results import folder as folders
 from ..results import gravity
@@ -30,7 +31,7 @@ from ..run import save
 from ..scene.case import Case, load
 from ..scene.parameters import parameter
 from .bodies import interface_of
-from .branch import PRECISION, ROUGH, SURE, Branch, Point
+from .branch import Branch, row
 
 #: What is divided by the strength reduction factor. The fracture energies, too: the jumps at which
 #: a bond has gone stay as they are, and its whole curve is lowered.
@@ -304,7 +305,7 @@ class Search:
             why = (
                 f"beyond it, pushed {far:.2g} times as far, the dam holds {top.level:.6g} m at most"
             )
-            if reached := bound(failing.case, top.last):
+            if reached := bound(last_state(self, top))[1]:
                 why += f"; there {reached}"
         beside = None if value is None else self.by_gravity(value)
         return Answer(value, failing.mode, why, "" if why else doubt, point, beside)
@@ -405,11 +406,11 @@ def critical(
 def table(search: Search) -> dict[str, np.ndarray]:
     """critical.csv: the equilibria of all trials."""
     rows = [
-        {"trial": number, "value": trial.value, "stands": float(trial.stands)} | point.row
+        {"trial": number, "value": trial.value, "stands": float(trial.stands)} | row(point)
         for number, trial in enumerate(search.trials, 1)
         for point in trial.branch.points
     ]
-    return {name: np.array([row[name] for row in rows]) for name in CRITICAL}
+    return {name: np.array([one[name] for one in rows]) for name in CRITICAL}
 
 
 def last_state(search: Search, point: Point) -> Results:

@@ -49,7 +49,7 @@ SAID = ("failed", "verdict", "statement")
 ERROR = "failed"
 
 #: Verdicts that do not tell whether there is an equilibrium.
-UNDECIDED = (ERROR, "no convergence", "interrupted")
+UNDECIDED = (ERROR, "not converged", "interrupted")
 
 #: Rows that are computed together at most: they share the steps up to the levels where they part.
 MOST = 8

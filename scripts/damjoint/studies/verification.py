@@ -352,7 +352,7 @@ def reached(run: Written, block: Block) -> dict[str, bool]:
     Overturning: about the toe, or about the heel, against the largest tension, which a bond has
     only where it has not broken, and not if it is about to break at one end; sliding: against
     friction, a bond's cohesion being gone, or friction's cohesion and what its slip has hardened.
-    No convergence: one of these, or a bond that is about to break at an end of the joint, after
+    Not converged: one of these, or a bond that is about to break at an end of the joint, after
     which nothing may hold.
     """
     case, length = run.case, run.length
@@ -374,7 +374,7 @@ def reached(run: Written, block: Block) -> dict[str, bool]:
         "overturning": held < (1 - NEAR) * abs(block.N) * length,
         "sliding": case["law"] != "rupture" and abs(block.T) > NEAR * holds,
     }
-    return found | {"no convergence": breaks or any(found.values())}
+    return found | {"not converged": breaks or any(found.values())}
 
 
 def stiffness_ratio(case: Case) -> float:
@@ -387,7 +387,7 @@ def unjustified(run: Written) -> tuple[bool, str]:
     """Whether it is wrong that a run has stopped, or the reason that it gives; and what is to be
     said of that, empty if nothing is.
 
-    Not wrong, but not proved to be right either: no convergence of a joint that is too stiff for
+    Not wrong, but not proved to be right either: not converged, of a joint that is too stiff for
     its mesh, and says so, of a displacement, whose level is not known beforehand, and where the
     rigid block is neither certain to stand nor near a limit. A crack that lets the reservoir in may
     run through the joint at once, from far off any limit: the block under the most uplift tells.
@@ -395,14 +395,14 @@ def unjustified(run: Written) -> tuple[bool, str]:
     said = run.told["verdict"]
     if run.told["state"] != "stopped":
         return True, run.told["statement"]
-    undecided = said in ("no convergence", "no equilibrium")
+    undecided = said in ("not converged", "no equilibrium")
     if run.case["drive"] == "level" and certain(run):
         return True, f"{said}, where an equilibrium is certain"
     if undecided and stiffness_ratio(run.case) >= STIFF:
         return False, f"{said}, K_N h/E = {stiffness_ratio(run.case):.3g}"
     if run.case["drive"] != "level":
         return False, f"{said} of a driven run" if undecided else ""
-    reason = "no convergence" if undecided else said
+    reason = "not converged" if undecided else said
     if any(reached(run, block)[reason] for block in blocks(run)):
         return False, ""
     return not undecided, f"{said}, which the rigid block does not explain"

@@ -70,7 +70,5 @@ def solve(case: Case, on_step: OnStep, _fields: bool) -> Iterator[Outcome]:
                     fillings[-1].keep_last()
             result = fillings[-1].results()
             seconds = before | {"solve": time.perf_counter() - begin}
-            result.info = about(bulk) | {"wall_seconds": seconds}
-            if fillings[-1].ran_on:
-                result.info["ran_on"] = fillings[-1].ran_on
+            result.info |= about(bulk) | {"wall_seconds": seconds}
             yield Outcome(result, lambda: bodies().mesh, partial(fields, number), error)
