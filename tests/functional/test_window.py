@@ -12,7 +12,9 @@ import gmsh
 import numpy as np
 import pytest
 from damjoint.window import tree
+from damjoint.window.shapes import Deformed
 from damjoint.window.sheet import Request, titles
+from damjoint.window.views import captions
 from damjoint.window.window import ACTION, Session
 
 SMALL = {"n_joint": 10.0, "h_dam": 3.0, "h_found": 4.0}
@@ -153,6 +155,21 @@ def test_results_stand_in_the_tree(open_window):
             assert entry["values"][0] == pytest.approx(result.last[column], rel=1e-12)
     assert tree.get_text(tree.VERDICT) == "sliding"
     assert not json.loads(gmsh.onelab.get(names["Leakage [kg per m s]"]))["visible"]
+
+
+def test_a_softening_joint_is_a_number_and_a_color(open_window):
+    coarse = {"n_joint": 20.0, "h_dam": 8.0, "h_found": 30.0}
+    hand = open_window("dam", law="bond", sigma_max=3e5, G_f=300.0, **coarse)
+    hand.type(tree.LEVELS, "40, 48")
+    hand.run()
+    (entry,) = (hand.entry(n) for n in gmsh.onelab.getNames("01Res.*") if "process zone" in n)
+    zone = hand.session.scenes[0].result.last["process_zone"]
+    assert entry["visible"] and entry["values"][0] == pytest.approx(zone) and zone > 5
+    assert "softening joint" in hand.views
+    tag = gmsh.view.getTags()[hand.views.index("softening joint")]
+    assert "violet: joint softening" in str(gmsh.view.getListDataStrings(tag, 2))
+    before, now = captions(Deformed(hand.session.scenes[0]))
+    assert "softening" not in before and now.endswith(f"crack 0 m, softening {zone:.3g} m")
 
 
 def test_views_have_a_step_per_level_and_replace_those_before(open_window):
@@ -373,7 +390,8 @@ def test_accuracy_chooses_the_mesh(open_window):
 def test_3d_shows_the_joint_as_a_surface(open_window):
     hand = open_window("f", n_joint=8.0, h_dam=3.0, h_found=4.0)
     assert hand.run().startswith("done in")
-    for start in ("opening of the joint", "joint: closed, slipped, open", "water pressure"):
+    state = "joint: closed, slipped, softening, open"
+    for start in ("opening of the joint", state, "water pressure"):
         assert any(view.startswith(start) for view in hand.views), start
 
 

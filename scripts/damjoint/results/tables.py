@@ -48,6 +48,7 @@ HISTORY = {
     "cuts": ("-", "how often the step was shortened"),
     "residual": ("-", "remaining out-of-balance force over that of the highest water"),
     "crack_length": ("m", "broken (rupture) or open (friction, bond) joint"),
+    "process_zone": ("m", "softening joint (rupture, bond): 0 < damage < 1, not open; friction: 0"),
     "slip_length": ("m", "released (rupture) or slipped (friction, bond) joint"),
     "max_opening": ("m", "largest opening of a node"),
     "crest_ux": ("m", "displacement of the upstream end of the crest along x"),

@@ -184,7 +184,7 @@ def pictures_of(solution: Solution) -> list[dict[str, str]]:
             "half",
             joint,
             f"The joint at level {level:.4g} m: jumps, normal stress, shear. Red: open or broken; "
-            "orange: slipped.",
+            "violet: softening; orange: slipped.",
         ),
         ("whole", history, "All converged steps."),
     ]

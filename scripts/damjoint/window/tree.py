@@ -52,6 +52,7 @@ RESULTS = {
     "tail_level": "Tailwater level [m]",
     "max_opening": "Largest opening [m]",
     "crack_length": "Crack length [m]",
+    "process_zone": "Fracture process zone, softening [m]",
     "slip_length": "Slipped length [m]",
     "crest_ux": "Crest movement, downstream > 0 [m]",
     "N": "Normal force N, effective [N per m]",
@@ -285,7 +286,7 @@ def show_results(scenes: list[Scene], shown: int) -> None:
     for i, (column, name) in enumerate(RESULTS.items()):
         values = history[column]
         there = len(values) > 0 and bool(np.isfinite(values[-1]))
-        if column in ("tail_level", "U", "flux"):  # only where there is such a thing
+        if column in ("tail_level", "U", "flux", "process_zone"):  # only where there is one
             there = there and bool(np.any(values != 0))
         put(
             number(
