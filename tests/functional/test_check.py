@@ -2,6 +2,7 @@
 
 import csv
 import math
+import re
 from dataclasses import replace
 
 import matplotlib.image
@@ -86,11 +87,33 @@ def test_two_combinations(command, combinations, tmp_path):
 def test_a_check_that_is_not_met(solve, setting, said):
     (result,) = solve("d", "7", dim=2.0, n_joint=20.0)
     for answer in (by_finite_elements(result), by_gravity(hand_calculation(result))):
-        assert not answer.fails and answer.row["verdict"] == "pass"
+        assert not answer.fails and answer.row["verdict"] == "not checked"
+        met = replace(answer.case, values=answer.case.values | {"required_OSF": 1.01})
+        assert replace(answer, case=met).row["verdict"] == "pass"
         stricter = replace(answer, case=replace(answer.case, values=answer.case.values | setting))
         expected = said.format(**answer.numbers, toe=-answer.numbers["sigma_n_toe"])
         assert stricter.fails == [expected]
         assert (stricter.row["verdict"], stricter.row["why"]) == ("fail", expected)
+
+
+def test_where_nothing_is_required_nothing_passes(command, combinations, tmp_path):
+    """A sliding factor of 0.35 under a law that has no friction is no pass, and no fail."""
+    none = "required_SSF=0", "required_OSF=0", "f_c=0", "mu=0.2", "adhesion=0"
+    words = [word for setting in ("law=rupture", *none) for word in ("--set", setting)]
+    code, out, _ = command("check", "usual.case", *words, "--out", "here")
+    assert code == 0
+    for row in rows(tmp_path / "here/check.csv").values():
+        assert row["answer"] == "difference" or float(row["SSF"]) < 0.8
+        assert row["verdict"] == ("" if row["answer"] == "difference" else "not checked")
+    assert out.count("not checked") == 3 and "pass" not in out
+    assert "not checked: the case sets none of required_SSF, required_OSF, f_c" in out
+    assert not re.search(r"\brequired\b", out)
+    # friction asks for 1 by itself: less fails, more is not a pass either
+    code, out, _ = command("check", "usual.case", *words, "--set", "law=friction", "--out", "here")
+    assert code == 1 and "fails, SSF" in out
+    words[words.index("mu=0.2")] = "mu=2"
+    code, out, _ = command("check", "usual.case", *words, "--set", "law=friction", "--out", "here")
+    assert code == 0 and "pass" not in out and not re.search(r"\brequired\b", out)
 
 
 def test_a_dam_that_slides(command, combinations, tmp_path):

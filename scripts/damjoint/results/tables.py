@@ -97,7 +97,7 @@ CHECK = {
     "required_SSF": ("-", "what the case requires; 0: nothing"),
     "required_OSF": ("-", "what the case requires; 0: nothing"),
     "f_c": ("Pa", "compressive strength at the toe; 0: not checked"),
-    "verdict": ("", "pass or fail"),
+    "verdict": ("", "pass or fail; not checked: nothing fails, and nothing is required"),
     "why": ("", "why it fails"),
 }
 
