@@ -227,7 +227,7 @@ def draw_history(figure: FigureBase, result: Results) -> None:
             "part of the joint",
             (("%", 100 / joint_length(result)),),
             [
-                ("crack_length", RED, "open or broken"),
+                ("crack_length", RED, "open"),
                 ("slip_length", ORANGE, "slipped"),
                 *([("process_zone", VIOLET, "softening")] if history["process_zone"].any() else []),
             ],

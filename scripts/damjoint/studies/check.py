@@ -16,7 +16,7 @@ from .. import InputError
 from ..engines import engine_of
 from ..results import folder as folders
 from ..results import gravity, verdict
-from ..results.check_picture import draw_check
+from ..results.check_picture import SIGN, draw_check
 from ..results.fields import along
 from ..results.gravity import GravityMethod
 from ..results.tables import CHECK, Results, write_csv
@@ -65,7 +65,8 @@ class Answer:
             if found[name] < value
         ]
         if case["f_c"] and -found["sigma_n_toe"] > case["f_c"]:
-            said.append(f"{-found['sigma_n_toe']:.4g} Pa at the toe > f_c = {case['f_c']:g} Pa")
+            pressed = f"compression {-found['sigma_n_toe']:.4g} Pa at the toe"
+            said.append(f"{pressed} > f_c = {case['f_c']:g} Pa")
         return [self.statement, *said] if self.statement else said
 
     @property
@@ -186,7 +187,7 @@ class Check:
         """What to know when the two are compared."""
         case, found = self.gravity.case, []
         if not requires(case):
-            found.append(f"{UNCHECKED}: the case sets none of {', '.join(REQUIREMENTS)}")
+            found.append(f"nothing is required: the case sets none of {', '.join(REQUIREMENTS)}")
         if case["law"] == "rupture":
             given = f"mu = {case['mu']:g}, adhesion = {case['adhesion']:g} Pa"
             found.append(f"SSF with {given}, which the law rupture does not have")
@@ -231,7 +232,8 @@ def text_table(checks: list[Check]) -> str:
         size, factor = unit([finite], units)
         # a difference beyond the digits that are shown
         values[less & (np.abs(values) < 1e-5 * np.abs(finite).max(initial=0))] = 0
-        heads += [f"{title}\n[{size}]" for title in names.values()]
+        sign = f"\n{SIGN}" if units is STRESSES else ""
+        heads += [f"{title}\n[{size}]{sign}" for title in names.values()]
         show = [signed if is_less else number for is_less in less]
         columns += [[f(v * factor) for f, v in zip(show, line, strict=True)] for line in values]
     told = ([row[name] for row in rows] for name in ("position", "verdict"))
@@ -300,7 +302,7 @@ def check(cases: list[Case], out: Path) -> list[Check]:
 def picture_table(found: Check) -> list[tuple[str, ...]]:
     """The table beside the picture: a row per quantity."""
     pair = found.finite_elements, found.gravity
-    cells = [("", "FE", "gravity", "required")]
+    cells = [(f"stress: {SIGN}", "FE", "gravity", "required")]
     least = asked(found.gravity.case)
     for units, names in SHOWN:
         values = [[answer.numbers[name] for answer in pair] for name in names]
