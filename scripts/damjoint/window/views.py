@@ -14,7 +14,6 @@ import gmsh
 import numpy as np
 
 from ..results.fields import CLOSED, OPEN, SOFTENING, along, distance, row_of_nodes, state_of
-from ..results.pictures import heading
 from ..results.units import LENGTHS, STRESSES, unit
 from ..scene.case import Case
 from .camera import CLIPPED, MAPS, clip, frame
@@ -146,10 +145,18 @@ def layer(case: Case, number: int) -> dict[str, float]:
     return {"OffsetZ": number * 5e-4 * case.size}
 
 
-def show(scene: Scene, before: Sequence[Scene] = ()) -> Gallery:
-    """All views of a scene; its first line and history alone if no requested level was reached.
+def show_heading(gallery: Gallery, heading: tuple[str, str]) -> None:
+    """The first two lines: what the case is called, and its joint law and water."""
+    title, scene = heading
+    tag = gallery.write(20, 28, [title], DARK, 18)
+    label(tag, 20, 50, [scene], 14)
+    gmsh.view.option.setString(tag, "Name", "heading")
 
-    before: earlier runs, whose last curves are drawn in grey for comparison.
+
+def show(scene: Scene, title: str, before: Sequence[Scene] = ()) -> Gallery:
+    """All views of a scene; its heading and history alone if no requested level was reached.
+
+    title: of the case; before: earlier runs, whose last curves are drawn in grey for comparison.
     """
     gallery = Gallery()
     graphs = Graphs(gallery)
@@ -160,18 +167,14 @@ def show(scene: Scene, before: Sequence[Scene] = ()) -> Gallery:
             show_maps(gallery, deformed)
         if extruded(scene.result.case):
             show_curves(graphs, scene, [other for other in before if other.times.size])
-        gallery.write(20, 52, captions(deformed), DARK, 15)
+        gallery.write(20, 74, captions(deformed), DARK, 15)
     if len(scene.result.history["time"]):
         show_history(graphs, scene, before)
     if before:
-        gallery.write(180, 98, ["grey curves: before"], GREY, 13)
-    gallery.write(20, 28, [heading_of(scene)], DARK, 18)
+        gallery.write(180, 118, ["grey curves: before"], GREY, 13)
+    case = scene.result.case
+    show_heading(gallery, (title, f"law {case['law']}, uplift {case['uplift']}"))
     return gallery
-
-
-def heading_of(scene: Scene) -> str:
-    """The first line: what was run."""
-    return heading(scene.result).split(", level")[0]
 
 
 def captions(deformed: Deformed) -> list[str]:
@@ -220,12 +223,12 @@ def show_deformed(gallery: Gallery, deformed: Deformed) -> None:
     above = {**flat, **layer(case, 2), "LineWidth": 3}
     slipped = gallery.add("slipped joint", [marks["slipped"]], [ORANGE], **above)
     broken = gallery.add("open or broken joint", [marks["open"]], [RED], **above)
-    label(broken, 20, 76, ["red: joint open or broken"], 13)
-    label(slipped, 210, 76, ["orange: joint slipped"], 13)
+    label(broken, 20, 97, ["red: joint open or broken"], 13)
+    label(slipped, 210, 97, ["orange: joint slipped"], 13)
     if (deformed.at_lip(state_of) == SOFTENING).any():
         softening = gallery.add("softening joint", [marks["softening"]], [VIOLET], **above)
-        label(softening, 370, 76, ["violet: joint softening"], 13)
-    gallery.write(20, 98, [f"displacement x {deformed.scale:g}"], DARK, 13)
+        label(softening, 370, 97, ["violet: joint softening"], 13)
+    gallery.write(20, 118, [f"displacement x {deformed.scale:g}"], DARK, 13)
 
 
 def scale_at(place: int) -> dict[str, float]:
