@@ -123,6 +123,7 @@ def validation_page() -> str:
     from .results import validation
     from .run import run
     from .scene.case import load
+    from .studies.provenance import provenance, said
 
     comparisons = []
     with tempfile.TemporaryDirectory() as folder:
@@ -139,6 +140,7 @@ def validation_page() -> str:
                 "to a variable with another meaning, or to a value that the document prints "
                 "otherwise. At the heel the opening of I is almost 7 % above the GEFDYN value, "
                 "whose tolerance is 7 %: the mesh-converged opening is 4.29e-7 m.",
+                said([provenance()], "Computed"),
                 validation.report(comparisons, "github"),
                 "![Modeling K: past the critical load](pictures/k_curve.png)",
             ]
@@ -149,10 +151,18 @@ def validation_page() -> str:
 
 def tour_page() -> str:
     """reference/tour.md with its commands run anew, one after the other in a temporary folder."""
-    page = (REFERENCE / "tour.md").read_text()
+    from .studies.provenance import provenance, said
+
+    page = between("figures", (REFERENCE / "tour.md").read_text(), said([provenance()], "Computed"))
     with tempfile.TemporaryDirectory() as folder:
         play = lambda block: f"```\n{played(block[1], Path(folder))}```"
         return re.sub(r"^```\n(.*?)^```$", play, page, flags=re.S | re.M)
+
+
+def between(mark: str, text: str, new: str) -> str:
+    """A text with what stands between the comments <!-- mark --> and <!-- /mark --> replaced."""
+    marks = rf"(<!-- {mark} -->\n).*?(<!-- /{mark} -->)"
+    return re.sub(marks, lambda found: f"{found[1]}{new}\n{found[2]}", text, flags=re.S)
 
 
 def played(block: str, folder: Path) -> str:
@@ -180,9 +190,7 @@ def take_bench(out: Path) -> None:
     shutil.copy(out / "benchmarks.md", REFERENCE)
     shutil.copy(out / "accuracy.png", REFERENCE / "pictures")
     readme, table = Path("README.md"), (out / "modelings.md").read_text()
-    marks = r"(<!-- modelings -->\n).*?(<!-- /modelings -->)"
-    text = re.sub(marks, lambda m: m[1] + table + m[2], readme.read_text(), flags=re.S)
-    readme.write_text(text)
+    readme.write_text(between("modelings", readme.read_text(), table.rstrip("\n")))
 
 
 #: What `damjoint stress` asks of every scene, in words.
@@ -208,7 +216,11 @@ A command that does not end in time is a defect."""
 
 
 def trust_page(results: Path) -> str:
-    """reference/trust.md: what random scenes have found, from the result file of the last run."""
+    """reference/trust.md: what random scenes have found, from the result file of the last run.
+
+    Raises ValueError if its rows are of different code.
+    """
+    from .studies import provenance
     from .studies.stress import CLASSES, DEFECT, UNDECIDED, counts, read_rows
 
     rows = read_rows(results)
@@ -237,6 +249,7 @@ def trust_page(results: Path) -> str:
                 "and earthquake, water up and down; one plane scene in ten is a slender dam of "
                 "real stiffness on a brittle joint. Made by `python -m damjoint.pages trust FILE` "
                 "from its result file.",
+                provenance.said(rows),
                 "## What is asked of each",
                 ASKED,
                 "## What was found",

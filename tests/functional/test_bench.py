@@ -2,6 +2,7 @@
 about speed."""
 
 import csv
+import json
 
 import pytest
 
@@ -12,7 +13,11 @@ def test_short_form(command, tmp_path):
     text = (tmp_path / "bench" / "benchmarks.md").read_text()
     assert text.startswith("# Benchmarks\n") and text.count("\n## ") == 8
     assert (tmp_path / "bench" / "accuracy.png").read_bytes()[:4] == b"\x89PNG"
-    assert len((tmp_path / "bench" / "modelings.md").read_text().splitlines()) == 13
+    *lines, blank, source = (tmp_path / "bench" / "modelings.md").read_text().splitlines()
+    assert len(lines) == 13 and not blank and source in text
+    told = json.loads((tmp_path / "bench" / "provenance.json").read_text())
+    assert source.startswith(f"Measured with damjoint {told['version']} (")
+    assert told["date"] in source and told["machine"] in source and told["commit"] in source
 
     def table(name):
         with (tmp_path / "bench" / f"{name}.csv").open() as file:

@@ -2,19 +2,23 @@
 
 import csv
 import math
+import re
 from dataclasses import replace
 
 import matplotlib.image
 import pytest
 from damjoint.results import folder as folders
 from damjoint.results import gravity
+from damjoint.results.check_picture import draw_joint
 from damjoint.studies.check import (
     Check,
     by_finite_elements,
     by_gravity,
     hand_calculation,
+    picture_table,
     text_table,
 )
+from matplotlib.figure import Figure
 
 #: SSNP142's dam on a coarse mesh: what load combinations share.
 COMMON = """
@@ -80,17 +84,39 @@ def test_two_combinations(command, combinations, tmp_path):
     [
         ({"required_SSF": 3.0}, "SSF {SSF:.4g} < 3"),
         ({"required_OSF": 5.0}, "OSF {OSF:.4g} < 5"),
-        ({"f_c": 1.5e5}, "{toe:.4g} Pa at the toe > f_c = 150000 Pa"),
+        ({"f_c": 1.5e5}, "compression {toe:.4g} Pa at the toe > f_c = 150000 Pa"),
     ],
 )
 def test_a_check_that_is_not_met(solve, setting, said):
     (result,) = solve("d", "7", dim=2.0, n_joint=20.0)
     for answer in (by_finite_elements(result), by_gravity(hand_calculation(result))):
-        assert not answer.fails and answer.row["verdict"] == "pass"
+        assert not answer.fails and answer.row["verdict"] == "not checked"
+        met = replace(answer.case, values=answer.case.values | {"required_OSF": 1.01})
+        assert replace(answer, case=met).row["verdict"] == "pass"
         stricter = replace(answer, case=replace(answer.case, values=answer.case.values | setting))
         expected = said.format(**answer.numbers, toe=-answer.numbers["sigma_n_toe"])
         assert stricter.fails == [expected]
         assert (stricter.row["verdict"], stricter.row["why"]) == ("fail", expected)
+
+
+def test_where_nothing_is_required_nothing_passes(command, combinations, tmp_path):
+    """A sliding factor of 0.35 under a law that has no friction is no pass, and no fail."""
+    none = "required_SSF=0", "required_OSF=0", "f_c=0", "mu=0.2", "adhesion=0"
+    words = [word for setting in ("law=rupture", *none) for word in ("--set", setting)]
+    code, out, _ = command("check", "usual.case", *words, "--out", "here")
+    assert code == 0
+    for row in rows(tmp_path / "here/check.csv").values():
+        assert row["answer"] == "difference" or float(row["SSF"]) < 0.8
+        assert row["verdict"] == ("" if row["answer"] == "difference" else "not checked")
+    assert out.count("not checked") == 2 and "pass" not in out
+    assert "nothing is required: the case sets none of required_SSF, required_OSF, f_c" in out
+    assert not re.search(r"usual +required", out)
+    # friction asks for 1 by itself: less fails, more is not a pass either
+    code, out, _ = command("check", "usual.case", *words, "--set", "law=friction", "--out", "here")
+    assert code == 1 and "fails, SSF" in out
+    words[words.index("mu=0.2")] = "mu=2"
+    code, out, _ = command("check", "usual.case", *words, "--set", "law=friction", "--out", "here")
+    assert code == 0 and "pass" not in out and not re.search(r"usual +required", out)
 
 
 def test_a_dam_that_slides(command, combinations, tmp_path):
@@ -150,6 +176,33 @@ def test_a_difference_beyond_the_digits_of_the_table_is_not_shown(solve):
         assert found.rows[2]["N"] < 0
         (line,) = (line for line in text_table([found]).splitlines() if "difference" in line)
         assert line.split()[3].startswith(shown)
+
+
+def test_stresses_have_one_sign(solve):
+    """Of heel (pulled) and toe (pressed): tension > 0 in check.csv, in the printed table, in the
+    table beside the picture and at the ends of its diagram, and each of them says so."""
+    (result,) = solve("dam", "45", n_joint=20, h_dam=8, h_found=30)
+    method = hand_calculation(result)
+    found = Check(by_finite_elements(result), by_gravity(method))
+    heel, toe = (found.rows[1][f"sigma_n_eff_{end}"] for end in ("heel", "toe"))
+    assert heel > 0 > toe
+    shown = [f"{value / 1e6:.5g}" for value in (heel, toe)]
+    printed = text_table([found])
+    (line,) = (line for line in printed.splitlines() if "gravity method " in line)
+    assert re.search(rf" {shown[0]} +{shown[1]} ", line) and printed.count("tension > 0") == 2
+    cells = {head: row for head, *row in picture_table(found)}
+    assert [cells[f"eff. {end} [MPa]"][1] for end in ("heel", "toe")] == shown
+    assert next(iter(cells)) == "stress: tension > 0"
+    axes = Figure().subplots()
+    draw_joint(axes, result, method)
+    texts = [text.get_text() for text in axes.texts]
+    name = texts.index("effective stress, tension > 0")
+    assert texts[name + 1 : name + 3] == [f"{value / 1e6:.3g} MPa" for value in (heel, toe)]
+    # what presses hangs under the line, what pulls stands above it
+    stress = axes.get_lines()[-3]
+    assert stress.get_linestyle() == "--"
+    level, depth = (line.get_ydata() for line in (axes.get_lines()[-5], stress))
+    assert depth[1] > level[0] > depth[-2]
 
 
 def test_resultants_with_flow(solve):

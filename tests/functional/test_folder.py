@@ -174,9 +174,9 @@ def test_a_getdp_that_prints_rubbish(command, tmp_path, fake_getdp, printed):
     [
         ("true", "ended without saying how far it went"),
         ("echo 0 > status.txt; touch history.txt", "no step at t = 4"),
-        ("echo 0 > status.txt; echo step 1 3 x y z 1 1 1 1 1 1 1 1 1 1 > history.txt", "'x'"),
+        ("echo 0 > status.txt; echo step 1 3 x y z 1 1 1 1 1 1 1 1 1 1 1 > history.txt", "'x'"),
         ("echo 0 > status.txt; head -c 900 /dev/urandom > history.txt", "tables can not be read"),
-        ("echo 1 > status.txt; echo step 1 3 1 1 1 1 1 1 1 1 1 1 1 1 1 > history.txt", "jump_1"),
+        ("echo 1 > status.txt; echo step 1 3 1 1 1 1 1 1 1 1 1 1 1 1 1 1 > history.txt", "jump_1"),
         ("head -c 3000000 /dev/zero", "ended without saying how far it went"),
     ],
 )

@@ -12,8 +12,8 @@ from numpy.testing import assert_allclose
 
 JOINT = "time,level,x,y,z,delta_n,delta_t1,delta_t2,sigma_n,tau_1,tau_2,p,damage,slip,s,sigma_n_eff"
 HISTORY = (
-    "time,level,load_factor,iterations,cuts,residual,crack_length,slip_length,max_opening,crest_ux,"
-    "N,T,M,flux,tail_level,U,x_resultant"
+    "time,level,load_factor,iterations,cuts,residual,crack_length,process_zone,slip_length,max_opening,"
+    "crest_ux,N,T,M,flux,tail_level,U,x_resultant"
 )
 
 
@@ -157,3 +157,36 @@ def test_a_plain_run_loads_no_library_it_does_not_need(tmp_path):
     tell += f"; print([m for m in {heavy} if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", tell], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == "[]"
+
+
+@pytest.mark.parametrize("law", ["rupture", "bond", "friction"])
+def test_the_fracture_process_zone_is_a_number(command, tmp_path, law):
+    """No crack yet, but metres that soften: the integral over the Gauss points is, to an element,
+    the length from the heel over which the nodes' damage is between 0 and 1; both engines agree."""
+    settings = f"law={law}", "sigma_max=3e5", "G_f=300", "n_joint=20", "h_dam=8", "h_found=30"
+    words = "--levels", "40,48", "--no-fields", "--no-picture"
+    words += tuple(word for setting in settings for word in ("--set", setting))
+    zones = []
+    for engine in ("condensed", "getdp"):
+        code, out, _ = command("run", "dam", *words, "--engine", engine, "--out", engine)
+        history, joint = (read(tmp_path / engine / f"{n}.csv") for n in ("history", "joint"))
+        last = joint["time"] == 2
+        softening = (joint["damage"][last] > 0) & (joint["damage"][last] < 1)
+        zone = history["process_zone"]
+        assert code == 0 and zone[0] == 0
+        assert ("softening" in out) == bool(softening.any()) == (law != "friction")
+        if law != "friction":
+            assert history["crack_length"][-1] == 0 and history["max_opening"][-1] > 0
+            length = joint["s"][last][np.argmin(softening)]
+            assert zone[-1] > 0.5 and zone[-1] == pytest.approx(length, abs=34 / 20)
+        zones.append(zone)
+    assert_allclose(zones[0], zones[1], atol=1e-9)
+
+
+def test_a_history_without_a_column_is_of_an_earlier_version(command, folder):
+    path = folder / "history.csv"
+    lines = (line.split(",") for line in path.read_text().splitlines())
+    path.write_text("".join(",".join([*row[:7], *row[8:]]) + "\n" for row in lines))
+    code, _, error = command("plot", folder)
+    assert code == 2 and error.count("\n") == 1
+    assert "history.csv of damjoint" in error and "lacks process_zone" in error

@@ -1,5 +1,6 @@
 """Pictures and a page from the files of a run, without running."""
 
+import html
 import json
 import re
 import shutil
@@ -114,11 +115,28 @@ def test_report(command, folder, tmp_path):
     mine = sections[0]
     assert mine.count("data:image/svg+xml;base64,") == 3
     assert re.search(r"SSF [\d.]+ &lt; 50", mine) and ">fail<" in mine  # what the case requires
-    assert ">pass<" in sections[1]
+    assert ">not checked<" in sections[1] and ">pass<" not in page  # a requires nothing
+    assert 'class="verdict not-checked"' in sections[1]
     words = re.sub(r"\s+", " ", re.sub(r"<[^>]*>", " ", mine))
     assert "K_N Normal stiffness K_N 2e+10 Pa per m 1e+11" in words
     assert "dam_height" in words and "E_dam" not in words  # follows E, which nobody has set
-    assert "reservoir" in words and "tailwater" in words and "not estimated" in words
+    assert (
+        "reservoir" in words
+        and "tailwater" in words
+        and "not estimated; damjoint run --accuracy 1% estimates it" in words
+    )
+
+
+def test_report_of_what_passes_with_its_estimated_error(command, tmp_path):
+    """What is required is met; the error that --accuracy has estimated is the one of run.json."""
+    needs = "--set", "required_SSF=0.1", "--levels", "40", "--accuracy", "coarse", "--no-picture"
+    assert command("run", "dam", *needs)[0] == 0
+    estimate = json.loads((tmp_path / "out/dam/run.json").read_text())["error_estimate"]
+    assert command("report", "out/dam")[0] == 0
+    page = (tmp_path / "report.html").read_text()
+    assert 'class="verdict pass"' in page and "not checked" not in page
+    assert html.escape(estimate["statement"], quote=False) in page and estimate["statement"]
+    assert "not estimated" not in page
 
 
 def test_report_of_a_run_that_found_nothing(command, tmp_path):

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from damjoint import pages, run
+from damjoint import __version__, pages, run
 from damjoint.results.tables import write_csv
 from damjoint.scene.case import load
 from damjoint.studies import stress, verification
@@ -155,6 +155,16 @@ def test_stress_is_seeded_resumed_and_has_a_page(command, monkeypatch):
     assert stress.random_scene(3, 1) == stress.random_scene(3, 1) != stress.random_scene(3, 0)
     page = pages.trust_page(Path("s.csv"))
     assert "2 random scenes" in page and stress.VERIFIED in page
+    assert f"Measured with damjoint {__version__} (" in page
+    assert rows[0]["date"] in page and rows[0]["machine"] in page
+    # no row of other code is added to, and none gets into one page
+    other = before.replace(rows[0]["code"], "of-other-code", 1)
+    Path("s.csv").write_text(other)
+    code, _, error = command("stress", 3, "--seed", 3, "--out", "s.csv")
+    assert code == 2 and error.count("\n") == 1 and "s.csv: begun with damjoint" in error
+    assert Path("s.csv").read_text() == other
+    with pytest.raises(ValueError, match="figures of different versions"):
+        pages.trust_page(Path("s.csv"))
 
 
 @pytest.mark.heavy

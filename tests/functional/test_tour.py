@@ -12,7 +12,9 @@ NUMBER = re.compile(r"(?<![\w.])[+-]?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 
 
 def words_and_numbers(text):
-    """The text without its numbers, blanks and rules of tables; the numbers."""
+    """The text without its numbers, blanks, rules of tables, and the line of commit and date; the
+    numbers."""
+    text = pages.between("figures", text, "")
     words = re.sub(r"[\s-]+", " ", NUMBER.sub("#", text))
     return words, [float(number) for number in NUMBER.findall(text)]
 

@@ -12,7 +12,9 @@ import gmsh
 import numpy as np
 import pytest
 from damjoint.window import tree
+from damjoint.window.shapes import Deformed
 from damjoint.window.sheet import Request, titles
+from damjoint.window.views import captions
 from damjoint.window.window import ACTION, Session
 
 SMALL = {"n_joint": 10.0, "h_dam": 3.0, "h_found": 4.0}
@@ -155,6 +157,21 @@ def test_results_stand_in_the_tree(open_window):
     assert not json.loads(gmsh.onelab.get(names["Leakage [kg per m s]"]))["visible"]
 
 
+def test_a_softening_joint_is_a_number_and_a_color(open_window):
+    coarse = {"n_joint": 20.0, "h_dam": 8.0, "h_found": 30.0}
+    hand = open_window("dam", law="bond", sigma_max=3e5, G_f=300.0, **coarse)
+    hand.type(tree.LEVELS, "40, 48")
+    hand.run()
+    (entry,) = (hand.entry(n) for n in gmsh.onelab.getNames("01Res.*") if "process zone" in n)
+    zone = hand.session.scenes[0].result.last["process_zone"]
+    assert entry["visible"] and entry["values"][0] == pytest.approx(zone) and zone > 5
+    assert "softening joint" in hand.views
+    tag = gmsh.view.getTags()[hand.views.index("softening joint")]
+    assert "violet: joint softening" in str(gmsh.view.getListDataStrings(tag, 2))
+    before, now = captions(Deformed(hand.session.scenes[0]))
+    assert "softening" not in before and now.endswith(f"crack 0 m, softening {zone:.3g} m")
+
+
 def test_views_have_a_step_per_level_and_replace_those_before(open_window):
     hand = open_window("c", **SMALL)
     hand.run()
@@ -188,10 +205,72 @@ def test_the_status_says_whether_the_results_are_those_of_the_parameters(open_wi
     assert hand.type(tree.KEEP, 1.0) == done
     assert hand.type("dam_crest", 2.0) == "changed since the run: press Run"
     visible = [gmsh.view.option.getNumber(tag, "Visible") for tag in gmsh.view.getTags()]
-    assert sum(visible) == 1  # the water beside the new outline
+    assert sum(visible) == 2  # the water beside the new outline, and the heading
     assert hand.type("dam_crest", 1.5) == done
     visible = [gmsh.view.option.getNumber(tag, "Visible") for tag in gmsh.view.getTags()]
     assert sum(visible) == len(visible) - 2  # all but that water, and the stress
+
+
+def shown_results():
+    """The verdict, the names of the numbers beside it, and the visible lines of text."""
+    numbers = [
+        n for n in gmsh.onelab.getNames("01Results/.*") if n not in (tree.STATUS, tree.VERDICT)
+    ]
+    seen = [t for t in gmsh.view.getTags() if gmsh.view.option.getNumber(t, "Visible")]
+    lines = [line for tag in seen for line in gmsh.view.getListDataStrings(tag, 2)[1]]
+    return tree.get_text(tree.VERDICT), numbers, lines
+
+
+def test_results_of_anything_else_are_gone_at_once(open_window):
+    """Before the engine has answered: another parameter, another case, a bad choice, Run pressed
+    right after it; and back again with the parameter."""
+    hand = open_window("c", **SMALL)
+    assert shown_results() == (
+        "not run yet",
+        [],
+        ["C: friction, 2D, order 1, quadrangles", C_SCENE],
+    )
+    hand.run()
+    assert hand.views.count("displacement [m]") == 1
+    before = verdict, numbers, lines = shown_results()
+    assert verdict == "sliding" and len(numbers) > 10 and C_SCENE in lines
+    mu, own = hand.session.tree.known["mu"].label, hand.session.tree.sheet.case["mu"]
+    for value, found in ((0.7, ("not run yet", [])), (own, before[:2])):
+        gmsh.onelab.setNumber(mu, [value])
+        hand.press("check")
+        assert shown_results()[:2] == ("not run yet", [])
+        assert not any("level" in line for line in shown_results()[2])
+        hand.wait()
+        assert shown_results()[:2] == found
+    assert shown_results() == before
+    for case in (float(len(titles())), 0.0):  # "open a case file ...", and modeling A
+        gmsh.onelab.setNumber(tree.CASE, [case])
+        hand.press("check")
+        assert shown_results()[:2] == ("not run yet", [])
+    hand.press("run")
+    assert hand.session.busy == "running" and shown_results()[:2] == ("not run yet", [])
+    hand.wait()
+    assert shown_results()[0] == "stands"
+    assert "A: rupture, 2D, order 1" in shown_results()[2]
+
+
+#: The second line of modeling C's heading.
+C_SCENE = "law friction, uplift imposed"
+
+
+def test_the_title_follows_law_and_water(open_window):
+    hand = open_window("c", **SMALL)
+    hand.run()
+    hand.type("law", "rupture")
+    hand.type("uplift", "none")
+    changed = ["C, changed", "law rupture, uplift none"]
+    assert shown_results()[2] == changed
+    hand.run()
+    assert [line for line in shown_results()[2] if line in changed] == changed
+    assert not any("friction" in line for line in shown_results()[2])
+    hand.type("law", "friction")
+    hand.type("uplift", "imposed")
+    assert shown_results()[2] == ["C: friction, 2D, order 1, quadrangles", C_SCENE]
 
 
 def test_drawing_follows_geometry_and_can_be_meshed(open_window):
@@ -199,7 +278,7 @@ def test_drawing_follows_geometry_and_can_be_meshed(open_window):
     assert gmsh.model.getBoundingBox(-1, -1)[4] == pytest.approx(10, abs=1e-6)
     hand.type("dam_height", 12.0)
     assert gmsh.model.getBoundingBox(-1, -1)[4] == pytest.approx(12, abs=1e-6)
-    assert hand.views == ["water"]
+    assert hand.views == ["water", "heading"]
     gmsh.model.mesh.generate(2)
     assert len(gmsh.model.mesh.getNodes()[0]) > 100
 
@@ -336,7 +415,7 @@ def test_other_cases_and_files(open_window, tmp_path):
     hand = open_window("a", **SMALL)
     hand.run()
     hand.type(tree.CASE, float(list(hand.session.tree.titles).index("dam")))
-    assert hand.session.tree.sheet.case.name == "dam" and hand.views == ["water"]
+    assert hand.session.tree.sheet.case.name == "dam" and hand.views == ["water", "heading"]
     assert tree.get_text(tree.LEVELS) == "30, 40, 45"
     assert hand.session.tree.sheet.request.overrides == {}
     mine = tmp_path / "mine.case"
@@ -373,7 +452,8 @@ def test_accuracy_chooses_the_mesh(open_window):
 def test_3d_shows_the_joint_as_a_surface(open_window):
     hand = open_window("f", n_joint=8.0, h_dam=3.0, h_found=4.0)
     assert hand.run().startswith("done in")
-    for start in ("opening of the joint", "joint: closed, slipped, open", "water pressure"):
+    state = "joint: closed, slipped, softening, open"
+    for start in ("opening of the joint", state, "water pressure"):
         assert any(view.startswith(start) for view in hand.views), start
 
 
@@ -389,7 +469,7 @@ def test_water_and_loads_of_any_section(open_window, joint):
     hand = open_window("e", **SMALL, **SECTION, **joint, **LOADS, uplift="imposed")
     hand.type(tree.LEVELS, "6, 10.5")
     hand.type(tree.TAIL_LEVELS, "0, 3")
-    assert hand.views == ["water", "silt", "forces"]
+    assert hand.views == ["water", "silt", "forces", "heading"]
     case = hand.session.tree.sheet.case
     base, side, bed = 5.0, case["found_side"], joint.get("joint_slope", 0.0)
     bed = base * np.tan(np.radians(bed))

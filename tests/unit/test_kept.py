@@ -32,5 +32,17 @@ def test_what_other_code_has_measured_is_not_taken(path, monkeypatch):
     Kept(path, False).once(("a",), lambda: 1)
     assert not Kept(path, True).has(("a",))
     Kept(path, False).once(("a",), lambda: 1)
-    monkeypatch.setattr("damjoint.studies.bench.sources", lambda: "other")
+    other = {**Kept(path, False).provenance, "code": "other"}
+    monkeypatch.setattr("damjoint.studies.bench.provenance", lambda: other)
     assert not Kept(path, False).has(("a",))
+    assert Kept(path, False).provenance == other
+
+
+def test_what_was_begun_earlier_keeps_its_day_and_commit(path, monkeypatch):
+    """The same code under another commit, on another day: taken, and said to be of the first."""
+    begun = Kept(path, False)
+    begun.once(("a",), lambda: 1)
+    later = {**begun.provenance, "date": "2999-01-01", "commit": "0000000"}
+    monkeypatch.setattr("damjoint.studies.bench.provenance", lambda: later)
+    again = Kept(path, False)
+    assert again.has(("a",)) and again.provenance == begun.provenance

@@ -2,7 +2,16 @@
 
 import numpy as np
 import pytest
-from damjoint.results.fields import along, distance, row_of_nodes
+from damjoint.results.fields import (
+    CLOSED,
+    OPEN,
+    SLIPPED,
+    SOFTENING,
+    along,
+    distance,
+    row_of_nodes,
+    state_of,
+)
 from damjoint.results.outline import filled, section_of, skin
 from damjoint.results.units import FORCES, LENGTHS, told, unit
 from damjoint.scene.mesh import Body
@@ -94,6 +103,15 @@ def test_skin_of_a_solid():
     ((faces, owners),) = skin(Body(points, np.arange(5), tets, np.arange(2)))
     assert len(faces) == 6 and {1, 2, 3} not in map(set, faces.tolist())
     assert sorted(owners) == [0, 0, 0, 1, 1, 1]
+
+
+def test_states_of_the_joint():
+    """Closed, slipped, softening (slipped or not), open; friction does not soften: what is between
+    0 and 1 is a mean over z."""
+    rows = {"damage": np.array([0, 0, 0.2, 0.2, 1]), "slip": np.array([0, 1e-3, 0, 1e-3, 1e-3])}
+    assert state_of(rows).tolist() == [CLOSED, SLIPPED, SOFTENING, SOFTENING, OPEN]
+    friction = rows | {"lambda": rows["slip"]}
+    assert state_of(friction).tolist() == [CLOSED, SLIPPED, CLOSED, SLIPPED, OPEN]
 
 
 def test_rows_of_a_broken_joint():

@@ -13,8 +13,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from ..scene.parameters import constants
-from .drawing import BLUE, GREEN, ORANGE, RED, WATER, write_picture
-from .fields import along
+from .drawing import BLUE, GREEN, ORANGE, RED, VIOLET, WATER, write_picture
+from .fields import SOFTENING, along, state_of
 from .gravity import GravityMethod
 from .pictures import heading
 from .tables import Results
@@ -25,6 +25,8 @@ CONCRETE, ROCK, SILT = "#c3ccd6", "#e6dcc8", "#a98d5d"
 UPLIFT_AT, STRESS_AT, TALL = 0.14, 0.52, 0.24
 
 COMPUTED, HAND = "finite elements", "gravity method"
+#: Of a stress, in every table and diagram.
+SIGN = "tension > 0"
 
 
 def draw_check(
@@ -56,7 +58,7 @@ def draw_check(
 def draw_cells(axes: Axes, cells: list[tuple[str, ...]]) -> None:
     """A table in the upper part of axes."""
     height = min(0.045 * len(cells), 0.75)
-    widths = [0.4, *[0.6 / (len(cells[0]) - 1)] * (len(cells[0]) - 1)]
+    widths = [0.34, *[0.66 / (len(cells[0]) - 1)] * (len(cells[0]) - 1)]
     table = axes.table(
         cells,
         colWidths=widths,
@@ -162,18 +164,13 @@ def draw_joint(axes: Axes, result: Results, method: GravityMethod) -> None:
     if rows and last["crack_length"]:
         line = under.place(s, np.where(rows["damage"] >= 1, 0, np.nan))
         axes.plot(*line, color=RED, linewidth=3, label=f"crack, {COMPUTED}", zorder=4)
+    if rows and (softening := state_of(rows) == SOFTENING).any():
+        line = under.place(s, np.where(softening, 0, np.nan))
+        axes.plot(*line, color=VIOLET, linewidth=3, label=f"softening, {COMPUTED}", zorder=2)
     pressure = method.uplift.s / under.length, method.uplift.p
-    for depth, name, color, by_hand, computed in (
-        (UPLIFT_AT, "uplift", WATER, pressure, rows.get("p", none)),
-        (
-            STRESS_AT,
-            "effective compression",
-            ORANGE,
-            effective_stress(method),
-            -rows.get("sigma_n_eff", none),
-        ),
-    ):
-        draw_diagram(axes, under, depth, name, color, by_hand, (s, computed))
+    stress = effective_stress(method), (s, rows.get("sigma_n_eff", none))
+    draw_diagram(axes, under, UPLIFT_AT, "uplift", WATER, 1, pressure, (s, rows.get("p", none)))
+    draw_diagram(axes, under, STRESS_AT, f"effective stress, {SIGN}", ORANGE, -1, *stress)
     if rows:
         draw_resultant(axes, under, last, BLUE, "-")
         axes.plot([], [], color=BLUE, label=f"resultant, {COMPUTED}")
@@ -188,15 +185,18 @@ def draw_diagram(
     depth: float,
     name: str,
     color: str,
+    hanging: int,
     by_hand: tuple[np.ndarray, np.ndarray],
     computed: tuple[np.ndarray, np.ndarray],
 ) -> None:
     """A quantity [Pa] hanging under the joint at a depth, both methods as (places over the joint's
     length, values); the end values and the name are written beside it.
+
+    hanging: 1 if what is positive is drawn downwards, -1 if what is negative is.
     """
     both = by_hand[1], computed[1]
     size, factor = unit(list(both), STRESSES)
-    scale = TALL / (max(np.abs(v).max(initial=0) for v in both) or 1.0)
+    scale = hanging * TALL / (max(np.abs(v).max(initial=0) for v in both) or 1.0)
     outline = lambda s, v: under.place(
         np.concatenate([[0], s, [1]]), depth + scale * np.concatenate([[0], v, [0]])
     )
@@ -213,15 +213,15 @@ def draw_diagram(
 
 
 def effective_stress(method: GravityMethod) -> tuple[np.ndarray, np.ndarray]:
-    """Places over the joint's length and compression [Pa] of the gravity method: nothing in the
-    crack, linear beyond it.
+    """Places over the joint's length and effective stress [Pa], tension > 0, of the gravity method:
+    nothing in the crack, linear beyond it.
     """
     if not method.uncracked:
         return np.array([0.0, 1.0]), np.zeros(2)
     tip = method.crack_length / method.body.length
     s, stress = [tip, 1.0], [method.tip_stress, method.sigma_n_eff_toe]
     crack = [0.0, tip] if tip else []
-    return np.array([*crack, *s]), 0.0 - np.array([*(0.0 for _ in crack), *stress])
+    return np.array([*crack, *s]), np.array([*(0.0 for _ in crack), *stress])
 
 
 def draw_resultant(

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure, FigureBase
 from ..storage import whole
 
 BLUE, ORANGE, WATER, RED, GREEN = "#0b5394", "#cc7a00", "#3d9be0", "#b3261e", "#2e7d32"
+VIOLET = "#8e24aa"
 GREY, DARK, CONCRETE, ROCK, SILT = "#8a8a8a", "#333333", "#c3ccd6", "#d8c9ae", "#a1866f"
 
 

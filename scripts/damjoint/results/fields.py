@@ -62,9 +62,16 @@ def along(rows: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     return {name: np.bincount(place, column) / number for name, column in rows.items()} | {"s": s}
 
 
+#: States of the joint, each drawn in a color of its own.
+CLOSED, SLIPPED, SOFTENING, OPEN = range(4)
+
+
 def state_of(rows: dict[str, np.ndarray]) -> np.ndarray:
-    """Of each row of the joint's table: 2 open or broken, 1 slipped, 0 neither."""
-    return np.where(rows["damage"] >= 1, 2, np.where(rows["slip"] > 0, 1, 0))
+    """Of each row of the joint's table: OPEN (or broken), SOFTENING, SLIPPED, or CLOSED."""
+    # friction, whose rows have lambda, does not soften: what is between is a mean over z
+    softening = (rows["damage"] > 0) & ("lambda" not in rows)
+    found = np.where(rows["slip"] > 0, SLIPPED, CLOSED)
+    return np.where(rows["damage"] >= 1, OPEN, np.where(softening, SOFTENING, found))
 
 
 def nearest_rows(points: np.ndarray, rows: dict[str, np.ndarray]) -> np.ndarray:

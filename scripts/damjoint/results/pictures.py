@@ -24,13 +24,14 @@ from .drawing import (
     GREY,
     ORANGE,
     RED,
+    VIOLET,
     WATER,
     figure_of,
     legend_above,
     panels,
     write_picture,
 )
-from .fields import Solution, along, distance, row_of_nodes, state_of
+from .fields import OPEN, SLIPPED, SOFTENING, Solution, along, distance, row_of_nodes, state_of
 from .outline import skin
 from .section_picture import draw_section, exaggeration
 from .tables import Results
@@ -132,7 +133,7 @@ def draw_joint(figure: FigureBase, result: Results, time: float) -> None:
     state = state_of(curves)
     for axes in (jumps, normals, shears):
         across = axes.get_xaxis_transform()
-        for number, color in ((2, RED), (1, ORANGE)):
+        for number, color in ((OPEN, RED), (SOFTENING, VIOLET), (SLIPPED, ORANGE)):
             look = {"color": color, "alpha": 0.07, "linewidth": 0, "transform": across}
             axes.fill_between(curves["s"], 0, 1, where=state == number, **look)
         axes.axhline(0, color="black", linewidth=0.5)
@@ -225,15 +226,19 @@ def draw_history(figure: FigureBase, result: Results) -> None:
         (
             "part of the joint",
             (("%", 100 / joint_length(result)),),
-            [("crack_length", RED, "open or broken"), ("slip_length", ORANGE, "slipped")],
+            [
+                ("crack_length", RED, "open"),
+                ("slip_length", ORANGE, "slipped"),
+                *([("process_zone", VIOLET, "softening")] if history["process_zone"].any() else []),
+            ],
         ),
         *([("leakage", FLUXES, [("flux", BLUE, "")])] if flowing else []),
     ]
     where = panels(figure, 1, len(shown), left=0.85, across=0.95).flat
     for axes, (what, units, lines) in zip(where, shown, strict=True):
         name, factor = unit([history[column] for column, *_ in lines], units)
-        # dashed over the first one: they often coincide
-        for (column, color, label), style in zip(lines, ("o-", "o--"), strict=False):
+        # dashed and dotted over the first one: they often coincide
+        for (column, color, label), style in zip(lines, ("o-", "o--", "o:"), strict=False):
             values = history[column] * factor
             axes.plot(history["level"], values, style, color=color, markersize=3, label=label)
         axes.set(xlabel="reservoir level [m]", ylabel=f"{what} [{name}]")

@@ -16,8 +16,8 @@ from matplotlib.patches import Patch
 from ..scene.case import has_drains
 from ..scene.loads import Loading, line_forces
 from ..scene.parameters import constants
-from .drawing import CONCRETE, DARK, GREEN, GREY, ORANGE, RED, ROCK, SILT, WATER, panels
-from .fields import Solution, distance, nearest_rows, state_of
+from .drawing import CONCRETE, DARK, GREEN, GREY, ORANGE, RED, ROCK, SILT, VIOLET, WATER, panels
+from .fields import CLOSED, OPEN, SLIPPED, SOFTENING, Solution, distance, nearest_rows, state_of
 from .outline import Section, section_of
 from .units import FORCES, STRESSES, told
 
@@ -169,28 +169,29 @@ class Drawing:
             self.axes.plot(*outline.T, "--", color=GREY, linewidth=0.6, zorder=2)
 
     def joint(self) -> None:
-        """Both lips where the joint is broken or open, and where it has slipped else; water in
-        between.
+        """Both lips where the joint is broken or open, softens, or has slipped; water in the
+        crack.
         """
         shown, lips = set(), []
         for plane, lip in self.section.lips:
             row = self.rows_at(plane.points[lip])
-            state = state_of({name: self.rows[name][row] for name in ("damage", "slip")})
+            state = state_of(self.rows)[row]
             both = np.minimum(state[:-1], state[1:])
             lips.append(np.stack([plane.moved[lip][:-1], plane.moved[lip][1:]], axis=1))
-            for number, color in ((0, DARK), (1, ORANGE), (2, RED)):
+            for number, color in enumerate((DARK, ORANGE, VIOLET, RED)):
                 some = lips[-1][both == number]
-                width = 2.2 if number else 0.8
+                width = 0.8 if number == CLOSED else 2.2
                 self.axes.add_collection(
                     LineCollection(some, color=color, linewidth=width, zorder=3), autolim=False
                 )
                 shown |= {number} if len(some) else set()
-        if self.case["uplift"] != "none" and 2 in shown:
-            crack = np.concatenate([lips[0], lips[1][:, ::-1]], axis=1)[both == 2]
+        if self.case["uplift"] != "none" and OPEN in shown:
+            crack = np.concatenate([lips[0], lips[1][:, ::-1]], axis=1)[both == OPEN]
             self.axes.add_collection(PolyCollection(crack, color=WATER, zorder=2), autolim=False)
         for number, color, label in (
-            (2, RED, "joint open or broken"),
-            (1, ORANGE, "joint slipped"),
+            (OPEN, RED, "joint open or broken"),
+            (SOFTENING, VIOLET, "joint softening"),
+            (SLIPPED, ORANGE, "joint slipped"),
         ):
             if number in shown:
                 self.legend.append((Line2D([], [], color=color, linewidth=2.2), label))

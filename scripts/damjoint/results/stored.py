@@ -15,7 +15,7 @@ from ..scene.mesh import Body
 from ..scene.parameters import INCLUDE, assignments, constants, declared, listing, parse
 from .fields import Field, Solution
 from .folder import earlier
-from .tables import Results
+from .tables import HISTORY, Results
 
 #: What is raised where files are not what a run writes; a SyntaxError by XML.
 DAMAGED = (OSError, ValueError, LookupError, TypeError, SyntaxError, meshio.ReadError)
@@ -54,6 +54,9 @@ def results_of(told: dict, folder: Path) -> Results:
     kept.
     """
     history = read_csv(folder / "history.csv")
+    if missing := [name for name in HISTORY if name not in history]:
+        made = told["versions"]["damjoint"]
+        raise InputError(f"history.csv of damjoint {made} lacks {', '.join(missing)}: run it again")
     case = case_of(told)
     heel = np.zeros(0)
     if case["drive"] != "level":

@@ -21,6 +21,7 @@ SHOWN: tuple[tuple[str, str, Units], ...] = (
     ("U", "uplift U", FORCES),
     ("x_resultant", "N' at x", LENGTHS[:1]),
     ("crack_length", "open or broken", LENGTHS[:1]),
+    ("process_zone", "softening", LENGTHS[:1]),
     ("slip_length", "slipped", LENGTHS[:1]),
     ("max_opening", "largest opening", LENGTHS),
     ("crest_ux", "crest movement", LENGTHS),
@@ -50,7 +51,7 @@ def levels_table(result: Results) -> dict:
         (head, history[name][rows], units)
         for name, head, units in SHOWN
         if (name != "flux" or case["uplift"] == "flow")
-        and (name != "tail_level" or history[name].any())
+        and (name not in ("tail_level", "process_zone") or history[name].any())
     ]
     found = table(shown)
     length = case.joint_length

@@ -6,11 +6,8 @@ from __future__ import annotations
 
 import contextlib
 import csv
-import hashlib
 import json
 import os
-import platform
-import re
 import subprocess
 import sys
 import tempfile
@@ -25,10 +22,9 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
-from .. import RunError, data
+from .. import RunError
 from .. import accuracy as on_request
 from ..engines import engine_of
-from ..engines.condensed import factor
 from ..engines.condensed.bulk import Bodies, condense
 from ..engines.condensed.filling import Filling
 from ..engines.condensed.interface import Interface
@@ -41,6 +37,7 @@ from ..run import run
 from ..scene.case import ACCURACIES, Case, load
 from ..storage import whole
 from .bodies import interface_of
+from .provenance import provenance
 from .sweep import filled, pool_of
 
 #: code_aster 15.2, sequential, on a 2-core machine: seconds of wall time of the whole job without
@@ -112,22 +109,36 @@ class Kept:
     """What a benchmark has measured so far, a line of JSON each: one that was interrupted goes on
     where it was.
 
-    The first line names code and machine; what another has measured is not taken.
+    The first line names code and machine; what another has measured is not taken. What is taken
+    keeps the day on which it was begun.
     """
 
     def __init__(self, path: Path, short: bool) -> None:
         self.path, self.short = path, short
-        first = [short, sources(), machine()]
+        #: of all that is measured
+        self.provenance = provenance()
         lines = path.read_text().splitlines() if path.exists() else []
         self.known: dict[str, object] = {}
         with contextlib.suppress(ValueError):  # a half-written last line
-            if lines and json.loads(lines[0]) == first:
+            if lines and (begun := self.begun(json.loads(lines[0]))):
+                self.provenance = begun
                 for line in lines[1:]:
                     key, value = json.loads(line)
                     self.known[json.dumps(key)] = value
         pairs = [[json.loads(key), value] for key, value in self.known.items()]
         with whole(path) as part:
-            part.write_text("".join(json.dumps(one) + "\n" for one in (first, *pairs)))
+            lines = [[short, self.provenance], *pairs]
+            part.write_text("".join(json.dumps(one) + "\n" for one in lines))
+
+    def begun(self, first: object) -> dict[str, str] | None:
+        """The provenance in a file's first line, if it is of the same benchmark, code and
+        machine.
+        """
+        match first:
+            case [self.short, {"code": code, "machine": on} as found]:
+                same = code == self.provenance["code"] and on == self.provenance["machine"]
+                return found if same else None
+        return None
 
     def has(self, key: tuple) -> bool:
         """Whether something was measured under a key."""
@@ -148,13 +159,6 @@ def plain(value: object) -> object:
     if isinstance(value, (list, tuple, np.ndarray)):
         return [plain(one) for one in value]
     return value.item() if isinstance(value, np.generic) else value
-
-
-def sources() -> str:
-    """A fingerprint of the code."""
-    files = [*Path(__file__).parents[1].rglob("*.py"), *data("pro").rglob("*.pro")]
-    files += data("geo").glob("*.geo")
-    return hashlib.sha256(b"".join(path.read_bytes() for path in sorted(files))).hexdigest()
 
 
 class Table(dict):
@@ -701,17 +705,6 @@ def precision(n: int) -> list[str]:
         "flux at the toe over flux at the heel minus one "
         f"{rows['flux'][-1] / rows['flux'][0] - 1:.1e}",
     ]
-
-
-def machine() -> str:
-    """Processor, cores, Python and factorisation, in a line."""
-    try:
-        told = Path("/proc/cpuinfo").read_text()
-        processor = re.search(r"model name\s*:\s*(.*)", told)[1]
-    except (OSError, TypeError):
-        processor = platform.processor() or platform.machine()
-    cores = len(os.sched_getaffinity(0))
-    return f"{processor}, {cores} cores, Python {platform.python_version()}, {factor.name()}"
 
 
 def write_table(table: Table, path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import tempfile
 from collections import Counter
 from functools import partial
@@ -18,6 +19,7 @@ from ..scene.case import Case, load
 from ..storage import held
 from . import bench as measured
 from .bench import PARTS, QUANTITIES, SCENES, Kept, Table, front
+from .provenance import provenance, said
 
 STYLES = {
     (2, "free"): ("o", "triangles"),
@@ -134,11 +136,15 @@ def modelings(kept: Kept, cases: Table) -> Table:
     return table
 
 
-def page(tables: dict[str, Table], precise: list[str], beyond: str, short: bool) -> str:
-    """The page: a finding in a sentence or two, and the table it comes from."""
+def page(
+    tables: dict[str, Table], precise: list[str], beyond: str, short: bool, source: str
+) -> str:
+    """The page: a finding in a sentence or two, and the table it comes from; source: in a line, by
+    which code, when and where all was measured.
+    """
     parts = [
         "# Benchmarks",
-        f"Written by `damjoint bench{' --short' if short else ''}` on {measured.machine()}. "
+        f"{source} Written by `damjoint bench{' --short' if short else ''}`. "
         "The published code is code_aster 15.2 on a machine of 2 cores, the whole job without its "
         "mesh. Two digits are given; they vary by as much from run to run.",
         *of_cases(tables["cases"], short),
@@ -245,8 +251,8 @@ def of_stress(grid: Table) -> list[str]:
 
 
 def bench(out: Path, short: bool) -> None:
-    """Run everything; write tables (CSV), benchmarks.md, modelings.md and accuracy.png into out;
-    print the page.
+    """Run everything; write tables (CSV), benchmarks.md, modelings.md, accuracy.png and what has
+    measured them (provenance.json) into out; print the page.
 
     What is measured is kept in out/measured.jsonl until the page is written.
     """
@@ -257,8 +263,11 @@ def bench(out: Path, short: bool) -> None:
         for name, table in tables.items():
             measured.write_table(table, out / f"{name}.csv")
         draw(tables["accuracy"], out / "accuracy.png")
-        (out / "modelings.md").write_text(as_text(tables["modelings"]) + "\n")
-        text = page(tables, precise, measured.beyond_memory(), short)
+        ended = kept.provenance | {"date": provenance()["date"]}
+        source = said([kept.provenance, ended])
+        (out / "modelings.md").write_text(f"{as_text(tables['modelings'])}\n\n{source}\n")
+        text = page(tables, precise, measured.beyond_memory(), short, source)
+        (out / "provenance.json").write_text(json.dumps(ended, indent=1) + "\n")
         (out / "benchmarks.md").write_text(text)
         kept.path.unlink()
     print(text)

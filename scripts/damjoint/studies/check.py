@@ -16,7 +16,7 @@ from .. import InputError
 from ..engines import engine_of
 from ..results import folder as folders
 from ..results import gravity, verdict
-from ..results.check_picture import draw_check
+from ..results.check_picture import SIGN, draw_check
 from ..results.fields import along
 from ..results.gravity import GravityMethod
 from ..results.tables import CHECK, Results, write_csv
@@ -26,6 +26,8 @@ from ..scene.case import Case
 
 FINITE_ELEMENTS, GRAVITY = "finite elements", "gravity method"
 DIFFERENCE, REQUIRED = "difference", "required"
+#: The verdict where nothing fails and nothing is required; what a case can require.
+UNCHECKED, REQUIREMENTS = "not checked", ("required_SSF", "required_OSF", "f_c")
 
 #: The columns of check.csv that are numbers which the two answers share.
 NUMBERS = tuple(CHECK)[list(CHECK).index("level") : list(CHECK).index("OSF") + 1]
@@ -63,8 +65,14 @@ class Answer:
             if found[name] < value
         ]
         if case["f_c"] and -found["sigma_n_toe"] > case["f_c"]:
-            said.append(f"{-found['sigma_n_toe']:.4g} Pa at the toe > f_c = {case['f_c']:g} Pa")
+            pressed = f"compression {-found['sigma_n_toe']:.4g} Pa at the toe"
+            said.append(f"{pressed} > f_c = {case['f_c']:g} Pa")
         return [self.statement, *said] if self.statement else said
+
+    @property
+    def verdict(self) -> str:
+        """fail; pass if the case requires something; else not checked."""
+        return "fail" if self.fails else "pass" if requires(self.case) else UNCHECKED
 
     @property
     def length(self) -> float:
@@ -80,10 +88,15 @@ class Answer:
             "uplift": self.case["uplift"],
             **self.numbers,
             "position": gravity.position(self.numbers["x_resultant"], self.length),
-            **{name: self.case[name] for name in ("required_SSF", "required_OSF", "f_c")},
-            "verdict": "fail" if self.fails else "pass",
+            **{name: self.case[name] for name in REQUIREMENTS},
+            "verdict": self.verdict,
             "why": "; ".join(self.fails),
         }
+
+
+def requires(case: Case) -> bool:
+    """Whether a case requires anything: a safety factor, or a compressive strength at the toe."""
+    return any(case[name] for name in REQUIREMENTS)
 
 
 def least_sliding_factor(case: Case) -> float:
@@ -156,12 +169,12 @@ class Check:
     @property
     def shown(self) -> list[dict[str, float | str]]:
         """Rows of the printed table: those of check.csv and what is required."""
-        factors = required(self.gravity.case)
+        factors = asked(self.gravity.case)
         if all(map(math.isnan, factors.values())):
             return self.rows
-        asked = {"case": self.gravity.case.name, "uplift": self.gravity.case["uplift"]}
+        scene = {"case": self.gravity.case.name, "uplift": self.gravity.case["uplift"]}
         blank = dict.fromkeys(NUMBERS, math.nan)
-        return [*self.rows, asked | {"answer": REQUIRED} | blank | factors | NO_VERDICT]
+        return [*self.rows, scene | {"answer": REQUIRED} | blank | factors | NO_VERDICT]
 
     @property
     def why(self) -> str:
@@ -173,6 +186,8 @@ class Check:
     def notes(self) -> list[str]:
         """What to know when the two are compared."""
         case, found = self.gravity.case, []
+        if not requires(case):
+            found.append(f"nothing is required: the case sets none of {', '.join(REQUIREMENTS)}")
         if case["law"] == "rupture":
             given = f"mu = {case['mu']:g}, adhesion = {case['adhesion']:g} Pa"
             found.append(f"SSF with {given}, which the law rupture does not have")
@@ -195,6 +210,12 @@ def required(case: Case) -> dict[str, float]:
     return {name: value or math.nan for name, value in least.items()}
 
 
+def asked(case: Case) -> dict[str, float]:
+    """`required`, but nan for what only the law asks for: what is shown as required."""
+    least = required(case)
+    return {n: v if case[f"required_{n}"] else math.nan for n, v in least.items()}
+
+
 def difference(one: float, other: float) -> float:
     """One less the other; 0 if they agree to nine digits, or are both infinite."""
     return 0.0 if math.isclose(one, other, rel_tol=1e-9) else one - other
@@ -211,7 +232,8 @@ def text_table(checks: list[Check]) -> str:
         size, factor = unit([finite], units)
         # a difference beyond the digits that are shown
         values[less & (np.abs(values) < 1e-5 * np.abs(finite).max(initial=0))] = 0
-        heads += [f"{title}\n[{size}]" for title in names.values()]
+        sign = f"\n{SIGN}" if units is STRESSES else ""
+        heads += [f"{title}\n[{size}]{sign}" for title in names.values()]
         show = [signed if is_less else number for is_less in less]
         columns += [[f(v * factor) for f, v in zip(show, line, strict=True)] for line in values]
     told = ([row[name] for row in rows] for name in ("position", "verdict"))
@@ -280,8 +302,8 @@ def check(cases: list[Case], out: Path) -> list[Check]:
 def picture_table(found: Check) -> list[tuple[str, ...]]:
     """The table beside the picture: a row per quantity."""
     pair = found.finite_elements, found.gravity
-    cells = [("", "FE", "gravity", "required")]
-    least = required(found.gravity.case)
+    cells = [(f"stress: {SIGN}", "FE", "gravity", "required")]
+    least = asked(found.gravity.case)
     for units, names in SHOWN:
         values = [[answer.numbers[name] for answer in pair] for name in names]
         size, factor = unit([np.array(values)[np.isfinite(values)]], units)
@@ -289,4 +311,4 @@ def picture_table(found: Check) -> list[tuple[str, ...]]:
             told = (number(v * factor) for v in line)
             head = title if size == "-" else f"{title} [{size}]"
             cells.append((head, *told, number(least.get(name, math.nan))))
-    return [*cells, ("", *("fail" if answer.fails else "pass" for answer in pair), "")]
+    return [*cells, ("", *(answer.verdict for answer in pair), "")]

@@ -24,7 +24,7 @@ from ..results.verdict import failed, statement, stiffness_ratio
 from ..scene.case import Case
 from ..scene.parameters import constants, declared, parse
 from ..storage import whole
-from .check import Check, by_finite_elements, by_gravity, hand_calculation, picture_table
+from .check import UNCHECKED, Check, by_finite_elements, by_gravity, hand_calculation, picture_table
 
 #: Of the parts of a picture that are dots, not lines.
 DPI = 160
@@ -83,6 +83,7 @@ def part_of(folder: Path, solution: Solution) -> dict:
         "title": case.title,
         "name": case.name,
         "verdict": told["verdict"],
+        "judged": "fail" if fails else found.finite_elements.verdict if found else UNCHECKED,
         "fails": fails,
         "hints": [*told["hints"]],
         "made": f"{made:%Y-%m-%d %H:%M}",
@@ -184,7 +185,7 @@ def pictures_of(solution: Solution) -> list[dict[str, str]]:
             "half",
             joint,
             f"The joint at level {level:.4g} m: jumps, normal stress, shear. Red: open or broken; "
-            "orange: slipped.",
+            "violet: softening; orange: slipped.",
         ),
         ("whole", history, "All converged steps."),
     ]
@@ -215,6 +216,15 @@ def critical_of(found: dict | None) -> list[tuple[str, str]]:
     return [(f"critical {found['of']}, and the last state before it", "; ".join(said))]
 
 
+def mesh_error(result: Results) -> str:
+    """What --accuracy has estimated; without it, how to see the error."""
+    if "error_estimate" in result.info:
+        return result.info["error_estimate"]["statement"]
+    own = result.case.geometry and result.case.geometry.suffix != ".geo"
+    how = "a run on a finer mesh shows it" if own else "damjoint run --accuracy 1% estimates it"
+    return f"not estimated; {how}"
+
+
 def facts(result: Results) -> list[tuple[str, str]]:
     """Mesh, solver, versions, times."""
     case, told = result.case, result.info
@@ -232,10 +242,7 @@ def facts(result: Results) -> list[tuple[str, str]]:
             "stiffness of the joint over that of an element, K_N h/E",
             f"{stiffness_ratio(result):.3g}",
         ),
-        (
-            "error of the mesh",
-            "not estimated for this dam; repeat the run with twice n_joint to see it",
-        ),
+        ("error of the mesh", mesh_error(result)),
         (
             "steps",
             f"{len(result.history['time'])} converged, {result.history['iterations'].sum():.0f} "

@@ -19,6 +19,7 @@ from tqdm import tqdm
 from .. import InputError
 from ..scene.case import Case, has_drains, load
 from ..storage import lock
+from .provenance import RECORDED, provenance
 from .sweep import pool_of, read_done
 from .verification import Written, unjustified, violations
 
@@ -26,6 +27,7 @@ from .verification import Written, unjustified, violations
 COLUMNS = (
     *("scene", "class", "found", "dim", "law", "uplift", "drive", "verdict", "level", "asked"),
     *("steps", "iterations", "cuts", "seconds", "command"),
+    *RECORDED,
 )
 #: What becomes of a scene.
 CLASSES = VERIFIED, JUSTIFIED, UNDECIDED, DEFECT = (
@@ -308,11 +310,16 @@ def stress(
     """Run what is missing of the scenes 0 .. count - 1 of a seed, and return the rows of them all.
 
     out: CSV of COLUMNS, a row written whole when it is done; what is in it already is not run
-    again. Raises InputError.
+    again. Raises InputError, also where those are of other code.
     """
     if not out.parent.is_dir():
         raise InputError(f"out = {out}: must be a file in an existing folder")
     done = read_done(out, list(COLUMNS), ("dim", "seconds"))
+    now = provenance()
+    for row in done.values():
+        if row["code"] != now["code"]:
+            begun = f"begun with damjoint {row['version']} ({row['commit'] or row['date']})"
+            raise InputError(f"out = {out}: {begun}, which is other code: name a new file")
     missing = [number for number in range(count) if f"{seed}-{number}" not in done]
     with out.open("a", newline="") as file:
         lock(file.fileno(), out)
@@ -323,7 +330,7 @@ def stress(
         for row in progress(
             rows, total=len(missing), desc="stress", disable=not sys.stderr.isatty()
         ):
-            writer.writerow(row)
+            writer.writerow(row | now)
             file.flush()
     wanted = {f"{seed}-{number}" for number in range(count)}
     return [row for row in read_rows(out) if row["scene"] in wanted]

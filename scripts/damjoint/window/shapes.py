@@ -11,7 +11,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..results.fields import BODIES, distance, nearest_rows, state_of
+from ..results.fields import (
+    BODIES,
+    OPEN,
+    SLIPPED,
+    SOFTENING,
+    distance,
+    nearest_rows,
+    state_of,
+)
 from ..results.outline import section_of, skin
 from ..scene.case import Case
 from ..scene.loads import Loading, line_forces
@@ -212,19 +220,20 @@ class Deformed:
         return np.array([values(rows)[self.lip_rows] for rows in self.rows])
 
     def marks(self) -> dict[str, Pieces]:
-        """Both lips of the joint where it is open or broken, and where it has slipped else.
+        """Both lips of the joint where it is open or broken, softens, or has slipped.
 
         A part that is not in that state at a step is drawn in a point.
         """
-        found: dict[str, list] = {"open": [], "slipped": []}
+        states = {"open": OPEN, "softening": SOFTENING, "slipped": SLIPPED}
+        found: dict[str, list] = {name: [] for name in states}
         state = self.at_lip(state_of)
         both = np.minimum(state[:, :-1], state[:, 1:])
         for name in BODIES:
             points, moved = self.lip(name)
             ends = np.stack([points[:-1], points[1:]], axis=1)
             to = np.stack([moved[:, :-1], moved[:, 1:]], axis=2)
-            for name, where in (("open", both == 2), ("slipped", both == 1)):
-                shown = to.copy()
+            for name, number in states.items():
+                where, shown = both == number, to.copy()
                 away = (to[:, :, 0] - to[:, :, 1]) + (ends[:, 0] - ends[:, 1]) / self.scale
                 shown[:, :, 1] += np.where(where[:, :, None], 0.0, away)
                 found[name].append(Pieces(ends, shown))
@@ -300,7 +309,7 @@ class Deformed:
         """Quadrangles of the water between open lips that stand under pressure."""
         below, down = self.lip("foundation")
         above, up = self.lip("dam")
-        wet = self.at_lip(lambda rows: (state_of(rows) == 2) & (rows["p"] > 0))
+        wet = self.at_lip(lambda rows: (state_of(rows) == OPEN) & (rows["p"] > 0))
         wet = (wet[:, :-1] & wet[:, 1:])[..., None, None]
         low, high = below + self.scale * down, above + self.scale * up
         faces = np.stack([low[:, :-1], low[:, 1:], high[:, 1:], high[:, :-1]], axis=2)

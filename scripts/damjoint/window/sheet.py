@@ -45,6 +45,10 @@ class Request:
         return load(self.case, self.overrides, self.levels, self.tail_levels, steps, self.accuracy)
 
 
+#: What the titles of cases tell of.
+TITLED = {"law", "uplift", "dim", "order", "mesh_pattern", "drive"}
+
+
 @dataclass(frozen=True)
 class Sheet:
     """A request that has been checked: the case it comes to, and what the tree shows of it."""
@@ -56,6 +60,18 @@ class Sheet:
     entries: list[dict]
     #: path of the case file
     path: str
+
+    @property
+    def heading(self) -> tuple[str, str]:
+        """What the case is called, and its joint law and water.
+
+        Of a title that tells of more ("C: friction, 2D"), the name, once that has been changed.
+        """
+        case, title = self.case, self.case.title
+        if TITLED & set(self.request.overrides):
+            title = f"{title.partition(':')[0]}, changed"
+        water = " and ".join([case["uplift"], *case.also_uplift])
+        return title, f"law {case['law']}, uplift {water}"
 
 
 def fill(request: Request) -> Sheet:

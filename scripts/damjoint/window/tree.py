@@ -43,6 +43,9 @@ SAVE_ACTION = "save results"
 #: What stands for "as the case has it" among choices, and for the choice of a case file.
 OWN, OPEN = "as the case", "open a case file ..."
 
+#: The verdict of what has not been run.
+NOT_RUN = "not run yet"
+
 #: Colors of the status line.
 CALM, GOOD, WARN, BAD = "LightSteelBlue1", "DarkSeaGreen1", "Orange", "LightCoral"
 
@@ -52,6 +55,7 @@ RESULTS = {
     "tail_level": "Tailwater level [m]",
     "max_opening": "Largest opening [m]",
     "crack_length": "Crack length [m]",
+    "process_zone": "Fracture process zone, softening [m]",
     "slip_length": "Slipped length [m]",
     "crest_ux": "Crest movement, downstream > 0 [m]",
     "N": "Normal force N, effective [N per m]",
@@ -259,6 +263,11 @@ def say(status: str, color: str) -> None:
     put(text(STATUS, status, readOnly=True, help=status, attributes={"Highlight": color}))
 
 
+def show_verdict(said: str, color: str, why: str) -> None:
+    """Put a verdict into the tree; why: in words, for its tooltip."""
+    put(text(VERDICT, said, readOnly=True, help=why, attributes={"Highlight": color}))
+
+
 def show_results(scenes: list[Scene], shown: int) -> None:
     """Put a scene's results into the tree: the last step's, all steps' as their range."""
     scene = scenes[shown]
@@ -266,14 +275,8 @@ def show_results(scenes: list[Scene], shown: int) -> None:
     said = scene.said or "the dam stands"
     color = WARN if scene.failed or scene.said else GOOD
     modes = [s.result.case["uplift"] for s in scenes]
+    show_verdict(scene.ended or verdict(result), color, said)
     put(
-        text(
-            VERDICT,
-            scene.ended or verdict(result),
-            readOnly=True,
-            help=said,
-            attributes={"Highlight": color},
-        ),
         text(
             SCENE,
             modes[shown],
@@ -285,7 +288,7 @@ def show_results(scenes: list[Scene], shown: int) -> None:
     for i, (column, name) in enumerate(RESULTS.items()):
         values = history[column]
         there = len(values) > 0 and bool(np.isfinite(values[-1]))
-        if column in ("tail_level", "U", "flux"):  # only where there is such a thing
+        if column in ("tail_level", "U", "flux", "process_zone"):  # only where there is one
             there = there and bool(np.any(values != 0))
         put(
             number(
@@ -300,10 +303,11 @@ def show_results(scenes: list[Scene], shown: int) -> None:
 
 
 def hide_results() -> None:
-    """Take the results of an earlier run out of the tree."""
+    """Take the results of an earlier run out of the tree: what it asks for has not been run."""
     for name in gmsh.onelab.getNames("01Results/.*"):
-        if name != STATUS:
+        if name not in (STATUS, VERDICT):
             gmsh.onelab.clear(name)
+    show_verdict(NOT_RUN, CALM, "press Run")
 
 
 def chosen_scene(scenes: list[Scene]) -> int:

@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import gmsh
 import numpy as np
 
-from ..results.fields import along, distance, row_of_nodes, state_of
-from ..results.pictures import heading
+from ..results.fields import CLOSED, OPEN, SOFTENING, along, distance, row_of_nodes, state_of
 from ..results.units import LENGTHS, STRESSES, unit
 from ..scene.case import Case
 from .camera import CLIPPED, MAPS, clip, frame
@@ -26,6 +25,7 @@ Color = tuple[int, int, int, int]
 BLUE: Color = (11, 83, 148, 255)
 ORANGE: Color = (214, 120, 0, 255)
 RED: Color = (200, 20, 20, 255)
+VIOLET: Color = (142, 36, 170, 255)
 GREEN: Color = (46, 125, 50, 255)
 DARK: Color = (60, 60, 60, 255)
 GREY: Color = (150, 150, 150, 255)
@@ -145,10 +145,18 @@ def layer(case: Case, number: int) -> dict[str, float]:
     return {"OffsetZ": number * 5e-4 * case.size}
 
 
-def show(scene: Scene, before: Sequence[Scene] = ()) -> Gallery:
-    """All views of a scene; its first line and history alone if no requested level was reached.
+def show_heading(gallery: Gallery, heading: tuple[str, str]) -> None:
+    """The first two lines: what the case is called, and its joint law and water."""
+    title, scene = heading
+    tag = gallery.write(20, 28, [title], DARK, 18)
+    label(tag, 20, 50, [scene], 14)
+    gmsh.view.option.setString(tag, "Name", "heading")
 
-    before: earlier runs, whose last curves are drawn in grey for comparison.
+
+def show(scene: Scene, title: str, before: Sequence[Scene] = ()) -> Gallery:
+    """All views of a scene; its heading and history alone if no requested level was reached.
+
+    title: of the case; before: earlier runs, whose last curves are drawn in grey for comparison.
     """
     gallery = Gallery()
     graphs = Graphs(gallery)
@@ -159,29 +167,28 @@ def show(scene: Scene, before: Sequence[Scene] = ()) -> Gallery:
             show_maps(gallery, deformed)
         if extruded(scene.result.case):
             show_curves(graphs, scene, [other for other in before if other.times.size])
-        gallery.write(20, 52, captions(deformed), DARK, 15)
+        gallery.write(20, 74, captions(deformed), DARK, 15)
     if len(scene.result.history["time"]):
         show_history(graphs, scene, before)
     if before:
-        gallery.write(180, 98, ["grey curves: before"], GREY, 13)
-    gallery.write(20, 28, [heading_of(scene)], DARK, 18)
+        gallery.write(180, 118, ["grey curves: before"], GREY, 13)
+    case = scene.result.case
+    show_heading(gallery, (title, f"law {case['law']}, uplift {case['uplift']}"))
     return gallery
 
 
-def heading_of(scene: Scene) -> str:
-    """The first line: what was run."""
-    return heading(scene.result).split(", level")[0]
-
-
 def captions(deformed: Deformed) -> list[str]:
-    """A line per step: level, opening, crack."""
+    """A line per step: level, opening, crack, fracture process zone."""
     result, lines = deformed.scene.result, []
     for time in deformed.times:
         now = result.state(time)
         tail = f", tailwater {now['tail_level']:.4g} m" if now["tail_level"] > 0 else ""
         opened = now["max_opening"]
         said = f"opening {in_unit(opened)}" if opened > 0 else "closed"
-        lines.append(f"level {now['level']:.4g} m{tail}: {said}, crack {now['crack_length']:.3g} m")
+        said += f", crack {now['crack_length']:.3g} m"
+        if now["process_zone"] > 0:
+            said += f", softening {now['process_zone']:.3g} m"
+        lines.append(f"level {now['level']:.4g} m{tail}: {said}")
     return lines
 
 
@@ -216,9 +223,12 @@ def show_deformed(gallery: Gallery, deformed: Deformed) -> None:
     above = {**flat, **layer(case, 2), "LineWidth": 3}
     slipped = gallery.add("slipped joint", [marks["slipped"]], [ORANGE], **above)
     broken = gallery.add("open or broken joint", [marks["open"]], [RED], **above)
-    label(broken, 20, 76, ["red: joint open or broken"], 13)
-    label(slipped, 210, 76, ["orange: joint slipped"], 13)
-    gallery.write(20, 98, [f"displacement x {deformed.scale:g}"], DARK, 13)
+    label(broken, 20, 97, ["red: joint open or broken"], 13)
+    label(slipped, 210, 97, ["orange: joint slipped"], 13)
+    if (deformed.at_lip(state_of) == SOFTENING).any():
+        softening = gallery.add("softening joint", [marks["softening"]], [VIOLET], **above)
+        label(softening, 370, 97, ["violet: joint softening"], 13)
+    gallery.write(20, 118, [f"displacement x {deformed.scale:g}"], DARK, 13)
 
 
 def scale_at(place: int) -> dict[str, float]:
@@ -237,7 +247,7 @@ def show_maps(gallery: Gallery, deformed: Deformed) -> None:
     state = [state_of(r) for r in rows]
     shown = [
         (f"opening of the joint [{length}]", [r["delta_n"] * per_m for r in rows], STONE),
-        ("joint: closed, slipped, open", state, (STONE[0], ORANGE, RED)),
+        ("joint: closed, slipped, softening, open", state, (STONE[0], ORANGE, VIOLET, RED)),
     ]
     if case["uplift"] != "none":
         shown.append((f"water pressure [{stress}]", [r["p"] * per_pa for r in rows], STONE))
@@ -255,7 +265,7 @@ def show_maps(gallery: Gallery, deformed: Deformed) -> None:
             Pieces(points[table], np.array(values)[:, nearest][:, table, None])
             for _, table in joint.cells
         ]
-        whole = {"RangeType": 2, "CustomMin": 0, "CustomMax": 2} if values is state else {}
+        whole = {"RangeType": 2, "CustomMin": CLOSED, "CustomMax": OPEN} if values is state else {}
         gallery.add(name, pieces, colors, **scale_at(i + 1), **whole, Light=0)
 
 

@@ -58,6 +58,9 @@ class Session:
         self.scene_shown = 0
         self.kept: list[tuple[Scene, views.Gallery]] = []
         self.water: views.Gallery | None = None
+        #: what was run is called; and, before a run, what will be
+        self.title = ""
+        self.heading = views.Gallery()
         self.message = views.Gallery()
         self.drawn: tuple = ()
         self.aimed: tuple = ()
@@ -112,25 +115,36 @@ class Session:
 
     def other_scene(self) -> bool:
         """Whether the user has asked to see another scene of the last run; shows it then."""
-        if not self.scenes or tree.chosen_scene(self.scenes) == self.scene_shown:
+        if not tree.get_text(tree.SCENE) or tree.chosen_scene(self.scenes) == self.scene_shown:
             return False
         self.show(tree.chosen_scene(self.scenes))
         return True
 
     def check(self, request: Request | None = None) -> None:
         """Have a request checked: what stands in the tree, if none is given."""
-        try:
-            self.engine.send("check", request or self.tree.asked())
+        if request := request or self.asked():
+            self.engine.send("check", request)
             self.busy = "checking"
-        except InputError as error:
-            self.on_bad(str(error))
 
-    def run(self) -> None:
-        """Have what stands in the tree run."""
+    def asked(self) -> Request | None:
+        """What the tree asks for; None, and said, if that is bad.
+
+        Results of anything else are hidden at once.
+        """
         try:
             request = self.tree.asked()
         except InputError as error:
+            self.hide_results()
             self.on_bad(str(error))
+            return None
+        if request != self.ran:
+            self.hide_results()
+        return request
+
+    def run(self) -> None:
+        """Have what stands in the tree run."""
+        request = self.asked()
+        if not request:
             return
         self.busy, self.started = "running", time.perf_counter()
         tree.put(button(STOP))
@@ -151,6 +165,9 @@ class Session:
             self.draw(sheet.case)
             self.drawn = drawn
             self.tree.show(sheet)  # reading the geometry has declared the parameters anew
+        if sheet.request != self.ran:
+            self.hide_results()
+            views.show_heading(self.heading, sheet.heading)
         if self.busy == "running":
             self.update()
             return
@@ -163,6 +180,7 @@ class Session:
         else:  # nothing that matters to it, or changed back
             self.outline(False)
             self.aim(sheet.case, True)
+            tree.show_results(self.scenes, self.scene_shown)
             self.free(*self.outcome)
 
     def on_bad(self, why: str) -> None:
@@ -194,7 +212,7 @@ class Session:
     def on_done(self, scenes: list[Scene]) -> None:
         """A run has ended, at its last level or before."""
         self.keep_or_drop()
-        self.scenes = scenes
+        self.scenes, self.title = scenes, self.tree.sheet.heading[0]
         self.show(0)
         took = f"{time.perf_counter() - self.started:.2f} s"
         trouble = [scene.said for scene in scenes if scene.said]
@@ -225,7 +243,7 @@ class Session:
         tree.say(status, color)
         self.message.close()
         if color == tree.BAD:
-            self.message.write(20, 124, [status], views.RED, 15)
+            self.message.write(20, 144, [status], views.RED, 15)
         self.update()
         if self.windowed:
             gmsh.fltk.setStatusMessage(status)
@@ -261,6 +279,8 @@ class Session:
             self.water.show(shown)
         if self.gallery:
             self.gallery.show(not shown)
+        if not shown:
+            self.heading.close()
 
     def aim(self, case: Case, beside_graphs: bool) -> None:
         """Place the scene in the window anew when it has changed, else leave it to the user."""
@@ -275,7 +295,7 @@ class Session:
         if self.gallery:
             self.gallery.close()
         self.scene_shown = scene
-        self.gallery = views.show(self.scenes[scene], [old for old, _ in self.kept])
+        self.gallery = views.show(self.scenes[scene], self.title, [old for old, _ in self.kept])
         gmsh.model.mesh.clear()  # if the user has had one drawn: another one can be on top
         self.outline(False)
         self.aim(self.scenes[scene].result.case, True)
@@ -283,13 +303,8 @@ class Session:
         self.update()
 
     def keep_or_drop(self) -> None:
-        """Before new results come: the views there are kept for comparison, or go.
-
-        Gmsh's own graphs of results go in any case: they would stay as they are.
-        """
-        for tag in gmsh.view.getTags():
-            if gmsh.view.option.getString(tag, "Name") in tree.RESULTS.values():
-                gmsh.view.remove(tag)
+        """Before new results come: the views there are kept for comparison, or go."""
+        self.drop_graphs()
         if not tree.get_number(tree.KEEP):
             self.drop_results()
         elif self.gallery:
@@ -297,12 +312,28 @@ class Session:
             self.kept.append((self.scenes[self.scene_shown], self.gallery))
             self.gallery = None
 
+    def drop_graphs(self) -> None:
+        """Gmsh's own graphs of results go: they would stay as they are."""
+        for tag in gmsh.view.getTags():
+            if gmsh.view.option.getString(tag, "Name") in tree.RESULTS.values():
+                gmsh.view.remove(tag)
+
+    def hide_results(self) -> None:
+        """Show the undeformed outline and no results: none are of what the tree asks for."""
+        tree.hide_results()
+        self.drop_graphs()
+        self.heading.close()
+        self.outline(True)
+        if self.tree.sheet:
+            self.aim(self.tree.sheet.case, False)
+        self.update()
+
     def drop_results(self) -> None:
         """What earlier runs have given goes."""
         for gallery in (*(kept for _, kept in self.kept), self.gallery):
             if gallery:
                 gallery.close()
-        self.scenes, self.kept, self.gallery = [], [], None
+        self.scenes, self.kept, self.gallery, self.ran = [], [], None, None
         tree.hide_results()
 
 

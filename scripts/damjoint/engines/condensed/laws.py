@@ -59,6 +59,11 @@ class Law:
     def shear_strength(self, jump: np.ndarray, memory: Memory) -> np.ndarray | None:
         """The shear stress (q,) that slip cannot raise [Pa]; None if there is no such bound."""
 
+    def in_process_zone(self, jump: np.ndarray, memory: Memory) -> np.ndarray:
+        """Whether the point softens: part of its strength is used up, and it is not open."""
+        damage = self.damage(jump, memory)
+        return (damage > 0) & (damage < 1) & ~self.open(jump, memory)
+
 
 class Rupture(Law):
     """Cohesive rupture, with grouting and sawing.

@@ -112,6 +112,7 @@ class Record:
             "cuts": cuts,
             "residual": residual,
             "crack_length": weights @ law.open(at_points, state.memory),
+            "process_zone": weights @ law.in_process_zone(at_points, state.memory),
             "slip_length": weights @ law.slid(at_points, state.memory),
             "max_opening": interface.jumps(interface.at_nodes, state.jump)[:, 0].max(),
             "crest_ux": self.crest(state),

@@ -21,6 +21,7 @@ PRINTED = [
     "cuts",
     "residual",
     "crack_length",
+    "process_zone",
     "slip_length",
     "max_opening",
     "crest_ux",
