@@ -1,10 +1,11 @@
 """The accuracy asked for, measured: a scene on finer and finer meshes until its answer changes by
 less.
 
-From mesh to mesh the elements along the joint are halved and those of the bodies follow. Each costs
+First the load steps are halved on the coarsest mesh until that changes next to nothing. Then from
+mesh to mesh the elements along the joint are halved and those of the bodies follow. Each costs
 several times the one before, so that most of the time goes into the last one. The error left in a
 quantity is estimated from its last changes, as Roache's grid convergence index does (J. Fluids
-Eng. 116, 1994).
+Eng. 116, 1994), and holds that of the load steps.
 """
 
 from __future__ import annotations
@@ -28,6 +29,9 @@ REFINED = ("n_joint", "n_layers")
 
 #: Elements along the joint at most: in the plane, in 3D with one layer, in 3D with several.
 FINEST = {"plane": 512, "slice": 128, "solid": 32}
+
+#: The part of the accuracy that the load steps may take, and how often they are halved at most.
+STEP_SHARE, HALVINGS = 0.25, 6
 
 #: What is compared: words and unit, by name.
 QUANTITIES = {
@@ -69,6 +73,8 @@ class Estimate:
     slack: float = 0.0
     #: whether the accuracy is asked of it
     used: bool = True
+    #: the part of the error that the load steps make
+    of_steps: float = 0.0
 
     @property
     def relative(self) -> float:
@@ -116,8 +122,9 @@ def refined(case: Case, once: Callable[[Case], Outcome]) -> Outcome:
     A mesh that fails or is too large leaves the outcome of the one before; so does an interruption,
     as that outcome's error. Raises RunError if there is none before.
     """
-    begin, (first, *finer) = time.perf_counter(), meshes(case)
-    outcome, why = once(first), "no finer mesh is tried"
+    begin = time.perf_counter()
+    case, outcome, of_steps = stepped(case, once)
+    (_, *finer), why = meshes(case), "no finer mesh is tried"
     tried, found = [outcome.result], []
     for meshed in finer:
         if outcome.error:
@@ -139,12 +146,49 @@ def refined(case: Case, once: Callable[[Case], Outcome]) -> Outcome:
         outcome = after
         outcome.result.info["wall_seconds"]["coarser meshes"] = start - begin
         tried.append(outcome.result)
-        found = estimates(tried[-3:])
+        found = estimates(tried[-3:], of_steps)
         if all(one.within(case.accuracy) for one in found):
             why = ""
             break
     outcome.result.info["error_estimate"] = told(case.accuracy, tried, found, why)
     return outcome
+
+
+def stepped(case: Case, once: Callable[[Case], Outcome]) -> tuple[Case, Outcome, dict[str, float]]:
+    """The case with as many load steps as its accuracy asks for, its outcome, and the error that
+    these steps leave in each quantity.
+
+    The error of a step is of order 1 in its length, hence twice the change from halving all steps.
+    """
+    outcome, errors = once(case), {}
+    for _ in range(HALVINGS):
+        if outcome.error:
+            break
+        halved = halve_steps(case)
+        after = once(halved)
+        if after.error:
+            return case, replace(outcome, error=after.error), errors
+        pair = [outcome.result, after.result]
+        times = [t for t in case.requested if all(t in reached(one) for one in pair)]
+        values = [read(one, times) for one in pair]
+        scales = {name: scale_of(pair[0], name, values, times) for name in values[0]}
+        errors = {
+            name: 2 * float(np.abs(np.subtract(*(v[name] for v in values))).max(initial=0.0))
+            for name in values[0]
+        }
+        asked = {n: e for n, e in errors.items() if n != "toe_stress" and n not in LENGTHS}
+        if all(e <= STEP_SHARE * case.accuracy * scales[n] for n, e in asked.items()):
+            break
+        case, outcome = halved, after
+        errors = {name: error / 2 for name, error in errors.items()}
+    return case, outcome, errors
+
+
+def halve_steps(case: Case) -> Case:
+    """The case with each of its load steps cut in two, none of them at the time of a level."""
+    middles = [(a + b) / 2 for a, b in zip((0.0, *case.times), case.times, strict=False)]
+    middles = [t + 1e-3 * (t == round(t)) for t in middles]
+    return replace(case, times=tuple(sorted({*case.times, *middles})))
 
 
 def meshes(case: Case) -> list[Case]:
@@ -169,9 +213,10 @@ def finer(case: Case, times: float = 2) -> Case:
     return replace(case, values=now | values)
 
 
-def estimates(tried: list[Results]) -> list[Estimate]:
-    """The error left on the last of two or three meshes, at every requested level that all of them
-    have reached, and in the last level itself where it is not prescribed or not reached.
+def estimates(tried: list[Results], of_steps: dict[str, float]) -> list[Estimate]:
+    """The error left on the last of two or three meshes, with that of the load steps, at every
+    requested level that all of them have reached, and in the last level itself where it is not
+    prescribed or not reached.
     """
     last = tried[-1]
     case = last.case
@@ -185,17 +230,25 @@ def estimates(tried: list[Results]) -> list[Estimate]:
         table = np.array([one[name] for one in values])
         if not table.size:
             continue
-        scale, slack = float(np.abs(table).max()), 0.0
-        if name == "max_opening":
-            scale = max(largest_jump(last, t) for t in times)
-        error = float(left(table, name in LENGTHS).max())
+        scale, slack = scale_of(last, name, values, times), 0.0
+        error = float(left(table, name in LENGTHS).max()) + of_steps.get(name, 0.0)
         if name in LENGTHS and scale:
             error = max(error, element)
             # a little more, for lengths that differ by just an element
             slack = 1.001 * element if case.accuracy * case["n_joint"] >= 1 else 0.0
         used = name != "toe_stress" or stiffness_ratio(tried[0]) <= SOFT
-        found.append(Estimate(name, float(table[-1, -1]), error, scale, slack, used))
+        value = float(table[-1, -1])
+        found.append(Estimate(name, value, error, scale, slack, used, of_steps.get(name, 0.0)))
     return found
+
+
+def scale_of(
+    last: Results, name: str, values: list[dict[str, list[float]]], times: list[float]
+) -> float:
+    """What an error is relative to, see `Estimate`."""
+    if name == "max_opening" and times:
+        return max(largest_jump(last, t) for t in times)
+    return float(np.abs([one[name] for one in values]).max(initial=0.0))
 
 
 def reached(result: Results) -> set[float]:
@@ -252,10 +305,12 @@ def left(values: np.ndarray, counted: bool) -> np.ndarray:
 def told(accuracy: float, tried: list[Results], found: list[Estimate], why: str) -> dict:
     """What run.json says; why: the accuracy is not reached, in words."""
     sizes = [int(one.case["n_joint"]) for one in tried]
+    steps = len(tried[-1].case.times)
     return {
         "accuracy": accuracy,
         "reached": not why,
         "n_joint": sizes,
+        "steps": steps,
         "quantities": {
             one.name: {
                 "value": one.value,
@@ -263,14 +318,15 @@ def told(accuracy: float, tried: list[Results], found: list[Estimate], why: str)
                 "relative": one.relative,
                 "unit": QUANTITIES[one.name][1],
                 "used": one.used,
+                "of_steps": one.of_steps,
             }
             for one in found
         },
-        "statement": summary(accuracy, sizes, found, why),
+        "statement": summary(accuracy, sizes, steps, found, why),
     }
 
 
-def summary(accuracy: float, sizes: list[int], found: list[Estimate], why: str) -> str:
+def summary(accuracy: float, sizes: list[int], steps: int, found: list[Estimate], why: str) -> str:
     """The estimate in one line."""
     asked = f"accuracy {100 * accuracy:g} %"
     if not found:
@@ -278,7 +334,10 @@ def summary(accuracy: float, sizes: list[int], found: list[Estimate], why: str) 
     coarser = ", ".join(map(str, sizes[:-1]))
     errors = ", ".join(one.words for one in found if one.used and one.scale)
     said = f"{asked}: {f'not reached, {why}' if why else 'reached'}; "
-    said += f"errors with n_joint = {sizes[-1]} (after {coarser}): {errors}"
+    said += f"errors with n_joint = {sizes[-1]} (after {coarser}) and {steps} load steps: {errors}"
+    of_steps = max((one.of_steps / one.scale for one in found if one.used and one.scale), default=0)
+    if of_steps > 1e-4:
+        said += f"; the load steps make up to {percent(of_steps)} of them"
     corner = "; ".join(one.words for one in found if not one.used)
     return said + (
         f"; not asked of the {corner}, a corner that needs K_N h/E < 1" if corner else ""
