@@ -156,12 +156,13 @@ def draw_joint(axes: Axes, result: Results, method: GravityMethod) -> None:
         line = under.place(ends * method.crack_length / under.length, -0.02)
         axes.plot(*line, "--", color=RED, label=f"crack, {HAND}", zorder=4)
     rows = along(result.at()) if last else {}
+    answer = COMPUTED + (", partial load" if result.partial_load else "")
     none = np.zeros(0)
     x = rows.get("x", none)
     s = (x - x[0]) / np.ptp(x) if rows else none
     if rows and last["crack_length"]:
         line = under.place(s, np.where(rows["damage"] >= 1, 0, np.nan))
-        axes.plot(*line, color=RED, linewidth=3, label=f"crack, {COMPUTED}", zorder=4)
+        axes.plot(*line, color=RED, linewidth=3, label=f"crack, {answer}", zorder=4)
     pressure = method.uplift.s / under.length, method.uplift.p
     for depth, name, color, by_hand, computed in (
         (UPLIFT_AT, "uplift", WATER, pressure, rows.get("p", none)),
@@ -173,10 +174,11 @@ def draw_joint(axes: Axes, result: Results, method: GravityMethod) -> None:
             -rows.get("sigma_n_eff", none),
         ),
     ):
-        draw_diagram(axes, under, depth, name, color, by_hand, (s, computed))
+        label = f"{name}, {answer}"
+        draw_diagram(axes, under, depth, name, label, color, by_hand, (s, computed))
     if rows:
         draw_resultant(axes, under, last, BLUE, "-")
-        axes.plot([], [], color=BLUE, label=f"resultant, {COMPUTED}")
+        axes.plot([], [], color=BLUE, label=f"resultant, {answer}")
     forces = {"N": method.N, "T": method.T, "x_resultant": method.x_resultant}
     draw_resultant(axes, under, forces, "black", "--")
     axes.plot([], [], "--", color="black", label=f"the same, {HAND}")
@@ -187,12 +189,13 @@ def draw_diagram(
     under: UnderJoint,
     depth: float,
     name: str,
+    label: str,
     color: str,
     by_hand: tuple[np.ndarray, np.ndarray],
     computed: tuple[np.ndarray, np.ndarray],
 ) -> None:
     """A quantity [Pa] hanging under the joint at a depth, both methods as (places over the joint's
-    length, values); the end values and the name are written beside it.
+    length, values); the end values and the name are written beside it. label: of the computed one.
     """
     both = by_hand[1], computed[1]
     size, factor = unit(list(both), STRESSES)
@@ -204,7 +207,7 @@ def draw_diagram(
     if len(computed[0]):
         axes.fill(*outline(*computed), color=color, alpha=0.35, linewidth=0)
         line = under.place(computed[0], depth + scale * computed[1])
-        axes.plot(*line, color=color, label=f"{name}, {COMPUTED}")
+        axes.plot(*line, color=color, label=label)
     axes.plot(*outline(*by_hand), "--", color="black", linewidth=1)
     axes.text(*under.place(0.5, depth - 0.02), name, ha="center", va="bottom", fontsize=9)
     for s, value, side in ((-0.015, by_hand[1][0], "right"), (1.015, by_hand[1][-1], "left")):

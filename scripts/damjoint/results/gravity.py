@@ -298,6 +298,7 @@ class GravityMethod:
 
     case: Case
     body: Body
+    time: float
     level: float
     tail_level: float
     #: all but the water in the joint
@@ -411,7 +412,7 @@ def at(case: Case, time: float, level: float | None = None) -> GravityMethod:
 
     def state(crack: float) -> GravityMethod:
         uplift = Uplift(case, body, level, tail, crack)
-        return GravityMethod(case, body, level, tail, loads, crack, uplift)
+        return GravityMethod(case, body, time, level, tail, loads, crack, uplift)
 
     strength, at_tip = tensile_strength(case)
     if state(0.0).tip_stress <= strength:

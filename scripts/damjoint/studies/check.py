@@ -48,10 +48,14 @@ class Answer:
 
     case: Case
     by: str
+    #: t of the state; nan if there is none
+    time: float
     #: NUMBERS in SI units; nan where there is none
     numbers: Mapping[str, float]
     #: why there is no equilibrium; empty if there is one
     statement: str = ""
+    #: whether it is for a part of the case's loads only
+    partial: bool = False
 
     @property
     def fails(self) -> list[str]:
@@ -78,6 +82,8 @@ class Answer:
             "case": self.case.name,
             "answer": self.by,
             "uplift": self.case["uplift"],
+            "load": "partial" if self.partial else "full",
+            "time": self.time,
             **self.numbers,
             "position": gravity.position(self.numbers["x_resultant"], self.length),
             **{name: self.case[name] for name in ("required_SSF", "required_OSF", "f_c")},
@@ -97,7 +103,7 @@ def by_gravity(method: GravityMethod) -> Answer:
     """The gravity method's answer."""
     said = "" if method.stands else "overturning: no part of the joint is left under compression"
     numbers = {name: float(getattr(method, name)) for name in NUMBERS}
-    return Answer(method.case, GRAVITY, numbers, said)
+    return Answer(method.case, GRAVITY, method.time, numbers, said)
 
 
 def by_finite_elements(result: Results) -> Answer:
@@ -105,10 +111,13 @@ def by_finite_elements(result: Results) -> Answer:
 
     Stresses are node values at the joint's ends, where those of an elastic body depend on the mesh.
     """
-    case, last = result.case, result.last
+    case, last, partial = result.case, result.last, result.partial_load
     said = verdict.statement(result) if verdict.failed(result) else ""
     if not last:
-        return Answer(case, FINITE_ELEMENTS, dict.fromkeys(NUMBERS, math.nan), said)
+        nothing = dict.fromkeys(NUMBERS, math.nan)
+        return Answer(case, FINITE_ELEMENTS, math.nan, nothing, said, partial)
+    if partial and not said:  # interrupted
+        said = f"t = {last['time']:.6g} of {case.times[-1]:g} is what the run has come to"
     method, rows = gravity.at(case, last["time"], last["level"]), along(result.at())
     numbers = {name: last[name] for name in NUMBERS if name in last}
     for name in ("sigma_n", "sigma_n_eff"):
@@ -117,16 +126,18 @@ def by_finite_elements(result: Results) -> Answer:
     numbers["SSF"] = gravity.sliding_factor(case, last["N"], last["T"], uncracked)
     lifting = method.resultant.moment - last["M"]
     numbers["OSF"] = gravity.overturning_factor(method.loads, lifting)
-    return Answer(case, FINITE_ELEMENTS, {name: float(numbers[name]) for name in NUMBERS}, said)
+    found = {name: float(numbers[name]) for name in NUMBERS}
+    return Answer(case, FINITE_ELEMENTS, last["time"], found, said, partial)
 
 
 def hand_calculation(result: Results) -> GravityMethod:
-    """The gravity method at a case's last level: the one prescribed, or found where a displacement
-    is.
+    """The gravity method at a case's last level with all its loads; where a displacement is
+    prescribed, at the last state found.
     """
-    case = result.case
-    found = result.last.get("level") if case["drive"] != "level" else None
-    return gravity.at(case, case.times[-1], found)
+    case, last = result.case, result.last
+    if case["drive"] != "level" and last:
+        return gravity.at(case, last["time"], last["level"])
+    return gravity.at(case, case.times[-1])
 
 
 @dataclass(frozen=True)
@@ -140,18 +151,20 @@ class Check:
 
     @property
     def comparable(self) -> bool:
-        """Whether both are for the same level."""
-        pair = self.finite_elements.numbers["level"], self.gravity.numbers["level"]
-        return math.isclose(*pair, abs_tol=1e-9)
+        """Whether both are for the same load: at the same t, by which loads grow, and level."""
+        one, other = self.finite_elements, self.gravity
+        pairs = (one.time, other.time), (one.numbers["level"], other.numbers["level"])
+        return all(math.isclose(*pair, abs_tol=1e-9) for pair in pairs)
 
     @property
     def rows(self) -> list[dict[str, float | str]]:
-        """Rows of check.csv: the answers and, if they are for the same level, their difference."""
+        """Rows of check.csv: the answers and, if they are for the same load, their difference."""
         one, other = self.finite_elements, self.gravity
         if not self.comparable:
             return [one.row, other.row]
         less = {name: difference(one.numbers[name], other.numbers[name]) for name in NUMBERS}
-        return [one.row, other.row, Answer(one.case, DIFFERENCE, less).row | NO_VERDICT]
+        less = Answer(one.case, DIFFERENCE, one.time, less)
+        return [one.row, other.row, less.row | NO_VERDICT]
 
     @property
     def shown(self) -> list[dict[str, float | str]]:
@@ -181,7 +194,10 @@ class Check:
         if case["f_c"]:
             found.append("the finite elements' stress at the toe, a corner, depends on the mesh")
         if not self.comparable:
-            found.append("no differences: the finite elements did not reach the last level")
+            one, other = self.finite_elements, self.gravity
+            said = "no differences: the finite elements did not reach the last level with all loads"
+            got = "" if math.isnan(one.time) else f", t = {one.time:.5g} of {other.time:g}"
+            found.append(said + got)
         return found
 
 
@@ -215,7 +231,7 @@ def text_table(checks: list[Check]) -> str:
         show = [signed if is_less else number for is_less in less]
         columns += [[f(v * factor) for f, v in zip(show, line, strict=True)] for line in values]
     told = ([row[name] for row in rows] for name in ("position", "verdict"))
-    names, answers = [label(checks, row) for row in rows], [row["answer"] for row in rows]
+    names, answers = [label(checks, row) for row in rows], [named(row) for row in rows]
     table = tabulate(
         zip(names, answers, *columns, *told, strict=True),
         ["case", "", *heads, "N' in", ""],
@@ -235,6 +251,11 @@ def label(checks: list[Check], row: Mapping) -> str:
     """The name of a row's scene, with its uplift where the case has several."""
     scenes = {c.gravity.case["uplift"] for c in checks if c.gravity.case.name == row["case"]}
     return row["case"] + (f", {row['uplift']}" if len(scenes) > 1 else "")
+
+
+def named(row: Mapping) -> str:
+    """Which answer a row gives, and whether it is for a part of the loads only."""
+    return row["answer"] + (", partial load" if row.get("load") == "partial" else "")
 
 
 def number(value: float) -> str:
@@ -289,4 +310,6 @@ def picture_table(found: Check) -> list[tuple[str, ...]]:
             told = (number(v * factor) for v in line)
             head = title if size == "-" else f"{title} [{size}]"
             cells.append((head, *told, number(least.get(name, math.nan))))
+    if found.finite_elements.partial:
+        cells.insert(1, ("load", "partial", "full", ""))
     return [*cells, ("", *("fail" if answer.fails else "pass" for answer in pair), "")]
