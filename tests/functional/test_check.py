@@ -12,6 +12,7 @@ from damjoint.studies.check import (
     Check,
     by_finite_elements,
     by_gravity,
+    compared,
     hand_calculation,
     picture_table,
     text_table,
@@ -141,6 +142,30 @@ def test_a_partial_load_is_no_pass(solve):
     assert by_hand["verdict"] == "pass"
     assert ("load", "partial", "full", "") in picture_table(found)
     assert len(Check(by_finite_elements(result), by_gravity(hand_calculation(result))).rows) == 3
+
+
+def test_drains_that_leave_two_cracks(command, tmp_path):
+    """The longer one is a row of its own, judged, too."""
+    dam = "dam_base=30", "uplift=cracked", "drains=1", "drain_x=6", "law=bond", "sigma_max=0"
+    more = "adhesion=0", "mu=1.2", "n_joint=20", "required_SSF=1.2"
+    words = [word for setting in (*dam, *more) for word in ("--set", setting)]
+    levels = "--levels", "40,44", "--tail-levels", "3"
+    code, out, _ = command("check", "dam", *words, *levels)
+    table = rows(tmp_path / "out/check/check.csv")
+    longer = table["dam", "gravity method, longer crack"]
+    assert code == 1 and longer["verdict"] == "fail" and longer["why"] == "SSF 1.162 < 1.2"
+    assert table["dam", "gravity method"]["verdict"] == "pass"
+    assert float(table["dam", "finite elements"]["crack_length"]) > 6
+    assert "past the drains (6 m): crack 12.4 m" in out
+    code, *_ = command("report", tmp_path / "out/check/dam")
+    page = (tmp_path / "report.html").read_text()
+    assert "longer crack" in page and "past the drains (6 m)" in page
+
+
+def test_a_joint_that_tension_keeps_uncracked(solve):
+    (result,) = solve("dam", "45", law="rupture", sigma_max=2e6, G_f=100.0, n_joint=20.0)
+    (note,) = (note for note in compared(result).notes if "tension" in note)
+    assert "below the strength of 2000 kPa; without tension: crack 0." in note
 
 
 def test_bad_input_leaves_nothing(command, combinations, tmp_path):

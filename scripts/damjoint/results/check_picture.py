@@ -56,7 +56,8 @@ def draw_check(
 def draw_cells(axes: Axes, cells: list[tuple[str, ...]]) -> None:
     """A table in the upper part of axes."""
     height = min(0.045 * len(cells), 0.75)
-    widths = [0.4, *[0.6 / (len(cells[0]) - 1)] * (len(cells[0]) - 1)]
+    others = len(cells[0]) - 1
+    widths = [0.4 if others < 4 else 0.3, *[0.6 / others if others < 4 else 0.7 / others] * others]
     table = axes.table(
         cells,
         colWidths=widths,
@@ -155,6 +156,9 @@ def draw_joint(axes: Axes, result: Results, method: GravityMethod) -> None:
     if method.crack_length:
         line = under.place(ends * method.crack_length / under.length, -0.02)
         axes.plot(*line, "--", color=RED, label=f"crack, {HAND}", zorder=4)
+    for longer in method.further:
+        line = under.place(ends * longer.crack_length / under.length, -0.04)
+        axes.plot(*line, ":", color=RED, label=f"longer crack, {HAND}", zorder=4)
     rows = along(result.at()) if last else {}
     answer = COMPUTED + (", partial load" if result.partial_load else "")
     none = np.zeros(0)

@@ -82,7 +82,10 @@ LOADS = {
 #: Columns of check.csv: a row per scene and answer at the last level, and one of differences.
 CHECK = {
     "case": ("", "name of the case"),
-    "answer": ("", "finite elements, gravity method, or the difference of the two"),
+    "answer": (
+        "",
+        "finite elements, gravity method (also with a longer crack), difference of the first two",
+    ),
     "uplift": ("", "water in the joint"),
     "load": ("", "full; partial: the run stopped before its last t, where all loads are there"),
     "time": HISTORY["time"],

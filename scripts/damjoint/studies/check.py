@@ -5,7 +5,7 @@ factors that the case requires; load combinations are cases that include a commo
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -25,6 +25,7 @@ from ..run import run
 from ..scene.case import Case
 
 FINITE_ELEMENTS, GRAVITY = "finite elements", "gravity method"
+LONGER = "gravity method, longer crack"
 DIFFERENCE, REQUIRED = "difference", "required"
 
 #: The columns of check.csv that are numbers which the two answers share.
@@ -99,11 +100,11 @@ def least_sliding_factor(case: Case) -> float:
     return max(case["required_SSF"], 0.0 if case["law"] == "rupture" else 1.0)
 
 
-def by_gravity(method: GravityMethod) -> Answer:
+def by_gravity(method: GravityMethod, name: str = GRAVITY) -> Answer:
     """The gravity method's answer."""
     said = "" if method.stands else "overturning: no part of the joint is left under compression"
     numbers = {name: float(getattr(method, name)) for name in NUMBERS}
-    return Answer(method.case, GRAVITY, method.time, numbers, said)
+    return Answer(method.case, name, method.time, numbers, said)
 
 
 def by_finite_elements(result: Results) -> Answer:
@@ -140,14 +141,35 @@ def hand_calculation(result: Results) -> GravityMethod:
     return gravity.at(case, case.times[-1])
 
 
+def compared(result: Results) -> Check:
+    """The answers for the scene of a run."""
+    method = hand_calculation(result)
+    return Check(
+        by_finite_elements(result),
+        by_gravity(method),
+        result.info.get("error_estimate", {}).get("statement", ""),
+        [by_gravity(one, LONGER) for one in method.further],
+        method.notes,
+    )
+
+
 @dataclass(frozen=True)
 class Check:
-    """Both answers for a scene."""
+    """The answers for a scene."""
 
     finite_elements: Answer
     gravity: Answer
     #: the estimated errors of a mesh that was chosen for an accuracy, in words
     accuracy: str = ""
+    #: the gravity method's with longer cracks that are in equilibrium, too
+    longer: Sequence[Answer] = ()
+    #: what to know of the gravity method's answers
+    by_hand: Sequence[str] = ()
+
+    @property
+    def answers(self) -> list[Answer]:
+        """All of them; each is judged."""
+        return [self.finite_elements, self.gravity, *self.longer]
 
     @property
     def comparable(self) -> bool:
@@ -160,11 +182,12 @@ class Check:
     def rows(self) -> list[dict[str, float | str]]:
         """Rows of check.csv: the answers and, if they are for the same load, their difference."""
         one, other = self.finite_elements, self.gravity
+        rows = [answer.row for answer in self.answers]
         if not self.comparable:
-            return [one.row, other.row]
+            return rows
         less = {name: difference(one.numbers[name], other.numbers[name]) for name in NUMBERS}
         less = Answer(one.case, DIFFERENCE, one.time, less)
-        return [one.row, other.row, less.row | NO_VERDICT]
+        return [*rows, less.row | NO_VERDICT]
 
     @property
     def shown(self) -> list[dict[str, float | str]]:
@@ -179,8 +202,8 @@ class Check:
     @property
     def why(self) -> str:
         """What fails, in words."""
-        pair = self.finite_elements, self.gravity
-        return "; ".join(f"{one.by}: {'; '.join(one.fails)}" for one in pair if one.fails)
+        failing = (one for one in self.answers if one.fails)
+        return "; ".join(f"{one.by}: {'; '.join(one.fails)}" for one in failing)
 
     @property
     def notes(self) -> list[str]:
@@ -198,7 +221,7 @@ class Check:
             said = "no differences: the finite elements did not reach the last level with all loads"
             got = "" if math.isnan(one.time) else f", t = {one.time:.5g} of {other.time:g}"
             found.append(said + got)
-        return found
+        return [*found, *self.by_hand]
 
 
 #: A difference is not judged.
@@ -288,8 +311,7 @@ def check(cases: list[Case], out: Path) -> list[Check]:
     for case in cases:
         for result in run(case, out / case.name):
             method = hand_calculation(result)
-            estimate = result.info.get("error_estimate", {}).get("statement", "")
-            checks.append(Check(by_finite_elements(result), by_gravity(method), estimate))
+            checks.append(compared(result))
             folder = folders.scene_folder(case, result.case, out / case.name)
             write_csv(folder / "gravity.csv", method.table())
             draw_check(result, method, picture_table(checks[-1]), checks[-1].why, folder)
@@ -300,16 +322,16 @@ def check(cases: list[Case], out: Path) -> list[Check]:
 
 def picture_table(found: Check) -> list[tuple[str, ...]]:
     """The table beside the picture: a row per quantity."""
-    pair = found.finite_elements, found.gravity
-    cells = [("", "FE", "gravity", "required")]
+    longer = ["longer"] * len(found.longer)
+    cells = [("", "FE", "gravity", *longer, "required")]
     least = required(found.gravity.case)
     for units, names in SHOWN:
-        values = [[answer.numbers[name] for answer in pair] for name in names]
+        values = [[answer.numbers[name] for answer in found.answers] for name in names]
         size, factor = unit([np.array(values)[np.isfinite(values)]], units)
         for (name, title), line in zip(names.items(), values, strict=True):
             told = (number(v * factor) for v in line)
             head = title if size == "-" else f"{title} [{size}]"
             cells.append((head, *told, number(least.get(name, math.nan))))
     if found.finite_elements.partial:
-        cells.insert(1, ("load", "partial", "full", ""))
-    return [*cells, ("", *("fail" if answer.fails else "pass" for answer in pair), "")]
+        cells.insert(1, ("load", "partial", "full", *("full" for _ in longer), ""))
+    return [*cells, ("", *("fail" if answer.fails else "pass" for answer in found.answers), "")]

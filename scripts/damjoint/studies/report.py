@@ -24,7 +24,7 @@ from ..results.verdict import failed, statement, stiffness_ratio
 from ..scene.case import Case
 from ..scene.parameters import constants, declared, parse
 from ..storage import whole
-from .check import Check, by_finite_elements, by_gravity, hand_calculation, picture_table
+from .check import Check, compared, hand_calculation, picture_table
 
 #: Of the parts of a picture that are dots, not lines.
 DPI = 160
@@ -71,9 +71,9 @@ def part_of(folder: Path, solution: Solution) -> dict:
     result = solution.result
     case, told = result.case, result.info
     # the gravity method knows sections by parameters only
-    found = None if case.geometry else check_of(result)
+    found = None if case.geometry else compared(result)
     fails = [statement(result)] if found is None and failed(result) else []
-    for answer in (found.finite_elements, found.gravity) if found else ():
+    for answer in found.answers if found else ():
         fails += [f"{answer.by}: {why}" for why in answer.fails]
     if told["state"] in ("failed", "interrupted"):
         fails.insert(0, told["statement"])
@@ -156,11 +156,6 @@ def loads_table(result: Results) -> dict:
     found = table([(h, np.array(v), u) for (h, u), v in zip(heads, columns, strict=True)])
     named = [(name, *row) for name, row in zip(names, found["rows"], strict=True)]
     return {"heads": ["load", *found["heads"]], "rows": named}
-
-
-def check_of(result: Results) -> Check:
-    """Both answers at the last level."""
-    return Check(by_finite_elements(result), by_gravity(hand_calculation(result)))
 
 
 def check_table(found: Check) -> dict:
