@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 from closed_forms import BASE, CENTROID, HEIGHT, WATER, WEIGHT, slide_level
+from damjoint.results import gravity
 from damjoint.studies import branch
 from damjoint.studies.critical import Search, critical
 from scipy.optimize import brentq
@@ -96,6 +97,30 @@ def test_any_parameter_whatever_its_direction():
     """T = mu N at 45 m: no equilibrium with less."""
     _, answer = found("dam", "mu", DAM | PLAIN, tail_levels="3")
     assert answer.value == pytest.approx(9888 / 12683, rel=2e-4)
+
+
+def test_the_gravity_method_without_tension(command, tmp_path):
+    """A strength that the heel's linear stress does not reach, and its elastic stress does."""
+    strong = "law=bond", "mu=5", "dam_base=30", "sigma_max=2e6", "G_f=100", "adhesion=5e6"
+    settings = *strong, "G_t=1e5", "n_joint=60"
+    words = [word for setting in settings for word in ("--set", setting)]
+    _, out, _ = command("critical", "dam", *words, "--levels", "40,48")
+    told = json.loads((tmp_path / "out/dam_critical/run.json").read_text())["critical"]
+    free = told["gravity_method_with"]["without tension"]
+    assert told["value"] == pytest.approx(free, rel=0.02) and told["gravity_method"] > 70
+    assert f"gravity method: {told['gravity_method']:.6g} m; without tension: {free:.6g} m" in out
+    assert "(n_joint = 60), " in out and "kPa, exceeds the strength of 2000 kPa" in out
+
+
+def test_the_gravity_method_with_drains_that_are_passed():
+    """The short crack holds until it comes to the drains; mu N = T with the one past them."""
+    drains = {"dam_base": 30.0, "uplift": "cracked", "drains": 1.0, "drain_x": 6.0, "mu": 1.0}
+    search = Search("dam", "level", DAM | PLAIN | drains, "40,44", "3")
+    first, longer = (search.by_gravity(44.4, True, longest) for longest in (False, True))
+    method = gravity.at(search.own, 2.0, first - 1e-5)
+    assert method.SSF > 1 and method.crack_length == pytest.approx(6, abs=1e-3)
+    (other,) = gravity.at(search.own, 2.0, longer).further
+    assert other.SSF == pytest.approx(1, abs=1e-4) and longer < first - 0.5
 
 
 @pytest.mark.heavy

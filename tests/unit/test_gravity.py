@@ -334,7 +334,12 @@ def test_two_cracks_in_equilibrium():
     assert (longer.crack_length, longer.SSF) == pytest.approx((12.401, 1.162), abs=1e-3)
     assert longer.tip_stress == pytest.approx(0, abs=1) and not longer.further
     (note,) = found.notes
-    assert "2.088 m" in note and "past the drains (6 m): crack 12.4 m, SSF 1.162" in note
+    assert "2.088 m; once past the drains (6 m): crack 12.4 m, SSF 1.162" in note
+    better = settings | {"drain_x": 4.0, "drain_effectiveness": 1.0}
+    stopped = gravity.at(load("dam", better, "46.8", "3"), 1)
+    (through,) = stopped.further
+    assert stopped.stands and stopped.crack_length < 4
+    assert not through.stands and through.crack_length == 30
     without = gravity.at(load("dam", settings | {"mu": 1.2, "drains": 0.0}, "44", "3"), 1)
     assert longer.crack_length == pytest.approx(without.crack_length, rel=1e-9)
 

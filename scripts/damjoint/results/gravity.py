@@ -307,7 +307,8 @@ class GravityMethod:
     #: from the heel [m]; the joint's length if no shorter one leaves an equilibrium
     crack_length: float
     uplift: Uplift
-    #: equilibria with a longer crack, at which it comes to rest once it has passed this one
+    #: where a crack that has passed this one's end, or the drains, comes to rest: equilibria with a
+    #: longer one, or the whole joint
     further: tuple[GravityMethod, ...] = ()
 
     @property
@@ -407,10 +408,10 @@ class GravityMethod:
         case, found = self.case, []
         for one in self.further:
             passed = self.crack_length <= case["drain_x"] < one.crack_length
-            behind = f" past the drains ({case['drain_x']:g} m)" if passed else ""
+            which = f"past the drains ({case['drain_x']:g} m)" if passed else "beyond it"
             found.append(
-                f"gravity method: the shortest crack in equilibrium is {self.crack_length:.4g} m; "
-                f"so is a longer one{behind}: {one.in_words}"
+                "gravity method: the shortest crack in equilibrium is "
+                f"{self.crack_length:.4g} m; once {which}: {one.in_words}"
             )
         if not self.crack_length and self.tip_stress > 0:
             free = at(case, self.time, self.level, tension=False)
@@ -434,7 +435,7 @@ class GravityMethod:
 
 def at(case: Case, time: float, level: float | None = None, tension: bool = True) -> GravityMethod:
     """The gravity method at a time of a case: uncracked, or with the shortest crack in equilibrium,
-    those with a longer one in `further`.
+    what a longer one leads to in `further`.
 
     level: of the reservoir [m] where it is not the one prescribed for that time; tension: whether
     the joint has its tensile strength.
@@ -458,6 +459,9 @@ def at(case: Case, time: float, level: float | None = None, tension: bool = True
     found = [state(crack) for crack in ends_of_growth(excess, pieces(case, body, level, tail))]
     standing = [one for one in found if one.stands]
     first, *further = standing or found[:1] or [state(body.length)]
+    behind = float(np.nextafter(case["drain_x"], body.length))
+    if first.stands and first.uplift.drains and not further and excess(behind) > 0:
+        further = [state(body.length)]  # past the drains nothing stops it
     return replace(first, further=tuple(further))
 
 

@@ -206,7 +206,8 @@ def critical_of(found: dict | None) -> list[tuple[str, str]]:
     unit, by_hand = found["unit"], found["gravity_method"]
     said = [f"{found['value']:.6g} {unit}".strip(), found["mode"]]
     said += [f"not confirmed: {found['doubt']}"] if found["doubt"] else []
-    said += [f"gravity method {by_hand:.6g} {unit}".strip()] if by_hand is not None else []
+    values = {"gravity method": by_hand} | found.get("gravity_method_with", {})
+    said += [f"{n} {v:.6g} {unit}".strip() for n, v in values.items() if v is not None]
     return [(f"critical {found['of']}, and the last state before it", "; ".join(said))]
 
 
