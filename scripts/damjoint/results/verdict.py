@@ -238,6 +238,13 @@ def seen_in(results: Results, last: dict[str, float]) -> list[str]:
             f"the crack ({crack:.3g} m) ends somewhere in an element of {element:.2g} m; "
             "--accuracy 3% finds the mesh, and says how wrong it is"
         )
+    if has_drains(case) and len(results.joint["time"]):  # a section's mesh has a node there
+        away = np.abs(results.at()["s"] - case["drain_x"]).min()
+        if away > 1e-5 * case.joint_along:
+            found.append(
+                f"the mesh has no node at the drains (drain_x = {case['drain_x']:g} m): the "
+                f"nearest is {away:.2g} m away"
+            )
     if has_drains(case) and crack > case["drain_x"]:
         kept = "" if case["uplift"] == "cracked" else "; their effect is kept all the same"
         found.append(
