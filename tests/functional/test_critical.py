@@ -3,11 +3,14 @@ one."""
 
 import csv
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from closed_forms import BASE, CENTROID, HEIGHT, WATER, WEIGHT, slide_level
 from damjoint.results import gravity
+from damjoint.results.verdict import highest_by_statics
+from damjoint.scene.case import load
 from damjoint.studies import branch
 from damjoint.studies.critical import Search, critical
 from scipy.optimize import brentq
@@ -152,6 +155,44 @@ def test_what_no_push_confirms_is_not_confirmed(monkeypatch, command):
     monkeypatch.setattr(branch.Branch, "pushes", lambda self: ())
     code, out, _ = command("critical", "c", "--set", "pena_tang=0", "--levels", "6,8")
     assert code == 1 and "not confirmed: no further equilibrium is found" in out
+
+
+@pytest.mark.parametrize(
+    "name, settings, limit, mode",
+    [
+        ("i", {"uplift": "imposed", "sigma_max": 0.0, "crest_water": 0.0}, 10.0171, "overturning"),
+        ("c", {"pena_tang": 0.0}, 6.63399, "sliding"),
+    ],
+)
+def test_what_statics_allows(name, settings, limit, mode):
+    """The level at which the resultant leaves a joint without tension; T = mu N + c L."""
+    case = load(name, settings, "6")
+    method = gravity.at(case, 1.0)
+    last = {"time": 1.0, "level": 6.0, "crack_length": method.crack_length, "M": method.M}
+    level, found, _ = highest_by_statics(case, last)
+    assert level == pytest.approx(limit, abs=1e-3) and found == mode
+    strong = replace(case, values=case.values | {"sigma_max": 1e6, "mu": 10.0, "adhesion": 1e6})
+    assert highest_by_statics(strong, last)[0] > 1.2 * limit
+
+
+def test_statics_confirms_a_level_that_is_near(monkeypatch):
+    """Where the search is stuck, and only there; the value is that of an equilibrium."""
+    monkeypatch.setattr(branch.Branch, "pushes", lambda self: ())
+    settings = {"uplift": "imposed", "sigma_max": 0.0, "crest_water": 0.0, "n_joint": 20.0}
+    _, answer = found("i", settings=settings, levels="9,9.8,9.95,10.1")
+    assert answer.confirmed and answer.mode == "overturning" and 9.9 < answer.value < 10.0171
+    assert "by statics there is no equilibrium above 10.01" in answer.why
+    _, answer = found("i", settings=settings, levels="7,12")
+    assert answer.value < 9.8 and not answer.confirmed
+
+
+@pytest.mark.heavy
+def test_a_rigid_block_that_opens_to_its_toe():
+    """Friction of 3 holds any shear; full head in the crack."""
+    settings = PLAIN | {"mu": 3.0, "uplift": "cracked", "n_joint": 40.0}
+    _, answer = found("dam", settings=settings)
+    assert answer.confirmed and answer.mode == "overturning"
+    assert answer.value == pytest.approx(answer.gravity, rel=0.01)
 
 
 def test_no_limit_is_said(command):

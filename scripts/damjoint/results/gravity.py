@@ -433,6 +433,13 @@ class GravityMethod:
         return dict(zip(LOADS, map(list, zip(*cells, strict=True)), strict=True))
 
 
+def with_crack(case: Case, time: float, level: float, crack: float) -> GravityMethod:
+    """The rigid block at a time of a case, at a level [m] and with a crack [m] that are given."""
+    body, tail = Body(case), case.tail_at(time)
+    loads, uplift = loads_on(case, body, time, level, tail), Uplift(case, body, level, tail, crack)
+    return GravityMethod(case, body, time, level, tail, loads, crack, uplift)
+
+
 def at(case: Case, time: float, level: float | None = None, tension: bool = True) -> GravityMethod:
     """The gravity method at a time of a case: uncracked, or with the shortest crack in equilibrium,
     what a longer one leads to in `further`.

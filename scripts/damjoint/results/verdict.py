@@ -124,6 +124,44 @@ def bound(case: Case, last: dict[str, float]) -> str:
     return ""
 
 
+def highest_by_statics(case: Case, last: dict[str, float]) -> tuple[float, str, str]:
+    """The level [m] above which a state has no equilibrium any more, how it fails and why, in
+    words; infinite and empty where statics does not tell.
+
+    Whatever the distribution of stress: with the tensile strength f, over the length l that is not
+    cracked, M >= -f l^2/2, and with friction T <= mu (N + f l) + c l; the crack does not close as
+    the level rises. The law friction keeps f = c/mu, of which its N has taken account, and l is the
+    whole joint.
+    """
+    from scipy.optimize import brentq  # half of a run's start
+
+    law, time = case["law"], min(last["time"], case.times[-1])
+    if case.geometry or case["uplift"] == "flow":
+        return np.inf, "", ""
+    strength, _ = gravity.tensile_strength(case)
+    crack = 0.0 if law == "friction" else last["crack_length"]
+    block = lambda level: gravity.with_crack(case, time, level, crack)
+    length = block(last["level"]).uncracked
+    tension = strength * length if law == "bond" else 0.0
+
+    def moment(level: float) -> float:
+        return block(level).M + strength * length**2 / 2
+
+    def shear(level: float) -> float:
+        found = block(level)
+        return case["mu"] * max(found.N + tension, 0.0) + case["adhesion"] * length - found.T
+
+    reasons = [(moment, "overturning", "the resultant leaves the joint")]
+    if law == "bond" or (law == "friction" and not case["pena_tang"]):
+        reasons.append((shear, "sliding", "the shear passes what the joint holds"))
+    found = [(np.inf, "", "")]
+    if np.isclose(block(last["level"]).M, last["M"], 0.05):  # else the crack is another one
+        for spare, mode, words in reasons:
+            if spare(last["level"]) > 0 > spare(case.highest_level):
+                found.append((brentq(spare, last["level"], case.highest_level), mode, words))
+    return min(found)
+
+
 def mean_slip(results: Results) -> float:
     """Mean slip along the joint at the last saved state [m]."""
     if not len(results.joint["time"]):
@@ -229,6 +267,28 @@ def hints(results: Results) -> list[str]:
     return found
 
 
+def pulled_when_open(case: Case, last: dict[str, float]) -> str:
+    """In words, what the law friction's tension c/mu of open points holds; empty if it holds
+    nothing.
+    """
+    crack = last["crack_length"]
+    if case["law"] != "friction" or not case["adhesion"] * crack:
+        return ""
+    tension, share = case["adhesion"] / case["mu"], ""
+    if not case.geometry:
+        time = min(last["time"], case.times[-1])
+        block = gravity.with_crack(case, time, last["level"], 0.0)
+        parts = [*(m for load in block.loads for m in load[3:]), last["M"] - block.resultant.moment]
+        turning = -sum(m for m in parts if m < 0)
+        pull = tension * crack * (block.body.length - crack / 2)
+        share = f" ({pull / turning:.0%} of the overturning moment)" if turning else ""
+    return (
+        f"the joint is open over {crack:.3g} m and pulls there with adhesion/mu = "
+        f"{tension / 1e3:.4g} kPa{share} at any opening, as the friction law is published: "
+        "law = bond lets go"
+    )
+
+
 def seen_in(results: Results, last: dict[str, float]) -> list[str]:
     """What the last state shows: a crack counted in elements, drains in it, tension at the heel."""
     case, found, crack = results.case, [], last["crack_length"]
@@ -250,13 +310,8 @@ def seen_in(results: Results, last: dict[str, float]) -> list[str]:
         found.append(
             f"the crack ({crack:.3g} m) has passed the drains ({case['drain_x']:g} m){kept}"
         )
-    if case["law"] == "friction" and case["adhesion"] > 0 and crack > 0:
-        tension = case["adhesion"] / case["mu"]
-        found.append(
-            f"the joint is open over {crack:.3g} m and pulls there with adhesion/mu = "
-            f"{tension / 1e3:.4g} kPa at any opening, as the friction law is published: "
-            "law = bond lets go"
-        )
+    if pulled := pulled_when_open(case, last):
+        found.append(pulled)
     elif len(results.joint["time"]):
         rows = results.at()
         heel = rows["sigma_n_eff"][rows["s"] <= rows["s"].min()].mean()

@@ -25,7 +25,7 @@ from ..engines.condensed.solve import about
 from ..results import folder as folders
 from ..results import gravity
 from ..results.tables import CRITICAL, Results, write_csv
-from ..results.verdict import bound, statement
+from ..results.verdict import bound, highest_by_statics, pulled_when_open, statement
 from ..run import save
 from ..scene.case import Case, load
 from ..scene.parameters import parameter
@@ -45,6 +45,9 @@ DRIVE = ("drive", "drive_begin", "drive_end", "drive_by")
 
 #: What the gravity method is asked for besides: tension, longest crack.
 ASSUMED = {"with the crack past the drains": (True, True), "without tension": (False, True)}
+
+#: How much higher, relatively, statics may allow a level that it confirms.
+NEAR = 0.02
 
 #: The smallest value of a parameter that has to be positive.
 TINY = 1e-30
@@ -105,6 +108,8 @@ class Answer:
             found.append("; ".join(f"{n}: {v:.6g}{unit}" for n, v in values.items()))
         if self.note:
             found.append(self.note)
+        if self.point:
+            found += filter(None, [pulled_when_open(search.own, self.point.last)])
         return found
 
 
@@ -301,7 +306,8 @@ class Search:
 
     def answer(self, value: float | None, failing: Branch, point: Point | None) -> Answer:
         """The answer, with what the failing branch shows."""
-        why, doubt = "", "no further equilibrium is found, but no mechanism either"
+        mode, why = failing.mode, ""
+        doubt = "no further equilibrium is found, but no mechanism either"
         if not failing.points:
             doubt = "no equilibrium is found even at the first step"
         elif failing.crushed_at_top:
@@ -317,7 +323,9 @@ class Search:
             )
             if reached := bound(failing.case, top.last):
                 why += f"; there {reached}"
-        found = Answer(value, failing.mode, why, "" if why else doubt, point)
+        else:
+            mode, why = self.by_statics(failing)
+        found = Answer(value, mode, why, "" if why else doubt, point)
         if value is None or (beside := self.by_gravity(value)) is None:
             return found
         others: dict[str, float] = {}
@@ -327,6 +335,20 @@ class Search:
             if other is not None and not np.isclose(other, known, PRECISION, 0).any():
                 others[name] = other
         return replace(found, gravity=beside, gravity_with=others, note=self.tension(value))
+
+    def by_statics(self, failing: Branch) -> tuple[str, str]:
+        """How a branch fails that is found no further, and why that is so: its resultants leave no
+        equilibrium above a level that is near (below the target, if it is no level that is sought).
+        Why is empty if they do.
+        """
+        top = failing.points[failing.top]
+        level, mode, words = highest_by_statics(failing.case, top.last)
+        if not level < (top.level * (1 + NEAR) if self.of == "level" else failing.target):
+            return failing.mode, ""
+        return mode, (
+            f"by statics there is no equilibrium above {level:.6g} m, where {words}; the highest "
+            f"one found is at {top.level:.6g} m"
+        )
 
     # -- beside it
     # ----------------------------------------------------------------------------------------------
