@@ -186,6 +186,15 @@ def test_statics_confirms_a_level_that_is_near(monkeypatch):
     assert answer.value < 9.8 and not answer.confirmed
 
 
+def test_a_tension_that_lasts_is_said():
+    """c/mu of the law friction holds the open joint down; the value without it stands beside."""
+    settings = {"law": "friction", "adhesion": 1e6, "n_joint": 20.0}
+    search, answer = found("dam", settings=settings)
+    lines = "\n".join(answer.lines(search))
+    assert "kPa (" in lines and "% of the overturning moment) at any opening" in lines
+    assert answer.gravity_with["without tension"] < answer.value
+
+
 @pytest.mark.heavy
 def test_a_rigid_block_that_opens_to_its_toe():
     """Friction of 3 holds any shear; full head in the crack."""
