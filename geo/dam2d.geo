@@ -9,8 +9,17 @@ regular = !StrCmp(mesh_pattern, "regular");
 
 Point(1) = {heel_x, heel_y, 0, h_joint};
 Point(2) = {toe_x, toe_y, 0, h_joint};
-Line(1) = {1, 2};  // joint
-Transfinite Curve {1} = n_joint + 1;
+n_first = n_joint;  // elements along the joint's first curve, and along a second one
+n_rest = 0;
+If(drained)  // a node at the drains: two curves
+  n_first = Round(n_joint * drain_x / joint_length);
+  n_first = (n_first < n_joint) ? n_first : n_joint - 1;
+  n_first = (n_first < 1) ? 1 : n_first;
+  n_rest = (n_first < n_joint) ? n_joint - n_first : 1;
+  Point(100) = {drain_line_x, drain_line_y, 0, h_joint};
+EndIf
+Line(1) = {1, drained ? 100 : 2};  // joint
+Transfinite Curve {1} = n_first + 1;
 
 side_names() = Str["upstream face", "downstream face", "crest surface", "reservoir floor",
                    "tailwater bed"];
@@ -81,9 +90,18 @@ For i In {0 : #seg_side() - 1}
   piece_start() += #pieces();
 EndFor
 
+joint_line() = {1};
+joint_back() = {-1};
+If(drained)
+  Line(100) = {100, 2};
+  Transfinite Curve {100} = n_rest + 1;
+  joint_line() = {1, 100};
+  joint_back() = {-100, -1};
+EndIf
+
 // The upper body; the lower one: under a lift joint the dam's concrete, with a base glued to the
 // foundation; the foundation
-upper() = {1};
+upper() = {joint_line()};
 under() = {};
 surface_left() = {};  // of the foundation, from the heel outwards
 surface_right() = {};  // and towards the toe
@@ -104,7 +122,7 @@ Curve Loop(1) = {upper()};
 Plane Surface(1) = {1};
 dam() = {1};
 lower() = {};
-base() = {1};
+base_back() = {joint_back()};
 base_points() = {1, 2};
 If(lift)
   For k In {0 : #known_point() - 1}
@@ -114,8 +132,9 @@ If(lift)
       base_points(1) = known_point(k);
     EndIf
   EndFor
-  base() = {newl};
-  Line(base(0)) = {base_points(0), base_points(1)};
+  base = newl;
+  Line(base) = {base_points(0), base_points(1)};
+  base_back() = {-base};
 EndIf
 
 If(!regular)
@@ -137,11 +156,11 @@ If(!regular)
   Line(side + 1) = {left, right};
   Line(side + 2) = {right, corner_right};
   fixed() = {side, side + 1, side + 2};
-  Curve Loop(2) = {surface_left(), fixed(), surface_right(), -base(0)};
+  Curve Loop(2) = {surface_left(), fixed(), surface_right(), base_back()};
   Plane Surface(2) = {2};
   foundation() = {2};
   If(lift)
-    Curve Loop(3) = {base(0), under(), -1};
+    Curve Loop(3) = {base, under(), joint_back()};
     Plane Surface(3) = {3};
     lower() = {3};
   EndIf
@@ -177,13 +196,13 @@ Else
   Line(17) = {2, 10};
   Line(18) = {11, 12};
   Line(19) = {13, 14};
-  Transfinite Curve {3, 10} = n_joint + 1;
+  Transfinite Curve {3, 10} = n_first + n_rest + 1;
   Transfinite Curve {2, -4} = n_dam + 1 Using Progression 1.25 ^ (9 / n_dam);
   Transfinite Curve {16, 17, 18, 19} = n_depth + 1 Using Progression 1.5 ^ (7 / n_depth);
   Transfinite Curve {5, -9, -15, 11} = n_side + 1 Using Progression 1.5 ^ (5 / n_side);
   Transfinite Curve {6, 8, 12, 14} = Ceil(n_joint / 50) + 1;
   Transfinite Curve {7, 13} = Ceil(2 * n_joint / 50) + 1;
-  Curve Loop(2) = {16, 10, -17, -1};
+  Curve Loop(2) = {16, 10, -17, joint_back()};
   Curve Loop(3) = {5, 18, 9, -16};
   Curve Loop(4) = {17, 11, -19, 15};
   Curve Loop(5) = {6, 7, 8, -18};
@@ -193,7 +212,13 @@ Else
   Plane Surface(4) = {4};
   Plane Surface(5) = {5};
   Plane Surface(6) = {6};
-  Transfinite Surface {1:4};
+  If(drained)  // five curves: by their corners
+    Transfinite Surface {1} = {1, 2, known_point(2), known_point(3)};
+    Transfinite Surface {2} = {1, 9, 10, 2};
+    Transfinite Surface {3:4};
+  Else
+    Transfinite Surface {1:4};
+  EndIf
   Recombine Surface {1:4};
   foundation() = {2:6};
   fixed() = {7, 8, 9, 10, 11, 12, 13};
@@ -205,7 +230,7 @@ If(dim == 2)
   Physical Surface("dam", DAM) = {dam()};
   Physical Surface("foundation", FOUNDATION) = {foundation()};
   Physical Surface("lower dam", LOWER) = {lower()};
-  Physical Curve("joint", JOINT) = {1};
+  Physical Curve("joint", JOINT) = {joint_line()};
   Physical Curve("fixed", FIXED) = {fixed()};
   Physical Point("heel", HEEL) = {1};
   Physical Point("toe", TOE) = {2};

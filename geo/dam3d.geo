@@ -50,7 +50,23 @@ toe() = Curve In BoundingBox {toe_x - eps, toe_y - eps, -eps,
 If(!StrCmp(mesh_pattern, "free"))
   joint_skin() = Boundary { Surface{joint()}; };
   joint_skin() -= {heel(), toe()};
-  Transfinite Curve {joint_skin()} = n_joint + 1;
+  If(drained)
+    x0 = heel_x;
+    y0 = heel_y;
+    x1 = drain_line_x;
+    y1 = drain_line_y;
+    Call Around;
+    drain_line() = Curve In BoundingBox {x1 - eps, y1 - eps, -eps, x1 + eps, y1 + eps,
+                                         thickness + eps};
+    first() = Boundary { Surface{around()}; };
+    first() -= {heel(), drain_line()};
+    joint_skin() -= {first(), drain_line()};
+    Transfinite Curve {first()} = n_first + 1;
+    Transfinite Curve {joint_skin()} = n_rest + 1;
+    Transfinite Curve {drain_line()} = n_layers + 1;
+  Else
+    Transfinite Curve {joint_skin()} = n_joint + 1;
+  EndIf
   Transfinite Curve {heel(), toe()} = n_layers + 1;
   Transfinite Surface {joint()};
 EndIf
@@ -95,6 +111,7 @@ For i In {0 : #seg_side() - 1}
   x1 = seg_x1(i);
   y1 = seg_y1(i);
   Call Around;
+  around() -= joint();  // half of which, behind the drains, may lie in the box of a face
   name = StrCat(Str(side_names(seg_side(i))), Sprintf(" %g", i));
   Physical Surface(Str(name), SEGMENT + i) = {around()};
 EndFor

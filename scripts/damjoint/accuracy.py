@@ -91,7 +91,8 @@ class Estimate:
         words, unit = QUANTITIES[self.name]
         counted = self.name in LENGTHS and self.error
         length = f" ({self.error:.2g} {unit}, counted in elements)" if counted else ""
-        return f"{words} {percent(self.relative)}{length}"
+        of = " of the joint's largest jump" if self.name == "max_opening" else ""
+        return f"{words} {percent(self.relative)}{of}{length}"
 
 
 def percent(part: float) -> str:

@@ -88,7 +88,7 @@ def results_page() -> str:
         "the face, `heel_opening` [m], `crest_ux` [m] of each converged step.",
         "## check.csv",
         "Of `damjoint check`: for each scene a row by the finite elements, one by the gravity "
-        "method, and, where both are for the same level, one with the first less the second.",
+        "method, and, where both are for the same load, one with the first less the second.",
         check,
         "## gravity.csv",
         "Of `damjoint check`: the gravity method's resultants, a row per load, the uplift and the "

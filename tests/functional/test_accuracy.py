@@ -72,6 +72,14 @@ def test_what_is_said_is_true(scene):
             assert told["quantities"][name]["relative"] <= 0.03
 
 
+def test_a_summary_says_what_an_error_is_relative_to():
+    """An opening's error stands beside the joint's largest jump, which may be all slip."""
+    opening = accuracy.Estimate("max_opening", 1e-6, 7.2e-6, 1e-3)
+    crest = accuracy.Estimate("crest_ux", 1e-2, 1e-4, 1e-2)
+    said = accuracy.summary(0.01, [20, 40], 3, [opening, crest], "")
+    assert said.endswith(": largest opening 0.72 % of the joint's largest jump, crest 1 %")
+
+
 def test_run_writes_and_says_it(command, tmp_path):
     """One line; the folder is the last mesh's, and a run on that mesh gives the same."""
     asked = "run", "dam", "--levels", "40", *words(DAM), *PLAIN

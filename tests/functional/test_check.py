@@ -14,6 +14,7 @@ from damjoint.studies.check import (
     Check,
     by_finite_elements,
     by_gravity,
+    compared,
     hand_calculation,
     picture_table,
     text_table,
@@ -135,6 +136,61 @@ def test_a_dam_that_slides(command, combinations, tmp_path):
     assert by_hand["why"] == f"SSF {float(by_hand['SSF']):.4g} < 1"
     assert float(computed["SSF"]) == pytest.approx(1, abs=0.01)
     assert "did not reach the last level" in out
+
+
+def test_an_earthquake_that_is_not_reached(command, tmp_path):
+    """The level is the same, the load is not: T grows with the earthquake."""
+    weak = "law=bond", "sigma_max=0", "adhesion=0", "mu=0.8", "k_h=0.3", "n_joint=12"
+    short = "smallest_step=0.02", "burst_iterations=30"
+    words = [word for setting in (*weak, *short) for word in ("--set", setting)]
+    code, out, _ = command("check", "dam", *words, "--levels", "40,40")
+    assert code == 1
+    table = rows(tmp_path / "out/check/check.csv")
+    assert set(table) == {("dam", "finite elements"), ("dam", "gravity method")}
+    computed, by_hand = table.values()
+    assert computed["level"] == by_hand["level"] == "40"
+    assert (computed["load"], by_hand["load"]) == ("partial", "full")
+    assert 1 < float(computed["time"]) < 2 == float(by_hand["time"])
+    assert float(by_hand["T"]) - float(computed["T"]) > 1e6
+    assert computed["verdict"] == "fail" and "finite elements, partial load" in out
+    assert f"with all loads, t = {float(computed['time']):.5g} of 2" in out
+
+
+def test_a_partial_load_is_no_pass(solve):
+    """Interrupted, nothing has failed; the picture's table and the differences say so, too."""
+    (result,) = solve("d", "7", dim=2.0, n_joint=20.0)
+    longer = replace(result, case=replace(result.case, levels=(7.0, 7.0), tail_levels=(0.0,) * 2))
+    longer = replace(longer, case=replace(longer.case, times=(1.0, 2.0)))
+    found = Check(by_finite_elements(longer), by_gravity(hand_calculation(longer)))
+    computed, by_hand = found.rows
+    assert computed["verdict"] == "fail" and computed["why"].startswith("t = 1 of 2")
+    assert by_hand["verdict"] == "not checked"
+    assert ("load", "partial", "full", "") in picture_table(found)
+    assert len(Check(by_finite_elements(result), by_gravity(hand_calculation(result))).rows) == 3
+
+
+def test_drains_that_leave_two_cracks(command, tmp_path):
+    """The longer one is a row of its own, judged, too."""
+    dam = "dam_base=30", "uplift=cracked", "drains=1", "drain_x=6", "law=bond", "sigma_max=0"
+    more = "adhesion=0", "mu=1.2", "n_joint=20", "required_SSF=1.2"
+    words = [word for setting in (*dam, *more) for word in ("--set", setting)]
+    levels = "--levels", "40,44", "--tail-levels", "3"
+    code, out, _ = command("check", "dam", *words, *levels)
+    table = rows(tmp_path / "out/check/check.csv")
+    longer = table["dam", "gravity method, longer crack"]
+    assert code == 1 and longer["verdict"] == "fail" and longer["why"] == "SSF 1.162 < 1.2"
+    assert table["dam", "gravity method"]["verdict"] == "pass"
+    assert float(table["dam", "finite elements"]["crack_length"]) > 6
+    assert "past the drains (6 m): crack 12.4 m" in out
+    code, *_ = command("report", tmp_path / "out/check/dam")
+    page = (tmp_path / "report.html").read_text()
+    assert "longer crack" in page and "past the drains (6 m)" in page
+
+
+def test_a_joint_that_tension_keeps_uncracked(solve):
+    (result,) = solve("dam", "45", law="rupture", sigma_max=2e6, G_f=100.0, n_joint=20.0)
+    (note,) = (note for note in compared(result).notes if "tension" in note)
+    assert "below the strength of 2000 kPa; without tension: crack 0." in note
 
 
 def test_bad_input_leaves_nothing(command, combinations, tmp_path):

@@ -3,10 +3,14 @@ one."""
 
 import csv
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from closed_forms import BASE, CENTROID, HEIGHT, WATER, WEIGHT, slide_level
+from damjoint.results import gravity
+from damjoint.results.verdict import highest_by_statics
+from damjoint.scene.case import load
 from damjoint.studies import branch
 from damjoint.studies.critical import Search, critical
 from scipy.optimize import brentq
@@ -98,6 +102,30 @@ def test_any_parameter_whatever_its_direction():
     assert answer.value == pytest.approx(9888 / 12683, rel=2e-4)
 
 
+def test_the_gravity_method_without_tension(command, tmp_path):
+    """A strength that the heel's linear stress does not reach, and its elastic stress does."""
+    strong = "law=bond", "mu=5", "dam_base=30", "sigma_max=2e6", "G_f=100", "adhesion=5e6"
+    settings = *strong, "G_t=1e5", "n_joint=60"
+    words = [word for setting in settings for word in ("--set", setting)]
+    _, out, _ = command("critical", "dam", *words, "--levels", "40,48")
+    told = json.loads((tmp_path / "out/dam_critical/run.json").read_text())["critical"]
+    free = told["gravity_method_with"]["without tension"]
+    assert told["value"] == pytest.approx(free, rel=0.02) and told["gravity_method"] > 70
+    assert f"gravity method: {told['gravity_method']:.6g} m; without tension: {free:.6g} m" in out
+    assert "(n_joint = 60), " in out and "kPa, exceeds the strength of 2000 kPa" in out
+
+
+def test_the_gravity_method_with_drains_that_are_passed():
+    """The short crack holds until it comes to the drains; mu N = T with the one past them."""
+    drains = {"dam_base": 30.0, "uplift": "cracked", "drains": 1.0, "drain_x": 6.0, "mu": 1.0}
+    search = Search("dam", "level", DAM | PLAIN | drains, "40,44", "3")
+    first, longer = (search.by_gravity(44.4, True, longest) for longest in (False, True))
+    method = gravity.at(search.own, 2.0, first - 1e-5)
+    assert method.SSF > 1 and method.crack_length == pytest.approx(6, abs=1e-3)
+    (other,) = gravity.at(search.own, 2.0, longer).further
+    assert other.SSF == pytest.approx(1, abs=1e-4) and longer < first - 0.5
+
+
 @pytest.mark.heavy
 def test_a_burst_is_passed():
     """A bond that breaks through at once: the level falls by metres, and no push finds it again."""
@@ -127,6 +155,53 @@ def test_what_no_push_confirms_is_not_confirmed(monkeypatch, command):
     monkeypatch.setattr(branch.Branch, "pushes", lambda self: ())
     code, out, _ = command("critical", "c", "--set", "pena_tang=0", "--levels", "6,8")
     assert code == 1 and "not confirmed: no further equilibrium is found" in out
+
+
+@pytest.mark.parametrize(
+    "name, settings, limit, mode",
+    [
+        ("i", {"uplift": "imposed", "sigma_max": 0.0, "crest_water": 0.0}, 10.0171, "overturning"),
+        ("c", {"pena_tang": 0.0}, 6.63399, "sliding"),
+    ],
+)
+def test_what_statics_allows(name, settings, limit, mode):
+    """The level at which the resultant leaves a joint without tension; T = mu N + c L."""
+    case = load(name, settings, "6")
+    method = gravity.at(case, 1.0)
+    last = {"time": 1.0, "level": 6.0, "crack_length": method.crack_length, "M": method.M}
+    level, found, _ = highest_by_statics(case, last)
+    assert level == pytest.approx(limit, abs=1e-3) and found == mode
+    strong = replace(case, values=case.values | {"sigma_max": 1e6, "mu": 10.0, "adhesion": 1e6})
+    assert highest_by_statics(strong, last)[0] > 1.2 * limit
+
+
+def test_statics_confirms_a_level_that_is_near(monkeypatch):
+    """Where the search is stuck, and only there; the value is that of an equilibrium."""
+    monkeypatch.setattr(branch.Branch, "pushes", lambda self: ())
+    settings = {"uplift": "imposed", "sigma_max": 0.0, "crest_water": 0.0, "n_joint": 20.0}
+    _, answer = found("i", settings=settings, levels="9,9.8,9.95,10.1")
+    assert answer.confirmed and answer.mode == "overturning" and 9.9 < answer.value < 10.0171
+    assert "by statics there is no equilibrium above 10.01" in answer.why
+    _, answer = found("i", settings=settings, levels="7,12")
+    assert answer.value < 9.8 and not answer.confirmed
+
+
+def test_a_tension_that_lasts_is_said():
+    """c/mu of the law friction holds the open joint down; the value without it stands beside."""
+    settings = {"law": "friction", "adhesion": 1e6, "n_joint": 20.0}
+    search, answer = found("dam", settings=settings)
+    lines = "\n".join(answer.lines(search))
+    assert "kPa (" in lines and "% of the overturning moment) at any opening" in lines
+    assert answer.gravity_with["without tension"] < answer.value
+
+
+@pytest.mark.heavy
+def test_a_rigid_block_that_opens_to_its_toe():
+    """Friction of 3 holds any shear; full head in the crack."""
+    settings = PLAIN | {"mu": 3.0, "uplift": "cracked", "n_joint": 40.0}
+    _, answer = found("dam", settings=settings)
+    assert answer.confirmed and answer.mode == "overturning"
+    assert answer.value == pytest.approx(answer.gravity, rel=0.01)
 
 
 def test_no_limit_is_said(command):

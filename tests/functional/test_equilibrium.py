@@ -1,9 +1,12 @@
 """Equilibrium of every converged step, whatever the joint does: N, T, M against the loads."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from closed_forms import BASE, CENTROID, WATER, WEIGHT, integral, resultants, slide_level, thrust
 from damjoint import InputError, run
+from damjoint.results import gravity
 from damjoint.scene.case import load
 from numpy.testing import assert_allclose
 
@@ -120,6 +123,32 @@ def test_drains(tmp_path, engine, level, tail, effectiveness, outlet, at_drains)
     moment = integral(np.array([0.0, 1, 5]), heads, np.array([5.0, 4, 0]))
     assert last["N"] == pytest.approx(dry_n - uplift, rel=1e-6)
     assert last["M"] == pytest.approx(dry_m - moment, rel=1e-6)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize(
+    "engine, uplift, settings",
+    [
+        ("condensed", "drained", {}),
+        ("getdp", "drained", {}),
+        ("condensed", "cracked", {}),
+        ("condensed", "flow", {}),
+        ("condensed", "drained", {"mesh_pattern": "regular"}),
+        ("condensed", "cracked", {"mesh_pattern": "regular"}),
+        ("condensed", "drained", {"dim": 3, "n_layers": 2, "mesh_pattern": "layers"}),
+        ("condensed", "cracked", {"dim": 3, "n_layers": 2, "thickness": 10}),
+    ],
+)
+def test_uplift_with_drains_anywhere(tmp_path, engine, uplift, settings, order):
+    """No element's length from heel to drains is that of the others."""
+    drains = {"uplift": uplift, "drains": float(uplift != "drained"), "drain_x": 6.1}
+    case = load("dam", {"n_joint": 9, "order": order} | drains | settings, "30", "3")
+    (result,) = run.run(case, tmp_path, False, False, False, engine)
+    uplift = {"uplift": "drained" if uplift == "drained" else "cracked"}
+    method = gravity.at(replace(case, values=case.values | uplift), 1.0)
+    assert result.last["max_opening"] <= 0 == method.crack_length
+    assert result.last["U"] == pytest.approx(method.U, rel=1e-8)
+    assert result.last["M"] == pytest.approx(method.M, rel=1e-6)
 
 
 def test_drains_where_there_are_none():

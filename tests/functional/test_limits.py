@@ -124,8 +124,10 @@ def test_module_entry_point():
             "40,46",
             "has passed the drains (2 m)",
         ),
+        ({"uplift": "drained", "drain_x": 6.1, "sigma_max": 0.0}, "30", ""),
         ({}, "45", "the heel is in tension"),
         ({"law": "friction", "adhesion": 1e4, "mu": 2}, "40,46", "law = bond lets go"),
+        ({"law": "friction", "adhesion": 1e5, "mu": 1}, "40,50", "% of the overturning moment)"),
         ({}, "30", ""),
     ],
 )

@@ -55,6 +55,31 @@ def test_area_of_dam_and_foundation(tmp_path, settings):
         assert size == pytest.approx(area * (0.5 if dim == 3 else 1), rel=1e-9)
 
 
+@pytest.mark.parametrize("drain_x", [0.02, 6.1, 33.9])
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"n_joint": 20},
+        {"n_joint": 1},
+        {"n_joint": 20, "mesh_pattern": "regular"},
+        {"n_joint": 20, "joint_slope": -5},
+        {"n_joint": 20, "dam_base": 40, "joint_height": 6},
+        *(
+            {"n_joint": 20, "n_layers": 2, "dim": 3, "mesh_pattern": pattern}
+            for pattern in ("free", "layers", "split", "regular")
+        ),
+    ],
+)
+def test_a_node_at_the_drains(settings, drain_x):
+    """Wherever they are, on a line along z; as many elements from heel to toe as ever."""
+    case = load("dam", {"drains": 1, "uplift": "cracked", "drain_x": drain_x} | settings)
+    points = mesh.Mesh(case).bodies["joint"].points
+    heel = [case.section[name][0] for name in ("heel_x", "heel_y")]
+    away = np.hypot(*(points[:, :2] - heel).T).round(9)
+    assert len(np.unique(away)) == max(settings["n_joint"], 2) + 1
+    assert np.sum(away == drain_x) == np.sum(away == 0) == (3 if case["dim"] == 3 else 1)
+
+
 def test_a_force_at_the_end_of_the_crest():
     """Where rounding puts it 5e-16 m beside the corner: the corner is both."""
     found = mesh.Mesh(load("dam", {"batter": 0.6, "dam_crest": 3.5, "force_x": 1e4, "n_joint": 5}))

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from damjoint import InputError, run
 from damjoint.engines.condensed.elements import tensor
+from damjoint.results.verdict import hints
 from damjoint.scene.case import load
 from damjoint.scene.mesh import Mesh
 from damjoint.scene.parameters import start_gmsh
@@ -67,6 +68,14 @@ def test_equilibrium(solve, name, tolerance):
     assert found == pytest.approx(expected, rel=tolerance)
     wet = solve(name, "33.3", "6.1" if name == "stepped" else "0", uplift="imposed")[0].last
     assert wet["N"] + wet["U"] == pytest.approx(result.last["N"], rel=1e-9)
+
+
+def test_drains_without_a_node_are_said(solve):
+    (result,) = solve("stepped", "20", "0", uplift="drained", drain_x=6.4, n_joint=34)
+    found = "\n".join(hints(result))
+    assert "no node at the drains (drain_x = 6.4 m): the nearest is 0.1 m away" in found
+    (result,) = solve("stepped", "20", "0", uplift="drained", drain_x=6, n_joint=34)
+    assert "no node" not in "\n".join(hints(result))
 
 
 @pytest.mark.heavy

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -321,6 +322,62 @@ def test_drains_lose_their_effect_where_the_crack_passes_them():
     assert 0 < stopped.crack_length < 10 < without.crack_length < 34
     assert len(stopped.uplift.s) == 4 and len(passed.uplift.s) == 3
     assert passed.crack_length == pytest.approx(without.crack_length, rel=1e-9)
+
+
+def test_two_cracks_in_equilibrium():
+    """Drains stop a crack of 2.09 m; one of 12.4 m has passed them and is in equilibrium, too."""
+    drains = {"uplift": "cracked", "drains": 1.0, "drain_x": 6.0}
+    settings = drains | {"dam_base": 30.0, "law": "bond", "sigma_max": 0.0, "adhesion": 0.0}
+    found = gravity.at(load("dam", settings | {"mu": 1.2}, "44", "3"), 1)
+    (longer,) = found.further
+    assert (found.crack_length, found.SSF) == pytest.approx((2.088, 1.732), abs=1e-3)
+    assert (longer.crack_length, longer.SSF) == pytest.approx((12.401, 1.162), abs=1e-3)
+    assert longer.tip_stress == pytest.approx(0, abs=1) and not longer.further
+    (note,) = found.notes
+    assert "2.088 m; once past the drains (6 m): crack 12.4 m, SSF 1.162" in note
+    better = settings | {"drain_x": 4.0, "drain_effectiveness": 1.0}
+    stopped = gravity.at(load("dam", better, "46.8", "3"), 1)
+    (through,) = stopped.further
+    assert stopped.stands and stopped.crack_length < 4
+    assert not through.stands and through.crack_length == 30
+    without = gravity.at(load("dam", settings | {"mu": 1.2, "drains": 0.0}, "44", "3"), 1)
+    assert longer.crack_length == pytest.approx(without.crack_length, rel=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_every_crack_at_which_growth_ends(seed):
+    """Beside a scan of the tension at the tip."""
+    dice = np.random.default_rng(seed)
+    settings = {
+        "dam_base": dice.uniform(26, 36),
+        "law": ("bond", "friction")[seed % 2],
+        "sigma_max": 0.0,
+        "adhesion": (0.0, 5e4)[seed // 2 % 2],
+        "G_t": 1e5,
+        "uplift": "cracked",
+        "drains": 1.0,
+        "drain_x": dice.uniform(0.5, 20),
+        "drain_effectiveness": dice.uniform(0, 1),
+        "drain_level": dice.uniform(0, 25),
+    }
+    case = load("dam", settings, str(dice.uniform(38, 52)), str(dice.uniform(0, 15)))
+    first = gravity.at(case, 1)
+    _, at_tip = gravity.tensile_strength(case)
+
+    def too_much(crack):
+        uplift = gravity.Uplift(case, first.body, first.level, first.tail_level, crack)
+        state = replace(first, crack_length=crack, uplift=uplift, further=())
+        return state.tip_stress > at_tip
+
+    if not too_much(0.0):
+        assert first.crack_length == 0 and not first.further
+        return
+    step = first.body.length / 4000
+    scan = np.arange(first.body.length, 0, -step)[::-1][:-1]
+    cracked = np.array([too_much(a) for a in scan])
+    ends = scan[1:][cracked[:-1] & ~cracked[1:]]
+    found = [one.crack_length for one in (first, *first.further) if one.stands]
+    assert len(found) == len(ends) and np.all(np.abs(np.array(found) - ends) <= step)
 
 
 # -- strength and factors

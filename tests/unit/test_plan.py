@@ -1,5 +1,6 @@
 """What a sweep goes over: ties are arithmetic and nothing else, samples are those of scipy."""
 
+import itertools
 import math
 
 import numpy as np
@@ -80,6 +81,32 @@ def test_a_latin_hypercube_has_one_value_in_each_part():
     for name, law in (("mu", stats.norm(1.0, 0.15)), ("adhesion", stats.lognorm(0.3, scale=2e5))):
         assert np.array_equal(np.sort(np.floor(law.cdf(drawn[name]) * 400)), np.arange(400))
     assert sampling.sensitivity(drawn["mu"], drawn["adhesion"]) == pytest.approx(-0.5, abs=0.1)
+
+
+@pytest.mark.parametrize("design", ["latin", "monte-carlo"])
+@pytest.mark.parametrize("number, error", [(30, 0.05), (100, 0.01), (1000, 1e-3)])
+@pytest.mark.parametrize(
+    "wanted", [{"ab": -0.5}, {"ab": 0.95}, {"ab": 0.6, "bc": -0.3, "cd": 0.5}, {"ad": -0.8}]
+)
+def test_the_sample_has_the_correlations_asked_for(design, number, error, wanted):
+    """Those of the sample itself, 0 where none is asked for; each input keeps its values."""
+    laws = {"a": "normal(1,0.1)", "b": "lognorm(0.3)", "c": "uniform(0,1)", "d": "gumbel_r(2,3)"}
+    texts = [f"{a},{b}={rank}" for (a, b), rank in wanted.items()]
+    for seed in range(5):
+        drawn = sampling.draw(number, laws, design, seed, texts)
+        free = sampling.draw(number, laws, design, seed, [])
+        for one, other in itertools.combinations(laws, 2):
+            found = sampling.sensitivity(drawn[one], drawn[other])
+            assert found == pytest.approx(wanted.get(one + other, 0.0), abs=error)
+        assert all(np.array_equal(np.sort(drawn[n]), np.sort(free[n])) for n in laws)
+
+
+@pytest.mark.parametrize("number", [1, 2, 3])
+def test_a_correlated_sample_of_few_values(number):
+    laws = dict.fromkeys("abc", "normal(1,0.1)")
+    drawn = sampling.draw(number, laws, "latin", 0, ["a,b=-0.5"])
+    free = sampling.draw(number, laws, "latin", 0, [])
+    assert all(np.array_equal(np.sort(drawn[n]), np.sort(free[n])) for n in laws)
 
 
 @pytest.mark.parametrize("text", ["mu=0.5", "mu,mu=0.5", "mu,K_N=0.5", "mu,adhesion=1", "mu,E=x"])

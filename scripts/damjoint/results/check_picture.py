@@ -58,7 +58,9 @@ def draw_check(
 def draw_cells(axes: Axes, cells: list[tuple[str, ...]]) -> None:
     """A table in the upper part of axes."""
     height = min(0.045 * len(cells), 0.75)
-    widths = [0.34, *[0.66 / (len(cells[0]) - 1)] * (len(cells[0]) - 1)]
+    others = len(cells[0]) - 1
+    first = 0.34 if others < 4 else 0.3
+    widths = [first, *[(1 - first) / others] * others]
     table = axes.table(
         cells,
         colWidths=widths,
@@ -157,23 +159,31 @@ def draw_joint(axes: Axes, result: Results, method: GravityMethod) -> None:
     if method.crack_length:
         line = under.place(ends * method.crack_length / under.length, -0.02)
         axes.plot(*line, "--", color=RED, label=f"crack, {HAND}", zorder=4)
+    for longer in method.further:
+        line = under.place(ends * longer.crack_length / under.length, -0.04)
+        axes.plot(*line, ":", color=RED, label=f"longer crack, {HAND}", zorder=4)
     rows = along(result.at()) if last else {}
+    answer = COMPUTED + (", partial load" if result.partial_load else "")
     none = np.zeros(0)
     x = rows.get("x", none)
     s = (x - x[0]) / np.ptp(x) if rows else none
     if rows and last["crack_length"]:
         line = under.place(s, np.where(rows["damage"] >= 1, 0, np.nan))
-        axes.plot(*line, color=RED, linewidth=3, label=f"crack, {COMPUTED}", zorder=4)
+        axes.plot(*line, color=RED, linewidth=3, label=f"crack, {answer}", zorder=4)
     if rows and (softening := state_of(rows) == SOFTENING).any():
         line = under.place(s, np.where(softening, 0, np.nan))
-        axes.plot(*line, color=VIOLET, linewidth=3, label=f"softening, {COMPUTED}", zorder=2)
+        axes.plot(*line, color=VIOLET, linewidth=3, label=f"softening, {answer}", zorder=2)
     pressure = method.uplift.s / under.length, method.uplift.p
-    stress = effective_stress(method), (s, rows.get("sigma_n_eff", none))
-    draw_diagram(axes, under, UPLIFT_AT, "uplift", WATER, 1, pressure, (s, rows.get("p", none)))
-    draw_diagram(axes, under, STRESS_AT, f"effective stress, {SIGN}", ORANGE, -1, *stress)
+    stress = effective_stress(method), rows.get("sigma_n_eff", none)
+    for depth, name, color, hanging, (by_hand, computed) in (
+        (UPLIFT_AT, "uplift", WATER, 1, (pressure, rows.get("p", none))),
+        (STRESS_AT, f"effective stress, {SIGN}", ORANGE, -1, stress),
+    ):
+        label = f"{name}, {answer}"
+        draw_diagram(axes, under, depth, name, label, color, hanging, by_hand, (s, computed))
     if rows:
         draw_resultant(axes, under, last, BLUE, "-")
-        axes.plot([], [], color=BLUE, label=f"resultant, {COMPUTED}")
+        axes.plot([], [], color=BLUE, label=f"resultant, {answer}")
     forces = {"N": method.N, "T": method.T, "x_resultant": method.x_resultant}
     draw_resultant(axes, under, forces, "black", "--")
     axes.plot([], [], "--", color="black", label=f"the same, {HAND}")
@@ -184,6 +194,7 @@ def draw_diagram(
     under: UnderJoint,
     depth: float,
     name: str,
+    label: str,
     color: str,
     hanging: int,
     by_hand: tuple[np.ndarray, np.ndarray],
@@ -192,7 +203,8 @@ def draw_diagram(
     """A quantity [Pa] hanging under the joint at a depth, both methods as (places over the joint's
     length, values); the end values and the name are written beside it.
 
-    hanging: 1 if what is positive is drawn downwards, -1 if what is negative is.
+    label: of the computed one; hanging: 1 if what is positive is drawn downwards, -1 if what is
+    negative is.
     """
     both = by_hand[1], computed[1]
     size, factor = unit(list(both), STRESSES)
@@ -204,7 +216,7 @@ def draw_diagram(
     if len(computed[0]):
         axes.fill(*outline(*computed), color=color, alpha=0.35, linewidth=0)
         line = under.place(computed[0], depth + scale * computed[1])
-        axes.plot(*line, color=color, label=f"{name}, {COMPUTED}")
+        axes.plot(*line, color=color, label=label)
     axes.plot(*outline(*by_hand), "--", color="black", linewidth=1)
     axes.text(*under.place(0.5, depth - 0.02), name, ha="center", va="bottom", fontsize=9)
     for s, value, side in ((-0.015, by_hand[1][0], "right"), (1.015, by_hand[1][-1], "left")):

@@ -12,7 +12,8 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -22,9 +23,6 @@ from ..scene.case import Case
 from ..scene.loads import Loading, line_forces
 from ..scene.parameters import constants
 from .tables import LOADS
-
-#: Places at which a crack's tip is tried before its length is solved for.
-TRIED = 400
 
 
 class Load(NamedTuple):
@@ -226,16 +224,19 @@ class Uplift:
 
     def __init__(self, case: Case, body: Body, level: float, tail: float, crack: float) -> None:
         self.length, mode = body.length, case["uplift"]
-        h1, h2 = max(level - body.heel[1], 0.0), max(tail - body.toe[1], 0.0)
+        self.h1, self.h2 = h1, h2 = max(level - body.heel[1], 0.0), max(tail - body.toe[1], 0.0)
+        #: distance from the heel and head of the outlet [m] of drains that the crack has not passed
+        self.drains: tuple[float, float] | None = None
         crack = crack if mode in ("cracked", "flow") else 0.0
         drained = mode == "drained" or (mode == "cracked" and case["drains"])
         places, heads = [0.0, crack, self.length], [h1, h1, h2]
         at = case["drain_x"]
         if drained and crack <= at < self.length:
-            outlet = max(case["drain_level"], tail) - (body.heel[1] + at * body.along[1])
+            outlet = max(max(case["drain_level"], tail) - (body.heel[1] + at * body.along[1]), 0.0)
+            self.drains = at, outlet
             undrained = float(np.interp(at, places[1:], heads[1:]))
             places.insert(2, at)
-            heads.insert(2, drained_head(case, undrained, max(outlet, 0.0)))
+            heads.insert(2, drained_head(case, undrained, outlet))
         weight = case["rho_water"] * case["g"] if mode != "none" else 0.0
         self.s, self.p = np.array(places), weight * np.array(heads)
 
@@ -298,6 +299,7 @@ class GravityMethod:
 
     case: Case
     body: Body
+    time: float
     level: float
     tail_level: float
     #: all but the water in the joint
@@ -305,6 +307,9 @@ class GravityMethod:
     #: from the heel [m]; the joint's length if no shorter one leaves an equilibrium
     crack_length: float
     uplift: Uplift
+    #: where a crack that has passed this one's end, or the drains, comes to rest: equilibria with a
+    #: longer one, or the whole joint
+    further: tuple[GravityMethod, ...] = ()
 
     @property
     def uncracked(self) -> float:
@@ -390,6 +395,34 @@ class GravityMethod:
         """Overturning safety factor."""
         return overturning_factor(self.loads, self.uplift.moment)
 
+    @property
+    def in_words(self) -> str:
+        """Its crack and safety factors."""
+        if not self.stands:
+            return "overturning"
+        return f"crack {self.crack_length:.4g} m, SSF {self.SSF:.4g}, OSF {self.OSF:.4g}"
+
+    @property
+    def notes(self) -> list[str]:
+        """What its figures do not show: longer cracks in equilibrium, and what hangs on tension."""
+        case, found = self.case, []
+        for one in self.further:
+            passed = self.crack_length <= case["drain_x"] < one.crack_length
+            which = f"past the drains ({case['drain_x']:g} m)" if passed else "beyond it"
+            found.append(
+                "gravity method: the shortest crack in equilibrium is "
+                f"{self.crack_length:.4g} m; once {which}: {one.in_words}"
+            )
+        if not self.crack_length and self.tip_stress > 0:
+            free = at(case, self.time, self.level, tension=False)
+            strength = tensile_strength(case)[0]
+            found.append(
+                f"gravity method: uncracked, as its {self.tip_stress / 1e3:.4g} kPa at the heel "
+                f"are below the strength of {strength / 1e3:.4g} kPa; without tension: "
+                f"{(free, *free.further)[-1].in_words}"
+            )
+        return found
+
     def table(self) -> dict[str, list]:
         """Its resultants by the columns tables.LOADS: the loads, the uplift, the sum."""
         tx, ty = self.body.along
@@ -400,10 +433,19 @@ class GravityMethod:
         return dict(zip(LOADS, map(list, zip(*cells, strict=True)), strict=True))
 
 
-def at(case: Case, time: float, level: float | None = None) -> GravityMethod:
-    """The gravity method at a time of a case.
+def with_crack(case: Case, time: float, level: float, crack: float) -> GravityMethod:
+    """The rigid block at a time of a case, at a level [m] and with a crack [m] that are given."""
+    body, tail = Body(case), case.tail_at(time)
+    loads, uplift = loads_on(case, body, time, level, tail), Uplift(case, body, level, tail, crack)
+    return GravityMethod(case, body, time, level, tail, loads, crack, uplift)
 
-    level: of the reservoir [m] where it is not the one prescribed for that time.
+
+def at(case: Case, time: float, level: float | None = None, tension: bool = True) -> GravityMethod:
+    """The gravity method at a time of a case: uncracked, or with the shortest crack in equilibrium,
+    what a longer one leads to in `further`.
+
+    level: of the reservoir [m] where it is not the one prescribed for that time; tension: whether
+    the joint has its tensile strength.
     """
     body, tail = Body(case), case.tail_at(time)
     level = case.level_at(time) if level is None else level
@@ -411,9 +453,9 @@ def at(case: Case, time: float, level: float | None = None) -> GravityMethod:
 
     def state(crack: float) -> GravityMethod:
         uplift = Uplift(case, body, level, tail, crack)
-        return GravityMethod(case, body, level, tail, loads, crack, uplift)
+        return GravityMethod(case, body, time, level, tail, loads, crack, uplift)
 
-    strength, at_tip = tensile_strength(case)
+    strength, at_tip = tensile_strength(case) if tension else (0.0, 0.0)
     if state(0.0).tip_stress <= strength:
         return state(0.0)
 
@@ -421,12 +463,52 @@ def at(case: Case, time: float, level: float | None = None) -> GravityMethod:
         found, left = state(crack), body.length - crack
         return 2 * found.N * left - 6 * found.M - at_tip * left**2
 
-    tips = np.union1d(np.linspace(0, body.length, TRIED), [case["drain_x"]])
-    tips = tips[tips <= body.length]
-    for before, after in itertools.pairwise(tips):
-        if excess(after) <= 0:
-            while after - before > 1e-12 * body.length:  # scipy's roots are half of a run's start
-                middle = (before + after) / 2
-                before, after = (middle, after) if excess(middle) > 0 else (before, middle)
-            return state(float(after))
-    return state(body.length)
+    found = [state(crack) for crack in ends_of_growth(excess, pieces(case, body, level, tail))]
+    standing = [one for one in found if one.stands]
+    first, *further = standing or found[:1] or [state(body.length)]
+    behind = float(np.nextafter(case["drain_x"], body.length))
+    if first.stands and first.uplift.drains and not further and excess(behind) > 0:
+        further = [state(body.length)]  # past the drains nothing stops it
+    return replace(first, further=tuple(further))
+
+
+def pieces(case: Case, body: Body, level: float, tail: float) -> list[tuple[float, float]]:
+    """Crack lengths [m], from and to, between which the uplift follows one formula: the drains'
+    effect begins where the crack raises the head above their outlet, and ends behind them.
+    """
+    uplift = Uplift(case, body, level, tail, 0.0)
+    ends = [0.0, body.length]
+    if uplift.drains:
+        at, outlet = uplift.drains
+        h1, h2 = uplift.h1, uplift.h2
+        ends.append(at)
+        if h1 != h2 and (share := (h1 - outlet) / (h1 - h2)) != 1:
+            ends.append((at - share * body.length) / (1 - share))
+    ends = sorted(e for e in ends if 0 <= e <= body.length)
+    return [(np.nextafter(a, b), b) for a, b in itertools.pairwise(ends) if b > a]
+
+
+def ends_of_growth(
+    excess: Callable[[float], float], spans: list[tuple[float, float]]
+) -> list[float]:
+    """The crack lengths [m] at which the tension at the tip falls to what it may be.
+
+    excess: of the tension [N/m]; times the length left it is a polynomial of degree 3 within each
+    of the spans, whose roots are all found.
+    """
+    length, found = spans[-1][1], []
+    for start, end in spans:
+        x = (start + end) / 2 + (end - start) / 2 * np.cos(np.pi * (np.arange(4) + 0.5) / 4)
+        values = [excess(a) * (length - a) for a in x]
+        rough = np.polynomial.Polynomial.fit(x, values, 3, domain=[start, end]).roots()
+        rough = np.sort(rough.real[np.abs(rough.imag) < 1e-6 * (end - start)])
+        turns = [a for a in rough if start < a < end]
+        # between two roots, and beside the first and the last, the sign is known
+        limits = [start, *((a + b) / 2 for a, b in itertools.pairwise(turns)), end]
+        for before, after in itertools.pairwise(limits):
+            if excess(before) > 0 >= excess(after):
+                while after - before > 1e-12 * length:  # scipy's roots are half of a run's start
+                    middle = (before + after) / 2
+                    before, after = (middle, after) if excess(middle) > 0 else (before, middle)
+                found.append(float(after))
+    return found

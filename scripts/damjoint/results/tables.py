@@ -83,8 +83,13 @@ LOADS = {
 #: Columns of check.csv: a row per scene and answer at the last level, and one of differences.
 CHECK = {
     "case": ("", "name of the case"),
-    "answer": ("", "finite elements, gravity method, or the difference of the two"),
+    "answer": (
+        "",
+        "finite elements, gravity method (also with a longer crack), difference of the first two",
+    ),
     "uplift": ("", "water in the joint"),
+    "load": ("", "full; partial: the run stopped before its last t, where all loads are there"),
+    "time": HISTORY["time"],
     **{name: HISTORY[name] for name in ("level", "tail_level", "N", "T", "M", "U", "x_resultant")},
     "sigma_n_heel": ("Pa", "total normal stress at the heel, compression < 0"),
     "sigma_n_toe": ("Pa", "total normal stress at the toe, compression < 0"),
@@ -138,6 +143,14 @@ class Results:
     def last(self) -> dict[str, float]:
         """The last row of the history; empty before the first step."""
         return {name: float(column[-1]) for name, column in self.history.items() if len(column)}
+
+    @property
+    def partial_load(self) -> bool:
+        """Whether the last state is short of the case's last time, at which levels and loads are
+        those asked for; a prescribed displacement asks for none.
+        """
+        time = self.last.get("time", 0.0)
+        return self.case["drive"] == "level" and time < self.case.times[-1] - 1e-9
 
 
 def rows_at(table: dict[str, np.ndarray], time: float | None = None) -> dict[str, np.ndarray]:

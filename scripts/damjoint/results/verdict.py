@@ -106,9 +106,8 @@ def bound(results: Results) -> tuple[str, str]:
     """Which bound of statics the last state has reached, sliding or overturning, and in words; both
     empty if none.
 
-    A rigid block on a joint without
-    tension has M >= 0; on elements the compression ends within the last one at the toe. Friction's
-    tension c/mu of the open part is no compression.
+    A rigid block on a joint without tension has M >= 0; on elements the compression ends within the
+    last one at the toe. Friction's tension c/mu of the open part is no compression.
     """
     case, last = results.case, results.last
     length, holds = case.joint_along, case["mu"] * last["N"] + held(results)
@@ -122,6 +121,44 @@ def bound(results: Results) -> tuple[str, str]:
     if case["law"] != "rupture" and last["T"] >= (1 - AT_BOUND) * holds:
         return "sliding", f"T = {last['T']:.5g} N/m of the {holds:.5g} N/m that the joint holds"
     return "", ""
+
+
+def highest_by_statics(case: Case, last: dict[str, float]) -> tuple[float, str, str]:
+    """The level [m] above which a state has no equilibrium any more, how it fails and why, in
+    words; infinite and empty where statics does not tell.
+
+    Whatever the distribution of stress: with the tensile strength f, over the length l that is not
+    cracked, M >= -f l^2/2, and with friction T <= mu (N + f l) + c l; the crack does not close as
+    the level rises. The law friction keeps f = c/mu, of which its N has taken account, and l is the
+    whole joint.
+    """
+    from scipy.optimize import brentq  # half of a run's start
+
+    law, time = case["law"], min(last["time"], case.times[-1])
+    if case.geometry or case["uplift"] == "flow":
+        return np.inf, "", ""
+    strength, _ = gravity.tensile_strength(case)
+    crack = 0.0 if law == "friction" else last["crack_length"]
+    block = lambda level: gravity.with_crack(case, time, level, crack)
+    length = block(last["level"]).uncracked
+    tension = strength * length if law == "bond" else 0.0
+
+    def moment(level: float) -> float:
+        return block(level).M + strength * length**2 / 2
+
+    def shear(level: float) -> float:
+        found = block(level)
+        return case["mu"] * max(found.N + tension, 0.0) + case["adhesion"] * length - found.T
+
+    reasons = [(moment, "overturning", "the resultant leaves the joint")]
+    if law == "bond" or (law == "friction" and not case["pena_tang"]):
+        reasons.append((shear, "sliding", "the shear passes what the joint holds"))
+    found = [(np.inf, "", "")]
+    if np.isclose(block(last["level"]).M, last["M"], 0.05):  # else the crack is another one
+        for spare, mode, words in reasons:
+            if spare(last["level"]) > 0 > spare(case.highest_level):
+                found.append((brentq(spare, last["level"], case.highest_level), mode, words))
+    return min(found)
 
 
 def mean(results: Results, column: str) -> float:
@@ -165,9 +202,12 @@ def why_there(results: Results) -> str:
     case, last, shown = results.case, results.last, results.info.get("mechanism")
     where = f"level {last['level']:.6g} m (t = {last['time']:.6g})"
     if shown:
-        pushed = f", pushed {shown['pushed']:.2g} times as far" if shown["pushed"] > 1 else ""
-        most = f"the dam{pushed} holds {shown['level']:.6g} m at most"
-        return f"no equilibrium beyond {where}: {most}"
+        pushed = f", pushed {shown['pushed']:.2g} times as far," if shown["pushed"] > 1 else ""
+        most = shown["level"]
+        with_all = f" under the loads of t = {shown['time']:g}" if most < last["level"] else ""
+        return (
+            f"no equilibrium beyond {where}: the dam{pushed} holds {most:.6g} m at most{with_all}"
+        )
     if reached := bound(results)[1]:
         return f"no equilibrium beyond {where}: {reached}"
     arm = case.joint_along - last["x_resultant"]
@@ -250,6 +290,28 @@ def hints(results: Results) -> list[str]:
     return found
 
 
+def pulled_when_open(case: Case, last: dict[str, float]) -> str:
+    """In words, what the law friction's tension c/mu of open points holds; empty if it holds
+    nothing.
+    """
+    crack = last["crack_length"]
+    if case["law"] != "friction" or not case["adhesion"] * crack:
+        return ""
+    tension, share = case["adhesion"] / case["mu"], ""
+    if not case.geometry:
+        time = min(last["time"], case.times[-1])
+        block = gravity.with_crack(case, time, last["level"], 0.0)
+        parts = [*(m for load in block.loads for m in load[3:]), last["M"] - block.resultant.moment]
+        turning = -sum(m for m in parts if m < 0)
+        pull = tension * crack * (block.body.length - crack / 2)
+        share = f" ({pull / turning:.0%} of the overturning moment)" if turning else ""
+    return (
+        f"the joint is open over {crack:.3g} m and pulls there with adhesion/mu = "
+        f"{tension / 1e3:.4g} kPa{share} at any opening, as the friction law is published: "
+        "law = bond lets go"
+    )
+
+
 def seen_in(results: Results, last: dict[str, float]) -> list[str]:
     """What the last state shows: a crack counted in elements, drains in it, tension at the heel."""
     case, found, crack = results.case, [], last["crack_length"]
@@ -259,18 +321,20 @@ def seen_in(results: Results, last: dict[str, float]) -> list[str]:
             f"the crack ({crack:.3g} m) ends somewhere in an element of {element:.2g} m; "
             "--accuracy 3% finds the mesh, and says how wrong it is"
         )
+    if has_drains(case) and len(results.joint["time"]):  # a section's mesh has a node there
+        away = np.abs(results.at()["s"] - case["drain_x"]).min()
+        if away > 1e-5 * case.joint_along:
+            found.append(
+                f"the mesh has no node at the drains (drain_x = {case['drain_x']:g} m): the "
+                f"nearest is {away:.2g} m away"
+            )
     if has_drains(case) and crack > case["drain_x"]:
         kept = "" if case["uplift"] == "cracked" else "; their effect is kept all the same"
         found.append(
             f"the crack ({crack:.3g} m) has passed the drains ({case['drain_x']:g} m){kept}"
         )
-    if case["law"] == "friction" and case["adhesion"] > 0 and crack > 0:
-        tension = case["adhesion"] / case["mu"]
-        found.append(
-            f"the joint is open over {crack:.3g} m and pulls there with adhesion/mu = "
-            f"{tension / 1e3:.4g} kPa at any opening, as the friction law is published: "
-            "law = bond lets go"
-        )
+    if pulled := pulled_when_open(case, last):
+        found.append(pulled)
     elif len(results.joint["time"]):
         rows = results.at()
         heel = rows["sigma_n_eff"][rows["s"] <= rows["s"].min()].mean()

@@ -12,7 +12,7 @@ import numpy as np
 from scipy import sparse
 
 from .. import InputError, RunError, data
-from .case import Case
+from .case import Case, has_drains
 from .parameters import assignments, constants, start_gmsh
 
 #: Parameters that the mesh depends on, and nothing else.
@@ -131,7 +131,9 @@ def shares(case: Case) -> dict[str, float | str]:
     names = [*GEOMETRY, *(n for force, needs in MARKS.items() if case[force] for n in needs)]
     # whether there is a force, not how large
     there = {name: float(bool(case[name])) for name in MARKS}
-    return {name: case[name] for name in names} | there
+    # drains want a node, however they act
+    drains = {"uplift": "drained", "drain_x": case["drain_x"]} if has_drains(case) else {}
+    return {name: case[name] for name in names} | there | drains
 
 
 def heel_normal(joint: Body, heel: Body) -> np.ndarray:

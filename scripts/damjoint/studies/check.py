@@ -5,7 +5,7 @@ factors that the case requires; load combinations are cases that include a commo
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -25,6 +25,7 @@ from ..run import run
 from ..scene.case import Case
 
 FINITE_ELEMENTS, GRAVITY = "finite elements", "gravity method"
+LONGER = "gravity method, longer crack"
 DIFFERENCE, REQUIRED = "difference", "required"
 #: The verdict where nothing fails and nothing is required; what a case can require.
 UNCHECKED, REQUIREMENTS = "not checked", ("required_SSF", "required_OSF", "f_c")
@@ -50,10 +51,14 @@ class Answer:
 
     case: Case
     by: str
+    #: t of the state; nan if there is none
+    time: float
     #: NUMBERS in SI units; nan where there is none
     numbers: Mapping[str, float]
     #: why there is no equilibrium; empty if there is one
     statement: str = ""
+    #: whether it is for a part of the case's loads only
+    partial: bool = False
 
     @property
     def fails(self) -> list[str]:
@@ -86,6 +91,8 @@ class Answer:
             "case": self.case.name,
             "answer": self.by,
             "uplift": self.case["uplift"],
+            "load": "partial" if self.partial else "full",
+            "time": self.time,
             **self.numbers,
             "position": gravity.position(self.numbers["x_resultant"], self.length),
             **{name: self.case[name] for name in REQUIREMENTS},
@@ -106,11 +113,11 @@ def least_sliding_factor(case: Case) -> float:
     return max(case["required_SSF"], 0.0 if case["law"] == "rupture" else 1.0)
 
 
-def by_gravity(method: GravityMethod) -> Answer:
+def by_gravity(method: GravityMethod, name: str = GRAVITY) -> Answer:
     """The gravity method's answer."""
     said = "" if method.stands else "overturning: no part of the joint is left under compression"
     numbers = {name: float(getattr(method, name)) for name in NUMBERS}
-    return Answer(method.case, GRAVITY, numbers, said)
+    return Answer(method.case, name, method.time, numbers, said)
 
 
 def by_finite_elements(result: Results) -> Answer:
@@ -118,10 +125,13 @@ def by_finite_elements(result: Results) -> Answer:
 
     Stresses are node values at the joint's ends, where those of an elastic body depend on the mesh.
     """
-    case, last = result.case, result.last
+    case, last, partial = result.case, result.last, result.partial_load
     said = verdict.statement(result) if verdict.failed(result) else ""
     if not last:
-        return Answer(case, FINITE_ELEMENTS, dict.fromkeys(NUMBERS, math.nan), said)
+        nothing = dict.fromkeys(NUMBERS, math.nan)
+        return Answer(case, FINITE_ELEMENTS, math.nan, nothing, said, partial)
+    if partial and not said:  # interrupted
+        said = f"t = {last['time']:.6g} of {case.times[-1]:g} is what the run has come to"
     method, rows = gravity.at(case, last["time"], last["level"]), along(result.at())
     numbers = {name: last[name] for name in NUMBERS if name in last}
     for name in ("sigma_n", "sigma_n_eff"):
@@ -130,41 +140,67 @@ def by_finite_elements(result: Results) -> Answer:
     numbers["SSF"] = gravity.sliding_factor(case, last["N"], last["T"], uncracked)
     lifting = method.resultant.moment - last["M"]
     numbers["OSF"] = gravity.overturning_factor(method.loads, lifting)
-    return Answer(case, FINITE_ELEMENTS, {name: float(numbers[name]) for name in NUMBERS}, said)
+    found = {name: float(numbers[name]) for name in NUMBERS}
+    return Answer(case, FINITE_ELEMENTS, last["time"], found, said, partial)
 
 
 def hand_calculation(result: Results) -> GravityMethod:
-    """The gravity method at a case's last level: the one prescribed, or found where a displacement
-    is.
+    """The gravity method at a case's last level with all its loads; where a displacement is
+    prescribed, at the last state found.
     """
-    case = result.case
-    found = result.last.get("level") if case["drive"] != "level" else None
-    return gravity.at(case, case.times[-1], found)
+    case, last = result.case, result.last
+    if case["drive"] != "level" and last:
+        return gravity.at(case, last["time"], last["level"])
+    return gravity.at(case, case.times[-1])
+
+
+def compared(result: Results) -> Check:
+    """The answers for the scene of a run."""
+    method = hand_calculation(result)
+    return Check(
+        by_finite_elements(result),
+        by_gravity(method),
+        result.info.get("error_estimate", {}).get("statement", ""),
+        [by_gravity(one, LONGER) for one in method.further],
+        method.notes,
+    )
 
 
 @dataclass(frozen=True)
 class Check:
-    """Both answers for a scene."""
+    """The answers for a scene."""
 
     finite_elements: Answer
     gravity: Answer
     #: the estimated errors of a mesh that was chosen for an accuracy, in words
     accuracy: str = ""
+    #: the gravity method's with longer cracks that are in equilibrium, too
+    longer: Sequence[Answer] = ()
+    #: what to know of the gravity method's answers
+    by_hand: Sequence[str] = ()
+
+    @property
+    def answers(self) -> list[Answer]:
+        """All of them; each is judged."""
+        return [self.finite_elements, self.gravity, *self.longer]
 
     @property
     def comparable(self) -> bool:
-        """Whether both are for the same level."""
-        pair = self.finite_elements.numbers["level"], self.gravity.numbers["level"]
-        return math.isclose(*pair, abs_tol=1e-9)
+        """Whether both are for the same load: at the same t, by which loads grow, and level."""
+        one, other = self.finite_elements, self.gravity
+        pairs = (one.time, other.time), (one.numbers["level"], other.numbers["level"])
+        return all(math.isclose(*pair, abs_tol=1e-9) for pair in pairs)
 
     @property
     def rows(self) -> list[dict[str, float | str]]:
-        """Rows of check.csv: the answers and, if they are for the same level, their difference."""
+        """Rows of check.csv: the answers and, if they are for the same load, their difference."""
         one, other = self.finite_elements, self.gravity
+        rows = [answer.row for answer in self.answers]
         if not self.comparable:
-            return [one.row, other.row]
+            return rows
         less = {name: difference(one.numbers[name], other.numbers[name]) for name in NUMBERS}
-        return [one.row, other.row, Answer(one.case, DIFFERENCE, less).row | NO_VERDICT]
+        less = Answer(one.case, DIFFERENCE, one.time, less)
+        return [*rows, less.row | NO_VERDICT]
 
     @property
     def shown(self) -> list[dict[str, float | str]]:
@@ -179,8 +215,8 @@ class Check:
     @property
     def why(self) -> str:
         """What fails, in words."""
-        pair = self.finite_elements, self.gravity
-        return "; ".join(f"{one.by}: {'; '.join(one.fails)}" for one in pair if one.fails)
+        failing = (one for one in self.answers if one.fails)
+        return "; ".join(f"{one.by}: {'; '.join(one.fails)}" for one in failing)
 
     @property
     def notes(self) -> list[str]:
@@ -196,8 +232,11 @@ class Check:
         if case["f_c"]:
             found.append("the finite elements' stress at the toe, a corner, depends on the mesh")
         if not self.comparable:
-            found.append("no differences: the finite elements did not reach the last level")
-        return found
+            one, other = self.finite_elements, self.gravity
+            said = "no differences: the finite elements did not reach the last level with all loads"
+            got = "" if math.isnan(one.time) else f", t = {one.time:.5g} of {other.time:g}"
+            found.append(said + got)
+        return [*found, *self.by_hand]
 
 
 #: A difference is not judged.
@@ -237,7 +276,7 @@ def text_table(checks: list[Check]) -> str:
         show = [signed if is_less else number for is_less in less]
         columns += [[f(v * factor) for f, v in zip(show, line, strict=True)] for line in values]
     told = ([row[name] for row in rows] for name in ("position", "verdict"))
-    names, answers = [label(checks, row) for row in rows], [row["answer"] for row in rows]
+    names, answers = [label(checks, row) for row in rows], [named(row) for row in rows]
     table = tabulate(
         zip(names, answers, *columns, *told, strict=True),
         ["case", "", *heads, "N' in", ""],
@@ -257,6 +296,11 @@ def label(checks: list[Check], row: Mapping) -> str:
     """The name of a row's scene, with its uplift where the case has several."""
     scenes = {c.gravity.case["uplift"] for c in checks if c.gravity.case.name == row["case"]}
     return row["case"] + (f", {row['uplift']}" if len(scenes) > 1 else "")
+
+
+def named(row: Mapping) -> str:
+    """Which answer a row gives, and whether it is for a part of the loads only."""
+    return row["answer"] + (", partial load" if row.get("load") == "partial" else "")
 
 
 def number(value: float) -> str:
@@ -289,8 +333,7 @@ def check(cases: list[Case], out: Path) -> list[Check]:
     for case in cases:
         for result in run(case, out / case.name):
             method = hand_calculation(result)
-            estimate = result.info.get("error_estimate", {}).get("statement", "")
-            checks.append(Check(by_finite_elements(result), by_gravity(method), estimate))
+            checks.append(compared(result))
             folder = folders.scene_folder(case, result.case, out / case.name)
             write_csv(folder / "gravity.csv", method.table())
             draw_check(result, method, picture_table(checks[-1]), checks[-1].why, folder)
@@ -301,14 +344,16 @@ def check(cases: list[Case], out: Path) -> list[Check]:
 
 def picture_table(found: Check) -> list[tuple[str, ...]]:
     """The table beside the picture: a row per quantity."""
-    pair = found.finite_elements, found.gravity
-    cells = [(f"stress: {SIGN}", "FE", "gravity", "required")]
+    longer = ["longer"] * len(found.longer)
+    cells = [(f"stress: {SIGN}", "FE", "gravity", *longer, "required")]
     least = asked(found.gravity.case)
     for units, names in SHOWN:
-        values = [[answer.numbers[name] for answer in pair] for name in names]
+        values = [[answer.numbers[name] for answer in found.answers] for name in names]
         size, factor = unit([np.array(values)[np.isfinite(values)]], units)
         for (name, title), line in zip(names.items(), values, strict=True):
             told = (number(v * factor) for v in line)
             head = title if size == "-" else f"{title} [{size}]"
             cells.append((head, *told, number(least.get(name, math.nan))))
-    return [*cells, ("", *(answer.verdict for answer in pair), "")]
+    if found.finite_elements.partial:
+        cells.insert(1, ("load", "partial", "full", *("full" for _ in longer), ""))
+    return [*cells, ("", *(answer.verdict for answer in found.answers), "")]

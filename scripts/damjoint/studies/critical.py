@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from itertools import chain, zip_longest
 from pathlib import Path
 
@@ -26,12 +26,13 @@ from ..engines.condensed.solve import about
 from ..results import folder as folders
 from ..results import gravity
 from ..results.tables import CRITICAL, Results, write_csv
-from ..results.verdict import bound, statement
+from ..results.verdict import bound, highest_by_statics, pulled_when_open, statement
 from ..run import save
 from ..scene.case import Case, load
 from ..scene.parameters import parameter
 from .bodies import interface_of
 from .branch import Branch, row
+from .limit import elastic_heel_stress
 
 #: What is divided by the strength reduction factor. The fracture energies, too: the jumps at which
 #: a bond has gone stay as they are, and its whole curve is lowered.
@@ -42,6 +43,12 @@ QUICK = {"smallest_step": 1.0, "max_iterations": 15.0, "burst_iterations": 15.0}
 
 #: What says how the loading is driven.
 DRIVE = ("drive", "drive_begin", "drive_end", "drive_by")
+
+#: What the gravity method is asked for besides: tension, longest crack.
+ASSUMED = {"with the crack past the drains": (True, True), "without tension": (False, True)}
+
+#: How much higher, relatively, statics may allow a level that it confirms.
+NEAR = 0.02
 
 #: The smallest value of a parameter that has to be positive.
 TINY = 1e-30
@@ -74,6 +81,10 @@ class Answer:
     point: Point | None
     #: the same by the gravity method; None if it gives none
     gravity: float | None = None
+    #: and with other assumptions where they change it, by what they are
+    gravity_with: Mapping[str, float] = field(default_factory=dict)
+    #: what to know of the gravity method's values
+    note: str = ""
     #: what has ended the search before its time
     error: BaseException | None = None
 
@@ -94,7 +105,12 @@ class Answer:
         if self.point and self.point.filling.case["pena_tang"] and search.own.hardening_asked:
             found += filter(None, [statement(last_state(search, self.point))])
         if self.gravity is not None:
-            found.append(f"gravity method: {self.gravity:.6g}{unit}")
+            values = {"gravity method": self.gravity} | self.gravity_with
+            found.append("; ".join(f"{n}: {v:.6g}{unit}" for n, v in values.items()))
+        if self.note:
+            found.append(self.note)
+        if self.point:
+            found += filter(None, [pulled_when_open(search.own, self.point.last)])
         return found
 
 
@@ -291,7 +307,8 @@ class Search:
 
     def answer(self, value: float | None, failing: Branch, point: Point | None) -> Answer:
         """The answer, with what the failing branch shows."""
-        why, doubt = "", "no further equilibrium is found, but no mechanism either"
+        mode, why = failing.mode, ""
+        doubt = "no further equilibrium is found, but no mechanism either"
         if not failing.points:
             doubt = "no equilibrium is found even at the first step"
         elif failing.crushed_at_top:
@@ -307,29 +324,78 @@ class Search:
             )
             if reached := bound(last_state(self, top))[1]:
                 why += f"; there {reached}"
-        beside = None if value is None else self.by_gravity(value)
-        return Answer(value, failing.mode, why, "" if why else doubt, point, beside)
+        else:
+            mode, why = self.by_statics(failing)
+        found = Answer(value, mode, why, "" if why else doubt, point)
+        if value is None or (beside := self.by_gravity(value)) is None:
+            return found
+        others: dict[str, float] = {}
+        for name, how in ASSUMED.items():
+            other = self.by_gravity(value, *how)
+            known = beside, *others.values()
+            if other is not None and not np.isclose(other, known, PRECISION, 0).any():
+                others[name] = other
+        return replace(found, gravity=beside, gravity_with=others, note=self.tension(value))
+
+    def by_statics(self, failing: Branch) -> tuple[str, str]:
+        """How a branch fails that is found no further, and why that is so: its resultants leave no
+        equilibrium above a level that is near (below the target, if it is no level that is sought).
+        Why is empty if they do.
+        """
+        top = failing.points[failing.top]
+        level, mode, words = highest_by_statics(failing.case, top.last)
+        if not level < (top.level * (1 + NEAR) if self.of == "level" else failing.target):
+            return failing.mode, ""
+        return mode, (
+            f"by statics there is no equilibrium above {level:.6g} m, where {words}; the highest "
+            f"one found is at {top.level:.6g} m"
+        )
 
     # -- beside it
     # ----------------------------------------------------------------------------------------------
 
-    def by_gravity(self, value: float) -> float | None:
+    def tension(self, value: float) -> str:
+        """In words, that the gravity method stays uncracked at a value where the elastic stress at
+        the heel does not; empty if it does not.
+        """
+        method = self.rigid_block(value)
+        strength, _ = gravity.tensile_strength(method.case)
+        if method.crack_length or method.tip_stress <= 0:
+            return ""
+        case = method.case
+        if self.of == "level":
+            level = {"levels": (*case.levels[:-1], value)}
+            case = replace(case, values=case.values | {"drive": "level"}, **level)
+        elastic = elastic_heel_stress(case, interface_of(case))
+        if elastic <= strength:
+            return ""
+        linear = method.tip_stress / 1e3
+        return (
+            f"there the gravity method is uncracked, {linear:.4g} kPa at the heel; "
+            f"the elastic stress of the finite elements (n_joint = {case['n_joint']:g}), "
+            f"{elastic / 1e3:.4g} kPa, exceeds the strength of {strength / 1e3:.4g} kPa"
+        )
+
+    def by_gravity(self, value: float, tension: bool = True, longest: bool = False) -> float | None:
         """The critical value of the gravity method that is nearest to one of the finite elements;
         None if there is none near.
+
+        tension: whether the joint has its tensile strength; longest: whether the longest crack
+        counts where several are in equilibrium.
         """
-        here = self.rigid_block_stands(value)
+        stands = lambda value: self.rigid_block_stands(value, tension, longest)
+        here = stands(value)
         for share in (0.02, 0.05, 0.1, 0.2, 0.5, 0.9):
             for other in (value * (1 + share), value * (1 - share)):
-                there = self.rigid_block_stands(other)
+                there = stands(other)
                 if there is not None and there != here:
-                    sign = lambda v: 1.0 if self.rigid_block_stands(v) == here else -1.0
+                    sign = lambda v: 1.0 if stands(v) == here else -1.0
                     return float(bisect(sign, value, other, rtol=PRECISION / 1000))
         return None
 
-    def rigid_block_stands(self, value: float) -> bool | None:
-        """Whether the gravity method finds an equilibrium, with friction if the law has it, and a
-        toe that is not crushed; None if the case allows no such value, or its geometry no gravity
-        method.
+    def rigid_block(self, value: float, tension: bool = True) -> gravity.GravityMethod | None:
+        """The gravity method with a value; None if the case allows no such value, or its geometry
+        no gravity method.
         """
         if self.own.geometry:
             return None
@@ -337,7 +403,16 @@ class Search:
             case = self.own if self.of == "level" else self.case_at(value)
         except InputError:
             return None
-        method = gravity.at(case, case.times[-1], value if self.of == "level" else None)
+        return gravity.at(case, case.times[-1], value if self.of == "level" else None, tension)
+
+    def rigid_block_stands(self, value: float, tension: bool, longest: bool) -> bool | None:
+        """Whether the gravity method finds an equilibrium, with friction if the law has it, and a
+        toe that is not crushed; None if there is no gravity method.
+        """
+        method = self.rigid_block(value, tension)
+        if method is None:
+            return None
+        case, method = method.case, (method, *method.further)[-1] if longest else method
         slides = case["law"] != "rupture" and method.SSF < 1
         crushed = 0 < case["f_c"] < -method.sigma_n_toe
         return method.stands and not slides and not crushed
@@ -455,5 +530,6 @@ def told_of(search: Search, answer: Answer) -> dict:
         "confirmed": answer.why,
         "doubt": answer.doubt,
         "gravity_method": answer.gravity,
+        "gravity_method_with": answer.gravity_with,
         "trials": len(search.trials),
     }

@@ -38,6 +38,14 @@ def resultants(case: Case, interface: Interface) -> dict[str, np.ndarray]:
     return _LAST[key]
 
 
+def elastic_heel_stress(case: Case, interface: Interface) -> float:
+    """Largest effective normal stress [Pa] at the heel at the last level of a case whose joint does
+    not fail: the heel is a corner, it depends on the mesh.
+    """
+    rows = Filling(replace(case, values=case.values | UNBREAKABLE), interface).run().at()
+    return float(rows["sigma_n_eff"][rows["s"] <= rows["s"].min()].max())
+
+
 def mechanism(case: Case, interface: Interface) -> tuple[str, str]:
     """How a case fails for certain, and why, in words; both empty where the loads do not tell.
 

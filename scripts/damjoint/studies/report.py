@@ -24,7 +24,7 @@ from ..results.verdict import failed, statement, stiffness_ratio
 from ..scene.case import Case
 from ..scene.parameters import constants, declared, parse
 from ..storage import whole
-from .check import UNCHECKED, Check, by_finite_elements, by_gravity, hand_calculation, picture_table
+from .check import UNCHECKED, Check, compared, hand_calculation, picture_table
 
 #: Of the parts of a picture that are dots, not lines.
 DPI = 160
@@ -71,9 +71,9 @@ def part_of(folder: Path, solution: Solution) -> dict:
     result = solution.result
     case, told = result.case, result.info
     # the gravity method knows sections by parameters only
-    found = None if case.geometry else check_of(result)
+    found = None if case.geometry else compared(result)
     fails = [statement(result)] if found is None and failed(result) else []
-    for answer in (found.finite_elements, found.gravity) if found else ():
+    for answer in found.answers if found else ():
         fails += [f"{answer.by}: {why}" for why in answer.fails]
     if told["state"] in ("failed", "interrupted"):
         fails.insert(0, told["statement"])
@@ -159,11 +159,6 @@ def loads_table(result: Results) -> dict:
     return {"heads": ["load", *found["heads"]], "rows": named}
 
 
-def check_of(result: Results) -> Check:
-    """Both answers at the last level."""
-    return Check(by_finite_elements(result), by_gravity(hand_calculation(result)))
-
-
 def check_table(found: Check) -> dict:
     """The finite elements' answer beside the gravity method's, and what is required."""
     heads, *rows = picture_table(found)
@@ -212,7 +207,8 @@ def critical_of(found: dict | None) -> list[tuple[str, str]]:
     unit, by_hand = found["unit"], found["gravity_method"]
     said = [f"{found['value']:.6g} {unit}".strip(), found["mode"]]
     said += [f"not confirmed: {found['doubt']}"] if found["doubt"] else []
-    said += [f"gravity method {by_hand:.6g} {unit}".strip()] if by_hand is not None else []
+    values = {"gravity method": by_hand} | found.get("gravity_method_with", {})
+    said += [f"{n} {v:.6g} {unit}".strip() for n, v in values.items() if v is not None]
     return [(f"critical {found['of']}, and the last state before it", "; ".join(said))]
 
 

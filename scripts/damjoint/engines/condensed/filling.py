@@ -137,7 +137,13 @@ class Filling(Stepper):
         begin, wanted = self.state, self.case.level_at(time)
         if begin.time == 0 or wanted < begin.loading.level:
             return None
-        path = Path([Point(self.fork(self.case))], time)
+        start = Point(self.fork(self.case))
+        path = Path([start], time)
+        path.advance()
+        if path.stuck:
+            return None
+        if not self.same_but_for_level(path.points[1].filling.state.loading, begin.loading):
+            del path.points[0]  # no point of this path: other loads acted
         while path.points[-1].level < wanted:
             if path.slides or path.settled(ROUGH if path.stuck else SURE):
                 self.fails(path)
@@ -145,10 +151,12 @@ class Filling(Stepper):
                 self.end_at_knee(path)
                 return None
             path.advance()
-        last, beyond = (point.filling for point in path.points[-2:])
         levels = [point.level for point in path.points]
-        share = (wanted - levels[-2]) / (levels[-1] - levels[-2])
-        jump = last.state.jump + share * (beyond.state.jump - last.state.jump)
+        last, beyond = (point.filling for point in ([start] + path.points)[-2:])
+        jump = beyond.state.jump
+        if len(levels) > 1:
+            share = (wanted - levels[-2]) / (levels[-1] - levels[-2])
+            jump = last.state.jump + share * (jump - last.state.jump)
         found = last.solve_by(self.attempts()[:3], time, start=(jump, wanted))
         if found is None:
             return None
@@ -170,7 +178,8 @@ class Filling(Stepper):
     def fails(self, path: Path) -> None:
         """The mechanism of a path that has no equilibrium at the level asked for."""
         pushed = path.points[-1].pushed / (path.points[path.knee].pushed or path.size)
-        self.mechanism = {"mode": path.mode, "level": float(path.highest), "pushed": float(pushed)}
+        level, time = float(path.highest), path.time
+        self.mechanism = {"mode": path.mode, "level": level, "pushed": float(pushed), "time": time}
 
     def end_at_knee(self, path: Path) -> None:
         """Take a path's highest level as a step, if only the level has changed on the way."""
@@ -188,9 +197,6 @@ class Filling(Stepper):
     def results(self) -> Results:
         """All tables so far, and what is known of failure and unstable crack growth."""
         found = self.record.results(self.case, self.stopped)
-        if self.mechanism:  # the last steps of the level may have gone a little further
-            most = max(self.mechanism["level"], float(self.state.loading.level))
-            self.mechanism = self.mechanism | {"level": most}
         about = {"mechanism": self.mechanism, "snapped": self.snapped, "ran_on": self.ran_on}
         found.info = {name: value for name, value in about.items() if value}
         return found

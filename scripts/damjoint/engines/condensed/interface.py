@@ -217,12 +217,12 @@ class Interface:
         law's points beside them.
         """
         way, tables = self.along.way, [table for _, table in self.bulk.joint.cells]
-        at, near = distance / self.length, []
-        for table in tables:  # in each element that the line crosses, its nearest node
-            low, high = way[table].min(axis=1), way[table].max(axis=1)
+        at, near, same = distance / self.length, [], 1e-9
+        for table in tables:  # in each element that the line crosses, its nearest nodes
+            low, high = way[table].min(axis=1) - same, way[table].max(axis=1) + same
             crossed = table[(low <= at) & (at <= high)]
-            best = np.abs(way[crossed] - at).argmin(axis=1)
-            near.append(crossed[np.arange(len(crossed)), best])
+            away = np.abs(way[crossed] - at)
+            near.append(crossed[away <= away.min(axis=1, keepdims=True) + same])
         nodes = np.intersect1d(np.concatenate(near), self.along.inside)
         beside = np.concatenate([np.isin(table, nodes).any(axis=1) for table in tables])
         return nodes, np.flatnonzero(beside[self.points.elements])
