@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import fcntl
 import os
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -35,6 +37,21 @@ def whole(path: Path) -> Iterator[Path]:
     finally:
         with contextlib.suppress(OSError):
             part.unlink(missing_ok=True)
+
+
+def check_end(path: Path, end: str) -> None:
+    """Raise OSError (no space left) if a file that another program has written is missing or does
+    not end as it should: programs that do not check their writes leave half of a file on a full
+    disk.
+    """
+    last = b""
+    with contextlib.suppress(FileNotFoundError), path.open("rb") as file:
+        file.seek(max(0, file.seek(0, os.SEEK_END) - len(end)))
+        last = file.read()
+    if last != end.encode():
+        free = shutil.disk_usage(path.parent).free
+        said = f"not written whole ({free} bytes are free in its folder)"
+        raise OSError(errno.ENOSPC, said, str(path))
 
 
 def lock(file: int, path: Path) -> None:
