@@ -20,14 +20,15 @@ PART = ".part."
 def whole(path: Path) -> Iterator[Path]:
     """A path to write to, whose file takes the place of `path` when all is written.
 
-    What fails or is interrupted leaves what was there. A link is replaced, not followed; a device
-    is written to. Raises OSError, naming the path.
+    What fails or is interrupted leaves what was there. A link is replaced, not followed, also one
+    in place of the file being written; a device is written to. Raises OSError, naming the path.
     """
     if path.exists() and not (path.is_file() or path.is_dir()):  # /dev/stdout
         yield path
         return
     part = path.with_name(PART + path.name)
     try:
+        part.unlink(missing_ok=True)
         yield part
         part.replace(path)
     except OSError as error:

@@ -101,6 +101,15 @@ def test_links_lead_nowhere(command, tmp_path):
     assert code == 2 and "fields must be a folder, and not a link" in err
 
 
+def test_nor_through_a_file_that_is_being_written(tmp_path):
+    (tmp_path / "mine.csv").write_text("mine")
+    (tmp_path / ".part.table.csv").symlink_to(tmp_path / "mine.csv")
+    with whole(tmp_path / "table.csv") as part:
+        part.write_text("new")
+    assert (tmp_path / "mine.csv").read_text() == "mine"
+    assert (tmp_path / "table.csv").read_text() == "new"
+
+
 def test_another_run_in_the_folder(command, tmp_path):
     assert command(*RUN)[0] == 0
     before = {p: p.read_bytes() for p in (tmp_path / "out" / "c").iterdir()}
