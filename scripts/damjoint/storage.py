@@ -40,16 +40,16 @@ def whole(path: Path) -> Iterator[Path]:
             part.unlink(missing_ok=True)
 
 
-def check_end(path: Path, end: str) -> None:
+def check_end(path: Path, *ends: str) -> None:
     """Raise OSError (no space left) if a file that another program has written is missing or does
-    not end as it should: programs that do not check their writes leave half of a file on a full
-    disk.
+    not end in one of the ways it should: programs that do not check their writes leave half of a
+    file on a full disk.
     """
     last = b""
     with contextlib.suppress(FileNotFoundError), path.open("rb") as file:
-        file.seek(max(0, file.seek(0, os.SEEK_END) - len(end)))
+        file.seek(max(0, file.seek(0, os.SEEK_END) - max(map(len, ends))))
         last = file.read()
-    if last != end.encode():
+    if not last.endswith(tuple(end.encode() for end in ends)):
         free = shutil.disk_usage(path.parent).free
         said = f"not written whole ({free} bytes are free in its folder)"
         raise OSError(errno.ENOSPC, said, str(path))

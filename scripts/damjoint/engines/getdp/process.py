@@ -189,6 +189,10 @@ def execute(
     return told
 
 
+#: With which of its blocks GetDP's numbering of the unknowns (.pre) can end.
+LAST_BLOCKS = "DofData", "ElementsXEdges", "ElementsXFacets", "ExtendedGroup"
+
+
 def fill(
     case: Case,
     mesh: Mesh,
@@ -213,7 +217,7 @@ def fill(
     threads = 1 if case["dim"] == 2 else 2
     told = execute(problem, ["-msh", str(mesh_file), "-solve", "Fill"], threads, watch)
     if (numbering := problem.with_suffix(".pre")).exists():  # GetDP reads back what it wrote
-        check_end(numbering, "$EndDofData\n")
+        check_end(numbering, *(f"$End{block}\n" for block in LAST_BLOCKS))
     if steps:  # printed, and written
         check_end(folder / "history.txt", "".join(steps))
     status = folder / "status.txt"
