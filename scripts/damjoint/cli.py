@@ -6,7 +6,6 @@ import argparse
 import io
 import os
 import re
-import signal
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -478,18 +477,8 @@ def check_text(word: str) -> None:
         ) from None
 
 
-def heed_signals() -> None:
-    """Let SIGTERM, and a terminal that is closed, end a command as Ctrl-C does; what is ignored
-    (nohup) stays so.
-    """
-    for number in (signal.SIGTERM, signal.SIGHUP):
-        if signal.getsignal(number) == signal.SIG_DFL:
-            signal.signal(number, signal.default_int_handler)
-
-
 def main(argv: list[str] | None = None) -> int:
-    """Entry point: 0 done, 1 failed, 2 bad input, 130 interrupted."""
-    heed_signals()
+    """The command: 0 done, 1 failed, 2 bad input, 130 interrupted."""
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # a locale without a mu for the micrometres
     words = list(sys.argv[1:] if argv is None else argv)
@@ -509,7 +498,10 @@ def main(argv: list[str] | None = None) -> int:
     except RunError as error:
         print(f"damjoint: {error}", file=sys.stderr)
         return 1
-    except OSError as error:  # no space, no permission, a folder that has gone
+    except MemoryError as error:
+        print(f"damjoint: memory: none is left; {error}".rstrip("; "), file=sys.stderr)
+        return 1
+    except (OSError, ImportError) as error:  # no space, no permission, a library that has gone
         print(f"damjoint: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:

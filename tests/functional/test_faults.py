@@ -1,5 +1,6 @@
 """What can go wrong around a run: signals, full disks, links, another run in the same place."""
 
+import argparse
 import contextlib
 import fcntl
 import json
@@ -9,8 +10,10 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
+from damjoint.engines.condensed import factor
 from damjoint.storage import held, whole
 
 BARE = ("--set", "n_joint=10", "--set", "h_dam=3", "--set", "h_found=4", "--no-fields")
@@ -165,3 +168,95 @@ def test_a_damaged_sweep(command, tmp_path, damage):
     code, _, err = command(*words)
     assert code == 2 and "mu.csv: line 2 is damaged" in err
     assert len(err.splitlines()) == 1 and file.read_bytes() == damaged
+
+
+def limited(address_space, *words, cwd):
+    """The command with so much address space [bytes]: exit code and standard error."""
+    bound = lambda: resource.setrlimit(resource.RLIMIT_AS, (address_space, address_space))
+    done = subprocess.run(
+        [sys.executable, "-m", "damjoint", *words],
+        cwd=cwd,
+        env=os.environ | {"DAMJOINT_CACHE": ""},
+        preexec_fn=bound,
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    return done.returncode, done.stderr
+
+
+@pytest.mark.parametrize("megabytes", [100, 310, 410])
+def test_too_little_memory_for_the_libraries(tmp_path, megabytes):
+    """They would crash."""
+    code, err = limited(megabytes * 1_000_000, *RUN, cwd=tmp_path)
+    assert code == 1 and "memory" in err and len(err.splitlines()) == 1
+    assert not any(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("words", [("b", "--no-picture"), ("c", *BARE, "--set", "n_joint=1500")])
+def test_too_little_memory_for_the_case(tmp_path, words):
+    """It is refused before the linear algebra waits for memory that never comes."""
+    code, err = limited(921_600_000, "run", *words, cwd=tmp_path)
+    assert code == 1 and "memory" in err and len(err.splitlines()) == 1, err
+
+
+def test_little_memory_that_is_enough(tmp_path):
+    assert limited(921_600_000, *RUN[:-3], "--levels", "6", cwd=tmp_path) == (0, "")
+
+
+def test_a_computation_that_runs_out_of_memory(command, monkeypatch):
+    def full(*_):
+        raise MemoryError("no 3 GB")
+
+    monkeypatch.setattr("damjoint.engines.condensed.solve.cached", full)
+    code, out, err = command(*RUN)
+    assert (code, out) == (1, "") and "memory" in err and "no 3 GB" in err
+    assert len(err.splitlines()) == 1
+
+
+@pytest.mark.skipif(factor.mumps is None, reason="MUMPS")
+def test_mumps_without_memory(monkeypatch):
+    class Full(RuntimeError):
+        error = -13
+
+    monkeypatch.setattr(factor.mumps, "Context", contextlib.nullcontext)
+    with pytest.raises(MemoryError), factor.context():
+        raise Full("Not enough memory")
+
+
+def test_getdp_is_refused_what_it_has_no_memory_for(command, monkeypatch):
+    """By an estimate before meshing, and by the mesh."""
+    words = "run", "dam", "--engine", "getdp", "--levels", "30", "--no-fields", "--no-picture"
+    code, _, err = command(*words, "--set", "n_joint=50000")
+    assert code == 1 and "need about" in err and len(err.splitlines()) == 1
+    monkeypatch.setattr("damjoint.engines.memory.left", lambda: 1e6)
+    monkeypatch.setattr("damjoint.engines.getdp.solve.bulk_size", lambda _: 0)
+    code, _, err = command(*words, "--set", "n_joint=20")
+    assert code == 1 and "need about" in err and len(err.splitlines()) == 1
+
+
+@pytest.mark.parametrize("streams", ["2>&-", ">&-", "<&- >&- 2>&-"])
+@pytest.mark.parametrize("engine", ["condensed", "getdp"])
+def test_closed_standard_streams(tmp_path, streams, engine):
+    """As cron and services may start a command: it runs."""
+    words = " ".join([*RUN, "--out", "out", "--engine", engine])
+    line = f"exec {sys.executable} -m damjoint {words} {streams}"
+    done = subprocess.run(["bash", "-c", line], cwd=tmp_path, stdout=subprocess.PIPE)
+    assert done.returncode == 0 and (b"stands" in done.stdout) == (streams == "2>&-")
+    assert {"run.json", "joint.csv"} <= {path.name for path in (tmp_path / "out").iterdir()}
+
+
+def test_an_interrupt_during_an_import(tmp_path):
+    """Waits until the import is over; nothing but one line is said."""
+    kill = "import os, signal\nos.kill(os.getpid(), signal.SIGINT)\n"
+    (tmp_path / "argparse.py").write_text(kill + Path(argparse.__file__).read_text())
+    paths = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
+    done = subprocess.run(
+        [sys.executable, "-m", "damjoint", *RUN],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": paths},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 130 and "interrupted" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
