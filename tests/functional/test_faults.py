@@ -143,6 +143,76 @@ def test_a_damaged_run_json(command, tmp_path):
         assert not (tmp_path / "report.html").exists()
 
 
+NESTED = "[" * 100_000 + "]" * 100_000
+
+
+@pytest.mark.parametrize(
+    "old, new",
+    [
+        ("{", NESTED),
+        ('"state": "complete"', f'"state": {NESTED}'),
+        ('"wall_seconds": {', '"wall_seconds": [1], "seconds": {'),
+        ('"versions": {', '"versions": ["damjoint"], "numbers": {'),
+        ('"title": "', '"title": "\\ud800'),
+        ('"case": "c"', '"case": "\\ud800"'),
+        ('"case": "c"', '"case": "c\\u0000"'),
+        ('"case": "c"', '"case": ".."'),
+        ('"case": "c"', '"case": ["c"]'),
+        ('"levels": [', '"levels": [1e400, '),
+    ],
+)
+def test_a_run_json_of_which_nothing_can_be_made(command, tmp_path, old, new):
+    """One line, and a run takes the folder again."""
+    assert command(*RUN)[0] == 0
+    file = tmp_path / "out" / "c" / "run.json"
+    text = file.read_text()
+    assert old in text
+    file.write_text(text.replace(old, new, 1))
+    for words in (("report", "out/c"), ("plot", "out/c")):
+        code, _, err = command(*words)
+        drawn = words[0] == "plot" and "seconds" in new  # which it does not look at
+        assert code == (0 if drawn else 2) and len(err.splitlines()) == (0 if drawn else 1)
+    assert command(*RUN)[0] == 0
+    assert command("plot", "out/c")[0] == 0
+
+
+@pytest.mark.parametrize("name", ["run.json", "history.csv"])
+def test_a_pipe_in_place_of_a_file(tmp_path, name):
+    """It is not waited for. (In a process of its own, which can be ended.)"""
+    call = [sys.executable, "-m", "damjoint"]
+    subprocess.run([*call, *RUN], cwd=tmp_path, check=True)
+    (tmp_path / "out" / "c" / name).unlink()
+    os.mkfifo(tmp_path / "out" / "c" / name)
+    for words in (("report", "out/c"), ("plot", "out/c"), RUN):
+        done = subprocess.run(
+            [*call, *words], cwd=tmp_path, capture_output=True, text=True, timeout=100
+        )
+        assert done.returncode == 2 and len(done.stderr.splitlines()) == 1 and name in done.stderr
+
+
+@pytest.mark.parametrize("table", ["joint.csv", "history.csv"])
+def test_an_infinite_number_in_a_table(command, tmp_path, table):
+    assert command(*RUN)[0] == 0
+    file = tmp_path / "out" / "c" / table
+    head, *rows = file.read_text().splitlines()
+    cells = rows[-1].split(",")
+    cells[head.split(",").index("level")] = "1e400"
+    file.write_text("\n".join([head, *rows[:-1], ",".join(cells)]) + "\n")
+    for word in ("report", "plot"):
+        code, _, err = command(word, "out/c")
+        assert code == 2 and table in err and "infinite" in err and len(err.splitlines()) == 1
+
+
+@pytest.mark.parametrize("to", ["/", ".", "out/c/run.json", "out/c/../c/joint.csv", "out/c/c.png"])
+def test_a_report_that_would_be_in_the_way(command, tmp_path, to):
+    """Of itself, in place of a folder or of a run's own file."""
+    assert command(*RUN)[0] == 0
+    before = {p: p.read_bytes() for p in (tmp_path / "out" / "c").iterdir()}
+    code, _, err = command("report", "out/c", "--to", to)
+    assert code == 2 and f"to = {to}" in err and len(err.splitlines()) == 1
+    assert {p: p.read_bytes() for p in (tmp_path / "out" / "c").iterdir()} == before
+
+
 def test_a_locale_without_all_letters(tmp_path):
     """Of the table's units."""
     locale = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
