@@ -477,6 +477,12 @@ def check_text(word: str) -> None:
         ) from None
 
 
+def one_line(error: BaseException) -> str:
+    """What went wrong, for a terminal: what would end the line or steer the terminal is escaped."""
+    letter = lambda c: c if c.isprintable() else c.encode("unicode_escape").decode()
+    return "damjoint: " + "".join(map(letter, str(error)))
+
+
 def main(argv: list[str] | None = None) -> int:
     """The command: 0 done, 1 failed, 2 bad input, 130 interrupted."""
     if isinstance(sys.stdout, io.TextIOWrapper):
@@ -493,16 +499,16 @@ def main(argv: list[str] | None = None) -> int:
             os.environ[RUN_GEO] = "1"  # for the processes of a sweep, too
         return arguments.call(arguments)
     except InputError as error:
-        print(f"damjoint: {error}", file=sys.stderr)
+        print(one_line(error), file=sys.stderr)
         return 2
     except RunError as error:
-        print(f"damjoint: {error}", file=sys.stderr)
+        print(one_line(error), file=sys.stderr)
         return 1
     except MemoryError as error:
         print(f"damjoint: memory: none is left; {error}".rstrip("; "), file=sys.stderr)
         return 1
     except (OSError, ImportError) as error:  # no space, no permission, a library that has gone
-        print(f"damjoint: {error}", file=sys.stderr)
+        print(one_line(error), file=sys.stderr)
         return 1
     except KeyboardInterrupt:
         said = "interrupted; what has been finished is saved"

@@ -398,10 +398,14 @@ def check_energies(found: Mapping[str, list]) -> None:
     elastic = {
         "G_f": (
             law != "friction",
-            values["sigma_max"] ** 2 / (2 * values["K_N"]),
+            values["sigma_max"] * values["sigma_max"] / (2 * values["K_N"]),
             "sigma_max^2/(2 K_N)",
         ),
-        "G_t": (law == "bond", values["adhesion"] ** 2 / (2 * values["K_T"]), "adhesion^2/(2 K_T)"),
+        "G_t": (
+            law == "bond",
+            values["adhesion"] * values["adhesion"] / (2 * values["K_T"]),
+            "adhesion^2/(2 K_T)",
+        ),
     }
     for name, (matters, least, formula) in elastic.items():
         if matters and not values[name] > least:
