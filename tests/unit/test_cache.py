@@ -132,3 +132,13 @@ def test_another_mesh_makes_other_bodies(kept, monkeypatch):
     """After a change of geo/ or of the elements nothing old is found."""
     monkeypatch.setattr(cache, "sources", lambda: "changed")
     assert cache.cached(load("a", SMALL))[1] is not None
+
+
+def test_the_files_longest_unused_go_first(tmp_path, monkeypatch):
+    """Whatever their names, and no more of them than have to."""
+    for age, name in enumerate("bdac"):
+        (tmp_path / f"{name}.npz").write_bytes(bytes(10))
+        os.utime(tmp_path / f"{name}.npz", (0, 1e9 - 100 * age))
+    monkeypatch.setattr(cache, "LIMIT", 20)
+    cache.prune(tmp_path)
+    assert sorted(file.stem for file in tmp_path.iterdir()) == ["b", "d"]
