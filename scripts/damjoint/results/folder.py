@@ -75,8 +75,8 @@ def earlier(folder: Path) -> dict | None:
     try:
         told = json.loads(file.read_text(encoding="utf-8")) if file.is_file() else {}
         json.dumps(told, ensure_ascii=False).encode()  # half of a letter can not be printed
-        return told if told["versions"]["damjoint"] and is_name(told["case"]) else None
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        return told if told["versions"]["damjoint"] and isinstance(told["case"], str) else None
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return None
 
 
@@ -94,7 +94,7 @@ def clear(folder: Path) -> None:
     pictures = ("", "_curve", "_check", "_critical")
     names = [*TABLES, *(f"{told['case']}{end}.png" for end in pictures)]
     for name in names:
-        if Path(name).name == name:
+        if is_name(name):
             for mark in ("", PART):
                 (folder / (mark + name)).unlink(missing_ok=True)
     fields = folder / "fields"

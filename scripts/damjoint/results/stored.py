@@ -10,7 +10,7 @@ import meshio
 import numpy as np
 
 from .. import InputError
-from ..scene.case import SECTION, SHARED, Case
+from ..scene.case import SECTION, SHARED, Case, is_name
 from ..scene.mesh import Body
 from ..scene.parameters import INCLUDE, assignments, constants, declared, listing, parse
 from .fields import Field, Solution
@@ -77,6 +77,8 @@ def case_of(told: dict) -> Case:
 
     Raises KeyError, TypeError, InputError (a ValueError) if it tells of none.
     """
+    if not is_name(told["case"]):
+        raise InputError(f"case {told['case']!r}: must be the name of a case")
     if missing := [n for n in declared() if n not in told["parameters"]]:
         made = told["versions"]["damjoint"]
         raise InputError(f"parameters {', '.join(missing)} are unknown to its damjoint {made}")
