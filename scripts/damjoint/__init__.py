@@ -8,13 +8,16 @@ accuracy.py  the mesh that an accuracy asks for, and what is still wrong on it
 run.py    one case, solved and written
 studies/  what is done with runs: checks, sweeps, critical values, benchmarks, a law along a path
 window/   the Gmsh window, with the condensed engine behind it
-cli.py    the command line
+cli.py    the command line; __main__.py what has to be done before it
 
 Each of them uses only those above it.
 """
 
-from importlib.resources import files
-from pathlib import Path
+from __future__ import annotations
+
+TYPE_CHECKING = False  # typing's own takes time in which an interrupt is not yet heeded
+if TYPE_CHECKING:
+    from pathlib import Path
 
 __version__ = "0.2.0"
 
@@ -42,5 +45,8 @@ def data(folder: str) -> Path:
     """The folder geo, pro, cases or reference: in the package where it is installed, else in the
     checkout.
     """
+    from importlib.resources import files
+    from pathlib import Path
+
     packaged = Path(str(files(__name__))) / folder
     return packaged if packaged.is_dir() else Path(__file__).resolve().parents[2] / folder

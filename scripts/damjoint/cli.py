@@ -6,7 +6,6 @@ import argparse
 import io
 import os
 import re
-import signal
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -478,18 +477,14 @@ def check_text(word: str) -> None:
         ) from None
 
 
-def heed_signals() -> None:
-    """Let SIGTERM, and a terminal that is closed, end a command as Ctrl-C does; what is ignored
-    (nohup) stays so.
-    """
-    for number in (signal.SIGTERM, signal.SIGHUP):
-        if signal.getsignal(number) == signal.SIG_DFL:
-            signal.signal(number, signal.default_int_handler)
+def one_line(error: BaseException) -> str:
+    """What went wrong, for a terminal: what would end the line or steer the terminal is escaped."""
+    letter = lambda c: c if c.isprintable() else c.encode("unicode_escape").decode()
+    return "damjoint: " + "".join(map(letter, str(error)))
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Entry point: 0 done, 1 failed, 2 bad input, 130 interrupted."""
-    heed_signals()
+    """The command: 0 done, 1 failed, 2 bad input, 130 interrupted."""
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # a locale without a mu for the micrometres
     words = list(sys.argv[1:] if argv is None else argv)
@@ -504,13 +499,16 @@ def main(argv: list[str] | None = None) -> int:
             os.environ[RUN_GEO] = "1"  # for the processes of a sweep, too
         return arguments.call(arguments)
     except InputError as error:
-        print(f"damjoint: {error}", file=sys.stderr)
+        print(one_line(error), file=sys.stderr)
         return 2
     except RunError as error:
-        print(f"damjoint: {error}", file=sys.stderr)
+        print(one_line(error), file=sys.stderr)
         return 1
-    except OSError as error:  # no space, no permission, a folder that has gone
-        print(f"damjoint: {error}", file=sys.stderr)
+    except MemoryError as error:
+        print(f"damjoint: memory: none is left; {error}".rstrip("; "), file=sys.stderr)
+        return 1
+    except (OSError, ImportError) as error:  # no space, no permission, a library that has gone
+        print(one_line(error), file=sys.stderr)
         return 1
     except KeyboardInterrupt:
         said = "interrupted; what has been finished is saved"

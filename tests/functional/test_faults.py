@@ -1,5 +1,6 @@
 """What can go wrong around a run: signals, full disks, links, another run in the same place."""
 
+import argparse
 import contextlib
 import fcntl
 import json
@@ -9,8 +10,10 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
+from damjoint.engines.condensed import factor
 from damjoint.storage import held, whole
 
 BARE = ("--set", "n_joint=10", "--set", "h_dam=3", "--set", "h_found=4", "--no-fields")
@@ -101,6 +104,15 @@ def test_links_lead_nowhere(command, tmp_path):
     assert code == 2 and "fields must be a folder, and not a link" in err
 
 
+def test_nor_through_a_file_that_is_being_written(tmp_path):
+    (tmp_path / "mine.csv").write_text("mine")
+    (tmp_path / ".part.table.csv").symlink_to(tmp_path / "mine.csv")
+    with whole(tmp_path / "table.csv") as part:
+        part.write_text("new")
+    assert (tmp_path / "mine.csv").read_text() == "mine"
+    assert (tmp_path / "table.csv").read_text() == "new"
+
+
 def test_another_run_in_the_folder(command, tmp_path):
     assert command(*RUN)[0] == 0
     before = {p: p.read_bytes() for p in (tmp_path / "out" / "c").iterdir()}
@@ -131,6 +143,76 @@ def test_a_damaged_run_json(command, tmp_path):
         assert not (tmp_path / "report.html").exists()
 
 
+NESTED = "[" * 100_000 + "]" * 100_000
+
+
+@pytest.mark.parametrize(
+    "old, new",
+    [
+        ("{", NESTED),
+        ('"state": "complete"', f'"state": {NESTED}'),
+        ('"wall_seconds": {', '"wall_seconds": [1], "seconds": {'),
+        ('"versions": {', '"versions": ["damjoint"], "numbers": {'),
+        ('"title": "', '"title": "\\ud800'),
+        ('"case": "c"', '"case": "\\ud800"'),
+        ('"case": "c"', '"case": "c\\u0000"'),
+        ('"case": "c"', '"case": ".."'),
+        ('"case": "c"', '"case": ["c"]'),
+        ('"levels": [', '"levels": [1e400, '),
+    ],
+)
+def test_a_run_json_of_which_nothing_can_be_made(command, tmp_path, old, new):
+    """One line, and a run takes the folder again."""
+    assert command(*RUN)[0] == 0
+    file = tmp_path / "out" / "c" / "run.json"
+    text = file.read_text()
+    assert old in text
+    file.write_text(text.replace(old, new, 1))
+    for words in (("report", "out/c"), ("plot", "out/c")):
+        code, _, err = command(*words)
+        drawn = words[0] == "plot" and "seconds" in new  # which it does not look at
+        assert code == (0 if drawn else 2) and len(err.splitlines()) == (0 if drawn else 1)
+    assert command(*RUN)[0] == 0
+    assert command("plot", "out/c")[0] == 0
+
+
+@pytest.mark.parametrize("name", ["run.json", "history.csv"])
+def test_a_pipe_in_place_of_a_file(tmp_path, name):
+    """It is not waited for. (In a process of its own, which can be ended.)"""
+    call = [sys.executable, "-m", "damjoint"]
+    subprocess.run([*call, *RUN], cwd=tmp_path, check=True)
+    (tmp_path / "out" / "c" / name).unlink()
+    os.mkfifo(tmp_path / "out" / "c" / name)
+    for words in (("report", "out/c"), ("plot", "out/c"), RUN):
+        done = subprocess.run(
+            [*call, *words], cwd=tmp_path, capture_output=True, text=True, timeout=100
+        )
+        assert done.returncode == 2 and len(done.stderr.splitlines()) == 1 and name in done.stderr
+
+
+@pytest.mark.parametrize("table", ["joint.csv", "history.csv"])
+def test_an_infinite_number_in_a_table(command, tmp_path, table):
+    assert command(*RUN)[0] == 0
+    file = tmp_path / "out" / "c" / table
+    head, *rows = file.read_text().splitlines()
+    cells = rows[-1].split(",")
+    cells[head.split(",").index("level")] = "1e400"
+    file.write_text("\n".join([head, *rows[:-1], ",".join(cells)]) + "\n")
+    for word in ("report", "plot"):
+        code, _, err = command(word, "out/c")
+        assert code == 2 and table in err and "infinite" in err and len(err.splitlines()) == 1
+
+
+@pytest.mark.parametrize("to", ["/", ".", "out/c/run.json", "out/c/../c/joint.csv", "out/c/c.png"])
+def test_a_report_that_would_be_in_the_way(command, tmp_path, to):
+    """Of itself, in place of a folder or of a run's own file."""
+    assert command(*RUN)[0] == 0
+    before = {p: p.read_bytes() for p in (tmp_path / "out" / "c").iterdir()}
+    code, _, err = command("report", "out/c", "--to", to)
+    assert code == 2 and f"to = {to}" in err and len(err.splitlines()) == 1
+    assert {p: p.read_bytes() for p in (tmp_path / "out" / "c").iterdir()} == before
+
+
 def test_a_locale_without_all_letters(tmp_path):
     """Of the table's units."""
     locale = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
@@ -156,3 +238,95 @@ def test_a_damaged_sweep(command, tmp_path, damage):
     code, _, err = command(*words)
     assert code == 2 and "mu.csv: line 2 is damaged" in err
     assert len(err.splitlines()) == 1 and file.read_bytes() == damaged
+
+
+def limited(address_space, *words, cwd):
+    """The command with so much address space [bytes]: exit code and standard error."""
+    bound = lambda: resource.setrlimit(resource.RLIMIT_AS, (address_space, address_space))
+    done = subprocess.run(
+        [sys.executable, "-m", "damjoint", *words],
+        cwd=cwd,
+        env=os.environ | {"DAMJOINT_CACHE": ""},
+        preexec_fn=bound,
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    return done.returncode, done.stderr
+
+
+@pytest.mark.parametrize("megabytes", [100, 310, 410])
+def test_too_little_memory_for_the_libraries(tmp_path, megabytes):
+    """They would crash."""
+    code, err = limited(megabytes * 1_000_000, *RUN, cwd=tmp_path)
+    assert code == 1 and "memory" in err and len(err.splitlines()) == 1
+    assert not any(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("words", [("b", "--no-picture"), ("c", *BARE, "--set", "n_joint=1500")])
+def test_too_little_memory_for_the_case(tmp_path, words):
+    """It is refused before the linear algebra waits for memory that never comes."""
+    code, err = limited(921_600_000, "run", *words, cwd=tmp_path)
+    assert code == 1 and "memory" in err and len(err.splitlines()) == 1, err
+
+
+def test_little_memory_that_is_enough(tmp_path):
+    assert limited(921_600_000, *RUN[:-3], "--levels", "6", cwd=tmp_path) == (0, "")
+
+
+def test_a_computation_that_runs_out_of_memory(command, monkeypatch):
+    def full(*_):
+        raise MemoryError("no 3 GB")
+
+    monkeypatch.setattr("damjoint.engines.condensed.solve.cached", full)
+    code, out, err = command(*RUN)
+    assert (code, out) == (1, "") and "memory" in err and "no 3 GB" in err
+    assert len(err.splitlines()) == 1
+
+
+@pytest.mark.skipif(factor.mumps is None, reason="MUMPS")
+def test_mumps_without_memory(monkeypatch):
+    class Full(RuntimeError):
+        error = -13
+
+    monkeypatch.setattr(factor.mumps, "Context", contextlib.nullcontext)
+    with pytest.raises(MemoryError), factor.context():
+        raise Full("Not enough memory")
+
+
+def test_getdp_is_refused_what_it_has_no_memory_for(command, monkeypatch):
+    """By an estimate before meshing, and by the mesh."""
+    words = "run", "dam", "--engine", "getdp", "--levels", "30", "--no-fields", "--no-picture"
+    code, _, err = command(*words, "--set", "n_joint=50000")
+    assert code == 1 and "need about" in err and len(err.splitlines()) == 1
+    monkeypatch.setattr("damjoint.engines.memory.left", lambda: 1e6)
+    monkeypatch.setattr("damjoint.engines.getdp.solve.bulk_size", lambda _: 0)
+    code, _, err = command(*words, "--set", "n_joint=20")
+    assert code == 1 and "need about" in err and len(err.splitlines()) == 1
+
+
+@pytest.mark.parametrize("streams", ["2>&-", ">&-", "<&- >&- 2>&-"])
+@pytest.mark.parametrize("engine", ["condensed", "getdp"])
+def test_closed_standard_streams(tmp_path, streams, engine):
+    """As cron and services may start a command: it runs."""
+    words = " ".join([*RUN, "--out", "out", "--engine", engine])
+    line = f"exec {sys.executable} -m damjoint {words} {streams}"
+    done = subprocess.run(["bash", "-c", line], cwd=tmp_path, stdout=subprocess.PIPE)
+    assert done.returncode == 0 and (b"stands" in done.stdout) == (streams == "2>&-")
+    assert {"run.json", "joint.csv"} <= {path.name for path in (tmp_path / "out").iterdir()}
+
+
+def test_an_interrupt_during_an_import(tmp_path):
+    """Waits until the import is over; nothing but one line is said."""
+    kill = "import os, signal\nos.kill(os.getpid(), signal.SIGINT)\n"
+    (tmp_path / "argparse.py").write_text(kill + Path(argparse.__file__).read_text())
+    paths = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
+    done = subprocess.run(
+        [sys.executable, "-m", "damjoint", *RUN],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": paths},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 130 and "interrupted" in done.stderr
+    assert len(done.stderr.splitlines()) == 1

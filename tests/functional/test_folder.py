@@ -1,8 +1,11 @@
 """The output folder: what a run leaves there, and what it must never do to what is there."""
 
 import json
+import shutil
 import tempfile
+from pathlib import Path
 
+import gmsh
 import numpy as np
 import pytest
 from damjoint.engines.getdp import process
@@ -186,6 +189,37 @@ def test_a_getdp_that_leaves_rubbish(command, tmp_path, fake_getdp, left, said):
     code, out, err = command("run", "c", *BARE, "--engine", "getdp")
     assert (code, out) == (1, "") and len(err.splitlines()) == 1 and said in err
     assert json.loads((tmp_path / "out/c/run.json").read_text())["state"] == "failed"
+
+
+@pytest.mark.parametrize("size", [0, -1])
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("scene.pre", "history.txt", "status.txt", "jump_1.txt", "traction_2.txt", "way_2.txt"),
+        *("mean_jump_1.txt", "lambda_2.txt", "u_dam_1.txt", "stress_2.txt"),
+    ],
+)
+def test_a_file_of_getdp_that_is_not_whole(command, tmp_path, fake_getdp, name, size):
+    """GetDP does not notice a full disk: it is a fault, never the dam's."""
+    cut = f"head -c {size} {name} > cut && mv cut {name}"
+    fake_getdp(f'{shutil.which("getdp")} "$@" && {cut}')
+    code, out, err = command("run", "c", *BARE[:-2], "--levels", "3,6", "--engine", "getdp")
+    assert (code, out) == (1, "") and len(err.splitlines()) == 1 and name in err
+    assert json.loads((tmp_path / "out/c/run.json").read_text())["state"] == "failed"
+
+
+def test_a_law_whose_table_lacks_a_row(command, tmp_path, fake_getdp):
+    (tmp_path / "path.csv").write_text("delta_n,delta_t1,delta_t2\n0,0,0\n1e-6,0,0\n")
+    fake_getdp(f"{shutil.which('getdp')} \"$@\" && sed -i '$d' law.txt")
+    code, out, err = command("law", "rupture", "--path", "path.csv")
+    assert (code, out) == (1, "") and "1 of 2 rows" in err and len(err.splitlines()) == 1
+
+
+def test_a_mesh_that_is_not_whole(command, tmp_path, monkeypatch):
+    """Gmsh does not notice a full disk."""
+    monkeypatch.setattr(gmsh, "write", lambda path: Path(path).write_bytes(b"$MeshFormat"))
+    code, out, err = command("run", "c", *BARE, "--levels", "3,6", "--engine", "getdp")
+    assert (code, out) == (1, "") and len(err.splitlines()) == 1 and "scene.msh" in err
 
 
 @pytest.mark.parametrize("version", ["2.11.3", "rubbish"])

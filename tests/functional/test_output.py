@@ -8,6 +8,7 @@ import sys
 import meshio
 import numpy as np
 import pytest
+from damjoint.results.tables import write_csv
 from numpy.testing import assert_allclose
 
 JOINT = "time,level,x,y,z,delta_n,delta_t1,delta_t2,sigma_n,tau_1,tau_2,p,damage,slip,s,sigma_n_eff"
@@ -15,6 +16,27 @@ HISTORY = (
     "time,level,load_factor,iterations,cuts,residual,crack_length,process_zone,slip_length,max_opening,"
     "crest_ux,N,T,M,flux,tail_level,U,x_resultant"
 )
+
+
+def test_a_text_is_no_formula(tmp_path):
+    """Of a spreadsheet; a number stays one."""
+    table = {"case": ["=1+1", "+x", "-2.5", "@x", "a=1"], "n": np.array([-1.0] * 5)}
+    write_csv(tmp_path / "t.csv", table)
+    cells = [line.split(",") for line in (tmp_path / "t.csv").read_text().splitlines()[1:]]
+    assert [cell for cell, _ in cells] == ["'=1+1", "'+x", "-2.5", "'@x", "a=1"]
+    assert {number for _, number in cells} == {"-1"}
+
+
+def test_a_matplotlibrc_of_the_present_folder_changes_nothing(tmp_path):
+    (tmp_path / "matplotlibrc").write_text("axes.facecolor: red\nfont.size: 40\n")
+    script = (
+        "from damjoint.results import drawing\nimport matplotlib as m\n"
+        "print(m.rcParams['axes.facecolor'], m.rcParams['font.size'])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert done.stdout.split() == ["white", "10.0"], done.stderr
 
 
 def read(path):

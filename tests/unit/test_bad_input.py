@@ -221,6 +221,51 @@ def test_level_that_is_no_number(tmp_path):
     assert done.stdout == "" and len(done.stderr.splitlines()) == 1 and "nan" in done.stderr
 
 
+@pytest.mark.parametrize(
+    "words, parts",
+    [
+        (("--sample", "5", "mu=ksone(1000000)"), ("ksone is none",)),
+        (("--sample", "5", "mu=normal(1e308,1e308)"), ("mu=normal(1e308,1e308)",)),
+        (("--vary", "mu=1e308"), ("mu = 1e308", "<= 1e+06")),
+        (("--vary", "mu=0.5", "--tie", "adhesion=1if 1else 2"), ("--tie adhesion=1if 1else 2",)),
+        (("--vary", "mu=0.5", "--tie", "adhesion=1+\n2"), (r"--tie adhesion=1+\n2",)),
+    ],
+)
+def test_a_sweep_in_one_line(tmp_path, words, parts):
+    """In a process of its own, whose warnings are seen."""
+    done = subprocess.run(
+        [sys.executable, "-m", "damjoint", "sweep", "c", *words],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    assert done.returncode == 2 and len(done.stderr.splitlines()) == 1, done.stderr
+    assert all(part in done.stderr for part in parts) and not any(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("law, name", [("rupture", "sigma_max"), ("bond", "adhesion")])
+def test_a_strength_whose_square_overflows(command, law, name):
+    code, _, err = command(*RUN, "--set", f"{name}=1e308", "--set", f"law={law}")
+    assert code == 2 and len(err.splitlines()) == 1
+
+
+def test_escape_sequences_do_not_reach_the_terminal(command, tmp_path):
+    for text in ('title = "a \x1b[31m";', "bad \x1b[31m = 3;", 'title = "a \x9b31m";'):
+        (tmp_path / "my.case").write_text(text, encoding="utf-8")
+        code, _, err = command("run", "my.case")
+        assert code == 2 and err[:-1].isprintable() and "line 1" in err
+
+
+@pytest.mark.parametrize("name", ["...case", "..case", "my\x1b[31m.case", "a" * 230 + ".case"])
+def test_a_case_that_can_not_have_a_folder(command, tmp_path, name):
+    (tmp_path / "in").mkdir()
+    (tmp_path / "in" / name).write_text("default_n_joint = 8;")
+    code, _, err = command("run", f"in/{name}")
+    assert code == 2 and err[:-1].isprintable() and "must be called" in err
+    assert [path.name for path in tmp_path.iterdir()] == ["in"]
+
+
 def test_a_bad_case_does_not_spoil_the_next_one(tmp_path):
     (tmp_path / "bad.case").write_text(
         "default_nu = unheard_of; default_E = 1e9;\ntimes() = {1};\n"

@@ -1,5 +1,6 @@
 """Condensed bodies on disk: whole, of this scene and version, or made anew; nothing is executed."""
 
+import os
 import pickle
 
 import numpy as np
@@ -63,6 +64,54 @@ def test_a_bad_entry_is_made_anew(kept, tmp_path, damage):
     assert cache.cached(load("a", SMALL))[1] is None  # and kept again
 
 
+@pytest.mark.parametrize(
+    "place, value",
+    [
+        pytest.param(6, 99, id="version"),
+        pytest.param(8, 1, id="encrypted"),
+        pytest.param(10, 97, id="compression"),
+        pytest.param(46, 0, id="name"),
+    ],
+)
+def test_a_flipped_byte_is_a_miss_once(kept, place, value):
+    """In an entry of the zip file's directory."""
+    file, made = kept
+    data = bytearray(file.read_bytes())
+    data[data.index(b"PK\x01\x02") + place] = value
+    file.write_bytes(data)
+    found, bodies = cache.cached(load("a", SMALL))
+    assert bodies is not None and same(found, made)
+    assert cache.cached(load("a", SMALL))[1] is None  # and replaced
+
+
+def test_an_array_that_is_missing_is_a_miss(kept):
+    """As one of the loads is if the length of the entry before it in the directory is damaged."""
+    file, made = kept
+    with np.load(file) as found:
+        np.savez(file, **{name: found[name] for name in found.files if name != "units/dam_x"})
+    found, bodies = cache.cached(load("a", SMALL))
+    assert bodies is not None and found.units.keys() == made.units.keys()
+
+
+def test_a_pipe_in_place_of_an_entry(kept):
+    file, made = kept
+    file.unlink()
+    os.mkfifo(file)
+    found, bodies = cache.cached(load("a", SMALL))
+    assert bodies is not None and same(found, made)
+
+
+def test_nothing_is_written_through_links(kept, tmp_path_factory):
+    file, _ = kept
+    mine = tmp_path_factory.mktemp("mine") / "mine"
+    mine.write_text("mine")
+    file.with_suffix(f".{os.getpid()}").symlink_to(mine)
+    file.write_bytes(b"")
+    assert cache.cached(load("a", SMALL))[1] is not None
+    assert mine.read_text() == "mine"
+    assert cache.cached(load("a", SMALL))[1] is None
+
+
 def test_an_array_of_objects_is_not_loaded(kept, tmp_path):
     file, made = kept
     with np.load(file) as found:
@@ -83,3 +132,13 @@ def test_another_mesh_makes_other_bodies(kept, monkeypatch):
     """After a change of geo/ or of the elements nothing old is found."""
     monkeypatch.setattr(cache, "sources", lambda: "changed")
     assert cache.cached(load("a", SMALL))[1] is not None
+
+
+def test_the_files_longest_unused_go_first(tmp_path, monkeypatch):
+    """Whatever their names, and no more of them than have to."""
+    for age, name in enumerate("bdac"):
+        (tmp_path / f"{name}.npz").write_bytes(bytes(10))
+        os.utime(tmp_path / f"{name}.npz", (0, 1e9 - 100 * age))
+    monkeypatch.setattr(cache, "LIMIT", 20)
+    cache.prune(tmp_path)
+    assert sorted(file.stem for file in tmp_path.iterdir()) == ["b", "d"]

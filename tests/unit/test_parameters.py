@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from damjoint import InputError
 from damjoint.scene import parameters
-from damjoint.scene.case import load
+from damjoint.scene.case import CASES, as_published, load
 from damjoint.scene.parameters import independent
 from numpy.testing import assert_allclose
 
@@ -237,3 +237,13 @@ def test_a_changed_case_is_checked():
             base.changed({name: value})
     with pytest.raises(KeyError):
         base.changed({"K_N": 1e12})
+
+
+def test_a_case_is_as_published_with_another_mesh_only():
+    """Solver and uplift, too; any other parameter makes it the user's."""
+    groups = {name: known.group for name, known in parameters.declared().items()}
+    kept = {n for n in groups if as_published(CASES / "a.case", {n: 0}, None, None)}
+    assert kept == {n for n in groups if groups[n] in ("Mesh", "Solver")} | {"order", "uplift"}
+    assert {"n_joint", "tolerance"} <= kept and not {"mu", "sigma_max", "K_N", "law"} & kept
+    assert load("a", {"n_joint": 10}).published and not load("a", {"sigma_max": 2e4}).published
+    assert not load("a", levels="3").published

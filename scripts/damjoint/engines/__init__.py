@@ -3,7 +3,7 @@
 `check(case)` of engines/condensed/solve.py and of engines/getdp/solve.py raises InputError, and
 `solve(case, on_step, fields)` gives, scene by scene, an Outcome (fields: whether the bodies' fields
 will be asked for; raises RunError). They know nothing of output folders, and what uses them nothing
-of their insides.
+of their insides. memory.py tells both what a case needs.
 """
 
 from __future__ import annotations

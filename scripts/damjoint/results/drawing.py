@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg  # not pyplot: it costs half of a 2D run
 from matplotlib.figure import Figure, FigureBase
 
 from ..storage import whole
+
+matplotlib.rcdefaults()  # not what a matplotlibrc in the present folder says
 
 BLUE, ORANGE, WATER, RED, GREEN = "#0b5394", "#cc7a00", "#3d9be0", "#b3261e", "#2e7d32"
 VIOLET = "#8e24aa"

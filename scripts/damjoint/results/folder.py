@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from .. import InputError, __version__
-from ..scene.case import Case
+from ..scene.case import Case, is_name
 from ..scene.parameters import declared
 from ..storage import PART, held, whole
 from .tables import HISTORY, Results, joint_columns
@@ -71,10 +71,12 @@ def earlier(folder: Path) -> dict | None:
     """The run.json of an earlier run in this folder; None if there is none that damjoint has
     written.
     """
+    file = folder / "run.json"
     try:
-        told = json.loads((folder / "run.json").read_text(encoding="utf-8"))
-        return told if "damjoint" in told["versions"] and isinstance(told["case"], str) else None
-    except (OSError, ValueError, KeyError, TypeError):
+        told = json.loads(file.read_text(encoding="utf-8")) if file.is_file() else {}
+        json.dumps(told, ensure_ascii=False).encode()  # half of a letter can not be printed
+        return told if told["versions"]["damjoint"] and isinstance(told["case"], str) else None
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return None
 
 
@@ -92,7 +94,7 @@ def clear(folder: Path) -> None:
     pictures = ("", "_curve", "_check", "_critical")
     names = [*TABLES, *(f"{told['case']}{end}.png" for end in pictures)]
     for name in names:
-        if Path(name).name == name:
+        if is_name(name):
             for mark in ("", PART):
                 (folder / (mark + name)).unlink(missing_ok=True)
     fields = folder / "fields"

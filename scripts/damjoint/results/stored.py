@@ -10,7 +10,7 @@ import meshio
 import numpy as np
 
 from .. import InputError
-from ..scene.case import SECTION, SHARED, Case
+from ..scene.case import SECTION, SHARED, Case, is_name
 from ..scene.mesh import Body
 from ..scene.parameters import INCLUDE, assignments, constants, declared, listing, parse
 from .fields import Field, Solution
@@ -18,7 +18,10 @@ from .folder import earlier
 from .tables import HISTORY, Results
 
 #: What is raised where files are not what a run writes; a SyntaxError by XML.
-DAMAGED = (OSError, ValueError, LookupError, TypeError, SyntaxError, meshio.ReadError)
+DAMAGED = (
+    *(OSError, ValueError, LookupError, TypeError, AttributeError, ArithmeticError),
+    *(RecursionError, SyntaxError, meshio.ReadError),
+)
 
 
 def runs_in(folder: Path) -> list[Path]:
@@ -77,17 +80,19 @@ def case_of(told: dict) -> Case:
 
     Raises KeyError, TypeError, InputError (a ValueError) if it tells of none.
     """
-    name = told["case"]
-    if Path(name).name != name:
-        raise InputError(f"case {name!r}: must be the name of a case")
+    if not is_name(told["case"]):
+        raise InputError(f"case {told['case']!r}: must be the name of a case")
     if missing := [n for n in declared() if n not in told["parameters"]]:
         made = told["versions"]["damjoint"]
         raise InputError(f"parameters {', '.join(missing)} are unknown to its damjoint {made}")
     values = {n: p.check(told["parameters"][n]) for n, p in declared().items()}
     lists = {n: tuple(map(float, told[n])) for n in ("levels", "tail_levels", "times")}
+    for name, numbers in lists.items():
+        if not np.isfinite(numbers).all():
+            raise InputError(f"{name} = {','.join(map(str, numbers))}: must be finite")
     found = parse(resolved(values, lists["levels"]))
     return Case(
-        name,
+        told["case"],
         str(told["title"]).encode(errors="replace").decode(),
         values,
         **lists,
@@ -105,11 +110,20 @@ def resolved(values: dict, levels: tuple[float, ...]) -> str:
 
 
 def read_csv(path: Path) -> dict[str, np.ndarray]:
-    """A table of numbers by column."""
+    """A table of numbers by column; where there is none they are nan, but never infinite."""
+    check_file(path)
     with path.open(newline="") as file:
         head, *rows = csv.reader(file)
     numbers = np.array(rows, float).reshape(len(rows), len(head))
+    if np.isinf(numbers).any():
+        raise ValueError(f"{path.name} has infinite numbers")
     return dict(zip(head, numbers.T, strict=True))
+
+
+def check_file(path: Path) -> None:
+    """Raise OSError if it is none: a pipe would be read without end."""
+    if not path.is_file():
+        raise OSError(f"{path.name} is no file")
 
 
 def fields_in(folder: Path, times: np.ndarray) -> tuple[dict[str, Body], dict[float, Field]]:
@@ -118,6 +132,7 @@ def fields_in(folder: Path, times: np.ndarray) -> tuple[dict[str, Body], dict[fl
     for time in times.tolist():
         path = folder / f"bulk_t{time:g}.vtu"
         if path.is_file():
+            check_file(folder / f"joint_t{time:g}.vtu")
             # not meshio.read: it leaves the process where a file is damaged
             bulk, joint = (meshio.vtu.read(p) for p in (path, folder / f"joint_t{time:g}.vtu"))
             parts = {"dam": part(bulk, "dam"), "foundation": part(bulk, "foundation", "lower")}

@@ -199,9 +199,20 @@ def history_table(case: Case, rows: dict[str, np.ndarray]) -> dict[str, np.ndarr
     return {name: rows[name] for name in HISTORY}
 
 
+def as_text(cell: str) -> str:
+    """A cell of a table that a spreadsheet shows and does not compute: a text that begins as a
+    formula does gets an apostrophe before it, a number none.
+    """
+    try:
+        float(cell)
+    except ValueError:
+        return "'" + cell if cell[:1] in tuple("=+-@\t\r") else cell
+    return cell
+
+
 def write_csv(target: Path | TextIO, table: dict[str, np.ndarray | list]) -> None:
     """Write a table with its column names to a path or an open file; numbers with twelve digits,
-    texts as they are.
+    texts so that no spreadsheet takes them for a formula.
     """
     if isinstance(target, Path):
         with whole(target) as path, path.open("w", newline="") as file:
@@ -210,7 +221,9 @@ def write_csv(target: Path | TextIO, table: dict[str, np.ndarray | list]) -> Non
     writer = csv.writer(target, lineterminator="\n")
     writer.writerow(table)
     rows = zip(*table.values(), strict=True)
-    writer.writerows([v if isinstance(v, str) else f"{v:.12g}" for v in row] for row in rows)
+    writer.writerows(
+        [as_text(v) if isinstance(v, str) else f"{v:.12g}" for v in row] for row in rows
+    )
 
 
 def write(results: Results, folder: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import math
 import operator
+import warnings
 from collections.abc import Mapping
 
 OPERATORS = {
@@ -24,8 +25,10 @@ def parsed(text: str) -> ast.expr:
     Raises ValueError.
     """
     try:
-        return ast.parse(text.strip().replace("^", "**"), mode="eval").body
-    except (SyntaxError, RecursionError, MemoryError):
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # Python warns of 1if 1else 2
+            return ast.parse(text.strip().replace("^", "**"), mode="eval").body
+    except (SyntaxError, Warning, RecursionError, MemoryError):
         raise ValueError(text) from None
 
 

@@ -171,13 +171,30 @@ def between(levels: tuple[float, ...], time: float) -> float:
     return points[i] + (time - i) * (points[i + 1] - points[i])
 
 
+def is_name(text: str) -> bool:
+    """Whether a text can be a case's name, which its files and its folder carry: one part of a path
+    that leads nowhere else, with nothing that a terminal would obey.
+    """
+    single = Path(text).name == text and text.strip(".")
+    return bool(single) and text.isprintable() and len(text.encode()) <= LONGEST_NAME
+
+
+#: Bytes of a case's name, for a file's has 255.
+LONGEST_NAME = 200
+
+
 def case_file(case: str) -> Path:
     """The file of a case given by letter, name or path.
 
-    Raises InputError if there is none.
+    Raises InputError if there is none, or its name can not be that of a folder.
     """
     for path in (CASES / f"{case.lower()}.case", Path(case)):
         if path.suffix == ".case" and os.path.isfile(path):  # False for any name, however odd
+            if not is_name(path.stem):
+                raise InputError(
+                    f"case {case!r}: must be called by printable letters, at most {LONGEST_NAME} "
+                    "bytes, and not . or .."
+                )
             return path
     names = ", ".join(path.stem for path in sorted(CASES.glob("*.case")))
     raise InputError(f"case {case}: unknown; allowed: {names}, or the path of a .case file")
@@ -381,10 +398,14 @@ def check_energies(found: Mapping[str, list]) -> None:
     elastic = {
         "G_f": (
             law != "friction",
-            values["sigma_max"] ** 2 / (2 * values["K_N"]),
+            values["sigma_max"] * values["sigma_max"] / (2 * values["K_N"]),
             "sigma_max^2/(2 K_N)",
         ),
-        "G_t": (law == "bond", values["adhesion"] ** 2 / (2 * values["K_T"]), "adhesion^2/(2 K_T)"),
+        "G_t": (
+            law == "bond",
+            values["adhesion"] * values["adhesion"] / (2 * values["K_T"]),
+            "adhesion^2/(2 K_T)",
+        ),
     }
     for name, (matters, least, formula) in elastic.items():
         if matters and not values[name] > least:

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import difflib
 import re
+import unicodedata
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -87,6 +88,8 @@ def read_into(found: CaseText, path: Path) -> None:
         first = first if statement else text.count("\n", 0, match.start()) + 1
         statement.append((kind, token))
         where = f"case {path}, line {first}"
+        if kind == "text" and any(unicodedata.category(c) == "Cc" and c != "\t" for c in token):
+            raise InputError(f"{where}: {token}: must have no control characters")
         if kind == "other":
             raise InputError(f"{where}: {said(statement)}: {token!r} is not part of a case")
         if token == ";":

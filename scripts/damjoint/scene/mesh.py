@@ -12,6 +12,7 @@ import numpy as np
 from scipy import sparse
 
 from .. import InputError, RunError, data
+from ..storage import check_end
 from .case import Case, has_drains
 from .parameters import assignments, constants, start_gmsh
 
@@ -379,12 +380,16 @@ class Mesh:
         }
 
     def write(self, path: Path) -> None:
-        """Write the mesh for GetDP (MSH 2.2, binary); only while it is Gmsh's current one."""
+        """Write the mesh for GetDP (MSH 2.2, binary); only while it is Gmsh's current one.
+
+        Raises OSError if the disk is full: Gmsh itself says nothing then.
+        """
         gmsh.option.setNumber("Mesh.MshFileVersion", 2.2)
         # else elements are numbered anew, shape by shape
         gmsh.option.setNumber("Mesh.PreserveNumberingMsh2", 1)
         gmsh.option.setNumber("Mesh.Binary", 1)
         gmsh.write(str(path))
+        check_end(path, "$EndElements\n")
 
 
 def write_mesh(case: Case, path: Path) -> dict[str, int]:

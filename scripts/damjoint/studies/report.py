@@ -36,6 +36,11 @@ def write(folders: list[Path], to: Path) -> None:
     Raises InputError if one of them is no run's folder, or the page can not be written.
     """
     runs = [run for folder in folders for run in stored.runs_in(folder)]
+    inside = any(run.resolve() in to.resolve().parents for run in runs)
+    if to.is_dir() or (inside and to.suffix != ".html"):
+        raise InputError(
+            f"to = {to}: must be a file, in the folder of a run one that ends in .html"
+        )
     parts = [read_part(folder) for folder in runs]
     environment = Environment(
         loader=FileSystemLoader(Path(__file__).parent),

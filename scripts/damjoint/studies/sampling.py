@@ -11,6 +11,9 @@ from ..scene.arithmetic import call_of
 #: Distributions by scipy's names, and the name by which everyone knows one of them.
 LAWS = {name: law for name, law in vars(stats).items() if isinstance(law, stats.rv_continuous)}
 LAWS["normal"] = stats.norm
+#: Those without closed forms, of test statistics: a number of theirs takes minutes.
+for slow in ("ksone", "kstwo", "levy_stable", "studentized_range"):
+    del LAWS[slow]
 
 #: Of the intervals of a probability.
 CONFIDENCE = 0.95
@@ -35,9 +38,10 @@ def law_of(name: str, text: str) -> stats.rv_continuous:
         raise InputError(f"{said}; {kind} is none; known: {known}")
     shapes = ", ".join((*filter(None, [LAWS[kind].shapes]), "loc", "scale"))
     try:
-        law = LAWS[kind](*numbers, **named)
-        spread = law.std()
-    except (TypeError, ValueError):
+        with np.errstate(all="ignore"):
+            law = LAWS[kind](*numbers, **named)
+            spread = law.std()
+    except (TypeError, ValueError, ArithmeticError):
         spread = np.nan
     if np.isnan(spread) or spread == 0:
         raise InputError(f"{said}; {kind}({shapes}), as scipy.stats has them")
@@ -80,7 +84,8 @@ def draw(
         shares = generator.random((number, len(laws)))
     if known:
         shares = correlated(shares, known)
-    return {name: law.ppf(shares[:, i]) for i, (name, law) in enumerate(frozen.items())}
+    with np.errstate(all="ignore"):  # an infinite value is refused where it is used
+        return {name: law.ppf(shares[:, i]) for i, (name, law) in enumerate(frozen.items())}
 
 
 def correlated(shares: np.ndarray, pairs: list[tuple[int, int, float]]) -> np.ndarray:

@@ -22,7 +22,7 @@ from .. import InputError, RunError, __version__, accuracy
 from ..engines import engine_of
 from ..engines.condensed.filling import Filling
 from ..engines.condensed.interface import Interface
-from ..results.tables import HISTORY
+from ..results.tables import HISTORY, as_text
 from ..results.verdict import failed, statement, verdict
 from ..scene.case import Case, first_mesh, load
 from ..storage import lock
@@ -316,7 +316,8 @@ def sweep(
         for key, row in progress(
             rows, total=len(missing), desc=f"sweep {case}", disable=not sys.stderr.isatty()
         ):
-            writer.writerow([key, *chosen[key].values(), *(row[c] for c in results)])
+            cells = *chosen[key].values(), *(row[c] for c in results)
+            writer.writerow([key, *(as_text(str(cell)) for cell in cells)])
             file.flush()
     found = read_done(out, columns, ())
     return len(missing), [found[key] for key in keys]

@@ -28,9 +28,10 @@ from scipy import linalg, sparse
 from ...scene.case import Case
 from ...scene.loads import wet
 from ...scene.mesh import LINES, SIDES, Body, Face, Mesh, mesh_of
+from ..memory import bulk_size, check_memory
 from .elasticity import Material, body_force, elasticity
 from .elements import WATER, Space, points_of
-from .factor import check_memory, dense_memory, schur_complement
+from .factor import dense_memory, schur_complement
 
 #: What the condensed bodies depend on besides the mesh.
 MATERIAL = ("order", "hold_z", "E_dam", "E_found", "nu_dam", "nu_found")
@@ -48,19 +49,6 @@ def joint_size(case: Case) -> int:
     )
 
 
-def bulk_size(case: Case) -> float:
-    """About the number of unknowns of both bodies, before any meshing.
-
-    A triangle has half of the product of the sizes at both ends of the body, order 2 four unknowns
-    a triangle. (Prisms and tetrahedra: within a factor of three.)
-    """
-    dim, order, near = int(case["dim"]), int(case["order"]), case.joint_length / case["n_joint"]
-    dam = (case["dam_base"] + case["dam_crest"]) / 2 * case["dam_height"]
-    foundation = (case["dam_base"] + 2 * case["found_side"]) * case["found_depth"]
-    triangles = 2 * (dam / (near * case["h_dam"]) + foundation / (near * case["h_found"]))
-    return triangles * order**2 * (1 if dim == 2 else 1.5 * case["n_layers"])
-
-
 #: Memory of a factorised body [bytes per unknown], as `damjoint bench` finds it in 2D.
 PER_UNKNOWN = 2400
 
@@ -68,7 +56,8 @@ PER_UNKNOWN = 2400
 def check_size(case: Case) -> None:
     """Raise RunError, before any meshing, if a case asks for more memory than there is."""
     joint, bulk = joint_size(case), bulk_size(case)
-    check_memory(dense_memory(joint) + PER_UNKNOWN * bulk, int(bulk), joint)
+    what = f"{bulk:.0f} unknowns, {joint} of them on the joint,"
+    check_memory(dense_memory(joint) + PER_UNKNOWN * bulk, what)
 
 
 def unknowns(functions: np.ndarray, dim: int, components: list[int] | None = None) -> np.ndarray:

@@ -96,14 +96,16 @@ def cached(case: Case) -> tuple[Condensed, Bodies | None]:
 
 def read(path: Path, header: str) -> Condensed | None:
     """The bodies in a file, if they are there, whole and those of the header."""
+    if not path.is_file():
+        return None
     try:
         with np.load(path, allow_pickle=False) as file:
             if str(file["header"]) != header:
                 return None
-            found = unpacked({name: file[name] for name in file.files})
+            found = unpacked({name: file[name] for name in file["names"].tolist()})
         path.touch()
         return found
-    except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile):
+    except Exception:  # numpy and zipfile raise whatever a damaged byte leads them to
         return None
 
 
@@ -114,9 +116,12 @@ def keep(made: Condensed, header: str, path: Path) -> None:
     part = path.with_suffix(f".{os.getpid()}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        # as numpy.savez does it, but closed also where the disk is full
-        with zipfile.ZipFile(part, "w") as file:
-            for name, array in {"header": np.array(header), **packed(made)}.items():
+        part.unlink(missing_ok=True)
+        # as numpy.savez does it, but closed also where the disk is full, and never through a link
+        with zipfile.ZipFile(part, "x") as file:
+            arrays = packed(made)
+            about = {"header": np.array(header), "names": np.array(list(arrays))}
+            for name, array in (about | arrays).items():
                 with file.open(f"{name}.npy", "w", force_zip64=True) as entry:
                     np.lib.format.write_array(entry, array, allow_pickle=False)
         part.replace(path)

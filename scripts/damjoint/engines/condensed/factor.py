@@ -6,16 +6,16 @@ is several times slower in 3D: is_slow() says so.
 
 from __future__ import annotations
 
-import re
+import contextlib
+from collections.abc import Iterator
 from importlib.metadata import version
-from pathlib import Path
 
 import numpy as np
 import scipy
 import scipy.sparse.linalg
 from scipy import sparse
 
-from ... import RunError
+from ..memory import check_memory
 
 try:
     import mumps
@@ -35,24 +35,33 @@ def is_slow() -> bool:
     return mumps is None
 
 
-def check_memory(needed: float, unknowns: int, joint: int) -> None:
-    """Raise RunError if more memory [bytes] is needed than the machine has left."""
-    try:
-        found = re.search(r"MemAvailable:\s+(\d+)", Path("/proc/meminfo").read_text())
-        left = float(found[1]) * 1024
-    except (OSError, TypeError):
-        return
-    if needed > left:
-        raise RunError(
-            f"memory: {unknowns} unknowns, {joint} of them on the joint and the wet faces, need "
-            f"about {needed / 1e9:.1f} GB and {left / 1e9:.1f} GB are left; use a coarser mesh "
-            f"(n_joint, n_layers, h_dam, h_found)"
-        )
+#: MUMPS's number of that error.
+NO_MEMORY = -13
+
+
+def estimate(one: mumps.Context) -> float:
+    """Memory [bytes] that MUMPS takes for a matrix it has analysed."""
+    return 1e6 * one.mumps_instance.infog[16]
 
 
 def dense_memory(joint: int) -> float:
     """Memory [bytes] of a Schur complement of so many unknowns, its factors and products."""
     return 8.0 * joint**2 * 6
+
+
+@contextlib.contextmanager
+def context() -> Iterator[mumps.Context]:
+    """MUMPS, for one matrix.
+
+    Raises MemoryError where MUMPS gets none.
+    """
+    try:
+        with mumps.Context() as one:
+            yield one
+    except RuntimeError as error:
+        if getattr(error, "error", 0) == NO_MEMORY:
+            raise MemoryError(str(error)) from None
+        raise
 
 
 def schur_complement(
@@ -61,37 +70,37 @@ def schur_complement(
     """Dense Schur complement (k, k) of a symmetric matrix on the k unknowns `keep`, and loads (n,
     m) reduced to them (k, m).
 
-    Raises RunError before it runs out of memory.
+    Raises RunError before it runs out of memory, MemoryError where it does.
     """
     dense = dense_memory(len(keep))
-    check_memory(dense, matrix.shape[0], len(keep))
+    what = f"{matrix.shape[0]} unknowns, {len(keep)} of them on the joint and the wet faces,"
+    check_memory(dense, what)
     if mumps is None:
         return schur_by_superlu(matrix, keep, loads)
     result = np.zeros((len(keep), len(keep)))
-    with mumps.Context() as context:
-        context.set_matrix(sparse.triu(matrix, format="coo"), symmetric=True)
-        instance = context.mumps_instance
+    with context() as one:
+        one.set_matrix(sparse.triu(matrix, format="coo"), symmetric=True)
+        instance = one.mumps_instance
         instance.icntl[19] = 1  # Schur complement on the host
         indices = keep.astype(np.int32) + 1  # Fortran's; MUMPS keeps the address
         instance.set_schur(result, indices)
         # Debian's MUMPS knows no METIS and takes another ordering then
-        context.analyze(ordering="metis" if matrix.shape[0] > 15000 else "scotch")
-        estimate = 1e6 * instance.infog[16]  # MUMPS's, in MB
-        check_memory(dense + estimate, matrix.shape[0], len(keep))
-        context.factor(reuse_analysis=True, pivot_tol=0.0)
-        inside = solved(context, loads)  # with nothing moving that is kept
+        one.analyze(ordering="metis" if matrix.shape[0] > 15000 else "scotch")
+        check_memory(dense + estimate(one), what)
+        one.factor(reuse_analysis=True, pivot_tol=0.0)
+        inside = solved(one, loads)  # with nothing moving that is kept
     # a symmetric factorisation leaves the lower triangle
     return np.tril(result) + np.tril(result, -1).T, loads[keep] - matrix[keep] @ inside
 
 
-def solved(context: mumps.Context, right: np.ndarray) -> np.ndarray:
+def solved(one: mumps.Context, right: np.ndarray) -> np.ndarray:
     """Solution for right-hand sides (n, m) by the factors of a context."""
     # python-mumps writes to the right-hand side once more when the context ends, which owns it
-    context.right = np.array(right, order="F")
-    context.mumps_instance.set_dense_rhs(context.right)
-    context.mumps_instance.job = 3
-    context.call()
-    return context.right.copy()
+    one.right = np.array(right, order="F")
+    one.mumps_instance.set_dense_rhs(one.right)
+    one.mumps_instance.job = 3
+    one.call()
+    return one.right.copy()
 
 
 def superlu(matrix: sparse.csc_matrix, ordering: str) -> sparse.linalg.SuperLU:
@@ -130,11 +139,16 @@ def schur_by_superlu(
 
 
 def solve_symmetric(matrix: sparse.csr_matrix, right: np.ndarray) -> np.ndarray:
-    """Solution (n, m) of a symmetric positive definite system, all right-hand sides at once."""
+    """Solution (n, m) of a symmetric positive definite system, all right-hand sides at once.
+
+    Raises RunError before it runs out of memory.
+    """
     if mumps is None:
         return superlu(matrix.tocsc(), "MMD_AT_PLUS_A").solve(right)
-    with mumps.Context() as context:
-        context.set_matrix(sparse.triu(matrix, format="coo"), symmetric=True)
+    with context() as one:
+        one.set_matrix(sparse.triu(matrix, format="coo"), symmetric=True)
         # up to this size nested dissection costs more than it saves
-        context.factor(ordering="amf" if matrix.shape[0] < 50000 else "auto", pivot_tol=0.0)
-        return solved(context, right)
+        one.analyze(ordering="amf" if matrix.shape[0] < 50000 else "auto")
+        check_memory(estimate(one) + 3 * right.nbytes, f"{matrix.shape[0]} unknowns")
+        one.factor(reuse_analysis=True, pivot_tol=0.0)
+        return solved(one, right)

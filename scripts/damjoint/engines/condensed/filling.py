@@ -152,9 +152,10 @@ class Filling(Stepper):
                 return None
             path.advance()
         levels = [point.level for point in path.points]
-        last, beyond = (point.filling for point in ([start] + path.points)[-2:])
+        last, beyond = start.filling, path.points[-1].filling
         jump = beyond.state.jump
         if len(levels) > 1:
+            last = path.points[-2].filling
             share = (wanted - levels[-2]) / (levels[-1] - levels[-2])
             jump = last.state.jump + share * (jump - last.state.jump)
         found = last.solve_by(self.attempts()[:3], time, start=(jump, wanted))

@@ -10,6 +10,7 @@ import numpy as np
 from ... import RunError, data
 from ...scene.case import load
 from ...scene.parameters import assignments, listing, parameter
+from ...storage import check_end
 from . import process
 
 #: What the scalar and the vector of a law's memory are called, in the output; the vector's normal
@@ -68,7 +69,10 @@ def evaluate(
         )
         process.execute(problem, ["-msh", str(folder / "one.msh"), "-solve", "Path"])
         try:
+            check_end(folder / "law.txt", "\n")
             table = np.loadtxt(folder / "law.txt", ndmin=2)
+            if len(table) != len(jumps):
+                raise ValueError(f"{len(table)} of {len(jumps)} rows")
         except (OSError, ValueError) as damage:
             raise RunError(f"GetDP: its table can not be read: {damage}") from None
     names = "sigma_n", "tau_1", "tau_2", "damage", "open", "slid", *MEMORY[law]

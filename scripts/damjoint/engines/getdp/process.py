@@ -17,6 +17,7 @@ from ... import InputError, RunError, data
 from ...scene.case import Case
 from ...scene.mesh import LINES, SIDES, Mesh, area, heel_normal
 from ...scene.parameters import assignments, constants, listing
+from ...storage import check_end
 
 OLDEST = (3, 2)
 #: One process talks to no other: without looking for networks Open MPI starts a quarter of a second
@@ -188,6 +189,10 @@ def execute(
     return told
 
 
+#: With which of its blocks GetDP's numbering of the unknowns (.pre) can end.
+LAST_BLOCKS = "DofData", "ElementsXEdges", "ElementsXFacets", "ExtendedGroup"
+
+
 def fill(
     case: Case,
     mesh: Mesh,
@@ -200,15 +205,23 @@ def fill(
 
     Tables are left in folder (see tables.py); returns what `execute` tells.
         fields: also displacement and stress; on_step: called with the time of each converged step.
+    Raises RunError, OSError (a full disk, which GetDP itself does not notice).
     """
-    problem = write_problem(case, mesh, folder, {"views": 0.0, "fields": float(fields)})
+    problem, steps = write_problem(case, mesh, folder, {"views": 0.0, "fields": float(fields)}), []
 
     def watch(line: str) -> None:
         if match := re.match(rf"step {NUMBER} ", line):
+            steps.append(line)
             on_step(float(match[1]))
 
     threads = 1 if case["dim"] == 2 else 2
     told = execute(problem, ["-msh", str(mesh_file), "-solve", "Fill"], threads, watch)
-    if not (folder / "status.txt").exists():
+    if (numbering := problem.with_suffix(".pre")).exists():  # GetDP reads back what it wrote
+        check_end(numbering, *(f"$End{block}\n" for block in LAST_BLOCKS))
+    if steps:  # printed, and written
+        check_end(folder / "history.txt", "".join(steps))
+    status = folder / "status.txt"
+    if not status.exists():
         raise RunError("GetDP: ended without saying how far it went")
+    check_end(status, "\n")
     return told

@@ -17,6 +17,7 @@ from ... import InputError, RunError
 from ...scene.case import Case, flows, has_drains
 from ...scene.mesh import Mesh, mesh_of
 from .. import OnStep, Outcome
+from ..memory import bulk_size, check_memory
 from . import process, tables
 
 #: Patterns that pro/*.pro knows in 3D: GetDP's rules for prisms and hexahedra do not do.
@@ -50,13 +51,27 @@ def check_own(mesh: Mesh, case: Case) -> None:
         )
 
 
+#: Memory of GetDP [bytes per unknown], by dimension, and functions of order 2 per node of the mesh.
+PER_UNKNOWN, EDGES = {2: 3000, 3: 8000}, {2: 4, 3: 8}
+
+
+def check_size(case: Case, unknowns: float) -> None:
+    """Raise RunError if so many unknowns need more memory than there is."""
+    at_once = min(2, len(case.scenes()))
+    check_memory(at_once * PER_UNKNOWN[case["dim"]] * unknowns, f"{unknowns:.0f} unknowns")
+
+
 def solve(case: Case, on_step: OnStep, fields: bool) -> Iterator[Outcome]:
     """The scenes of a case; GetDP works in a temporary folder.
 
     See engines/__init__.py.
     """
     start = time.perf_counter()
+    if not case.geometry:
+        check_size(case, bulk_size(case))
     mesh = mesh_of(case)
+    functions = mesh.nodes if case["order"] == 1 else EDGES[case["dim"]] * mesh.nodes
+    check_size(case, case["dim"] * functions)
     meshed = time.perf_counter() - start
     with tempfile.TemporaryDirectory(prefix="damjoint-") as name, ThreadPoolExecutor(2) as pool:
         mesh_file = Path(name) / "scene.msh"

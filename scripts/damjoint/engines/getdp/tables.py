@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import takewhile
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from ...results.fields import Field
 from ...results.tables import FLUX, HARDENING, Results, history_table, joint_columns, joint_table
 from ...scene.case import Case
 from ...scene.mesh import Mesh
+from ...storage import check_end
 
 BODIES = ("dam", "foundation")
 
@@ -37,9 +39,10 @@ PRINTED = [
 def read_simple_table(path: Path, components: int = 3) -> tuple[np.ndarray, np.ndarray]:
     """GetDP's SimpleTable on elements: points (elements x nodes, 3) and values (elements x nodes,
     components).
+
+    Raises OSError, ValueError if the file is missing or not whole.
     """
-    if not path.stat().st_size:
-        raise ValueError(f"{path} is empty")
+    check_end(path, "\n")
     table = np.loadtxt(path, ndmin=2)
     points = 3 * table.shape[1] // (3 + components)
     return table[:, :points].reshape(-1, 3), table[:, points:].reshape(-1, components)
@@ -60,12 +63,14 @@ def node_means(rows: np.ndarray, values: np.ndarray, number: int) -> np.ndarray:
 
 
 def read_history(case: Case, folder: Path) -> dict[str, np.ndarray]:
-    """The rows of history.txt that are complete, {column of PRINTED: values}, and tail_level."""
+    """The rows of history.txt up to the first that is not whole, {column of PRINTED: values}, and
+    tail_level.
+    """
     file = folder / "history.txt"
     # what stands behind the last end of a line is not whole
     lines = file.read_text().split("\n")[:-1] if file.exists() else []
-    rows = [line.split()[1:] for line in lines]
-    steps = np.array([row for row in rows if len(row) == len(PRINTED)], float)
+    rows = (line.split()[1:] for line in lines)
+    steps = np.array([*takewhile(lambda row: len(row) == len(PRINTED), rows)], float)
     printed = dict(zip(PRINTED, steps.reshape(-1, len(PRINTED)).T, strict=True))
     return printed | {"tail_level": np.array([case.tail_at(time) for time in printed["time"]])}
 
@@ -127,8 +132,8 @@ def read(case: Case, folder: Path) -> tuple[Results, dict[int, float]]:
     """
     history = read_history(case, folder)
     status = folder / "status.txt"
-    finished = status.exists()
-    stopped = finished and status.read_text().strip() != "0"
+    said = status.read_text() if status.exists() else ""
+    finished, stopped = bool(said), said == "1\n"
     if finished and not stopped and not np.isclose(history["time"], case.times[-1]).any():
         raise ValueError(f"no step at t = {case.times[-1]:g}, where it says to be")
     blocks, saved = [], {}
@@ -147,8 +152,15 @@ def read(case: Case, folder: Path) -> tuple[Results, dict[int, float]]:
 
 
 def read_values(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """GetDP's NodeTable or ElementTable with one value set each: numbers and values."""
-    table = np.loadtxt(path, skiprows=1, ndmin=2)
+    """GetDP's NodeTable or ElementTable with one value set each: numbers and values.
+
+    Raises OSError, ValueError if the file is missing or has not as many rows as its head says.
+    """
+    check_end(path, "\n")
+    with path.open() as file:
+        number, table = int(file.readline()), np.loadtxt(file, ndmin=2)
+    if len(table) != number:
+        raise ValueError(f"{path} has {len(table)} of {number} rows")
     return table[:, 0].astype(int), table[:, 1:]
 
 
