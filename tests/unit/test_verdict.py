@@ -56,7 +56,9 @@ def test_a_bond_holds_by_the_cohesion_that_damage_has_left():
         result = stopped(law)
         length = result.case.joint_along
         half = {"time": np.ones(2), "x": np.array([0, length]), "s": np.array([0, length])}
-        result.joint.update(half | {"slip": np.zeros(2), "damage": np.full(2, 0.5)})
+        result.joint.update(
+            half | {"slip": np.zeros(2), "z": np.zeros(2), "damage": np.full(2, 0.5)}
+        )
         assert verdict.held(result) == pytest.approx(left * result.case["adhesion"] * length)
 
 

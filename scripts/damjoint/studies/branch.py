@@ -12,15 +12,12 @@ import numpy as np
 
 from ..engines.condensed.filling import Filling
 from ..engines.condensed.interface import Interface
-from ..engines.condensed.path import PRECISION, Path, Point
+from ..engines.condensed.path import Path, Point
 from ..results.tables import CRITICAL
 from ..scene.case import Case
 
 #: How many steps of the level may fail, each one half of the one before, until the dam is pushed.
 FAILURES = 2
-
-#: Looks at most at a branch's end.
-MOST_LOOKS = 30
 
 #: Time between two pushes, after the last level: only their order matters, and that all loads that
 #: grow in time are there.
@@ -127,68 +124,20 @@ class Branch(Path):
     # -- its end, more closely
     # ----------------------------------------------------------------------------------------------
 
-    def refine(self, wanted: float = np.inf) -> None:
-        """Look at the branch's end to the precision: at its highest level, or where it passes the
-        target or f_c; no closer than needed to see that a wanted level is out of reach.
-        """
-        for _ in range(MOST_LOOKS):
-            left, share, possible = self.unknown()
-            known = not possible - self.highest > PRECISION / 2 * possible
-            if known or possible < wanted < np.inf:
-                return
-            middle = self.between(left, share)
-            if middle is None:
-                return
-            if self.crushes(middle):
-                self.points[left + 1 :] = [middle]
-            else:
-                self.points.insert(left + 1, middle)
+    def insert(self, left: int, point: Point) -> None:
+        """One more equilibrium; if it is crushed, the last one."""
+        if self.crushes(point):
+            self.points[left + 1 :] = [point]
+        else:
+            super().insert(left, point)
 
     def unknown(self) -> tuple[int, float, float]:
-        """Where to look next: the number of a point, the share of the way to the next one, and the
-        highest level [m] that may be there; the highest one found if no look is needed.
-        """
+        """Where to look next, see `Path.unknown`: also where it passes the target or f_c."""
         if self.crushed_at_top or self.arrival is not None:
             right = len(self.points) - 1 if self.crushed else self.arrival
             ends = [p.level for p in self.points[max(right - 1, 0) : right + 1]]
             return right - 1, 0.5, self.highest + max(ends) - min(ends)
-        if self.slides:
-            return self.top, 0.5, self.highest
-        inner = (i for i in (self.top - 1, self.top) if 0 <= i < len(self.points) - 1)
-        sides = [(i, *self.summit(i)) for i in inner if self.points[i + 1].pushed]
-        return max(sides, key=lambda side: side[2], default=(self.top, 0.5, self.highest))
-
-    def summit(self, left: int) -> tuple[float, float]:
-        """How high a branch that gets no steeper can be between a point and the next one, and at
-        which share of the way it is likely to bend: where the lines through their neighbours meet.
-        """
-        a, b = self.points[left], self.points[left + 1]
-        length, chord = b.pushed - (a.pushed or self.size), self.slope(left)
-        before, beyond = self.slope(left - 1), self.slope(left + 1)
-        if before is None:
-            return 0.5, max(a.level, b.level) + abs(b.level - a.level)
-        share = 0.5
-        if beyond is not None and before > chord > beyond:
-            share = np.clip((chord - beyond) / (before - beyond), 0.1, 0.9)
-        return float(share), max(a.level + before * length, b.level)
-
-    def slope(self, left: int) -> float | None:
-        """Rise of the level over the push between a point and the next one; None if there is no
-        push.
-        """
-        if left < 0 or left + 1 >= len(self.points) or not self.points[left + 1].pushed:
-            return None
-        a, b = self.points[left], self.points[left + 1]
-        return (b.level - a.level) / (b.pushed - (a.pushed or self.size))
-
-    def between(self, left: int, share: float) -> Point | None:
-        """The equilibrium at a share of the way from a point to the next one."""
-        a, b = self.points[left], self.points[left + 1]
-        if b.pushed:
-            return self.pushed(a, share * (b.pushed - (a.pushed or self.size)), b.control)
-        times = a.filling.state.time, b.filling.state.time
-        filling = a.filling.fork(self.case)
-        return Point(filling) if filling.step(times[0] + share * (times[1] - times[0])) else None
+        return super().unknown()
 
 
 def fill(filling: Filling) -> None:

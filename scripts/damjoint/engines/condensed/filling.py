@@ -148,6 +148,7 @@ class Filling(Stepper):
             if path.slides or path.settled(ROUGH if path.stuck else SURE):
                 self.fails(path)
             if path.stuck or self.mechanism:
+                path.refine()
                 self.end_at_knee(path)
                 return None
             path.advance()
@@ -179,13 +180,14 @@ class Filling(Stepper):
     def fails(self, path: Path) -> None:
         """The mechanism of a path that has no equilibrium at the level asked for."""
         pushed = path.points[-1].pushed / (path.points[path.knee].pushed or path.size)
-        level, time = float(path.highest), path.time
-        self.mechanism = {"mode": path.mode, "level": level, "pushed": float(pushed), "time": time}
+        self.mechanism = {"mode": path.mode, "pushed": float(pushed), "time": path.time}
 
     def end_at_knee(self, path: Path) -> None:
         """Take a path's highest level as a step, if only the level has changed on the way."""
         top, begin = path.points[path.knee], self.state
         self.followed = True
+        if self.mechanism:
+            self.mechanism["level"] = float(path.highest)
         state, rise = top.filling.state, top.level - begin.loading.level
         if rise > 0 and self.same_but_for_level(state.loading, begin.loading):
             share = rise / (self.case.level_at(path.time) - begin.loading.level)
@@ -198,6 +200,10 @@ class Filling(Stepper):
     def results(self) -> Results:
         """All tables so far, and what is known of failure and unstable crack growth."""
         found = self.record.results(self.case, self.stopped)
+        if self.mechanism:  # the last steps of the level may have gone a little further
+            time, last = self.mechanism["time"], self.state.loading
+            if self.same_but_for_level(Loading.at(self.case, time, 0.0, last.tail), last):
+                self.mechanism["level"] = max(self.mechanism["level"], float(last.level))
         about = {"mechanism": self.mechanism, "snapped": self.snapped, "ran_on": self.ran_on}
         found.info = {name: value for name, value in about.items() if value}
         return found

@@ -42,6 +42,9 @@ ROUGH, SURE = 1.5, 4.0
 #: Levels that differ relatively by less are the same.
 PLATEAU = 1e-7
 
+#: Points at most that are added where a path ends.
+MOST_REFINED = 30
+
 #: Equilibria at most on a path.
 MOST_POINTS = 500
 
@@ -213,3 +216,67 @@ class Path:
         if not filling.step(time, Control(of, value, row)):
             return None
         return Point(filling, (point.pushed or self.size) + by, of)
+
+    # -- its highest level, more closely
+    # ----------------------------------------------------------------------------------------------
+
+    def refine(self, wanted: float = np.inf) -> None:
+        """Find more points where it ends, to the precision; no more than needed to see that a
+        wanted level is out of reach.
+        """
+        for _ in range(MOST_REFINED):
+            left, share, possible = self.unknown()
+            known = not possible - self.highest > PRECISION / 2 * possible
+            if known or possible < wanted < np.inf:
+                return
+            middle = self.between(left, share)
+            if middle is None:
+                return
+            self.insert(left, middle)
+
+    def insert(self, left: int, point: Point) -> None:
+        """One more equilibrium, after a point of a number."""
+        self.points.insert(left + 1, point)
+
+    def unknown(self) -> tuple[int, float, float]:
+        """Where its highest level is not known closely: the number of a point, the share of the way
+        to the next one, and the highest level [m] that may be there; the highest one found if it is
+        known.
+        """
+        if self.slides:
+            return self.top, 0.5, self.highest
+        inner = (i for i in (self.top - 1, self.top) if 0 <= i < len(self.points) - 1)
+        sides = [(i, *self.summit(i)) for i in inner if self.points[i + 1].pushed]
+        return max(sides, key=lambda side: side[2], default=(self.top, 0.5, self.highest))
+
+    def summit(self, left: int) -> tuple[float, float]:
+        """How high a path that gets no steeper can be between a point and the next one, and at
+        which share of the way it is likely to bend: where the lines through their neighbours meet.
+        """
+        a, b = self.points[left], self.points[left + 1]
+        length, chord = b.pushed - (a.pushed or self.size), self.slope(left)
+        before, beyond = self.slope(left - 1), self.slope(left + 1)
+        if before is None:
+            return 0.5, max(a.level, b.level) + abs(b.level - a.level)
+        share = 0.5
+        if beyond is not None and before > chord > beyond:
+            share = np.clip((chord - beyond) / (before - beyond), 0.1, 0.9)
+        return float(share), max(a.level + before * length, b.level)
+
+    def slope(self, left: int) -> float | None:
+        """Rise of the level over the push between a point and the next one; None if there is no
+        push.
+        """
+        if left < 0 or left + 1 >= len(self.points) or not self.points[left + 1].pushed:
+            return None
+        a, b = self.points[left], self.points[left + 1]
+        return (b.level - a.level) / (b.pushed - (a.pushed or self.size))
+
+    def between(self, left: int, share: float) -> Point | None:
+        """The equilibrium at a share of the way from a point to the next one."""
+        a, b = self.points[left], self.points[left + 1]
+        if b.pushed:
+            return self.pushed(a, share * (b.pushed - (a.pushed or self.size)), b.control)
+        times = a.filling.state.time, b.filling.state.time
+        filling = a.filling.fork(a.filling.case)
+        return Point(filling) if filling.step(times[0] + share * (times[1] - times[0])) else None
