@@ -155,7 +155,10 @@ def highest_by_statics(case: Case, last: dict[str, float]) -> tuple[float, str, 
         reasons.append((shear, "sliding", "the shear passes what the joint holds"))
     found = [(np.inf, "", "")]
     # where the resultants are a hundredth of the base apart, the crack is another one
-    if abs(block(last["level"]).M - last["M"]) < 0.01 * abs(last["N"]) * case.joint_along:
+    if (
+        abs(block(last["level"]).M - last["M"])
+        < 0.01 * abs(block(last["level"]).N) * case.joint_along
+    ):
         for spare, mode, words in reasons:
             if spare(last["level"]) > 0 > spare(case.highest_level):
                 found.append((brentq(spare, last["level"], case.highest_level), mode, words))
