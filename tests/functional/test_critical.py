@@ -59,10 +59,13 @@ def test_overturning_level(wet):
     assert answer.mode == "overturning" and answer.confirmed
 
 
-@pytest.mark.parametrize("mu, level", [(0.6, 40.619), (0.7, 43.161)])
-def test_friction_alone(mu, level):
-    """Of a real dam with linear uplift and a tailwater of 3 m."""
-    _, answer = found("dam", settings=DAM | PLAIN | {"mu": mu}, tail_levels="3")
+@pytest.mark.parametrize(
+    "mu, level, levels, tails",
+    [(0.6, 40.619, None, "3"), (0.7, 43.161, None, "3"), (0.7, 43.161, "30,40", "0,3")],
+)
+def test_friction_alone(mu, level, levels, tails):
+    """Of a real dam with linear uplift and a tailwater of 3 m, which has risen or was there."""
+    _, answer = found("dam", "level", DAM | PLAIN | {"mu": mu}, levels, tails)
     assert answer.value == pytest.approx(level, abs=1e-3)
     assert answer.gravity == pytest.approx(level, abs=1e-3)
 

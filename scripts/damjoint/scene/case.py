@@ -165,8 +165,10 @@ class Case:
 
 
 def between(levels: tuple[float, ...], time: float) -> float:
-    """Level at a time, linear between the levels at t = 1, 2, ..., from 0 at t = 0."""
-    points = (0.0, *levels)
+    """Level at a time, linear between the levels at t = 1, 2, ..., from 0 at t = 0; later the last
+    one.
+    """
+    points, time = (0.0, *levels), min(time, len(levels))
     i = min(int(time), len(points) - 2)
     return points[i] + (time - i) * (points[i + 1] - points[i])
 
