@@ -3,7 +3,7 @@
 A displacement is prescribed instead, and the level is found with it: limit points, plateaus and
 unstable crack growth are passed, where steps of the level would only fail. It is the crest's, or,
 where the crest turns back, the mean jump of the points whose damage grows, which does not turn back
-while they do [indirect displacement control: de Borst, Int. J. Numer. Meth. Engng 24, 1987]. A path
+while they do [indirect displacement control: de Borst, Comput. Struct. 25, 1987]. A path
 whose level rises no more, however far the dam is pushed, is a mechanism.
 """
 
