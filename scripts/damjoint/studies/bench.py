@@ -418,7 +418,8 @@ DAMS = {
 
 def estimates(kept: Kept) -> Table:
     """Errors in percent that --accuracy estimates of DAMS, and the true ones, "estimated / true",
-    by the same mesh rule with 1024 elements along the joint (256 if short), in 3D with 96.
+    by the same mesh rule with 1024 elements along the joint (256 if short), in 3D with 96, and a
+    quarter of the load steps.
     """
     finest, levels = (256.0, ["coarse"]) if kept.short else (1024.0, ["coarse", "standard"])
     columns = [n for n in on_request.QUANTITIES if n not in ("level", "toe_stress")]
@@ -446,9 +447,11 @@ def estimates(kept: Kept) -> Table:
 
 
 def on_finest(case: Case, n: float) -> Case:
-    """A case on a mesh of n elements along the joint, by the rule of --accuracy."""
+    """A case on a mesh of n elements along the joint, by the rule of --accuracy, each load step cut
+    in four.
+    """
     found = on_request.finer(case, n / case["n_joint"])
-    return replace(found, accuracy=None)
+    return replace(on_request.halve_steps(on_request.halve_steps(found)), accuracy=None)
 
 
 def off(name: str, told: dict, result: Results, exact: Results) -> str:
