@@ -84,7 +84,8 @@ class Filling(Stepper):
             time = min(self.state.time + dt, target)
             time = target if target - time < 1e-9 else time
             smallest = time - self.state.time < self.case["smallest_step"] * (1 + 1e-9)
-            quick = self.mechanism or ((self.ran_on or self.followed) and not smallest)
+            ended = self.followed and (self.mechanism or not smallest)
+            quick = ended or (self.ran_on and not smallest)
             likely = attempts[:1] if quick else attempts
             found = self.solve_by(likely, time, ahead=True, insist=smallest)
             if found is None and not weighed:
@@ -92,7 +93,7 @@ class Filling(Stepper):
                 if self.rest():
                     cuts += 1
                     continue
-            if found is None and not self.mechanism and (smallest or not self.followed):
+            if found is None and not ended:
                 found = self.snap_through(time, cuts, smallest)
             if found is None:
                 tried, cuts = time - self.state.time, cuts + 1
@@ -116,11 +117,11 @@ class Filling(Stepper):
         and a turn at every point. Else, and where the path is not found, by relaxation.
         """
         law, found = self.joint.law, None
-        if not (law.releases or self.driven or self.followed):
+        if not (law.releases or self.driven or self.followed) and (smallest or not cuts):
             found = self.along_path(time)
             if self.followed and not smallest:  # shorter steps from where the path has ended
                 return None
-        if found is None and not self.mechanism and (law.breaks or self.joint.flowing):
+        if found is None and (law.breaks or self.joint.flowing):
             known = self.ran_on or smallest or cuts > 0
             if relaxed := self.relaxed(time, wherever=law.breaks and bool(known)):
                 *found, own = relaxed
@@ -132,7 +133,7 @@ class Filling(Stepper):
         """A step along the equilibrium path, until the level of its time is there.
 
         If it never is the dam fails: `mechanism`. Then, and where the path is lost, its highest
-        level is the last step.
+        level is the last step if only the level changes in it; else shorter steps are to be tried.
         """
         begin, wanted = self.state, self.case.level_at(time)
         if begin.time == 0 or wanted < begin.loading.level:
@@ -183,13 +184,15 @@ class Filling(Stepper):
         self.mechanism = {"mode": path.mode, "pushed": float(pushed), "time": path.time}
 
     def end_at_knee(self, path: Path) -> None:
-        """Take a path's highest level as a step, if only the level has changed on the way."""
+        """Take a path's highest level as a step if nothing but the level changes: `followed`."""
         top, begin = path.points[path.knee], self.state
-        self.followed = True
         if self.mechanism:
             self.mechanism["level"] = float(path.highest)
         state, rise = top.filling.state, top.level - begin.loading.level
-        if rise > 0 and self.same_but_for_level(state.loading, begin.loading):
+        self.followed = self.same_but_for_level(
+            path.points[-1].filling.state.loading, begin.loading
+        )
+        if rise > 0 and self.followed:
             share = rise / (self.case.level_at(path.time) - begin.loading.level)
             rows = top.filling.record.rows
             reached = replace(state, time=begin.time + share * (path.time - begin.time))
@@ -200,7 +203,9 @@ class Filling(Stepper):
     def results(self) -> Results:
         """All tables so far, and what is known of failure and unstable crack growth."""
         found = self.record.results(self.case, self.stopped)
-        if self.mechanism:  # the last steps of the level may have gone a little further
+        if not self.stopped:
+            self.mechanism = {}  # another way has been found
+        elif self.mechanism:  # the last steps of the level may have gone a little further
             time, last = self.mechanism["time"], self.state.loading
             if self.same_but_for_level(Loading.at(self.case, time, 0.0, last.tail), last):
                 self.mechanism["level"] = max(self.mechanism["level"], float(last.level))
