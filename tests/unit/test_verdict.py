@@ -62,6 +62,13 @@ def test_a_bond_holds_by_the_cohesion_that_damage_has_left():
         assert verdict.held(result) == pytest.approx(left * result.case["adhesion"] * length)
 
 
+@pytest.mark.parametrize("engine, said", [("getdp", True), ("condensed", False)])
+def test_the_plain_engine_says_what_it_does_not_do(engine, said):
+    result = stopped("bond")
+    result.info["engine"] = engine
+    assert any("does not follow the equilibrium path" in h for h in verdict.hints(result)) == said
+
+
 def test_what_a_path_has_shown_is_said():
     """Far from any bound, the mechanism counts; else the run has not converged."""
     result = stopped("bond")

@@ -282,6 +282,11 @@ def hints(results: Results) -> list[str]:
             f"unstable crack growth at level {limit:.4g} m: along the equilibrium path the level "
             f"falls to {lowest:.4g} m before it rises again"
         )
+    if results.info.get("engine") == "getdp" and verdict(results) == "not converged":
+        found.append(
+            "the plain engine does not follow the equilibrium path beyond a limit point: "
+            "--engine condensed does"
+        )
     releases = case["law"] == "rupture" and case["alpha"] < 2
     if releases and (levels or verdict(results) == "not converged"):
         found.append(
