@@ -140,7 +140,8 @@ def highest_by_statics(case: Case, last: dict[str, float]) -> tuple[float, str, 
     strength, _ = gravity.tensile_strength(case)
     crack = 0.0 if law == "friction" else last["crack_length"]
     block = lambda level: gravity.with_crack(case, time, level, crack)
-    length = block(last["level"]).uncracked
+    here = block(last["level"])
+    length = here.uncracked
     tension = strength * length if law == "bond" else 0.0
 
     def moment(level: float) -> float:
@@ -155,10 +156,7 @@ def highest_by_statics(case: Case, last: dict[str, float]) -> tuple[float, str, 
         reasons.append((shear, "sliding", "the shear passes what the joint holds"))
     found = [(np.inf, "", "")]
     # where the resultants are a hundredth of the base apart, the crack is another one
-    if (
-        abs(block(last["level"]).M - last["M"])
-        < 0.01 * abs(block(last["level"]).N) * case.joint_along
-    ):
+    if abs(here.M - last["M"]) < 0.01 * abs(here.N) * case.joint_along:
         for spare, mode, words in reasons:
             if spare(last["level"]) > 0 > spare(case.highest_level):
                 found.append((brentq(spare, last["level"], case.highest_level), mode, words))

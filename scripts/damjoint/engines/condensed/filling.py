@@ -143,14 +143,21 @@ class Filling(Stepper):
         path.advance()
         if path.stuck:
             return None
-        if not self.same_but_for_level(path.points[1].filling.state.loading, begin.loading):
+        same = self.same_but_for_level(path.points[1].filling.state.loading, begin.loading)
+        if not same:
             del path.points[0]  # no point of this path: other loads acted
         while path.points[-1].level < wanted:
-            if path.slides or path.settled(ROUGH if path.stuck else SURE):
+            # an earlier path's mechanism, under other loads, does not end this one
+            failing = path.slides or path.settled(ROUGH if path.stuck else SURE)
+            if failing:
                 self.fails(path)
-            if path.stuck or self.mechanism:
+            if failing or path.stuck:
                 path.refine()
-                self.end_at_knee(path)
+                if failing:
+                    self.mechanism["level"] = float(path.highest)
+                self.followed = same
+                if same:
+                    self.end_at_knee(path)
                 return None
             path.advance()
         levels = [point.level for point in path.points]
@@ -184,15 +191,10 @@ class Filling(Stepper):
         self.mechanism = {"mode": path.mode, "pushed": float(pushed), "time": path.time}
 
     def end_at_knee(self, path: Path) -> None:
-        """Take a path's highest level as a step if nothing but the level changes: `followed`."""
+        """Take a path's highest level as a step, in which nothing else has changed."""
         top, begin = path.points[path.knee], self.state
-        if self.mechanism:
-            self.mechanism["level"] = float(path.highest)
         state, rise = top.filling.state, top.level - begin.loading.level
-        self.followed = self.same_but_for_level(
-            path.points[-1].filling.state.loading, begin.loading
-        )
-        if rise > 0 and self.followed:
+        if rise > 0:
             share = rise / (self.case.level_at(path.time) - begin.loading.level)
             rows = top.filling.record.rows
             reached = replace(state, time=begin.time + share * (path.time - begin.time))

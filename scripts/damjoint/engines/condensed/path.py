@@ -3,8 +3,8 @@
 A displacement is prescribed instead, and the level is found with it: limit points, plateaus and
 unstable crack growth are passed, where steps of the level would only fail. It is the crest's, or,
 where the crest turns back, the mean jump of the points whose damage grows, which does not turn back
-while they do [indirect displacement control: de Borst, Comput. Struct. 25, 1987]. A path
-whose level rises no more, however far the dam is pushed, is a mechanism.
+while they do [indirect displacement control: de Borst, Comput. Struct. 25, 1987]. A path whose
+level rises no more, however far the dam is pushed, is a mechanism.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class Point:
     #: how far the dam has been pushed, with its displacement before the first push [m]; 0 where the
     #: level is prescribed
     pushed: float = 0.0
-    #: what was prescribed: level, crest or heel
+    #: what was prescribed: level, or `of` of a Control
     control: str = "level"
 
     @property
