@@ -31,11 +31,11 @@ test-all: check
 # picture and the modelings' table in README.md
 bench: setup
 	$(BIN)/damjoint bench
-	$(BIN)/python -m damjoint.pages bench out/bench
+	$(BIN)/python -m damjoint_tools.pages bench out/bench
 
 # What is made from the code: reference/parameters.md, results.md; ssnp142.md from a validation of all cases
 pages: setup
-	$(BIN)/python -m damjoint.pages all
+	$(BIN)/python -m damjoint_tools.pages all
 
 # Results and caches
 clean:

@@ -2,7 +2,7 @@
 
 import pytest
 from damjoint import run
-from damjoint.scene.case import load
+from damjoint.model.case import load
 
 
 @pytest.fixture(scope="session", autouse=True)

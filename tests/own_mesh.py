@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from damjoint.scene.case import Case
-from damjoint.scene.mesh import OWN_FACES, OWN_NAMES, SHAPES, Body, Mesh, dimension
+from damjoint.model.case import Case
+from damjoint.model.mesh import OWN_FACES, OWN_NAMES, SHAPES, Body, Mesh, dimension
 
 KINDS = {shape: kind for kind, shape in SHAPES.items()}
 

@@ -1,16 +1,22 @@
 """Concrete gravity dams on a thin joint that opens, breaks, slides and lets water in.
 
 storage.py  files written whole or not at all, by one process at a time
-scene/    what is asked: parameters, case files, meshes
-results/  what comes out: tables, verdict, fields, pictures, comparison with published numbers
-engines/  how it is solved: getdp/ runs the problem definition, condensed/ follows the joint alone
-accuracy.py  the mesh that an accuracy asks for, and what is still wrong on it
-run.py    one case, solved and written
-studies/  what is done with runs: checks, sweeps, critical values, benchmarks, a law along a path
-window/   the Gmsh window, with the condensed engine behind it
-cli.py    the command line; __main__.py what has to be done before it
+model/      what is asked and what comes out, as data: parameters, case, mesh, loads, results
+laws/       the joint laws, one file each
+fem/        finite elements of the bodies, condensed onto the joint
+joint/      the joint between them: interpolation, water, residual and tangent
+solver/     load stepping, Newton's method, equilibrium path
+engines/    a case solved: condensed/ with the parts above, getdp/ by the problem definition
+statics/    gravity method, limit analysis, verdict
+post/       tables, pictures, fields and folders of results
+accuracy.py the mesh that an accuracy requires, and the error that is left
+run.py      one case, solved and written
+studies/    checks, sweeps, critical values, a law along a path, reports
+gui/        the Gmsh window
+cli.py      the command line; __main__.py what has to be done before it
 
-Each of them uses only those above it.
+Each of them uses only those above it. Beside the package stand damjoint_tools: benchmarks, random
+verification and the pages made from the code.
 """
 
 from __future__ import annotations

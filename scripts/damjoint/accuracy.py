@@ -19,10 +19,10 @@ import numpy as np
 
 from . import RunError
 from .engines import OnStep, Outcome
-from .results.fields import along
-from .results.tables import Results
-from .results.verdict import stiffness_ratio
-from .scene.case import Case, has_plane_fields
+from .model.case import Case, has_plane_fields
+from .model.fields import along
+from .model.results import Results
+from .statics.verdict import stiffness_ratio
 
 #: What makes a finer mesh besides the sizes h_dam and h_found, which follow.
 REFINED = ("n_joint", "n_layers")

@@ -253,11 +253,11 @@ def parser() -> argparse.ArgumentParser:
 
 def do_run(arguments: argparse.Namespace) -> int:
     """damjoint run; 0, or 1 if the dam does not stand or the run stopped before its last level."""
-    from .results import summary
-    from .results.verdict import failed, hints, path_statement, statement, verdict
+    from .model import parameters
+    from .model.case import load
+    from .post import summary
     from .run import run
-    from .scene import parameters
-    from .scene.case import load
+    from .statics.verdict import failed, hints, path_statement, statement, verdict
 
     case = load(
         arguments.case,
@@ -291,8 +291,8 @@ def do_run(arguments: argparse.Namespace) -> int:
 
 def do_check(arguments: argparse.Namespace) -> int:
     """damjoint check; 1 if a check is not met."""
-    from .scene import parameters
-    from .scene.case import load
+    from .model import parameters
+    from .model.case import load
     from .studies.check import check, text_table
 
     settings = parameters.settings(arguments.settings)
@@ -308,7 +308,7 @@ def do_check(arguments: argparse.Namespace) -> int:
 
 def do_plot(arguments: argparse.Namespace) -> int:
     """damjoint plot."""
-    from .results import pictures, stored
+    from .post import pictures, stored
 
     found = [(folder, stored.read(folder)) for folder in stored.runs_in(arguments.out)]
     for folder, solution in found:
@@ -327,9 +327,9 @@ def do_report(arguments: argparse.Namespace) -> int:
 
 def do_gui(arguments: argparse.Namespace) -> int:
     """damjoint gui; 0 when the window is closed."""
-    from .scene import parameters
-    from .window.sheet import Request
-    from .window.window import gui
+    from .gui.sheet import Request
+    from .gui.window import gui
+    from .model import parameters
 
     gui(Request(arguments.case, parameters.settings(arguments.settings)))
     return 0
@@ -337,7 +337,7 @@ def do_gui(arguments: argparse.Namespace) -> int:
 
 def warn_if_slow() -> None:
     """Say before a 3D run that it takes several times longer than it need."""
-    from .engines.condensed import factor
+    from .fem import factor
 
     if factor.is_slow():
         print(
@@ -349,7 +349,7 @@ def warn_if_slow() -> None:
 
 def do_new(arguments: argparse.Namespace) -> int:
     """damjoint new."""
-    from .scene import template
+    from .model import template
 
     template.write(arguments.path)
     print(f"{arguments.path}: a 45 m dam on rock; damjoint run {arguments.path}")
@@ -358,10 +358,10 @@ def do_new(arguments: argparse.Namespace) -> int:
 
 def do_validate(arguments: argparse.Namespace) -> int:
     """damjoint validate; 1 if a row fails."""
-    from .results import validation
-    from .results.verdict import statement
+    from .model.case import load
+    from .post import validation
     from .run import run
-    from .scene.case import load
+    from .statics.verdict import statement
 
     cases = [load(name) for name in arguments.cases or validation.modelings()]
     for case in cases:
@@ -381,7 +381,7 @@ def do_validate(arguments: argparse.Namespace) -> int:
 
 def do_critical(arguments: argparse.Namespace) -> int:
     """damjoint critical; 0, or 1 if there is no critical value, or none that is confirmed."""
-    from .scene import parameters
+    from .model import parameters
     from .studies.critical import critical
 
     answer, said = critical(
@@ -398,7 +398,7 @@ def do_critical(arguments: argparse.Namespace) -> int:
 
 def do_sweep(arguments: argparse.Namespace) -> int:
     """damjoint sweep."""
-    from .scene import parameters
+    from .model import parameters
     from .studies.plan import Loading, plan_of, sample_of
     from .studies.sweep import meshed, sweep
 
@@ -427,7 +427,7 @@ def show(case: str, plan: Plan, rows: list[Row], out: Path) -> None:
     from .studies.plan import beside
 
     if plan.sampled:
-        from .studies import outcome  # scipy.stats takes a second to import
+        from .studies import outcome
 
         print(outcome.report(plan, rows, out))
     picture = beside(out, ".png")
@@ -437,7 +437,7 @@ def show(case: str, plan: Plan, rows: list[Row], out: Path) -> None:
 
 def do_stress(arguments: argparse.Namespace) -> int:
     """damjoint stress; 1 if a scene is a defect."""
-    from .studies.stress import DEFECT, counts, stress
+    from damjoint_tools.stress import DEFECT, counts, stress
 
     rows = stress(arguments.count, arguments.seed, arguments.out, arguments.jobs)
     for row in rows:
@@ -450,7 +450,7 @@ def do_stress(arguments: argparse.Namespace) -> int:
 
 def do_bench(arguments: argparse.Namespace) -> int:
     """damjoint bench."""
-    from .studies.bench_page import bench
+    from damjoint_tools.bench_page import bench
 
     bench(arguments.out, arguments.short)
     return 0
@@ -458,7 +458,7 @@ def do_bench(arguments: argparse.Namespace) -> int:
 
 def do_law(arguments: argparse.Namespace) -> int:
     """damjoint law."""
-    from .scene import parameters
+    from .model import parameters
     from .studies import law_path
 
     settings = parameters.settings(arguments.settings)

@@ -13,10 +13,10 @@ from tqdm import tqdm
 
 from . import __version__, accuracy
 from .engines import Outcome, engine_of
-from .results import folder as folders
-from .results import tables
-from .results.fields import Solution
-from .scene.case import Case
+from .model.case import Case
+from .model.fields import Solution
+from .post import folder as folders
+from .post import tables
 
 
 class Progress:
@@ -118,11 +118,11 @@ def finish(outcome: Outcome, case: Case, out: Path, fields: bool, picture: bool)
     folder = folders.scene_folder(case, result.case, out)
     solution = Solution(result, outcome.mesh().bodies, outcome.fields())
     if fields and solution.fields:
-        from .results.field_files import write_fields
+        from .post.field_files import write_fields
 
         write_fields(solution, folder / "fields")
     if picture:
-        from .results.pictures import draw
+        from .post.pictures import draw
 
         draw(solution, folder)
     result.info["wall_seconds"]["post"] += time.perf_counter() - start

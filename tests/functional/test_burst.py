@@ -4,10 +4,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from damjoint.engines.condensed.laws import LAWS
-from damjoint.results.verdict import hints, verdict
-from damjoint.scene.case import load
-from damjoint.studies.verification import Written, violations
+from damjoint.laws import LAWS
+from damjoint.model.case import load
+from damjoint.statics.verdict import hints, verdict
+from damjoint_tools.verification import Written, violations
 
 #: A slender dam of real stiffness: under uplift the rupture law's crack runs on at once, as where
 #: it opens it lets go of its shear, and no friction takes that over.

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import matplotlib.image
 import pytest
-from damjoint.results import folder as folders
-from damjoint.results import gravity
-from damjoint.results.check_picture import draw_joint
+from damjoint.post import folder as folders
+from damjoint.post.check_picture import draw_joint
+from damjoint.statics import gravity
 from damjoint.studies.check import (
     Check,
     by_finite_elements,

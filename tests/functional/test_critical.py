@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from closed_forms import BASE, CENTROID, HEIGHT, WATER, WEIGHT, slide_level
-from damjoint.engines.condensed import path
-from damjoint.results import gravity
-from damjoint.results.verdict import highest_by_statics
-from damjoint.scene.case import load
+from damjoint.model.case import load
+from damjoint.solver import path
+from damjoint.statics import gravity
+from damjoint.statics.verdict import highest_by_statics
 from damjoint.studies import branch
 from damjoint.studies.critical import Search, critical
 from scipy.optimize import brentq

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 from damjoint import run
-from damjoint.engines.condensed.laws import LAWS
 from damjoint.engines.getdp import law
-from damjoint.results.tables import JOINT
-from damjoint.scene.case import Case, load
+from damjoint.laws import LAWS
+from damjoint.model.case import Case, load
+from damjoint.model.results import JOINT
 
 
 def random_path(law_name: str, seed: int, case: Case) -> np.ndarray:

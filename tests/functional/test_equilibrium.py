@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from closed_forms import BASE, CENTROID, WATER, WEIGHT, integral, resultants, slide_level, thrust
 from damjoint import InputError, run
-from damjoint.results import gravity
-from damjoint.scene.case import load
+from damjoint.model.case import load
+from damjoint.statics import gravity
 from numpy.testing import assert_allclose
 
 

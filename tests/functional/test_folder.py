@@ -9,7 +9,7 @@ import gmsh
 import numpy as np
 import pytest
 from damjoint.engines.getdp import process
-from damjoint.scene.case import CASES
+from damjoint.model.case import CASES
 from test_output import read
 
 SMALL = ("--set", "n_joint=10", "--set", "h_dam=3", "--set", "h_found=4")
@@ -133,7 +133,7 @@ def test_tailwater_in_the_history(command, tmp_path):
 def test_an_interrupted_run_keeps_what_has_converged(tmp_path, monkeypatch, engine):
     """Ctrl-C after the second step."""
     from damjoint import run
-    from damjoint.scene.case import load
+    from damjoint.model.case import load
 
     def interrupt(self, scene, now):
         if now > 1:

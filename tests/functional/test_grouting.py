@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from damjoint.engines.condensed.elasticity import body_force, elasticity
-from damjoint.engines.condensed.elements import JOINT, Space, points_of
-from damjoint.engines.condensed.laws import Rupture
-from damjoint.scene.case import load
-from damjoint.scene.mesh import Body
+from damjoint.fem.elasticity import body_force, elasticity
+from damjoint.fem.elements import JOINT, Space, points_of
+from damjoint.laws.rupture import Rupture
+from damjoint.model.case import load
+from damjoint.model.mesh import Body
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 

@@ -6,7 +6,7 @@ import pytest
 from closed_forms import JUMPS_AND_STRESSES, differences
 from damjoint import run
 from damjoint.engines.getdp import law
-from damjoint.scene.case import load
+from damjoint.model.case import load
 from numpy.testing import assert_allclose
 
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from closed_forms import BASE, CENTROID, WATER, WEIGHT, slide_level, thrust
 from damjoint import cli
-from damjoint.results.verdict import hints, statement, verdict
+from damjoint.statics.verdict import hints, statement, verdict
 from numpy.testing import assert_allclose
 
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from damjoint.scene import mesh
-from damjoint.scene.case import load
+from damjoint.model import mesh
+from damjoint.model.case import load
 
 # Bulk and joint elements in the verification document's table.
 PUBLISHED = {

@@ -8,7 +8,7 @@ import sys
 import meshio
 import numpy as np
 import pytest
-from damjoint.results.tables import write_csv
+from damjoint.post.tables import write_csv
 from numpy.testing import assert_allclose
 
 JOINT = "time,level,x,y,z,delta_n,delta_t1,delta_t2,sigma_n,tau_1,tau_2,p,damage,slip,s,sigma_n_eff"
@@ -116,7 +116,7 @@ def test_fields_for_paraview(folder):
 def test_fields_for_gmsh(folder):
     """Each view has dam and foundation, a step per level with its time, and a unit in its name."""
     import gmsh
-    from damjoint.scene.parameters import start_gmsh
+    from damjoint.model.parameters import start_gmsh
 
     start_gmsh()
     history = read(folder / "history.csv")

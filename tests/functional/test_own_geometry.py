@@ -5,11 +5,11 @@ import gmsh
 import numpy as np
 import pytest
 from damjoint import InputError, run
-from damjoint.engines.condensed.elements import tensor
-from damjoint.results.verdict import hints
-from damjoint.scene.case import load
-from damjoint.scene.mesh import Mesh
-from damjoint.scene.parameters import start_gmsh
+from damjoint.fem.elements import tensor
+from damjoint.model.case import load
+from damjoint.model.mesh import Mesh
+from damjoint.model.parameters import start_gmsh
+from damjoint.statics.verdict import hints
 
 #: Points and weights on a line and, their products, on a triangle: fine enough for a kink.
 LINE, X, W = tensor(400, 1), *tensor(40, 1)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from damjoint.results.verdict import hints, statement, verdict
+from damjoint.statics.verdict import hints, statement, verdict
 from damjoint.studies.critical import Search
 
 #: 45 m, drains, on a joint that breaks and slides a little.

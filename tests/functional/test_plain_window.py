@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from damjoint import data, run
 from damjoint.engines.getdp.process import find_getdp
-from damjoint.scene.case import load
-from damjoint.scene.parameters import parameter, start_gmsh
+from damjoint.model.case import load
+from damjoint.model.parameters import parameter, start_gmsh
 from matplotlib.image import imread
 
 #: Of an order 1 mesh that is solved in a second

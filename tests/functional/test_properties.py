@@ -8,9 +8,9 @@ from functools import partial
 import numpy as np
 import pytest
 from damjoint import InputError, run
-from damjoint.results.tables import FLUX, HARDENING, HISTORY, JOINT
-from damjoint.scene.case import load
-from damjoint.scene.parameters import declared
+from damjoint.model.case import load
+from damjoint.model.parameters import declared
+from damjoint.model.results import FLUX, HARDENING, HISTORY, JOINT
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from own_mesh import OwnMesh, Shuffled

@@ -5,7 +5,7 @@ import pytest
 from closed_forms import differences
 from damjoint import data
 from damjoint.engines import engine_of
-from damjoint.scene.case import load
+from damjoint.model.case import load
 from numpy.testing import assert_allclose
 
 #: A dam on a foundation of three blocks in rows and columns; regular: of quadrangles, but for the

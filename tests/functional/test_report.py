@@ -8,8 +8,8 @@ import shutil
 import numpy as np
 import pytest
 from damjoint import cli
-from damjoint.results import stored
-from damjoint.results.pictures import shear_limit
+from damjoint.post import stored
+from damjoint.post.pictures import shear_limit
 from numpy.testing import assert_allclose
 from PIL import Image
 

@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
-from damjoint.engines.condensed.laws import Friction, Memory, Rupture
-from damjoint.results.verdict import verdict
-from damjoint.scene.case import load
+from damjoint.laws import Memory
+from damjoint.laws.friction import Friction
+from damjoint.laws.rupture import Rupture
+from damjoint.model.case import load
+from damjoint.statics.verdict import verdict
 
 #: A real dam whose joint releases its shear over a distance far below its jumps.
 LOOSE = {"dam_height": 40, "dam_base": 30, "E": 1e10, "sigma_max": 0}

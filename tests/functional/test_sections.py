@@ -4,8 +4,8 @@ integration of the tests' own; cracked uplift against the gravity method."""
 import numpy as np
 import pytest
 from damjoint import InputError
-from damjoint.results import gravity
-from damjoint.scene.case import load
+from damjoint.model.case import load
+from damjoint.statics import gravity
 from numpy.testing import assert_allclose
 from sections import resultants
 

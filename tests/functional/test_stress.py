@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from damjoint import __version__, pages, run
-from damjoint.results.tables import write_csv
-from damjoint.scene.case import load
-from damjoint.studies import stress, verification
-from damjoint.studies.verification import Written, read_table, unjustified, violations
+from damjoint import __version__, run
+from damjoint.model.case import load
+from damjoint.post.tables import write_csv
+from damjoint_tools import pages, stress, verification
+from damjoint_tools.verification import Written, read_table, unjustified, violations
 
 SCENES = {
     "rupture": {"law": "rupture", "uplift": "flow", "sigma_max": 1e4, "G_f": 10.0},

@@ -10,7 +10,7 @@ import time
 
 import pytest
 from closed_forms import slide_level
-from damjoint.scene.case import CASES
+from damjoint.model.case import CASES
 from damjoint.studies import sweep
 from damjoint.studies.plan import plan_of
 from distributed import LocalCluster

@@ -4,7 +4,8 @@ import re
 from pathlib import Path
 
 import pytest
-from damjoint import __version__, pages
+from damjoint import __version__
+from damjoint_tools import pages
 from numpy.testing import assert_allclose
 
 PAGE = Path(__file__).parents[2] / "reference" / "tour.md"

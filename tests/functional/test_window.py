@@ -11,11 +11,11 @@ import time
 import gmsh
 import numpy as np
 import pytest
-from damjoint.window import tree
-from damjoint.window.shapes import Deformed
-from damjoint.window.sheet import Request, titles
-from damjoint.window.views import captions
-from damjoint.window.window import ACTION, Session
+from damjoint.gui import tree
+from damjoint.gui.shapes import Deformed
+from damjoint.gui.sheet import Request, titles
+from damjoint.gui.views import captions
+from damjoint.gui.window import ACTION, Session
 
 SMALL = {"n_joint": 10.0, "h_dam": 3.0, "h_found": 4.0}
 WORDS = [word for name, value in SMALL.items() for word in ("--set", f"{name}={value}")]

@@ -1,7 +1,7 @@
 """The eleven modelings of SSNP142 against the published numbers, and how hard they are to solve."""
 
 import pytest
-from damjoint.results import validation
+from damjoint.post import validation
 
 #: at most so many Newton iterations: in one step, in all of them (both uplifts of a, b, i counted
 #: apart)

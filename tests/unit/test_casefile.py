@@ -5,9 +5,9 @@ import os
 import gmsh
 import pytest
 from damjoint import InputError
-from damjoint.results import validation
-from damjoint.scene import casefile, parameters
-from damjoint.scene.case import CASES, load
+from damjoint.model import casefile, parameters
+from damjoint.model.case import CASES, load
+from damjoint.post import validation
 
 
 @pytest.mark.parametrize("path", sorted(CASES.glob("*.case")), ids=lambda path: path.stem)

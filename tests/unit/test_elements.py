@@ -3,9 +3,9 @@ theirs."""
 
 import numpy as np
 import pytest
-from damjoint.engines.condensed.elasticity import body_force, elasticity, stress
-from damjoint.engines.condensed.elements import CORNERS, Space, basis, corners_of
-from damjoint.scene.mesh import Body
+from damjoint.fem.elasticity import body_force, elasticity, stress
+from damjoint.fem.elements import CORNERS, Space, basis, corners_of
+from damjoint.model.mesh import Body
 from scipy.sparse.linalg import spsolve
 
 #: Numbers of functions: simplices have the quadratic ones, the others products of such.

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from closed_forms import BASE, CENTROID, WEIGHT, resultants, slide_level
-from damjoint.results import gravity
-from damjoint.scene.case import load
+from damjoint.model.case import load
+from damjoint.statics import gravity
 from numpy.testing import assert_allclose
 from scipy.integrate import quad
 from scipy.optimize import brentq

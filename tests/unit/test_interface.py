@@ -3,9 +3,9 @@ derivatives."""
 
 import numpy as np
 import pytest
-from damjoint.engines.condensed.bulk import Bodies, condense
-from damjoint.engines.condensed.interface import Interface, lu_solve
-from damjoint.scene.case import load
+from damjoint.fem.condensation import Bodies, condense
+from damjoint.joint.interface import Interface, lu_solve
+from damjoint.model.case import load
 from numpy.testing import assert_allclose
 
 SMALL = {"n_joint": 10.0, "h_dam": 3.0, "h_found": 4.0, "order": 2.0}

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from damjoint.studies.bench import Kept, Table
+from damjoint_tools.bench import Kept, Table
 
 
 @pytest.fixture
@@ -33,7 +33,7 @@ def test_what_other_code_has_measured_is_not_taken(path, monkeypatch):
     assert not Kept(path, True).has(("a",))
     Kept(path, False).once(("a",), lambda: 1)
     other = {**Kept(path, False).provenance, "code": "other"}
-    monkeypatch.setattr("damjoint.studies.bench.provenance", lambda: other)
+    monkeypatch.setattr("damjoint_tools.bench.provenance", lambda: other)
     assert not Kept(path, False).has(("a",))
     assert Kept(path, False).provenance == other
 
@@ -43,6 +43,6 @@ def test_what_was_begun_earlier_keeps_its_day_and_commit(path, monkeypatch):
     begun = Kept(path, False)
     begun.once(("a",), lambda: 1)
     later = {**begun.provenance, "date": "2999-01-01", "commit": "0000000"}
-    monkeypatch.setattr("damjoint.studies.bench.provenance", lambda: later)
+    monkeypatch.setattr("damjoint_tools.bench.provenance", lambda: later)
     again = Kept(path, False)
     assert again.has(("a",)) and again.provenance == begun.provenance

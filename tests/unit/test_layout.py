@@ -5,12 +5,12 @@ from pathlib import Path
 
 import damjoint
 import pytest
-from damjoint import pages
+from damjoint_tools import pages
 
 PACKAGE = Path(damjoint.__file__).parent
 #: Each part uses only those before it.
-PARTS = ["", "storage", "scene", "results", "engines", "accuracy", "run", "studies", "pages"]
-PARTS += ["window", "cli", "__main__"]
+PARTS = ["", "storage", "model", "laws", "fem", "joint", "solver", "engines", "statics", "post"]
+PARTS += ["accuracy", "run", "studies", "gui", "cli", "__main__"]
 
 
 def part_of(path):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from damjoint.results.fields import (
+from damjoint.model.fields import (
     CLOSED,
     OPEN,
     SLIPPED,
@@ -12,9 +12,9 @@ from damjoint.results.fields import (
     row_of_nodes,
     state_of,
 )
-from damjoint.results.outline import filled, section_of, skin
-from damjoint.results.units import FORCES, LENGTHS, told, unit
-from damjoint.scene.mesh import Body
+from damjoint.model.mesh import Body
+from damjoint.post.outline import filled, section_of, skin
+from damjoint.post.units import FORCES, LENGTHS, told, unit
 from numpy.testing import assert_allclose
 
 

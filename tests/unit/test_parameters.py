@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 from damjoint import InputError
-from damjoint.scene import parameters
-from damjoint.scene.case import CASES, as_published, load
-from damjoint.scene.parameters import independent
+from damjoint.model import parameters
+from damjoint.model.case import CASES, as_published, load
+from damjoint.model.parameters import independent
 from numpy.testing import assert_allclose
 
 # What the verification document and the published test files say of each modeling.

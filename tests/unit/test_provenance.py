@@ -7,8 +7,8 @@ from datetime import date
 from pathlib import Path
 
 import pytest
-from damjoint import __version__, pages
-from damjoint.studies import provenance
+from damjoint import __version__
+from damjoint_tools import pages, provenance
 
 ROOT = Path(__file__).parents[2]
 ONE = {"version": "1.2", "commit": "abc1234", "code": "f00", "machine": "PC", "date": "2030-01-02"}

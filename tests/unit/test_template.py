@@ -1,7 +1,7 @@
 """damjoint new: a file that runs as it is, and says everything."""
 
-from damjoint.scene import casefile, parameters
-from damjoint.scene.case import load
+from damjoint.model import casefile, parameters
+from damjoint.model.case import load
 
 
 def test_it_is_the_dam_of_the_defaults(command, tmp_path):

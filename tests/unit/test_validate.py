@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from damjoint.engines.getdp.tables import nodes_of
-from damjoint.results import validation
-from damjoint.results.tables import HISTORY, JOINT, Results
-from damjoint.results.verdict import failed, statement, verdict
-from damjoint.scene.case import load
+from damjoint.model.case import load
+from damjoint.model.results import HISTORY, JOINT, Results
+from damjoint.post import validation
+from damjoint.statics.verdict import failed, statement, verdict
 
 REFERENCE = validation.Reference(
     "A", "imposed", "delta_n", 1.3, 2e-7, "m", 0.01, "test", "", "node"

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from damjoint.results import verdict
-from damjoint.results.tables import HISTORY, Results
-from damjoint.scene.case import load
+from damjoint.model.case import load
+from damjoint.model.results import HISTORY, Results
+from damjoint.statics import verdict
 
 #: Effective normal force [N/m] of all these states.
 N = 1e6

@@ -14,10 +14,10 @@ from importlib import import_module
 from types import ModuleType
 
 from .. import InputError
-from ..results.fields import Field
-from ..results.tables import Results
-from ..scene.case import Case
-from ..scene.mesh import Mesh
+from ..model.case import Case
+from ..model.fields import Field
+from ..model.mesh import Mesh
+from ..model.results import Results
 
 ENGINES = ("auto", "condensed", "getdp")
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from ..engines.condensed import cache
-from ..engines.condensed.interface import Interface
-from ..scene.case import Case
+from ..joint.interface import Interface
+from ..model.case import Case
 
 _LAST: dict[tuple, Interface] = {}
 

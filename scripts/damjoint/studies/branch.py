@@ -1,7 +1,7 @@
 """One dam followed to the end of its equilibria.
 
 The levels are prescribed as far as a step is found, then its equilibrium path is followed (see
-engines/condensed/path.py), and where it ends is looked at to the precision.
+solver/path.py), and where it ends is looked at to the precision.
 """
 
 from __future__ import annotations
@@ -10,11 +10,22 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..engines.condensed.filling import Filling
-from ..engines.condensed.interface import Interface
-from ..engines.condensed.path import Path, Point
-from ..results.tables import CRITICAL
-from ..scene.case import Case
+from ..joint.interface import Interface
+from ..model.case import Case
+from ..model.results import HISTORY
+from ..solver.load_stepper import Filling
+from ..solver.path import Path, Point
+
+#: Columns of critical.csv: a row per equilibrium of each dam that was tried.
+CRITICAL = {
+    "trial": ("-", "number of the dam that was tried"),
+    "value": ("", "what was varied: level [m], strength, or the parameter"),
+    "stands": ("-", "1: there is an equilibrium with this value, 0: none was found"),
+    "driven": ("-", "0: the level was prescribed, 1: a displacement, and the level found"),
+    **{n: HISTORY[n] for n in ("level", "crest_ux", "crack_length", "slip_length", "N", "T", "M")},
+    "pushed": ("m", "how far the dam was pushed where a displacement was prescribed"),
+    "compression": ("Pa", "total compression at the toe"),
+}
 
 #: How many steps of the level may fail, each one half of the one before, until the dam is pushed.
 FAILURES = 2

@@ -12,9 +12,9 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg  # as in results/pictures.py
 from matplotlib.figure import Figure
 
-from ..results.drawing import write_picture
-from ..results.pictures import BLUE, LENGTHS, ORANGE, RED, unit
-from ..scene import parameters
+from ..model import parameters
+from ..post.drawing import write_picture
+from ..post.pictures import BLUE, LENGTHS, ORANGE, RED, unit
 from .plan import Plan, Row, column_of, numbers
 
 #: What is drawn: in words, and in which units.
@@ -136,7 +136,7 @@ def draw_maps(figure: Figure, plan: Plan, rows: list[Row], names: list[str]) -> 
 
 def draw_probability(figure: Figure, plan: Plan, rows: list[Row], names: list[str]) -> None:
     """The probability of failure over the varied parameter, with its interval."""
-    from .outcome import probabilities  # scipy.stats takes a second to import
+    from .outcome import probabilities
 
     (name,), axes = names, figure.subplots()
     table = probabilities(plan, rows)

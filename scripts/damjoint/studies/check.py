@@ -14,21 +14,48 @@ from tabulate import tabulate
 
 from .. import InputError
 from ..engines import engine_of
-from ..results import folder as folders
-from ..results import gravity, verdict
-from ..results.check_picture import SIGN, draw_check
-from ..results.fields import along
-from ..results.gravity import GravityMethod
-from ..results.tables import CHECK, Results, write_csv
-from ..results.units import FORCES, MOMENTS, STRESSES, unit
+from ..model.case import Case
+from ..model.fields import along
+from ..model.results import HISTORY, Results
+from ..post import folder as folders
+from ..post.check_picture import SIGN, draw_check
+from ..post.tables import write_csv
+from ..post.units import FORCES, MOMENTS, STRESSES, unit
 from ..run import run
-from ..scene.case import Case
+from ..statics import gravity, verdict
+from ..statics.gravity import GravityMethod
 
 FINITE_ELEMENTS, GRAVITY = "finite elements", "gravity method"
 LONGER = "gravity method, longer crack"
 DIFFERENCE, REQUIRED = "difference", "required"
 #: The verdict where nothing fails and nothing is required; what a case can require.
 UNCHECKED, REQUIREMENTS = "not checked", ("required_SSF", "required_OSF", "f_c")
+
+#: Columns of check.csv: a row per scene and answer at the last level, and one of differences.
+CHECK = {
+    "case": ("", "name of the case"),
+    "answer": (
+        "",
+        "finite elements, gravity method (also with a longer crack), difference of the first two",
+    ),
+    "uplift": ("", "water in the joint"),
+    "load": ("", "full; partial: the run stopped before its last t, where all loads are there"),
+    "time": HISTORY["time"],
+    **{name: HISTORY[name] for name in ("level", "tail_level", "N", "T", "M", "U", "x_resultant")},
+    "sigma_n_heel": ("Pa", "total normal stress at the heel, compression < 0"),
+    "sigma_n_toe": ("Pa", "total normal stress at the toe, compression < 0"),
+    "sigma_n_eff_heel": ("Pa", "effective normal stress at the heel, compression < 0; 0: cracked"),
+    "sigma_n_eff_toe": ("Pa", "effective normal stress at the toe, compression < 0"),
+    "crack_length": HISTORY["crack_length"],
+    "SSF": ("-", "sliding: (mu N + adhesion (length - crack_length)) / T"),
+    "OSF": ("-", "overturning: stabilising over overturning moments about the toe"),
+    "position": ("", "where N meets the joint: middle third, middle half, within base, outside"),
+    "required_SSF": ("-", "what the case requires; 0: nothing"),
+    "required_OSF": ("-", "what the case requires; 0: nothing"),
+    "f_c": ("Pa", "compressive strength at the toe; 0: not checked"),
+    "verdict": ("", "pass or fail; not checked: nothing fails, and nothing is required"),
+    "why": ("", "why it fails"),
+}
 
 #: The columns of check.csv that are numbers which the two answers share.
 NUMBERS = tuple(CHECK)[list(CHECK).index("level") : list(CHECK).index("OSF") + 1]

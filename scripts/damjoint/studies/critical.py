@@ -21,18 +21,19 @@ from tqdm import tqdm
 
 from .. import InputError
 from ..engines import Outcome
-from ..engines.condensed.path import PRECISION, ROUGH, SURE, Point
 from ..engines.condensed.solve import about
-from ..results import folder as folders
-from ..results import gravity
-from ..results.tables import CRITICAL, Results, write_csv
-from ..results.verdict import bound, highest_by_statics, pulled_when_open, statement
+from ..model.case import Case, load
+from ..model.parameters import parameter
+from ..model.results import Results
+from ..post import folder as folders
+from ..post.tables import write_csv
 from ..run import save
-from ..scene.case import Case, load
-from ..scene.parameters import parameter
+from ..solver.path import PRECISION, ROUGH, SURE, Point
+from ..statics import gravity
+from ..statics.limit import elastic_heel_stress
+from ..statics.verdict import bound, highest_by_statics, pulled_when_open, statement
 from .bodies import interface_of
-from .branch import Branch, row
-from .limit import elastic_heel_stress
+from .branch import CRITICAL, Branch, row
 
 #: What is divided by the strength reduction factor. The fracture energies, too: the jumps at which
 #: a bond has gone stay as they are, and its whole curve is lowered.

@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from ..engines.condensed.path import Point
-from ..results.drawing import write_picture
-from ..results.pictures import BLUE, GREEN, LENGTHS, ORANGE, RED, unit
+from ..post.drawing import write_picture
+from ..post.pictures import BLUE, GREEN, LENGTHS, ORANGE, RED, unit
+from ..solver.path import Point
 from .branch import Branch
 
 

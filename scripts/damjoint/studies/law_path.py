@@ -10,8 +10,8 @@ import numpy as np
 
 from .. import InputError
 from ..engines.getdp.law import evaluate
-from ..results.tables import write_csv
-from ..scene.parameters import parameter
+from ..model.parameters import parameter
+from ..post.tables import write_csv
 
 JUMPS = ("delta_n", "delta_t1", "delta_t2")
 

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from .. import InputError
-from ..scene import parameters
-from ..scene.arithmetic import parsed, value_of
-from ..scene.case import Case, load
+from ..model import parameters
+from ..model.arithmetic import parsed, value_of
+from ..model.case import Case, load
 
 #: The texts of a row, by column.
 Row = dict[str, str]
@@ -52,7 +52,7 @@ class Sample:
 
         Raises InputError.
         """
-        from . import sampling  # scipy.stats takes a second to import
+        from . import sampling
 
         drawn = sampling.draw(self.number, self.laws, self.design, self.seed, self.correlate)
         found = {name: [f"{v:.12g}" for v in values] for name, values in drawn.items()}

@@ -14,15 +14,15 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from matplotlib.figure import Figure
 
 from .. import InputError, __version__
-from ..results import pictures, stored
-from ..results.drawing import figure_of
-from ..results.fields import Solution
-from ..results.summary import levels_table, table
-from ..results.tables import Results
-from ..results.units import FORCES, MOMENTS
-from ..results.verdict import failed, statement, stiffness_ratio
-from ..scene.case import Case
-from ..scene.parameters import constants, declared, parse
+from ..model.case import Case
+from ..model.fields import Solution
+from ..model.parameters import constants, declared, parse
+from ..model.results import Results
+from ..post import pictures, stored
+from ..post.drawing import figure_of
+from ..post.summary import levels_table, table
+from ..post.units import FORCES, MOMENTS
+from ..statics.verdict import failed, statement, stiffness_ratio
 from ..storage import whole
 from .check import UNCHECKED, Check, compared, hand_calculation, picture_table
 

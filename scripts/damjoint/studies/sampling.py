@@ -6,7 +6,7 @@ import numpy as np
 from scipy import linalg, stats
 
 from .. import InputError
-from ..scene.arithmetic import call_of
+from ..model.arithmetic import call_of
 
 #: Distributions by scipy's names, and the name by which everyone knows one of them.
 LAWS = {name: law for name, law in vars(stats).items() if isinstance(law, stats.rv_continuous)}

@@ -20,15 +20,16 @@ from tqdm import tqdm
 
 from .. import InputError, RunError, __version__, accuracy
 from ..engines import engine_of
-from ..engines.condensed.filling import Filling
-from ..engines.condensed.interface import Interface
-from ..results.tables import HISTORY, as_text
-from ..results.verdict import failed, statement, verdict
-from ..scene.case import Case, first_mesh, load
+from ..joint.interface import Interface
+from ..model.case import Case, first_mesh, load
+from ..model.results import HISTORY
+from ..post.tables import as_text
+from ..solver.load_stepper import Filling
+from ..statics.limit import mechanism
+from ..statics.verdict import failed, statement, verdict
 from ..storage import lock
 from .bodies import interface_of
 from .critical import Search
-from .limit import mechanism
 from .plan import AS_IT_IS, Loading, Plan, Row, cases_of, column_of
 
 

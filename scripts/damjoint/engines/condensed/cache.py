@@ -19,10 +19,10 @@ import numpy as np
 from scipy import linalg
 
 from ... import RunError, __version__, data
-from ...scene.case import Case
-from ...scene.loads import overtopped
-from ...scene.mesh import Body, Mesh, mesh_of, shares
-from .bulk import MATERIAL, Bodies, Condensed, check_size, condense
+from ...fem.condensation import MATERIAL, Bodies, Condensed, check_size, condense
+from ...model.case import Case
+from ...model.loads import overtopped
+from ...model.mesh import Body, Mesh, mesh_of, shares
 
 #: The cache is kept below this size [bytes]; the files longest unused go first.
 LIMIT = 2_000_000_000
@@ -62,8 +62,7 @@ def fingerprint(mesh: Mesh) -> str:
 @lru_cache(maxsize=1)
 def sources() -> str:
     """A fingerprint of all that makes condensed bodies of a case: meshes and elements."""
-    here = Path(__file__).parent
-    makers = [here / f"{name}.py" for name in ("elements", "elasticity", "bulk", "factor")]
+    makers = sorted((Path(__file__).parents[2] / "fem").glob("*.py"))
     texts = [path.read_bytes() for path in (*sorted(data("geo").glob("*.geo")), *makers)]
     return hashlib.sha256(b"".join(texts)).hexdigest()
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
-from ...results.fields import Field
-from .bulk import Bodies, body_of, material_of, unit_loads, unknowns
-from .elasticity import stress
-from .equilibrium import Joint
-from .factor import solve_symmetric
-from .record import Record
+from ...fem.condensation import Bodies, body_of, material_of, unit_loads, unknowns
+from ...fem.elasticity import stress
+from ...fem.factor import solve_symmetric
+from ...joint.equilibrium import Joint
+from ...model.fields import Field
+from ...solver.history import Record
 
 
 def recover(bodies: Bodies, scenes: list[tuple[Joint, Record]]) -> list[dict[float, Field]]:

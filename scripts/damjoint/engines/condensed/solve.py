@@ -8,15 +8,15 @@ from functools import lru_cache, partial
 
 from threadpoolctl import threadpool_limits
 
-from ...results.fields import Field
-from ...scene.case import Case
-from ...scene.mesh import mesh_of
+from ...fem import factor
+from ...fem.condensation import Bodies, Condensed, joint_size
+from ...joint.interface import Interface
+from ...model.case import Case
+from ...model.fields import Field
+from ...model.mesh import mesh_of
+from ...solver.load_stepper import Filling
 from .. import OnStep, Outcome
-from . import factor
-from .bulk import Bodies, Condensed, joint_size
 from .cache import cached
-from .filling import Filling
-from .interface import Interface
 
 #: Jump unknowns from which on a second thread of the linear algebra pays; below it waits and
 #: disturbs.

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from ... import RunError, data
-from ...scene.case import load
-from ...scene.parameters import assignments, listing, parameter
+from ...model.case import load
+from ...model.parameters import assignments, listing, parameter
 from ...storage import check_end
 from . import process
 

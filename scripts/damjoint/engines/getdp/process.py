@@ -14,9 +14,9 @@ from functools import lru_cache
 from pathlib import Path
 
 from ... import InputError, RunError, data
-from ...scene.case import Case
-from ...scene.mesh import LINES, SIDES, Mesh, area, heel_normal
-from ...scene.parameters import assignments, constants, listing
+from ...model.case import Case
+from ...model.mesh import LINES, SIDES, Mesh, area, heel_normal
+from ...model.parameters import assignments, constants, listing
 from ...storage import check_end
 
 OLDEST = (3, 2)

@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 
 from ... import InputError, RunError
-from ...scene.case import Case, flows, has_drains
-from ...scene.mesh import Mesh, mesh_of
+from ...fem.memory import bulk_size, check_memory
+from ...model.case import Case, flows, has_drains
+from ...model.mesh import Mesh, mesh_of
 from .. import OnStep, Outcome
-from ..memory import bulk_size, check_memory
 from . import process, tables
 
 #: Patterns that pro/*.pro knows in 3D: GetDP's rules for prisms and hexahedra do not do.

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ...results.fields import Field
-from ...results.tables import FLUX, HARDENING, Results, history_table, joint_columns, joint_table
-from ...scene.case import Case
-from ...scene.mesh import Mesh
+from ...model.case import Case
+from ...model.fields import Field
+from ...model.mesh import Mesh
+from ...model.results import FLUX, HARDENING, Results, history_table, joint_columns, joint_table
 from ...storage import check_end
 
 BODIES = ("dam", "foundation")

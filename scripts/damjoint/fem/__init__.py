@@ -1,0 +1,1 @@
+"""Finite elements of the bodies: functions, stiffness, factorisation, condensation."""

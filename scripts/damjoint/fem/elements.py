@@ -1,0 +1,315 @@
+"""Finite elements of the condensed engine: shape functions, quadrature, interpolation on a body.
+
+The same spaces as pro/spaces.pro: nodal functions N_a of order 1; order 2 adds the products
+N_a N_b, on the same straight mesh. The quadrature rules are those of pro/spaces.pro, so that both
+engines solve one discrete problem. Wedges and hexahedra are this engine's alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from itertools import combinations, product
+
+import numpy as np
+from scipy import sparse
+
+from ..model.mesh import Body
+
+#: Corners of the reference elements, by node number.
+CORNERS = {
+    "vertex": [()],
+    "line": [(-1,), (1,)],
+    "triangle": [(0, 0), (1, 0), (0, 1)],
+    "quad": [(-1, -1), (1, -1), (1, 1), (-1, 1)],
+    "tetra": [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)],
+}
+CORNERS["wedge"] = [(*c, w) for w in (-1, 1) for c in CORNERS["triangle"]]
+CORNERS["hexahedron"] = [(*c, w) for w in (-1, 1) for c in CORNERS["quad"]]
+
+
+@cache
+def corners_of(shape: str) -> np.ndarray:
+    """Corners of a reference element (n, d)."""
+    return np.array(CORNERS[shape], float)
+
+
+@cache
+def pairs_of(shape: str) -> np.ndarray:
+    """The pairs of nodes whose products N_a N_b are the functions that order 2 adds to an element,
+    (n, k, 2): k pairs with the same product; fewer are repeated.
+
+    Pairs with the same middle have it: an edge's ends; both diagonals of a quadrangular face; the
+    four of a hexahedron. With these the functions span all products of quadratic ones of the
+    coordinates: on simplices the full quadratic space, on other elements one that contains it.
+    """
+    corners, found = corners_of(shape), {}
+    for a, b in combinations(range(len(corners)), 2):
+        found.setdefault(tuple(corners[a] + corners[b]), []).append((a, b))
+    most = max(map(len, found.values()), default=1)
+    repeated = [(pairs * most)[:most] for pairs in found.values()]
+    return np.array(repeated, int).reshape(-1, most, 2)
+
+
+@cache
+def places_of(shape: str, order: int) -> np.ndarray:
+    """Where the functions of an order are, (n, d): the nodes, then the middles of pairs."""
+    corners = corners_of(shape)
+    middles = corners[pairs_of(shape)[:, 0]].mean(axis=1)
+    return np.concatenate([corners, middles]) if order == 2 else corners
+
+
+def nodal(shape: str, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Nodal functions (n,) and their reference gradient (n, d) at a reference point u (d,)."""
+    if shape in ("vertex", "triangle", "tetra"):
+        d = len(u)
+        return np.array([1 - u.sum(), *u]), np.vstack([-np.ones(d), np.eye(d)])
+    if shape == "wedge":
+        flat, flat_gradient = nodal("triangle", u[:2])
+        low, high = (1 - u[2]) / 2, (1 + u[2]) / 2
+        values = np.concatenate([flat * low, flat * high])
+        up = np.concatenate([-flat, flat]) / 2
+        return values, np.column_stack([np.vstack([flat_gradient * low, flat_gradient * high]), up])
+    corners = corners_of(shape)
+    factors = (1 + corners * u) / 2
+    gradient = np.empty_like(corners)
+    for i in range(len(u)):
+        gradient[:, i] = corners[:, i] / 2 * np.prod(np.delete(factors, i, axis=1), axis=1)
+    return factors.prod(axis=1), gradient
+
+
+def basis(shape: str, order: int, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """All functions of an element of this order, and their reference gradient, at a reference
+    point.
+    """
+    n, dn = nodal(shape, np.asarray(u, float))
+    if order == 1:
+        return n, dn
+    a, b = pairs_of(shape)[:, 0].T
+    return np.concatenate([n, n[a] * n[b]]), np.vstack(
+        [dn, n[a, None] * dn[b] + n[b, None] * dn[a]]
+    )
+
+
+# Triangle rules with 1, 3, 6 and 7 points (degrees 1, 2, 4, 5): Strang and Fix, Dunavant
+_A6, _B6, _A7, _B7 = 0.091576213509771, 0.445948490915965, 0.101286507323456, 0.470142064105115
+TRIANGLE = {
+    1: ([(1 / 3, 1 / 3)], [0.5]),
+    3: ([(1 / 6, 1 / 6), (2 / 3, 1 / 6), (1 / 6, 2 / 3)], [1 / 6] * 3),
+    6: (
+        [
+            (1 - 2 * _A6, _A6),
+            (_A6, 1 - 2 * _A6),
+            (_A6, _A6),
+            (1 - 2 * _B6, _B6),
+            (_B6, 1 - 2 * _B6),
+            (_B6, _B6),
+        ],
+        [0.054975871827661] * 3 + [0.111690794839005] * 3,
+    ),
+    7: (
+        [
+            (1 / 3, 1 / 3),
+            (1 - 2 * _A7, _A7),
+            (_A7, 1 - 2 * _A7),
+            (_A7, _A7),
+            (1 - 2 * _B7, _B7),
+            (_B7, 1 - 2 * _B7),
+            (_B7, _B7),
+        ],
+        [0.1125] + [0.0629695902724135] * 3 + [0.066197076394253] * 3,
+    ),
+}
+# Tetrahedron with 4 points (degree 2)
+_A4, _B4 = 0.1381966011250105, 0.5854101966249685
+
+
+def tensor(n: int, d: int) -> tuple[np.ndarray, np.ndarray]:
+    """Gauss points (n^d, d) and weights on [-1, 1]^d."""
+    x, w = np.polynomial.legendre.leggauss(n)
+    return np.array(list(product(x, repeat=d))), np.array(
+        [np.prod(v) for v in product(w, repeat=d)]
+    )
+
+
+def rule(shape: str, points: int) -> tuple[np.ndarray, np.ndarray]:
+    """Quadrature with a number of points on a reference element: points (n, d), weights (n,)."""
+    if shape == "vertex":
+        return np.zeros((1, 0)), np.ones(1)
+    if shape == "line":
+        return tensor(points, 1)
+    if shape == "triangle":
+        x, w = TRIANGLE[points]
+    elif shape == "quad":
+        return tensor(round(points**0.5), 2)
+    elif shape == "tetra":
+        x, w = (
+            ([(0.25,) * 3], [1 / 6])
+            if points == 1
+            else ([(_A4,) * 3, (_B4, _A4, _A4), (_A4, _B4, _A4), (_A4, _A4, _B4)], [1 / 24] * 4)
+        )
+    elif shape == "wedge":
+        (flat, fw), (up, uw) = (
+            rule("triangle", {6: 3, 21: 7}[points]),
+            tensor({6: 2, 21: 3}[points], 1),
+        )
+        x, w = [(*f, *h) for h in up for f in flat], [a * b for b in uw for a in fw]
+    else:
+        return tensor(round(points ** (1 / 3)), 3)
+    return np.array(x, float), np.array(w, float)
+
+
+#: Points of the rules, by order and shape.
+BULK = {
+    1: {"triangle": 1, "quad": 4, "tetra": 1, "wedge": 6, "hexahedron": 8},
+    2: {"triangle": 3, "quad": 9, "tetra": 4, "wedge": 21, "hexahedron": 27},
+}
+#: Of the joint, by quadrature, too. Published quadrangles of order 2 have 3 x 3 points; they take 2
+#: x 2 here, so that layers repeat the plane scene.
+JOINT = {
+    "full": {1: {"line": 2, "triangle": 3, "quad": 4}, 2: {"line": 3, "triangle": 6, "quad": 9}},
+    "published": {
+        1: {"line": 2, "triangle": 1, "quad": 4},
+        2: {"line": 2, "triangle": 6, "quad": 4},
+    },
+}
+WATER = {"vertex": 1, "line": 4, "triangle": 6, "quad": 16}
+
+
+@cache
+def tabulated(
+    shape: str, order: int, points: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """At the points of a rule: functions (q, n), reference gradients (q, n, d), nodal gradients (q,
+    m, d), weights (q,).
+    """
+    x, w = rule(shape, points)
+    values, gradients = zip(*(basis(shape, order, u) for u in x), strict=True)
+    return np.array(values), np.array(gradients), np.array([nodal(shape, u)[1] for u in x]), w
+
+
+class Space:
+    """The scalar functions of an order on a body: nodes first, then (order 2) products of two.
+
+    place: (n, 3) the node, or the middle of the edge, face or element, of each function.
+    """
+
+    def __init__(self, body: Body, order: int) -> None:
+        self.body, self.order, self.connectivity = body, order, body.cells
+        self.place = body.points
+        #: what tells a product from others, on this body and on its parts, sorted
+        self.codes = np.zeros(0, np.int64)
+        if order == 2:
+            pairs = [cells[:, pairs_of(shape)] for shape, cells in body.cells]
+            codes = np.concatenate([codes_of(body.node_tags[p]).ravel() for p in pairs])
+            middles = [body.points[p].mean(axis=(2, 3)).reshape(-1, 3) for p in pairs]
+            self.codes, first, inverse = np.unique(codes, return_index=True, return_inverse=True)
+            self.place = np.vstack([body.points, np.concatenate(middles)[first]])
+            cuts = np.cumsum([m.size // 3 for m in middles])[:-1]
+            products = np.split(len(body.points) + inverse, cuts)
+            self.connectivity = [
+                (shape, np.hstack([cells, own.reshape(p.shape[:2])]))
+                for (shape, cells), p, own in zip(body.cells, pairs, products, strict=True)
+            ]
+
+    def find(self, part: Space) -> np.ndarray:
+        """The functions of this space that are those of a part (a face, an edge of the body, the
+        joint).
+        """
+        place = {t: i for i, t in enumerate(self.body.node_tags)}
+        nodes = np.array([place[t] for t in part.body.node_tags], int)
+        products = np.searchsorted(self.codes, part.codes)
+        return np.concatenate([nodes, len(self.body.points) + products])
+
+    def at_places(self, order: int) -> sparse.csr_matrix:
+        """Values at the places, from the functions up to an order (places, functions)."""
+        rows, matrices = [], []
+        for shape, table in self.connectivity:
+            local = [basis(shape, order, u)[0] for u in places_of(shape, self.order)]
+            columns = np.repeat(table[:, : len(local[0])], len(local), axis=0)
+            pointers = columns.shape[1] * np.arange(len(columns) + 1)
+            data = np.tile(np.ravel(local), len(table))
+            size = len(columns), len(self.place) if order == 2 else len(self.body.points)
+            matrices.append(sparse.csr_matrix((data, columns.ravel(), pointers), size))
+            rows.append(table.ravel())
+        _, first = np.unique(np.concatenate(rows), return_index=True)
+        values = sparse.vstack(matrices, format="csr")[first]
+        values.eliminate_zeros()
+        return values
+
+
+def codes_of(pairs: np.ndarray) -> np.ndarray:
+    """A number for each product (..., n), from the tags of its pairs (..., n, k, 2): the same for
+    all elements that share an edge or a face.
+    """
+    ends = np.sort(pairs.astype(np.int64), axis=-1)
+    return (ends[..., 0] << 32 | ends[..., 1]).min(axis=-1)
+
+
+def geometry(
+    points: np.ndarray, cells: np.ndarray, dn: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Measure of the element per reference measure (e,), and reference-to-real gradient (e, d, 3 or
+    less).
+
+    dn: (m, d) nodal gradients at one point; points (n, D). For d < D the pseudo-inverse: gradients
+    along the element.
+    """
+    jacobian = np.einsum("md,eml->edl", dn, points[cells])
+    metric = jacobian @ jacobian.transpose(0, 2, 1)
+    return np.sqrt(np.linalg.det(metric)), np.linalg.solve(metric, jacobian)
+
+
+@dataclass
+class Points:
+    """Quadrature points of a space: weights (q,), positions (q, 3), functions and their gradients
+    as sparse matrices.
+    """
+
+    weights: np.ndarray
+    positions: np.ndarray
+    #: (q, functions)
+    values: sparse.csr_matrix
+    #: (q, functions) for x, y and z
+    gradients: tuple[sparse.csr_matrix, ...]
+    #: element of each point
+    elements: np.ndarray
+
+
+def points_of(space: Space, numbers: dict[str, int], gradients: bool = False) -> Points:
+    """The points of the rules with these numbers of points; element by element."""
+    weights, positions, tables, coefficients, slopes, elements, start = [], [], [], [], [], [], 0
+    for shape, table in space.connectivity:
+        values, dg, dn, w = tabulated(shape, space.order, numbers[shape])
+        cells = table[:, : dn.shape[1]]
+        e, q, n = len(table), len(w), table.shape[1]
+        measure, inverse = zip(*(geometry(space.body.points, cells, d) for d in dn), strict=True)
+        weights.append((np.array(measure) * w[:, None]).T.ravel())
+        positions.append(
+            np.einsum("qm,eml->eql", values[:, : dn.shape[1]], space.body.points[cells]).reshape(
+                -1, 3
+            )
+        )
+        tables.append(np.repeat(table, q, axis=0).ravel())
+        coefficients.append(np.broadcast_to(values, (e, q, n)).ravel())
+        slopes.append(
+            np.einsum("qnd,qedl->eqnl", dg, np.array(inverse)).reshape(-1, 3)
+            if gradients
+            else np.zeros((0, 3))
+        )
+        elements.append(start + np.repeat(np.arange(e), q))
+        start += e
+    widths = np.concatenate(
+        [np.full(len(t) * numbers[s], t.shape[1]) for s, t in space.connectivity]
+    )
+    pointers = np.concatenate([[0], np.cumsum(widths)])
+    size = (len(widths), len(space.place))
+    build = lambda data: sparse.csr_matrix((data, np.concatenate(tables), pointers), size)
+    slope = np.concatenate(slopes)
+    return Points(
+        np.concatenate(weights),
+        np.concatenate(positions),
+        build(np.concatenate(coefficients)),
+        tuple(build(slope[:, i]) for i in range(3)) if gradients else (),
+        np.concatenate(elements),
+    )

@@ -1,0 +1,1 @@
+"""The joint between the condensed bodies: interpolation, wet faces, flow, residual and tangent."""

@@ -1,0 +1,327 @@
+"""The equilibrium of the joint with the condensed bodies around it (see bulk.py).
+
+Unknown: the jump. Residual R = N^T W t(jump) - (water in the joint) + S jump - t_0(loading) = 0;
+the pressure of flowing water is solved for the jump at hand before every residual, and its
+derivative enters the tangent.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+from ..laws import LAWS, Memory
+from ..model.case import Case, flows, has_drains
+from ..model.loads import Loading, line_forces, quake_column, water_column
+from .interface import Change, Interface
+from .wet_faces import WetFace
+
+
+@dataclass
+class Pressure:
+    """Water pressure [Pa] at the law's points, at the water's points and at the nodes; and if it
+    flows, its mass flux:
+
+    mean of each joint element [kg/(m s)], and out of the toe per metre of thickness.
+    """
+
+    points: np.ndarray
+    water_points: np.ndarray
+    nodes: np.ndarray
+    flux: np.ndarray | None = None
+    leakage: float = 0.0
+
+
+class Joint:
+    """The joint of a case with the condensed bodies around it: residual, tangent and what is read
+    from them.
+    """
+
+    def __init__(self, case: Case, interface: Interface) -> None:
+        self.case, self.bulk, self.interface = case, interface.bulk, interface
+        self.wet, self.flowing = case["uplift"] != "none", flows(case)
+        #: where drains take from the water that flows
+        drained = self.flowing and has_drains(case)
+        self.drains = interface.drains(case["drain_x"]) if drained else None
+        self.unit_weight = case["rho_water"] * case["g"]
+        self.law = LAWS[case["law"]](case)
+        self.virgin = self.law.respond(np.zeros((1, 3)), self.law.start(1))[1][0]
+        #: forces on the loaded unknowns and t_0; with the water in the joint: of the last loadings
+        self.pushed = lru_cache(maxsize=4)(self._pushed)
+        self.loads = lru_cache(maxsize=4)(self._loads)
+
+    # -- loads
+    # ---------------------------------------------------------------------------------------------
+
+    def face_forces(self, face: WetFace, loading: Loading) -> np.ndarray:
+        """Forces on the functions of a face [N], (functions * dim,): water, and upstream silt and
+        the water's added mass in an earthquake.
+        """
+        case = self.case
+        level = loading.tail if face.side in ("down", "bed") else loading.level
+        if case["face_load"] == "uniform":
+            pressure = np.full(len(face.y), self.unit_weight * level)
+            return face.spread(-pressure[:, None] * face.normals)
+        shaking = 0.0
+        if face.side == "up" and case["added_mass"]:
+            # Westergaard's pressure, times the part of the acceleration that is normal to the face
+            shaking = 7 / 8 * case["k_h"] * loading.part("quake")
+        floor = self.interface.floor
+
+        def height(level: float, y: np.ndarray, tilt: np.ndarray) -> np.ndarray:
+            still = np.maximum(level - y, 0)
+            return still + shaking * tilt * np.sqrt(np.maximum(level - floor, 0) * still)
+
+        def column(level: float, low: float, high: float) -> tuple[float, float]:
+            still, quake = water_column(level, low, high), quake_column(level, low, high, floor)
+            share = shaking * abs(face.normals[0, 0])
+            return tuple(a + share * b for a, b in zip(still, quake, strict=True))
+
+        forces = self.unit_weight * face.press(level, height, column)
+        grown = loading.part("silt") if face.side == "up" else 0.0
+        if grown > 0 and case["silt_height"] > 0:
+            weight = grown * case["rho_silt"] * case["g"] * case["silt_K0"]
+            depth = lambda level, y, _tilt: np.maximum(level - y, 0)
+            silt = face.press(case["silt_height"], depth, water_column).reshape(-1, self.bulk.dim)
+            silt[:, 1:] = 0  # it presses horizontally, on the vertical projection
+            forces += weight * silt.ravel()
+        return forces
+
+    def units_of(self, loading: Loading) -> dict[str, float]:
+        """The unit loads of the bulk that act: weights [N/m3] and line forces [N/m]."""
+        case, quake = self.case, loading.part("quake")
+        concrete = case["rho_dam"] * case["g"]
+        found = {
+            "dam_x": case["k_h"] * quake * concrete,
+            "dam_y": (case["k_v"] * quake - 1) * concrete,
+            "foundation_y": 0.0 if case["in_situ"] else -case["rho_found"] * case["g"],
+        }
+        found |= {"lower_x": found["dam_x"], "lower_y": found["dam_y"]}
+        for name, force in line_forces(case, loading).items():
+            found |= {f"{name}_{axis}": part for axis, part in zip("xy", force, strict=True)}
+        return {name: value for name, value in found.items() if value and name in self.bulk.units}
+
+    def _pushed(self, loading: Loading) -> tuple[np.ndarray, np.ndarray]:
+        """Forces on the loaded unknowns (m,), and t_0 (j,) of them and of the unit loads."""
+        bulk = self.bulk
+        forces = np.zeros(bulk.pressure.shape[1])
+        for name, face in self.interface.faces.items():
+            places = bulk.places[name]
+            np.add.at(forces, places[places >= 0], self.face_forces(face, loading)[places >= 0])
+        total = bulk.pressure @ forces
+        for name, size in self.units_of(loading).items():
+            total += size * bulk.units[name]
+        return forces, total
+
+    def rate(self, of: Callable[[Loading], np.ndarray], loading: Loading) -> np.ndarray:
+        """The derivative with the reservoir level of what is nearly linear in it.
+
+        An empty reservoir's thrust has none, which would leave a driven step without a direction:
+        it is that of a tenth of the dam's height.
+        """
+        height = self.case.size
+        step = 1e-5 * max(height, abs(loading.level))
+        level = loading.level if abs(loading.level) > 1e-3 * height else 0.1 * height
+        above, below = (replace(loading, level=level + s) for s in (step, -step))
+        return (of(above) - of(below)) / (2 * step)
+
+    # -- water in the joint
+    # ---------------------------------------------------------------------------------------------
+
+    def head(self, loading: Loading, matrix: object = None) -> np.ndarray:
+        """Head [m] in a joint that conducts alike everywhere, at the joint's nodes or at places
+        that a matrix of `Along` leads to: linear on the way from the reservoir's level to the
+        tailwater's; a dry end has its own height, or the other end's head if that is lower.
+
+        Drains take away their part of the head above their outlet, the tailwater or their own
+        height (EM 1110-2-2200).
+        """
+        case, along = self.case, self.interface.along
+        fields = along.heel_y, along.toe_y, along.way
+        heel, toe, way = fields if matrix is None else (matrix @ field for field in fields)
+        level, tail = loading.level, loading.tail
+        first = np.maximum(level, np.minimum(heel, tail))
+        last = np.maximum(tail, np.minimum(toe, level))
+        if case["uplift"] != "drained":
+            return first + (last - first) * way
+        at = case["drain_x"] / self.interface.length
+        there = first + (last - first) * at
+        outlet = np.maximum(heel + (toe - heel) * at, max(case["drain_level"], loading.tail))
+        there = there - case["drain_effectiveness"] * np.maximum(there - outlet, 0)
+        return np.where(
+            way < at,
+            first + (there - first) * way / at,
+            there + (last - there) * (way - at) / (1 - at),
+        )
+
+    def uplift(
+        self, loading: Loading, matrix: object, y: np.ndarray, beyond: np.ndarray | float = 0.0
+    ) -> np.ndarray:
+        """Pressure [Pa], never below the air's, at places of height y that a matrix of `Along`
+        leads to; beyond: what flowing water adds there to the pressure imposed.
+        """
+        return np.maximum(self.unit_weight * (self.head(loading, matrix) - y) + beyond, 0)
+
+    def lift(self, loading: Loading, beyond: np.ndarray | float = 0.0) -> np.ndarray:
+        """How the water in the joint pushes its lips apart (j,)."""
+        interface = self.interface
+        weights, y = interface.water_points.weights, interface.water_points.positions[:, 1]
+        pressure = self.uplift(loading, interface.along.at_water, y, beyond)
+        return interface.water.T @ (weights * pressure)
+
+    def _loads(self, loading: Loading) -> np.ndarray:
+        """t_0 and, unless it flows, the water in the joint together (j,)."""
+        total = self.pushed(loading)[1]
+        return total + self.lift(loading) if self.wet and not self.flowing else total
+
+    def beyond(self, inner: np.ndarray) -> np.ndarray:
+        """The pressure at all of the joint's nodes from that at the inner ones."""
+        whole = np.zeros(self.interface.along.nodes)
+        whole[self.interface.along.inside] = inner
+        return whole
+
+    def aperture(self, jump: np.ndarray, memory: Memory) -> tuple[np.ndarray, np.ndarray, float]:
+        """Conductivity at the law's points over that of the closed joint, its derivative with the
+        opening, and the closed joint's aperture [m].
+
+        flow: cubic law. cracked: likewise, but from the opening on at which the bond is gone, and
+        up to where an open point conducts so well that it holds all of the head.
+        """
+        opening = self.interface.flow.opening @ jump
+        if self.case["uplift"] == "flow":
+            narrowest, most = self.case["aperture_min"], np.inf
+        else:
+            shared = self.case.shared
+            narrowest, most = (shared[f"crack_{n}"][0] for n in ("aperture", "most"))
+            opening = opening - self.law.opens_at(memory)
+        wider = np.maximum(opening, 0) / narrowest
+        factor = 1 + np.minimum(wider, most)
+        growing = (wider > 0) & (wider < most)
+        return factor**3, np.where(growing, 3 / narrowest * factor**2, 0), narrowest
+
+    def solve_flow(
+        self, jump: np.ndarray, memory: Memory, loading: Loading
+    ) -> tuple[np.ndarray, object]:
+        """Pressure beyond the imposed one at the inner nodes; and for each solution it is made of
+        its share in it and what its sensitivity wants.
+
+        Drains: of the head that the joint would have there, they take away their part above their
+        outlet, the tailwater or their own height; the pressure is that part of one with the
+        outlet's head at the drains, and the rest of one without them. A crack that has reached them
+        takes their effect (EM 1110-2-2200).
+        """
+        case, flow = self.case, self.interface.flow
+        factor = self.aperture(jump, memory)[0]
+        conductivity = factor * self.interface.points.weights
+        head = self.head(loading)
+        free, solution = flow.solve(conductivity, self.unit_weight * head)
+        if self.drains is None:
+            return free, [(1.0, solution)]
+        nodes, points = self.drains
+        own = self.bulk.joint.points[nodes, 1]
+        outlet = np.maximum(own, max(case["drain_level"], loading.tail))
+        there = head[nodes] + self.beyond(free)[nodes] / self.unit_weight
+        cracked = case["uplift"] == "cracked" and (factor[points] > 1).any()
+        effect = case["drain_effectiveness"]
+        if cracked or not (there > outlet).all() or effect == 0:
+            return free, [(1.0, solution)]
+        drawn, drained = flow.solve(
+            conductivity, self.unit_weight * head, nodes, self.unit_weight * outlet
+        )
+        parts = [(1 - effect, solution), (effect, drained)]
+        return (1 - effect) * free + effect * drawn, parts
+
+    def flowing_lift(
+        self, jump: np.ndarray, memory: Memory, loading: Loading
+    ) -> tuple[np.ndarray, object]:
+        """How flowing water pushes the joint's lips apart (j,), and its flow's solution."""
+        inner, solution = self.solve_flow(jump, memory, loading)
+        return self.lift(loading, self.interface.along.at_water @ self.beyond(inner)), solution
+
+    def residual(
+        self,
+        jump: np.ndarray,
+        memory: Memory,
+        loading: Loading,
+        within: np.ndarray | None = None,
+        held_lift: np.ndarray | None = None,
+    ) -> tuple[np.ndarray, Callable[[bool], Change], Callable[[], np.ndarray]]:
+        """The residual (j,), and functions that give its derivatives with jump (a change of the
+        virgin joint's, by the law's tangent or by its secant) and with the level (j,).
+
+        within: see the law's `respond`; held_lift: what takes the place of the flowing water's
+        lift, whatever the jump.
+        """
+        interface = self.interface
+        at_points = interface.jumps(interface.at_points, jump)
+        traction, tangent = self.law.respond(at_points, memory, within=within)
+
+        def law_change(secant: bool) -> Change:
+            stiffness = self.law.respond(at_points, memory, True)[1] if secant else tangent
+            return interface.change(stiffness, self.virgin)
+
+        value = self.bulk.stiffness @ jump - self.loads(loading) + interface.forces(traction)
+
+        flowing, solution = self.flowing and held_lift is None, None
+        if flowing:
+            lift, solution = self.flowing_lift(jump, memory, loading)
+            value = value - lift
+        elif held_lift is not None:
+            value = value - held_lift
+
+        def by_jump(secant: bool) -> Change:
+            change = law_change(secant)
+            if flowing:
+                growing = self.aperture(jump, memory)[1] * interface.points.weights
+                found = [interface.flow.sensitivity(part, growing) for _, part in solution]
+                change.columns = found[0][1]
+                shares = (share for share, _ in solution)
+                change.pressure = sum(s * p for s, (p, _) in zip(shares, found, strict=True))
+            return change
+
+        def by_level() -> np.ndarray:
+            slope = -self.rate(self._loads, loading)
+            if flowing:
+                lifted = lambda other: self.flowing_lift(jump, memory, other)[0]
+                slope = slope - self.rate(lifted, loading)
+            return slope
+
+        return value, by_jump, by_level
+
+    def pressure(self, jump: np.ndarray, memory: Memory, loading: Loading) -> Pressure:
+        """The water's pressure in the joint for an opening."""
+        interface, bulk = self.interface, self.bulk
+        place = interface.space.place
+        here = [interface.points.positions, interface.water_points.positions, place]
+        if not self.wet:
+            return Pressure(*(np.zeros(len(x)) for x in here))
+        along = interface.along
+        matrices = along.at_points, along.at_water, along.at_places
+        inner = self.solve_flow(jump, memory, loading)[0] if self.flowing else 0.0
+        whole = self.beyond(inner)
+        found = [
+            self.uplift(loading, m, x[:, 1], m @ whole) for m, x in zip(matrices, here, strict=True)
+        ]
+        if self.case["uplift"] != "flow":
+            return Pressure(*found)
+        factor, _, narrowest = self.aperture(jump, memory)
+        conductivity = self.case["rho_water"] * narrowest**3 * factor / (12 * self.case["visc"])
+        total = self.unit_weight * self.head(loading) + whole
+        nodes = () if self.drains is None else (self.drains[0],)
+        return Pressure(*found, *interface.flow.flux(conductivity, total, bulk.width, *nodes))
+
+    def crest(self, jump: np.ndarray, loading: Loading) -> float:
+        """The crest's displacement along x [m]."""
+        bulk = self.bulk
+        value = bulk.crest_pressure @ self.pushed(loading)[0] + bulk.crest_jump @ jump
+        for name, size in self.units_of(loading).items():
+            value += size * bulk.crest_units[name]
+        return float(value)
+
+    def crest_rate(self, loading: Loading) -> float:
+        """Its derivative with the level."""
+        forces = self.rate(lambda other: self._pushed(other)[0], loading)
+        return float(self.bulk.crest_pressure @ forces)

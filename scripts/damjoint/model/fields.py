@@ -1,0 +1,97 @@
+"""Fields of a run: displacement and stress of the bodies; jump, stress and state of the joint."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .mesh import Body
+from .results import FLUX, HARDENING, Results
+
+BODIES = ("dam", "foundation")
+
+
+@dataclass
+class Field:
+    """The bulk at one time: displacement (nodes, 3) [m] and stress (elements, 6) [Pa] by body.
+
+    Stress: xx, yy, zz, xy, yz, xz at the middle of each element.
+    """
+
+    displacement: dict[str, np.ndarray]
+    stress: dict[str, np.ndarray]
+
+
+@dataclass
+class Solution:
+    """A scene solved: its tables, the bodies of its mesh, fields by requested time (or none)."""
+
+    result: Results
+    bodies: dict[str, Body]
+    fields: dict[float, Field]
+
+
+#: Fields of the joint: name, unit, and the columns of joint.csv along x, y, z (or the one column).
+OF_JOINT = {
+    "jump": ("m", ("delta_t1", "delta_n", "delta_t2")),
+    "traction": ("Pa", ("tau_1", "sigma_n", "tau_2")),
+    "sigma_n_eff": ("Pa", ("sigma_n_eff",)),
+    "p": ("Pa", ("p",)),
+    "damage": ("-", ("damage",)),
+    "slip": ("m", ("slip",)),
+    **{name: (unit, (name,)) for name, (unit, _) in (HARDENING | FLUX).items()},
+}
+
+
+def distance(rows: dict[str, np.ndarray]) -> np.ndarray:
+    """Distance from the heel along the joint [m]."""
+    return rows.get("s", rows["x"])
+
+
+def along(rows: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """The joint's rows as curves over the distance s from the heel: means over z, of equal parts of
+    the joint where the nodes of a mesh stand in no rows across.
+    """
+    s = np.round(distance(rows), 9)
+    if np.ptp(rows["z"]) > 0 and len(np.unique(s)) > len(s) / 2:
+        part = s.max() / np.sqrt(len(s))
+        s = (s // part + 0.5) * part
+    s, place = np.unique(s, return_inverse=True)
+    number = np.bincount(place)
+    return {name: np.bincount(place, column) / number for name, column in rows.items()} | {"s": s}
+
+
+#: States of the joint, each drawn in a color of its own.
+CLOSED, SLIPPED, SOFTENING, OPEN = range(4)
+
+
+def state_of(rows: dict[str, np.ndarray]) -> np.ndarray:
+    """Of each row of the joint's table: OPEN (or broken), SOFTENING, SLIPPED, or CLOSED."""
+    # friction, whose rows have lambda, does not soften: what is between is a mean over z
+    softening = (rows["damage"] > 0) & ("lambda" not in rows)
+    found = np.where(rows["slip"] > 0, SLIPPED, CLOSED)
+    return np.where(rows["damage"] >= 1, OPEN, np.where(softening, SOFTENING, found))
+
+
+def nearest_rows(points: np.ndarray, rows: dict[str, np.ndarray]) -> np.ndarray:
+    """For each of some points (n, 3) the row of the joint's table at one time that is nearest."""
+    places = np.column_stack([rows[axis] for axis in "xyz"])
+    # one by one: all distances at once would fill the memory for a fine joint in 3D
+    return np.array([np.argmin(((places - point) ** 2).sum(axis=1)) for point in points], int)
+
+
+def row_of_nodes(body: Body, rows: dict[str, np.ndarray]) -> np.ndarray:
+    """For each mesh node of the joint (n,) its row in the joint's table at one time."""
+    return nearest_rows(body.points, rows)
+
+
+def joint_data(result: Results, body: Body, time: float) -> dict[str, np.ndarray]:
+    """The joint's table at its mesh nodes: OF_JOINT by name, vectors along x, y, z."""
+    rows = result.at(time)
+    nearest = row_of_nodes(body, rows)
+    return {
+        name: np.column_stack([rows[c][nearest] for c in columns]).squeeze()
+        for name, (_, columns) in OF_JOINT.items()
+        if columns[0] in rows
+    }

@@ -1,0 +1,150 @@
+"""Results of a run as arrays: the tables of the joint and of the history, with their columns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .case import Case
+
+#: Columns of joint.csv: a row per joint node and requested level.
+JOINT = {
+    "time": ("-", "t of the requested level"),
+    "level": ("m", "reservoir level above the base (y = 0)"),
+    "x": ("m", "place of the node: downstream"),
+    "y": ("m", "place of the node: height"),
+    "z": ("m", "place of the node: across, 3D"),
+    "delta_n": ("m", "normal jump, opening > 0"),
+    "delta_t1": ("m", "tangential jump along x, dam moving downstream > 0"),
+    "delta_t2": ("m", "tangential jump along z"),
+    "sigma_n": ("Pa", "total normal stress, water included, compression < 0"),
+    "tau_1": ("Pa", "shear stress along x, of the sign of the slip it causes"),
+    "tau_2": ("Pa", "shear stress along z"),
+    "p": ("Pa", "water pressure in the joint"),
+    "damage": ("-", "rupture, bond: used part of the softening, 1 broken; friction: 1 where open"),
+    "slip": (
+        "m",
+        "rupture: tangential jump at the last free slide; else: plastic slip",
+    ),
+    "s": ("m", "distance from the heel along the joint"),
+    "sigma_n_eff": ("Pa", "effective normal stress, sigma_n + p"),
+}
+#: One more where friction hardens with it.
+HARDENING = {"lambda": ("m", "friction: cumulated plastic slip, which hardens")}
+#: One more where water flows.
+FLUX = {"flux": ("kg/(m s)", "mass flux towards the toe, mean of the elements around the node")}
+
+#: Columns of history.csv: a row per converged step. Forces are per metre of thickness, in 3D too.
+HISTORY = {
+    "time": ("-", "t of the step"),
+    "level": ("m", "reservoir level above the base (y = 0)"),
+    "load_factor": ("-", "level over the level prescribed for this t"),
+    "iterations": ("-", "Newton iterations of the step"),
+    "cuts": ("-", "how often the step was shortened"),
+    "residual": ("-", "remaining out-of-balance force over that of the highest water"),
+    "crack_length": ("m", "broken (rupture) or open (friction, bond) joint"),
+    "process_zone": ("m", "softening joint (rupture, bond): 0 < damage < 1, not open; friction: 0"),
+    "slip_length": ("m", "released (rupture) or slipped (friction, bond) joint"),
+    "max_opening": ("m", "largest opening of a node"),
+    "crest_ux": ("m", "displacement of the upstream end of the crest along x"),
+    "N": ("N/m", "effective normal force on the joint, compression > 0"),
+    "T": ("N/m", "shear force on the joint, downstream > 0"),
+    "M": ("N m/m", "moment of N about the toe, holding the dam down > 0"),
+    "flux": ("kg/(m s)", "leakage: mass flux out of the toe"),
+    "tail_level": ("m", "tailwater level above the base"),
+    "U": ("N/m", "uplift: resultant of the water pressure in the joint"),
+    "x_resultant": ("m", "where N meets the joint, from the heel"),
+}
+
+
+@dataclass
+class Results:
+    """What a run has found: tables as {column: array}."""
+
+    case: Case
+    #: a row per converged step, columns HISTORY
+    history: dict[str, np.ndarray]
+    #: a row per joint node and requested level, columns `joint_columns`
+    joint: dict[str, np.ndarray]
+    #: the same rows with jumps and stresses extrapolated from element means, as published codes
+    #: print them
+    extrapolated: dict[str, np.ndarray]
+    #: whether the run ended before its last level
+    stopped: bool = False
+    #: opening of the heel [m] at each row of history
+    heel: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    #: what run.json says of the run itself: engine, sizes, versions, seconds
+    info: dict = field(default_factory=dict)
+
+    def at(self, time: float | None = None) -> dict[str, np.ndarray]:
+        """The joint rows of a requested time, the last one by default, from heel to toe."""
+        return rows_at(self.joint, time)
+
+    def at_extrapolated(self, time: float | None = None) -> dict[str, np.ndarray]:
+        """As `at`, with jump and stress extrapolated from the integration points."""
+        return rows_at(self.extrapolated, time)
+
+    def state(self, time: float) -> dict[str, float]:
+        """The row of the history at a time, or next to it."""
+        row = np.argmin(np.abs(self.history["time"] - time))
+        return {name: float(column[row]) for name, column in self.history.items()}
+
+    @property
+    def last(self) -> dict[str, float]:
+        """The last row of the history; empty before the first step."""
+        return {name: float(column[-1]) for name, column in self.history.items() if len(column)}
+
+    @property
+    def partial_load(self) -> bool:
+        """Whether the last state is short of the case's last time, at which levels and loads are
+        those asked for; a prescribed displacement asks for none.
+        """
+        time = self.last.get("time", 0.0)
+        return self.case["drive"] == "level" and time < self.case.times[-1] - 1e-9
+
+
+def rows_at(table: dict[str, np.ndarray], time: float | None = None) -> dict[str, np.ndarray]:
+    """The rows of one time (the last one by default), sorted from heel to toe, then by z."""
+    time = table["time"].max() if time is None else time
+    rows = np.flatnonzero(np.isclose(table["time"], time))
+    s, z = (np.round(table[n][rows] / (np.abs(table["s"]).max() or 1.0), 9) for n in "sz")
+    rows = rows[np.lexsort((z, s))]
+    return {name: column[rows] for name, column in table.items()}
+
+
+def joint_columns(case: Case) -> dict[str, tuple[str, str]]:
+    """The columns of a case's joint.csv: unit and meaning."""
+    hardening, flux = case["law"] == "friction", case["uplift"] == "flow"
+    return JOINT | (HARDENING if hardening else {}) | (FLUX if flux else {})
+
+
+def joint_table(case: Case, blocks: list[np.ndarray]) -> dict[str, np.ndarray]:
+    """The joint's table from blocks of rows, one per requested time: its columns in their order,
+    but for sigma_n_eff.
+
+    Adds that one and sorts each block from heel to toe, then by z.
+    """
+    columns = joint_columns(case)
+    given = [name for name in columns if name != "sigma_n_eff"]
+    rows = np.vstack(blocks) if blocks else np.zeros((0, len(given)))
+    table = dict(zip(given, rows.T, strict=True))
+    table["sigma_n_eff"] = table["sigma_n"] + table["p"]
+    table = {name: table[name] for name in columns}
+    times = list(dict.fromkeys(table["time"]))
+    parts = [rows_at(table, time) for time in times]
+    return {
+        name: np.concatenate([p[name] for p in parts]) if parts else table[name] for name in table
+    }
+
+
+def history_table(case: Case, rows: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """The history from what an engine has found at each step; load_factor and x_resultant are made
+    here.
+    """
+    scheduled = np.array([case.level_at(time) for time in rows["time"]])
+    factor = np.divide(rows["level"], scheduled, out=np.ones_like(scheduled), where=scheduled > 0)
+    # where M = N (length - x)
+    arm = np.divide(rows["M"], rows["N"], out=np.full_like(scheduled, np.nan), where=rows["N"] > 0)
+    rows = rows | {"load_factor": factor, "x_resultant": case.joint_length - arm}
+    return {name: rows[name] for name in HISTORY}

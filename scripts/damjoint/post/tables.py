@@ -1,0 +1,61 @@
+"""Results as files: joint.csv, history.csv, curve.csv."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import TextIO
+
+import numpy as np
+
+from ..model.results import Results
+from ..storage import whole
+
+
+def as_text(cell: str) -> str:
+    """A cell of a table that a spreadsheet shows and does not compute: a text that begins as a
+    formula does gets an apostrophe before it, a number none.
+    """
+    try:
+        float(cell)
+    except ValueError:
+        return "'" + cell if cell[:1] in tuple("=+-@\t\r") else cell
+    return cell
+
+
+def write_csv(target: Path | TextIO, table: dict[str, np.ndarray | list]) -> None:
+    """Write a table with its column names to a path or an open file; numbers with twelve digits,
+    texts so that no spreadsheet takes them for a formula.
+    """
+    if isinstance(target, Path):
+        with whole(target) as path, path.open("w", newline="") as file:
+            write_csv(file, table)
+        return
+    writer = csv.writer(target, lineterminator="\n")
+    writer.writerow(table)
+    rows = zip(*table.values(), strict=True)
+    writer.writerows(
+        [as_text(v) if isinstance(v, str) else f"{v:.12g}" for v in row] for row in rows
+    )
+
+
+def write(results: Results, folder: Path) -> None:
+    """Write joint.csv and history.csv into a folder; curve.csv (load against opening) of a driven
+    case.
+    """
+    case, history = results.case, results.history
+    joint = dict(results.joint)
+    for axis in "xyz":  # the mesh generator's last digits
+        joint[axis] = np.round(joint[axis], 9) + 0.0
+    write_csv(folder / "joint.csv", joint)
+    write_csv(folder / "history.csv", history)
+    if case["drive"] != "level":
+        pressure = case["rho_water"] * case["g"] * history["level"]
+        curve = {
+            "time": history["time"],
+            "level": history["level"],
+            "pressure": pressure,
+            "heel_opening": results.heel,
+            "crest_ux": history["crest_ux"],
+        }
+        write_csv(folder / "curve.csv", curve)

@@ -1,0 +1,1 @@
+"""The loading followed step by step: Newton's method, load stepping, equilibrium path, history."""

@@ -1,0 +1,521 @@
+"""The gravity method: the body above the joint as a rigid block, stresses linear along the joint.
+
+The hand calculation that every answer of the finite elements is laid beside [USACE EM 1110-2-2200;
+FERC Engineering Guidelines, chapter 3; Leclerc, Leger and Tinawi 2003]. It knows the state at one
+time, not how that was reached, and cracks from the heel only.
+
+Forces are per metre of thickness: x downstream, y upwards, moments about the joint's toe, holding
+the dam down > 0. Along the joint, s is the distance from the heel.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from ..model.case import Case
+from ..model.loads import Loading, line_forces
+from ..model.parameters import constants
+
+#: Columns of gravity.csv: a row per load on the body above the joint, and their sum.
+LOADS = {
+    "load": ("", "what acts"),
+    "Fx": ("N/m", "horizontal force, downstream > 0"),
+    "Fy": ("N/m", "vertical force, upwards > 0"),
+    "moment": ("N m/m", "about the joint's toe, holding the dam down > 0"),
+}
+
+
+class Load(NamedTuple):
+    """A load's resultant: forces [N/m], moments [N m/m] of its horizontal and vertical part."""
+
+    name: str
+    fx: float
+    fy: float
+    moment_of_fx: float
+    moment_of_fy: float
+
+    @property
+    def moment(self) -> float:
+        """About the joint's toe [N m/m]."""
+        return self.moment_of_fx + self.moment_of_fy
+
+    def times(self, factor: float) -> Load:
+        """The load multiplied by a factor."""
+        return Load(self.name, *(factor * value for value in self[1:]))
+
+
+def together(name: str, loads: list[Load]) -> Load:
+    """The resultant of loads, by the name given."""
+    _, *components = zip(Load("nothing", 0.0, 0.0, 0.0, 0.0), *loads, strict=True)
+    return Load(name, *map(math.fsum, components))
+
+
+def force(name: str, fx: float, fy: float, place: tuple[float, float]) -> Load:
+    """A force at a place counted from the joint's toe [m]."""
+    return Load(name, fx, fy, -place[1] * fx, place[0] * fy)
+
+
+class Segment(NamedTuple):
+    """A straight part of a face from (x0, y0) to (x1, y1), counted from the joint's toe [m]; the
+    body on its left.
+    """
+
+    x0: float
+    y0: float
+    x1: float
+    y1: float
+
+    def below(self, height: float) -> Segment | None:
+        """The part of it that lies below a height above the toe; None if there is none."""
+        if min(self.y0, self.y1) >= height:
+            return None
+        if max(self.y0, self.y1) <= height:
+            return self
+        part = (height - self.y0) / (self.y1 - self.y0)
+        middle = self.x0 + part * (self.x1 - self.x0), height
+        return Segment(*self[:2], *middle) if self.y0 < height else Segment(*middle, *self[2:])
+
+    def pressed(self, p0: float, p1: float) -> Load:
+        """The resultant of a pressure [Pa] that is linear from one end to the other."""
+        width, rise, mean = self.x1 - self.x0, self.y1 - self.y0, (p0 + p1) / 2
+        first_moment = lambda v0, v1: (p0 * (2 * v0 + v1) + p1 * (v0 + 2 * v1)) / 6
+        return Load(
+            "pressure",
+            -mean * rise,
+            mean * width,
+            first_moment(self.y0, self.y1) * rise,
+            first_moment(self.x0, self.x1) * width,
+        )
+
+    def pressed_by_westergaard(self, surface: float) -> Load:
+        """The resultant of a pressure Sqrt[surface - y] (surface: height above the toe [m]), times
+        the normal's horizontal part, by the integrals of u^1/2 and u^3/2 over u = surface - y.
+        """
+        width, rise = self.x1 - self.x0, self.y1 - self.y0
+        if rise == 0:
+            return Load("pressure", 0, 0, 0, 0)
+        u0, u1 = surface - self.y0, surface - self.y1
+        whole, first = (2 / k * (u0 ** (k / 2) - u1 ** (k / 2)) for k in (3, 5))
+        lean = width / rise
+        part = abs(rise) / math.hypot(width, rise)
+        return Load(
+            "pressure",
+            -whole,
+            lean * whole,
+            surface * whole - first,
+            lean * ((self.x0 + lean * u0) * whole - lean * first),
+        ).times(part)
+
+
+class Body:
+    """The part of the section above the joint: outline, faces, marks, from the joint's toe [m]."""
+
+    def __init__(self, case: Case) -> None:
+        found = case.section
+        self.toe = found["toe_x"][0], found["toe_y"][0]
+        self.heel = found["heel_x"][0], found["heel_y"][0]
+        self.length = found["joint_length"][0]
+        #: the joint's direction, from heel to toe
+        self.along = tuple((t - h) / self.length for t, h in zip(self.toe, self.heel, strict=True))
+        x, y = self.toe
+        ends = zip(*(found[f"seg_{n}"] for n in ("x0", "y0", "x1", "y1")), strict=True)
+        self.all_segments = [Segment(x0 - x, y0 - y, x1 - x, y1 - y) for x0, y0, x1, y1 in ends]
+        self.sides, self.bodies = found["seg_side"], found["seg_body"]
+        self.marks = {
+            int(region): (mx - x, my - y)
+            for region, mx, my, k in zip(
+                *(found[f"mark_{n}"] for n in ("region", "x", "y", "segment")), strict=True
+            )
+            if self.bodies[int(k)] == constants()["UPPER"][0]
+        }
+
+    def segments(self, *sides: str) -> list[Segment]:
+        """Its segments on sides named as in pro/section.pro, from the toe up and to the heel."""
+        wanted = [constants()[side][0] for side in sides]
+        upper = constants()["UPPER"][0]
+        placed = zip(self.all_segments, self.sides, self.bodies, strict=True)
+        return [s for s, side, body in placed if body == upper and side in wanted]
+
+    @cached_property
+    def outline(self) -> np.ndarray:
+        """Its corners (n, 2) from the toe on, counterclockwise."""
+        segments = self.segments("UP", "TOP", "DOWN")
+        return np.array([s[:2] for s in segments] + [segments[-1][2:]])
+
+    @cached_property
+    def area_and_centroid(self) -> tuple[float, float, float]:
+        """Its area [m2] and centroid (shoelace formula)."""
+        x, y = self.outline.T
+        x1, y1 = np.roll(x, -1), np.roll(y, -1)
+        cross = x * y1 - x1 * y
+        area = float(cross.sum() / 2)
+        return area, *(float((cross * (v + v1)).sum() / (6 * area)) for v, v1 in ((x, x1), (y, y1)))
+
+    def force_at(self, mark: str, name: str, fx: float, fy: float) -> Load:
+        """A force at a mark of pro/section.pro; none where that lies below the joint."""
+        place = self.marks.get(int(constants()[mark][0]))
+        return force(name, fx, fy, place) if place else force(name, 0.0, 0.0, (0.0, 0.0))
+
+
+def fluid_on(segments: list[Segment], weight: float, surface: float) -> list[Load]:
+    """A fluid of a weight [N/m3] up to a surface [m above the toe] on segments."""
+    wet = [part for s in segments if (part := s.below(surface))]
+    return [s.pressed(weight * (surface - s.y0), weight * (surface - s.y1)) for s in wet]
+
+
+def water_on(name: str, segments: list[Segment], case: Case, body: Body, level: float) -> Load:
+    """Water up to a level, or of a uniform pressure, on the segments of a face."""
+    weight = case["rho_water"] * case["g"]
+    if case["face_load"] == "uniform":
+        return together(name, [s.pressed(weight * level, weight * level) for s in segments])
+    return together(name, fluid_on(segments, weight, level - body.toe[1]))
+
+
+def silt_on(case: Case, body: Body) -> Load:
+    """Silt on the upstream face: horizontal pressure of an equivalent fluid."""
+    weight = case["rho_silt"] * case["g"] * case["silt_K0"]
+    loads = fluid_on(body.segments("UP"), weight, case["silt_height"] - body.toe[1])
+    return together("silt", loads)._replace(fy=0.0, moment_of_fy=0.0)
+
+
+def added_pressure(case: Case, body: Body, level: float) -> Load:
+    """Westergaard's added pressure 7/8 k_h rho_water g Sqrt[H (H - y)] on the upstream face, H the
+    level, times the normal's horizontal part [USACE EM 1110-2-2200, Westergaard 1933].
+    """
+    surface = level - body.toe[1]
+    wet = [part for s in body.segments("UP") if (part := s.below(surface))]
+    size = 7 / 8 * case["k_h"] * case["rho_water"] * case["g"] * math.sqrt(level)
+    loads = [s.pressed_by_westergaard(surface) for s in wet]
+    return together("added water pressure", loads).times(size * case["added_mass"])
+
+
+def loads_on(case: Case, body: Body, time: float, level: float, tail: float) -> tuple[Load, ...]:
+    """All loads on the body above the joint but the water in the joint; the weight comes first,
+    others only where there are any.
+    """
+    area, *centroid = body.area_and_centroid
+    weight = case["rho_dam"] * case["g"] * area
+    up, down, top = (body.segments(side) for side in ("UP", "DOWN", "TOP"))
+    on_crest = case["crest_water"] and case["face_load"] == "hydrostatic"
+    loading = Loading.at(case, time, level, tail)
+    lines = line_forces(case, loading)
+    quake = loading.part("quake")
+    loads = (
+        water_on("reservoir", up, case, body, level),
+        water_on("tailwater", down, case, body, tail),
+        water_on("water on the crest", top if on_crest else [], case, body, level),
+        silt_on(case, body).times(loading.part("silt")),
+        *(body.force_at(name.upper(), name, *lines[name]) for name in lines),
+        force("earthquake", case["k_h"] * weight, case["k_v"] * weight, centroid).times(quake),
+        added_pressure(case, body, level).times(quake),
+    )
+    return force("weight", 0.0, -weight, centroid), *(p for p in loads if any(p[1:]))
+
+
+class Uplift:
+    """The water in the joint for a crack of length a from the heel: pressure [Pa] linear between
+    places s [m].
+
+    Heads are pressure heads above the joint's ends, never negative. By `uplift`: none; imposed: H1
+    to H2; drained: over the head left at the drains; cracked: H1 in the crack, beyond it as imposed
+    or, with drains not yet passed by the crack, as drained [USACE EM 1110-2-2200]; flow: as cracked
+    without drains, the limit of the cubic law for a narrow closed joint.
+    """
+
+    def __init__(self, case: Case, body: Body, level: float, tail: float, crack: float) -> None:
+        self.length, mode = body.length, case["uplift"]
+        self.h1, self.h2 = h1, h2 = max(level - body.heel[1], 0.0), max(tail - body.toe[1], 0.0)
+        #: distance from the heel and head of the outlet [m] of drains that the crack has not passed
+        self.drains: tuple[float, float] | None = None
+        crack = crack if mode in ("cracked", "flow") else 0.0
+        drained = mode == "drained" or (mode == "cracked" and case["drains"])
+        places, heads = [0.0, crack, self.length], [h1, h1, h2]
+        at = case["drain_x"]
+        if drained and crack <= at < self.length:
+            outlet = max(max(case["drain_level"], tail) - (body.heel[1] + at * body.along[1]), 0.0)
+            self.drains = at, outlet
+            undrained = float(np.interp(at, places[1:], heads[1:]))
+            places.insert(2, at)
+            heads.insert(2, drained_head(case, undrained, outlet))
+        weight = case["rho_water"] * case["g"] if mode != "none" else 0.0
+        self.s, self.p = np.array(places), weight * np.array(heads)
+
+    @property
+    def force(self) -> float:
+        """U, normal to the joint [N/m]."""
+        return float(np.sum(np.diff(self.s) * (self.p[1:] + self.p[:-1])) / 2)
+
+    @property
+    def moment(self) -> float:
+        """About the toe, lifting the dam > 0 [N m/m]."""
+        arm, p = self.length - self.s, self.p
+        parts = p[:-1] * (2 * arm[:-1] + arm[1:]) + p[1:] * (arm[:-1] + 2 * arm[1:])
+        return float(np.sum(np.diff(self.s) * parts) / 6)
+
+
+def drained_head(case: Case, undrained: float, outlet: float) -> float:
+    """Head left at the drains [m]: they take their part of what stands above their outlet, the
+    gallery or, if higher, the tailwater; all heads above the joint at the drains.
+    """
+    return undrained - case["drain_effectiveness"] * max(undrained - outlet, 0.0)
+
+
+def tensile_strength(case: Case) -> tuple[float, float]:
+    """Tension [Pa] at which the heel cracks, and at the tip of a crack.
+
+    Rupture and bond lose it at once where they crack; friction keeps its tension c/mu.
+    """
+    if case["law"] == "friction":
+        strength = case["adhesion"] / case["mu"]
+        return strength, strength
+    return case["sigma_max"], 0.0
+
+
+def sliding_factor(case: Case, normal: float, shear: float, uncracked: float) -> float:
+    """SSF = (mu N' + c (L - a)) / |T|: shear friction factor, cohesion on the uncracked joint."""
+    holds = case["mu"] * normal + case["adhesion"] * uncracked
+    return holds / abs(shear) if shear else math.inf
+
+
+def overturning_factor(loads: tuple[Load, ...], uplift_moment: float) -> float:
+    """OSF: stabilising over overturning moments about the toe, of the horizontal and the vertical
+    part of each load apart; uplift_moment: of the water in the joint, lifting > 0 [N m/m].
+    """
+    moments = [*(m for load in loads for m in load[3:]), -uplift_moment]
+    overturning = -math.fsum(m for m in moments if m < 0)
+    return math.fsum(m for m in moments if m > 0) / overturning if overturning else math.inf
+
+
+def position(x_resultant: float, length: float) -> str:
+    """In which part of a joint N meets it."""
+    away = abs(x_resultant / length - 1 / 2)
+    parts = (1 / 6, "middle third"), (1 / 4, "middle half"), (1 / 2, "within base")
+    return next((words for share, words in parts if away <= share), "outside")
+
+
+@dataclass(frozen=True)
+class GravityMethod:
+    """The rigid block at one time of a case. Stresses [Pa]: tension > 0, as in joint.csv."""
+
+    case: Case
+    body: Body
+    time: float
+    level: float
+    tail_level: float
+    #: all but the water in the joint
+    loads: tuple[Load, ...]
+    #: from the heel [m]; the joint's length if no shorter one leaves an equilibrium
+    crack_length: float
+    uplift: Uplift
+    #: where a crack that has passed this one's end, or the drains, comes to rest: equilibria with a
+    #: longer one, or the whole joint
+    further: tuple[GravityMethod, ...] = ()
+
+    @property
+    def uncracked(self) -> float:
+        """Length of the joint that holds [m]."""
+        return self.body.length - self.crack_length
+
+    @cached_property
+    def resultant(self) -> Load:
+        """Of all loads but the water in the joint."""
+        return together("sum", list(self.loads))
+
+    @property
+    def U(self) -> float:
+        """Uplift [N/m]."""
+        return self.uplift.force
+
+    @property
+    def N(self) -> float:
+        """Effective force normal to the joint, compression > 0 [N/m]."""
+        (tx, ty), total = self.body.along, self.resultant
+        return ty * total.fx - tx * total.fy - self.U
+
+    @property
+    def T(self) -> float:
+        """Shear force along the joint, downstream > 0 [N/m]."""
+        (tx, ty), total = self.body.along, self.resultant
+        return tx * total.fx + ty * total.fy
+
+    @property
+    def M(self) -> float:
+        """Moment of N about the toe, holding the dam down > 0 [N m/m]."""
+        return self.resultant.moment - self.uplift.moment
+
+    @property
+    def stands(self) -> bool:
+        """Whether there is an equilibrium, sliding apart: some joint is left, and pressed."""
+        return self.uncracked > 0 and self.N > 0
+
+    @property
+    def x_resultant(self) -> float:
+        """Where N meets the joint, from the heel [m]."""
+        return self.body.length - self.M / self.N if self.N else math.nan
+
+    @property
+    def eccentricity(self) -> float:
+        """Of N, from the middle of the whole joint towards the toe > 0 [m]."""
+        return self.x_resultant - self.body.length / 2
+
+    @property
+    def tip_stress(self) -> float:
+        """Effective stress at the upstream end of the uncracked joint."""
+        length = self.uncracked
+        return (2 * self.N * length - 6 * self.M) / length**2 if length else math.nan
+
+    @property
+    def sigma_n_eff_heel(self) -> float:
+        """Effective normal stress at the heel: 0 where it is cracked."""
+        return 0.0 if self.crack_length else self.tip_stress
+
+    @property
+    def sigma_n_eff_toe(self) -> float:
+        """Effective normal stress at the toe."""
+        length = self.uncracked
+        return (6 * self.M - 4 * self.N * length) / length**2 if length else math.nan
+
+    @property
+    def sigma_n_heel(self) -> float:
+        """Total normal stress at the heel."""
+        return self.sigma_n_eff_heel - float(self.uplift.p[0])
+
+    @property
+    def sigma_n_toe(self) -> float:
+        """Total normal stress at the toe."""
+        return self.sigma_n_eff_toe - float(self.uplift.p[-1])
+
+    @property
+    def SSF(self) -> float:
+        """Sliding safety factor, with mu and adhesion of the case whatever its law."""
+        return sliding_factor(self.case, self.N, self.T, self.uncracked)
+
+    @property
+    def OSF(self) -> float:
+        """Overturning safety factor."""
+        return overturning_factor(self.loads, self.uplift.moment)
+
+    @property
+    def in_words(self) -> str:
+        """Its crack and safety factors."""
+        if not self.stands:
+            return "overturning"
+        return f"crack {self.crack_length:.4g} m, SSF {self.SSF:.4g}, OSF {self.OSF:.4g}"
+
+    @property
+    def notes(self) -> list[str]:
+        """What its figures do not show: longer cracks in equilibrium, and what hangs on tension."""
+        case, found = self.case, []
+        for one in self.further:
+            passed = self.crack_length <= case["drain_x"] < one.crack_length
+            which = f"past the drains ({case['drain_x']:g} m)" if passed else "beyond it"
+            found.append(
+                "gravity method: the shortest crack in equilibrium is "
+                f"{self.crack_length:.4g} m; once {which}: {one.in_words}"
+            )
+        if not self.crack_length and self.tip_stress > 0:
+            free = at(case, self.time, self.level, tension=False)
+            strength = tensile_strength(case)[0]
+            found.append(
+                f"gravity method: uncracked, as its {self.tip_stress / 1e3:.4g} kPa at the heel "
+                f"are below the strength of {strength / 1e3:.4g} kPa; without tension: "
+                f"{(free, *free.further)[-1].in_words}"
+            )
+        return found
+
+    def table(self) -> dict[str, list]:
+        """Its resultants by the columns LOADS: the loads, the uplift, the sum."""
+        tx, ty = self.body.along
+        joint = Load("uplift", 0.0 - ty * self.U, tx * self.U, 0.0, 0.0 - self.uplift.moment)
+        rows = [*self.loads, joint]
+        rows.append(together("sum", rows))
+        cells = [(row.name, row.fx, row.fy, row.moment) for row in rows]
+        return dict(zip(LOADS, map(list, zip(*cells, strict=True)), strict=True))
+
+
+def with_crack(case: Case, time: float, level: float, crack: float) -> GravityMethod:
+    """The rigid block at a time of a case, at a level [m] and with a crack [m] that are given."""
+    body, tail = Body(case), case.tail_at(time)
+    loads, uplift = loads_on(case, body, time, level, tail), Uplift(case, body, level, tail, crack)
+    return GravityMethod(case, body, time, level, tail, loads, crack, uplift)
+
+
+def at(case: Case, time: float, level: float | None = None, tension: bool = True) -> GravityMethod:
+    """The gravity method at a time of a case: uncracked, or with the shortest crack in equilibrium,
+    what a longer one leads to in `further`.
+
+    level: of the reservoir [m] where it is not the one prescribed for that time; tension: whether
+    the joint has its tensile strength.
+    """
+    body, tail = Body(case), case.tail_at(time)
+    level = case.level_at(time) if level is None else level
+    loads = loads_on(case, body, time, level, tail)
+
+    def state(crack: float) -> GravityMethod:
+        uplift = Uplift(case, body, level, tail, crack)
+        return GravityMethod(case, body, time, level, tail, loads, crack, uplift)
+
+    strength, at_tip = tensile_strength(case) if tension else (0.0, 0.0)
+    if state(0.0).tip_stress <= strength:
+        return state(0.0)
+
+    def excess(crack: float) -> float:
+        found, left = state(crack), body.length - crack
+        return 2 * found.N * left - 6 * found.M - at_tip * left**2
+
+    found = [state(crack) for crack in ends_of_growth(excess, pieces(case, body, level, tail))]
+    standing = [one for one in found if one.stands]
+    first, *further = standing or found[:1] or [state(body.length)]
+    behind = float(np.nextafter(case["drain_x"], body.length))
+    if first.stands and first.uplift.drains and not further and excess(behind) > 0:
+        further = [state(body.length)]  # past the drains nothing stops it
+    return replace(first, further=tuple(further))
+
+
+def pieces(case: Case, body: Body, level: float, tail: float) -> list[tuple[float, float]]:
+    """Crack lengths [m], from and to, between which the uplift follows one formula: the drains'
+    effect begins where the crack raises the head above their outlet, and ends behind them.
+    """
+    uplift = Uplift(case, body, level, tail, 0.0)
+    ends = [0.0, body.length]
+    if uplift.drains:
+        at, outlet = uplift.drains
+        h1, h2 = uplift.h1, uplift.h2
+        ends.append(at)
+        if h1 != h2 and (share := (h1 - outlet) / (h1 - h2)) != 1:
+            ends.append((at - share * body.length) / (1 - share))
+    ends = sorted(e for e in ends if 0 <= e <= body.length)
+    return [(np.nextafter(a, b), b) for a, b in itertools.pairwise(ends) if b > a]
+
+
+def ends_of_growth(
+    excess: Callable[[float], float], spans: list[tuple[float, float]]
+) -> list[float]:
+    """The crack lengths [m] at which the tension at the tip falls to what it may be.
+
+    excess: of the tension [N/m]; times the length left it is a polynomial of degree 3 within each
+    of the spans, whose roots are all found.
+    """
+    length, found = spans[-1][1], []
+    for start, end in spans:
+        x = (start + end) / 2 + (end - start) / 2 * np.cos(np.pi * (np.arange(4) + 0.5) / 4)
+        values = [excess(a) * (length - a) for a in x]
+        rough = np.polynomial.Polynomial.fit(x, values, 3, domain=[start, end]).roots()
+        rough = np.sort(rough.real[np.abs(rough.imag) < 1e-6 * (end - start)])
+        turns = [a for a in rough if start < a < end]
+        # between two roots, and beside the first and the last, the sign is known
+        limits = [start, *((a + b) / 2 for a, b in itertools.pairwise(turns)), end]
+        for before, after in itertools.pairwise(limits):
+            if excess(before) > 0 >= excess(after):
+                while after - before > 1e-12 * length:  # scipy's roots are half of a run's start
+                    middle = (before + after) / 2
+                    before, after = (middle, after) if excess(middle) > 0 else (before, middle)
+                found.append(float(after))
+    return found

@@ -1,0 +1,368 @@
+"""What a run has found, in words: whether the dam stands, and if not, how it fails.
+
+This is the one place that reads a failure out of resultants.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..model.case import Case, has_drains
+from ..model.results import Results
+from . import gravity
+
+
+def verdict(results: Results) -> str:
+    """One of: stands, sliding, overturning, broken through, out of range, not converged, no
+    equilibrium, interrupted.
+
+    "no equilibrium": not even at the first step. "sliding" also where the whole joint has slipped
+    or opened and the dam stands on nothing but the joint's hardening.
+    """
+    if not results.last:
+        return "no equilibrium"
+    if results.stopped:
+        return why_stopped(results)
+    return "sliding" if loose_from(results) is not None else "stands"
+
+
+def failed(results: Results) -> bool:
+    """Whether the run's exit code has to be 1: stopped, or sliding on a hardening that nobody asked
+    for.
+    """
+    if results.stopped or not results.last:
+        return True
+    asked = results.case["law"] == "friction" and results.case.hardening_asked
+    return loose_from(results) is not None and not asked
+
+
+def loose_from(results: Results) -> float | None:
+    """The level [m] from which on the whole joint has slipped or is open; None if a part of it
+    still holds.
+
+    Once slipped, a joint counts as slipped. Seen at the integration points of every step, or at the
+    nodes of the last requested level. A bond does not harden: where all of it slips there is no
+    equilibrium, and a dam that has come to rest stands on friction.
+    """
+    if results.case["law"] == "bond":
+        return None
+    history, base = results.history, results.case.joint_length
+    gone = np.maximum(history["slip_length"], history["crack_length"]) > base * (1 - 1e-9)
+    if gone.any() and gone[-1]:
+        return float(history["level"][np.flatnonzero(~gone)[-1] + 1 if not gone.all() else 0])
+    rows = results.at() if len(results.joint["time"]) else {}
+    if rows and np.all((rows["damage"] >= 1) | (rows["slip"] > 0)):
+        return float(rows["level"][0])
+    return None
+
+
+def why_stopped(results: Results) -> str:
+    """Out of range, sliding, overturning, broken through or not converged.
+
+    Out of range: a driven run whose level would, in one more step like its last, be below 0 or
+    above the highest that is allowed. A failure is named where the equilibrium path has shown the
+    mechanism or where the last converged state has reached a bound of statics; else the run has not
+    converged.
+    """
+    case, last = results.case, results.last
+    ahead = 2 * last["level"] - [0.0, *results.history["level"]][-2]
+    if case["drive"] != "level" and not 0 <= ahead <= case.highest_level:
+        return "out of range"
+    shown = results.info.get("mechanism") or {}
+    return shown.get("mode") or bound(results)[0] or "not converged"
+
+
+def held(results: Results) -> float:
+    """What the joint holds along itself apart from mu N, from the last saved state [N/m]: a bond's
+    cohesion that damage has left; friction's adhesion, on all of the joint as N holds the tension
+    c/mu of its open points, and what slip has hardened.
+    """
+    case = results.case
+    if case["law"] == "bond":
+        return case["adhesion"] * (1 - mean(results, "damage")) * case.joint_along
+    return (case["adhesion"] + case["pena_tang"] * mean(results, "slip")) * case.joint_along
+
+
+#: How near to a bound of statics a state counts as there, relatively: a run's last step is found
+#: to 1/1024 of the way between two levels.
+AT_BOUND = 5e-3
+
+
+def bound(results: Results) -> tuple[str, str]:
+    """Which bound of statics the last state has reached, sliding or overturning, and in words; both
+    empty if none.
+
+    A rigid block on a joint without tension has M >= 0; on elements the compression ends within the
+    last one at the toe. Friction's tension c/mu of the open part is no compression.
+    """
+    case, last = results.case, results.last
+    length, holds = case.joint_along, case["mu"] * last["N"] + held(results)
+    crack = last["crack_length"]
+    pull = case["adhesion"] / case["mu"] * crack if case["law"] == "friction" else 0.0
+    normal, moment = last["N"] + pull, last["M"] + pull * (length - crack / 2)
+    arm = moment / normal if normal > 0 else 0.0
+    if arm < max(0.01, 0.5 / case["n_joint"]) * length:
+        side = "from" if arm >= 0 else "beyond"
+        return "overturning", f"the resultant is {abs(arm):.3g} m {side} the toe"
+    if case["law"] != "rupture" and last["T"] >= (1 - AT_BOUND) * holds:
+        return "sliding", f"T = {last['T']:.5g} N/m of the {holds:.5g} N/m that the joint holds"
+    return "", ""
+
+
+def highest_by_statics(case: Case, last: dict[str, float]) -> tuple[float, str, str]:
+    """The level [m] above which a state has no equilibrium any more, how it fails and why, in
+    words; infinite and empty where statics does not tell.
+
+    Whatever the distribution of stress: with the tensile strength f, over the length l that is not
+    cracked, M >= -f l^2/2, and with friction T <= mu (N + f l) + c l; the crack does not close as
+    the level rises. The law friction keeps f = c/mu, of which its N has taken account, and l is the
+    whole joint.
+    """
+    from scipy.optimize import brentq  # half of a run's start
+
+    law, time = case["law"], min(last["time"], case.times[-1])
+    if case.geometry or case["uplift"] == "flow":
+        return np.inf, "", ""
+    strength, _ = gravity.tensile_strength(case)
+    crack = 0.0 if law == "friction" else last["crack_length"]
+    block = lambda level: gravity.with_crack(case, time, level, crack)
+    here = block(last["level"])
+    length = here.uncracked
+    tension = strength * length if law == "bond" else 0.0
+
+    def moment(level: float) -> float:
+        return block(level).M + strength * length**2 / 2
+
+    def shear(level: float) -> float:
+        found = block(level)
+        return case["mu"] * max(found.N + tension, 0.0) + case["adhesion"] * length - found.T
+
+    reasons = [(moment, "overturning", "the resultant leaves the joint")]
+    if law == "bond" or (law == "friction" and not case["pena_tang"]):
+        reasons.append((shear, "sliding", "the shear passes what the joint holds"))
+    found = [(np.inf, "", "")]
+    # where the resultants are a hundredth of the base apart, the crack is another one
+    if abs(here.M - last["M"]) < 0.01 * abs(here.N) * case.joint_along:
+        for spare, mode, words in reasons:
+            if spare(last["level"]) > 0 > spare(case.highest_level):
+                found.append((brentq(spare, last["level"], case.highest_level), mode, words))
+    return min(found)
+
+
+def mean(results: Results, column: str) -> float:
+    """The mean of a column along the joint at the last saved state; 0 if there is none."""
+    if not len(results.joint["time"]):
+        return 0.0
+    rows = results.at()
+    place, inverse = np.unique(rows["x"].round(9), return_inverse=True)
+    values = np.bincount(inverse, rows[column]) / np.bincount(inverse)
+    return float(np.sum((values[1:] + values[:-1]) / 2 * np.diff(place)) / np.ptp(place))
+
+
+def statement(results: Results) -> str:
+    """In words: why and where a run has stopped, or that the dam slides; empty if it stands."""
+    case, last, found = results.case, results.last, verdict(results)
+    if found == "no equilibrium":
+        return "no equilibrium even at the first step"
+    if results.stopped:
+        where = f"level {last['level']:.6g} m (t = {last['time']:.6g})"
+        if found == "out of range":
+            return (
+                f"out of range: the displacement asks for a level below 0 or above "
+                f"{case.highest_level:g} m beyond {where}; the last converged state is saved"
+            )
+        return f"{found}: {why_there(results)}; the last converged state is saved"
+    if found == "stands":
+        return ""
+    said = (
+        f"sliding: the whole joint has slipped or is open from level {loose_from(results):.6g} m on"
+    )
+    if case["law"] != "friction":
+        return said + "; nothing holds it along the joint"
+    asked = "" if case.hardening_asked else ", a default that no joint has; set it if yours hardens"
+    return (
+        f"{said}; the dam stands on the hardening pena_tang = {case['pena_tang']:.4g} Pa/m{asked}"
+    )
+
+
+def why_there(results: Results) -> str:
+    """In words, what shows that a run has stopped for a reason, or that nothing does."""
+    case, last, shown = results.case, results.last, results.info.get("mechanism")
+    where = f"level {last['level']:.6g} m (t = {last['time']:.6g})"
+    if shown:
+        pushed = f", pushed {shown['pushed']:.2g} times as far," if shown["pushed"] > 1 else ""
+        most = shown["level"]
+        with_all = f" under the loads of t = {shown['time']:g}" if most < last["level"] else ""
+        return (
+            f"no equilibrium beyond {where}: the dam{pushed} holds {most:.6g} m at most{with_all}"
+        )
+    if reached := bound(results)[1]:
+        return f"no equilibrium beyond {where}: {reached}"
+    arm = case.joint_along - last["x_resultant"]
+    return (
+        f"no equilibrium is found beyond {where}, and no mechanism either{stiff_joint(results)}; "
+        f"there the resultant is {arm:.3g} m from the toe, T/N' = {last['T'] / last['N']:.3g}"
+    )
+
+
+#: K_N h/E beyond which a joint is stiff for its mesh: the published points make its node stresses
+#: oscillate, and convergence is hard.
+STIFF = 100
+
+
+def stiffness_ratio(results: Results) -> float:
+    """K_N h/E: the joint's stiffness over that of the bulk within an element's length h."""
+    case = results.case
+    length = case.joint_length / case["n_joint"]
+    return case["K_N"] * length / min(case["E_dam"], case["E_found"])
+
+
+def stiff_joint(results: Results) -> str:
+    """A hint to a run that has not converged, if the joint is too stiff for its elements."""
+    ratio = stiffness_ratio(results)
+    if ratio < STIFF:
+        return ""
+    why = f"the joint is too stiff for this mesh: K_N h/E = {ratio:.3g}"
+    return f" ({why}; refine n_joint or lower K_N)"
+
+
+#: A foundation that reaches less far than this many heights of the dam makes the crack too long: a
+#: 45 m dam at 45 m has 10.7, 5.3, 4.2, 3.2 m of it with 5, 34, 60, 120 m.
+FOUNDATION = 1.5
+#: K_N L/E below which the joint gives way more than the dam: the stress is that of a rigid block.
+SOFT = 1
+
+
+def hints(results: Results) -> list[str]:
+    """What an engineer should know of a result besides its verdict."""
+    case, last, found = results.case, results.last, []
+    ratio = stiffness_ratio(results)
+    if ratio >= STIFF and case["quadrature"] == "published":
+        found.append(
+            f"K_N h/E = {ratio:.3g}: the joint is stiff for this mesh, its node stresses oscillate "
+            "(N, T, M do not): take quadrature = full"
+        )
+    soft = case["K_N"] * case.joint_length / min(case["E_dam"], case["E_found"])
+    if soft < SOFT:
+        found.append(
+            f"K_N L/E = {soft:.3g}: the joint gives way more than the dam; a closed joint of "
+            "concrete on rock has 10 to 1000"
+        )
+    reach = min(case["found_side"], case["found_depth"])
+    if case.published:
+        return found
+    if not case.geometry and reach < FOUNDATION * case["dam_height"]:
+        found.append(
+            f"the foundation reaches {reach:g} m: less than {FOUNDATION:g} heights of the dam make "
+            "the crack too long"
+        )
+    if levels := results.info.get("ran_on"):
+        found.append(
+            f"unstable crack growth at level {min(levels):.4g} m: the state after it depends on "
+            "steps and mesh"
+        )
+    for limit, lowest in results.info.get("snapped", ()):
+        found.append(
+            f"unstable crack growth at level {limit:.4g} m: along the equilibrium path the level "
+            f"falls to {lowest:.4g} m before it rises again"
+        )
+    if results.info.get("engine") == "getdp" and verdict(results) == "not converged":
+        found.append(
+            "the plain engine does not follow the equilibrium path beyond a limit point: "
+            "--engine condensed does"
+        )
+    releases = case["law"] == "rupture" and case["alpha"] < 2
+    if releases and (levels or verdict(results) == "not converged"):
+        found.append(
+            f"where it opens, law = rupture with alpha = {case['alpha']:g} lets go of its shear, "
+            "and no friction takes it: the crack runs on at once; alpha = 2 keeps it, law = bond "
+            "slides"
+        )
+    if last:
+        found += seen_in(results, last)
+    return found
+
+
+def pulled_when_open(case: Case, last: dict[str, float]) -> str:
+    """In words, what the law friction's tension c/mu of open points holds; empty if it holds
+    nothing.
+    """
+    crack = last["crack_length"]
+    if case["law"] != "friction" or not case["adhesion"] * crack:
+        return ""
+    tension, share = case["adhesion"] / case["mu"], ""
+    if not case.geometry:
+        time = min(last["time"], case.times[-1])
+        block = gravity.with_crack(case, time, last["level"], 0.0)
+        parts = [*(m for load in block.loads for m in load[3:]), last["M"] - block.resultant.moment]
+        turning = -sum(m for m in parts if m < 0)
+        pull = tension * crack * (block.body.length - crack / 2)
+        share = f" ({pull / turning:.0%} of the overturning moment)" if turning else ""
+    return (
+        f"the joint is open over {crack:.3g} m and pulls there with adhesion/mu = "
+        f"{tension / 1e3:.4g} kPa{share} at any opening, as the friction law is published: "
+        "law = bond lets go"
+    )
+
+
+def seen_in(results: Results, last: dict[str, float]) -> list[str]:
+    """What the last state shows: a crack counted in elements, drains in it, tension at the heel."""
+    case, found, crack = results.case, [], last["crack_length"]
+    element = case.joint_length / case["n_joint"]
+    if crack > 0 and not (case.accuracy or case.geometry):
+        found.append(
+            f"the crack ({crack:.3g} m) ends somewhere in an element of {element:.2g} m; "
+            "--accuracy 3% finds the mesh, and says how wrong it is"
+        )
+    if has_drains(case) and len(results.joint["time"]):  # a section's mesh has a node there
+        away = np.abs(results.at()["s"] - case["drain_x"]).min()
+        if away > 1e-5 * case.joint_along:
+            found.append(
+                f"the mesh has no node at the drains (drain_x = {case['drain_x']:g} m): the "
+                f"nearest is {away:.2g} m away"
+            )
+    if has_drains(case) and crack > case["drain_x"]:
+        kept = "" if case["uplift"] == "cracked" else "; their effect is kept all the same"
+        found.append(
+            f"the crack ({crack:.3g} m) has passed the drains ({case['drain_x']:g} m){kept}"
+        )
+    if pulled := pulled_when_open(case, last):
+        found.append(pulled)
+    elif len(results.joint["time"]):
+        rows = results.at()
+        heel = rows["sigma_n_eff"][rows["s"] <= rows["s"].min()].mean()
+        strength = case["adhesion"] / case["mu"] if case["law"] == "friction" else case["sigma_max"]
+        if heel > 1e-3 * strength > 0:
+            found.append(
+                f"the heel is in tension, {heel / 1e3:.4g} kPa of the {strength / 1e3:.4g} kPa "
+                "that the joint is said to hold"
+            )
+    return found
+
+
+def path_statement(results: Results) -> str:
+    """In words, what a prescribed displacement has found: the largest level, and whether the path
+    turns back.
+    """
+    history, case = results.history, results.case
+    level, time = history["level"], history["time"]
+    if not len(level):
+        return "no step has converged"
+    driven = (time > case["drive_begin"] - 1e-9) & (time < case["drive_end"] + 1e-9)
+    load = case["rho_water"] * case["g"] * level.max()
+    said = f"largest load: level {level.max():.5g} m ({load / 1e3:.5g} kPa)"
+    if case["drive_by"] < 0:
+        return said + "; the displacement was taken back"
+    falls = bool((np.diff(level[driven]) < 0).any())
+    moved = history["crest_ux"][driven], results.heel[driven]
+    back = any(bool((np.diff(m) < 0).any()) for m in moved)
+    said += "; the level " + ("falls while the displacement grows" if falls else "rises all along")
+    return said + ("; snap-back met" if back else "; no snap-back")
+
+
+def overturning_level(case: Case) -> float:
+    """Level [m] of a uniform pressure at which the rigid dam without tension turns over about its
+    toe: the moment is linear in it.
+    """
+    empty, one = (gravity.at(case, case.times[-1], level).M for level in (0.0, 1.0))
+    return empty / (empty - one)

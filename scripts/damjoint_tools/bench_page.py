@@ -1,0 +1,286 @@
+"""The page and the picture of a benchmark."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from collections import Counter
+from functools import partial
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+from damjoint.model.case import Case, load
+from damjoint.post import validation
+from damjoint.run import run
+from damjoint.storage import held
+from tabulate import tabulate
+from threadpoolctl import threadpool_limits
+
+from . import bench as measured
+from .bench import PARTS, QUANTITIES, SCENES, Kept, Table, front
+from .provenance import provenance, said
+
+STYLES = {
+    (2, "free"): ("o", "triangles"),
+    (2, "regular"): ("s", "regular"),
+    (3, "layers"): ("^", "layers"),
+    (3, "split"): ("D", "split layers"),
+    (3, "free"): ("v", "tetrahedra"),
+}
+
+
+def draw(table: Table, path: Path) -> None:
+    """Worst error against time, log-log, with the efficient front; a column per scene, 2D above
+    3D.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+    from matplotlib.ticker import NullFormatter
+
+    columns = {n: np.array(c, object) for n, c in table.items()}
+    error, seconds = 100 * columns["worst"].astype(float), columns["seconds"].astype(float)
+    figure = Figure(figsize=(13, 8), layout="constrained")
+    FigureCanvasAgg(figure)
+    panels = figure.subplots(2, len(SCENES), sharex=True, sharey=True)
+    for row, dim in zip(panels, (2, 3), strict=True):
+        for axes, scene in zip(row, SCENES, strict=True):
+            here = (columns["scene"] == scene) & (columns["dim"] == dim)
+            patterns = [(p, s) for (d, p), s in STYLES.items() if d == dim]
+            for (pattern, (marker, name)), order in product(patterns, (1, 2)):
+                some = here & (columns["pattern"] == pattern) & (columns["order"] == order)
+                color = {1: "#cc7a00", 2: "#0b5394"}[order]
+                label = f"{name}, order {order}"
+                axes.loglog(
+                    seconds[some], error[some], marker, color=color, ms=4, alpha=0.7, label=label
+                )
+            best = np.flatnonzero(here)
+            best = best[front(seconds[best], error[best])]
+            axes.loglog(seconds[best], error[best], "k-", linewidth=0.8, label="efficient front")
+            axes.set(title=f"{scene}, {dim}D")
+            axes.grid(alpha=0.3, which="both")
+        row[0].set_ylabel("worst error [%]")
+        row[-1].legend(fontsize=7)
+    for axes in panels[-1]:
+        axes.set_xlabel("seconds, start and mesh included")
+        ticks = [0.3, 0.5, 1, 2, 5, 10]
+        axes.set_xticks(ticks, [f"{t:g}" for t in ticks])
+        axes.xaxis.set_minor_formatter(NullFormatter())
+    figure.savefig(path, dpi=100)
+
+
+def short_number(value: object, digits: int = 2) -> str:
+    """A number with two or three digits, without exponents where they can be done without."""
+    if not isinstance(value, (float, np.floating)):
+        return str(value)
+    if not np.isfinite(value):
+        return "-"
+    if abs(value) >= 10**digits:
+        return f"{value:.0f}"
+    rounded = float(f"{value:.{digits}g}")
+    text = f"{rounded:.{digits}g}"
+    return f"{rounded:g}" if "e" in text and 1e-3 <= abs(rounded) < 1e6 else text
+
+
+def as_text(table: Table, names: dict[str, str] | None = None, digits: int = 2) -> str:
+    """A table, or some of its columns under other names, in Markdown."""
+    names = names or {n: n for n in table}
+    columns = {head: [short_number(v, digits) for v in table[n]] for n, head in names.items()}
+    return tabulate(columns, headers="keys", tablefmt="github", disable_numparse=True)
+
+
+def efficient(table: Table) -> Table:
+    """The efficient front of each scene and dimension with published steps, in strides of at least
+    a third.
+    """
+    heads = "scene", "dim", "pattern", "order", "n_joint", "grading", "unknowns", "seconds"
+    chosen = Table("efficient", *heads, "worst error [%]")
+    published = np.array([steps == "published" for steps in table["steps"]])
+    error, seconds = (np.array(table[n]) for n in ("worst", "seconds"))
+    for scene, dim in product(SCENES, (2, 3)):
+        here = table.rows(scene, dim)
+        here = here[published[here]]
+        for i in here[front(seconds[here], error[here], 2 / 3)]:
+            chosen.add(*(table[n][i] for n in heads), 100 * error[i])
+    return chosen
+
+
+def step_spread(table: Table) -> float:
+    """By how much the errors of SCENES differ between 1, 2 and 4 steps per level [%]."""
+    rows = [i for i, steps in enumerate(table["steps"]) if steps != "published"]
+    spread = 0.0
+    for scene, quantity in product(SCENES, QUANTITIES):
+        some = [table[f"error_{quantity}"][i] for i in rows if table["scene"][i] == scene]
+        spread = max(spread, np.ptp(some))
+    return 100 * spread
+
+
+def modelings(kept: Kept, cases: Table) -> Table:
+    """For README: what each modeling shows, the worst difference of its judged rows, and the
+    seconds.
+    """
+    told = "shows", "rows", "worst difference", "seconds", "published code", "times faster"
+    table = Table("modelings", "case", *told)
+
+    def one(row: int, case: Case) -> tuple:
+        with tempfile.TemporaryDirectory() as folder:
+            found = run(case, Path(folder), False, False, False)
+        judged = [c for result in found for c in validation.compare(result) if c.verdict != "info"]
+        difference = 100 * max(abs(c.difference) for c in judged)
+        shows = case.title.split(": ", 1)[1]
+        spent = (cases[n][row] for n in ("seconds", "published", "times faster"))
+        return shows, len(judged), f"{difference:.1f} %", *spent
+
+    for row, name in enumerate(cases["case"][:-1]):
+        table.once(kept, (name.upper(),), partial(one, row, load(name)))
+    return table
+
+
+def page(
+    tables: dict[str, Table], precise: list[str], beyond: str, short: bool, source: str
+) -> str:
+    """The page: a finding in a sentence or two, and the table it comes from; source: in a line, by
+    which code, when and where all was measured.
+    """
+    parts = [
+        "# Benchmarks",
+        f"{source} Written by `damjoint bench{' --short' if short else ''}`. "
+        "The published code is code_aster 15.2 on a machine of 2 cores, the whole job without its "
+        "mesh. Two digits are given; they vary by as much from run to run.",
+        *of_cases(tables["cases"], short),
+        *of_accuracy(tables),
+        *of_estimates(tables["estimates"]),
+        *of_costs(tables["switches"], tables["sweeps"]),
+        "## Growth",
+        "; ".join(measured.exponents(tables["growth"])) + ". Uniform refinement, cold. "
+        f"Beyond the memory: `{beyond}`",
+        as_text(tables["growth"]),
+        "## Precision at scale",
+        "; ".join(precise) + ".",
+        *of_stress(tables["stress"]),
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def of_cases(cases: Table, short: bool) -> list[str]:
+    """The eleven modelings."""
+    slowest = min(range(len(cases["case"]) - 1), key=lambda i: cases["times faster"][i])
+    columns = {n: n for n in ("case", "seconds", *PARTS, "MB", "published", "times faster")}
+    plain = ""
+    if not short:
+        columns |= {"GetDP": "GetDP", "times faster, GetDP": "times"}
+        plain = (
+            f" The plain problem definition (GetDP) takes {cases['GetDP'][-1]:.0f} s, "
+            f"{cases['times faster, GetDP'][-1]:.1f} times less than the published code."
+        )
+    return [
+        "## The eleven modelings",
+        "With published meshes and steps, cold start, all scenes, tables written: "
+        f"{cases['seconds'][-1]:.0f} s in all, {cases['times faster'][-1]:.0f} times faster than "
+        f"the published code; the slowest by comparison is {cases['case'][slowest].upper()}, "
+        f"{cases['times faster'][slowest]:.1f} times.{plain} Seconds, and where they went; peak "
+        "memory in MB.",
+        as_text(cases, columns),
+    ]
+
+
+def of_accuracy(tables: dict[str, Table]) -> list[str]:
+    """Error against time."""
+    recommended, spread = tables["recommended"], step_spread(tables["accuracy"])
+    error, spent = (short_number(recommended[f"coarse: {n}"][-1]) for n in ("error [%]", "seconds"))
+    heads = {n: n for n in recommended if n == "case" or "seconds" in n or "error" in n}
+    heads["published: error [%]"] = "published mesh [%]"
+    best = efficient(tables["accuracy"])
+    second = sum(order == 2 for order in best["order"])
+    return [
+        "## To a given accuracy",
+        f"`--accuracy` refines the mesh until the estimated errors are smaller. Its meshes for 3 % "
+        f"(coarse) are wrong by at most {error} % in the modelings below and take "
+        f"{spent} s for all their main scenes. Worst error of opening, toe stress, crack, slip and "
+        "leakage against the overkill solution; seconds with the start of the process.",
+        as_text(recommended, heads),
+        "The overkill solution, triangles of order 2, and how it converges:",
+        as_text(tables["overkill"], digits=4),
+        "![Error against time](pictures/accuracy.png)",
+        f"The efficient settings (of {len(tables['accuracy']['scene'])} in `accuracy.csv`): "
+        f"{second} of {len(best['order'])} are of order 2. One, two and four steps per level "
+        f"differ by {spread:.1g} % at most.",
+        as_text(best),
+    ]
+
+
+def of_estimates(estimates: Table) -> list[str]:
+    """What --accuracy says of its errors."""
+    return [
+        "## Estimated and true errors",
+        "What `--accuracy` says of its errors, and what they are, in percent: estimated / true, "
+        "the worst of all levels, of dams with E = 20 and 30 GPa, K_N 1e11 or 1e12 Pa/m. A length "
+        "is counted in elements; an opening's error is relative to the joint's largest jump.",
+        as_text(estimates),
+    ]
+
+
+def of_costs(costs: Table, sweeps: Table) -> list[str]:
+    """What options and rows of a sweep cost."""
+    dear = max(range(len(costs["option"])), key=lambda i: costs["ratio"][i])
+    level, strength = (
+        f"{1e3 * min(sweeps[n]):.0f} to {1e3 * max(sweeps[n]):.0f} ms"
+        for n in ("another level", "another strength")
+    )
+    return [
+        "## What a scene pays for",
+        "Seconds with and without, in one process, the best of three. The dearest is "
+        f'"{costs["option"][dear]}", {costs["ratio"][dear]:.0f} times.',
+        as_text(costs),
+        "## One row more in a sweep",
+        f"A further level costs {level}, another strength {strength}. Seconds on a mesh that is "
+        "condensed.",
+        as_text(sweeps),
+    ]
+
+
+def of_stress(grid: Table) -> list[str]:
+    """Flow pressed to its limits."""
+    ends = ", ".join(f"{k} {v}" for k, v in Counter(grid["end"]).items())
+    return [
+        "## Flow pressed to its limits",
+        "aperture_min 1e-9 to 1e-4 m, K_N 1e9 to 1e14 Pa/m, E 1e10 to 3e12 Pa, level to the "
+        f"crest: the {len(grid['end'])} combinations end with {ends}; at most "
+        f"{max(grid['seconds']):.1f} s each (`stress.csv`).",
+    ]
+
+
+def bench(out: Path, short: bool) -> None:
+    """Run everything; write tables (CSV), benchmarks.md, modelings.md, accuracy.png and what has
+    measured them (provenance.json) into out; print the page.
+
+    What is measured is kept in out/measured.jsonl until the page is written.
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    with held(out):
+        kept = Kept(out / "measured.jsonl", short)
+        tables, precise = measure(kept)
+        for name, table in tables.items():
+            measured.write_table(table, out / f"{name}.csv")
+        draw(tables["accuracy"], out / "accuracy.png")
+        ended = kept.provenance | {"date": provenance()["date"]}
+        source = said([kept.provenance, ended])
+        (out / "modelings.md").write_text(f"{as_text(tables['modelings'])}\n\n{source}\n")
+        text = page(tables, precise, measured.beyond_memory(), short, source)
+        (out / "provenance.json").write_text(json.dumps(ended, indent=1) + "\n")
+        (out / "benchmarks.md").write_text(text)
+        kept.path.unlink()
+    print(text)
+
+
+def measure(kept: Kept) -> tuple[dict[str, Table], list[str]]:
+    """All tables by name, and what holds to machine precision."""
+    found = [cases := measured.cases(kept)]
+    studies = measured.switches, measured.sweeps, measured.growth, measured.stress
+    found += [study(kept) for study in studies]
+    found.append(modelings(kept, cases))
+    with threadpool_limits(1):
+        exact, overkill = measured.overkill(kept)
+        found += [overkill, measured.accuracy(kept, exact, cases["start"][0])]
+        found += [measured.recommended(kept, exact), measured.estimates(kept)]
+        return {table.name: table for table in found}, measured.checks(kept)

@@ -1,0 +1,288 @@
+"""The pages that are made from the code: python -m damjoint_tools.pages NAME.
+
+Run from the checkout: `make pages` (parameters, results, tour, validation: all), `make bench`.
+"""
+
+from __future__ import annotations
+
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from damjoint.model.parameters import declared
+from damjoint.model.results import FLUX, HARDENING, HISTORY, JOINT
+from damjoint.statics.gravity import LOADS
+from damjoint.studies.branch import CRITICAL
+from damjoint.studies.check import CHECK
+from tabulate import tabulate
+
+REFERENCE = Path("reference")
+
+
+def markdown(rows: list[tuple], heads: tuple[str, ...]) -> str:
+    """A table in Markdown."""
+    return tabulate(rows, heads, tablefmt="github", disable_numparse=True)
+
+
+def parameters_page() -> str:
+    """reference/parameters.md: every parameter, by group."""
+    parts = [
+        "# Parameters",
+        "Made from [pro/parameters.pro](../pro/parameters.pro) by `make pages`. Each is set by "
+        "`--set name=value`, by `default_name = value;` in a case file, or in the Gmsh window. "
+        "The defaults are those of a 45 m dam of ordinary concrete on rock; "
+        "[cases/ssnp142.case](../cases/ssnp142.case) has those of the verification case. "
+        "A parameter whose default is -1 follows others.",
+        "The loading is a list in the case file, or an option: `levels() = {30, 40, 45};` "
+        "(`--levels`) [m above the base's heel], level number i being reached at t = i, from 0 at "
+        "t = 0; `tail_levels()` (`--tail-levels`) likewise, one value for all or as many as "
+        "levels; `times()` (`--steps` between two levels) the converged steps. Default: two "
+        "thirds and eight ninths of the height, and the crest. The Gmsh window has them as "
+        "numbers, in the group Water levels.",
+    ]
+    groups: dict[str, list[tuple]] = {}
+    for parameter in declared().values():
+        description, _, unit = parameter.meaning.rpartition(" [")
+        if not unit.endswith("]"):
+            description, unit = parameter.meaning, ""
+        notes = parameter.help if not parameter.follows else ""
+        groups.setdefault(parameter.group, []).append(
+            (
+                f"`{parameter.name}`",
+                description,
+                unit.rstrip("]"),
+                parameter.default,
+                parameter.allowed(),
+                parameter.matters,
+                notes,
+            )
+        )
+    heads = "name", "meaning", "unit", "default", "allowed", "matters if", "notes"
+    for group, rows in groups.items():
+        parts += [f"## {group}", markdown(rows, heads)]
+    return "\n\n".join(parts) + "\n"
+
+
+def results_page() -> str:
+    """reference/results.md: the columns of the tables."""
+    joint, history, check, loads, critical = (
+        markdown([(f"`{n}`", u, m) for n, (u, m) in columns.items()], ("column", "unit", "meaning"))
+        for columns in (JOINT | HARDENING | FLUX, HISTORY, CHECK, LOADS, CRITICAL)
+    )
+    parts = [
+        "# Results",
+        "The columns of the tables that a run writes; `run.json` repeats the units. Signs: "
+        "[theory.md](theory.md). Made by `make pages`.",
+        "## joint.csv",
+        "A row per joint node and requested level, sorted by level, x and z; order 2 lists the "
+        "middles of the edges and of rectangles, too. Every row obeys the joint law: nodes have a "
+        "memory of their own. `lambda` with law = friction, `flux` where water flows.",
+        joint,
+        "## history.csv",
+        "A row per converged step. Forces are per metre of thickness, in 3D too.",
+        history,
+        "## curve.csv",
+        "Of a run driven by a displacement: `time`, `level` [m], `pressure` [Pa] at the foot of "
+        "the face, `heel_opening` [m], `crest_ux` [m] of each converged step.",
+        "## check.csv",
+        "Of `damjoint check`: for each scene a row by the finite elements, one by the gravity "
+        "method, and, where both are for the same load, one with the first less the second.",
+        check,
+        "## gravity.csv",
+        "Of `damjoint check`: the gravity method's resultants, a row per load, the uplift and the "
+        "sum.",
+        loads,
+        "## critical.csv",
+        "Of `damjoint critical`: a row per equilibrium of each dam that was tried, pushed beyond "
+        "its highest level where it fails.",
+        critical,
+        "## CASE_sweep.csv",
+        "Of `damjoint sweep`, a row per combination, in the order in which they are done: `key`; "
+        "the varied, sampled and tied values (a level as `level_asked`); the last row of "
+        "history.csv; `failed` (1 where `damjoint run` ends with exit code 1), `verdict`, "
+        "`statement`; with `--critical` the critical value, its `mode`, whether it is `confirmed` "
+        "and by what. A row of a sample whose loads are beyond what the joint could hold at most "
+        "says so and has no more. Beside it `_probability.csv` (with the interval of Clopper and "
+        "Pearson; rows without an answer are `undecided`, failures but for the lower limit), "
+        "`_sensitivity.csv` (Spearman's rank correlation of each sampled input with `failed` "
+        "and, over the rows that stand, with crack, opening and crest) and a chart of one or two "
+        "varied numbers or of the sample.",
+        "## fields/",
+        "`bulk.msh` and `joint.msh` for Gmsh (a view per field with all levels as its steps); "
+        "`fields.pvd` with `bulk_t*.vtu` and `joint_t*.vtu` for ParaView. Bulk: `displacement` "
+        "[m], `stress` [Pa] (xx, yy, zz, xy, yz, xz), `body` (1 dam, 2 foundation). Joint: `jump` "
+        "[m] and `traction` [Pa] along x, y, z, and the columns of joint.csv.",
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def validation_page() -> str:
+    """reference/ssnp142.md: the comparison with the published numbers, all cases run anew."""
+    from damjoint.model.case import load
+    from damjoint.post import validation
+    from damjoint.run import run
+
+    from .provenance import provenance, said
+
+    comparisons = []
+    with tempfile.TemporaryDirectory() as folder:
+        for name in validation.modelings():
+            for result in run(load(name), Path(folder) / name, fields=False, picture=False):
+                comparisons += validation.compare(result)
+    return (
+        "\n\n".join(
+            [
+                "# SSNP142: computed beside published",
+                "As `damjoint validate` prints it; written by `make pages`. "
+                '"Extrapolated" rows were published as node values made from integration points, '
+                "and are compared with the same. Rows for information belong to another geometry, "
+                "to a variable with another meaning, or to a value that the document prints "
+                "otherwise. At the heel the opening of I is almost 7 % above the GEFDYN value, "
+                "whose tolerance is 7 %: the mesh-converged opening is 4.29e-7 m.",
+                said([provenance()], "Computed"),
+                validation.report(comparisons, "github"),
+                "![Modeling K: past the critical load](pictures/k_curve.png)",
+            ]
+        )
+        + "\n"
+    )
+
+
+def tour_page() -> str:
+    """reference/tour.md with its commands run anew, one after the other in a temporary folder."""
+    from .provenance import provenance, said
+
+    page = between("figures", (REFERENCE / "tour.md").read_text(), said([provenance()], "Computed"))
+    with tempfile.TemporaryDirectory() as folder:
+        play = lambda block: f"```\n{played(block[1], Path(folder))}```"
+        return re.sub(r"^```\n(.*?)^```$", play, page, flags=re.S | re.M)
+
+
+def between(mark: str, text: str, new: str) -> str:
+    """A text with what stands between the comments <!-- mark --> and <!-- /mark --> replaced."""
+    marks = rf"(<!-- {mark} -->\n).*?(<!-- /{mark} -->)"
+    return re.sub(marks, lambda found: f"{found[1]}{new}\n{found[2]}", text, flags=re.S)
+
+
+def played(block: str, folder: Path) -> str:
+    """A block of code of the tour: below each line `$ damjoint ...` what it prints; one that begins
+    with `// NAME.case` becomes that file.
+
+    Raises ValueError if a command ends with an error of the input.
+    """
+    if file := re.match(r"// (\S+\.case)\n", block):
+        (folder / file[1]).write_text(block)
+        return block
+    said = ""
+    for command in re.findall(r"^\$ damjoint (?:.*\\\n)*.*\n", block, flags=re.M):
+        words = [sys.executable, "-m", *shlex.split(command[2:].replace("\\\n", ""))]
+        done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)
+        if done.returncode not in (0, 1):
+            raise ValueError(f"{command}{done.stderr}")
+        printed = "\n".join(line.rstrip() for line in done.stdout.splitlines())
+        said += f"{command}{printed}\n" + f"(exit code {done.returncode})\n" * done.returncode
+    return said
+
+
+def take_bench(out: Path) -> None:
+    """Page, picture and the modelings' table of README.md from a benchmark's folder."""
+    shutil.copy(out / "benchmarks.md", REFERENCE)
+    shutil.copy(out / "accuracy.png", REFERENCE / "pictures")
+    readme, table = Path("README.md"), (out / "modelings.md").read_text()
+    readme.write_text(between("modelings", readme.read_text(), table.rstrip("\n")))
+
+
+#: What `damjoint stress` asks of every scene, in words.
+ASKED = """\
+- *Equilibrium*: $N + U$ and $T$ of every row of `history.csv`, and $M$ wherever there is a joint
+  table, are those of the [gravity method](theory.md#gravity-method)'s closed forms, to 1e-5 of the
+  dam's weight (times its base).
+- *Water*: $U$ is the integral of `p`, and the closed form where there is one; heads lie between
+  the reservoir's and the tailwater's; in 2D the flux is the same at every node, but for what drains
+  take.
+- *The law*: at every node of `joint.csv` a closed point is pressed by $K_N$ times its overlap, an
+  open one is not, there is no more tension than the damage leaves, and no more shear than friction,
+  cohesion and what has hardened hold. Damage, cumulated slip (friction), crack (rupture) and
+  slipped length never fall.
+- *The command*: parameters, times, levels, tailwater and exit code are those that were asked for.
+- *A stop*: no equilibrium is certain beyond it (a rigid block without strength but friction, under
+  the most uplift that a crack can bring, 5 % on the safe side), and the reason given is a limit
+  that the block is within 10 % of.
+
+*Undecided* is a stop that these bounds neither prove right nor wrong: a displacement that leads no
+further, or a joint that is too stiff for its mesh ($K_N h/E \\ge 100$), which the run says.
+A command that does not end in time is a defect."""
+
+
+def trust_page(results: Path) -> str:
+    """reference/trust.md: what random scenes have found, from the result file of the last run.
+
+    Raises ValueError if its rows are of different code.
+    """
+    from . import provenance
+    from .stress import CLASSES, DEFECT, UNDECIDED, counts, read_rows
+
+    rows = read_rows(results)
+    of = lambda name, value: [row for row in rows if row[name] == value]
+    tables = []
+    for name in ("law", "uplift", "dim", "drive"):
+        values = sorted({row[name] for row in rows})
+        lines = [(f"{name} = {value}", *counts(of(name, value)).values()) for value in values]
+        tables += lines
+    tables.append(("all", *counts(rows).values()))
+    slowest = sorted(rows, key=lambda row: -float(row["seconds"] or 0))[:5]
+    told = [
+        f"- {row['scene']}, {row['class']}: {row['found']}\n\n      {row['command']}"
+        for kind in (DEFECT, UNDECIDED)
+        for row in of("class", kind)
+    ]
+    worst = [(r["scene"], r["seconds"], r["iterations"], r["cuts"], r["found"]) for r in slowest]
+    return (
+        "\n\n".join(
+            [
+                "# What can be trusted",
+                f"{len(rows)} random scenes of `damjoint stress`, each run by the command and "
+                "verified from its files by code that shares nothing with the engines: dams from "
+                "5 to 150 m, $E$ from 1e9 to 1e13 Pa, $K_N$ from 1e8 to 1e15 Pa/m, all laws and "
+                "uplifts, sections with batter, neck, sloping and lift joint, silt, ice, anchor "
+                "and earthquake, water up and down; one plane scene in ten is a slender dam of "
+                "real stiffness on a brittle joint. Made by "
+                "`python -m damjoint_tools.pages trust FILE` from its result file.",
+                provenance.said(rows),
+                "## What is asked of each",
+                ASKED,
+                "## What was found",
+                markdown(tables, ("scenes", *CLASSES)),
+                "## Defects and undecided stops",
+                "\n".join(told) or "None.",
+                "## The slowest",
+                "Seconds of the whole command in one of several processes.",
+                markdown(worst, ("scene", "seconds", "iterations", "cuts", "found")),
+            ]
+        )
+        + "\n"
+    )
+
+
+def main(words: list[str]) -> None:
+    """Write the pages that are asked for."""
+    if words[0] == "bench":
+        take_bench(Path(words[1]))
+    if words[0] == "trust":
+        (REFERENCE / "trust.md").write_text(trust_page(Path(words[1])))
+    if words[0] in ("parameters", "all"):
+        (REFERENCE / "parameters.md").write_text(parameters_page())
+    if words[0] in ("results", "all"):
+        (REFERENCE / "results.md").write_text(results_page())
+    if words[0] in ("tour", "all"):
+        (REFERENCE / "tour.md").write_text(tour_page())
+    if words[0] in ("validation", "all"):
+        (REFERENCE / "ssnp142.md").write_text(validation_page())
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
