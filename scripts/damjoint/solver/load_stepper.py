@@ -276,8 +276,10 @@ class LoadStepper:
 
     def same_but_for_level(self, one: Loading, other: Loading) -> bool:
         """Whether two loadings differ in nothing else that acts."""
-        loads = [self.model.equilibrium.loads(replace(loads, level=0.0)) for loads in (one, other)]
-        return one.tail == other.tail and np.array_equal(*loads)
+        dry, other_dry = (
+            self.model.equilibrium.loads(replace(loads, level=0.0)) for loads in (one, other)
+        )
+        return one.tail == other.tail and np.array_equal(dry, other_dry)
 
     def mechanism_of(self, path: Path) -> Mechanism:
         """The mechanism of a path that does not reach the prescribed level."""

@@ -146,7 +146,7 @@ class Model:
         loading goes on in the same direction.
         """
         level, before = state.loading.level, state.previous
-        prescribed = isinstance(control, LevelControl)
+        prescribed = control.level if isinstance(control, LevelControl) else None
         if extrapolate and before and before.time > 0:
             if self.case["drive"] != "level":
                 new, now, old = time, state.time, before.time
@@ -158,8 +158,8 @@ class Model:
             if 0 < ahead < LONGEST_EXTRAPOLATION:
                 jump = state.jump + ahead * (state.jump - before.jump)
                 rise = level - before.loading.level
-                return jump, control.level if prescribed else level + ahead * rise
-        return state.jump, control.level if prescribed else level
+                return jump, level + ahead * rise if prescribed is None else prescribed
+        return state.jump, level if prescribed is None else prescribed
 
     def measure(self, control: DisplacementControl, state: State) -> float:
         """The displacement of a control in a state [m]."""

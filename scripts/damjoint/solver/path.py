@@ -304,7 +304,7 @@ class Path:
         a, b = self.points[left], self.points[left + 1]
         length, chord = b.pushed - (a.pushed or self.size), self.slope(left)
         before, beyond = self.slope(left - 1), self.slope(left + 1)
-        if before is None:
+        if before is None or chord is None:
             return 0.5, max(a.level, b.level) + abs(b.level - a.level)
         share = 0.5
         if beyond is not None and before > chord > beyond:

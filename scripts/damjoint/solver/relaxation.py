@@ -36,8 +36,7 @@ def relax(model: Model, begin: State, time: float, control: Control) -> StepResu
             start, time, control, strategies=coupled, persist=False, frozen=frozen
         )
         if found is None and equilibrium.flowing:
-            prescribed = isinstance(control, LevelControl)
-            level = control.level if prescribed else start.loading.level
+            level = control.level if isinstance(control, LevelControl) else start.loading.level
             loading = model.loading(time, level)
             lift, _ = equilibrium.flowing_lift(start.jump, start.variables, loading)
             found = model.advance(
