@@ -25,11 +25,15 @@ def same(one, other):
     return np.array_equal(one.stiffness, other.stiffness) and one.counts == other.counts
 
 
+def shapes(condensed):
+    return [shape for j in condensed.joints.values() for shape, _ in j.mesh.surface.cells]
+
+
 def test_an_entry_is_found_again(kept):
     _, made = kept
     found, bodies = cache.cached(load("a", SMALL))
     assert bodies is None and same(found, made)
-    assert [shape for shape, _ in found.joint.cells] == [shape for shape, _ in made.joint.cells]
+    assert shapes(found) == shapes(made)
     assert list(found.faces) == ["face2"] and found.width == made.width
 
 
@@ -88,7 +92,9 @@ def test_an_array_that_is_missing_is_a_miss(kept):
     """As one of the loads is if the length of the entry before it in the directory is damaged."""
     file, made = kept
     with np.load(file) as found:
-        np.savez(file, **{name: found[name] for name in found.files if name != "units/dam_x"})
+        np.savez(
+            file, **{name: found[name] for name in found.files if name != "bodies/units/dam_x"}
+        )
     found, bodies = cache.cached(load("a", SMALL))
     assert bodies is not None and found.units.keys() == made.units.keys()
 
@@ -116,7 +122,7 @@ def test_an_array_of_objects_is_not_loaded(kept, tmp_path):
     file, made = kept
     with np.load(file) as found:
         arrays = dict(found)
-    arrays["stiffness"] = np.array([Trap(tmp_path / "trap")], dtype=object)
+    arrays["bodies/stiffness"] = np.array([Trap(tmp_path / "trap")], dtype=object)
     np.savez(file, **arrays)
     found, bodies = cache.cached(load("a", SMALL))
     assert bodies is not None and same(found, made) and not (tmp_path / "trap").exists()

@@ -21,6 +21,7 @@ from tqdm import tqdm
 
 from .. import InputError
 from ..engines import Outcome
+from ..engines.condensed.cache import interface_of
 from ..engines.condensed.solve import about
 from ..model.case import Case, load
 from ..model.parameters import parameter
@@ -32,7 +33,6 @@ from ..solver.path import PRECISION, ROUGH, SURE, Point
 from ..statics import gravity
 from ..statics.limit import elastic_heel_stress
 from ..statics.verdict import bound, highest_by_statics, pulled_when_open, statement
-from .bodies import interface_of
 from .branch import CRITICAL, Branch, row
 
 #: What is divided by the strength reduction factor. The fracture energies, too: the jumps at which
