@@ -16,6 +16,7 @@ import numpy as np
 from ..laws import LAWS, Memory
 from ..model.case import Case, flows, has_drains
 from ..model.loads import Loading, line_forces, quake_column, water_column
+from .flow import FlowSolution
 from .interface import Change, Interface
 from .wet_faces import WetFace
 
@@ -109,7 +110,7 @@ class Joint:
         bulk = self.bulk
         forces = np.zeros(bulk.pressure.shape[1])
         for name, face in self.interface.faces.items():
-            places = bulk.places[name]
+            places = bulk.dof_of_face[name]
             np.add.at(forces, places[places >= 0], self.face_forces(face, loading)[places >= 0])
         total = bulk.pressure @ forces
         for name, size in self.units_of(loading).items():
@@ -133,14 +134,14 @@ class Joint:
 
     def head(self, loading: Loading, matrix: object = None) -> np.ndarray:
         """Head [m] in a joint that conducts alike everywhere, at the joint's nodes or at places
-        that a matrix of `Along` leads to: linear on the way from the reservoir's level to the
+        that a matrix of `JointFields` leads to: linear on the way from the reservoir's level to the
         tailwater's; a dry end has its own height, or the other end's head if that is lower.
 
         Drains take away their part of the head above their outlet, the tailwater or their own
         height (EM 1110-2-2200).
         """
-        case, along = self.case, self.interface.along
-        fields = along.heel_y, along.toe_y, along.way
+        case, along = self.case, self.interface.fields
+        fields = along.heel_y, along.toe_y, along.xi
         heel, toe, way = fields if matrix is None else (matrix @ field for field in fields)
         level, tail = loading.level, loading.tail
         first = np.maximum(level, np.minimum(heel, tail))
@@ -160,8 +161,8 @@ class Joint:
     def uplift(
         self, loading: Loading, matrix: object, y: np.ndarray, beyond: np.ndarray | float = 0.0
     ) -> np.ndarray:
-        """Pressure [Pa], never below the air's, at places of height y that a matrix of `Along`
-        leads to; beyond: what flowing water adds there to the pressure imposed.
+        """Pressure [Pa], never below the air's, at places of height y that a matrix of
+        `JointFields` leads to; beyond: what flowing water adds there to the pressure imposed.
         """
         return np.maximum(self.unit_weight * (self.head(loading, matrix) - y) + beyond, 0)
 
@@ -169,8 +170,8 @@ class Joint:
         """How the water in the joint pushes its lips apart (j,)."""
         interface = self.interface
         weights, y = interface.water_points.weights, interface.water_points.positions[:, 1]
-        pressure = self.uplift(loading, interface.along.at_water, y, beyond)
-        return interface.water.T @ (weights * pressure)
+        pressure = self.uplift(loading, interface.fields.at_water, y, beyond)
+        return interface.opening_at_water.T @ (weights * pressure)
 
     def _loads(self, loading: Loading) -> np.ndarray:
         """t_0 and, unless it flows, the water in the joint together (j,)."""
@@ -179,8 +180,8 @@ class Joint:
 
     def beyond(self, inner: np.ndarray) -> np.ndarray:
         """The pressure at all of the joint's nodes from that at the inner ones."""
-        whole = np.zeros(self.interface.along.nodes)
-        whole[self.interface.along.inside] = inner
+        whole = np.zeros(self.interface.fields.nodes)
+        whole[self.interface.fields.inside] = inner
         return whole
 
     def aperture(self, jump: np.ndarray, memory: Memory) -> tuple[np.ndarray, np.ndarray, float]:
@@ -202,11 +203,8 @@ class Joint:
         growing = (wider > 0) & (wider < most)
         return factor**3, np.where(growing, 3 / narrowest * factor**2, 0), narrowest
 
-    def solve_flow(
-        self, jump: np.ndarray, memory: Memory, loading: Loading
-    ) -> tuple[np.ndarray, object]:
-        """Pressure beyond the imposed one at the inner nodes; and for each solution it is made of
-        its share in it and what its sensitivity wants.
+    def solve_flow(self, jump: np.ndarray, memory: Memory, loading: Loading) -> FlowSolution:
+        """Pressure beyond the imposed one at the inner nodes.
 
         Drains: of the head that the joint would have there, they take away their part above their
         outlet, the tailwater or their own height; the pressure is that part of one with the
@@ -217,29 +215,29 @@ class Joint:
         factor = self.aperture(jump, memory)[0]
         conductivity = factor * self.interface.points.weights
         head = self.head(loading)
-        free, solution = flow.solve(conductivity, self.unit_weight * head)
+        free = flow.solve(conductivity, self.unit_weight * head)
         if self.drains is None:
-            return free, [(1.0, solution)]
+            return free
         nodes, points = self.drains
-        own = self.bulk.joint.points[nodes, 1]
+        own = self.interface.surface.points[nodes, 1]
         outlet = np.maximum(own, max(case["drain_level"], loading.tail))
-        there = head[nodes] + self.beyond(free)[nodes] / self.unit_weight
+        there = head[nodes] + self.beyond(free.pressure)[nodes] / self.unit_weight
         cracked = case["uplift"] == "cracked" and (factor[points] > 1).any()
         effect = case["drain_effectiveness"]
         if cracked or not (there > outlet).all() or effect == 0:
-            return free, [(1.0, solution)]
-        drawn, drained = flow.solve(
+            return free
+        drained = flow.solve(
             conductivity, self.unit_weight * head, nodes, self.unit_weight * outlet
         )
-        parts = [(1 - effect, solution), (effect, drained)]
-        return (1 - effect) * free + effect * drawn, parts
+        return free.mixed(effect, drained)
 
     def flowing_lift(
         self, jump: np.ndarray, memory: Memory, loading: Loading
-    ) -> tuple[np.ndarray, object]:
+    ) -> tuple[np.ndarray, FlowSolution]:
         """How flowing water pushes the joint's lips apart (j,), and its flow's solution."""
-        inner, solution = self.solve_flow(jump, memory, loading)
-        return self.lift(loading, self.interface.along.at_water @ self.beyond(inner)), solution
+        solution = self.solve_flow(jump, memory, loading)
+        beyond = self.interface.fields.at_water @ self.beyond(solution.pressure)
+        return self.lift(loading, beyond), solution
 
     def residual(
         self,
@@ -274,13 +272,10 @@ class Joint:
 
         def by_jump(secant: bool) -> Change:
             change = law_change(secant)
-            if flowing:
-                growing = self.aperture(jump, memory)[1] * interface.points.weights
-                found = [interface.flow.sensitivity(part, growing) for _, part in solution]
-                change.columns = found[0][1]
-                shares = (share for share, _ in solution)
-                change.pressure = sum(s * p for s, (p, _) in zip(shares, found, strict=True))
-            return change
+            if solution is None:
+                return change
+            growing = self.aperture(jump, memory)[1] * interface.points.weights
+            return replace(change, flow=interface.flow.derivative(solution, growing))
 
         def by_level() -> np.ndarray:
             slope = -self.rate(self._loads, loading)
@@ -298,9 +293,9 @@ class Joint:
         here = [interface.points.positions, interface.water_points.positions, place]
         if not self.wet:
             return Pressure(*(np.zeros(len(x)) for x in here))
-        along = interface.along
+        along = interface.fields
         matrices = along.at_points, along.at_water, along.at_places
-        inner = self.solve_flow(jump, memory, loading)[0] if self.flowing else 0.0
+        inner = self.solve_flow(jump, memory, loading).pressure if self.flowing else 0.0
         whole = self.beyond(inner)
         found = [
             self.uplift(loading, m, x[:, 1], m @ whole) for m, x in zip(matrices, here, strict=True)

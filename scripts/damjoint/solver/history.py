@@ -38,7 +38,7 @@ class State:
         """Before any load."""
         law, interface = joint.law, joint.interface
         memories = law.start(len(interface.points.weights)), law.start(len(interface.rows))
-        return State(0.0, Loading(0.0, 0.0), np.zeros(len(joint.bulk.free)), *memories)
+        return State(0.0, Loading(0.0, 0.0), np.zeros(len(joint.bulk.stiffness)), *memories)
 
     def staged(self, joint: Joint, time: float) -> State:
         """The state with the memories for a step that goes on to a time."""
@@ -102,7 +102,7 @@ class Record:
         along_axes = np.einsum("qk,qkc->qc", traction, frames)
         N, T, M = interface.chord.resultants(weights, interface.points.positions, along_axes)
         pressure = state.pressure
-        lifted = interface.bulk.joint.normals[interface.water_points.elements]
+        lifted = interface.surface.normals[interface.water_points.elements]
         uplift = interface.water_points.weights * pressure.water_points / joint.bulk.width
         row = {
             "time": state.time,
@@ -136,11 +136,11 @@ class Record:
         element means.
         """
         joint, law, interface = self.joint, self.joint.law, self.joint.interface
-        place, corners = interface.space.place, len(joint.bulk.joint.points)
+        place, corners = interface.space.place, len(interface.surface.points)
         pressure = state.pressure
         jump = interface.jumps(interface.at_nodes, state.jump)
         traction, _ = law.respond(jump, state.nodes)
-        seen = interface.at_places(
+        seen = interface.mean_at_nodes(
             np.column_stack(
                 [
                     jump,
@@ -157,10 +157,10 @@ class Record:
             seen[:, :6],
             pressure.nodes[:, None],
             seen[:, 6:],
-            interface.way[:, None] * interface.length,
+            interface.xi[:, None] * interface.length,
         ]
         if "lambda" in joint_columns(joint.case):
-            columns.append(interface.at_places(state.nodes.scalar)[:, None])
+            columns.append(interface.mean_at_nodes(state.nodes.scalar)[:, None])
         if pressure.flux is not None:
             columns.append(self.node_means(pressure.flux[:, None], True))
         table = np.hstack(columns)

@@ -88,8 +88,8 @@ class Point:
         joint, state = self.filling.joint, self.filling.state
         interface = joint.interface
         jump = interface.jumps(interface.at_nodes, state.jump)
-        effective = interface.at_places(joint.law.respond(jump, state.nodes)[0][:, 0])
-        toe = interface.way > 1 - 1e-9
+        effective = interface.mean_at_nodes(joint.law.respond(jump, state.nodes)[0][:, 0])
+        toe = interface.xi > 1 - 1e-9
         return float((state.pressure.nodes - effective)[toe].max())
 
     @property
@@ -172,9 +172,9 @@ class Path:
         knee, last = self.points[self.knee].filling, self.points[-1].filling
         interface = last.joint.interface
         moved = interface.jumps(interface.at_nodes, last.state.jump - knee.state.jump)
-        along = interface.way * interface.length
+        along = interface.xi * interface.length
         crack = self.points[-1].last["crack_length"]
-        return movement(last.case, crack, along, interface.at_places(moved))
+        return movement(last.case, crack, along, interface.mean_at_nodes(moved))
 
     # -- following it
     # ----------------------------------------------------------------------------------------------

@@ -11,7 +11,7 @@ import numpy as np
 
 from .. import RunError
 from ..joint.equilibrium import Joint
-from ..joint.interface import Interface
+from ..joint.interface import Border, Interface
 from ..model.case import Case
 from ..model.loads import STAGED, Loading
 from .history import Record, State
@@ -259,7 +259,7 @@ class Stepper:
                 size, edge = np.hypot(size, stiff * gap), (row, rate, gap)
 
             def correction(secant: bool) -> tuple[np.ndarray, float]:
-                border = edge and (by_level(), *edge)
+                border = edge and Border(by_level(), *edge)
                 return joint.interface.solve(joint.virgin, by_jump(secant), -value, border)
 
             return Iterate(jump, level, value, size, correction, side)
