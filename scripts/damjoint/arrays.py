@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-
-if TYPE_CHECKING:
-    from scipy import sparse
 
 Array: TypeAlias = NDArray[np.float64]
 #: of any width: numbers of nodes, elements, unknowns; Gmsh's tags are unsigned
 IntArray: TypeAlias = NDArray[np.integer[Any]]
 BoolArray: TypeAlias = NDArray[np.bool_]
-Sparse: TypeAlias = "sparse.csr_matrix[np.float64]"
+#: scipy.sparse.csr_matrix, of which type checkers do not know that its product with an array is one
+Sparse: TypeAlias = Any
 
 #: A table of results, by column.
 Table: TypeAlias = dict[str, Array]

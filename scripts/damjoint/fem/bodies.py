@@ -24,13 +24,6 @@ PARAMETERS = ("order", "hold_z", *(f"{p}_{name}" for p in ("E", "nu") for name i
 WEIGHTS = (("dam", 0), ("dam", 1), ("lower", 0), ("lower", 1), ("foundation", 1))
 
 
-def dofs_of(functions: IntArray, dim: int, components: Sequence[int] | None = None) -> IntArray:
-    """Degrees of freedom dim * function + component, function by function; default: all of them."""
-    return (
-        dim * functions[:, None] + np.array(range(dim) if components is None else components)
-    ).ravel()
-
-
 def material_of(case: Case) -> Material:
     """Elastic constants by region."""
     return {
@@ -42,7 +35,7 @@ def material_of(case: Case) -> Material:
 
 @dataclass(frozen=True, kw_only=True)
 class ElasticBody:
-    """A linear elastic body of n degrees of freedom."""
+    """A linear elastic body of n degrees of freedom, dim * function + component."""
 
     space: Space
     #: (n, n) [N/m]
@@ -62,18 +55,22 @@ class ElasticBody:
         (joint,) = mesh.joints.values()
         body = mesh.solids[name]
         space = Space(body, order)
-        functions = lambda part: space.find(Space(part, order))
-        fixed = [dofs_of(functions(within(mesh.bodies["fixed"], body)), dim)]
+
+        def dofs(part: Body, components: Sequence[int] = range(dim)) -> IntArray:
+            functions = space.find(Space(part, order))
+            return np.ravel(dim * functions[:, None] + np.array(components))
+
+        fixed = [dofs(within(mesh.bodies["fixed"], body))]
         if dim == 3 and case["hold_z"]:
-            fixed.append(dofs_of(functions(within(mesh.bodies["sides"], body)), dim, [2]))
+            fixed.append(dofs(within(mesh.bodies["sides"], body), [2]))
         return ElasticBody(
             space=space,
             stiffness=elasticity(space, dim, material_of(case)),
             unit_loads=dict(unit_loads(space, mesh, name)),
             fixed_dofs=np.unique(np.concatenate(fixed)),
-            joint_dofs=dofs_of(functions(joint.surface), dim),
+            joint_dofs=dofs(joint.surface),
             face_dofs={
-                n: dofs_of(functions(face.surface), dim)
+                n: dofs(face.surface)
                 for n, face in mesh.faces.items()
                 if face.body == name and wet(case, face)
             },

@@ -170,7 +170,11 @@ def condense(case: Case, bodies: Bodies) -> Condensed:
     crest_face = -(above.coupling @ row)
     crest_both = linalg.cho_solve((both, True), crest_face)
 
-    pressure, crest_pressure, units, crest_units, dof_of_face = [], [], {}, {}, {}
+    pressure: list[Array] = []
+    crest_pressure: list[Array] = []
+    units: dict[str, Array] = {}
+    crest_units: dict[str, float] = {}
+    dof_of_face: dict[str, IntArray] = {}
     count = 0
     for name, body in bodies.by_name.items():
         own, on_upper = reduced[name], name == joint.upper

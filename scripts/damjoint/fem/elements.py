@@ -18,7 +18,7 @@ from ..arrays import Array, IntArray, Sparse
 from ..model.mesh import Body
 
 #: Corners of the reference elements, by node number.
-CORNERS = {
+CORNERS: dict[str, list[tuple[float, ...]]] = {
     "vertex": [()],
     "line": [(-1,), (1,)],
     "triangle": [(0, 0), (1, 0), (0, 1)],
@@ -94,7 +94,7 @@ def basis(shape: str, order: int, u: Array | tuple[float, ...]) -> tuple[Array, 
 
 # Triangle rules with 1, 3, 6 and 7 points (degrees 1, 2, 4, 5): Strang and Fix, Dunavant
 _A6, _B6, _A7, _B7 = 0.091576213509771, 0.445948490915965, 0.101286507323456, 0.470142064105115
-TRIANGLE = {
+TRIANGLE: dict[int, tuple[list[tuple[float, ...]], list[float]]] = {
     1: ([(1 / 3, 1 / 3)], [0.5]),
     3: ([(1 / 6, 1 / 6), (2 / 3, 1 / 6), (1 / 6, 2 / 3)], [1 / 6] * 3),
     6: (
@@ -246,7 +246,7 @@ def codes_of(pairs: IntArray) -> IntArray:
     elements that share the edge or face.
     """
     ends = np.sort(pairs.astype(np.int64), axis=-1)
-    return (ends[..., 0] << 32 | ends[..., 1]).min(axis=-1)
+    return np.asarray((ends[..., 0] << 32 | ends[..., 1]).min(axis=-1))
 
 
 def geometry(points: Array, cells: IntArray, dn: Array) -> tuple[Array, Array]:
@@ -303,7 +303,10 @@ def points_of(space: Space, numbers: dict[str, int], gradients: bool = False) ->
     )
     pointers = np.concatenate([[0], np.cumsum(widths)])
     size = (len(widths), len(space.place))
-    build = lambda data: sparse.csr_matrix((data, np.concatenate(tables), pointers), size)
+
+    def build(data: Array) -> Sparse:
+        return sparse.csr_matrix((data, np.concatenate(tables), pointers), size)
+
     slope = np.concatenate(slopes)
     return Points(
         weights=np.concatenate(weights),

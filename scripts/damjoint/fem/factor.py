@@ -9,17 +9,18 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterator
 from importlib.metadata import version
+from typing import Literal
 
 import numpy as np
 import scipy
-import scipy.sparse.linalg
 from scipy import sparse
+from scipy.sparse.linalg import SuperLU, splu
 
 from ..arrays import Array, IntArray, Sparse
 from .memory import check_memory, dense_memory
 
 try:
-    import mumps
+    import mumps  # type: ignore[import-untyped]
 except ImportError:  # not built for this Python, or the system's libmumps is gone
     mumps = None
 
@@ -42,7 +43,7 @@ NO_MEMORY = -13
 
 def estimate(session: mumps.Context) -> float:
     """Memory [bytes] that MUMPS needs for the matrix it has analysed."""
-    return 1e6 * session.mumps_instance.infog[16]
+    return 1e6 * float(session.mumps_instance.infog[16])
 
 
 @contextlib.contextmanager
@@ -94,14 +95,12 @@ def solved(session: mumps.Context, right: Array) -> Array:
     session.mumps_instance.set_dense_rhs(session.right)
     session.mumps_instance.job = 3
     session.call()
-    return session.right.copy()
+    return np.array(session.right)
 
 
-def superlu(matrix: sparse.csc_matrix, ordering: str) -> sparse.linalg.SuperLU:
+def superlu(matrix: Sparse, ordering: Literal["NATURAL", "MMD_AT_PLUS_A"]) -> SuperLU:
     """SuperLU factors of a symmetric matrix, pivots on the diagonal."""
-    return sparse.linalg.splu(
-        matrix, permc_spec=ordering, diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-    )
+    return splu(matrix, permc_spec=ordering, diag_pivot_thresh=0.0, options={"SymmetricMode": True})
 
 
 def schur_by_superlu(matrix: Sparse, keep: IntArray, loads: Array) -> tuple[Array, Array]:
@@ -113,8 +112,8 @@ def schur_by_superlu(matrix: Sparse, keep: IntArray, loads: Array) -> tuple[Arra
     the end.
     """
     n, k = matrix.shape[0], len(keep)
-    columns = sparse.csr_matrix(loads)
-    matrix = sparse.bmat([[matrix, columns], [columns.T, None]], format="csc")
+    border: Sparse = sparse.csr_matrix(loads)
+    matrix = sparse.bmat([[matrix, border], [border.T, None]], format="csc")
     keep = np.append(keep, np.arange(n, matrix.shape[0]))
     inside = np.setdiff1d(np.arange(matrix.shape[0]), keep)
     order = np.empty_like(inside)
@@ -124,9 +123,10 @@ def schur_by_superlu(matrix: Sparse, keep: IntArray, loads: Array) -> tuple[Arra
     added = sparse.diags(np.append(np.zeros(len(inside)), raised))
     factors = superlu((matrix[order][:, order] + added).tocsc(), "NATURAL")
     rows, columns = factors.perm_r[len(inside) :], factors.perm_c[len(inside) :]
-    lower = factors.L.tocsr()[rows][:, columns].toarray()
-    upper = factors.U.tocsr()[columns][:, columns].toarray()
-    reduced = lower @ upper - np.diag(raised)
+    lower: Sparse = factors.L.tocsr()
+    upper: Sparse = factors.U.tocsr()
+    reduced = lower[rows][:, columns].toarray() @ upper[columns][:, columns].toarray()
+    reduced -= np.diag(raised)
     return reduced[:k, :k], reduced[:k, k:]
 
 

@@ -49,7 +49,7 @@ class JointFields:
         self.ends = np.concatenate([heel, toe])
         self.inside = np.setdiff1d(np.arange(number), self.ends)
         y = surface.points[:, 1]
-        self.xi = harmonic(laplace, self.ends, 1.0 * np.isin(self.ends, toe))
+        self.xi = harmonic(laplace, self.ends, np.isin(self.ends, toe).astype(float))
         self.heel_y, self.toe_y = (
             np.full(number, y[nodes[0]])
             if np.ptp(y[nodes]) < 1e-9 * np.abs(surface.points).max()
@@ -58,7 +58,7 @@ class JointFields:
         )
 
 
-def harmonic(laplace: sparse.csc_matrix[np.float64], fixed: IntArray, values: Array) -> Array:
+def harmonic(laplace: Sparse, fixed: IntArray, values: Array) -> Array:
     """Solve the Laplace equation (n,) with these values at fixed nodes."""
     field = np.zeros(laplace.shape[0])
     field[fixed] = values
@@ -293,10 +293,10 @@ class Flow:
             resistance = self.resistances(points.weights * conductivity)
             known = self.known(drains)
             drop = -np.diff(total[self.chain[known]])
-            means = drop / np.add.reduceat(resistance, known[:-1])
+            of_parts = drop / np.add.reduceat(resistance, known[:-1])
             flux = np.empty(len(resistance))
-            flux[self.order] = np.repeat(means, np.diff(known))
-            return flux, float(means[-1])
+            flux[self.order] = np.repeat(of_parts, np.diff(known))
+            return flux, float(of_parts[-1])
         slopes = self.fields.slopes
         at_toe = 1.0 * np.isin(np.arange(self.fields.nodes), self.fields.toe)
         # tested with the function that is 1 at the toe: consistent with the weak form

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.linalg import norm
 from scipy import linalg, sparse
 
 from ..arrays import Array, IntArray, Sparse
@@ -175,8 +176,9 @@ class Interface:
         if len(self.rows) == len(self.space.place):
             return values
         count = np.bincount(self.rows)
-        mean = lambda column: np.bincount(self.rows, column) / count
-        return np.column_stack([mean(v) for v in values.T]) if values.ndim > 1 else mean(values)
+        columns = values[:, None] if values.ndim == 1 else values
+        means = [np.bincount(self.rows, column) / count for column in columns.T]
+        return np.column_stack(means) if values.ndim > 1 else means[0]
 
     def _select(self, component: int) -> Sparse:
         """A component of the jump of the space's functions, from the unknowns."""
@@ -212,7 +214,8 @@ class Interface:
 
     def forces(self, traction: Array) -> Array:
         """Nodal forces (j,) of a traction (q, 3) at the Gauss points."""
-        return self.from_points @ (self.points.weights[:, None] * traction[:, : self.dim]).ravel()
+        weighted = self.points.weights[:, None] * traction[:, : self.dim]
+        return np.asarray(self.from_points @ weighted.ravel())
 
     def _heel_row(self) -> Array:
         """Mean opening along the heel, from the unknowns."""
@@ -249,7 +252,7 @@ class Interface:
     @cached_property
     def xi(self) -> Array:
         """Normalised path coordinate of each place, from heel (0) to toe (1)."""
-        return self.fields.at_places @ self.fields.xi
+        return np.asarray(self.fields.at_places @ self.fields.xi)
 
     def drains(self, distance: float) -> tuple[IntArray, IntArray]:
         """Nodes nearest to a line at a distance from the heel along the joint [m], and the Gauss
@@ -347,6 +350,10 @@ class Interface:
         return x, s
 
 
+#: Number of unknowns from which on single precision pays.
+SINGLE_PRECISION = 300
+
+
 def lu_solve(matrix: Array, right: Array) -> Array:
     """Solve a linear system by LU; the matrix may be overwritten.
 
@@ -355,19 +362,20 @@ def lu_solve(matrix: Array, right: Array) -> Array:
     """
     if not right.any():
         return np.zeros_like(right)
-    if len(right) > 300:
+    if len(right) > SINGLE_PRECISION:
         factors, pivots, info = linalg.lapack.sgetrf(matrix.T.astype(np.float32), overwrite_a=True)
-        solution, residual, size = np.zeros_like(right), right, np.linalg.norm(right)
+        solution: Array = np.zeros_like(right)
+        residual, size = right, norm(right)
         for _ in range(0 if info else 8):
             correction = linalg.lapack.sgetrs(factors, pivots, residual / size, trans=1)[0]
             solution = solution + size * correction
             residual, before = right - matrix @ solution, size
-            size = np.linalg.norm(residual)
-            if size <= 1e-12 * np.linalg.norm(right):
+            size = norm(residual)
+            if size <= 1e-12 * norm(right):
                 return solution
             if not size < 0.1 * before:
                 break
     factors, pivots, info = linalg.lapack.dgetrf(matrix.T, overwrite_a=True)
     if info:
         raise linalg.LinAlgError("singular matrix")
-    return linalg.lapack.dgetrs(factors, pivots, right, trans=1)[0]
+    return np.asarray(linalg.lapack.dgetrs(factors, pivots, right, trans=1)[0])

@@ -42,18 +42,18 @@ class WetFace:
 
     def spread(self, traction: Array) -> Array:
         """Nodal forces of a traction (q, dim) [Pa]."""
-        return (self.points.values.T @ (self.points.weights[:, None] * traction)).ravel()
+        return np.ravel(self.points.values.T @ (self.points.weights[:, None] * traction))
 
     def press(self, level: float, height: Height, column: Column) -> Array:
         """Nodal forces [m x area] of a height of pressure on the face."""
         if self.flat or not self.straight:
-            cut = [] if self.flat else self.cut_by(level)
+            cut = np.zeros(0, int) if self.flat else self.cut_by(level)
             outside = ~np.isin(self.points.elements, cut)
             forces = self.spread(
                 -(height(level, self.y, self.tilt) * outside)[:, None] * self.normals
             )
             for element in cut:
-                self.add_wet_part(forces, element, level, height)
+                self.add_wet_part(forces, int(element), level, height)
         else:
             forces = self.spread(-self.corrected(level, height, column)[:, None] * self.normals)
         return forces
@@ -79,7 +79,7 @@ class WetFace:
             shape_level = max(shape_level, self.low) + RAISE * (self.high - self.low)
         b = (m0 * moment - m1 * force) / determinant
         a = (force - b * m1) / m0
-        return shape * (a + b * y)
+        return np.asarray(shape * (a + b * y))
 
     # -- elements that the waterline cuts
 
@@ -132,6 +132,6 @@ def below(corners: Array, height: Array) -> list[Array]:
 def measure(simplex: Array) -> float:
     """Measure of a simplex in reference coordinates over that of its rule's own simplex."""
     if len(simplex) == 2:
-        return abs(simplex[1, 0] - simplex[0, 0]) / 2
+        return float(abs(simplex[1, 0] - simplex[0, 0]) / 2)
     (a, b), (c, d) = simplex[1] - simplex[0], simplex[2] - simplex[0]
-    return abs(a * d - b * c)
+    return float(abs(a * d - b * c))

@@ -47,10 +47,11 @@ def folder() -> Path | None:
 def key_of(case: Case) -> tuple[object, ...]:
     """All that condensed bodies depend on."""
     shape = fingerprint(mesh_of(case)) if case.geometry else tuple(shares(case).items())
-    faces = max(case.tail_levels) > 0, case["floor_water"], overtopped(case)
-    if case.geometry:  # which faces are under water depends on heights that only its mesh has
-        faces = (*faces, case.reached, max(case.tail_levels))
-    return (shape, *(case[n] for n in PARAMETERS), *faces)
+    tail = max(case.tail_levels)
+    faces = tail > 0, case["floor_water"], overtopped(case)
+    # which faces of an own geometry are under water depends on heights that only its mesh has
+    levels = (case.reached, tail) if case.geometry else ()
+    return (shape, *(case[n] for n in PARAMETERS), *faces, *levels)
 
 
 def fingerprint(mesh: Mesh) -> str:
@@ -161,12 +162,12 @@ def write(condensed: Condensed, header: str, path: Path) -> None:
 CLASSES = {cls.__name__: cls for cls in (Condensed, CondensedJoint, JointMesh, Face, Body)}
 
 
-def pack(value: object, path: str, arrays: dict[str, Array]) -> object:
+def pack(value: Any, path: str, arrays: dict[str, Array]) -> object:
     """Tree of a value for JSON; its arrays are added to `arrays` by their paths in the tree."""
     if isinstance(value, np.ndarray):
         arrays[path] = value
         return {"array": path}
-    if isinstance(value, tuple(CLASSES.values())):
+    if type(value) in CLASSES.values():
         content = {field.name: getattr(value, field.name) for field in fields(value)}
         return {"class": type(value).__name__, "fields": pack(content, path, arrays)}
     if isinstance(value, dict):
