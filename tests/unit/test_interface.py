@@ -8,7 +8,8 @@ import pytest
 from damjoint.fem.bodies import Bodies
 from damjoint.fem.condensation import condense
 from damjoint.joint.flow import FlowDerivative
-from damjoint.joint.interface import Border, Interface, lu_solve
+from damjoint.joint.interface import Interface
+from damjoint.joint.linear_system import Border, lu_solve
 from damjoint.model.case import load
 from numpy.testing import assert_allclose
 

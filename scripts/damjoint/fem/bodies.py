@@ -88,7 +88,7 @@ def unit_loads(space: Space, mesh: Mesh, name: str) -> Iterator[tuple[str, Array
             part = Space(mesh.bodies[line], space.order)
             points = points_of(part, WATER)
             for component in (0, 1):
-                load = np.zeros(dim * len(space.place))
+                load = np.zeros(dim * len(space.locations))
                 load[dim * space.find(part) + component] = points.values.T @ points.weights
                 yield f"{line}_{'xyz'[component]}", load
 

@@ -13,7 +13,7 @@ leaves the displacement jump:
     t_0 = f_u - S_u M^-1 (f_u + f_l).
 
 S is symmetric; the rigid motions of the upper body are its null space. GetDP is not used for the
-bodies: its start alone takes as long as a whole 2D loading here, and an independent assembly checks
+bodies: its start alone takes as long as all steps of a 2D scene, and an independent assembly checks
 the problem definition (tests compare both).
 """
 
@@ -104,8 +104,8 @@ class ReducedBody:
         free = np.setdiff1d(np.arange(size), body.fixed_dofs)
         number = np.full(size, -1)
         number[free] = np.arange(len(free))
-        n, kept = len(joint), np.concatenate([number[joint], number[loaded]])
-        schur, reduced_loads = schur_complement(stiffness[free][:, free], kept, loads[free])
+        n, ends = len(joint), np.concatenate([number[joint], number[loaded]])
+        schur, reduced_loads = schur_complement(stiffness[free][:, free], ends, loads[free])
         jj, jl, ll = schur[:n, :n], schur[:n, n:], schur[n:, n:]
         units, loaded_units = reduced_loads[:n], reduced_loads[n:]
         spread = jl

@@ -56,7 +56,7 @@ def elasticity(space: Space, dim: int, material: Material) -> Sparse:
         rows.append(np.repeat(dofs, n * dim, axis=1).ravel())
         columns.append(np.tile(dofs, (1, n * dim)).ravel())
         values.append(block.ravel())
-    size = dim * len(space.place)
+    size = dim * len(space.locations)
     return sparse.coo_matrix(
         (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), (size, size)
     ).tocsr()
@@ -87,7 +87,7 @@ def body_force(space: Space, dim: int, component: int, region: str | None = None
     points = points_of(space, BULK[space.order])
     sizes = [len(table) for _, table in space.connectivity]
     inside = np.repeat([region in (None, own) for own in space.body.regions], sizes)
-    load = np.zeros((len(space.place), dim))
+    load = np.zeros((len(space.locations), dim))
     load[:, component] = points.values.T @ (points.weights * inside[points.elements])
     return load.ravel()
 

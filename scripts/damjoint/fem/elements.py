@@ -55,7 +55,7 @@ def pairs_of(shape: str) -> IntArray:
 
 
 @cache
-def places_of(shape: str, order: int) -> Array:
+def locations_of(shape: str, order: int) -> Array:
     """Location of each function of an order, (n, d): the nodes, then the midpoints of pairs."""
     corners = corners_of(shape)
     middles = corners[pairs_of(shape)[:, 0]].mean(axis=1)
@@ -166,7 +166,7 @@ BULK = {
     2: {"triangle": 3, "quad": 9, "tetra": 4, "wedge": 21, "hexahedron": 27},
 }
 #: In the joint, by parameter `quadrature`, order and shape. Published quadrangles of order 2 have 3
-#: x 3 points; they take 2 x 2 here, so that layers repeat the plane scene.
+#: x 3 points; 2 x 2 are used instead, so that layers repeat the plane scene.
 JOINT = {
     "full": {1: {"line": 2, "triangle": 3, "quad": 4}, 2: {"line": 3, "triangle": 6, "quad": 9}},
     "published": {
@@ -191,14 +191,14 @@ def tabulated(shape: str, order: int, points: int) -> tuple[Array, Array, Array,
 class Space:
     """Scalar functions of an order on a region: nodal ones, then (order 2) products of two.
 
-    place: (n, 3) location of each function: the node, or the midpoint of the edge, face or element.
+    locations: (n, 3) of each function: the node, or the midpoint of the edge, face or element.
     """
 
     def __init__(self, body: Body, order: int) -> None:
         self.body, self.order = body, order
         #: functions of each element, by shape: (elements, functions)
         self.connectivity: list[tuple[str, IntArray]] = body.cells
-        self.place = body.points
+        self.locations = body.points
         #: a number for each product, equal on a region and on its parts, sorted
         self.codes = np.zeros(0, np.int64)
         if order == 2:
@@ -206,7 +206,7 @@ class Space:
             codes = np.concatenate([codes_of(body.node_tags[p]).ravel() for p in pairs])
             middles = [body.points[p].mean(axis=(2, 3)).reshape(-1, 3) for p in pairs]
             self.codes, first, inverse = np.unique(codes, return_index=True, return_inverse=True)
-            self.place = np.vstack([body.points, np.concatenate(middles)[first]])
+            self.locations = np.vstack([body.points, np.concatenate(middles)[first]])
             cuts = np.cumsum([m.size // 3 for m in middles])[:-1]
             products = np.split(len(body.points) + inverse, cuts)
             self.connectivity = [
@@ -224,15 +224,15 @@ class Space:
         products = np.searchsorted(self.codes, part.codes)
         return np.concatenate([nodes, len(self.body.points) + products])
 
-    def at_places(self, order: int) -> Sparse:
-        """Interpolation at the places from the functions up to an order (places, functions)."""
+    def interpolation(self, order: int) -> Sparse:
+        """Values at the locations, from the functions up to an order (locations, functions)."""
         rows, matrices = [], []
         for shape, table in self.connectivity:
-            local = [basis(shape, order, u)[0] for u in places_of(shape, self.order)]
+            local = [basis(shape, order, u)[0] for u in locations_of(shape, self.order)]
             columns = np.repeat(table[:, : len(local[0])], len(local), axis=0)
             pointers = columns.shape[1] * np.arange(len(columns) + 1)
             data = np.tile(np.ravel(local), len(table))
-            size = len(columns), len(self.place) if order == 2 else len(self.body.points)
+            size = len(columns), len(self.locations) if order == 2 else len(self.body.points)
             matrices.append(sparse.csr_matrix((data, columns.ravel(), pointers), size))
             rows.append(table.ravel())
         _, first = np.unique(np.concatenate(rows), return_index=True)
@@ -302,7 +302,7 @@ def points_of(space: Space, numbers: dict[str, int], gradients: bool = False) ->
         [np.full(len(t) * numbers[s], t.shape[1]) for s, t in space.connectivity]
     )
     pointers = np.concatenate([[0], np.cumsum(widths)])
-    size = (len(widths), len(space.place))
+    size = (len(widths), len(space.locations))
 
     def build(data: Array) -> Sparse:
         return sparse.csr_matrix((data, np.concatenate(tables), pointers), size)

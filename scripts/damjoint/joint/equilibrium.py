@@ -1,4 +1,4 @@
-"""The equilibrium of the joint with the condensed bodies around it (see bulk.py).
+"""The equilibrium of the joint with the condensed bodies around it (see fem/condensation.py).
 
 Unknown: the jump. Residual R = N^T W t(jump) - (water in the joint) + S jump - t_0(loading) = 0;
 the pressure of flowing water is solved for the jump at hand before every residual, and its
@@ -110,8 +110,8 @@ class Joint:
         bulk = self.bulk
         forces = np.zeros(bulk.pressure.shape[1])
         for name, face in self.interface.faces.items():
-            places = bulk.dof_of_face[name]
-            np.add.at(forces, places[places >= 0], self.face_forces(face, loading)[places >= 0])
+            dofs = bulk.dof_of_face[name]
+            np.add.at(forces, dofs[dofs >= 0], self.face_forces(face, loading)[dofs >= 0])
         total = bulk.pressure @ forces
         for name, size in self.units_of(loading).items():
             total += size * bulk.units[name]
@@ -289,12 +289,12 @@ class Joint:
     def pressure(self, jump: np.ndarray, memory: Memory, loading: Loading) -> Pressure:
         """The water's pressure in the joint for an opening."""
         interface, bulk = self.interface, self.bulk
-        place = interface.space.place
+        place = interface.space.locations
         here = [interface.points.positions, interface.water_points.positions, place]
         if not self.wet:
             return Pressure(*(np.zeros(len(x)) for x in here))
         along = interface.fields
-        matrices = along.at_points, along.at_water, along.at_places
+        matrices = along.at_points, along.at_water, along.at_locations
         inner = self.solve_flow(jump, memory, loading).pressure if self.flowing else 0.0
         whole = self.beyond(inner)
         found = [

@@ -40,11 +40,11 @@ class JointFields:
         points = elements.points_of(linear, rule, gradients=True)
         self.joint, self.dim, self.nodes, self.toe = joint, joint.dim, number, toe
         #: fields at the Gauss points, their slopes there along x, y, z, and fields at the points of
-        #: the water and at all places of the joint's space, from their values at the nodes
+        #: the water and at the locations of the joint's space, from their values at the nodes
         self.at_points = points.values
         self.slopes = [g for g in points.gradients[: joint.dim] if np.abs(g.data).max() > 1e-12]
         self.at_water = elements.points_of(linear, elements.WATER).values
-        self.at_places = space.at_places(1)
+        self.at_locations = space.interpolation(1)
         laplace = sum(g.T @ scaled(g, points.weights) for g in self.slopes).tocsc()
         self.ends = np.concatenate([heel, toe])
         self.inside = np.setdiff1d(np.arange(number), self.ends)

@@ -1,14 +1,5 @@
 """The joint of condensed bodies, whatever its law, its water and its levels: interpolations, flow
 operators, and the linear systems of Newton's method.
-
-The tangent is that of the undamaged joint, A_0 = S + K_0, and its change where the joint has
-opened, broken or slipped: A = A_0 + L - B P (L: change by the law, on few rows; P: derivative of
-the pressures of flowing water; B: their nodal forces). With C = A_0^-1, computed once, A x = r is
-
-    x = C (r - f + B p),    f = L x,    p = P x,
-
-a system of the forces f on the rows of L and the pressures p only (Woodbury). Bordered by one more
-equation it stays regular at a limit point of the load, where A is singular.
 """
 
 from __future__ import annotations
@@ -17,58 +8,16 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.linalg import norm
-from scipy import linalg, sparse
+from scipy import sparse
 
 from ..arrays import Array, IntArray, Sparse
 from ..fem import elements
 from ..fem.condensation import Condensed
 from ..model.mesh import JointMesh, ends_of, heel_normal
 from ..model.scene import UP
-from .flow import Flow, FlowDerivative, JointFields
+from .flow import Flow, JointFields
+from .linear_system import Border, Change, UndamagedSystem
 from .wet_faces import WetFace
-
-
-@dataclass(frozen=True, kw_only=True)
-class Change:
-    """L (rows, j), without its zero rows, and P if water flows."""
-
-    law: Sparse
-    rows: IntArray
-    flow: FlowDerivative | None = None
-
-
-@dataclass(frozen=True)
-class Border:
-    """One more unknown s and equation: A x + slope s = right, row x + rate s = gap."""
-
-    slope: Array
-    row: Array
-    rate: float
-    gap: float
-
-
-class Undamaged:
-    """The inverse tangent of the undamaged joint, C = A_0^-1 (j, j)."""
-
-    def __init__(self, tangent: Array, matrix: Array) -> None:
-        """tangent: (3, 3) of all Gauss points; matrix: A_0, overwritten.
-
-        Raises LinAlgError if the joint is not stiff enough to support the dam.
-        """
-        self.tangent = tangent
-        factor, info = linalg.lapack.dpotrf(matrix.T, lower=True, overwrite_a=True, clean=False)
-        if info:
-            raise linalg.LinAlgError("the joint does not hold the dam")
-        inverse, _ = linalg.lapack.dpotri(factor, lower=True, overwrite_c=True)
-        self.compliance: Array = np.tril(inverse) + np.tril(inverse, -1).T
-        self._by_pressure: Array | None = None
-
-    def by_pressure(self, lift: Sparse) -> Array:
-        """C B (j, p), the jumps by unit pressures with nodal forces B; computed once."""
-        if self._by_pressure is None:
-            self._by_pressure = np.ascontiguousarray((lift.T @ self.compliance).T)
-        return self._by_pressure
 
 
 def frames(normals: Array) -> Array:
@@ -140,10 +89,10 @@ class Interface:
         self.from_points = self.at_points.T.tocsr()
         #: pattern of from_points: unknowns on which each component at a Gauss point acts
         self.touched = self.from_points != 0
-        #: jump at the nodes likewise: dim rows of `at_nodes` for each of `rows`, indices of places;
-        #: where the joint bends, a node has a row in the frame of each of its elements
+        #: jump at the nodes likewise, dim rows for each of `rows`, indices of locations; where the
+        #: joint bends, a node has rows in the frame of each of its elements
         self.rows, node_frames = self._node_frames()
-        self.at_nodes = self._components(space.at_places(bulk.order)[self.rows], node_frames)
+        self.at_nodes = self._components(space.interpolation(bulk.order)[self.rows], node_frames)
         self.water_points = elements.points_of(space, elements.WATER)
         #: opening at the points of the water from the unknowns
         self.opening_at_water = self._components(
@@ -159,12 +108,12 @@ class Interface:
         self.chord = Chord.of(self.mesh)
         #: from heel to toe along the joint [m], a mean in 3D
         self.length = self.points.weights.sum() / bulk.width
-        self._undamaged: Undamaged | None = None
+        self._undamaged: UndamagedSystem | None = None
 
     def _node_frames(self) -> tuple[IntArray, Array]:
-        """Places and the frames of their jumps: one for each place on a plane joint."""
+        """Locations (rows,) and frames of their jumps (rows, 3, 3); on a plane joint one each."""
         if self.flat:
-            number = len(self.space.place)
+            number = len(self.space.locations)
             return np.arange(number), np.broadcast_to(self.frames[0], (number, 3, 3))
         tables = [table for _, table in self.space.connectivity]
         sizes = np.concatenate([np.full(len(t), t.shape[1]) for t in tables])
@@ -172,8 +121,8 @@ class Interface:
         return rows, np.repeat(self.frames, sizes, axis=0)
 
     def mean_at_nodes(self, values: Array) -> Array:
-        """Mean at each place of values by `rows` (rows,) or (rows, n)."""
-        if len(self.rows) == len(self.space.place):
+        """Mean at each location of values (rows,) or (rows, n) in the order of `rows`."""
+        if len(self.rows) == len(self.space.locations):
             return values
         count = np.bincount(self.rows)
         columns = values[:, None] if values.ndim == 1 else values
@@ -186,7 +135,7 @@ class Interface:
         selected = np.flatnonzero(components == component)
         return sparse.csr_matrix(
             (np.ones(len(selected)), (functions[selected], selected)),
-            (len(self.space.place), len(self.joint.free)),
+            (len(self.space.locations), len(self.joint.free)),
         )
 
     def _components(self, values: Sparse, frames: Array, most: int = 3) -> Sparse:
@@ -223,7 +172,7 @@ class Interface:
         points = elements.points_of(heel, elements.WATER)
         functions = self.space.find(heel)
         normal = heel_normal(self.surface, heel.body)
-        weights = np.zeros(len(self.space.place))
+        weights = np.zeros(len(self.space.locations))
         weights[functions] = points.values.T @ points.weights / points.weights.sum()
         functions, components = np.divmod(self.joint.free, self.dim)
         return weights[functions] * normal[components]
@@ -235,7 +184,6 @@ class Interface:
         return ends_of(heel, self.chord.toe, self.length)
 
     # -- flow
-    # ----------------------------------------------------------------------------------------------
 
     @cached_property
     def flow(self) -> Flow:
@@ -251,8 +199,8 @@ class Interface:
 
     @cached_property
     def xi(self) -> Array:
-        """Normalised path coordinate of each place, from heel (0) to toe (1)."""
-        return np.asarray(self.fields.at_places @ self.fields.xi)
+        """Normalised path coordinate of each location, from heel (0) to toe (1)."""
+        return np.asarray(self.fields.at_locations @ self.fields.xi)
 
     def drains(self, distance: float) -> tuple[IntArray, IntArray]:
         """Nodes nearest to a line at a distance from the heel along the joint [m], and the Gauss
@@ -270,32 +218,24 @@ class Interface:
         return nodes, np.flatnonzero(beside[self.points.elements])
 
     # -- linear systems
-    # ------------------------------------------------------------------------------------
 
     def stiffness(self, tangent: Array, points: IntArray) -> Sparse:
         """Stiffness (j, j) of some Gauss points with a tangent (points, 3, 3)."""
         number, d = len(points), self.dim
         if not number:
             return sparse.csr_matrix((len(self.joint.free),) * 2)
-        here = self.at_points[(d * points[:, None] + np.arange(d)).ravel()]
+        rows = self.at_points[(d * points[:, None] + np.arange(d)).ravel()]
         blocks = self.points.weights[points, None, None] * tangent[:, :d, :d]
-        return (
-            here.T
-            @ (
-                sparse.bsr_matrix(
-                    (blocks, np.arange(number), np.arange(number + 1)), (d * number,) * 2
-                )
-                @ here
-            )
-        ).tocsr()
+        diagonal = blocks, np.arange(number), np.arange(number + 1)
+        return (rows.T @ (sparse.bsr_matrix(diagonal, (d * number,) * 2) @ rows)).tocsr()
 
-    def undamaged(self, tangent: Array) -> Undamaged:
-        """The system of the undamaged joint for a tangent (3, 3); the last one is kept."""
+    def undamaged(self, tangent: Array) -> UndamagedSystem:
+        """Linear system of the undamaged joint for a tangent (3, 3); the last one is kept."""
         if self._undamaged is None or not np.array_equal(tangent, self._undamaged.tangent):
             points = np.arange(len(self.points.weights))
             everywhere = np.broadcast_to(tangent, (len(points), 3, 3))
             matrix = self.bulk.stiffness + self.stiffness(everywhere, points).toarray()
-            self._undamaged = Undamaged(tangent, matrix)
+            self._undamaged = UndamagedSystem(tangent, matrix)
         return self._undamaged
 
     def change(self, tangent: Array, undamaged: Array) -> Change:
@@ -309,73 +249,9 @@ class Interface:
     def solve(
         self, undamaged: Array, change: Change, right: Array, border: Border | None
     ) -> tuple[Array, float]:
-        """Solve A x = right (j,), bordered or not; x and s (0 without border).
+        """Solve A x = right (j,), bordered or not; see UndamagedSystem.solve.
 
         undamaged: tangent (3, 3). Raises LinAlgError if the system is singular.
         """
-        system, law, rows, flow = self.undamaged(undamaged), change.law, change.rows, change.flow
-        compliance, m = system.compliance, len(rows)
-        start = compliance @ right
-        size = m + (len(flow.pressure) if flow else 0)
-        small = np.zeros((size + (border is not None),) * 2)
-        small_right = np.zeros(len(small))
-        touched = np.unique(law.indices)
-        small[:m, :m] = law[:, touched] @ compliance[np.ix_(touched, rows)]
-        small_right[:m] = law @ start
-        if flow:
-            by_pressure = system.by_pressure(self.flow.lift)
-            small[:m, m:size] = -(law @ by_pressure)
-            small[m:size, :m] = flow.pressure @ compliance[np.ix_(flow.columns, rows)]
-            small[m:size, m:size] = -(flow.pressure @ by_pressure[flow.columns])
-            small_right[m:size] = flow.pressure @ start[flow.columns]
-        small[np.arange(size), np.arange(size)] += 1
-        if border:
-            by_slope, by_row = compliance @ border.slope, compliance @ border.row
-            small[:m, size], small[size, :m] = law @ by_slope, -by_row[rows]
-            if flow:
-                small[m:size, size] = flow.pressure @ by_slope[flow.columns]
-                small[size, m:size] = border.row @ by_pressure
-            small[size, size] = border.rate - border.row @ by_slope
-            small_right[size] = border.gap - border.row @ start
-        solution = lu_solve(small, small_right)
-        force = np.zeros(len(right))
-        force[rows] = solution[:m]
-        x = start - compliance @ force
-        if flow:
-            x += by_pressure @ solution[m:size]
-        if border is None:
-            return x, 0.0
-        s = solution[size]
-        x -= s * by_slope
-        return x, s
-
-
-#: Number of unknowns from which on single precision pays.
-SINGLE_PRECISION = 300
-
-
-def lu_solve(matrix: Array, right: Array) -> Array:
-    """Solve a linear system by LU; the matrix may be overwritten.
-
-    A large matrix is factorised in single precision, twice as fast, and the solution refined; in
-    double precision if the refinement does not converge. Raises LinAlgError if it is singular.
-    """
-    if not right.any():
-        return np.zeros_like(right)
-    if len(right) > SINGLE_PRECISION:
-        factors, pivots, info = linalg.lapack.sgetrf(matrix.T.astype(np.float32), overwrite_a=True)
-        solution: Array = np.zeros_like(right)
-        residual, size = right, norm(right)
-        for _ in range(0 if info else 8):
-            correction = linalg.lapack.sgetrs(factors, pivots, residual / size, trans=1)[0]
-            solution = solution + size * correction
-            residual, before = right - matrix @ solution, size
-            size = norm(residual)
-            if size <= 1e-12 * norm(right):
-                return solution
-            if not size < 0.1 * before:
-                break
-    factors, pivots, info = linalg.lapack.dgetrf(matrix.T, overwrite_a=True)
-    if info:
-        raise linalg.LinAlgError("singular matrix")
-    return np.asarray(linalg.lapack.dgetrs(factors, pivots, right, trans=1)[0])
+        lift = self.flow.lift if change.flow else None
+        return self.undamaged(undamaged).solve(change, right, border, lift)

@@ -93,19 +93,19 @@ class WetFace:
         """Add the forces on an element below the waterline, a straight line on a plane element."""
         shape, functions = self.elements[element]
         corners = elements.corners_of(shape)
-        place = self.surface.points[functions[: len(corners)]]
+        nodes = self.surface.points[functions[: len(corners)]]
         normal = self.surface.normals[element, : self.dim]
         of_functions = forces.reshape(-1, self.dim)
         simplex, points = ("line", 4) if len(corners) == 2 else ("triangle", 6)
-        for part in below(corners, place[:, 1] - level):
+        for part in below(corners, nodes[:, 1] - level):
             for x, weight in zip(*elements.rule(simplex, points), strict=True):
                 u = elements.nodal(simplex, x)[0] @ part
                 n, dn = elements.nodal(shape, u)
-                jacobian = dn.T @ place
+                jacobian = dn.T @ nodes
                 area = measure(part) * weight * np.sqrt(np.linalg.det(jacobian @ jacobian.T))
-                here = area * height(level, n @ place[:, 1], abs(normal[0]))
+                force = area * height(level, n @ nodes[:, 1], abs(normal[0]))
                 values = elements.basis(shape, self.space.order, u)[0]
-                of_functions[functions] -= here * np.outer(values, normal)
+                of_functions[functions] -= force * np.outer(values, normal)
 
 
 #: m0 m2 - m1^2 over m1^2 from which force and lever can be distinguished; and part of the face's

@@ -136,7 +136,7 @@ class Record:
         element means.
         """
         joint, law, interface = self.joint, self.joint.law, self.joint.interface
-        place, corners = interface.space.place, len(interface.surface.points)
+        place, corners = interface.space.locations, len(interface.surface.points)
         pressure = state.pressure
         jump = interface.jumps(interface.at_nodes, state.jump)
         traction, _ = law.respond(jump, state.nodes)
@@ -181,7 +181,7 @@ class Record:
         values (e, m).
         """
         space = self.joint.interface.space
-        number = len(space.place) if middles else len(space.body.points)
+        number = len(space.locations) if middles else len(space.body.points)
         total, count, start = np.zeros((number, values.shape[1])), np.zeros(number), 0
         for (_, whole), (_, cells) in zip(space.connectivity, space.body.cells, strict=True):
             table = whole if middles else cells

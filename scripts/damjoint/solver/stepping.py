@@ -11,7 +11,8 @@ import numpy as np
 
 from .. import RunError
 from ..joint.equilibrium import Joint
-from ..joint.interface import Border, Interface
+from ..joint.interface import Interface
+from ..joint.linear_system import Border
 from ..model.case import Case
 from ..model.loads import STAGED, Loading
 from .history import Record, State

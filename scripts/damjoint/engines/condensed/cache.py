@@ -80,8 +80,8 @@ def cached(case: Case) -> tuple[Condensed, Bodies | None]:
     Raises RunError (mesh, memory).
     """
     header = json.dumps([__version__, sources(), key_of(case)])
-    place = folder()
-    path = place and place / (hashlib.sha256(header.encode()).hexdigest()[:24] + ".npz")
+    parent = folder()
+    path = parent and parent / (hashlib.sha256(header.encode()).hexdigest()[:24] + ".npz")
     stored = read(path, header) if path else None
     if stored:
         return stored, None
@@ -196,9 +196,9 @@ def unpack(tree: Any, arrays: Mapping[str, Array]) -> Any:
     return {key: unpack(item, arrays) for key, item in tree["dict"].items()}
 
 
-def prune(place: Path) -> None:
+def prune(parent: Path) -> None:
     """Delete the files longest unused until the cache is not above its limit."""
-    files = sorted(place.glob("*.npz"), key=lambda f: f.stat().st_mtime)
+    files = sorted(parent.glob("*.npz"), key=lambda f: f.stat().st_mtime)
     total = sum(f.stat().st_size for f in files)
     for file in files:
         if total <= LIMIT:
