@@ -12,9 +12,10 @@ from ...arrays import Array, IntArray, Sparse
 from ...fem.bodies import Bodies, ElasticBody, material_of
 from ...fem.elasticity import stress
 from ...fem.factor import solve_symmetric
-from ...joint.equilibrium import Joint
+from ...joint.equilibrium import Equilibrium
 from ...model.fields import Field
-from ...solver.history import Record, State
+from ...solver.history import History
+from ...solver.state import State
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,16 +59,19 @@ class GluedBodies:
         return solution
 
 
-def add_external_forces(load: Array, body: ElasticBody, joint: Joint, state: State) -> None:
+def add_external_forces(
+    load: Array, body: ElasticBody, equilibrium: Equilibrium, state: State
+) -> None:
     """Add water, weight and line forces of a state to the load vector (n,) of a body."""
     for name, dofs in body.face_dofs.items():
-        np.add.at(load, dofs, joint.face_forces(joint.interface.faces[name], state.loading))
-    for name, size in joint.units_of(state.loading).items():
+        face = equilibrium.interface.faces[name]
+        np.add.at(load, dofs, equilibrium.face_forces(face, state.loading))
+    for name, size in equilibrium.units_of(state.loading).items():
         if name in body.unit_loads:
             load += size * body.unit_loads[name]
 
 
-def recover(bodies: Bodies, scenes: list[tuple[Joint, Record]]) -> list[dict[float, Field]]:
+def recover(bodies: Bodies, scenes: list[tuple[Equilibrium, History]]) -> list[dict[float, Field]]:
     """Fields of the saved states of scenes on the same bodies, by scene and time. Displacements
     count from the state under the weight alone, if there is one.
 
@@ -75,11 +79,11 @@ def recover(bodies: Bodies, scenes: list[tuple[Joint, Record]]) -> list[dict[flo
     one, -K_u jump; the water in the joint acts on both joint faces and cancels.
     """
     states = [
-        (joint, state)
-        for joint, record in scenes
-        for state in (*record.saved, *filter(None, [record.at_rest]))
+        (equilibrium, state)
+        for equilibrium, history in scenes
+        for state in (*history.saved, *filter(None, [history.at_rest]))
     ]
-    if not any(record.saved for _, record in scenes):
+    if not any(history.saved for _, history in scenes):
         return [{} for _ in scenes]
     ((above, below),) = ((joint.upper, joint.lower) for joint in bodies.mesh.joints.values())
     upper, lower = bodies.by_name[above], bodies.by_name[below]
@@ -87,11 +91,11 @@ def recover(bodies: Bodies, scenes: list[tuple[Joint, Record]]) -> list[dict[flo
     glued = GluedBodies.of(upper, lower)
     jumps = np.zeros((len(states), upper.stiffness.shape[0]))
     loads = np.zeros((glued.stiffness.shape[0], len(states)))
-    for i, (joint, state) in enumerate(states):
-        jumps[i, upper.joint_dofs[joint.interface.joint.free]] = state.jump
+    for i, (equilibrium, state) in enumerate(states):
+        jumps[i, upper.joint_dofs[equilibrium.interface.joint.free]] = state.jump
         on_upper, on_lower = -upper.stiffness @ jumps[i], np.zeros(lower_size)
-        add_external_forces(on_upper, upper, joint, state)
-        add_external_forces(on_lower, lower, joint, state)
+        add_external_forces(on_upper, upper, equilibrium, state)
+        add_external_forces(on_lower, lower, equilibrium, state)
         loads[:, i] = glued.from_upper.T @ on_upper
         loads[:lower_size, i] += on_lower
     solution = glued.solve(loads)
@@ -105,17 +109,17 @@ def recover(bodies: Bodies, scenes: list[tuple[Joint, Record]]) -> list[dict[flo
         stresses[name] = stress(space, u, material)
         at_nodes[name] = np.pad(u[:, : len(space.body.points)], ((0, 0), (0, 0), (0, 3 - dim)))
 
-    def fields_of(first: int, record: Record) -> Iterator[tuple[float, Field]]:
-        """Times and fields of a record whose states start at a number."""
-        rest = first + len(record.saved)
-        start = {n: u[rest] if record.at_rest else 0 * u[0] for n, u in at_nodes.items()}
-        for i, state in enumerate(record.saved, first):
+    def fields_of(first: int, history: History) -> Iterator[tuple[float, Field]]:
+        """Times and fields of a scene whose states start at a number."""
+        rest = first + len(history.saved)
+        start = {n: u[rest] if history.at_rest else 0 * u[0] for n, u in at_nodes.items()}
+        for i, state in enumerate(history.saved, first):
             moved = {name: u[i] - start[name] for name, u in at_nodes.items()}
             yield state.time, Field(moved, {name: s[i] for name, s in stresses.items()})
 
-    counts = [len(record.saved) + (record.at_rest is not None) for _, record in scenes]
+    counts = [len(history.saved) + (history.at_rest is not None) for _, history in scenes]
     firsts = np.cumsum([0, *counts[:-1]])
     return [
-        dict(fields_of(int(first), record))
-        for first, (_, record) in zip(firsts, scenes, strict=True)
+        dict(fields_of(int(first), history))
+        for first, (_, history) in zip(firsts, scenes, strict=True)
     ]
