@@ -76,29 +76,31 @@ class Condensed:
 
 @dataclass(frozen=True, kw_only=True)
 class ReducedBody:
-    """A body reduced to n degrees of freedom of a joint, with its responses to unit forces on l
-    other loaded ones and to k unit loads. The loaded ones move by
-    loaded_stiffness^-1 (forces - coupling^T u).
+    """A body reduced to n degrees of freedom of a joint, with its responses to k unit loads and to
+    unit forces on m degrees of freedom: l away from the joint, then those on the joint. The former
+    move by loaded_stiffness^-1 (forces - coupling^T u).
     """
 
-    joint: IntArray
-    loaded: IntArray
+    #: degrees of freedom on which unit forces act (m,)
+    dofs: IntArray
+    #: (n, n)
     stiffness: Array
-    #: forces on the joint: of unit forces (n, l), of unit loads (n, k)
-    spread: Array
+    #: forces on the joint: of unit forces (n, m), of unit loads (n, k)
+    forces: Array
     units: Array
     #: (n, l), (l, l)
     coupling: Array
     loaded_stiffness: Array
-    #: unit loads on the loaded degrees of freedom (l, k)
+    #: unit loads on the degrees of freedom away from the joint (l, k)
     loaded_units: Array
 
     @staticmethod
-    def of(body: ElasticBody, joint: IntArray, wanted: IntArray) -> ReducedBody:
-        """Schur complement of a body on degrees of freedom of a joint; wanted: where unit forces
-        act, those of the joint and fixed ones included.
+    def of(body: ElasticBody, joint: IntArray, loaded: IntArray) -> ReducedBody:
+        """Schur complement of a body on degrees of freedom of a joint and loaded ones, of which
+        those that are fixed are left out.
         """
-        loaded = np.setdiff1d(wanted, np.concatenate([joint, body.fixed_dofs]))
+        shared = np.flatnonzero(np.isin(joint, loaded))
+        loaded = np.setdiff1d(loaded, np.concatenate([joint, body.fixed_dofs]))
         stiffness, loads = body.stiffness, np.column_stack(list(body.unit_loads.values()))
         size = stiffness.shape[0]
         free = np.setdiff1d(np.arange(size), body.fixed_dofs)
@@ -115,10 +117,9 @@ class ReducedBody:
             jj, spread = (jj + jj.T) / 2, -to_joint
             units = units - to_joint @ loaded_units
         return ReducedBody(
-            joint=joint,
-            loaded=loaded,
+            dofs=np.concatenate([loaded, joint[shared]]),
             stiffness=jj,
-            spread=spread,
+            forces=np.hstack([spread, np.eye(n)[:, shared]]),
             units=units,
             coupling=jl,
             loaded_stiffness=ll,
@@ -138,6 +139,23 @@ def loaded_dofs(bodies: Bodies, body: ElasticBody) -> IntArray:
     return np.concatenate(dofs)
 
 
+class FaceElimination:
+    """Displacements of both joint faces eliminated."""
+
+    def __init__(self, upper: Array, lower: Array) -> None:
+        """upper, lower: S_u and S_l (j, j)."""
+        #: L of M = L L^T, and L^-1 S_u
+        self.factor = linalg.cholesky(lower + upper, lower=True, overwrite_a=True)
+        self.half = linalg.solve_triangular(self.factor, upper, lower=True)
+        #: S
+        self.stiffness = upper - self.half.T @ self.half
+
+    def transmitted(self, forces: Array, on_upper: bool) -> Array:
+        """t_0 of forces (j, k) on the upper or the lower joint face."""
+        through = self.half.T @ linalg.solve_triangular(self.factor, forces, lower=True)
+        return (forces if on_upper else 0) - through
+
+
 def condense(case: Case, bodies: Bodies) -> Condensed:
     """Eliminate the bodies of a case."""
     start, mesh = time.perf_counter(), bodies.mesh
@@ -145,30 +163,21 @@ def condense(case: Case, bodies: Bodies) -> Condensed:
     upper = bodies.by_name[joint.upper]
     is_free = ~np.isin(upper.joint_dofs, upper.fixed_dofs)
     crest = upper.space.find(Space(mesh.bodies["crest"], 1))[:1] * mesh.dim
-    wanted = {name: loaded_dofs(bodies, body) for name, body in bodies.by_name.items()}
-    wanted[joint.upper] = np.append(wanted[joint.upper], crest)
+    loaded = {name: loaded_dofs(bodies, body) for name, body in bodies.by_name.items()}
+    loaded[joint.upper] = np.append(loaded[joint.upper], crest)
     reduced = {
-        name: ReducedBody.of(body, body.joint_dofs[is_free], wanted[name])
+        name: ReducedBody.of(body, body.joint_dofs[is_free], loaded[name])
         for name, body in bodies.by_name.items()
     }
-
     above = reduced[joint.upper]
-    # M = L L^T
-    both = linalg.cholesky(
-        reduced[joint.lower].stiffness + above.stiffness, lower=True, overwrite_a=True
-    )
-    half = linalg.solve_triangular(both, above.stiffness, lower=True)  # L^-1 S_u
+    faces = FaceElimination(above.stiffness, reduced[joint.lower].stiffness)
 
-    def transmitted(forces: Array, on_upper: bool) -> Array:
-        """t_0 of forces (j, k) on one of the joint faces."""
-        through = half.T @ linalg.solve_triangular(both, forces, lower=True)
-        return (forces if on_upper else 0) - through
-
-    # The crest: row (forces on the loaded degrees of freedom - coupling^T u_u), with
-    # u_u = delta + M^-1 (f_u + f_l - S_u delta)
-    row = linalg.solve(above.loaded_stiffness, 1.0 * (above.loaded == crest[0]), assume_a="pos")
+    # The crest: row (forces - coupling^T u_u), with u_u = delta + M^-1 (f_u + f_l - S_u delta)
+    size = len(above.loaded_stiffness)
+    at_crest = 1.0 * (above.dofs[:size] == crest[0])
+    row = linalg.solve(above.loaded_stiffness, at_crest, assume_a="pos")
     crest_face = -(above.coupling @ row)
-    crest_both = linalg.cho_solve((both, True), crest_face)
+    crest_both = linalg.cho_solve((faces.factor, True), crest_face)
 
     pressure: list[Array] = []
     crest_pressure: list[Array] = []
@@ -178,17 +187,14 @@ def condense(case: Case, bodies: Bodies) -> Condensed:
     count = 0
     for name, body in bodies.by_name.items():
         own, on_upper = reduced[name], name == joint.upper
-        # unit forces: on the loaded degrees of freedom, then on those shared by joint and faces
-        shared = np.flatnonzero(np.isin(own.joint, wanted[name]))
-        forces = np.hstack([own.spread, np.eye(len(own.joint))[:, shared]])
-        pressure.append(transmitted(forces, on_upper))
-        direct = np.concatenate([row, np.zeros(len(shared))]) if on_upper else 0
-        crest_pressure.append(direct + crest_both @ forces)
+        pressure.append(faces.transmitted(own.forces, on_upper))
+        direct = np.pad(row, (0, len(own.dofs) - size)) if on_upper else 0
+        crest_pressure.append(direct + crest_both @ own.forces)
         column = np.full(body.stiffness.shape[0], -1)
-        column[np.concatenate([own.loaded, own.joint[shared]])] = count + np.arange(forces.shape[1])
-        count += forces.shape[1]
+        column[own.dofs] = count + np.arange(len(own.dofs))
+        count += len(own.dofs)
         dof_of_face |= {n: column[dofs] for n, dofs in body.face_dofs.items()}
-        by_load = transmitted(own.units, on_upper)
+        by_load = faces.transmitted(own.units, on_upper)
         moved = (row @ own.loaded_units if on_upper else 0) + crest_both @ own.units
         units |= {n: by_load[:, i] for i, n in enumerate(body.unit_loads)}
         crest_units |= {n: float(moved[i]) for i, n in enumerate(body.unit_loads)}
@@ -200,8 +206,8 @@ def condense(case: Case, bodies: Bodies) -> Condensed:
         counts=mesh.counts,
         unknowns=sum(b.stiffness.shape[0] - len(b.fixed_dofs) for b in bodies.by_name.values()),
         joints={joint_name: CondensedJoint(mesh=joint, free=np.flatnonzero(is_free))},
-        faces={name: mesh.faces[name] for name in mesh.faces if name in dof_of_face},
-        stiffness=above.stiffness - half.T @ half,
+        faces={name: face for name, face in mesh.faces.items() if name in dof_of_face},
+        stiffness=faces.stiffness,
         units=units,
         pressure=np.hstack(pressure),
         dof_of_face=dof_of_face,

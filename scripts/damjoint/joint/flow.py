@@ -276,8 +276,7 @@ class Flow:
             return -system.inverse(coupling[:, columns].toarray())
 
         parts = (system.share * of(system) for system in solution.systems)
-        total = sum(parts, np.zeros((len(self.inside), len(columns))))
-        return FlowDerivative(pressure=total, columns=columns)
+        return FlowDerivative(pressure=np.asarray(sum(parts)), columns=columns)
 
     def flux(
         self, conductivity: Array, total: Array, width: float, drains: IntArray = NO_NODES
