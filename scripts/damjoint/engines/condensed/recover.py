@@ -85,8 +85,8 @@ def recover(bodies: Bodies, scenes: list[tuple[Equilibrium, History]]) -> list[d
     ]
     if not any(history.saved for _, history in scenes):
         return [{} for _ in scenes]
-    ((above, below),) = ((joint.upper, joint.lower) for joint in bodies.mesh.joints.values())
-    upper, lower = bodies.by_name[above], bodies.by_name[below]
+    (joint,) = bodies.mesh.joints.values()
+    upper, lower = bodies.by_name[joint.upper], bodies.by_name[joint.lower]
     lower_size = lower.stiffness.shape[0]
     glued = GluedBodies.of(upper, lower)
     jumps = np.zeros((len(states), upper.stiffness.shape[0]))
@@ -100,7 +100,10 @@ def recover(bodies: Bodies, scenes: list[tuple[Equilibrium, History]]) -> list[d
         loads[:lower_size, i] += on_lower
     solution = glued.solve(loads)
 
-    displacements = {above: solution[glued.number].T + jumps, below: solution[:lower_size].T}
+    displacements = {
+        joint.upper: solution[glued.number].T + jumps,
+        joint.lower: solution[:lower_size].T,
+    }
     at_nodes, stresses = {}, {}
     material, dim = material_of(states[0][0].case), bodies.mesh.dim
     for name, values in displacements.items():
