@@ -15,8 +15,8 @@ import gmsh
 import numpy as np
 
 from .. import InputError
-from ..model.case import ACCURACIES, Case, numbers
-from ..model.parameters import AUTOMATIC, Parameter
+from ..model.case import ACCURACIES, Case
+from ..model.parameters import AUTOMATIC, Parameter, levels_of
 from ..statics.verdict import verdict
 from .sheet import Request, Sheet
 from .worker import Scene
@@ -247,7 +247,7 @@ class Tree:
         """A list of levels: what was asked before, unless the numbers have changed."""
         now = get_text(name).replace(";", ",")
         try:
-            same = numbers(name, now) == numbers(name, self.shown[name])
+            same = levels_of(name, now) == levels_of(name, self.shown[name])
         except InputError:  # said when the case is read
             same = False
         return before if same else now
