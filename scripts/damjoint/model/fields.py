@@ -16,7 +16,7 @@ BODIES = tuple(SOLIDS)
 
 @dataclass
 class Field:
-    """The bodies at one time, by name: displacement (nodes, 3) [m]; stress (elements, 6) [Pa] at the
+    """The bodies at one time: displacement (nodes, 3) [m], stress (elements, 6) [Pa] at the
     middle of each element: xx, yy, zz, xy, yz, xz.
     """
 
