@@ -8,10 +8,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Literal, TypeAlias, overload
+from typing import Any, Literal, TypeAlias, overload
 
 from .. import RUN_GEO, InputError, data
 from ..arrays import Value, Values
+from ..laws import LAWS, Law
 from . import casefile
 from .constraints import (
     check_also_uplift,
@@ -153,6 +154,12 @@ class Case:
     def checks(self) -> Section:
         """Safety factors and strength that are required."""
         return Section(self.group("Checks"))
+
+    @cached_property
+    def law(self) -> Law[Any]:
+        """The joint's law with its parameters."""
+        solver = {name: self.shared[name][0] for name in ("artificial", "sudden")}
+        return LAWS[self["law"]](self.values | solver)
 
     @property
     def joint_length(self) -> float:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from .. import InputError
 from ..arrays import Values
+from ..laws import LAWS
 from .parameters import constants, declared
 from .uplift import flows, has_drains
 
@@ -39,21 +40,8 @@ def check_energies(case: Case) -> None:
     """Fracture energies: larger than what the joint stores before it softens, else a point would
     snap back.
     """
-    joint, law = case.joint, case.scene.law
-    elastic = {
-        "G_f": (
-            law != "friction",
-            joint.sigma_max * joint.sigma_max / (2 * joint.K_N),
-            "sigma_max^2/(2 K_N)",
-        ),
-        "G_t": (
-            law == "bond",
-            joint.adhesion * joint.adhesion / (2 * joint.K_T),
-            "adhesion^2/(2 K_T)",
-        ),
-    }
-    for name, (matters, least, formula) in elastic.items():
-        if matters and not case[name] > least:
+    for name, (least, formula) in LAWS[case["law"]].least_energies(case.values).items():
+        if not case[name] > least:
             raise InputError(
                 f"{name} = {case[name]:g}: must be > {least:.4g} N/m ({formula}, what the joint "
                 "stores before it softens)"
@@ -124,12 +112,14 @@ def check_drains(case: Case) -> None:
 
 def check_works(case: Case) -> None:
     """Grouting and sawing: of laws and uplifts that include them."""
-    included = case["law"] == "rupture" and not flows(case)
+    included = LAWS[case["law"]].has_works and not flows(case)
     for name in ("grout_pressure", "saw_thickness"):
         if case[name] > 0 and not included:
+            laws = " or ".join(name for name, law in LAWS.items() if law.has_works)
             raise InputError(
                 f"{name} = {case[name]:g}: must be 0 with law = {case['law']}, uplift = "
-                f"{case['uplift']} (known to law = rupture, and to none, imposed and drained)"
+                f"{case['uplift']} (only law = {laws} includes it, with uplift = none, imposed "
+                "or drained)"
             )
 
 

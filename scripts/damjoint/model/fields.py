@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Array, IntArray, Table
+from ..laws import COLUMNS
 from .mesh import Body
-from .results import FLUX, HARDENING, Results
+from .results import FLUX, Results
 from .scene import SOLIDS
 
 BODIES = tuple(SOLIDS)
@@ -41,7 +42,7 @@ OF_JOINT = {
     "p": ("Pa", ("p",)),
     "damage": ("-", ("damage",)),
     "slip": ("m", ("slip",)),
-    **{name: (unit, (name,)) for name, (unit, _) in (HARDENING | FLUX).items()},
+    **{name: (unit, (name,)) for name, (unit, _) in (COLUMNS | FLUX).items()},
 }
 
 
