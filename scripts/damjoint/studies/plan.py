@@ -55,7 +55,7 @@ class Sample:
     """Distributions by name, as texts; number of values, design and seed of the sample."""
 
     number: int
-    laws: dict[str, str]
+    distributions: dict[str, str]
     design: str = "latin"
     seed: int = 0
     #: rank correlations, 'A,B=R' each
@@ -68,14 +68,16 @@ class Sample:
         """
         from . import sampling
 
-        drawn = sampling.draw(self.number, self.laws, self.design, self.seed, self.correlate)
+        drawn = sampling.draw(
+            self.number, self.distributions, self.design, self.seed, self.correlate
+        )
         values = {}
         for name, numbers in drawn.items():
             try:
                 values[name] = [checked(name, rounded(number)) for number in numbers]
             except InputError as error:
                 raise InputError(
-                    f"--sample {name}={self.laws[name]}: draws {error}; truncnorm, uniform or "
+                    f"--sample {name}={self.distributions[name]}: draws {error}; truncnorm, uniform or "
                     "lognorm keep within bounds"
                 ) from None
         return values
@@ -145,22 +147,22 @@ def sample_of(
 
     Raises InputError.
     """
-    number, *laws = words
+    number, *texts = words
     bad = InputError(
         f"--sample {' '.join(words)}: must be N NAME=DISTRIBUTION ..., such as "
         "1000 mu=normal(1.0,0.15)"
     )
-    if not number.isdecimal() or not 1 <= int(number) <= MOST_ROWS or not laws:
+    if not number.isdecimal() or not 1 <= int(number) <= MOST_ROWS or not texts:
         raise bad
-    by_name: dict[str, str] = {}
-    for text in laws:
-        name, equals, law = (part.strip() for part in text.partition("="))
-        if not equals or not law:
+    distributions: dict[str, str] = {}
+    for text in texts:
+        name, equals, distribution = (part.strip() for part in text.partition("="))
+        if not equals or not distribution:
             raise bad
-        if name in by_name:
+        if name in distributions:
             raise InputError(f"--sample {name}: must be given once")
-        by_name[name] = law
-    return Sample(int(number), by_name, design, seed, list(correlate))
+        distributions[name] = distribution
+    return Sample(int(number), distributions, design, seed, list(correlate))
 
 
 @dataclass(frozen=True)
@@ -248,8 +250,8 @@ def plan_of(
         if not expression:
             raise InputError(f"--tie {text}: must be NAME=EXPRESSION, such as adhesion=2e5*mu")
         ties.append((name, expression))
-    laws = [*sample.laws] if sample else []
-    names = [("--vary", n) for n, _ in axes] + [("--sample", n) for n in laws]
+    sampled = [*sample.distributions] if sample else []
+    names = [("--vary", n) for n, _ in axes] + [("--sample", n) for n in sampled]
     names += [("--tie", n) for n, _ in ties]
     for place, (option, name) in enumerate(names):
         if name in settings or any(name == other for _, other in names[:place]):
