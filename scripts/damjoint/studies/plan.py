@@ -77,8 +77,8 @@ class Sample:
                 values[name] = [checked(name, rounded(number)) for number in numbers]
             except InputError as error:
                 raise InputError(
-                    f"--sample {name}={self.distributions[name]}: draws {error}; truncnorm, uniform or "
-                    "lognorm keep within bounds"
+                    f"--sample {name}={self.distributions[name]}: draws {error}; truncnorm, "
+                    "uniform or lognorm keep within bounds"
                 ) from None
         return values
 
