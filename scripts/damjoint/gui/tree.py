@@ -15,8 +15,8 @@ import gmsh
 import numpy as np
 
 from .. import InputError
-from ..model.case import ACCURACIES, Case, numbers
-from ..model.parameters import AUTOMATIC, Parameter
+from ..model.case import ACCURACIES, Case
+from ..model.parameters import AUTOMATIC, Parameter, levels_of
 from ..statics.verdict import verdict
 from .sheet import Request, Sheet
 from .worker import Scene
@@ -196,7 +196,7 @@ class Tree:
         parameter = next(p for p in self.known.values() if p.label == told["name"])
         entry = {k: told[k] for k in ("type", "name", "values", "visible", "choices") if k in told}
         allowed = f"{parameter.name}: {parameter.allowed()}"
-        note = told.get("help", "") if not parameter.follows else ""
+        note = told.get("help", "") if not parameter.automatic else ""
         entry["help"] = f"{allowed}. {note}" if note else allowed
         entry["label"] = parameter.meaning
         if parameter.text:
@@ -206,10 +206,11 @@ class Tree:
             labels = told.get("valueLabels") or {f"{choice:g}": choice for choice in choices}
             entry["valueLabels"] = labels
         entry |= {"min": told["min"], "max": told["max"], "attributes": {"ReadOnlyRange": "1"}}
-        if parameter.follows and told["values"][0] == AUTOMATIC:
-            leader = parameter.follows.split(",")[0]
+        if parameter.automatic and told["values"][0] == AUTOMATIC:
             value = self.sheet.case[parameter.name]
-            entry["label"] = f"{parameter.name} = {value:.6g} ({leader}): {parameter.meaning}"
+            entry["label"] = (
+                f"{parameter.name} = {value:.6g} ({parameter.help}): {parameter.meaning}"
+            )
         return entry
 
     def asked(self) -> Request:
@@ -246,7 +247,7 @@ class Tree:
         """A list of levels: what was asked before, unless the numbers have changed."""
         now = get_text(name).replace(";", ",")
         try:
-            same = numbers(name, now) == numbers(name, self.shown[name])
+            same = levels_of(name, now) == levels_of(name, self.shown[name])
         except InputError:  # said when the case is read
             same = False
         return before if same else now

@@ -92,9 +92,9 @@ def case_of(told: dict) -> Case:
             raise InputError(f"{name} = {','.join(map(str, numbers))}: must be finite")
     found = parse(resolved(values, lists["levels"]))
     return Case(
-        told["case"],
-        str(told["title"]).encode(errors="replace").decode(),
-        values,
+        name=told["case"],
+        title=str(told["title"]).encode(errors="replace").decode(),
+        values=values,
         **lists,
         published=bool(told["published"]),
         hardening_asked=bool(told["hardening_asked"]),
