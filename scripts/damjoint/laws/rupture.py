@@ -33,7 +33,7 @@ class Rupture(Law):
         self.L_CT = (
             np.inf
             if case["alpha"] >= 2
-            else max(self.L_C * np.tan(case["alpha"] * np.pi / 4), case.shared["sudden"][0])
+            else max(self.L_C * np.tan(case["alpha"] * np.pi / 4), case.shared["release_length"][0])
         )
         self.grout, self.grout_t = case["grout_pressure"] / self.contact, case["grout_t"]
         self.saw, self.saw_t = case["saw_thickness"], case["saw_t"]

@@ -33,15 +33,15 @@ MOST_LEVELS = 10_000
 
 #: Values of pro/parameters.pro that the engines share and nobody sets.
 SHARED = (
-    "attempt_growth",
-    "attempt_secant",
-    "attempt_release",
-    "attempt_iterations",
+    "strategy_growth",
+    "strategy_secant",
+    "strategy_release",
+    "strategy_iterations",
     "cut",
     "round_off",
     "coarsest",
     "artificial",
-    "sudden",
+    "release_length",
     "crack_aperture",
     "crack_most",
 )

@@ -81,7 +81,7 @@ class Stepper:
         giving up.
         """
         parts = ("growth", "secant", "release", "iterations")
-        of_each = zip(*(self.case.shared[f"attempt_{n}"] for n in parts), strict=True)
+        of_each = zip(*(self.case.shared[f"strategy_{n}"] for n in parts), strict=True)
         halvings, most = int(self.case["max_halvings"]), 2 if self.joint.law.releases else 1
         return [
             Attempt(growth, int(secant), int(release), int(iterations), halvings)
