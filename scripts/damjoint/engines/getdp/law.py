@@ -1,4 +1,4 @@
-"""A joint law along a path of jumps, evaluated by the very functions of the problem definition."""
+"""A joint law along a path of jumps, by the functions of the problem definition."""
 
 from __future__ import annotations
 
@@ -13,15 +13,7 @@ from ...model.parameters import assignments, listing, parameter
 from ...storage import check_end
 from . import process
 
-#: What the scalar and the vector of a law's memory are called, in the output; the vector's normal
-#: component last, if it has one.
-MEMORY = {
-    "rupture": ("kappa", "released_1", "released_2", "thickness"),
-    "friction": ("lambda", "slip_1", "slip_2"),
-    "bond": ("D", "slip_1", "slip_2"),
-}
-
-#: GetDP wants a mesh: one line, in the region JOINT (3).
+#: GetDP needs a mesh: one line, in the region JOINT (3).
 ONE_LINE = """$MeshFormat
 2.2 0 8
 $EndMeshFormat
@@ -42,11 +34,10 @@ def evaluate(
 ) -> dict[str, np.ndarray]:
     """The law along a path.
 
-    law: rupture, friction or bond; jumps: (n, 3) delta_n, delta_t1, delta_t2 [m], the i-th row one
-    converged step to t = i, from the virgin state on; pressure: (n,) [Pa], 0 by default; settings:
-    {parameter: value}.
-    Returns columns sigma_n (total), tau_1, tau_2 [Pa] and the law's state. Raises InputError,
-    RunError.
+    law: its name; jumps: (n, 3) delta_n, delta_t1, delta_t2 [m], row i a converged step to t = i,
+    from the undamaged state; pressure: (n,) [Pa], 0 by default; settings: {parameter: value}.
+    Returns columns sigma_n (total), tau_1, tau_2 [Pa], damage, open, slid and the internal
+    variables. Raises InputError, RunError.
     """
     parameter("law").check(law)
     jumps = np.asarray(jumps, float).reshape(-1, 3)
@@ -70,10 +61,11 @@ def evaluate(
         process.execute(problem, ["-msh", str(folder / "one.msh"), "-solve", "Path"])
         try:
             check_end(folder / "law.txt", "\n")
-            table = np.loadtxt(folder / "law.txt", ndmin=2)
+            heading, *rows = (folder / "law.txt").read_text().splitlines()
+            table = np.loadtxt(rows, ndmin=2)
             if len(table) != len(jumps):
                 raise ValueError(f"{len(table)} of {len(jumps)} rows")
         except (OSError, ValueError) as damage:
             raise RunError(f"GetDP: its table can not be read: {damage}") from None
-    names = "sigma_n", "tau_1", "tau_2", "damage", "open", "slid", *MEMORY[law]
+    names = "sigma_n", "tau_1", "tau_2", "damage", "open", "slid", *heading.split()[1:]
     return dict(zip(names, table.T, strict=False))
