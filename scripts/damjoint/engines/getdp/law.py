@@ -62,10 +62,10 @@ def evaluate(
         try:
             check_end(folder / "law.txt", "\n")
             heading, *rows = (folder / "law.txt").read_text().splitlines()
+            _, names = heading.split(": ")
             table = np.loadtxt(rows, ndmin=2)
             if len(table) != len(jumps):
                 raise ValueError(f"{len(table)} of {len(jumps)} rows")
         except (OSError, ValueError) as damage:
             raise RunError(f"GetDP: its table can not be read: {damage}") from None
-    names = "sigma_n", "tau_1", "tau_2", "damage", "open", "slid", *heading.split()[1:]
-    return dict(zip(names, table.T, strict=False))
+    return dict(zip(names.split(), table.T, strict=False))
