@@ -1,6 +1,6 @@
 """Concrete gravity dams on a thin joint that opens, breaks, slides and lets water in.
 
-storage.py  files written whole or not at all, by one process at a time
+storage.py  atomic writes, locks on files and folders
 model/      what is asked and what comes out, as data: parameters, case, mesh, loads, results
 laws/       the joint laws, one file each
 fem/        finite elements of the bodies, condensed onto the joint

@@ -32,7 +32,7 @@ from damjoint.post.validation import read_at
 from damjoint.run import run
 from damjoint.solver.load_stepper import Filling
 from damjoint.statics.verdict import statement
-from damjoint.storage import whole
+from damjoint.storage import atomic_write
 from damjoint.studies.bodies import interface_of
 from damjoint.studies.sweep import filled, pool_of
 from threadpoolctl import threadpool_limits
@@ -126,7 +126,7 @@ class Kept:
                     key, value = json.loads(line)
                     self.known[json.dumps(key)] = value
         pairs = [[json.loads(key), value] for key, value in self.known.items()]
-        with whole(path) as part:
+        with atomic_write(path) as part:
             lines = [[short, self.provenance], *pairs]
             part.write_text("".join(json.dumps(one) + "\n" for one in lines))
 

@@ -28,7 +28,7 @@ from ..model.parameters import declared
 from ..model.results import Results
 from ..run import ended, keep
 from ..statics.verdict import failed, statement
-from ..storage import whole
+from ..storage import atomic_write
 from .sheet import Request, Sheet, case_text, fill, titles
 
 #: What a case file begins with that a save may replace.
@@ -168,7 +168,7 @@ def save(folder: str, last: tuple[Sheet, list[Outcome]] | None) -> None:
     if file.exists() and not file.read_bytes().startswith(SAVED.encode()):
         raise InputError(f"out = {folder}: has a {file.name} of its own: choose another folder")
     keep(sheet.case, outcomes, Path(folder))
-    with whole(file) as part:
+    with atomic_write(file) as part:
         part.write_text(SAVED + case_text(sheet, outcomes[0].result.case), encoding="utf-8")
 
 

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg  # not pyplot: it costs half of a 2D run
 from matplotlib.figure import Figure, FigureBase
 
-from ..storage import whole
+from ..storage import atomic_write
 
 matplotlib.rcdefaults()  # not what a matplotlibrc in the present folder says
 
@@ -28,7 +28,7 @@ def figure_of(width: float, height: float) -> Figure:
 
 def write_picture(figure: Figure, path: Path, dpi: int, **how: int) -> None:
     """Write a figure; how: what PIL takes."""
-    with whole(path) as part:
+    with atomic_write(path) as part:
         figure.savefig(part, dpi=dpi, format="png", pil_kwargs=how)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..model.fields import OF_JOINT, Solution, joint_data
 from ..model.parameters import constants, start_gmsh
-from ..storage import whole
+from ..storage import atomic_write
 
 
 def write_fields(solution: Solution, folder: Path) -> None:
@@ -43,15 +43,15 @@ def write_fields(solution: Solution, folder: Path) -> None:
             cell_data={"stress": np.split(stresses[time], cuts), "body": body},
         )
         names = f"bulk_t{time:g}.vtu", f"joint_t{time:g}.vtu"
-        with whole(folder / names[0]) as path:
+        with atomic_write(folder / names[0]) as path:
             bulk.write(path, compression=None)
         lips = meshio.Mesh(joint.points, joint.cells, point_data=joints[time])
-        with whole(folder / names[1]) as path:
+        with atomic_write(folder / names[1]) as path:
             lips.write(path, compression=None)
         entries += [(time, part, name) for part, name in enumerate(names)]
     lines = "".join(f'<DataSet timestep="{t!r}" part="{k}" file="{n}"/>\n' for t, k, n in entries)
     collection = f"<Collection>\n{lines}</Collection>"
-    with whole(folder / "fields.pvd") as path:
+    with atomic_write(folder / "fields.pvd") as path:
         path.write_text(f'<VTKFile type="Collection" version="0.1">\n{collection}\n</VTKFile>\n')
     # xx, xy, xz, yx, ...: what Gmsh calls a tensor
     tensor = [0, 3, 5, 3, 1, 4, 5, 4, 2]
@@ -59,13 +59,13 @@ def write_fields(solution: Solution, folder: Path) -> None:
         ("displacement [m]", "NodeData", moved),
         ("stress [Pa]", "ElementData", {t: s[:, tensor] for t, s in stresses.items()}),
     ]
-    with whole(folder / "bulk.msh") as path:
+    with atomic_write(folder / "bulk.msh") as path:
         write_views(path, points, cells, of_bulk)
     of_joint = [
         (f"{name} [{OF_JOINT[name][0]}]", "NodeData", {t: d[name] for t, d in joints.items()})
         for name in next(iter(joints.values()))
     ]
-    with whole(folder / "joint.msh") as path:
+    with atomic_write(folder / "joint.msh") as path:
         write_views(path, joint.points, joint.cells, of_joint)
 
 

@@ -18,7 +18,7 @@ from ..model.case import Case, is_name
 from ..model.parameters import declared
 from ..model.results import HISTORY, Results, joint_columns
 from ..statics.verdict import hints, statement, verdict
-from ..storage import PART, held, whole
+from ..storage import PART, atomic_write, locked_folder
 
 #: Names that a run writes, besides its pictures.
 TABLES = ("joint.csv", "history.csv", "curve.csv", "gravity.csv", "critical.csv", "run.json")
@@ -54,7 +54,7 @@ def taken(case: Case, folder: Path) -> Iterator[None]:
     """
     check_writable(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    with held(folder):
+    with locked_folder(folder):
         clear(folder)
         say(case, folder, "running")
         yield
@@ -151,5 +151,5 @@ def write_info(results: Results, folder: Path, state: str = "", why: str = "") -
 
 def write_json(folder: Path, told: dict) -> None:
     """Write run.json."""
-    with whole(folder / "run.json") as path:
+    with atomic_write(folder / "run.json") as path:
         path.write_text(json.dumps(told, indent=2) + "\n")

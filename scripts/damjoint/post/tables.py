@@ -9,7 +9,7 @@ from typing import TextIO
 import numpy as np
 
 from ..model.results import Results
-from ..storage import whole
+from ..storage import atomic_write
 
 
 def as_text(cell: str) -> str:
@@ -28,7 +28,7 @@ def write_csv(target: Path | TextIO, table: dict[str, np.ndarray | list]) -> Non
     texts so that no spreadsheet takes them for a formula.
     """
     if isinstance(target, Path):
-        with whole(target) as path, path.open("w", newline="") as file:
+        with atomic_write(target) as path, path.open("w", newline="") as file:
             write_csv(file, table)
         return
     writer = csv.writer(target, lineterminator="\n")

@@ -23,7 +23,7 @@ from ..post.drawing import figure_of
 from ..post.summary import levels_table, table
 from ..post.units import FORCES, MOMENTS
 from ..statics.verdict import failed, statement, stiffness_ratio
-from ..storage import whole
+from ..storage import atomic_write
 from .check import UNCHECKED, Check, compared, hand_calculation, picture_table
 
 #: Of the parts of a picture that are dots, not lines.
@@ -53,7 +53,7 @@ def write(folders: list[Path], to: Path) -> None:
         runs=parts, version=__version__, now=f"{datetime.now():%Y-%m-%d %H:%M}"
     )
     try:
-        with whole(to) as path:
+        with atomic_write(to) as path:
             path.write_text(page, encoding="utf-8")
     except OSError as error:
         raise InputError(f"to = {to}: {error}") from None
