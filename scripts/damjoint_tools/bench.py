@@ -450,7 +450,7 @@ def on_finest(case: Case, n: float) -> Case:
     """A case on a mesh of n elements along the joint, by the rule of --accuracy, each load step cut
     in four.
     """
-    found = on_request.finer(case, n / case["n_joint"])
+    found = on_request.refine_mesh(case, n / case["n_joint"])
     return replace(on_request.halve_steps(on_request.halve_steps(found)), accuracy=None)
 
 
@@ -459,8 +459,8 @@ def off(name: str, told: dict, result: Results, exact: Results) -> str:
     if name not in told:
         return ""
     one = told[name]
-    times = [t for t in on_request.reached(result) if t in on_request.reached(exact)]
-    pair = [np.array(on_request.read(r, sorted(times))[name]) for r in (result, exact)]
+    times = [t for t in on_request.reached_times(result) if t in on_request.reached_times(exact)]
+    pair = [np.array(on_request.quantities_at(r, sorted(times))[name]) for r in (result, exact)]
     scale = one["error"] / one["relative"] if one["relative"] else np.abs(pair[1]).max() or 1.0
     return f"{100 * one['relative']:.2g} / {100 * np.abs(pair[0] - pair[1]).max() / scale:.2g}"
 
