@@ -32,6 +32,9 @@ __version__ = "0.2.0"
 #: can.
 RUN_GEO = "DAMJOINT_RUN_GEO"
 
+#: Relative round-off: computed coordinates, times and values that differ by less are equal.
+ROUND_OFF = 1e-9
+
 
 class InputError(ValueError):
     """Bad input: one line that names the parameter, its value and what is allowed.

@@ -28,7 +28,7 @@ from damjoint.model.case import ACCURACIES, Case, load
 from damjoint.model.fields import along
 from damjoint.model.results import Results
 from damjoint.post import tables
-from damjoint.post.validation import read_at
+from damjoint.post.validation import reference_time
 from damjoint.run import run
 from damjoint.solver.load_stepper import Filling
 from damjoint.statics.verdict import statement
@@ -242,7 +242,7 @@ def read_off(result: Results) -> np.ndarray:
     prescribed displacement), means over z; the crack's tip where the opening interpolates to zero.
     """
     times = result.history["time"]
-    reached = np.flatnonzero(np.isclose(times, read_at(result.case)))
+    reached = np.flatnonzero(np.isclose(times, reference_time(result.case)))
     step = reached[0] if len(reached) else -1  # a mesh far too coarse may stop before
     mean = along(result.at(times[step]))
     x, opening = mean["x"], mean["delta_n"]

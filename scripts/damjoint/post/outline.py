@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .. import ROUND_OFF
 from ..model.fields import BODIES
 from ..model.mesh import Body
 
-#: Relative distances: of points of one plane (round-off of the mesh generator); of the points of a
-#: crest or of the outer edges of the ground, which a user's geometry may have slightly off.
-COINCIDENT, LEVEL = 1e-9, 1e-6
+#: Relative distance of points that count as level: a user's crest may be slightly off.
+LEVEL = 1e-6
 
 #: Corners of the faces of a cell, by its shape.
 FACES: dict[str, tuple[list[int], ...]] = {
@@ -112,7 +112,7 @@ class PlaneBody:
 def plane_body(body: Body, displacement: np.ndarray, scale: float) -> PlaneBody | None:
     """Cut a body at its lowest z; None if it has no face there."""
     points = body.points[:, :2]
-    low = body.points[:, 2].min() + COINCIDENT * np.ptp(points, axis=0).max()
+    low = body.points[:, 2].min() + ROUND_OFF * np.ptp(points, axis=0).max()
     region = np.repeat(body.regions, [len(table) for _, table in body.cells])
     faces: dict[str, list[np.ndarray]] = {}
     for table, owners in skin(body):

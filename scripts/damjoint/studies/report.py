@@ -24,7 +24,7 @@ from ..post.summary import levels_table, table
 from ..post.units import FORCES, MOMENTS
 from ..statics.verdict import failed, statement, stiffness_ratio
 from ..storage import atomic_write
-from .check import UNCHECKED, Check, compared, hand_calculation, picture_table
+from .check import UNCHECKED, SafetyCheck, compare_methods, hand_calculation, picture_table
 
 #: Of the parts of a picture that are dots, not lines.
 DPI = 160
@@ -76,10 +76,10 @@ def part_of(folder: Path, solution: Solution) -> dict:
     result = solution.result
     case, told = result.case, result.info
     # the gravity method knows sections by parameters only
-    found = None if case.geometry else compared(result)
+    found = None if case.geometry else compare_methods(result)
     fails = [statement(result)] if found is None and failed(result) else []
-    for answer in found.answers if found else ():
-        fails += [f"{answer.by}: {why}" for why in answer.fails]
+    for answer in found.results if found else ():
+        fails += [f"{answer.method}: {why}" for why in answer.failures]
     if told["state"] in ("failed", "interrupted"):
         fails.insert(0, told["statement"])
     made = datetime.fromtimestamp((folder / "run.json").stat().st_mtime)
@@ -164,7 +164,7 @@ def loads_table(result: Results) -> dict:
     return {"heads": ["load", *found["heads"]], "rows": named}
 
 
-def check_table(found: Check) -> dict:
+def check_table(found: SafetyCheck) -> dict:
     """The finite elements' answer beside the gravity method's, and what is required."""
     heads, *rows = picture_table(found)
     return {"heads": heads, "rows": rows}
