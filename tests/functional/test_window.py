@@ -107,7 +107,7 @@ def test_only_what_matters_shows_and_followers_say_what_they_follow(open_window)
     assert hand.entry("mu")["visible"] and not hand.entry("sigma_max")["visible"]
     hand.type("E", 2e10)
     entry = hand.entry("E_dam")
-    assert entry["values"] == [-1] and entry["label"].startswith("E_dam = 2e+10 (E): ")
+    assert entry["values"] == [-1] and entry["label"].startswith("E_dam = 2e+10 (-1: E): ")
     assert hand.session.tree.sheet.case["E_dam"] == 2e10
     hand.type("E_dam", 3e10)
     assert hand.session.tree.sheet.case["E_dam"] == 3e10

@@ -145,7 +145,7 @@ BODIES = ("dam", "foundation")
 
 def body_of(face: Face) -> str:
     """The body a face belongs to."""
-    return "dam" if face.upper else "foundation"
+    return face.body
 
 
 def within(surface: Body, body: Body) -> Body:

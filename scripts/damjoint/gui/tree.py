@@ -196,7 +196,7 @@ class Tree:
         parameter = next(p for p in self.known.values() if p.label == told["name"])
         entry = {k: told[k] for k in ("type", "name", "values", "visible", "choices") if k in told}
         allowed = f"{parameter.name}: {parameter.allowed()}"
-        note = told.get("help", "") if not parameter.follows else ""
+        note = told.get("help", "") if not parameter.automatic else ""
         entry["help"] = f"{allowed}. {note}" if note else allowed
         entry["label"] = parameter.meaning
         if parameter.text:
@@ -206,10 +206,11 @@ class Tree:
             labels = told.get("valueLabels") or {f"{choice:g}": choice for choice in choices}
             entry["valueLabels"] = labels
         entry |= {"min": told["min"], "max": told["max"], "attributes": {"ReadOnlyRange": "1"}}
-        if parameter.follows and told["values"][0] == AUTOMATIC:
-            leader = parameter.follows.split(",")[0]
+        if parameter.automatic and told["values"][0] == AUTOMATIC:
             value = self.sheet.case[parameter.name]
-            entry["label"] = f"{parameter.name} = {value:.6g} ({leader}): {parameter.meaning}"
+            entry["label"] = (
+                f"{parameter.name} = {value:.6g} ({parameter.help}): {parameter.meaning}"
+            )
         return entry
 
     def asked(self) -> Request:

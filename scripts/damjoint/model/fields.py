@@ -8,8 +8,9 @@ import numpy as np
 
 from .mesh import Body
 from .results import FLUX, HARDENING, Results
+from .scene import SOLIDS
 
-BODIES = ("dam", "foundation")
+BODIES = tuple(SOLIDS)
 
 
 @dataclass

@@ -31,8 +31,8 @@ def line(parameter: Parameter, value: str) -> str:
     """A statement with the parameter's meaning behind it; a comment unless it is a common one."""
     value = f'"{value}"' if parameter.text else value
     about = parameter.meaning + (f"; {parameter.matters}" if parameter.matters else "")
-    if parameter.follows:
-        about += f"; -1: {parameter.follows}"
+    if parameter.automatic:
+        about += f"; {parameter.help}"
     if parameter.choices:
         about += f"; {parameter.allowed()}"
     mark = "" if parameter.name in COMMON else "// "

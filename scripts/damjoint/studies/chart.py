@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import textwrap
 from collections.abc import Iterator
 from pathlib import Path
@@ -54,14 +53,23 @@ def is_number(text: str) -> bool:
     return True
 
 
+#: Names and units of what is varied besides parameters.
+QUANTITIES = {
+    "level": ("water level", "m"),
+    "strength": ("strength reduction", "-"),
+    "uplift": ("drain_effectiveness", "-"),
+}
+
+
+def quantity(name: str) -> tuple[str, str]:
+    """Name and unit of a varied or critical quantity."""
+    return QUANTITIES.get(name) or (name, parameters.parameter(name).unit)
+
+
 def label(name: str) -> str:
-    """What an axis says of a parameter: its name and unit."""
-    if name == "level":
-        return "water level [m]"
-    if name in ("strength", "uplift"):  # of critical values
-        return {"strength": "strength reduction", "uplift": "drain_effectiveness"}[name]
-    unit_of = re.search(r"\[.*\]|$", parameters.parameter(name).meaning)[0]
-    return f"{name} {unit_of}"
+    """The label of an axis: name and unit."""
+    words, size = quantity(name)
+    return f"{words} [{size}]" if size else words
 
 
 def fails(rows: list[Row]) -> np.ndarray:
@@ -82,8 +90,8 @@ def panels_of(figure: Figure, plan: Plan) -> Iterator[tuple[Axes, tuple[str, tup
     """
     drawn = DRAWN
     if plan.critical:
-        words, _, size = label(plan.critical).partition(" [")
-        drawn = {plan.critical_columns[0]: (f"critical {words}", ((size.rstrip("]") or "-", 1),))}
+        words, size = quantity(plan.critical)
+        drawn = {plan.critical_columns[0]: (f"critical {words}", ((size, 1),))}
     return zip(figure.subplots(1, len(drawn), squeeze=False)[0], drawn.items(), strict=True)
 
 

@@ -163,7 +163,7 @@ class Search:
         """The unit of what is varied, with a blank before it."""
         if self.of in ("level", "strength"):
             return " m" if self.of == "level" else ""
-        unit = parameter(self.name).meaning.rpartition("[")[2].rstrip("]")
+        unit = parameter(self.name).unit
         return "" if unit == "-" else f" {unit.replace(' per ', '/')}"
 
     # -- one value

@@ -120,20 +120,15 @@ def differences(case: Case) -> list[tuple[str, str, str, str, str]]:
     """
     known = declared()
     values = case.values
-    own = {n: v for n, v in values.items() if not known[n].follows}
+    own = {n: v for n, v in values.items() if not known[n].automatic}
     follow, plain = parse(stored.resolved(own, case.levels)), constants()
     seen = visible(case)
     rows = []
     for name, parameter in known.items():
-        usual = (follow if parameter.follows else plain)[name][0]
+        usual = (follow if parameter.automatic else plain)[name][0]
         if name in seen and not same(values[name], usual):
-            meaning, _, measure = parameter.meaning.rpartition(" [")
-            cells = (
-                meaning or measure,
-                said(values[name]),
-                measure.rstrip("]-") if meaning else "",
-            )
-            rows.append((name, *cells, said(usual)))
+            unit = parameter.unit.strip("-")
+            rows.append((name, parameter.description, said(values[name]), unit, said(usual)))
     return rows
 
 
