@@ -39,8 +39,8 @@ def draw(plan: Plan, rows: list[Row], title: str, path: Path) -> str:
         drawing = draw_curves if len(axes) == 1 else draw_maps
     if not fits:
         return (
-            f"no chart of {len(plan.varied)} varied parameters ({', '.join(plan.varied)}): needs one "
-            "or two with numbers as values, beside a sample at most one"
+            f"no chart of {len(plan.varied)} varied parameters ({', '.join(plan.varied)}): needs "
+            "one or two with numbers as values, beside a sample at most one"
         )
     figure = Figure(figsize=(10, 4.8), layout="constrained")
     FigureCanvasAgg(figure)
