@@ -327,7 +327,7 @@ def condense(case: Case, bodies: Bodies) -> Condensed:
     return Condensed(
         dim,
         int(case["order"]),
-        mesh.width,
+        mesh.joints["joint"].width,
         mesh.counts,
         total - sum(len(h) for h in bodies.held.values()),
         mesh.bodies["joint"],

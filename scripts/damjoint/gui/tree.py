@@ -16,8 +16,8 @@ import gmsh
 import numpy as np
 
 from .. import InputError
-from ..model.case import ACCURACIES, Case, numbers
-from ..model.parameters import AUTOMATIC, Parameter
+from ..model.case import ACCURACIES, Case
+from ..model.parameters import AUTOMATIC, Parameter, levels_of
 from ..statics.verdict import verdict
 from .sheet import Request, Sheet
 from .worker import Scene
@@ -256,7 +256,7 @@ class Tree:
         """Read a list of levels; the earlier text if the numbers have not changed."""
         now = get_text(name).replace(";", ",")
         try:
-            same = numbers(name, now) == numbers(name, self.shown[name])
+            same = levels_of(name, now) == levels_of(name, self.shown[name])
         except InputError:  # reported when the case is loaded
             same = False
         return before if same else now

@@ -9,7 +9,7 @@ import re
 import signal
 import tempfile
 import threading
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -96,22 +96,26 @@ class Parameter:
 
         Raises InputError if it is not a number, out of range or not one of the choices.
         """
-        bad = InputError(f"{self.name} = {value}: must be {self.allowed()} ({self.meaning})")
-        if self.text:
-            if value not in self.choices:
-                raise bad
-            return value
-        try:
-            result = number(value) if isinstance(value, str) else float(value)
-        except (TypeError, ValueError):
-            raise bad from None
-        if self.automatic and result == AUTOMATIC:
-            return result
-        if not (math.isfinite(result) and self.minimum <= result <= self.maximum):
-            raise bad
-        if (self.choices and result not in self.choices) or (self.integer and result % 1):
-            raise bad
+        result: Value = value
+        if not self.text:
+            try:
+                result = number(value) if isinstance(value, str) else float(value)
+            except (TypeError, ValueError):
+                result = math.nan
+        if not self.allows(result):
+            raise InputError(f"{self.name} = {value}: must be {self.allowed()} ({self.meaning})")
         return result
+
+    def allows(self, value: Value) -> bool:
+        """Whether a value is one of the choices, or a number within the range."""
+        if self.choices:
+            return value in self.choices
+        if isinstance(value, str):
+            return False
+        if self.automatic and value == AUTOMATIC:
+            return True
+        within = math.isfinite(value) and self.minimum <= value <= self.maximum
+        return within and not (self.integer and value % 1)
 
 
 def parse(text: str) -> dict[str, list[Any]]:
@@ -237,6 +241,22 @@ def settings(pairs: Iterable[str]) -> dict[str, Value]:
             raise InputError(f"--set {pair}: must be NAME=VALUE")
         values[name.strip()] = parameter(name.strip()).check(value.strip())
     return values
+
+
+def levels_of(name: str, levels: str | Sequence[float]) -> tuple[float, ...]:
+    """Water levels [m] from numbers, or a text 'a,b,c'.
+
+    Raises InputError if it is none.
+    """
+    if not isinstance(levels, str):
+        return tuple(map(float, levels))
+    try:
+        result = tuple(number(v) for v in levels.split(","))
+    except ValueError:
+        result = ()
+    if not result or not all(map(math.isfinite, result)):
+        raise InputError(f"{name} = {levels}: must be a list of levels in metres, such as 3,6,8,9")
+    return result
 
 
 def assignments(values: dict[str, Value]) -> str:

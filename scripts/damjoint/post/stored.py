@@ -94,9 +94,9 @@ def case_of(info: dict[str, Any]) -> Case:
     levels, tail_levels, times = (finite(n, info[n]) for n in ("levels", "tail_levels", "times"))
     parsed = parse(parser_input(values, levels))
     return Case(
-        info["case"],
-        str(info["title"]).encode(errors="replace").decode(),
-        values,
+        name=info["case"],
+        title=str(info["title"]).encode(errors="replace").decode(),
+        values=values,
         levels=levels,
         tail_levels=tail_levels,
         times=times,

@@ -143,7 +143,7 @@ def requires(case: Case) -> bool:
 
 def least_sliding_factor(case: Case) -> float:
     """Required sliding factor; at least 1 with friction: below it there is no equilibrium."""
-    return max(case["required_SSF"], 0.0 if case["law"] == "rupture" else 1.0)
+    return max(case["required_SSF"], 1.0 if case.law.limits_shear else 0.0)
 
 
 def by_gravity(method: GravityMethod, name: str = GRAVITY) -> MethodResult:
@@ -257,9 +257,9 @@ class SafetyCheck:
         case, notes = self.gravity.case, []
         if not requires(case):
             notes.append(f"nothing is required: the case sets none of {', '.join(REQUIREMENTS)}")
-        if case["law"] == "rupture":
+        if not case.law.limits_shear:
             strength = f"mu = {case['mu']:g}, adhesion = {case['adhesion']:g} Pa"
-            notes.append(f"SSF with {strength}, which the law rupture does not have")
+            notes.append(f"SSF with {strength}, which the law {case['law']} does not have")
         if case["uplift"] == "flow":
             notes.append("gravity method: full head in the crack, linear beyond it")
         if case["f_c"]:
