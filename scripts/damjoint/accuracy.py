@@ -220,13 +220,12 @@ def refine_mesh(case: Case, factor: float = 2) -> Case:
     """Multiply the number of elements along the joint; the sizes far from it follow as automatic
     ones do.
     """
-    values = case.values
     refined = {
-        "n_joint": factor * values["n_joint"],
-        "n_layers": values["n_layers"] * (1 if has_plane_fields(case) else factor),
-        **{name: values[name] / factor**0.5 for name in ("h_dam", "h_found")},
+        "n_joint": factor * case["n_joint"],
+        "n_layers": case["n_layers"] * (1 if has_plane_fields(case) else factor),
+        **{name: case[name] / factor**0.5 for name in ("h_dam", "h_found")},
     }
-    return replace(case, values=values | refined)
+    return replace(case, values=case.values | refined)
 
 
 def estimate_errors(

@@ -15,7 +15,8 @@ from .. import ROUND_OFF
 from ..model.case import Case
 from ..model.fields import BODIES, OPEN, SLIPPED, SOFTENING, distance, nearest_rows, state_of
 from ..model.loads import Loading, line_forces
-from ..model.mesh import SIDES, Body
+from ..model.mesh import Body
+from ..model.scene import BED, DOWN, FLOOR, SIDES, TOP, UP
 from ..post.outline import section_of, skin
 from .worker import Scene
 
@@ -47,23 +48,24 @@ class Pieces:
 
 def sharp_edges(body: Body, faces: list[np.ndarray]) -> np.ndarray:
     """Edges at which a skin ends or bends, (n, 2) point numbers."""
-    edges, normals = [], []
+    pairs_of_points, normals_of_faces = [], []
     for table in faces:
         corners = body.points[table]
-        across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        across /= np.linalg.norm(across, axis=1)[:, None]
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normal /= np.linalg.norm(normal, axis=1)[:, None]
         for i in range(table.shape[1]):
-            edges.append(table[:, [i, (i + 1) % table.shape[1]]])
-            normals.append(across)
-    edges, normals = np.sort(np.concatenate(edges), axis=1), np.concatenate(normals)
+            pairs_of_points.append(table[:, [i, (i + 1) % table.shape[1]]])
+            normals_of_faces.append(normal)
+    edges = np.sort(np.concatenate(pairs_of_points), axis=1)
+    normals = np.concatenate(normals_of_faces)
     order = np.lexsort(edges.T)
     edges, normals = edges[order], normals[order]
     _, index, count = np.unique(edges, axis=0, return_index=True, return_counts=True)
     sharp = np.ones(len(index), bool)
-    pairs = count == 2
-    first = index[pairs]
+    shared = count == 2
+    first = index[shared]
     cosine = np.abs(np.einsum("ij,ij->i", normals[first], normals[first + 1]))
-    sharp[pairs] = cosine < SMOOTH
+    sharp[shared] = cosine < SMOOTH
     return edges[index[sharp]]
 
 
@@ -118,8 +120,8 @@ def undeformed_loads(case: Case) -> dict[str, Pieces]:
     faces = lambda *sides: edges[np.isin(section["seg_side"], [SIDES.index(n) for n in sides])]
     level, tail = max(case.levels), max(case.tail_levels)
     over = level if case["crest_water"] else -np.inf
-    water = (faces("up", "floor"), level), (faces("top"), over), (faces("down", "bed"), tail)
-    silt = fluid_above(faces("up", "floor"), case["silt_height"])
+    water = (faces(UP, FLOOR), level), (faces(TOP), over), (faces(DOWN, BED), tail)
+    silt = fluid_above(faces(UP, FLOOR), case["silt_height"])
     forces = line_forces(case, Loading.at(case, np.inf, level, tail)).values()
     tips = [
         np.array([x, y, depth]) for x, y in zip(section["mark_x"], section["mark_y"], strict=True)

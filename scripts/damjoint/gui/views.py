@@ -16,7 +16,7 @@ import numpy as np
 from .. import ROUND_OFF
 from ..model.case import Case
 from ..model.fields import CLOSED, OPEN, SOFTENING, along, distance, row_of_nodes, state_of
-from ..post.units import LENGTHS, STRESSES, unit, with_unit
+from ..post.units import LENGTHS, STRESSES, Units, unit, with_unit
 from .camera import CLIPPED, MAPS, clip, frame
 from .shapes import Deformed, Pieces, is_extruded, undeformed_loads
 from .worker import Scene
@@ -57,7 +57,7 @@ class Gallery:
         self.hidden: list[int] = []
 
     def add(
-        self, name: str, pieces: list[Pieces], colors: Sequence[tuple], **numbers: float
+        self, name: str, pieces: list[Pieces], colors: Sequence[tuple[int, ...]], **numbers: float
     ) -> int:
         """Add a view of pieces in one color or a color scale; numbers: its options.
 
@@ -112,7 +112,7 @@ def label(tag: int, x: float, y: float, lines: list[str], size: int) -> None:
     gmsh.view.addListDataString(tag, [x, y], lines, style)
 
 
-def paint(tag: int, colors: Sequence[tuple]) -> None:
+def paint(tag: int, colors: Sequence[tuple[int, ...]]) -> None:
     """Set the color table of a view: one color, or interpolated between several."""
     table = np.array([(*color, 255)[:4] for color in colors], float)
     at = np.linspace(0, len(table) - 1, 64)
@@ -278,7 +278,7 @@ def show_curves(graphs: Graphs, scene: Scene, before: Sequence[Scene]) -> None:
     rows = [along(scene.result.at(time)) for time in scene.times]
     olds = [along(other.result.at()) for other in before]
     wet = scene.result.case["uplift"] != "none"
-    shown: list[tuple[str, tuple, list]] = [
+    shown: list[tuple[str, Units, list[tuple[str, str, Color]]]] = [
         ("opening", LENGTHS, [("", "delta_n", BLUE)]),
         ("slip", LENGTHS, [("jump", "delta_t1", ORANGE), ("slip", "slip", DARK)]),
         ("normal stress", STRESSES, [("total", "sigma_n", BLUE)]),
@@ -326,7 +326,7 @@ class Graphs:
         self.gallery, self.count = gallery, 0
 
     def add(
-        self, title: str, units: tuple, x_label: str, curves: list[Curve], points: bool = False
+        self, title: str, units: Units, x_label: str, curves: list[Curve], points: bool = False
     ) -> None:
         """Add a graph with curves on common axes, which include zero.
 
@@ -380,7 +380,7 @@ def span(values: np.ndarray) -> tuple[float, float]:
     return (ends[0], ends[1]) if ends[1] > ends[0] else (0.0, 1.0)
 
 
-def pieces_of(curve: Curve, factor: float, x_range: tuple, beyond: float) -> Pieces:
+def pieces_of(curve: Curve, factor: float, x_range: tuple[float, float], beyond: float) -> Pieces:
     """Convert a curve to lines along x.
 
     Gmsh takes the range of x from the curve. For a common range, each curve gets a line over all of

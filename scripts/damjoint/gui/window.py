@@ -47,7 +47,6 @@ class Session:
         self.busy = ""
         #: check or run, to be done when no longer busy; or empty
         self.pending = ""
-        self.tree: tree.Tree | None = None
         self.status = ""
         #: the last run: scenes, request, status line with its color, title
         self.scenes: list[Scene] = []

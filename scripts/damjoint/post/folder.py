@@ -38,9 +38,9 @@ def check_writable(folder: Path) -> None:
             existing = existing.parent
         if not existing.is_dir() or not os.access(existing, os.W_OK | os.X_OK):
             raise InputError(f"out = {folder}: must be a folder that can be written")
-        for name in ("fields", *declared()["uplift"].choices):
-            inner = folder / name
+        for inner in (folder / "fields", *scene_folders(folder)):
             if inner.is_symlink() or (inner.exists() and not inner.is_dir()):
+                name = inner.name
                 raise InputError(f"out = {folder}: its {name} must be a folder, and not a link")
         for name in TABLES:
             if (folder / name).exists() and not (folder / name).is_file():
@@ -68,6 +68,11 @@ def scene_folder(case: Case, scene: Case, out: Path) -> Path:
     return out if scene["uplift"] == case["uplift"] else out / scene["uplift"]
 
 
+def scene_folders(folder: Path) -> list[Path]:
+    """Folders that further scenes of a case may have below its own."""
+    return [folder / str(mode) for mode in declared()["uplift"].choices]
+
+
 def read_info(folder: Path) -> dict[str, Any] | None:
     """Read run.json of a folder; None if there is none, or it is not of damjoint."""
     file = folder / "run.json"
@@ -87,10 +92,10 @@ def clear(folder: Path) -> None:
     info = read_info(folder)
     if info is None:
         return
-    for name in declared()["uplift"].choices:  # folders of further scenes
-        if (folder / name).is_dir() and not (folder / name).is_symlink():
-            clear(folder / name)
-            remove_if_empty(folder / name)
+    for inner in scene_folders(folder):
+        if inner.is_dir() and not inner.is_symlink():
+            clear(inner)
+            remove_if_empty(inner)
     for name in (*TABLES, *(f"{info['case']}{end}.png" for end in PICTURES)):
         if is_name(name):
             for prefix in ("", PART):

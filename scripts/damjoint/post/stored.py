@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +11,13 @@ import meshio
 import numpy as np
 
 from .. import InputError
+from ..arrays import Value
 from ..model.case import SECTION, SHARED, Case, is_name
 from ..model.fields import Field, Solution
 from ..model.mesh import Body
 from ..model.parameters import INCLUDE, assignments, constants, declared, listing, parse
 from ..model.results import HISTORY, Results
-from .folder import read_info
+from .folder import read_info, scene_folders
 
 #: Errors that reading damaged files can raise; SyntaxError: by XML.
 DAMAGED = (
@@ -32,8 +33,7 @@ def runs_in(folder: Path) -> list[Path]:
     """
     if not folder.is_dir() or read_info(folder) is None:
         raise InputError(f"out = {folder}: must be the folder of a run (with its run.json)")
-    scenes = (folder / mode for mode in declared()["uplift"].choices)
-    return [folder, *(scene for scene in scenes if read_info(scene) is not None)]
+    return [folder, *(scene for scene in scene_folders(folder) if read_info(scene) is not None)]
 
 
 def read(folder: Path) -> Solution:
@@ -119,7 +119,7 @@ def finite(name: str, values: list[float]) -> tuple[float, ...]:
     return numbers
 
 
-def parser_input(values: Mapping[str, float | str], levels: tuple[float, ...]) -> str:
+def parser_input(values: dict[str, Value], levels: tuple[float, ...]) -> str:
     """Text from which Gmsh's parser computes the quantities that follow from parameters and
     levels.
     """

@@ -13,11 +13,11 @@ from matplotlib.figure import Figure
 
 from ..model import parameters
 from ..post.drawing import BLUE, ORANGE, RED, write_picture
-from ..post.units import LENGTHS, unit
+from ..post.units import LENGTHS, Units, unit
 from .plan import Plan, Row, column_of, numbers
 
 #: Quantities drawn: label and units.
-DRAWN = {
+DRAWN: dict[str, tuple[str, Units]] = {
     "crack_length": ("open or broken joint", LENGTHS[:1]),
     "max_opening": ("largest opening", LENGTHS),
     "crest_ux": ("crest, downstream", LENGTHS),
@@ -90,7 +90,7 @@ def is_marked(plan: Plan, rows: list[Row]) -> np.ndarray:
     return fails(rows)
 
 
-def panels_of(figure: Figure, plan: Plan) -> Iterator[tuple[Axes, tuple[str, tuple]]]:
+def panels_of(figure: Figure, plan: Plan) -> Iterator[tuple[Axes, tuple[str, tuple[str, Units]]]]:
     """Create axes side by side for the quantities drawn: DRAWN, or the critical value alone."""
     drawn = DRAWN
     if plan.critical:
