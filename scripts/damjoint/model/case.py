@@ -8,21 +8,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal, TypeAlias, overload
+from typing import Any
 
 from .. import RUN_GEO, InputError, data
-from ..arrays import Value, Values
+from ..arrays import Values
 from ..laws import LAWS, Law
 from . import casefile
 from .constraints import (
     check_also_uplift,
-    check_case,
     check_drive,
     check_levels,
     check_softening,
     check_steps,
     check_tail_levels,
     check_times,
+    check_values,
     highest_level,
 )
 from .parameters import (
@@ -35,9 +35,9 @@ from .parameters import (
     number,
     parse,
 )
-from .sections import Loads, MeshSize, Scene, Section
-from .uplift import flows as flows
-from .uplift import has_drains as has_drains
+from .values import ParameterValues
+from .values import flows as flows
+from .values import has_drains as has_drains
 
 CASES = data("cases")
 
@@ -64,14 +64,9 @@ SECTION = (
     *("mark_region", "mark_x", "mark_y", "mark_segment"),
 )
 
-#: The parameters whose values are texts, for type checkers: all others are numbers.
-TextName: TypeAlias = Literal[
-    "law", "uplift", "face_load", "drive", "mesh_pattern", "quadrature", "force_face"
-]
-
 
 @dataclass(frozen=True, kw_only=True)
-class Case:
+class Case(ParameterValues):
     """A scene and its loading, fully resolved: everything a run depends on."""
 
     name: str
@@ -96,64 +91,6 @@ class Case:
     shared: dict[str, list[float]] = field(default_factory=dict, compare=False, repr=False)
     #: the section, by the names of pro/section.pro
     section: dict[str, list[float]] = field(default_factory=dict, compare=False, repr=False)
-
-    @overload
-    def __getitem__(self, name: TextName) -> str: ...  # type: ignore[overload-overlap]
-
-    @overload
-    def __getitem__(self, name: str) -> float: ...
-
-    def __getitem__(self, name: str) -> Value:
-        return self.values[name]
-
-    def group(self, name: str) -> dict[str, Value]:
-        """The values of a group of parameters."""
-        return {n: self.values[n] for n, known in declared().items() if known.group == name}
-
-    @cached_property
-    def scene(self) -> Scene:
-        """Dimension and order, joint law, water, and what is prescribed."""
-        return Scene(self.group("Scene"))
-
-    @cached_property
-    def dimensions(self) -> Section:
-        """Lengths of the dam's section and of its foundation."""
-        return Section(self.group("Geometry"))
-
-    @cached_property
-    def mesh(self) -> MeshSize:
-        """Pattern and sizes of the mesh."""
-        return MeshSize(self.group("Mesh"))
-
-    @cached_property
-    def material(self) -> Section:
-        """Elasticity and density of dam and foundation."""
-        return Section(self.group("Bulk"))
-
-    @cached_property
-    def joint(self) -> Section:
-        """Stiffness, strength and fracture energy of the joint."""
-        return Section(self.group("Joint"))
-
-    @cached_property
-    def water(self) -> Section:
-        """Density and viscosity of the water, aperture of the closed joint, drains."""
-        return Section(self.group("Water"))
-
-    @cached_property
-    def loads(self) -> Loads:
-        """Loads besides the water, works on the joint."""
-        return Loads(self.group("Loads"))
-
-    @cached_property
-    def solver(self) -> Section:
-        """Tolerance and limits of the solver."""
-        return Section(self.group("Solver"))
-
-    @cached_property
-    def checks(self) -> Section:
-        """Safety factors and strength that are required."""
-        return Section(self.group("Checks"))
 
     @cached_property
     def law(self) -> Law[Any]:
@@ -187,7 +124,7 @@ class Case:
     @property
     def highest_level(self) -> float:
         """The highest water level that is allowed [m]."""
-        return math.inf if self.geometry else highest_level(self.values)
+        return math.inf if self.geometry else highest_level(self)
 
     @property
     def reached(self) -> float:
@@ -226,7 +163,7 @@ class Case:
         if not checked.keys() <= independent():
             raise KeyError(*checked.keys() - independent())
         result = replace(self, values=self.values | checked, published=False)
-        check_case(result)
+        check_values(result, result.section, result.geometry is None)
         return result
 
     def scenes(self) -> list[Case]:
@@ -382,7 +319,7 @@ def load(
         section={n: variables[n] for n in SECTION},
     )
     check_softening(result.joint, bool(variables["softening_twice"][0]))
-    check_case(result)
+    check_values(result, result.section, result.geometry is None)
     check_levels("levels", heights, result.highest_level)
     check_levels("tail_levels", tails, result.highest_level)
     check_tail_levels(result.tail_levels, len(heights), tail_levels is None)

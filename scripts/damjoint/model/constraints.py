@@ -8,35 +8,31 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
 
 from .. import InputError
-from ..arrays import Values
 from ..laws import LAWS
 from .parameters import constants, declared
-from .uplift import flows, has_drains
-
-if TYPE_CHECKING:
-    from .case import Case
-    from .sections import Section
+from .values import ParameterValues, Section, flows, has_drains
 
 #: Limits of the numbers of steps between two levels, and of levels, each of which has its table.
 MOST_STEPS, MOST_LEVELS = 100_000, 10_000
 
 
-def check_case(case: Case) -> None:
-    """Check the values of a case."""
+def check_values(
+    case: ParameterValues, section: Mapping[str, Sequence[float]], by_parameters: bool
+) -> None:
+    """Values of a case; section: as in `Case`; by_parameters: whether they define its geometry."""
     check_energies(case)
     for name, parameter in declared().items():
         parameter.check(case.values[name])
-    if not case.geometry:
-        check_section(case)
-    check_drains(case)
+    if by_parameters:
+        check_section(case, section)
+    check_drains(case, section["joint_length"][0])
     check_works(case)
 
 
-def check_energies(case: Case) -> None:
+def check_energies(case: ParameterValues) -> None:
     """Fracture energies: larger than what the joint stores before it softens, else a point would
     snap back.
     """
@@ -57,9 +53,9 @@ def check_softening(joint: Section, twice: bool) -> None:
         )
 
 
-def check_section(case: Case) -> None:
+def check_section(case: ParameterValues, section: Mapping[str, Sequence[float]]) -> None:
     """Lengths of the dam's section; places of line forces on it."""
-    dam, loads, section = case.dimensions, case.loads, case.section
+    dam, loads = case.dimensions, case.loads
     height = dam.dam_height
     for name, sign, holds in (
         ("batter_height", "<=", operator.le),
@@ -92,13 +88,13 @@ def check_section(case: Case) -> None:
         )
 
 
-def check_drains(case: Case) -> None:
-    """Drains: under the dam; with a prescribed displacement their pressure is linear in the
-    level.
+def check_drains(case: ParameterValues, length: float) -> None:
+    """Drains: on the joint, whose length is given [m]; pressure linear in the level where a
+    displacement is prescribed.
     """
     if not has_drains(case):
         return
-    water, drive, length = case.water, case.scene.drive, case.joint_length
+    water, drive = case.water, case.scene.drive
     if not water.drain_x < length:
         raise InputError(
             f"drain_x = {water.drain_x:g}: must be < the joint's length ({length:g} m)"
@@ -110,7 +106,7 @@ def check_drains(case: Case) -> None:
         )
 
 
-def check_works(case: Case) -> None:
+def check_works(case: ParameterValues) -> None:
     """Grouting and sawing: of laws and uplifts that include them."""
     included = LAWS[case["law"]].has_works and not flows(case)
     for name in ("grout_pressure", "saw_thickness"):
@@ -129,9 +125,9 @@ def check_steps(steps: int) -> None:
         raise InputError(f"steps = {steps}: must be an integer >= 1 and <= {MOST_STEPS}")
 
 
-def highest_level(values: Values) -> float:
+def highest_level(case: ParameterValues) -> float:
     """The highest water level at a section [m]."""
-    return float(constants()["highest_level"][0] * values["dam_height"])
+    return float(constants()["highest_level"][0] * case["dam_height"])
 
 
 def check_levels(name: str, levels: Sequence[float], highest: float) -> None:
