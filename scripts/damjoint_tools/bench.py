@@ -22,10 +22,9 @@ import numpy as np
 from damjoint import RunError
 from damjoint import accuracy as on_request
 from damjoint.engines import engine_of
-from damjoint.engines.condensed.cache import interface_of
 from damjoint.fem.bodies import Bodies
 from damjoint.fem.condensation import condense
-from damjoint.joint.interface import Interface
+from damjoint.joint.interface import Interface, interface_of
 from damjoint.model.case import ACCURACIES, Case, load
 from damjoint.model.fields import along
 from damjoint.model.results import Results

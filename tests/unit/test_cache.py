@@ -6,7 +6,7 @@ import pickle
 
 import numpy as np
 import pytest
-from damjoint.engines.condensed import cache
+from damjoint.fem import cache
 from damjoint.model.case import load
 
 SMALL = {"n_joint": 6.0, "h_dam": 4.0, "h_found": 4.0}

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 from closed_forms import BASE, resultants
-from damjoint.engines.condensed.cache import interface_of
+from damjoint.joint.interface import interface_of
 from damjoint.model.case import load
 from damjoint.statics.limit import mechanism
 

@@ -21,8 +21,8 @@ from tqdm import tqdm
 
 from .. import InputError
 from ..engines import Outcome
-from ..engines.condensed.cache import interface_of
 from ..engines.condensed.solve import about
+from ..joint.interface import interface_of
 from ..laws import Evidence
 from ..model.case import Case, load
 from ..model.parameters import parameter

@@ -23,8 +23,7 @@ from tqdm import tqdm
 from .. import InputError, RunError, __version__, accuracy
 from ..arrays import Value, Values
 from ..engines import engine_of
-from ..engines.condensed.cache import interface_of
-from ..joint.interface import Interface
+from ..joint.interface import Interface, interface_of
 from ..model.case import Case, first_mesh
 from ..model.results import HISTORY
 from ..post.tables import as_text
