@@ -86,8 +86,8 @@ def water_options() -> Parser:
     parser.add_argument(
         "--levels",
         metavar="H1,H2,...",
-        help="water levels [m above the heel] at t = 1, 2, ..., rising or falling: 3,6,8,9 (default: "
-        "those of the case)",
+        help="water levels [m above the heel] at t = 1, 2, ..., rising or falling: 3,6,8,9 "
+        "(default: those of the case)",
     )
     parser.add_argument("--tail-levels", metavar="H1,H2,...", help=TAIL_LEVELS)
     parser.add_argument(
