@@ -7,6 +7,7 @@ import io
 import os
 import sys
 from collections.abc import Callable
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -15,6 +16,8 @@ from typing import TYPE_CHECKING
 from . import RUN_GEO, InputError, RunError, __version__
 
 if TYPE_CHECKING:
+    from argparse import _SubParsersAction as Commands
+
     from .studies.plan import Plan, Row
 
 CASE = "a letter a to k (verification case SSNP142), dam, or the path of a .case file"
@@ -27,108 +30,122 @@ JOBS = "number of processes (default: one per core)"
 RESUMED = "CSV of results; rows that are already in it are not computed again"
 
 
-class Parser(argparse.ArgumentParser):
-    """Parser of arguments that raises an exception instead of printing the usage."""
-
-    def error(self, message: str) -> None:
-        """Raise InputError with argparse's message, which names the argument and its value."""
-        raise InputError(message)
-
-
-def integer_at_least(least: int, name: str) -> Callable[[str], int]:
-    """Return a converter of the text of argument `name`, which raises InputError."""
-
-    def convert(text: str) -> int:
-        if not text.strip().isdecimal() or int(text) < least:
-            raise InputError(f"{name} = {text}: must be an integer >= {least}")
-        return int(text)
-
-    return convert
-
-
-def path(name: str) -> Callable[[str], Path]:
-    """Return a converter of the text of argument `name`, which raises InputError if it is empty:
-    Path("") is the current folder.
+class Checked(argparse.Action):
+    """Action that stores `convert(name, text)`, which raises InputError. As a `type` its message
+    would be replaced by one of argparse.
     """
 
-    def convert(text: str) -> Path:
-        if not text.strip():
-            raise InputError(f"{name} = {text!r}: must be a path")
-        return Path(text)
+    def __init__(self, *, convert: Callable[[str, str], object], **options: object) -> None:
+        super().__init__(**options)
+        self.convert = partial(convert, self.dest)
 
-    return convert
+    def __call__(
+        self, parser: Parser, namespace: argparse.Namespace, values: object, _: str | None = None
+    ) -> None:
+        """Store the value, or the list of values."""
+        listed = isinstance(values, list)
+        value = [self.convert(text) for text in values] if listed else self.convert(str(values))
+        setattr(namespace, self.dest, value)
+
+
+def integer(name: str, text: str, least: int) -> int:
+    """Return an argument as an integer of at least `least`. Raises InputError."""
+    if not text.strip().isdecimal() or int(text) < least:
+        raise InputError(f"{name} = {text}: must be an integer >= {least}")
+    return int(text)
+
+
+def path(name: str, text: str) -> Path:
+    """Return an argument as a path. Raises InputError if it is empty: the current folder."""
+    if not text.strip():
+        raise InputError(f"{name} = {text!r}: must be a path")
+    return Path(text)
+
+
+class Parser(argparse.ArgumentParser):
+    """Parser of arguments that raises InputError."""
+
+    def error(self, message: str) -> None:
+        """Raise InputError instead of printing the usage."""
+        raise InputError(message)
+
+    def add_integer(self, name: str, least: int, **options: object) -> None:
+        """Add an argument that is an integer >= least."""
+        convert = partial(integer, least=least)
+        self.add_argument(name, action=Checked, convert=convert, metavar="N", **options)
+
+    def add_path(self, name: str, metavar: str, **options: object) -> None:
+        """Add an argument that is a path."""
+        self.add_argument(name, action=Checked, convert=path, metavar=metavar, **options)
+
+    def add_list(self, name: str, metavar: str, **options: object) -> None:
+        """Add an option that may be repeated."""
+        self.add_argument(name, action="append", default=[], metavar=metavar, **options)
 
 
 def settings_options() -> Parser:
     """Options of all commands that load a case."""
-    parser = Parser(add_help=False)
-    parser.add_argument(
+    options = Parser(add_help=False)
+    options.add_list(
         "--set",
-        action="append",
-        default=[],
-        metavar="NAME=VALUE",
+        "NAME=VALUE",
         dest="settings",
         help="value of a parameter, in the unit of reference/parameters.md (repeatable; default: "
         "that of the case)",
     )
-    parser.add_argument(
+    options.add_argument(
         "--run-geo",
         action="store_true",
         help="allow Gmsh to run the .geo file that the case names as its geometry; such a file can "
         "run any program (default: refused)",
     )
-    return parser
+    return options
 
 
 def water_options() -> Parser:
     """Options of the commands that fill the reservoir."""
-    parser = Parser(add_help=False)
-    parser.add_argument(
+    options = Parser(add_help=False)
+    options.add_argument(
         "--levels",
         metavar="H1,H2,...",
         help="water levels [m above the heel] at t = 1, 2, ..., rising or falling: 3,6,8,9 "
         "(default: those of the case)",
     )
-    parser.add_argument("--tail-levels", metavar="H1,H2,...", help=TAIL_LEVELS)
-    parser.add_argument(
+    options.add_argument("--tail-levels", metavar="H1,H2,...", help=TAIL_LEVELS)
+    options.add_argument(
         "--accuracy",
         metavar="PERCENT",
         help="refine the mesh until the estimated errors are smaller: coarse (3 %%), standard "
         "(1 %%), fine (0.2 %%) or a percentage such as 0.5%% (default: no refinement)",
     )
-    return parser
+    return options
 
 
 def loading_options() -> Parser:
     """Options of the water and of the load steps."""
-    parser = Parser(add_help=False, parents=[water_options()])
-    parser.add_argument(
+    options = Parser(add_help=False, parents=[water_options()])
+    options.add_integer(
         "--steps",
-        type=integer_at_least(1, "steps"),
-        metavar="N",
+        1,
         help="number of equal load steps between two levels (default: those of the case, or 1 if "
         "--levels is given)",
     )
-    return parser
+    return options
 
 
-class Commands:
-    """The commands of the parser, in the order of the help."""
+def add_command(commands: Commands, call: Callable, summary: str, *options: Parser) -> Parser:
+    """Add the command `damjoint NAME`.
 
-    def __init__(self, top: Parser) -> None:
-        self.commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True)
-
-    def add(self, call: Callable, name: str, summary: str, *options: Parser) -> Parser:
-        """Add a command.
-
-        call: function of its arguments that returns the exit code. options: shared ones.
-        """
-        description = f"{summary[0].upper()}{summary[1:]}."
-        command = self.commands.add_parser(
-            name, parents=options, help=summary, description=description
-        )
-        command.set_defaults(call=call)
-        return command
+    call: function do_NAME of the parsed arguments; returns the exit code. options: shared options.
+    """
+    command = commands.add_parser(
+        call.__name__.removeprefix("do_"),
+        parents=options,
+        help=summary,
+        description=f"{summary[0].upper()}{summary[1:]}.",
+    )
+    command.set_defaults(call=call)
+    return command
 
 
 def parser() -> Parser:
@@ -139,7 +156,7 @@ def parser() -> Parser:
         epilog="damjoint COMMAND --help explains the options of a command.",
     )
     top.add_argument("--version", action="version", version=__version__)
-    commands = Commands(top)
+    commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True)
     add_run(commands)
     add_check(commands)
     add_plot(commands)
@@ -158,12 +175,14 @@ def parser() -> Parser:
 def add_run(commands: Commands) -> None:
     """Add damjoint run."""
     summary = "fill the reservoir of a case; exit code 1 if the dam fails or the run stops early"
-    add = commands.add(do_run, "run", summary, settings_options(), loading_options()).add_argument
-    add("case", metavar="CASE", help=CASE)
-    add("--out", type=path("out"), metavar="FOLDER", help="output folder (default: out/CASE)")
-    add("--no-fields", action="store_true", help="write no files of displacement and stress")
-    add("--no-picture", action="store_true", help="draw no PNG")
-    add("--engine", default="auto", metavar="NAME", help=ENGINE)
+    command = add_command(commands, do_run, summary, settings_options(), loading_options())
+    command.add_argument("case", metavar="CASE", help=CASE)
+    command.add_path("--out", "FOLDER", help="output folder (default: out/CASE)")
+    command.add_argument(
+        "--no-fields", action="store_true", help="write no files of displacement and stress"
+    )
+    command.add_argument("--no-picture", action="store_true", help="draw no PNG")
+    command.add_argument("--engine", default="auto", metavar="NAME", help=ENGINE)
 
 
 def do_run(arguments: argparse.Namespace) -> int:
@@ -209,13 +228,12 @@ def add_check(commands: Commands) -> None:
     summary = (
         "safety factors by finite elements and by the gravity method; exit code 1 if one is too low"
     )
-    add = commands.add(do_check, "check", summary, settings_options(), water_options()).add_argument
-    add("cases", nargs="+", metavar="CASE", help=f"load combinations, each {CASE}")
-    add(
+    command = add_command(commands, do_check, summary, settings_options(), water_options())
+    command.add_argument("cases", nargs="+", metavar="CASE", help=f"load combinations, each {CASE}")
+    command.add_path(
         "--out",
-        type=path("out"),
+        "FOLDER",
         default=Path("out/check"),
-        metavar="FOLDER",
         help="folder of check.csv, with a folder for each case (default: out/check)",
     )
 
@@ -240,8 +258,8 @@ def do_check(arguments: argparse.Namespace) -> int:
 
 def add_plot(commands: Commands) -> None:
     """Add damjoint plot."""
-    add = commands.add(do_plot, "plot", "draw the pictures of a run again").add_argument
-    add("out", type=path("out"), metavar="FOLDER", help="output folder of the run")
+    command = add_command(commands, do_plot, "draw the pictures of a run again")
+    command.add_path("out", "FOLDER", help="output folder of the run")
 
 
 def do_plot(arguments: argparse.Namespace) -> int:
@@ -256,14 +274,10 @@ def do_plot(arguments: argparse.Namespace) -> int:
 
 def add_report(commands: Commands) -> None:
     """Add damjoint report."""
-    add = commands.add(do_report, "report", "write one HTML page about runs").add_argument
-    add("out", type=path("out"), nargs="+", metavar="FOLDER", help="output folders of the runs")
-    add(
-        "--to",
-        type=path("to"),
-        default=Path("report.html"),
-        metavar="FILE",
-        help="the page (default: report.html)",
+    command = add_command(commands, do_report, "write one HTML page about runs")
+    command.add_path("out", "FOLDER", nargs="+", help="output folders of the runs")
+    command.add_path(
+        "--to", "FILE", default=Path("report.html"), help="the page (default: report.html)"
     )
 
 
@@ -278,8 +292,10 @@ def do_report(arguments: argparse.Namespace) -> int:
 
 def add_gui(commands: Commands) -> None:
     """Add damjoint gui."""
-    add = commands.add(do_gui, "gui", "open a case in a window", settings_options()).add_argument
-    add("case", nargs="?", default="dam", metavar="CASE", help=f"{CASE} (default: dam)")
+    command = add_command(commands, do_gui, "open a case in a window", settings_options())
+    command.add_argument(
+        "case", nargs="?", default="dam", metavar="CASE", help=f"{CASE} (default: dam)"
+    )
 
 
 def do_gui(arguments: argparse.Namespace) -> int:
@@ -307,8 +323,8 @@ def warn_if_slow() -> None:
 def add_new(commands: Commands) -> None:
     """Add damjoint new."""
     summary = "write a case file with all parameters, explained in comments"
-    add = commands.add(do_new, "new", summary).add_argument
-    add("path", type=path("path"), metavar="MY.case", help="the file; it must not exist yet")
+    command = add_command(commands, do_new, summary)
+    command.add_path("path", "MY.case", help="the file; it must not exist yet")
 
 
 def do_new(arguments: argparse.Namespace) -> int:
@@ -323,16 +339,15 @@ def do_new(arguments: argparse.Namespace) -> int:
 def add_validate(commands: Commands) -> None:
     """Add damjoint validate."""
     summary = "compare with the published numbers of SSNP142; exit code 1 if a row fails"
-    add = commands.add(do_validate, "validate", summary).add_argument
-    add("cases", nargs="*", metavar="CASE", help="letters a to k (default: all)")
-    add(
+    command = add_command(commands, do_validate, summary)
+    command.add_argument("cases", nargs="*", metavar="CASE", help="letters a to k (default: all)")
+    command.add_path(
         "--out",
-        type=path("out"),
+        "FOLDER",
         default=Path("out"),
-        metavar="FOLDER",
         help="folder that gets a folder for each case (default: out)",
     )
-    add("--engine", default="auto", metavar="NAME", help=ENGINE)
+    command.add_argument("--engine", default="auto", metavar="NAME", help=ENGINE)
 
 
 def do_validate(arguments: argparse.Namespace) -> int:
@@ -364,28 +379,23 @@ def add_critical(commands: Commands) -> None:
         "find the level, strength factor or parameter beyond which there is no equilibrium; exit "
         "code 1 if there is none or it is not confirmed"
     )
-    add = commands.add(do_critical, "critical", summary, settings_options()).add_argument
-    add("case", metavar="CASE", help=CASE)
-    add(
+    command = add_command(commands, do_critical, summary, settings_options())
+    command.add_argument("case", metavar="CASE", help=CASE)
+    command.add_argument(
         "--of",
         default="level",
         metavar="WHAT",
         help="level [m], strength (factor that divides mu, c, f_t and the fracture energies), "
         "uplift (effectiveness of the drains), k_h or any other parameter (default: level)",
     )
-    add(
+    command.add_argument(
         "--levels",
         metavar="H1,H2,...",
-        help="water levels [m] in this order; all but a critical level are searched at the last "
-        "one (default: those of the case)",
+        help="water levels [m above the heel] in this order; all but a critical level are "
+        "searched at the last one (default: those of the case)",
     )
-    add("--tail-levels", metavar="H1,H2,...", help=TAIL_LEVELS)
-    add(
-        "--out",
-        type=path("out"),
-        metavar="FOLDER",
-        help="output folder (default: out/CASE_critical)",
-    )
+    command.add_argument("--tail-levels", metavar="H1,H2,...", help=TAIL_LEVELS)
+    command.add_path("--out", "FOLDER", help="output folder (default: out/CASE_critical)")
 
 
 def do_critical(arguments: argparse.Namespace) -> int:
@@ -407,54 +417,43 @@ def do_critical(arguments: argparse.Namespace) -> int:
 
 def add_sweep(commands: Commands) -> None:
     """Add damjoint sweep."""
-    summary = "run a case with many values of its parameters, given or random; CSV and chart"
-    options = settings_options(), loading_options()
-    add = commands.add(do_sweep, "sweep", summary, *options).add_argument
-    add("case", metavar="CASE", help=CASE)
-    add(
+    summary = "run a case with many values of its parameters, listed or random; CSV and chart"
+    command = add_command(commands, do_sweep, summary, settings_options(), loading_options())
+    command.add_argument("case", metavar="CASE", help=CASE)
+    command.add_list(
         "--vary",
-        action="append",
-        default=[],
-        metavar="NAME=VALUES",
+        "NAME=VALUES",
         help="values of a parameter, or of level, in its unit: NAME=V1,V2,... or "
         "NAME=FIRST:LAST:STEP; all combinations are run (repeatable)",
     )
-    add(
+    command.add_list(
         "--tie",
-        action="append",
-        default=[],
-        metavar="NAME=EXPRESSION",
+        "NAME=EXPRESSION",
         help="parameter computed from those varied, sampled or tied before: adhesion=2e5*mu "
         "(repeatable)",
     )
-    add(
+    command.add_argument(
         "--sample",
         nargs="+",
         metavar=("N", "NAME=DISTRIBUTION"),
         help="N random rows for each combination of --vary, from distributions of scipy.stats "
         "with their arguments (shapes, loc, scale): 1000 mu=normal(1.0,0.15)",
     )
-    add(
+    command.add_argument(
         "--design",
         choices=("latin", "monte-carlo"),
         default="latin",
         help="Latin hypercube or independent random rows of --sample (default: latin)",
     )
-    add(
-        "--seed",
-        type=integer_at_least(0, "seed"),
-        default=0,
-        metavar="N",
-        help="seed of the random numbers of --sample (default: 0)",
+    command.add_integer(
+        "--seed", 0, default=0, help="seed of the random numbers of --sample (default: 0)"
     )
-    add(
+    command.add_list(
         "--correlate",
-        action="append",
-        default=[],
-        metavar="A,B=R",
+        "A,B=R",
         help="rank correlation -1 < R < 1 of two sampled parameters (repeatable; default: 0)",
     )
-    add(
+    command.add_argument(
         "--critical",
         nargs="?",
         const="level",
@@ -463,18 +462,13 @@ def add_sweep(commands: Commands) -> None:
         help="add the critical value of each row: level (default), strength, ... as --of of "
         "damjoint critical",
     )
-    add("--jobs", type=integer_at_least(1, "jobs"), metavar="N", help=JOBS)
-    add(
+    command.add_integer("--jobs", 1, help=JOBS)
+    command.add_argument(
         "--scheduler",
         metavar="ADDRESS",
         help="run on the dask.distributed scheduler at this address (default: this machine)",
     )
-    add(
-        "--out",
-        type=path("out"),
-        metavar="FILE",
-        help=f"{RESUMED} (default: CASE_sweep.csv)",
-    )
+    command.add_path("--out", "FILE", help=f"{RESUMED} (default: CASE_sweep.csv)")
 
 
 def do_sweep(arguments: argparse.Namespace) -> int:
@@ -519,29 +513,14 @@ def report_sweep(case: str, plan: Plan, rows: list[Row], out: Path) -> None:
 def add_stress(commands: Commands) -> None:
     """Add damjoint stress."""
     summary = "run random dams and verify their result files; exit code 1 if one is a defect"
-    add = commands.add(do_stress, "stress", summary).add_argument
-    add(
-        "count",
-        nargs="?",
-        type=integer_at_least(1, "N"),
-        default=500,
-        metavar="N",
-        help="number of random dams (default: 500)",
+    command = add_command(commands, do_stress, summary)
+    command.add_integer(
+        "count", 1, nargs="?", default=500, help="number of random dams (default: 500)"
     )
-    add(
-        "--seed",
-        type=integer_at_least(1, "seed"),
-        default=1,
-        metavar="N",
-        help="seed of the random numbers (default: 1)",
-    )
-    add("--jobs", type=integer_at_least(1, "jobs"), metavar="N", help=JOBS)
-    add(
-        "--out",
-        type=path("out"),
-        default=Path("stress.csv"),
-        metavar="FILE",
-        help=f"{RESUMED} (default: stress.csv)",
+    command.add_integer("--seed", 1, default=1, help="seed of the random numbers (default: 1)")
+    command.add_integer("--jobs", 1, help=JOBS)
+    command.add_path(
+        "--out", "FILE", default=Path("stress.csv"), help=f"{RESUMED} (default: stress.csv)"
     )
 
 
@@ -561,13 +540,12 @@ def do_stress(arguments: argparse.Namespace) -> int:
 def add_bench(commands: Commands) -> None:
     """Add damjoint bench."""
     summary = "measure time, memory and discretisation error; resumed if it was interrupted"
-    add = commands.add(do_bench, "bench", summary).add_argument
-    add("--short", action="store_true", help="two minutes instead of thirty")
-    add(
+    command = add_command(commands, do_bench, summary)
+    command.add_argument("--short", action="store_true", help="two minutes instead of thirty")
+    command.add_path(
         "--out",
-        type=path("out"),
+        "FOLDER",
         default=Path("out/bench"),
-        metavar="FOLDER",
         help="folder of the page, tables and picture (default: out/bench)",
     )
 
@@ -594,17 +572,16 @@ def tool(name: str) -> ModuleType:
 def add_law(commands: Commands) -> None:
     """Add damjoint law."""
     summary = "evaluate a joint law along a path of displacement jumps"
-    add = commands.add(do_law, "law", summary, settings_options()).add_argument
-    add("law", metavar="LAW", help="rupture, friction or bond")
-    add(
+    command = add_command(commands, do_law, summary, settings_options())
+    command.add_argument("law", metavar="LAW", help="rupture, friction or bond")
+    command.add_path(
         "--path",
-        type=path("path"),
+        "FILE",
         required=True,
-        metavar="FILE",
         help="CSV with columns delta_n, delta_t1, delta_t2 [m] and, if there is water, p [Pa]; "
         "row n is the state at t = n",
     )
-    add("--out", type=path("out"), metavar="FILE", help="CSV of results (default: print it)")
+    command.add_path("--out", "FILE", help="CSV of results (default: print it)")
 
 
 def do_law(arguments: argparse.Namespace) -> int:
