@@ -126,7 +126,7 @@ def validation_page() -> str:
     from damjoint.post import validation
     from damjoint.run import run
 
-    from .provenance import provenance, said
+    from .provenance import provenance, source_line
 
     comparisons = []
     with tempfile.TemporaryDirectory() as folder:
@@ -143,7 +143,7 @@ def validation_page() -> str:
                 "to a variable with another meaning, or to a value that the document prints "
                 "otherwise. At the heel the opening of I is almost 7 % above the GEFDYN value, "
                 "whose tolerance is 7 %: the mesh-converged opening is 4.29e-7 m.",
-                said([provenance()], "Computed"),
+                source_line([provenance()], "Computed"),
                 validation.report(comparisons, "github"),
                 "![Modeling K: past the critical load](pictures/k_curve.png)",
             ]
@@ -154,9 +154,10 @@ def validation_page() -> str:
 
 def tour_page() -> str:
     """reference/tour.md with its commands run anew, one after the other in a temporary folder."""
-    from .provenance import provenance, said
+    from .provenance import provenance, source_line
 
-    page = between("figures", (REFERENCE / "tour.md").read_text(), said([provenance()], "Computed"))
+    source = source_line([provenance()], "Computed")
+    page = between("figures", (REFERENCE / "tour.md").read_text(), source)
     with tempfile.TemporaryDirectory() as folder:
         play = lambda block: f"```\n{played(block[1], Path(folder))}```"
         return re.sub(r"^```\n(.*?)^```$", play, page, flags=re.S | re.M)
@@ -252,7 +253,7 @@ def trust_page(results: Path) -> str:
                 "and earthquake, water up and down; one plane scene in ten is a slender dam of "
                 "real stiffness on a brittle joint. Made by "
                 "`python -m damjoint_tools.pages trust FILE` from its result file.",
-                provenance.said(rows),
+                provenance.source_line(rows),
                 "## What is asked of each",
                 ASKED,
                 "## What was found",
