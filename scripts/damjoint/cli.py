@@ -530,7 +530,7 @@ def do_stress(arguments: argparse.Namespace) -> int:
     rows = stress.stress(arguments.count, arguments.seed, arguments.out, arguments.jobs)
     for row in rows:
         if row["class"] == stress.DEFECT:
-            print(f"{row['scene']}: {row['found']}\n  {row['command']}")
+            print(f"{row['scene']}: {row['findings']}\n  {row['command']}")
     numbers = stress.counts(rows)
     counted = "; ".join(f"{number} {name}" for name, number in numbers.items())
     print(counted, arguments.out, sep="; ")

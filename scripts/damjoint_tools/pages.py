@@ -237,11 +237,11 @@ def trust_page(results: Path) -> str:
     tables.append(("all", *counts(rows).values()))
     slowest = sorted(rows, key=lambda row: -float(row["seconds"] or 0))[:5]
     told = [
-        f"- {row['scene']}, {row['class']}: {row['found']}\n\n      {row['command']}"
+        f"- {row['scene']}, {row['class']}: {row['findings']}\n\n      {row['command']}"
         for kind in (DEFECT, UNDECIDED)
         for row in of("class", kind)
     ]
-    worst = [(r["scene"], r["seconds"], r["iterations"], r["cuts"], r["found"]) for r in slowest]
+    worst = [(r["scene"], r["seconds"], r["iterations"], r["cuts"], r["findings"]) for r in slowest]
     return (
         "\n\n".join(
             [
@@ -262,7 +262,7 @@ def trust_page(results: Path) -> str:
                 "\n".join(told) or "None.",
                 "## The slowest",
                 "Seconds of the whole command in one of several processes.",
-                markdown(worst, ("scene", "seconds", "iterations", "cuts", "found")),
+                markdown(worst, ("scene", "seconds", "iterations", "cuts", "findings")),
             ]
         )
         + "\n"
