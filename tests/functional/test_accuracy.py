@@ -1,5 +1,4 @@
-"""--accuracy: meshes refined until the estimated errors are small enough, and what is said of
-them."""
+"""--accuracy: meshes refined until the estimated errors are small enough."""
 
 import json
 from dataclasses import replace
@@ -17,7 +16,7 @@ PLAIN = "--no-fields", "--no-picture"
 
 
 def solved(case, engine=condensed):
-    """The one scene of a case."""
+    """Solve the only scene of a case."""
     return next(accuracy.solve(case, engine, lambda *_: None, False))
 
 
@@ -26,8 +25,8 @@ def words(settings):
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])
-def test_the_error_left_of_a_power(order):
-    """Of q + c h^p no less than what is left, and hardly more than what order 1 leaves."""
+def test_the_estimate_bounds_the_error_of_a_power_law(order):
+    """Of q + c h^p: not below the true error, and hardly above that of order 1."""
     h = np.array([1, 0.5, 0.25])[:, None]
     values = np.array([[3.0, -2.0]]) + np.array([[1.0, -0.2]]) * h**order
     for some in (values, values[1:]):
@@ -37,12 +36,12 @@ def test_the_error_left_of_a_power(order):
         assert np.all(found >= true * (1 - 1e-12)) and np.all(found <= change * (1 + 1e-12))
 
 
-def test_two_values_that_agree_by_accident():
+def test_two_values_that_agree_by_accident_do_not_give_a_zero_error():
     assert accuracy.left(np.array([[1.0], [2.0], [2.0]]), counted=False) == pytest.approx(1.25 / 12)
 
 
-def test_values_that_go_to_and_fro_show_no_order():
-    """The slip of a dam whose crack is two elements long: 32, 64, 128, 512 elements."""
+def test_oscillating_values_have_no_observed_order():
+    """Slip of a dam whose crack is two elements long, on 32, 64, 128 and 512 elements."""
     values, limit = np.array([[2.1486e-05], [2.0175e-05], [2.0186e-05]]), 1.96e-05
     error = accuracy.left(values, counted=False)
     assert error == pytest.approx(1.25 * (values.max() - values.min()) / 2)
@@ -50,8 +49,8 @@ def test_values_that_go_to_and_fro_show_no_order():
 
 
 @pytest.mark.parametrize("scene", [pytest.param("imposed", marks=pytest.mark.heavy), "flow"])
-def test_what_is_said_is_true(scene):
-    """The errors on the mesh found, by one four times as fine; each within its estimate."""
+def test_true_errors_are_within_the_estimates(scene):
+    """True errors are those against a mesh four times as fine."""
     case = load("dam", DAM | {"uplift": scene}, "40,46", accuracy="3%")
     outcome = solved(case)
     told = outcome.result.info["error_estimate"]
@@ -72,16 +71,16 @@ def test_what_is_said_is_true(scene):
             assert told["quantities"][name]["relative"] <= 0.03
 
 
-def test_a_summary_says_what_an_error_is_relative_to():
-    """An opening's error stands beside the joint's largest jump, which may be all slip."""
+def test_the_statement_names_the_scale_of_a_relative_error():
+    """The error of an opening is relative to the joint's largest jump, which may be slip only."""
     opening = accuracy.Estimate("max_opening", 1e-6, 7.2e-6, 1e-3)
     crest = accuracy.Estimate("crest_ux", 1e-2, 1e-4, 1e-2)
     said = accuracy.summary(0.01, [20, 40], 3, [opening, crest], "")
     assert said.endswith(": largest opening 0.72 % of the joint's largest jump, crest 1 %")
 
 
-def test_run_writes_and_says_it(command, tmp_path):
-    """One line; the folder is the last mesh's, and a run on that mesh gives the same."""
+def test_run_writes_and_prints_the_estimate(command, tmp_path):
+    """The folder is that of the last mesh, and a run on that mesh gives the same results."""
     asked = "run", "dam", "--levels", "40", *words(DAM), *PLAIN
     code, said, _ = command(*asked, "--accuracy", "5%", "--out", "x")
     told = json.loads((tmp_path / "x" / "run.json").read_text())
@@ -96,15 +95,15 @@ def test_run_writes_and_says_it(command, tmp_path):
     assert pair[0] == pair[1]
 
 
-def test_sizes_far_away_follow_as_automatic_ones():
+def test_refinement_scales_the_far_element_sizes_like_the_automatic_ones():
     for n in (64, 256):
         found = accuracy.finer(load("dam", DAM, accuracy="fine"), n / 32)
         own = load("dam", DAM | {"n_joint": n, "order": 2, "mesh_pattern": "free"})
         assert found.values == pytest.approx(own.values)
 
 
-class Stub:
-    """The condensed engine on meshes below a size; above, something happens."""
+class Limited:
+    """Condensed engine that raises an exception on meshes finer than `most`."""
 
     def __init__(self, most, what):
         self.most, self.what = most, what
@@ -115,37 +114,37 @@ class Stub:
         yield from condensed.solve(case, on_step, fields)
 
 
-def test_a_mesh_beyond_the_memory_leaves_the_one_before():
+def test_if_memory_is_exceeded_the_results_of_the_mesh_before_are_returned():
     case = load("dam", DAM, "40", accuracy="0.01%")
-    told = solved(case, Stub(64, RunError("memory: too much"))).result.info["error_estimate"]
+    told = solved(case, Limited(64, RunError("memory: too much"))).result.info["error_estimate"]
     assert not told["reached"] and told["n_joint"] == [32, 64]
     assert "not reached, n_joint = 128: memory: too much" in told["statement"]
     with pytest.raises(RunError):
-        solved(case, Stub(16, RunError("memory: too much")))
+        solved(case, Limited(16, RunError("memory: too much")))
 
 
-def test_an_interruption_keeps_the_mesh_before(command, tmp_path, monkeypatch):
-    outcome = solved(load("dam", DAM, "40", accuracy="0.01%"), Stub(64, KeyboardInterrupt()))
+def test_if_interrupted_the_results_of_the_mesh_before_are_returned(command, tmp_path, monkeypatch):
+    outcome = solved(load("dam", DAM, "40", accuracy="0.01%"), Limited(64, KeyboardInterrupt()))
     assert isinstance(outcome.error, KeyboardInterrupt) and outcome.result.last["level"] == 40
     assert outcome.result.info["error_estimate"]["n_joint"] == [32, 64]
 
 
-def test_the_finest_mesh_is_said(monkeypatch):
+def test_the_statement_names_the_limit_of_refinement(monkeypatch):
     monkeypatch.setitem(accuracy.FINEST, "plane", 64)
     told = solved(load("dam", DAM, "40", accuracy="0.01%")).result.info["error_estimate"]
     assert not told["reached"] and "not reached, no finer mesh is tried" in told["statement"]
 
 
 @pytest.mark.parametrize("asked", ["1", "0%", "-1%", "100%", "nan%", "x%", "best"])
-def test_bad_accuracies(command, asked, tmp_path):
+def test_a_bad_accuracy_is_refused(command, asked, tmp_path):
     code, _, error = command("run", "dam", f"--accuracy={asked}")
     assert code == 2 and f"accuracy = {asked}: must be" in error and error.count("\n") == 1
     assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.heavy
-def test_both_scenes_and_3d():
-    """Each scene of a case on a mesh of its own; a slice needs no layers."""
+def test_accuracy_of_two_scenes_and_in_3d():
+    """Each scene of a case has its own mesh; a slice is not refined in layers."""
     slice_ = {"dim": 3, "thickness": 1.0, "hold_z": 1.0, "uplift": "imposed"}
     two = load("a", accuracy="coarse")
     both = [one.result for one in accuracy.solve(two, condensed, lambda *_: None, False)]
