@@ -145,8 +145,8 @@ def test_the_search_goes_on_over_unstable_crack_growth():
     assert answer.value == pytest.approx(52.32, abs=0.01)
 
 
-def test_hardening_is_kept_only_if_it_is_set():
-    """Then it carries the dam beyond T = mu N + c L, and the statement mentions it."""
+def test_only_hardening_set_by_the_user_counts_as_strength():
+    """It carries the dam beyond T = mu N + c L; the default one is left out."""
     _, hard = found("c")
     assert hard.value > 1.4 * slide_level(0.35, 1000, True) and "mu N" not in hard.why
     settings = DAM | {"law": "friction", "mu": 0.6, "adhesion": 0.0}

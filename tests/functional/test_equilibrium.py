@@ -152,7 +152,7 @@ def test_uplift_is_exact_with_drains_between_regular_nodes(
     assert result.last["M"] == pytest.approx(method.M, rel=1e-6)
 
 
-def test_a_node_at_the_drains_only_if_there_are_drains():
+def test_drains_beyond_the_joint_or_below_an_unknown_level_are_refused():
     for settings, said in (
         ({"drain_x": 5.0}, "drain_x = 5: must be < the joint's length"),
         ({"drain_level": 1.0, "drive": "heel"}, "drain_level = 1: must be 0"),

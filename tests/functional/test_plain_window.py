@@ -1,4 +1,4 @@
-"""The plain problem definition in Gmsh's window: cases/*.pro with GetDP, nothing of Python."""
+"""The GetDP model in the window of Gmsh: cases/*.pro, without Python."""
 
 import os
 import shutil
@@ -15,21 +15,22 @@ from damjoint.model.case import load
 from damjoint.model.parameters import parameter, start_gmsh
 from matplotlib.image import imread
 
-#: Of an order 1 mesh that is solved in a second
+#: An order 1 mesh that is solved in a second
 COARSE = {"n_joint": 20.0, "h_dam": 2.0, "h_found": 4.0}
 
 
 @pytest.fixture
 def plain(tmp_path):
-    """A copy of geo, pro and cases: a run leaves mesh and results beside the case."""
+    """A copy of geo, pro and cases: a run writes mesh and results beside the case."""
     for name in ("geo", "pro", "cases"):
         shutil.copytree(data(name), tmp_path / name, ignore=shutil.ignore_patterns("res"))
     return tmp_path / "cases"
 
 
 def press_run(folder, changed):
-    """What the window does at Run, in Gmsh without a window: parameters changed in the tree, the
-    drawing made anew, meshed, GetDP as ONELAB's client. The last row of history.txt."""
+    """Do what Run does, in Gmsh without a window: change parameters in the tree, redraw, mesh, run
+    GetDP as a client of ONELAB. Returns the last row of history.txt.
+    """
     for label, value in changed.items():
         if isinstance(value, str):
             gmsh.onelab.setString(label, [value])
@@ -62,8 +63,8 @@ def press_run(folder, changed):
         ("force_x 1 -setnumber force_at 3", "force_at, anchor_at: must lie on the dam's faces"),
     ],
 )
-def test_impossible_sections_are_told_before_anything_runs(plain, words, said):
-    """In Gmsh and in GetDP: one line with the level, its value and what is allowed."""
+def test_impossible_sections_are_refused_before_the_run(plain, words, said):
+    """In Gmsh and in GetDP: one line with the level, its value and the allowed range."""
     gmsh_command = [sys.executable, "-c", GMSH, str(plain / "a.geo"), "-", "-v", "2"]
     for command in (gmsh_command, [find_getdp(), str(plain / "a.pro"), "-v", "2"]):
         done = subprocess.run(
@@ -86,8 +87,8 @@ CHANGES = (
 
 
 @pytest.mark.heavy
-def test_every_change_in_the_tree_acts(plain):
-    """Changes in the tree, one run after the other, against the other engine."""
+def test_a_changed_parameter_changes_the_next_run(plain):
+    """Changes one after the other, compared with the other engine."""
     labels = {n: parameter(n).label for change in CHANGES for n in change}
     start_gmsh()
     gmsh.onelab.clear()
@@ -104,12 +105,12 @@ def test_every_change_in_the_tree_acts(plain):
         assert row[[1, 5, 6, 8, 9]] == pytest.approx(expected, rel=1e-6), (change, levels)
 
 
-#: What is compared: columns of the history.
+#: Columns of the history that are compared.
 SEEN = "level", "crack_length", "process_zone", "max_opening", "crest_ux"
 
 
 def solved(case, folder):
-    """SEEN at the end, by the default engine."""
+    """SEEN at the last step, by the default engine."""
     result = run.run(case, folder / "other", fields=False, picture=False, progress=False)[0]
     return [result.history[name][-1] for name in SEEN]
 
@@ -120,8 +121,9 @@ GREEN, RED = (127, 218, 127), (255, 72, 63)
 
 @pytest.fixture
 def window(plain, tmp_path):
-    """window(*arguments): Gmsh's own window on cases/a.pro, of fixed size, on a screen of its own.
-    It gives press(): Run, until the status is there and shows; a picture."""
+    """window(*arguments): the window of Gmsh with cases/a.pro, of fixed size, on its own virtual
+    screen. Has press(): Run, until the status is displayed; and a picture.
+    """
     for tool in ("Xvfb", "xdotool", "import"):
         if not shutil.which(tool):
             pytest.skip(f"{tool} is missing (apt-get install xvfb xdotool imagemagick)")
@@ -136,10 +138,10 @@ def window(plain, tmp_path):
         display = ":" + number.readline().strip()
     environment = os.environ | {
         "DISPLAY": display,
-        "HOME": str(tmp_path),  # no settings of the user's, none left to him
+        "HOME": str(tmp_path),  # settings of the user are neither read nor written
         "LIBGL_ALWAYS_SOFTWARE": "1",
     }
-    # xdotool and import wait for ever for a window that does not come
+    # xdotool and import would wait for ever for a missing window
     call = lambda *words: subprocess.run(words, env=environment, check=True, timeout=60)
     opened = [screen]
     sizes = {"GraphicsWidth": 1200, "GraphicsHeight": 800, "MenuWidth": 330}
@@ -178,7 +180,7 @@ def window(plain, tmp_path):
         process.wait()
 
 
-#: The gmsh command, of the package that is installed
+#: The gmsh command of the installed package
 GMSH = "import sys, gmsh; gmsh.initialize(['gmsh', *sys.argv[1:]], run=True); gmsh.finalize()"
 
 
@@ -187,13 +189,13 @@ def stamp(file):
 
 
 def pixels(picture, colour):
-    """How many pixels have a colour."""
+    """Count the pixels of a colour."""
     return (np.abs(picture[..., :3] * 255 - colour).max(axis=2) < 3).sum()
 
 
 @pytest.mark.heavy
 def test_window_shows_a_complete_run(window, plain):
-    """Run twice: the status is green both times, the views of the first run are gone."""
+    """Run twice: the status is green both times, the views of the first run are removed."""
     press = window()
     for name in ("first", "second"):
         picture = press(name)
@@ -203,10 +205,10 @@ def test_window_shows_a_complete_run(window, plain):
 
 
 @pytest.mark.heavy
-def test_window_shows_where_a_run_stops(window, plain):
+def test_window_shows_the_level_of_a_run_that_stops(window, plain):
     """A dam that slides without hardening: red, with the level."""
     words = "-setstring law friction -setstring uplift none -setnumber pena_tang 0"
-    words += " -setnumber n_joint 10"  # where it slides does not depend on the mesh
+    words += " -setnumber n_joint 10"  # the sliding level does not depend on the mesh
     picture = window(*words.split())("stopped")
     assert pixels(picture, RED) > 500 and not pixels(picture, GREEN) > 500
     assert "stopped_at = 7.4" in (plain / "res/a/stopped.geo").read_text()
