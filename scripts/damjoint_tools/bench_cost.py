@@ -18,10 +18,10 @@ from damjoint.fem.condensation import Bodies, condense
 from damjoint.joint.interface import Interface
 from damjoint.model.case import Case, load
 from damjoint.run import run
-from damjoint.solver.load_stepper import Filling
+from damjoint.solver.load_stepper import LoadStepper
 from damjoint.statics.verdict import verdict
 from damjoint.studies.bodies import interface_of
-from damjoint.studies.sweep import filled, pool_of
+from damjoint.studies.sweep import pool_of, stepped
 from threadpoolctl import threadpool_limits
 
 from .bench_scenes import (
@@ -144,7 +144,7 @@ def options(folder: Path) -> dict[str, tuple[Callable, Callable]]:
     """Return the options whose cost is measured: calls with and without."""
     e, dry = load("e"), {"uplift": "none"}
     joint = Interface(condense(e, Bodies.of(e)), e["quadrature"])
-    filling = lambda *loading: lambda: Filling(load("e", *loading), joint).run()
+    filling = lambda *loading: lambda: LoadStepper(load("e", *loading), joint).run()
     solving = lambda *loading: lambda: solve_timed(load("a", *loading))
     writing = lambda *files: lambda: run(load("a"), folder, *files, False)
     return {
@@ -201,8 +201,8 @@ def sweep_rows(name: str, case: Case, main: dict) -> tuple:
     with threadpool_limits(1):
         bulk, known, spent = condense(case, Bodies.of(case)), {}, []
         joint = Interface(bulk, case["quadrature"])
-        runs = [partial(filled, row, known, joint) for row in (first, further)]
-        runs += [Filling(load(name, main | s), joint).run for s in (weaker, stiffer)]
+        runs = [partial(stepped, row, known, joint) for row in (first, further)]
+        runs += [LoadStepper(load(name, main | s), joint).run for s in (weaker, stiffer)]
         for call in runs:
             start = time.perf_counter()
             call()
@@ -240,7 +240,7 @@ def run_of_grid(law: str, aperture: float, stiffness: float, young: float) -> tu
     case = load("e" if law == "rupture" else "g", settings, "3,6,8,9,10")
     with threadpool_limits(1):
         start = time.perf_counter()
-        result = Filling(case, interface_of(case)).run()
+        result = LoadStepper(case, interface_of(case)).run()
         spent = time.perf_counter() - start
     history = result.history
     level = history["level"][-1] if len(history["level"]) else 0.0

@@ -19,7 +19,7 @@ from damjoint.model.fields import along
 from damjoint.model.results import Results
 from damjoint.post import tables
 from damjoint.post.validation import read_at
-from damjoint.solver.load_stepper import Filling
+from damjoint.solver.load_stepper import LoadStepper
 
 #: Seconds of wall time of code_aster 15.2 for each modeling: sequential, on a 2-core machine, the
 #: whole job without meshing.
@@ -83,7 +83,7 @@ def solve_timed(case: Case) -> tuple[Results, dict[str, float]]:
     """
     bulk = condense(case, Bodies.of(case))
     begin = time.perf_counter()
-    result = Filling(case, Interface(bulk, case["quadrature"])).run()
+    result = LoadStepper(case, Interface(bulk, case["quadrature"])).run()
     done = time.perf_counter()
     with tempfile.TemporaryDirectory() as folder:
         tables.write(result, Path(folder))

@@ -13,11 +13,12 @@ import sys
 import tempfile
 from pathlib import Path
 
+from damjoint.laws import COLUMNS
 from damjoint.model.parameters import declared
-from damjoint.model.results import FLUX, HARDENING, HISTORY, JOINT
+from damjoint.model.results import FLUX, HISTORY, JOINT
 from damjoint.statics.gravity import LOADS
-from damjoint.studies.branch import CRITICAL
 from damjoint.studies.check import CHECK
+from damjoint.studies.failure_path import CRITICAL
 from tabulate import tabulate
 
 REFERENCE = Path("reference")
@@ -71,7 +72,7 @@ def results_page() -> str:
     """reference/results.md: the columns of the tables."""
     joint, history, check, loads, critical = (
         markdown([(f"`{n}`", u, m) for n, (u, m) in columns.items()], ("column", "unit", "meaning"))
-        for columns in (JOINT | HARDENING | FLUX, HISTORY, CHECK, LOADS, CRITICAL)
+        for columns in (JOINT | COLUMNS | FLUX, HISTORY, CHECK, LOADS, CRITICAL)
     )
     parts = [
         "# Results",
@@ -97,8 +98,8 @@ def results_page() -> str:
         "sum.",
         loads,
         "## critical.csv",
-        "Of `damjoint critical`: a row per equilibrium of each dam that was tried, pushed beyond "
-        "its highest level where it fails.",
+        "Of `damjoint critical`: a row per equilibrium of each trial, under displacement control "
+        "beyond its highest level where it fails.",
         critical,
         "## CASE_sweep.csv",
         "Of `damjoint sweep`, a row per combination, in the order in which they are done: `key`; "

@@ -1,0 +1,169 @@
+"""The equilibrium path of one dam to its failure.
+
+The levels are prescribed as far as the steps converge; then the path is followed under displacement
+control (see solver/path.py), and its highest level is refined to the precision.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ..joint.interface import Interface
+from ..model.case import Case
+from ..model.results import HISTORY
+from ..solver.load_stepper import LoadStepper
+from ..solver.path import EquilibriumPath, Point
+
+#: Columns of critical.csv: a row per equilibrium of each dam that was tried.
+CRITICAL = {
+    "trial": ("-", "number of the trial"),
+    "value": ("", "what was varied: level [m], strength, or the parameter"),
+    "stands": ("-", "1: there is an equilibrium with this value, 0: none was found"),
+    "displacement_control": ("-", "0: the level was prescribed; 1: a displacement"),
+    **{n: HISTORY[n] for n in ("level", "crest_ux", "crack_length", "slip_length", "N", "T", "M")},
+    "imposed_displacement": ("m", "since the first equilibrium under displacement control"),
+    "compression": ("Pa", "total compression at the toe"),
+}
+
+#: How many steps of the level may fail, each half of the one before, until a displacement is
+#: prescribed.
+FAILURES = 2
+
+#: Time of an increment, after the last level: only the order matters, and that all loads that grow
+#: in time act fully.
+TICK = 1e-3
+
+
+def row(point: Point) -> dict[str, float]:
+    """The row of critical.csv of a point, but for trial and value."""
+    return {name: value for name, value in point.last.items() if name in CRITICAL} | {
+        "displacement_control": float(point.control != "level"),
+        "imposed_displacement": point.imposed,
+        "compression": point.compression,
+    }
+
+
+class FailurePath(EquilibriumPath):
+    """The equilibria of a case, up to a target level or to failure."""
+
+    def __init__(
+        self,
+        case: Case,
+        interface: Interface,
+        target: float | None = None,
+        on_step: Callable[[float], None] = lambda level: None,
+    ) -> None:
+        """target: the level [m] to reach, the highest still to come by default; on_step: called
+        with the level of each equilibrium.
+        """
+        self.case, self.on_step = case, on_step
+        self.points: list[Point] = []
+        stepper = LoadStepper(case, interface, lambda _: self.add(point_of(stepper)))
+        # from the weight alone on steps can be halved; else the first one includes it at any length
+        if not (case["weight_first"] and stepper.weigh()):
+            stepper.advance_to(case.times[0])
+        if not stepper.stopped:
+            advance(stepper)
+        ahead = [v for t, v in enumerate(case.levels, 1) if t >= stepper.state.time]
+        self.target = max(ahead) if target is None else target
+        super().__init__(self.points, len(case.levels), TICK)
+
+    def add(self, point: Point) -> None:
+        """Append an equilibrium, if the toe is not crushed before it."""
+        if not self.crushed:
+            self.points.append(point)
+            self.on_step(point.level)
+
+    # -- its shape
+    # ----------------------------------------------------------------------------------------------
+
+    @property
+    def crushed(self) -> bool:
+        """Whether the toe is crushed at its last point."""
+        return bool(self.points) and self.crushes(self.points[-1])
+
+    def crushes(self, point: Point) -> bool:
+        """Whether the compression at the toe exceeds f_c at a point."""
+        return self.case["f_c"] > 0 and point.compression > self.case["f_c"]
+
+    @property
+    def arrival(self) -> int | None:
+        """The number of the first point at the target or above it; None if there is none."""
+        for number, point in enumerate(self.admissible):
+            complete = point.control != "level" or point.state.time == self.case.times[-1]
+            if complete and point.level >= self.target:
+                return number
+        return None
+
+    @property
+    def reached(self) -> bool:
+        """Whether there is an equilibrium at the target."""
+        return self.arrival is not None
+
+    @property
+    def admissible(self) -> list[Point]:
+        """The points before the toe is crushed."""
+        return self.points[:-1] if self.crushed else self.points
+
+    @property
+    def crushed_at_top(self) -> bool:
+        """Whether crushing ends it."""
+        return self.crushed and self.top + 2 == len(self.points)
+
+    @property
+    def mode(self) -> str:
+        """How the dam fails; empty if the path does not show it."""
+        return "crushed toe" if self.crushed_at_top else super().mode
+
+    # -- its continuation
+    # ----------------------------------------------------------------------------------------------
+
+    def follow(self, factor: float) -> None:
+        """Continue until the target is reached, the dam slides or is crushed, the level has settled
+        or no further equilibrium is found.
+
+        A highest level that is not far below the target is refined.
+        """
+        while not (
+            self.ended or self.reached or self.crushed or self.slides or self.settled(factor)
+        ):
+            self.advance()
+        if not self.reached:
+            self.refine(self.target)
+
+    # -- refinement of its end
+    # ----------------------------------------------------------------------------------------------
+
+    def insert(self, left: int, point: Point) -> None:
+        """Insert an equilibrium; if the toe is crushed there, it is the last one."""
+        if self.crushes(point):
+            self.points[left + 1 :] = [point]
+        else:
+            super().insert(left, point)
+
+    def uncertain(self) -> tuple[int, float, float]:
+        """See `EquilibriumPath.uncertain`: also where it passes the target or f_c."""
+        if self.crushed_at_top or self.arrival is not None:
+            right = len(self.points) - 1 if self.crushed else self.arrival
+            ends = [p.level for p in self.points[max(right - 1, 0) : right + 1]]
+            return right - 1, 0.5, self.highest + max(ends) - min(ends)
+        return super().uncertain()
+
+
+def point_of(stepper: LoadStepper) -> Point:
+    """The last converged step of a loading."""
+    return Point(stepper.model, stepper.state, stepper.history.copy())
+
+
+def advance(stepper: LoadStepper) -> None:
+    """Continue through the times of a case until some steps have not converged."""
+    failures, length = 0, np.inf
+    for target in stepper.case.times:
+        while stepper.state.time < target:
+            ahead = min(length, target - stepper.state.time)
+            if not stepper.step(stepper.state.time + ahead):
+                failures, length = failures + 1, ahead / 2
+            if failures > FAILURES:
+                return
