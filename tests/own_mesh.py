@@ -103,6 +103,6 @@ class OwnMesh:
         }
         lines = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat"]
         for title, rows in sections.items():
-            told = [" ".join(map(str, rows[i])) for i in n.order(len(rows))]
-            lines += [f"${title}", str(len(rows)), *told, f"$End{title}"]
+            entries = [" ".join(map(str, rows[i])) for i in n.order(len(rows))]
+            lines += [f"${title}", str(len(rows)), *entries, f"$End{title}"]
         path.write_text("\n".join([*lines, ""]))

@@ -53,44 +53,44 @@ def test_true_errors_are_within_the_estimates(scene):
     """True errors are those against a mesh four times as fine."""
     case = load("dam", DAM | {"uplift": scene}, "40,46", accuracy="3%")
     outcome = solved(case)
-    told = outcome.result.info["error_estimate"]
-    assert told["reached"] and told["n_joint"][-1] == outcome.result.case["n_joint"]
+    estimate = outcome.result.info["error_estimate"]
+    assert estimate["reached"] and estimate["n_joint"][-1] == outcome.result.case["n_joint"]
     fine = accuracy.finer(outcome.result.case, 4)
     exact = solved(replace(fine, accuracy=None)).result
     times = sorted(accuracy.reached(exact))
     assert len(times) == 2
     pair = [accuracy.read(one, times) for one in (outcome.result, exact)]
-    names = [name for name, one in told["quantities"].items() if one["used"]]
+    names = [name for name, one in estimate["quantities"].items() if one["used"]]
     assert {"max_opening", "slip", "crest_ux"} <= set(names) and ("flux" in names) == (
         scene == "flow"
     )
     for name in names:
         true = np.abs(np.subtract(*(one[name] for one in pair))).max()
-        assert true <= told["quantities"][name]["error"], name
+        assert true <= estimate["quantities"][name]["error"], name
         if name not in accuracy.LENGTHS:
-            assert told["quantities"][name]["relative"] <= 0.03
+            assert estimate["quantities"][name]["relative"] <= 0.03
 
 
 def test_the_statement_names_the_scale_of_a_relative_error():
     """The error of an opening is relative to the joint's largest jump, which may be slip only."""
     opening = accuracy.Estimate("max_opening", 1e-6, 7.2e-6, 1e-3)
     crest = accuracy.Estimate("crest_ux", 1e-2, 1e-4, 1e-2)
-    said = accuracy.summary(0.01, [20, 40], 3, [opening, crest], "")
-    assert said.endswith(": largest opening 0.72 % of the joint's largest jump, crest 1 %")
+    statement = accuracy.summary(0.01, [20, 40], 3, [opening, crest], "")
+    assert statement.endswith(": largest opening 0.72 % of the joint's largest jump, crest 1 %")
 
 
 def test_run_writes_and_prints_the_estimate(command, tmp_path):
     """The folder is that of the last mesh, and a run on that mesh gives the same results."""
-    asked = "run", "dam", "--levels", "40", *words(DAM), *PLAIN
-    code, said, _ = command(*asked, "--accuracy", "5%", "--out", "x")
-    told = json.loads((tmp_path / "x" / "run.json").read_text())
-    estimate = told["error_estimate"]
-    assert code == 0 and estimate["statement"] in said.splitlines()
+    arguments = "run", "dam", "--levels", "40", *words(DAM), *PLAIN
+    code, out, _ = command(*arguments, "--accuracy", "5%", "--out", "x")
+    record = json.loads((tmp_path / "x" / "run.json").read_text())
+    estimate = record["error_estimate"]
+    assert code == 0 and estimate["statement"] in out.splitlines()
     assert estimate["accuracy"] == 0.05 and estimate["reached"]
     assert not estimate["quantities"]["toe_stress"]["used"]
     assert "not asked of the stress at the toe" in estimate["statement"]
-    mesh = {n: told["parameters"][n] for n in ("n_joint", "h_dam", "h_found", "order")}
-    assert command(*asked, *words(mesh), "--out", "y")[0] == 0
+    mesh = {n: record["parameters"][n] for n in ("n_joint", "h_dam", "h_found", "order")}
+    assert command(*arguments, *words(mesh), "--out", "y")[0] == 0
     pair = [(tmp_path / name / "history.csv").read_text() for name in "xy"]
     assert pair[0] == pair[1]
 
@@ -116,9 +116,9 @@ class Limited:
 
 def test_if_memory_is_exceeded_the_results_of_the_mesh_before_are_returned():
     case = load("dam", DAM, "40", accuracy="0.01%")
-    told = solved(case, Limited(64, RunError("memory: too much"))).result.info["error_estimate"]
-    assert not told["reached"] and told["n_joint"] == [32, 64]
-    assert "not reached, n_joint = 128: memory: too much" in told["statement"]
+    estimate = solved(case, Limited(64, RunError("memory: too much"))).result.info["error_estimate"]
+    assert not estimate["reached"] and estimate["n_joint"] == [32, 64]
+    assert "not reached, n_joint = 128: memory: too much" in estimate["statement"]
     with pytest.raises(RunError):
         solved(case, Limited(16, RunError("memory: too much")))
 
@@ -131,14 +131,16 @@ def test_if_interrupted_the_results_of_the_mesh_before_are_returned(command, tmp
 
 def test_the_statement_names_the_limit_of_refinement(monkeypatch):
     monkeypatch.setitem(accuracy.FINEST, "plane", 64)
-    told = solved(load("dam", DAM, "40", accuracy="0.01%")).result.info["error_estimate"]
-    assert not told["reached"] and "not reached, no finer mesh is tried" in told["statement"]
+    estimate = solved(load("dam", DAM, "40", accuracy="0.01%")).result.info["error_estimate"]
+    assert (
+        not estimate["reached"] and "not reached, no finer mesh is tried" in estimate["statement"]
+    )
 
 
-@pytest.mark.parametrize("asked", ["1", "0%", "-1%", "100%", "nan%", "x%", "best"])
-def test_a_bad_accuracy_is_refused(command, asked, tmp_path):
-    code, _, error = command("run", "dam", f"--accuracy={asked}")
-    assert code == 2 and f"accuracy = {asked}: must be" in error and error.count("\n") == 1
+@pytest.mark.parametrize("accuracy", ["1", "0%", "-1%", "100%", "nan%", "x%", "best"])
+def test_a_bad_accuracy_is_refused(command, accuracy, tmp_path):
+    code, _, error = command("run", "dam", f"--accuracy={accuracy}")
+    assert code == 2 and f"accuracy = {accuracy}: must be" in error and error.count("\n") == 1
     assert not list(tmp_path.iterdir())
 
 
@@ -151,8 +153,8 @@ def test_accuracy_of_two_scenes_and_in_3d():
     assert [one.case["uplift"] for one in both] == ["imposed", "none"]
     assert all(one.info["error_estimate"]["reached"] for one in both)
     case = load("dam", DAM | slice_, "40", accuracy="5%")
-    told = solved(case).result.info["error_estimate"]
+    estimate = solved(case).result.info["error_estimate"]
     plane = solved(load("dam", DAM | {"uplift": "imposed"}, "40", accuracy="5%")).result
-    assert told["reached"] and told["n_joint"][0] == 16
-    crest = told["quantities"]["crest_ux"]["value"]
+    assert estimate["reached"] and estimate["n_joint"][0] == 16
+    crest = estimate["quantities"]["crest_ux"]["value"]
     assert crest == pytest.approx(plane.last["crest_ux"], rel=0.01)

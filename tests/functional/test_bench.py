@@ -16,9 +16,9 @@ def test_the_short_benchmark_writes_consistent_files(command, tmp_path):
     assert (tmp_path / "bench" / "accuracy.png").read_bytes()[:4] == b"\x89PNG"
     *lines, blank, source = (tmp_path / "bench" / "modelings.md").read_text().splitlines()
     assert len(lines) == 13 and not blank and source in text
-    told = json.loads((tmp_path / "bench" / "provenance.json").read_text())
-    assert source.startswith(f"Measured with damjoint {told['version']} (")
-    assert told["date"] in source and told["machine"] in source and told["commit"] in source
+    origin = json.loads((tmp_path / "bench" / "provenance.json").read_text())
+    assert source.startswith(f"Measured with damjoint {origin['version']} (")
+    assert origin["date"] in source and origin["machine"] in source and origin["commit"] in source
 
     def table(name):
         with (tmp_path / "bench" / f"{name}.csv").open() as file:

@@ -77,27 +77,27 @@ def test_two_load_combinations(command, combinations, tmp_path):
         assert float(loads[-1]["Fx"]) == pytest.approx(float(by_hand["T"]))
         folders.clear(folder)
         assert not list(folder.iterdir())
-    for said in ("usual", "flood", "gravity method", "required", "1.3", "pass"):
-        assert said in out
+    for message in ("usual", "flood", "gravity method", "required", "1.3", "pass"):
+        assert message in out
     assert "fail" not in out
 
 
 @pytest.mark.parametrize(
-    "setting, said",
+    "setting, message",
     [
         ({"required_SSF": 3.0}, "SSF {SSF:.4g} < 3"),
         ({"required_OSF": 5.0}, "OSF {OSF:.4g} < 5"),
         ({"f_c": 1.5e5}, "compression {toe:.4g} Pa at the toe > f_c = 150000 Pa"),
     ],
 )
-def test_a_factor_below_the_required_one_fails(solve, setting, said):
+def test_a_factor_below_the_required_one_fails(solve, setting, message):
     (result,) = solve("d", "7", dim=2.0, n_joint=20.0)
     for answer in (by_finite_elements(result), by_gravity(hand_calculation(result))):
         assert not answer.fails and answer.row["verdict"] == "not checked"
         met = replace(answer.case, values=answer.case.values | {"required_OSF": 1.01})
         assert replace(answer, case=met).row["verdict"] == "pass"
         stricter = replace(answer, case=replace(answer.case, values=answer.case.values | setting))
-        expected = said.format(**answer.numbers, toe=-answer.numbers["sigma_n_toe"])
+        expected = message.format(**answer.numbers, toe=-answer.numbers["sigma_n_toe"])
         assert stricter.fails == [expected]
         assert (stricter.row["verdict"], stricter.row["why"]) == ("fail", expected)
 
@@ -196,14 +196,14 @@ def test_a_note_gives_the_crack_without_tensile_strength(solve):
 
 
 def test_bad_input_writes_no_file(command, combinations, tmp_path):
-    for words, said in (
+    for words, message in (
         (("usual.case", "usual.case"), "case usual: must be given once"),
         (("usual.case", "none.case"), "case none.case: unknown"),
         (("usual.case", "--set", "f_c=-1"), "f_c = -1: must be"),
         (("usual.case", "--levels", "3,x"), "levels = 3,x: must be"),
     ):
         code, _, error = command("check", *words)
-        assert code == 2 and said in error and error.count("\n") == 1
+        assert code == 2 and message in error and error.count("\n") == 1
         assert not (tmp_path / "out").exists()
 
 

@@ -112,10 +112,10 @@ def test_the_gravity_method_without_tension(command, tmp_path):
     settings = *strong, "G_t=1e5", "n_joint=60"
     words = [word for setting in settings for word in ("--set", setting)]
     _, out, _ = command("critical", "dam", *words, "--levels", "40,48")
-    told = json.loads((tmp_path / "out/dam_critical/run.json").read_text())["critical"]
-    free = told["gravity_method_with"]["without tension"]
-    assert told["value"] == pytest.approx(free, rel=0.02) and told["gravity_method"] > 70
-    assert f"gravity method: {told['gravity_method']:.6g} m; without tension: {free:.6g} m" in out
+    record = json.loads((tmp_path / "out/dam_critical/run.json").read_text())["critical"]
+    free = record["gravity_method_with"]["without tension"]
+    assert record["value"] == pytest.approx(free, rel=0.02) and record["gravity_method"] > 70
+    assert f"gravity method: {record['gravity_method']:.6g} m; without tension: {free:.6g} m" in out
     assert "(n_joint = 60), " in out and "kPa, exceeds the strength of 2000 kPa" in out
 
 
@@ -220,7 +220,7 @@ def test_a_missing_limit_is_reported(command):
 
 
 @pytest.mark.parametrize(
-    "words, said",
+    "words, message",
     [
         (("--of", "law"), "--of law: must be level, strength, uplift or"),
         (("--of", "n_joint"), "--of n_joint: must be level, strength, uplift or"),
@@ -229,9 +229,9 @@ def test_a_missing_limit_is_reported(command):
         (("--levels", "21"), "levels = 21: must be between 0 and 20 m"),
     ],
 )
-def test_bad_input_is_refused(command, tmp_path, words, said):
+def test_bad_input_is_refused(command, tmp_path, words, message):
     code, _, err = command("critical", "c", *words)
-    assert code == 2 and said in err and len(err.splitlines()) == 1
+    assert code == 2 and message in err and len(err.splitlines()) == 1
     assert not list(tmp_path.iterdir())
 
 
@@ -242,12 +242,12 @@ def test_files_of_a_search(command, tmp_path):
     folder = tmp_path / "out/c_critical"
     names = {"run.json", "joint.csv", "history.csv", "critical.csv", "c_critical.png"}
     assert {path.name for path in folder.iterdir()} == names
-    told = json.loads((folder / "run.json").read_text())
-    assert told["critical"]["mode"] == "sliding" and told["critical"]["of"] == "level"
-    assert told["parameters"]["drive"] == "level"
+    record = json.loads((folder / "run.json").read_text())
+    assert record["critical"]["mode"] == "sliding" and record["critical"]["of"] == "level"
+    assert record["parameters"]["drive"] == "level"
     with (folder / "critical.csv").open() as file:
         rows = list(csv.DictReader(file))
-    assert max(float(row["level"]) for row in rows) == pytest.approx(told["critical"]["value"])
+    assert max(float(row["level"]) for row in rows) == pytest.approx(record["critical"]["value"])
     assert {row["displacement_control"] for row in rows} == {"0", "1"}
     assert command("report", folder) == (0, "report.html\n", "")
     page = (tmp_path / "report.html").read_text()
@@ -267,5 +267,5 @@ def test_an_interrupted_search_writes_its_results_so_far(monkeypatch, tmp_path):
     with pytest.raises(KeyboardInterrupt):
         critical("c", "level", {"pena_tang": 0.0}, out=tmp_path / "out")
     assert (tmp_path / "out/critical.csv").read_text().count("\n") > 4
-    told = json.loads((tmp_path / "out/run.json").read_text())
-    assert told["state"] == "interrupted" in told["statement"]
+    record = json.loads((tmp_path / "out/run.json").read_text())
+    assert record["state"] == "interrupted" in record["statement"]

@@ -153,9 +153,9 @@ def test_uplift_is_exact_with_drains_between_regular_nodes(
 
 
 def test_drains_beyond_the_joint_or_below_an_unknown_level_are_refused():
-    for settings, said in (
+    for settings, message in (
         ({"drain_x": 5.0}, "drain_x = 5: must be < the joint's length"),
         ({"drain_level": 1.0, "drive": "heel"}, "drain_level = 1: must be 0"),
     ):
-        with pytest.raises(InputError, match=said):
+        with pytest.raises(InputError, match=message):
             load("c", {"uplift": "drained"} | settings)

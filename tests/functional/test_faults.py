@@ -30,13 +30,13 @@ def wait_for(what, seconds=120):
 
 def test_sigterm_ends_a_run_as_ctrl_c_does(tmp_path):
     """Its GetDP is ended, too, and no temporary file remains."""
-    fake, told = tmp_path / "getdp", tmp_path / "out" / "run.json"
+    fake, record = tmp_path / "getdp", tmp_path / "out" / "run.json"
     version = '[ "$1" = --version ] && echo 3.2.0 && exit'
     fake.write_text(f"#!/bin/sh\n{version}\ntouch begun\nexec sleep 600\n")
     fake.chmod(0o755)
     (tmp_path / "tmp").mkdir()
     process = subprocess.Popen(
-        [sys.executable, "-m", "damjoint", *RUN, "--engine", "getdp", "--out", told.parent],
+        [sys.executable, "-m", "damjoint", *RUN, "--engine", "getdp", "--out", record.parent],
         env=os.environ | {"GETDP": str(fake), "TMPDIR": str(tmp_path / "tmp")},
         stderr=subprocess.PIPE,
         text=True,
@@ -44,9 +44,9 @@ def test_sigterm_ends_a_run_as_ctrl_c_does(tmp_path):
     )
     wait_for(lambda: list((tmp_path / "tmp").glob("*/*/begun")))
     process.send_signal(signal.SIGTERM)
-    _, said = process.communicate(timeout=120)
-    assert process.returncode == 130 and len(said.splitlines()) == 1
-    assert json.loads(told.read_text())["state"] == "interrupted"
+    _, error = process.communicate(timeout=120)
+    assert process.returncode == 130 and len(error.splitlines()) == 1
+    assert json.loads(record.read_text())["state"] == "interrupted"
     assert not any((tmp_path / "tmp").iterdir())
     with pytest.raises(ProcessLookupError):
         os.killpg(process.pid, 0)

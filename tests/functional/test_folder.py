@@ -87,8 +87,8 @@ def test_a_run_that_stops_writes_its_last_state(command, tmp_path, engine):
     words = "run", "c", *SMALL, *hardening, "--levels", "7.4,7.6", "--engine", engine
     code, out, err = command(*words)
     assert code == 1 and "sliding: no equilibrium beyond level 7.45" in out and err == ""
-    told = json.loads((tmp_path / "out/c/run.json").read_text())
-    assert (told["state"], told["verdict"]) == ("stopped", "sliding")
+    record = json.loads((tmp_path / "out/c/run.json").read_text())
+    assert (record["state"], record["verdict"]) == ("stopped", "sliding")
     joint, history = read(tmp_path / "out/c/joint.csv"), read(tmp_path / "out/c/history.csv")
     assert joint["time"].max() == history["time"][-1] and 1 < joint["time"].max() < 2
     assert len(list((tmp_path / "out/c/fields").glob("bulk_t*.vtu"))) == 2
@@ -99,8 +99,8 @@ def test_a_dam_on_the_default_hardening_is_reported_as_sliding(command, tmp_path
     words = "run", "c", *BARE, "--set", "uplift=none", "--levels", "7,9", "--set"
     code, out, _ = command(*words, "pena_tang=-1", "--out", "default")
     assert code == 1 and "sliding: the whole joint has slipped or is open from level 9 m on" in out
-    told = json.loads((tmp_path / "default" / "run.json").read_text())
-    assert (told["state"], told["verdict"]) == ("complete", "sliding")
+    record = json.loads((tmp_path / "default" / "run.json").read_text())
+    assert (record["state"], record["verdict"]) == ("complete", "sliding")
     code, out, _ = command(*words, "pena_tang=2e11", "--out", "asked")
     assert code == 0 and "stands on the hardening pena_tang = 2e+11" in out
 
@@ -114,10 +114,10 @@ def test_the_last_level_always_has_a_joint_table(command, tmp_path):
 
 def test_units_and_verdict_in_run_json(command, tmp_path):
     assert command("run", "e", *BARE, "--levels", "3")[0] == 0
-    told = json.loads((tmp_path / "out/e/run.json").read_text())
+    record = json.loads((tmp_path / "out/e/run.json").read_text())
     columns = [*read(tmp_path / "out/e/joint.csv"), *read(tmp_path / "out/e/history.csv")]
-    assert set(columns) == set(told["units"]) and told["units"]["sigma_n_eff"] == "Pa"
-    assert told["verdict"] == "stands" and told["state"] == "complete"
+    assert set(columns) == set(record["units"]) and record["units"]["sigma_n_eff"] == "Pa"
+    assert record["verdict"] == "stands" and record["state"] == "complete"
 
 
 def test_tailwater_in_the_history(command, tmp_path):
@@ -145,8 +145,11 @@ def test_an_interrupted_run_writes_its_converged_steps(tmp_path, monkeypatch, en
         run.run(case, tmp_path / "out", False, False, False, engine)
     history = read(tmp_path / "out" / "history.csv")
     assert 1 <= len(history["time"]) < 5
-    told = json.loads((tmp_path / "out" / "run.json").read_text())
-    assert told["state"] == told["verdict"] == "interrupted" and "after level" in told["statement"]
+    record = json.loads((tmp_path / "out" / "run.json").read_text())
+    assert (
+        record["state"] == record["verdict"] == "interrupted"
+        and "after level" in record["statement"]
+    )
 
 
 @pytest.fixture
@@ -173,7 +176,7 @@ def test_invalid_output_of_getdp_is_reported(command, tmp_path, fake_getdp, prin
 
 
 @pytest.mark.parametrize(
-    "left, said",
+    "left, message",
     [
         ("true", "ended without saying how far it went"),
         ("echo 0 > status.txt; touch history.txt", "no step at t = 4"),
@@ -183,11 +186,11 @@ def test_invalid_output_of_getdp_is_reported(command, tmp_path, fake_getdp, prin
         ("head -c 3000000 /dev/zero", "ended without saying how far it went"),
     ],
 )
-def test_an_invalid_file_of_getdp_is_reported(command, tmp_path, fake_getdp, left, said):
+def test_an_invalid_file_of_getdp_is_reported(command, tmp_path, fake_getdp, left, message):
     """GetDP returns 0, as it does on a full disk."""
     fake_getdp(left)
     code, out, err = command("run", "c", *BARE, "--engine", "getdp")
-    assert (code, out) == (1, "") and len(err.splitlines()) == 1 and said in err
+    assert (code, out) == (1, "") and len(err.splitlines()) == 1 and message in err
     assert json.loads((tmp_path / "out/c/run.json").read_text())["state"] == "failed"
 
 
@@ -251,8 +254,8 @@ def test_a_run_that_fails_early_removes_the_results_of_an_earlier_one(command, t
     code, _, err = command("run", "c", *BARE, *thin, "--out", "out")
     assert code == 1 and len(err.splitlines()) == 1
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["run.json"]
-    told = json.loads((tmp_path / "out" / "run.json").read_text())
-    assert told["state"] == "failed" and told["statement"] in err
+    record = json.loads((tmp_path / "out" / "run.json").read_text())
+    assert record["state"] == "failed" and record["statement"] in err
 
 
 def test_a_title_may_be_long_and_contain_dollar_signs(command, tmp_path):

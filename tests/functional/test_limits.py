@@ -110,7 +110,7 @@ def test_version_and_help_exit_with_0():
 
 
 @pytest.mark.parametrize(
-    "settings, levels, said",
+    "settings, levels, message",
     [
         ({"found_side": 20}, "40", "the foundation reaches 20 m: less than 1.5 heights"),
         (
@@ -130,10 +130,10 @@ def test_version_and_help_exit_with_0():
         ({}, "30", ""),
     ],
 )
-def test_hints(solve, settings, levels, said):
+def test_hints(solve, settings, levels, message):
     (result,) = solve("dam", levels, n_joint=40, **settings)
     found = "\n".join(hints(result))
-    assert said in found if said else not found
+    assert message in found if message else not found
 
 
 @pytest.mark.parametrize("weight_first", [0, 1])

@@ -79,11 +79,11 @@ def test_files_of_a_run(folder):
     dry = read(folder / "none" / "joint.csv")
     assert_allclose(dry["p"], 0)
 
-    told = json.loads((folder / "run.json").read_text())
-    assert told["parameters"]["n_joint"] == 20 and told["parameters"]["K_N"] == 1e12
-    assert told["levels"] == [6, 9] and told["statement"] == ""
-    assert told["mesh"]["joint_elements"] == 20 and told["unknowns"] > 0
-    assert set(told["wall_seconds"]) >= {"solve", "post"}
+    record = json.loads((folder / "run.json").read_text())
+    assert record["parameters"]["n_joint"] == 20 and record["parameters"]["K_N"] == 1e12
+    assert record["levels"] == [6, 9] and record["statement"] == ""
+    assert record["mesh"]["joint_elements"] == 20 and record["unknowns"] > 0
+    assert set(record["wall_seconds"]) >= {"solve", "post"}
 
     assert next(folder.glob("*.png")).read_bytes()[:4] == b"\x89PNG"
 
@@ -167,8 +167,8 @@ def test_a_hint_reports_a_joint_too_stiff_for_its_mesh(command, tmp_path):
     stiff = "--set", "K_N=1e14", "--set", "E=1e10", "--no-fields", "--no-picture"
     code, out, _ = command("run", "c", *small, *stiff, "--levels", "3")
     assert code == 0 and "K_N h/E = 5e+03" in out
-    told = json.loads((tmp_path / "out/c/run.json").read_text())
-    assert told["hints"][0] in out and "oscillate" in told["hints"][0]
+    record = json.loads((tmp_path / "out/c/run.json").read_text())
+    assert record["hints"][0] in out and "oscillate" in record["hints"][0]
 
 
 def test_a_run_imports_no_library_that_it_does_not_need(tmp_path):

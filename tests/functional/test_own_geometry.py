@@ -149,7 +149,7 @@ def test_a_mesh_file_of_the_user(draw, solve):
 
 
 @pytest.mark.parametrize(
-    "changes, said",
+    "changes, message",
     [
         ({"rename": {"toe": ""}}, "no region toe"),
         ({"rename": {"upstream": "usptream"}}, 'region "usptream" is not known'),
@@ -162,12 +162,12 @@ def test_a_mesh_file_of_the_user(draw, solve):
         ({"order": 2}, "must be of order 1"),
     ],
 )
-def test_a_bad_geometry_is_refused(draw, command, tmp_path, changes, said):
+def test_a_bad_geometry_is_refused(draw, command, tmp_path, changes, message):
     path = draw(**changes)
     before = sorted(tmp_path.rglob("*"))
     code, out, err = command("run", path)
     assert (code, out) == (2, "") and len(err.splitlines()) == 1, err
-    assert f"geometry = {tmp_path / 'own.msh'}" in err and said in err
+    assert f"geometry = {tmp_path / 'own.msh'}" in err and message in err
     assert sorted(tmp_path.rglob("*")) == before
 
 
@@ -192,12 +192,12 @@ def test_an_options_file_beside_a_mesh_is_not_run(draw, tmp_path):
     assert Mesh(case).nodes and not (tmp_path / "run").exists()
 
 
-@pytest.mark.parametrize("kept", [11, 20, 300, 0.5])
-def test_a_truncated_mesh_is_refused(draw, command, tmp_path, kept):
+@pytest.mark.parametrize("length", [11, 20, 300, 0.5])
+def test_a_truncated_mesh_is_refused(draw, command, tmp_path, length):
     """A good mesh after it is read."""
     path, mesh = draw(), tmp_path / "own.msh"
     whole = mesh.read_bytes()
-    mesh.write_bytes(whole[: int(kept * len(whole)) if kept < 1 else kept])
+    mesh.write_bytes(whole[: int(length * len(whole)) if length < 1 else length])
     code, _, err = command("run", path)
     assert code == 2 and len(err.splitlines()) == 1 and f"geometry = {mesh}" in err
     mesh.write_bytes(whole)

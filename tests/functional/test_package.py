@@ -36,7 +36,7 @@ def test_wheel_in_a_fresh_environment(tmp_path):
         assert json.loads((elsewhere / engine / "run.json").read_text())["verdict"] == "stands"
     call(command, "report", "condensed", cwd=elsewhere, env=environment)
     assert (elsewhere / "report.html").stat().st_size > 10_000
-    said = call(command, "validate", "c", cwd=elsewhere, env=environment)
-    assert ", 0 failed, " in said
+    out = call(command, "validate", "c", cwd=elsewhere, env=environment)
+    assert ", 0 failed, " in out
     where = call(python, "-c", "import damjoint; print(damjoint.data('pro'))", cwd=elsewhere)
     assert where.startswith(str(tmp_path / "env"))

@@ -48,7 +48,7 @@ def press_run(folder, changed):
 
 
 @pytest.mark.parametrize(
-    "words, said",
+    "words, message",
     [
         ("level_2 20.5", "Level 2 = 20.5 m: must be between 0 and 20 m"),
         ("tail_level_1 -3", "Tailwater at level 1 = -3 m: must be between 0 and 20 m"),
@@ -63,7 +63,7 @@ def press_run(folder, changed):
         ("force_x 1 -setnumber force_at 3", "force_at, anchor_at: must lie on the dam's faces"),
     ],
 )
-def test_impossible_sections_are_refused_before_the_run(plain, words, said):
+def test_impossible_sections_are_refused_before_the_run(plain, words, message):
     """In Gmsh and in GetDP: one line with the level, its value and the allowed range."""
     gmsh_command = [sys.executable, "-c", GMSH, str(plain / "a.geo"), "-", "-v", "2"]
     for command in (gmsh_command, [find_getdp(), str(plain / "a.pro"), "-v", "2"]):
@@ -71,7 +71,7 @@ def test_impossible_sections_are_refused_before_the_run(plain, words, said):
             [*command, "-setnumber", *words.split()], capture_output=True, text=True, check=False
         )
         lines = [line for line in (done.stdout + done.stderr).splitlines() if line.strip()]
-        assert len(lines) == 1 and said in lines[0]
+        assert len(lines) == 1 and message in lines[0]
     assert done.returncode and not (plain / "res").exists()
 
 

@@ -114,8 +114,8 @@ def in_units(case, units):
         for name, p in declared().items()
         if name != "pena_rupture"  # follows G_f
     }
-    told = lambda heights: ",".join(repr(height * factor("m")) for height in heights)
-    case = load("dam", values, told(case.levels), told(case.tail_levels))
+    text = lambda heights: ",".join(repr(height * factor("m")) for height in heights)
+    case = load("dam", values, text(case.levels), text(case.tail_levels))
     lengths = {n: [case.shared[n][0] * factor("m")] for n in ("sudden", "crack_aperture")}
     columns = (JOINT | COLUMNS | FLUX | HISTORY).items()
     scaled = {name: partial(np.multiply, factor(unit)) for name, (unit, _) in columns}

@@ -80,7 +80,7 @@ def damaged(folder, name, text):
 
 @pytest.mark.parametrize("words", [("plot",), ("report", "--to", "page.html")])
 @pytest.mark.parametrize(
-    "harm, said",
+    "harm, message",
     [
         (lambda f: (f / "run.json").unlink(), "must be the folder of a run"),
         (lambda f: damaged(f, "joint.csv", "x,y\n1\n"), "damaged"),
@@ -89,18 +89,18 @@ def damaged(folder, name, text):
         (lambda f: change(f, case="../../elsewhere"), "must be the name of a case"),
     ],
 )
-def test_a_bad_folder_is_reported_in_one_line(command, folder, tmp_path, harm, said, words):
+def test_a_bad_folder_is_reported_in_one_line(command, folder, tmp_path, harm, message, words):
     harm(folder)
     before = sorted(tmp_path.rglob("*"))
     code, out, err = command(*words, folder)
     assert (code, out) == (2, "") and len(err.splitlines()) == 1
-    assert said in err and str(folder) in err
+    assert message in err and str(folder) in err
     assert sorted(tmp_path.rglob("*")) == before
 
 
 def change(folder, **entries):
-    told = json.loads((folder / "run.json").read_text())
-    (folder / "run.json").write_text(json.dumps(told | entries))
+    record = json.loads((folder / "run.json").read_text())
+    (folder / "run.json").write_text(json.dumps(record | entries))
 
 
 def test_report_has_results_and_parameters(command, folder, tmp_path):

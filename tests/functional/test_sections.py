@@ -146,7 +146,7 @@ def test_uplift_cracked_has_no_water_in_an_intact_bond(solve):
 
 
 @pytest.mark.parametrize(
-    "settings, said",
+    "settings, message",
     [
         ({"neck_height": 45}, "neck_height = 45: must be < dam_height"),
         ({"batter_height": 46}, "batter_height = 46: must be <= dam_height"),
@@ -159,8 +159,8 @@ def test_uplift_cracked_has_no_water_in_an_intact_bond(solve):
         ({"mesh_pattern": "regular", "batter": 4}, "mesh_pattern = regular: must be free"),
     ],
 )
-def test_an_impossible_section_is_refused(settings, said):
-    with pytest.raises(InputError, match=said):
+def test_an_impossible_section_is_refused(settings, message):
+    with pytest.raises(InputError, match=message):
         load("dam", settings)
 
 

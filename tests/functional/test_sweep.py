@@ -82,11 +82,11 @@ def test_an_interrupted_sweep_ends_at_once_and_keeps_its_rows(tmp_path):
             time.sleep(0.05)
         os.killpg(process.pid, signal.SIGINT)
         try:
-            _, said = process.communicate(timeout=15)
+            _, error = process.communicate(timeout=15)
         except subprocess.TimeoutExpired:
             os.killpg(process.pid, signal.SIGKILL)
             raise
-    assert process.returncode == 130 and len(said.splitlines()) == 1
+    assert process.returncode == 130 and len(error.splitlines()) == 1
     assert 9 <= len(rows(out)) < 4001
 
 
@@ -178,13 +178,13 @@ SLIDES = (
 def test_the_probability_of_failure_is_that_of_the_distribution(command, tmp_path):
     """Of a Latin hypercube of the friction coefficient the share below 0.6, to one row."""
     sample = "--sample", "40", "mu=normal(0.68,0.06)"
-    code, said, _ = command(*SLIDES, *sample)
-    assert code == 0 and "Probability of failure" in said and "nan" not in said
-    (told,) = rows(tmp_path / "sweep_probability.csv")
+    code, out, _ = command(*SLIDES, *sample)
+    assert code == 0 and "Probability of failure" in out and "nan" not in out
+    (row,) = rows(tmp_path / "sweep_probability.csv")
     exact = stats.norm.cdf(0.6, 0.68, 0.06)
-    assert float(told["low"]) < exact < float(told["high"])
-    assert abs(float(told["probability"]) - exact) <= 1 / 40
-    assert (told["rows"], told["undecided"]) == ("40", "0")
+    assert float(row["low"]) < exact < float(row["high"])
+    assert abs(float(row["probability"]) - exact) <= 1 / 40
+    assert (row["rows"], row["undecided"]) == ("40", "0")
     (of_mu,) = rows(tmp_path / "sweep_sensitivity.csv")
     assert of_mu["input"] == "mu" and float(of_mu["crest_ux"]) < -0.99
     for row in rows(tmp_path / "sweep.csv"):
@@ -193,7 +193,7 @@ def test_the_probability_of_failure_is_that_of_the_distribution(command, tmp_pat
             row["failed"] == "1"
         )
     before = (tmp_path / "sweep.csv").read_text()
-    assert command(*SLIDES, *sample)[1].replace("0 rows", "40 rows") == said
+    assert command(*SLIDES, *sample)[1].replace("0 rows", "40 rows") == out
     assert (tmp_path / "sweep.csv").read_text() == before
     assert (tmp_path / "sweep.png").stat().st_size > 10_000
 
@@ -218,9 +218,9 @@ def test_ties_loading_and_accuracy(command, solve, tmp_path):
     """
     loading = "--levels", "6,8", "--tail-levels", "1", "--steps", "2"
     words = "--vary", "mu=0.35,0.5", "--tie", "adhesion=1e4*mu", "--jobs", "1", "--out", "s.csv"
-    code, said, _ = command("sweep", "c", *loading, "--accuracy", "coarse", *words)
-    assert code == 0 and said.startswith("one mesh for all rows")
-    n = re.search(r"n_joint = (\d+)", said)[1]
+    code, out, _ = command("sweep", "c", *loading, "--accuracy", "coarse", *words)
+    assert code == 0 and out.startswith("one mesh for all rows")
+    n = re.search(r"n_joint = (\d+)", out)[1]
     mesh = [part for name in (f"n_joint={n}", "order=2", *MESH) for part in ("--set", name)]
     for row in rows(tmp_path / "s.csv"):
         assert float(row["adhesion"]) == pytest.approx(1e4 * float(row["mu"]))
@@ -274,6 +274,6 @@ def test_a_failed_row_has_its_reason_and_the_others_are_computed(command, tmp_pa
 )
 def test_the_chart_of_a_sweep(command, tmp_path, words, drawn):
     common = "--set", "n_joint=10", "--jobs", "1", "--out", "s.csv"
-    code, said, _ = command("sweep", "c", *words, *common)
-    assert code == 0 and ("no chart" in said) != drawn
+    code, out, _ = command("sweep", "c", *words, *common)
+    assert code == 0 and ("no chart" in out) != drawn
     assert (tmp_path / "s.png").exists() == drawn

@@ -541,21 +541,21 @@ PRESS = """
 from damjoint.window import window
 from damjoint.window.sheet import Request
 say = window.Session.say
-def told(self, status, color):
+def print_status(self, status, color):
     say(self, status, color)
     print(status)
-window.Session.say = told
+window.Session.say = print_status
 if __name__ == "__main__":
     window.gui(Request("e"))
-' > said.txt 2>&1 &
-for i in $(seq 100); do grep -q ready said.txt && break; sleep 0.2; done
+' > status.txt 2>&1 &
+for i in $(seq 100); do grep -q ready status.txt && break; sleep 0.2; done
 sleep 1
 window=$(xdotool search --name Gmsh | tail -1)
 eval $(xdotool getwindowgeometry --shell $window)
 xdotool mousemove $((X + {x})) $((Y + HEIGHT + {y})) click 1
-for i in $(seq 100); do grep -q "done in" said.txt && break; sleep 0.2; done
+for i in $(seq 100); do grep -q "done in" status.txt && break; sleep 0.2; done
 sleep 1
 import -window root window.png
 kill $!
-cat said.txt
+cat status.txt
 """

@@ -1,4 +1,6 @@
-"""Condensed bodies on disk: whole, of this scene and version, or made anew; nothing is executed."""
+"""Condensed bodies in the cache: complete, of this scene and version, otherwise computed again;
+nothing in a file is executed.
+"""
 
 import os
 import pickle
@@ -12,8 +14,8 @@ SMALL = {"n_joint": 6.0, "h_dam": 4.0, "h_found": 4.0}
 
 
 @pytest.fixture
-def kept(tmp_path, monkeypatch):
-    """A cache with one entry: the file, and what it holds."""
+def entry(tmp_path, monkeypatch):
+    """A cache with one entry: its file and its content."""
     monkeypatch.setenv("DAMJOINT_CACHE", str(tmp_path))
     made, bodies = cache.cached(load("a", SMALL))
     assert bodies is not None
@@ -25,8 +27,8 @@ def same(one, other):
     return np.array_equal(one.stiffness, other.stiffness) and one.counts == other.counts
 
 
-def test_an_entry_is_found_again(kept):
-    _, made = kept
+def test_an_entry_is_read_again(entry):
+    _, made = entry
     found, bodies = cache.cached(load("a", SMALL))
     assert bodies is None and same(found, made)
     assert [shape for shape, _ in found.joint.cells] == [shape for shape, _ in made.joint.cells]
@@ -34,7 +36,7 @@ def test_an_entry_is_found_again(kept):
 
 
 class Trap:
-    """What a pickle would run on loading."""
+    """Object whose pickle creates a file when it is loaded."""
 
     def __init__(self, path):
         self.path = path
@@ -44,8 +46,8 @@ class Trap:
 
 
 @pytest.mark.parametrize("damage", ["truncated", "foreign", "pickle", "empty", "other header"])
-def test_a_bad_entry_is_made_anew(kept, tmp_path, damage):
-    file, made = kept
+def test_a_damaged_entry_is_computed_again(entry, tmp_path, damage):
+    file, made = entry
     whole = file.read_bytes()
     if damage == "truncated":
         file.write_bytes(whole[: len(whole) // 2])
@@ -61,7 +63,7 @@ def test_a_bad_entry_is_made_anew(kept, tmp_path, damage):
     found, bodies = cache.cached(load("a", SMALL))
     assert bodies is not None and same(found, made)
     assert not (tmp_path / "trap").exists()
-    assert cache.cached(load("a", SMALL))[1] is None  # and kept again
+    assert cache.cached(load("a", SMALL))[1] is None  # stored again
 
 
 @pytest.mark.parametrize(
@@ -73,36 +75,36 @@ def test_a_bad_entry_is_made_anew(kept, tmp_path, damage):
         pytest.param(46, 0, id="name"),
     ],
 )
-def test_a_flipped_byte_is_a_miss_once(kept, place, value):
-    """In an entry of the zip file's directory."""
-    file, made = kept
+def test_an_entry_with_a_changed_byte_is_replaced(entry, place, value):
+    """In the directory of the zip file."""
+    file, made = entry
     data = bytearray(file.read_bytes())
     data[data.index(b"PK\x01\x02") + place] = value
     file.write_bytes(data)
     found, bodies = cache.cached(load("a", SMALL))
     assert bodies is not None and same(found, made)
-    assert cache.cached(load("a", SMALL))[1] is None  # and replaced
+    assert cache.cached(load("a", SMALL))[1] is None  # replaced
 
 
-def test_an_array_that_is_missing_is_a_miss(kept):
-    """As one of the loads is if the length of the entry before it in the directory is damaged."""
-    file, made = kept
+def test_an_entry_without_an_array_is_computed_again(entry):
+    """E.g. if the length of the array before it in the directory is damaged."""
+    file, made = entry
     with np.load(file) as found:
         np.savez(file, **{name: found[name] for name in found.files if name != "units/dam_x"})
     found, bodies = cache.cached(load("a", SMALL))
     assert bodies is not None and found.units.keys() == made.units.keys()
 
 
-def test_a_pipe_in_place_of_an_entry(kept):
-    file, made = kept
+def test_a_pipe_in_place_of_an_entry_is_not_read(entry):
+    file, made = entry
     file.unlink()
     os.mkfifo(file)
     found, bodies = cache.cached(load("a", SMALL))
     assert bodies is not None and same(found, made)
 
 
-def test_nothing_is_written_through_links(kept, tmp_path_factory):
-    file, _ = kept
+def test_nothing_is_written_through_links(entry, tmp_path_factory):
+    file, _ = entry
     mine = tmp_path_factory.mktemp("mine") / "mine"
     mine.write_text("mine")
     file.with_suffix(f".{os.getpid()}").symlink_to(mine)
@@ -112,8 +114,8 @@ def test_nothing_is_written_through_links(kept, tmp_path_factory):
     assert cache.cached(load("a", SMALL))[1] is None
 
 
-def test_an_array_of_objects_is_not_loaded(kept, tmp_path):
-    file, made = kept
+def test_an_array_of_objects_is_not_loaded(entry, tmp_path):
+    file, made = entry
     with np.load(file) as found:
         arrays = dict(found)
     arrays["stiffness"] = np.array([Trap(tmp_path / "trap")], dtype=object)
@@ -122,20 +124,20 @@ def test_an_array_of_objects_is_not_loaded(kept, tmp_path):
     assert bodies is not None and same(found, made) and not (tmp_path / "trap").exists()
 
 
-def test_a_folder_that_can_not_be_written_costs_time_only(tmp_path, monkeypatch):
+def test_a_cache_that_can_not_be_written_is_ignored(tmp_path, monkeypatch):
     (tmp_path / "file").write_text("in the way")
     monkeypatch.setenv("DAMJOINT_CACHE", str(tmp_path / "file" / "below"))
     assert cache.cached(load("a", SMALL))[1] is not None
 
 
-def test_another_mesh_makes_other_bodies(kept, monkeypatch):
-    """After a change of geo/ or of the elements nothing old is found."""
+def test_an_entry_of_other_meshing_code_is_not_read(entry, monkeypatch):
+    """After a change of geo/ or of the elements."""
     monkeypatch.setattr(cache, "sources", lambda: "changed")
     assert cache.cached(load("a", SMALL))[1] is not None
 
 
-def test_the_files_longest_unused_go_first(tmp_path, monkeypatch):
-    """Whatever their names, and no more of them than have to."""
+def test_the_least_recently_used_files_are_removed(tmp_path, monkeypatch):
+    """Whatever their names, and no more than necessary."""
     for age, name in enumerate("bdac"):
         (tmp_path / f"{name}.npz").write_bytes(bytes(10))
         os.utime(tmp_path / f"{name}.npz", (0, 1e9 - 100 * age))
