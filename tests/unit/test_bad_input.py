@@ -306,3 +306,12 @@ def test_the_message_names_the_argument(command):
     ):
         code, _, err = command(*words)
         assert code == 2 and message in err and len(err.splitlines()) == 1
+
+
+@pytest.mark.parametrize("words", [("stress", 1), ("bench", "--short")])
+def test_a_command_whose_tools_are_not_installed_is_one_line(command, tmp_path, monkeypatch, words):
+    for name in ("damjoint_tools", "damjoint_tools.stress", "damjoint_tools.bench_page"):
+        monkeypatch.setitem(sys.modules, name, None)  # makes the import fail
+    code, out, err = command(*words)
+    assert (code, out) == (1, "") and "damjoint_tools is not installed" in err
+    assert len(err.splitlines()) == 1 and not list(tmp_path.iterdir())
