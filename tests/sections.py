@@ -63,7 +63,7 @@ def integrate(a, b, pressure, kinks):
 
 
 def depth(y, level):
-    """Depth of water below its level at height y."""
+    """Depth of a point at height y below a level; 0 above it."""
     return max(level - y, 0)
 
 
