@@ -12,7 +12,7 @@ from damjoint.model.case import load
 #: A dam of ordinary stiffness that slips and opens at its heel.
 DAM = {"E_dam": 2e10, "E_found": 3e10, "K_N": 1e11, "K_T": 1e11}
 DAM |= {"law": "friction", "adhesion": 1e5, "mu": 1.0}
-PLAIN = "--no-fields", "--no-picture"
+TABLES_ONLY = "--no-fields", "--no-picture"
 
 
 def solved(case, engine=condensed):
@@ -81,7 +81,7 @@ def test_the_statement_names_the_scale_of_a_relative_error():
 
 def test_run_writes_and_prints_the_estimate(command, tmp_path):
     """The folder is that of the last mesh, and a run on that mesh gives the same results."""
-    arguments = "run", "dam", "--levels", "40", *words(DAM), *PLAIN
+    arguments = "run", "dam", "--levels", "40", *words(DAM), *TABLES_ONLY
     code, out, _ = command(*arguments, "--accuracy", "5%", "--out", "x")
     record = json.loads((tmp_path / "x" / "run.json").read_text())
     estimate = record["error_estimate"]

@@ -18,7 +18,7 @@ from scipy.optimize import brentq
 #: A dam of 45 m on a mesh that is fine enough for limits of the rigid block.
 DAM = {"E_dam": 2e10, "E_found": 3e10, "n_joint": 20.0}
 #: Friction without cohesion.
-PLAIN = {"law": "bond", "sigma_max": 0.0, "adhesion": 0.0}
+UNBONDED = {"law": "bond", "sigma_max": 0.0, "adhesion": 0.0}
 
 
 def found(case, of="level", settings=None, levels=None, tail_levels=None):
@@ -64,7 +64,7 @@ def test_overturning_level(wet):
 )
 def test_sliding_level_without_cohesion(mu, level, levels, tails):
     """Linear uplift, and a tailwater of 3 m that rises or is constant."""
-    _, answer = found("dam", "level", DAM | PLAIN | {"mu": mu}, levels, tails)
+    _, answer = found("dam", "level", DAM | UNBONDED | {"mu": mu}, levels, tails)
     assert answer.value == pytest.approx(level, abs=1e-3)
     assert answer.gravity == pytest.approx(level, abs=1e-3)
 
@@ -82,7 +82,7 @@ def test_strength_factor():
 @pytest.mark.heavy
 def test_critical_effectiveness_of_drains():
     """The less effective the drains, the less the dam holds."""
-    settings = DAM | PLAIN | {"mu": 0.7, "uplift": "drained"}
+    settings = DAM | UNBONDED | {"mu": 0.7, "uplift": "drained"}
     _, answer = found("dam", "uplift", settings, tail_levels="3")
     assert 0 < answer.value < 0.5
     assert answer.value == pytest.approx(answer.gravity, rel=5e-4)
@@ -102,7 +102,7 @@ def test_critical_earthquake():
 @pytest.mark.heavy
 def test_critical_value_of_a_parameter_that_must_not_be_less():
     """T = mu N at 45 m: no equilibrium with less."""
-    _, answer = found("dam", "mu", DAM | PLAIN, tail_levels="3")
+    _, answer = found("dam", "mu", DAM | UNBONDED, tail_levels="3")
     assert answer.value == pytest.approx(9888 / 12683, rel=2e-4)
 
 
@@ -122,7 +122,7 @@ def test_the_gravity_method_without_tension(command, tmp_path):
 def test_the_gravity_method_with_a_crack_past_the_drains():
     """The short crack is in equilibrium up to the drains; mu N = T with the crack past them."""
     drains = {"dam_base": 30.0, "uplift": "cracked", "drains": 1.0, "drain_x": 6.0, "mu": 1.0}
-    search = Search("dam", "level", DAM | PLAIN | drains, "40,44", "3")
+    search = Search("dam", "level", DAM | UNBONDED | drains, "40,44", "3")
     first, longer = (search.by_gravity(44.4, True, longest) for longest in (False, True))
     method = gravity.at(search.own, 2.0, first - 1e-5)
     assert method.SSF > 1 and method.crack_length == pytest.approx(6, abs=1e-3)
@@ -207,7 +207,7 @@ def test_the_value_without_lasting_tension_is_given_too():
 @pytest.mark.heavy
 def test_a_rigid_block_that_opens_to_its_toe():
     """mu = 3 resists any shear; full head in the crack."""
-    settings = PLAIN | {"mu": 3.0, "uplift": "cracked", "n_joint": 40.0}
+    settings = UNBONDED | {"mu": 3.0, "uplift": "cracked", "n_joint": 40.0}
     _, answer = found("dam", settings=settings)
     assert answer.confirmed and answer.mode == "overturning"
     assert answer.value == pytest.approx(answer.gravity, rel=0.01)

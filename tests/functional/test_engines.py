@@ -180,11 +180,11 @@ def test_runs_of_both_engines_agree_on_sections_and_loads(scene, tmp_path):
 
 def agree(case, tmp_path):
     """Assert equal joint.csv to 1e-6 of the largest jump, stress, ..."""
-    plain, fast = (
+    reference, fast = (
         run.run(case, tmp_path / name, fields=False, picture=False, progress=False, engine=name)
         for name in ("getdp", "condensed")
     )
-    for a, b in zip(plain, fast, strict=True):
+    for a, b in zip(reference, fast, strict=True):
         assert not a.stopped and not b.stopped
         for time in a.case.requested:
             rows = a.at(time), b.at(time)

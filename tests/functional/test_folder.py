@@ -101,7 +101,7 @@ def test_a_dam_on_the_default_hardening_is_reported_as_sliding(command, tmp_path
     assert code == 1 and "sliding: the whole joint has slipped or is open from level 9 m on" in out
     record = json.loads((tmp_path / "default" / "run.json").read_text())
     assert (record["state"], record["verdict"]) == ("complete", "sliding")
-    code, out, _ = command(*words, "pena_tang=2e11", "--out", "asked")
+    code, out, _ = command(*words, "pena_tang=2e11", "--out", "set")
     assert code == 0 and "stands on the hardening pena_tang = 2e+11" in out
 
 

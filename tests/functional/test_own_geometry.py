@@ -113,12 +113,12 @@ def draw(tmp_path):
         lines = [geo.addLine(p[i], p[i + 1]) for i in range(3)] + [geo.addLine(p[3], p[0])]
         under = [(0, 4), (4, 5), (5, 6), (6, 7), (7, 1)]
         below = [geo.addLine(p[i], p[k]) for i, k in under]
-        lip = geo.addLine(p[0], p[1]) if apart else lines[0]
+        face = geo.addLine(p[0], p[1]) if apart else lines[0]
         dam = geo.addPlaneSurface([geo.addCurveLoop(lines)])
-        rock = geo.addPlaneSurface([geo.addCurveLoop([*below, -lip])])
+        rock = geo.addPlaneSurface([geo.addCurveLoop([*below, -face])])
         geo.synchronize()
         if apart:
-            gmsh.model.mesh.setTransfiniteCurve(lip, 7)
+            gmsh.model.mesh.setTransfiniteCurve(face, 7)
         regions = {
             "dam": (2, [dam]),
             "foundation": (2, [rock]),

@@ -49,10 +49,10 @@ def test_a_dam_on_a_brittle_bond_is_followed_beyond_its_limit_point(solve, n_joi
     assert 49.9 < limit < 50.3 and limit - lowest > 1
     assert any(f"unstable crack growth at level {limit:.4g} m" in hint for hint in hints(result))
     # where the bond is broken it has no influence: a dam without a bond has nearly the same state
-    (plain,) = solve("dam", "51", **BRITTLE | {"sigma_max": 0, "adhesion": 0}, n_joint=n_joint)
+    (unbonded,) = solve("dam", "51", **BRITTLE | {"sigma_max": 0, "adhesion": 0}, n_joint=n_joint)
     for name in ("N", "T", "M"):
-        assert result.last[name] == pytest.approx(plain.last[name], rel=1e-6)
-    assert result.last["crest_ux"] == pytest.approx(plain.last["crest_ux"], rel=0.05)
+        assert result.last[name] == pytest.approx(unbonded.last[name], rel=1e-6)
+    assert result.last["crest_ux"] == pytest.approx(unbonded.last["crest_ux"], rel=0.05)
 
 
 def test_a_run_stops_at_the_critical_level(solve):

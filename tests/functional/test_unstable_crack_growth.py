@@ -38,12 +38,12 @@ def test_the_state_after_unstable_crack_growth_hardly_depends_on_the_steps(solve
 
 def test_a_hint_reports_unstable_crack_growth(solve):
     """The hint states that the results depend on steps and mesh, and what helps."""
-    (ran_on,) = solve("ssnp142", "40", uplift="flow", **SLENDER)
-    assert verdict(ran_on) == "stands" and min(ran_on.info["unstable_growth"]) <= 40
-    assert any("depends on steps and mesh" in hint for hint in hints(ran_on))
-    assert any("alpha = 2 keeps the stiffness" in hint for hint in hints(ran_on))
-    (kept,) = solve("ssnp142", "40", uplift="flow", alpha=2, **SLENDER)
-    assert kept.last["level"] == 40 and not any("alpha" in hint for hint in hints(kept))
+    (unstable,) = solve("ssnp142", "40", uplift="flow", **SLENDER)
+    assert verdict(unstable) == "stands" and min(unstable.info["unstable_growth"]) <= 40
+    assert any("depends on steps and mesh" in hint for hint in hints(unstable))
+    assert any("alpha = 2 keeps the stiffness" in hint for hint in hints(unstable))
+    (stable,) = solve("ssnp142", "40", uplift="flow", alpha=2, **SLENDER)
+    assert stable.last["level"] == 40 and not any("alpha" in hint for hint in hints(stable))
 
 
 @pytest.mark.parametrize("law", LAWS)

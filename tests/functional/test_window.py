@@ -538,8 +538,8 @@ def test_run_in_the_window_on_a_virtual_screen(tmp_path):
 #: Prints the status of the session; Run is clicked, then a screenshot taken.
 PRESS = """
 {python} -u -c '
-from damjoint.window import window
-from damjoint.window.sheet import Request
+from damjoint.gui import window
+from damjoint.gui.sheet import Request
 say = window.Session.say
 def print_status(self, status, color):
     say(self, status, color)
@@ -549,12 +549,14 @@ if __name__ == "__main__":
     window.gui(Request("e"))
 ' > status.txt 2>&1 &
 for i in $(seq 100); do grep -q ready status.txt && break; sleep 0.2; done
-sleep 1
-window=$(xdotool search --name Gmsh | tail -1)
+window=$(xdotool search --sync --onlyvisible --name Gmsh | tail -1)
 eval $(xdotool getwindowgeometry --shell $window)
-xdotool mousemove $((X + {x})) $((Y + HEIGHT + {y})) click 1
+xdotool mousemove $((X + {x})) $((Y + HEIGHT + {y}))
+for i in $(seq 10); do  # a click is lost if the window is not drawn yet
+  xdotool click 1
+  for j in $(seq 10); do grep -q running status.txt && break 2; sleep 0.2; done
+done
 for i in $(seq 100); do grep -q "done in" status.txt && break; sleep 0.2; done
-sleep 1
 import -window root window.png
 kill $!
 cat status.txt
