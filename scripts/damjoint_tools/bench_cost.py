@@ -14,13 +14,14 @@ from pathlib import Path
 
 import numpy as np
 from damjoint import RunError
-from damjoint.fem.condensation import Bodies, condense
+from damjoint.engines.condensed.cache import interface_of
+from damjoint.fem.bodies import Bodies
+from damjoint.fem.condensation import condense
 from damjoint.joint.interface import Interface
 from damjoint.model.case import Case, load
 from damjoint.run import run
 from damjoint.solver.load_stepper import LoadStepper
 from damjoint.statics.verdict import verdict
-from damjoint.studies.bodies import interface_of
 from damjoint.studies.sweep import pool_of, stepped
 from threadpoolctl import threadpool_limits
 

@@ -12,7 +12,8 @@ from pathlib import Path
 
 import numpy as np
 from damjoint import RunError
-from damjoint.fem.condensation import Bodies, condense
+from damjoint.fem.bodies import Bodies
+from damjoint.fem.condensation import condense
 from damjoint.joint.interface import Interface
 from damjoint.model.case import Case, load
 from damjoint.model.fields import along

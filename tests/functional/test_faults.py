@@ -296,7 +296,7 @@ def test_a_getdp_run_that_exceeds_the_memory_is_refused(command, monkeypatch):
     words = "run", "dam", "--engine", "getdp", "--levels", "30", "--no-fields", "--no-picture"
     code, _, err = command(*words, "--set", "n_joint=50000")
     assert code == 1 and "need about" in err and len(err.splitlines()) == 1
-    monkeypatch.setattr("damjoint.fem.memory.left", lambda: 1e6)
+    monkeypatch.setattr("damjoint.fem.memory.available", lambda: 1e6)
     monkeypatch.setattr("damjoint.engines.getdp.solve.bulk_size", lambda _: 0)
     code, _, err = command(*words, "--set", "n_joint=20")
     assert code == 1 and "need about" in err and len(err.splitlines()) == 1

@@ -1,5 +1,5 @@
-"""Condensed bodies in the cache: complete, of this scene and version, otherwise computed again;
-nothing in a file is executed.
+"""Condensed bodies in the cache: complete, of this scene and version, or computed again; nothing in
+a file is executed.
 """
 
 import os
@@ -15,24 +15,28 @@ SMALL = {"n_joint": 6.0, "h_dam": 4.0, "h_found": 4.0}
 
 @pytest.fixture
 def entry(tmp_path, monkeypatch):
-    """A cache with one entry: its file and its content."""
+    """A cache with one entry: its file and the condensed bodies in it."""
     monkeypatch.setenv("DAMJOINT_CACHE", str(tmp_path))
-    made, bodies = cache.cached(load("a", SMALL))
+    written, bodies = cache.cached(load("a", SMALL))
     assert bodies is not None
     (file,) = tmp_path.iterdir()
-    return file, made
+    return file, written
 
 
-def same(one, other):
-    return np.array_equal(one.stiffness, other.stiffness) and one.counts == other.counts
+def same(first, second):
+    return np.array_equal(first.stiffness, second.stiffness) and first.counts == second.counts
 
 
-def test_an_entry_is_read_again(entry):
-    _, made = entry
-    found, bodies = cache.cached(load("a", SMALL))
-    assert bodies is None and same(found, made)
-    assert [shape for shape, _ in found.joint.cells] == [shape for shape, _ in made.joint.cells]
-    assert list(found.faces) == ["face2"] and found.width == made.width
+def test_all_of_an_entry_is_read_again(entry):
+    """Types, names, numbers, arrays."""
+    _, written = entry
+    result, bodies = cache.cached(load("a", SMALL))
+    assert bodies is None and list(result.faces) == ["face2"]
+    arrays = {}, {}
+    trees = [cache.pack(c, "", a) for c, a in zip((result, written), arrays, strict=True)]
+    assert trees[0] == trees[1] and len(arrays[0]) > 20
+    for name, array in arrays[0].items():
+        assert array.dtype == arrays[1][name].dtype and np.array_equal(array, arrays[1][name])
 
 
 class Trap:
@@ -47,7 +51,7 @@ class Trap:
 
 @pytest.mark.parametrize("damage", ["truncated", "foreign", "pickle", "empty", "other header"])
 def test_a_damaged_entry_is_computed_again(entry, tmp_path, damage):
-    file, made = entry
+    file, written = entry
     whole = file.read_bytes()
     if damage == "truncated":
         file.write_bytes(whole[: len(whole) // 2])
@@ -58,10 +62,10 @@ def test_a_damaged_entry_is_computed_again(entry, tmp_path, damage):
     elif damage == "empty":
         file.write_bytes(b"")
     else:
-        with np.load(file) as found:
-            np.savez(file, **{**found, "header": np.array("0.0.0")})
-    found, bodies = cache.cached(load("a", SMALL))
-    assert bodies is not None and same(found, made)
+        with np.load(file) as result:
+            np.savez(file, **{**result, "header": np.array("0.0.0")})
+    result, bodies = cache.cached(load("a", SMALL))
+    assert bodies is not None and same(result, written)
     assert not (tmp_path / "trap").exists()
     assert cache.cached(load("a", SMALL))[1] is None  # stored again
 
@@ -77,30 +81,32 @@ def test_a_damaged_entry_is_computed_again(entry, tmp_path, damage):
 )
 def test_an_entry_with_a_changed_byte_is_replaced(entry, place, value):
     """In the directory of the zip file."""
-    file, made = entry
+    file, written = entry
     data = bytearray(file.read_bytes())
     data[data.index(b"PK\x01\x02") + place] = value
     file.write_bytes(data)
-    found, bodies = cache.cached(load("a", SMALL))
-    assert bodies is not None and same(found, made)
+    result, bodies = cache.cached(load("a", SMALL))
+    assert bodies is not None and same(result, written)
     assert cache.cached(load("a", SMALL))[1] is None  # replaced
 
 
 def test_an_entry_without_an_array_is_computed_again(entry):
     """E.g. if the length of the array before it in the directory is damaged."""
-    file, made = entry
-    with np.load(file) as found:
-        np.savez(file, **{name: found[name] for name in found.files if name != "units/dam_x"})
-    found, bodies = cache.cached(load("a", SMALL))
-    assert bodies is not None and found.units.keys() == made.units.keys()
+    file, written = entry
+    with np.load(file) as result:
+        np.savez(
+            file, **{name: result[name] for name in result.files if name != "bodies/units/dam_x"}
+        )
+    result, bodies = cache.cached(load("a", SMALL))
+    assert bodies is not None and result.units.keys() == written.units.keys()
 
 
 def test_a_pipe_in_place_of_an_entry_is_not_read(entry):
-    file, made = entry
+    file, written = entry
     file.unlink()
     os.mkfifo(file)
-    found, bodies = cache.cached(load("a", SMALL))
-    assert bodies is not None and same(found, made)
+    result, bodies = cache.cached(load("a", SMALL))
+    assert bodies is not None and same(result, written)
 
 
 def test_nothing_is_written_through_links(entry, tmp_path_factory):
@@ -115,13 +121,13 @@ def test_nothing_is_written_through_links(entry, tmp_path_factory):
 
 
 def test_an_array_of_objects_is_not_loaded(entry, tmp_path):
-    file, made = entry
-    with np.load(file) as found:
-        arrays = dict(found)
-    arrays["stiffness"] = np.array([Trap(tmp_path / "trap")], dtype=object)
+    file, written = entry
+    with np.load(file) as result:
+        arrays = dict(result)
+    arrays["bodies/stiffness"] = np.array([Trap(tmp_path / "trap")], dtype=object)
     np.savez(file, **arrays)
-    found, bodies = cache.cached(load("a", SMALL))
-    assert bodies is not None and same(found, made) and not (tmp_path / "trap").exists()
+    result, bodies = cache.cached(load("a", SMALL))
+    assert bodies is not None and same(result, written) and not (tmp_path / "trap").exists()
 
 
 def test_a_cache_that_can_not_be_written_is_ignored(tmp_path, monkeypatch):

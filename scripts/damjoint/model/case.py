@@ -9,9 +9,10 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, TypeAlias, overload
 
 from .. import RUN_GEO, InputError, data
+from ..arrays import Value
 from ..laws import LAWS, Law
 from . import casefile
 from .parameters import (
@@ -57,6 +58,11 @@ SECTION = (
     *("mark_region", "mark_x", "mark_y", "mark_segment"),
 )
 
+#: The parameters whose values are texts, for type checkers: all others are numbers.
+TextName: TypeAlias = Literal[
+    "law", "uplift", "face_load", "drive", "mesh_pattern", "quadrature", "force_face"
+]
+
 
 @dataclass(frozen=True)
 class Case:
@@ -85,7 +91,13 @@ class Case:
     #: the section, by the names of pro/section.pro
     section: dict[str, list[float]] = field(default_factory=dict, compare=False, repr=False)
 
-    def __getitem__(self, name: str) -> float | str:
+    @overload
+    def __getitem__(self, name: TextName) -> str: ...  # type: ignore[overload-overlap]
+
+    @overload
+    def __getitem__(self, name: str) -> float: ...
+
+    def __getitem__(self, name: str) -> Value:
         return self.values[name]
 
     @cached_property

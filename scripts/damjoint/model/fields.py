@@ -9,8 +9,9 @@ import numpy as np
 from ..laws import COLUMNS
 from .mesh import Body
 from .results import FLUX, Results
+from .scene import SOLIDS
 
-BODIES = ("dam", "foundation")
+BODIES = tuple(SOLIDS)
 
 
 @dataclass

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from .case import Case
 from .mesh import Face
+from .scene import DOWN, TOP, UP
 
 #: Loads that grow by themselves, to all at t = <name>_t.
 STAGED = ("silt", "ice", "force", "anchor", "quake")
@@ -54,10 +55,10 @@ def line_forces(case: Case, loading: Loading) -> dict[str, tuple[float, float]]:
 
 def wet(case: Case, face: Face) -> bool:
     """Whether water (or silt) may press on a face in a case."""
-    if face.side == "up":
+    if face.side == UP:
         return True
-    highest = max(case.tail_levels) if face.side in ("down", "bed") else case.reached
-    loaded = {"down": True, "top": overtopped(case)}.get(face.side, bool(case["floor_water"]))
+    highest = max(case.tail_levels) if face.tailwater else case.reached
+    loaded = {DOWN: True, TOP: overtopped(case)}.get(face.side, bool(case["floor_water"]))
     return loaded and highest > face.surface.points[:, 1].min()
 
 

@@ -12,9 +12,11 @@ import numpy as np
 from scipy import sparse
 
 from .. import InputError, RunError, data
+from ..arrays import Array, BoolArray, IntArray, Value
 from ..storage import check_end
 from .case import Case, has_drains
 from .parameters import assignments, constants, start_gmsh
+from .scene import BED, DOWN, FLOOR, JOINT, JOINTS, SIDES, SOLIDS, TOP, UP
 
 #: Parameters that the mesh depends on, and nothing else.
 GEOMETRY = (
@@ -49,8 +51,6 @@ REGIONS = {
 LINES = ("ice", "force", "anchor")
 #: Those that every geometry has.
 NEEDED = ("dam", "foundation", "joint", "fixed", "heel", "toe", "crest")
-#: What stands before a face, in the order of the numbers in pro/section.pro.
-SIDES = ("up", "down", "top", "floor", "bed")
 
 #: Gmsh element types of order 1 by their VTK name.
 SHAPES = {
@@ -78,13 +78,13 @@ OWN_NAMES = {
     **{name: name for name in LINES},
 }
 OWN_FACES = {
-    "upstream": (True, "up"),
-    "downstream": (True, "down"),
-    "crest surface": (True, "top"),
-    "lower upstream": (False, "up"),
-    "lower downstream": (False, "down"),
-    "reservoir floor": (False, "floor"),
-    "tailwater bed": (False, "bed"),
+    "upstream": ("dam", UP),
+    "downstream": ("dam", DOWN),
+    "crest surface": ("dam", TOP),
+    "lower upstream": ("foundation", UP),
+    "lower downstream": ("foundation", DOWN),
+    "reservoir floor": ("foundation", FLOOR),
+    "tailwater bed": ("foundation", BED),
 }
 
 
@@ -99,35 +99,74 @@ class Body:
     tags in that order.
     """
 
-    points: np.ndarray
-    node_tags: np.ndarray
-    cells: list[tuple[str, np.ndarray]]
-    element_tags: np.ndarray
+    points: Array
+    node_tags: IntArray
+    cells: list[tuple[str, IntArray]]
+    element_tags: IntArray
     #: the region of each block of cells
     regions: list[str] = field(default_factory=list)
     #: of a surface: unit normals (elements, 3), out of the body it belongs to
-    normals: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    normals: Array = field(default_factory=lambda: np.zeros((0, 3)))
 
-    def middles(self) -> np.ndarray:
+    def middles(self) -> Array:
         """The middle of each element (elements, 3)."""
         return np.concatenate([self.points[table].mean(axis=1) for _, table in self.cells])
 
 
 @dataclass
 class Face:
-    """A face that water can press on: its surface, whether it is one of the upper body, which of
-    SIDES it is, and for a straight one from where to where [m] it reaches (not a number for any
-    other).
+    """A face that water can press on: its surface, normals outwards; the name of its body; its side
+    (one of SIDES); lowest and highest y [m] of a straight face (nan for any other).
     """
 
     surface: Body
-    upper: bool
+    body: str
     side: str
     low: float = np.nan
     high: float = np.nan
 
+    @property
+    def tailwater(self) -> bool:
+        """Whether tailwater, not the reservoir, presses on it."""
+        return self.side in (DOWN, BED)
 
-def shares(case: Case) -> dict[str, float | str]:
+
+@dataclass
+class JointMesh:
+    """The mesh of a joint: its surface, normals from the lower to the upper body; the lines (in the
+    plane: points) where it ends; names of its bodies.
+    """
+
+    dim: int
+    surface: Body
+    heel: Body
+    toe: Body
+    upper: str
+    lower: str
+
+    @property
+    def heel_nodes(self) -> IntArray:
+        """Indices of the surface's nodes at the heel."""
+        return np.flatnonzero(np.isin(self.surface.node_tags, self.heel.node_tags))
+
+    @property
+    def toe_nodes(self) -> IntArray:
+        """Indices of the surface's nodes at the toe."""
+        return np.flatnonzero(np.isin(self.surface.node_tags, self.toe.node_tags))
+
+    @property
+    def width(self) -> float:
+        """Extent along z [m]; 1 in the plane."""
+        return float(np.ptp(self.surface.points[:, 2])) if self.dim == 3 else 1.0
+
+    @property
+    def ends(self) -> dict[str, list[float]]:
+        """Heel, toe and length, by the names of pro/section.pro."""
+        heel, toe = (line.points[:, :2].mean(axis=0) for line in (self.heel, self.toe))
+        return ends_of(heel, toe, area(self.surface) / self.width)
+
+
+def shares(case: Case) -> dict[str, Value]:
     """The parameters that the mesh of a case depends on."""
     names = [*GEOMETRY, *(n for force, needs in MARKS.items() if case[force] for n in needs)]
     # whether there is a force, not how large
@@ -137,7 +176,7 @@ def shares(case: Case) -> dict[str, float | str]:
     return {name: case[name] for name in names} | there | drains
 
 
-def heel_normal(joint: Body, heel: Body) -> np.ndarray:
+def heel_normal(joint: Body, heel: Body) -> Array:
     """The joint's normal at its heel, a mean of the elements there."""
     near = [np.isin(joint.node_tags[t], heel.node_tags).any(axis=1) for _, t in joint.cells]
     return joint.normals[np.concatenate(near)].mean(axis=0)
@@ -193,8 +232,8 @@ def generate(case: Case) -> None:
 
 
 class Mesh:
-    """The mesh of a case: its bodies by the names of REGIONS (foundation: with what lies under a
-    lift joint), its faces, and its size.
+    """The mesh of a case: solids and joints by the names of model/scene.py, faces, number of nodes;
+    in `bodies` all of them and the other REGIONS.
 
     Raises RunError with Gmsh's message if there is no mesh for the parameters, InputError if a
     user's own geometry is not what is needed.
@@ -206,16 +245,29 @@ class Mesh:
         generate(case)
         self._read()
         bodies, faces = self._own_regions() if self.own else self._section_regions(case)
-        groups = {name: [(name, tag)] for name, tag in bodies.items() if name != "lower"}
-        if "lower" in bodies:
-            groups["foundation"].append(("lower", bodies["lower"]))
+        groups = {
+            n: [(r, bodies.pop(r)) for r in s.materials if r in bodies] for n, s in SOLIDS.items()
+        }
+        groups |= {name: [(name, tag)] for name, tag in bodies.items()}
         self.bodies = {
             name: self._body(dimension(name, self.dim), parts) for name, parts in groups.items()
         }
+        self.solids = {name: self.bodies[name] for name in SOLIDS}
+        self.joints = {
+            name: JointMesh(
+                dim=self.dim,
+                surface=self.bodies[name],
+                heel=self.bodies[joint.heel],
+                toe=self.bodies[joint.toe],
+                upper=joint.upper,
+                lower=joint.lower,
+            )
+            for name, joint in JOINTS.items()
+        }
         self.faces = {}
-        for i, (tag, upper, side, low, high) in enumerate(faces):
+        for i, (tag, body, side, low, high) in enumerate(faces):
             surface = self._body(self.dim - 1, [(f"face{i}", tag)])
-            self.faces[f"face{i}"] = Face(surface, upper, side, low, high)
+            self.faces[f"face{i}"] = Face(surface, body, side, low, high)
         self._turn_outwards()
         joint = self.bodies["joint"].element_tags
         if joint.max() >= 1_000_000:  # the keys of the joint's memory in GetDP hold six digits
@@ -239,8 +291,9 @@ class Mesh:
         for i, side in enumerate(section["seg_side"]):
             ends = section["seg_y0"][i], section["seg_y1"][i]
             upper = section["seg_body"][i] == numbers["UPPER"][0]
+            body = JOINTS[JOINT].upper if upper else JOINTS[JOINT].lower
             tag = int(numbers["SEGMENT"][0]) + i
-            faces.append((tag, upper, SIDES[int(side)], min(ends), max(ends)))
+            faces.append((tag, body, SIDES[int(side)], min(ends), max(ends)))
         return bodies, faces
 
     def _own_regions(self) -> tuple[dict[str, int], list[tuple]]:
@@ -320,31 +373,31 @@ class Mesh:
         """Give joint and faces their normals: the joint's from foundation to dam, a face's out of
         its body.
         """
-        joint, dam, foundation = (self.bodies[n] for n in ("joint", "dam", "foundation"))
+        joint = self.joints[JOINT]
+        upper, lower = self.solids[joint.upper], self.solids[joint.lower]
         if self.own:
-            shared = np.intersect1d(dam.node_tags, foundation.node_tags)
-            apart = np.setdiff1d(shared, joint.node_tags)
+            shared = np.intersect1d(upper.node_tags, lower.node_tags)
+            apart = np.setdiff1d(shared, joint.surface.node_tags)
             if len(apart):
                 x, y, z = self._coordinates[self._place[apart[0]]]
                 raise self._bad(
                     f"dam and foundation also meet beside the joint, at {x:g}, {y:g}, {z:g}"
                 )
-            heel, toe = (self.joint_ends[name][0] for name in ("heel_x", "toe_x"))
+            heel, toe = (joint.ends[name][0] for name in ("heel_x", "toe_x"))
             if toe < heel:
                 raise self._bad(
                     f"toe at x = {toe:g}, heel at {heel:g}: x must point downstream (mirror it)"
                 )
-            if np.isin(joint.node_tags, self.bodies["fixed"].node_tags).any():
+            if np.isin(joint.surface.node_tags, self.bodies["fixed"].node_tags).any():
                 raise self._bad("fixed: must not touch the joint")
-            if outward(joint, dam) is None:
+            if outward(joint.surface, upper) is None:
                 raise self._bad(
                     "joint: its elements must be sides of the dam's (a conforming mesh)"
                 )
         kinds = {kind: name for name, kind in OWN_FACES.items()}
-        surfaces = [("joint", joint, foundation)]
+        surfaces = [(JOINT, joint.surface, lower)]
         for face in self.faces.values():
-            body = dam if face.upper else foundation
-            surfaces.append((kinds[face.upper, face.side], face.surface, body))
+            surfaces.append((kinds[face.body, face.side], face.surface, self.solids[face.body]))
         for name, surface, body in surfaces:
             found = outward(surface, body)
             if found is None:
@@ -354,29 +407,29 @@ class Mesh:
                 gmsh.model.mesh.reverseElements(surface.element_tags[turned])
 
     def bearer(self, line: str) -> str:
-        """The body that bears the force on one of LINES: the dam where it is a line of both."""
-        dam = self.bodies["dam"].node_tags
-        return "dam" if np.isin(self.bodies[line].node_tags, dam).all() else "foundation"
+        """The body that bears the force on one of LINES: the first that has all nodes of it."""
+        nodes = self.bodies[line].node_tags
+        whole = (n for n, s in self.solids.items() if np.isin(nodes, s.node_tags).all())
+        return next(whole, JOINTS[JOINT].lower)
 
     @property
     def joint_ends(self) -> dict[str, list[float]]:
         """Where the joint's heel and toe are, by the names of pro/section.pro."""
-        heel, toe = (self.bodies[n].points[:, :2].mean(axis=0) for n in ("heel", "toe"))
-        return ends_of(heel, toe, area(self.bodies["joint"]) / self.width)
+        return self.joints[JOINT].ends
 
     @property
     def width(self) -> float:
         """Extent of the joint along z [m]; 1 in the plane."""
-        return float(np.ptp(self.bodies["joint"].points[:, 2])) if self.dim == 3 else 1.0
+        return self.joints[JOINT].width
 
     @property
     def counts(self) -> dict[str, int]:
-        """Nodes, elements (of dam and foundation) and joint_elements."""
-        size = {name: len(body.element_tags) for name, body in self.bodies.items()}
+        """Numbers of nodes, elements (of the solids) and joint_elements."""
+        joints = [joint.surface for joint in self.joints.values()]
         return {
             "nodes": self.nodes,
-            "elements": size["dam"] + size["foundation"],
-            "joint_elements": size["joint"],
+            "elements": sum(len(solid.element_tags) for solid in self.solids.values()),
+            "joint_elements": sum(len(surface.element_tags) for surface in joints),
         }
 
     def write(self, path: Path) -> None:
@@ -402,7 +455,7 @@ def write_mesh(case: Case, path: Path) -> dict[str, int]:
     return mesh.counts
 
 
-def ends_of(heel: np.ndarray, toe: np.ndarray, along: float) -> dict[str, list[float]]:
+def ends_of(heel: Array, toe: Array, along: float) -> dict[str, list[float]]:
     """The joint by the names of pro/section.pro, from its ends (2,) and its length [m]."""
     length = float(np.linalg.norm(toe - heel))
     values = (*heel, *toe, length, along)
@@ -422,7 +475,7 @@ def area(surface: Body) -> float:
     return float(total)
 
 
-def outward(surface: Body, body: Body) -> tuple[np.ndarray, np.ndarray] | None:
+def outward(surface: Body, body: Body) -> tuple[Array, BoolArray] | None:
     """Unit normals (elements, 3) of a surface, out of the body whose skin it is a part of, and
     which elements are numbered the other way round; None if not all are sides of the body's.
     """

@@ -92,7 +92,7 @@ def own_lists(mesh: Mesh) -> dict[str, list[float]]:
     shapes = {shape for name in ("dam", "foundation") for shape, _ in bodies[name].cells}
     return {
         "own_side": [float(SIDES.index(face.side)) for face in faces],
-        "own_body": [float(not face.upper) for face in faces],
+        "own_body": [float(face.body != "dam") for face in faces],
         "own_low": [float(face.surface.points[:, 1].min()) for face in faces],
         "own_ends": [*(v[0] for v in ends.values()), mesh.width, length, *normal[:2], *crest],
         "own_quadrangles": [float("quad" in shapes)],
