@@ -11,8 +11,8 @@ from damjoint.model.case import load
 from damjoint.solver import path
 from damjoint.statics import gravity
 from damjoint.statics.verdict import highest_by_statics
-from damjoint.studies import branch
 from damjoint.studies.critical import Search, critical
+from damjoint.studies.failure_path import FailurePath
 from scipy.optimize import brentq
 
 #: A dam of 45 m on a mesh that is fine enough for limits of the rigid block.
@@ -138,9 +138,9 @@ def test_the_search_goes_on_over_unstable_crack_growth():
     brittle |= {"adhesion": 5e6, "G_t": 1e5, "n_joint": 60.0}
     search, answer = found("dam", settings=brittle, levels="40,48")
     (trial,) = search.trials
-    levels = np.array([point.level for point in trial.branch.points])
+    levels = np.array([point.level for point in trial.path.points])
     falls = np.maximum.accumulate(levels) - levels
-    top = trial.branch.top
+    top = trial.path.top
     assert answer.confirmed and answer.mode == "overturning" and falls[:top].max() > 1
     assert answer.value == pytest.approx(52.32, abs=0.01)
 
@@ -161,7 +161,7 @@ def test_critical_level_of_a_crushed_toe():
 
 
 def test_a_limit_without_a_mechanism_is_not_confirmed(monkeypatch, command):
-    monkeypatch.setattr(branch.Branch, "pushes", lambda self: ())
+    monkeypatch.setattr(FailurePath, "increments", lambda self: ())
     code, out, _ = command("critical", "c", "--set", "pena_tang=0", "--levels", "6,8")
     assert code == 1 and "not confirmed: no further equilibrium is found" in out
 
@@ -186,7 +186,7 @@ def test_bounds_of_statics(name, settings, limit, mode):
 
 def test_statics_confirms_a_level_near_its_bound(monkeypatch):
     """Only where the search does not progress; the value is that of an equilibrium."""
-    monkeypatch.setattr(branch.Branch, "pushes", lambda self: ())
+    monkeypatch.setattr(FailurePath, "increments", lambda self: ())
     settings = {"uplift": "imposed", "sigma_max": 0.0, "crest_water": 0.0, "n_joint": 20.0}
     _, answer = found("i", settings=settings, levels="9,9.8,9.95,10.1")
     assert answer.confirmed and answer.mode == "overturning" and 9.9 < answer.value < 10.0171
@@ -200,7 +200,7 @@ def test_the_value_without_lasting_tension_is_given_too():
     settings = {"law": "friction", "adhesion": 1e6, "n_joint": 20.0}
     search, answer = found("dam", settings=settings)
     lines = "\n".join(answer.lines(search))
-    assert "kPa (" in lines and "% of the overturning moment) at any opening" in lines
+    assert "kPa (" in lines and "% of the overturning moment), at any opening" in lines
     assert answer.gravity_with["without tension"] < answer.value
 
 
@@ -216,7 +216,7 @@ def test_a_rigid_block_that_opens_to_its_toe():
 def test_a_missing_limit_is_reported(command):
     words = ("critical", "c", "--of", "visc", "--levels", "3")
     code, out, _ = command(*words)
-    assert code == 1 and "no critical visc found: stands with all that was tried" in out
+    assert code == 1 and "no critical visc found: stands with all values tried" in out
 
 
 @pytest.mark.parametrize(
@@ -255,7 +255,7 @@ def test_files_of_a_search(command, tmp_path):
 
 
 def test_an_interrupted_search_writes_its_results_so_far(monkeypatch, tmp_path):
-    advance, calls = branch.Branch.advance, []
+    advance, calls = FailurePath.advance, []
 
     def interrupted(self):
         calls.append(self)
@@ -263,7 +263,7 @@ def test_an_interrupted_search_writes_its_results_so_far(monkeypatch, tmp_path):
             raise KeyboardInterrupt
         advance(self)
 
-    monkeypatch.setattr(branch.Branch, "advance", interrupted)
+    monkeypatch.setattr(FailurePath, "advance", interrupted)
     with pytest.raises(KeyboardInterrupt):
         critical("c", "level", {"pena_tang": 0.0}, out=tmp_path / "out")
     assert (tmp_path / "out/critical.csv").read_text().count("\n") > 4
