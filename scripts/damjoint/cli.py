@@ -242,8 +242,7 @@ def do_check(arguments: argparse.Namespace) -> int:
     """Run damjoint check; 1 if a safety factor is too low."""
     from .model import parameters
     from .model.case import load
-    from .studies.check import check as check_cases
-    from .studies.check import text_table
+    from .studies.check import check_cases, text_table
 
     settings = parameters.settings(arguments.settings)
     water = arguments.levels, arguments.tail_levels
@@ -253,7 +252,7 @@ def do_check(arguments: argparse.Namespace) -> int:
     checks = check_cases(cases, arguments.out)
     errors = [f"{check.gravity.case.name}: {check.accuracy}" for check in checks if check.accuracy]
     print("\n\n".join([text_table(checks), *errors, str(arguments.out / "check.csv")]))
-    return int(any(answer.fails for check in checks for answer in check.answers))
+    return int(any(result.failures for check in checks for result in check.results))
 
 
 def add_plot(commands: Commands) -> None:
@@ -474,7 +473,7 @@ def add_sweep(commands: Commands) -> None:
 def do_sweep(arguments: argparse.Namespace) -> int:
     """Run damjoint sweep."""
     from .model import parameters
-    from .studies.plan import Loading, plan_of, sample_of
+    from .studies.plan import Schedule, plan_of, sample_of
     from .studies.sweep import meshed, sweep
 
     out = arguments.out or Path(f"{Path(arguments.case).stem}_sweep.csv")
@@ -484,7 +483,7 @@ def do_sweep(arguments: argparse.Namespace) -> int:
         raise InputError(f"--correlate {arguments.correlate[0]}: needs --sample")
     sample = sample_of(arguments.sample, **options) if arguments.sample else None
     plan = plan_of(arguments.vary, arguments.tie, sample, settings, arguments.critical)
-    loading = Loading(arguments.levels, arguments.tail_levels, arguments.steps, arguments.accuracy)
+    loading = Schedule(arguments.levels, arguments.tail_levels, arguments.steps, arguments.accuracy)
     if loading.accuracy:
         settings, loading, estimate = meshed(arguments.case, settings, loading)
         print(f"one mesh for all rows, refined for the case as it is: {estimate}")

@@ -215,7 +215,7 @@ def refined(case: Case, n: float) -> Case:
     """Return a case with n elements along the joint, by the mesh rule of --accuracy, and each load
     step cut in four.
     """
-    finer = refinement.finer(case, n / case["n_joint"])
+    finer = refinement.refine_mesh(case, n / case["n_joint"])
     return replace(refinement.halve_steps(refinement.halve_steps(finer)), accuracy=None)
 
 
@@ -226,7 +226,9 @@ def estimated_and_true(name: str, record: dict, result: Results, exact: Results)
     if name not in record:
         return ""
     error, relative = record[name]["error"], record[name]["relative"]
-    times = [t for t in refinement.reached(result) if t in refinement.reached(exact)]
-    values, true = (np.array(refinement.read(r, sorted(times))[name]) for r in (result, exact))
+    times = [t for t in refinement.reached_times(result) if t in refinement.reached_times(exact)]
+    values, true = (
+        np.array(refinement.quantities_at(r, sorted(times))[name]) for r in (result, exact)
+    )
     scale = error / relative if relative else np.abs(true).max() or 1.0
     return f"{100 * relative:.2g} / {100 * np.abs(values - true).max() / scale:.2g}"

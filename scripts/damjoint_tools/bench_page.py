@@ -13,7 +13,7 @@ import numpy as np
 from damjoint.model.case import Case, load
 from damjoint.post import validation
 from damjoint.run import run
-from damjoint.storage import held
+from damjoint.storage import locked_folder
 from tabulate import tabulate
 from threadpoolctl import threadpool_limits
 
@@ -270,7 +270,7 @@ def bench(out: Path, short: bool) -> None:
     out/measured.jsonl is the log from which an interrupted benchmark is resumed.
     """
     out.mkdir(parents=True, exist_ok=True)
-    with held(out):
+    with locked_folder(out):
         measurements = Measurements(out / "measured.jsonl", short)
         tables, precise = measure(measurements)
         for name, table in tables.items():

@@ -19,7 +19,7 @@ from damjoint.model.case import Case, load
 from damjoint.model.fields import along
 from damjoint.model.results import Results
 from damjoint.post import tables
-from damjoint.post.validation import read_at
+from damjoint.post.validation import reference_time
 from damjoint.solver.load_stepper import LoadStepper
 
 #: Seconds of wall time of code_aster 15.2 for each modeling: sequential, on a 2-core machine, the
@@ -101,7 +101,7 @@ def quantities(result: Results) -> np.ndarray:
     prescribed displacement), as means over z.
     """
     times = result.history["time"]
-    reached = np.flatnonzero(np.isclose(times, read_at(result.case)))
+    reached = np.flatnonzero(np.isclose(times, reference_time(result.case)))
     step = reached[0] if len(reached) else -1  # a far too coarse mesh may stop before
     mean = along(result.at(times[step]))
     x = mean["x"]

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
-from damjoint.storage import whole
+from damjoint.storage import atomic_write
 from tqdm import tqdm
 
 from .provenance import provenance
@@ -31,7 +31,7 @@ class Measurements:
         with contextlib.suppress(ValueError):  # last line written by half
             self._read()
         pairs = [[json.loads(key), value] for key, value in self.values.items()]
-        with whole(path) as part:
+        with atomic_write(path) as part:
             lines = [[short, self.provenance], *pairs]
             part.write_text("".join(json.dumps(line) + "\n" for line in lines))
 

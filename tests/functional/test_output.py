@@ -30,7 +30,7 @@ def test_a_text_in_a_table_is_not_a_formula_for_a_spreadsheet(tmp_path):
 def test_a_matplotlibrc_in_the_current_folder_has_no_effect(tmp_path):
     (tmp_path / "matplotlibrc").write_text("axes.facecolor: red\nfont.size: 40\n")
     script = (
-        "from damjoint.results import drawing\nimport matplotlib as m\n"
+        "from damjoint.post import drawing\nimport matplotlib as m\n"
         "print(m.rcParams['axes.facecolor'], m.rcParams['font.size'])"
     )
     done = subprocess.run(

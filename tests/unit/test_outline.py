@@ -13,8 +13,8 @@ from damjoint.model.fields import (
     state_of,
 )
 from damjoint.model.mesh import Body
-from damjoint.post.outline import filled, section_of, skin
-from damjoint.post.units import FORCES, LENGTHS, told, unit
+from damjoint.post.outline import fill_to_level, section_of, skin
+from damjoint.post.units import FORCES, LENGTHS, unit, with_unit
 from numpy.testing import assert_allclose
 
 
@@ -57,9 +57,9 @@ def test_outlines_of_a_lift_joint(lift):
     assert_allclose(section.crest, [(4, 8), (2, 8)])
     assert_allclose(section.floor, [(1, 4), (0, 0), (-5, 0)])
     assert_allclose(section.bed, [(20, 0), (12, 0), (8, 4)])
-    for plane, lip in section.lips:
-        assert_allclose(plane.points[lip], ends)
-    assert {name: len(*tables) for name, tables in section.under.faces.items()} == {
+    for body, face in section.joint_faces:
+        assert_allclose(body.points[face], ends)
+    assert {name: len(*tables) for name, tables in section.foundation.faces.items()} == {
         "foundation": 3,
         "lower": 1,
     }
@@ -93,7 +93,7 @@ def test_a_body_without_a_face_at_the_lowest_z_has_no_section(lift):
 
 def test_water_below_an_overhang():
     shore = np.array([(0.0, 3.0), (1.0, 2.0), (0.0, 1.0), (0.0, 0.0), (-2.0, 0.0)])
-    assert area(filled(shore, 2.0)) == pytest.approx(2 * 2 + 0.5)
+    assert area(fill_to_level(shore, 2.0)) == pytest.approx(2 * 2 + 0.5)
 
 
 def test_surface_of_a_solid():
@@ -149,5 +149,5 @@ def test_curves_of_a_joint_with_unordered_nodes():
     ],
 )
 def test_units_by_magnitude(value, units, text):
-    assert told(value, units) == text
+    assert with_unit(value, units) == text
     assert unit([np.array([0, -value])], units)[0] == text.split()[1]
