@@ -124,7 +124,7 @@ def validation_page() -> str:
     from damjoint.post import validation
     from damjoint.run import run
 
-    from .provenance import provenance, said
+    from .provenance import provenance, source_line
 
     comparisons = []
     with tempfile.TemporaryDirectory() as folder:
@@ -141,7 +141,7 @@ def validation_page() -> str:
                 "to a variable with another meaning, or to a value that the document prints "
                 "otherwise. At the heel the opening of I is almost 7 % above the GEFDYN value, "
                 "whose tolerance is 7 %: the mesh-converged opening is 4.29e-7 m.",
-                said([provenance()], "Computed"),
+                source_line([provenance()], "Computed"),
                 validation.report(comparisons, "github"),
                 "![Modeling K: past the critical load](pictures/k_curve.png)",
             ]
@@ -152,9 +152,10 @@ def validation_page() -> str:
 
 def tour_page() -> str:
     """reference/tour.md with its commands run anew, one after the other in a temporary folder."""
-    from .provenance import provenance, said
+    from .provenance import provenance, source_line
 
-    page = between("figures", (REFERENCE / "tour.md").read_text(), said([provenance()], "Computed"))
+    source = source_line([provenance()], "Computed")
+    page = between("figures", (REFERENCE / "tour.md").read_text(), source)
     with tempfile.TemporaryDirectory() as folder:
         play = lambda block: f"```\n{played(block[1], Path(folder))}```"
         return re.sub(r"^```\n(.*?)^```$", play, page, flags=re.S | re.M)
@@ -234,11 +235,11 @@ def trust_page(results: Path) -> str:
     tables.append(("all", *counts(rows).values()))
     slowest = sorted(rows, key=lambda row: -float(row["seconds"] or 0))[:5]
     told = [
-        f"- {row['scene']}, {row['class']}: {row['found']}\n\n      {row['command']}"
+        f"- {row['scene']}, {row['class']}: {row['findings']}\n\n      {row['command']}"
         for kind in (DEFECT, UNDECIDED)
         for row in of("class", kind)
     ]
-    worst = [(r["scene"], r["seconds"], r["iterations"], r["cuts"], r["found"]) for r in slowest]
+    worst = [(r["scene"], r["seconds"], r["iterations"], r["cuts"], r["findings"]) for r in slowest]
     return (
         "\n\n".join(
             [
@@ -250,7 +251,7 @@ def trust_page(results: Path) -> str:
                 "and earthquake, water up and down; one plane scene in ten is a slender dam of "
                 "real stiffness on a brittle joint. Made by "
                 "`python -m damjoint_tools.pages trust FILE` from its result file.",
-                provenance.said(rows),
+                provenance.source_line(rows),
                 "## What is asked of each",
                 ASKED,
                 "## What was found",
@@ -259,7 +260,7 @@ def trust_page(results: Path) -> str:
                 "\n".join(told) or "None.",
                 "## The slowest",
                 "Seconds of the whole command in one of several processes.",
-                markdown(worst, ("scene", "seconds", "iterations", "cuts", "found")),
+                markdown(worst, ("scene", "seconds", "iterations", "cuts", "findings")),
             ]
         )
         + "\n"
