@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from .. import InputError
 from ..laws import LAWS
 from .parameters import constants, declared
-from .values import ParameterValues, Section, flows, has_drains
+from .values import Group, ParameterValues, flows, has_drains
 
 #: Limits of the numbers of steps between two levels, and of levels, each of which has its table.
 MOST_STEPS, MOST_LEVELS = 100_000, 10_000
@@ -44,7 +44,7 @@ def check_energies(case: ParameterValues) -> None:
             )
 
 
-def check_softening(joint: Section, twice: bool) -> None:
+def check_softening(joint: Group, twice: bool) -> None:
     """The softening of law = rupture: not given twice."""
     if twice:
         raise InputError(
