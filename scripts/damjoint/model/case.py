@@ -117,7 +117,7 @@ class Case(ParameterValues):
 
     @property
     def reached(self) -> float:
-        """The highest level of the reservoir [m]; the highest allowed one if it is not prescribed."""
+        """The highest level of the reservoir [m]; the highest allowed if it is not prescribed."""
         return max(self.levels) if self["drive"] == "level" else self.highest_level
 
     def level_at(self, time: float) -> float:
