@@ -21,6 +21,7 @@ from tqdm import tqdm
 
 from .. import InputError
 from ..engines import Outcome
+from ..engines.condensed.cache import interface_of
 from ..engines.condensed.solve import about
 from ..laws import Evidence
 from ..model.case import Case, load
@@ -33,7 +34,6 @@ from ..solver.path import PRECISION, ROUGH, SURE, Point
 from ..statics import gravity
 from ..statics.limit import elastic_heel_stress
 from ..statics.verdict import bound, highest_by_statics, statement, tension_share
-from .bodies import interface_of
 from .failure_path import CRITICAL, FailurePath, row
 
 #: Parameters that are divided by the strength reduction factor. With the fracture energies among

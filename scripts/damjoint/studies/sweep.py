@@ -23,6 +23,7 @@ from tqdm import tqdm
 from .. import InputError, RunError, __version__, accuracy
 from ..arrays import Value, Values
 from ..engines import engine_of
+from ..engines.condensed.cache import interface_of
 from ..joint.interface import Interface
 from ..model.case import Case, first_mesh
 from ..model.results import HISTORY
@@ -31,7 +32,6 @@ from ..solver.load_stepper import LoadStepper
 from ..statics.limit import mechanism
 from ..statics.verdict import failed, statement, verdict
 from ..storage import lock
-from .bodies import interface_of
 from .critical import Search
 from .plan import AS_IN_CASE, Plan, Row, Schedule, cases_of, column_of, in_file
 
