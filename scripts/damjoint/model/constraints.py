@@ -1,5 +1,4 @@
-"""Constraints between the values of a case, one function each; that on a single value is
-`Parameter.check`.
+"""Constraints between the values of a case, a function each; `Parameter.check` checks single values.
 
 All raise InputError, "name = value: must be ...".
 """
@@ -89,8 +88,8 @@ def check_section(case: ParameterValues, section: Mapping[str, Sequence[float]])
 
 
 def check_drains(case: ParameterValues, length: float) -> None:
-    """Drains: on the joint, whose length is given [m]; pressure linear in the level where a
-    displacement is prescribed.
+    """Drains: within the length of the joint [m]; with a prescribed displacement their pressure has
+    to be linear in the level.
     """
     if not has_drains(case):
         return

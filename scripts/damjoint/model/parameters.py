@@ -168,7 +168,7 @@ def declaration(name: str, rest: str, text: str) -> Parameter:
     label = matched(r'Name\s+"([^"]+)"', rest)
     group, description, unit = re.findall(LABEL, label)[0]
     entry = json.loads(gmsh.onelab.get(label))
-    # Min of one that may be -1 is -1
+    # Min is -1 for a parameter that may be -1
     otherwise = entry.get("attributes", {}).get("Otherwise")
     low = {None: entry.get("min", -ANY), "> 0": TINY, ">= 0": 0.0}[otherwise]
     high = entry.get("max", ANY)
