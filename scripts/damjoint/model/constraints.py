@@ -1,4 +1,4 @@
-"""Constraints between the values of a case, a function each; `Parameter.check` checks single values.
+"""Constraints between the values of a case, a function each; single values: `Parameter.check`.
 
 All raise InputError, "name = value: must be ...".
 """
