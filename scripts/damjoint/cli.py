@@ -293,17 +293,17 @@ def do_check(arguments: argparse.Namespace) -> int:
     """damjoint check; 1 if a check is not met."""
     from .model import parameters
     from .model.case import load
-    from .studies.check import check, text_table
+    from .studies.check import check_cases, text_table
 
     settings = parameters.settings(arguments.settings)
     water = arguments.levels, arguments.tail_levels
     cases = [load(name, settings, *water, accuracy=arguments.accuracy) for name in arguments.cases]
     if any(case["dim"] == 3 for case in cases):
         warn_if_slow()
-    checks = check(cases, arguments.out)
+    checks = check_cases(cases, arguments.out)
     said = [f"{one.gravity.case.name}: {one.accuracy}" for one in checks if one.accuracy]
     print("\n\n".join([text_table(checks), *said, str(arguments.out / "check.csv")]))
-    return int(any(answer.fails for one in checks for answer in one.answers))
+    return int(any(result.failures for check in checks for result in check.results))
 
 
 def do_plot(arguments: argparse.Namespace) -> int:

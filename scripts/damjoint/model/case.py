@@ -43,8 +43,8 @@ CASES = data("cases")
 
 #: Constants of pro/parameters.pro that both engines use.
 SHARED = (
-    *("attempt_growth", "attempt_secant", "attempt_release", "attempt_iterations", "cut"),
-    *("round_off", "coarsest", "artificial", "sudden", "crack_aperture", "crack_most"),
+    *("strategy_growth", "strategy_secant", "strategy_release", "strategy_iterations", "cut"),
+    *("round_off", "coarsest", "artificial", "release_length", "crack_aperture", "crack_most"),
 )
 
 #: Variables of pro/section.pro: the joint's ends, the segments of the faces, the marks of line
@@ -86,7 +86,7 @@ class Case(ParameterValues):
     @cached_property
     def law(self) -> Law[Any]:
         """The joint's law with its parameters."""
-        solver = {name: self.shared[name][0] for name in ("artificial", "sudden")}
+        solver = {name: self.shared[name][0] for name in ("artificial", "release_length")}
         return LAWS[self["law"]](self.values | solver)
 
     @property

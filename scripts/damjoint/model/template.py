@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 from .. import InputError
-from ..storage import whole
+from ..storage import atomic_write
 from .parameters import Parameter, declared
 
 HEAD = """// {name} - a dam on rock. It runs as it is: damjoint run {name}
@@ -65,7 +65,7 @@ def write(path: Path) -> None:
         raise InputError(f"new = {path}: must not exist yet")
     try:
         title = re.sub(r'["\\\n]', "'", path.stem)
-        with whole(path) as part:
+        with atomic_write(path) as part:
             part.write_text(text(re.sub(r"\s", " ", path.name), title), encoding="utf-8")
     except OSError as error:
         raise InputError(f"new = {path}: {error}") from None

@@ -510,8 +510,8 @@ def write(search: Search, answer: Answer, out: Path, seconds: float) -> None:
     trials = [(t.value, t.stands, t.path) for t in search.trials]
     what = case.title, search.of, search.unit, trials
     shown = Found(*what, answer.value, answer.gravity, answer.mode)
-    with folders.taken(case, out):
-        folders.say(case, out, "interrupted" if answer.error else "complete", answer.doubt)
+    with folders.claim_output_folder(case, out):
+        folders.write_state(case, out, "interrupted" if answer.error else "complete", answer.doubt)
         if answer.point:
             result = last_state(search, answer.point)
             found = {"critical": as_json(search, answer), "wall_seconds": {"search": seconds}}

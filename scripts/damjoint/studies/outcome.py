@@ -9,7 +9,7 @@ import numpy as np
 from tabulate import tabulate
 
 from ..arrays import Value
-from ..storage import whole
+from ..storage import atomic_write
 from . import sampling
 from .plan import Plan, Row, beside, column_of, numbers
 from .sweep import UNDECIDED
@@ -68,7 +68,7 @@ def report(plan: Plan, rows: list[Row], out: Path) -> str:
         ("probability", f"Probability of failure ({interval})", probabilities(plan, rows)),
         ("sensitivity", "Rank correlation with the outcome", sensitivities(plan, rows)),
     ):
-        with whole(beside(out, f"_{name}.csv")) as path, path.open("w", newline="") as file:
+        with atomic_write(beside(out, f"_{name}.csv")) as path, path.open("w", newline="") as file:
             writer = csv.DictWriter(file, table[0], lineterminator="\n")
             writer.writeheader()
             writer.writerows(table)

@@ -13,7 +13,7 @@ from ...model.mesh import Mesh
 from ...model.results import JOINT, Results, history_table, joint_columns, joint_table
 from ...storage import check_end
 
-#: Columns of history.txt (pro/strategy.pro), behind the word "step".
+#: Columns of history.txt (pro/step_control.pro), behind the word "step".
 PRINTED = [
     "time",
     "level",
@@ -106,7 +106,7 @@ def read_joint(
         if name not in JOINT
     ]
     when = np.tile([time, level], (len(nodes), 1))
-    distance = case.joint_along * node_means(rows, table("way", 1)[1], len(nodes))
+    distance = case.joint_along * node_means(rows, table("path", 1)[1], len(nodes))
     whole = np.hstack([when, nodes, jump[:, order], traction[:, order], state, distance, *more])
     extra = whole.copy()
     corners, mean_jump = table("mean_jump")
