@@ -84,3 +84,19 @@ def test_a_force_at_the_corner_of_the_crest():
     """Rounding puts it 5e-16 m beside the corner; there must be one point only."""
     found = mesh.Mesh(load("dam", {"batter": 0.6, "dam_crest": 3.5, "force_x": 1e4, "n_joint": 5}))
     assert (found.bodies["force"].node_tags == found.bodies["crest"].node_tags).all()
+
+
+@pytest.mark.parametrize("settings", [{}, {"joint_height": 9.0}, {"dim": 3.0, "n_layers": 2.0}])
+def test_a_joint_lies_between_its_bodies(settings):
+    """Its nodes are nodes of both; its normals point to the upper one; its ends bound it."""
+    found = mesh.Mesh(load("dam", {"n_joint": 6.0, "mesh_pattern": "free"} | settings))
+    (joint,) = found.joints.values()
+    assert found.solids.keys() == {joint.upper, joint.lower}
+    for name, side in ((joint.upper, 1), (joint.lower, -1)):
+        body = found.solids[name]
+        assert np.isin(joint.surface.node_tags, body.node_tags).all()
+        away = body.points.mean(axis=0) - joint.surface.points.mean(axis=0)
+        assert (side * joint.surface.normals @ away > 0).all()
+    x = joint.surface.points[:, 0]
+    assert np.allclose(x[joint.heel_nodes], x.min()) and np.allclose(x[joint.toe_nodes], x.max())
+    assert {face.body for face in found.faces.values()} == set(found.solids)

@@ -1,11 +1,14 @@
 """Parameters, case files, levels."""
 
+from typing import get_args
+
 import numpy as np
 import pytest
 from damjoint import InputError
 from damjoint.model import parameters
 from damjoint.model.case import CASES, as_published, load
 from damjoint.model.parameters import independent
+from damjoint.model.values import TextName
 from numpy.testing import assert_allclose
 
 # Values of each modeling in the verification document and the published test files.
@@ -149,6 +152,14 @@ def test_settings_become_checked_numbers_and_choices():
     assert found == {"E": 3e9, "K_N": 1e11, "law": "friction"}
 
 
+def test_levels_as_numbers_and_as_text():
+    text = load("a", {"mu": 0.5}, "6,9", "1,2")
+    numbers = load("a", {"mu": 0.5}, [6, 9.0], (1, 2))
+    assert text == numbers and numbers.levels == (6, 9)
+    with pytest.raises(InputError, match="levels = 3,nan: must be"):
+        load("a", levels=[3, float("nan")])
+
+
 def test_levels_and_steps():
     case = load("a", levels="6,9,2,8", steps=4)
     assert case.levels == (6, 9, 2, 8)
@@ -251,3 +262,17 @@ def test_a_case_counts_as_published_with_another_mesh_only():
     } & published
     assert load("a", {"n_joint": 10}).published and not load("a", {"sigma_max": 2e4}).published
     assert not load("a", levels="3").published
+
+
+def test_groups_have_all_values_of_a_case():
+    """Each parameter is an attribute of one group; those declared as texts are the texts."""
+    case, known = load("dam"), parameters.declared()
+    names = ("scene", "dimensions", "mesh", "material", "joint", "water", "loads", "solver")
+    groups = [getattr(case, name) for name in (*names, "checks")]
+    assert sorted(n for group in groups for n in vars(group)) == sorted(known)
+    assert all(vars(group)[n] == case[n] for group in groups for n in vars(group))
+    texts = {n for n, parameter in known.items() if parameter.text}
+    assert {n for group in groups for n in getattr(group, "__annotations__", ())} == texts
+    assert set(get_args(TextName)) == texts
+    with pytest.raises(AttributeError):
+        case.joint.mu = 1.0
