@@ -12,6 +12,8 @@ Array: TypeAlias = NDArray[np.float64]
 #: of any width: numbers of nodes, elements, unknowns; Gmsh's tags are unsigned
 IntArray: TypeAlias = NDArray[np.integer[Any]]
 BoolArray: TypeAlias = NDArray[np.bool_]
+#: scipy.sparse.csr_matrix, of which type checkers do not know that its product with an array is one
+Sparse: TypeAlias = Any
 
 #: A table of results, by column.
 Table: TypeAlias = dict[str, Array]

@@ -22,7 +22,9 @@ import numpy as np
 from damjoint import RunError
 from damjoint import accuracy as on_request
 from damjoint.engines import engine_of
-from damjoint.fem.condensation import Bodies, condense
+from damjoint.engines.condensed.cache import interface_of
+from damjoint.fem.bodies import Bodies
+from damjoint.fem.condensation import condense
 from damjoint.joint.interface import Interface
 from damjoint.model.case import ACCURACIES, Case, load
 from damjoint.model.fields import along
@@ -33,7 +35,6 @@ from damjoint.run import run
 from damjoint.solver.load_stepper import LoadStepper
 from damjoint.statics.verdict import statement
 from damjoint.storage import atomic_write
-from damjoint.studies.bodies import interface_of
 from damjoint.studies.sweep import pool_of, stepped
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm

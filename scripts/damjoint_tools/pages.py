@@ -17,8 +17,8 @@ from damjoint.laws import COLUMNS
 from damjoint.model.parameters import declared
 from damjoint.model.results import FLUX, HISTORY, JOINT
 from damjoint.statics.gravity import LOADS
-from damjoint.studies.branch import CRITICAL
 from damjoint.studies.check import CHECK
+from damjoint.studies.failure_path import CRITICAL
 from tabulate import tabulate
 
 REFERENCE = Path("reference")
@@ -95,8 +95,8 @@ def results_page() -> str:
         "sum.",
         loads,
         "## critical.csv",
-        "Of `damjoint critical`: a row per equilibrium of each dam that was tried, pushed beyond "
-        "its highest level where it fails.",
+        "Of `damjoint critical`: a row per equilibrium of each trial, under displacement control "
+        "beyond its highest level where it fails.",
         critical,
         "## CASE_sweep.csv",
         "Of `damjoint sweep`, a row per combination, in the order in which they are done: `key`; "

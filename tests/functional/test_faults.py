@@ -299,7 +299,7 @@ def test_getdp_is_refused_what_it_has_no_memory_for(command, monkeypatch):
     words = "run", "dam", "--engine", "getdp", "--levels", "30", "--no-fields", "--no-picture"
     code, _, err = command(*words, "--set", "n_joint=50000")
     assert code == 1 and "need about" in err and len(err.splitlines()) == 1
-    monkeypatch.setattr("damjoint.fem.memory.left", lambda: 1e6)
+    monkeypatch.setattr("damjoint.fem.memory.available", lambda: 1e6)
     monkeypatch.setattr("damjoint.engines.getdp.solve.bulk_size", lambda _: 0)
     code, _, err = command(*words, "--set", "n_joint=20")
     assert code == 1 and "need about" in err and len(err.splitlines()) == 1

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from ..post.drawing import BLUE, GREEN, ORANGE, RED, write_picture
 from ..post.units import LENGTHS, unit
 from ..solver.path import Point
-from .branch import Branch
+from .failure_path import FailurePath
 
 
 class Trial(NamedTuple):
@@ -21,7 +21,7 @@ class Trial(NamedTuple):
 
     value: float
     stands: bool
-    branch: Branch
+    path: FailurePath
 
 
 class Content(NamedTuple):
@@ -71,9 +71,9 @@ def draw_trials(axes: Axes, content: Content) -> None:
         (True, GREEN, "^", "stands at the required level"),
         (False, RED, "v", "fails: its highest level"),
     ):
-        branches = {trial.value: trial.branch for trial in content.trials if trial.stands == stands}
-        levels = [b.target if stands else b.highest for b in branches.values()]
-        axes.plot(list(branches), levels, mark, color=color, label=label)
+        paths = {trial.value: trial.path for trial in content.trials if trial.stands == stands}
+        levels = [p.target if stands else p.highest for p in paths.values()]
+        axes.plot(list(paths), levels, mark, color=color, label=label)
     for value, style, label in critical_lines(content):
         axes.axvline(value, color="black", linestyle=style, linewidth=0.9, label=label)
     axes.set(xlabel=f"{content.of} [{content.unit.strip() or '-'}]", ylabel="level [m]")
@@ -87,8 +87,8 @@ def critical_lines(content: Content) -> list[tuple[float, str, str]]:
 
 def draw_paths(axes: Axes, content: Content) -> None:
     """Draw level against crest of the last dam that stands and of the last one that fails."""
-    last = {trial.stands: trial for trial in content.trials if trial.branch.points}
-    paths = [points_shown(trial.branch) for trial in last.values()]
+    last = {trial.stands: trial for trial in content.trials if trial.path.points}
+    paths = [points_shown(trial.path) for trial in last.values()]
     crests = [[p.last["crest_ux"] for p in points] for points in paths]
     name, factor = unit([abs(max(crest, key=abs)) for crest in crests], LENGTHS)
     for trial, points, crest in zip(last.values(), paths, crests, strict=True):
@@ -106,7 +106,7 @@ def draw_paths(axes: Axes, content: Content) -> None:
     axes.set(xlabel=f"crest, downstream [{name}]", ylabel="level [m]")
 
 
-def points_shown(branch: Branch) -> list[Point]:
-    """Points of a path up to twice the displacement at its highest level."""
-    far = 2 * (branch.points[branch.top].pushed or branch.size)
-    return [p for p in branch.points if p.pushed <= far]
+def points_shown(path: FailurePath) -> list[Point]:
+    """Points of a path up to twice the displacement of its highest level."""
+    far = 2 * path.imposed(path.points[path.top])
+    return [p for p in path.points if p.imposed <= far]

@@ -20,6 +20,7 @@ from tqdm import tqdm
 
 from .. import InputError, RunError, __version__, accuracy
 from ..engines import engine_of
+from ..engines.condensed.cache import interface_of
 from ..joint.interface import Interface
 from ..model.case import Case, first_mesh, load
 from ..model.results import HISTORY
@@ -28,7 +29,6 @@ from ..solver.load_stepper import LoadStepper
 from ..statics.limit import mechanism
 from ..statics.verdict import failed, statement, verdict
 from ..storage import lock
-from .bodies import interface_of
 from .critical import Search
 from .plan import AS_IT_IS, Loading, Plan, Row, cases_of, column_of
 
