@@ -399,7 +399,7 @@ def do_critical(arguments: argparse.Namespace) -> int:
 def do_sweep(arguments: argparse.Namespace) -> int:
     """damjoint sweep."""
     from .model import parameters
-    from .studies.plan import Loading, plan_of, sample_of
+    from .studies.plan import Schedule, plan_of, sample_of
     from .studies.sweep import meshed, sweep
 
     out = arguments.out or Path(f"{Path(arguments.case).stem}_sweep.csv")
@@ -409,7 +409,7 @@ def do_sweep(arguments: argparse.Namespace) -> int:
         raise InputError(f"--correlate {arguments.correlate[0]}: needs --sample")
     sample = sample_of(arguments.sample, **how) if arguments.sample else None
     plan = plan_of(arguments.vary, arguments.tie, sample, settings, arguments.critical)
-    loading = Loading(arguments.levels, arguments.tail_levels, arguments.steps, arguments.accuracy)
+    loading = Schedule(arguments.levels, arguments.tail_levels, arguments.steps, arguments.accuracy)
     if loading.accuracy:
         settings, loading, said = meshed(arguments.case, settings, loading)
         print(f"one mesh for all rows, that of the case itself: {said}")

@@ -43,15 +43,15 @@ CASES = data("cases")
 
 #: Values of pro/parameters.pro that the engines share and nobody sets.
 SHARED = (
-    "attempt_growth",
-    "attempt_secant",
-    "attempt_release",
-    "attempt_iterations",
+    "strategy_growth",
+    "strategy_secant",
+    "strategy_release",
+    "strategy_iterations",
     "cut",
     "round_off",
     "coarsest",
     "artificial",
-    "sudden",
+    "release_length",
     "crack_aperture",
     "crack_most",
 )
@@ -95,8 +95,13 @@ class Case(ParameterValues):
     @cached_property
     def law(self) -> Law[Any]:
         """The joint's law with its parameters."""
+<<<<<<< HEAD
         solver = {name: self.shared[name][0] for name in ("artificial", "sudden")}
         return LAWS[self["law"]](self.values | solver)
+=======
+        solver = {name: self.shared[name][0] for name in ("artificial", "release_length")}
+        return LAWS[self.values["law"]](self.values | solver)
+>>>>>>> w1
 
     @property
     def joint_length(self) -> float:

@@ -79,7 +79,7 @@ class Model:
         fallback of a step that can be cut no more.
         """
         parts = ("growth", "secant", "release", "iterations")
-        table = zip(*(self.case.shared[f"attempt_{n}"] for n in parts), strict=True)
+        table = zip(*(self.case.shared[f"strategy_{n}"] for n in parts), strict=True)
         halvings = int(self.case["max_halvings"])
         most = 2 if self.equilibrium.law.releases_shear else 1
         return tuple(

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain, zip_longest
 from pathlib import Path
@@ -126,8 +126,8 @@ class Search:
         case: str,
         of: str,
         settings: dict | None = None,
-        levels: str | None = None,
-        tail_levels: str | None = None,
+        levels: str | Sequence[float] | None = None,
+        tail_levels: str | Sequence[float] | None = None,
         on_progress: Callable[[str], None] = lambda message: None,
     ) -> None:
         """case, settings, levels, tail_levels: as in model.case.load; of: level, strength, uplift
@@ -213,9 +213,7 @@ class Search:
         """The highest level of the path, beyond the case's highest level."""
         name, *_ = self.source
         last = int(np.argmax(self.own.levels)) + 1
-        lists = (self.own.levels[:last], self.own.tail_levels[:last])
-        texts = (",".join(map(repr, values)) for values in lists)
-        case = load(name, self.settings, *texts)
+        case = load(name, self.settings, self.own.levels[:last], self.own.tail_levels[:last])
         path = self.path(max(case.levels), case, case.highest_level)
         path.follow(SURE)
         path.refine()

@@ -109,12 +109,12 @@ def write_problem(
 
     mesh: of a user's own geometry.
     """
-    wanted = [float(t in case.requested) for t in case.times]
+    save_step = [float(t in case.requested) for t in case.times]
     lists = {
         "levels": case.levels,
         "tail_levels": case.tail_levels,
         "times": case.times,
-        "wanted": wanted,
+        "save_step": save_step,
     }
     if case.geometry:
         lists |= own_lists(mesh)
