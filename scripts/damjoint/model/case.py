@@ -95,13 +95,8 @@ class Case(ParameterValues):
     @cached_property
     def law(self) -> Law[Any]:
         """The joint's law with its parameters."""
-<<<<<<< HEAD
-        solver = {name: self.shared[name][0] for name in ("artificial", "sudden")}
-        return LAWS[self["law"]](self.values | solver)
-=======
         solver = {name: self.shared[name][0] for name in ("artificial", "release_length")}
-        return LAWS[self.values["law"]](self.values | solver)
->>>>>>> w1
+        return LAWS[self["law"]](self.values | solver)
 
     @property
     def joint_length(self) -> float:

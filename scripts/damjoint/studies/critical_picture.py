@@ -107,6 +107,6 @@ def draw_paths(axes: Axes, content: Content) -> None:
 
 
 def points_shown(path: FailurePath) -> list[Point]:
-    """Points of a path up to twice the displacement of its highest level."""
+    """Points of a path up to twice the displacement at its highest level."""
     far = 2 * path.imposed(path.points[path.top])
     return [p for p in path.points if p.imposed <= far]
