@@ -30,11 +30,11 @@ from damjoint.model.results import Results
 from damjoint.post import tables
 from damjoint.post.validation import read_at
 from damjoint.run import run
-from damjoint.solver.load_stepper import Filling
+from damjoint.solver.load_stepper import LoadStepper
 from damjoint.statics.verdict import statement
 from damjoint.storage import whole
 from damjoint.studies.bodies import interface_of
-from damjoint.studies.sweep import filled, pool_of
+from damjoint.studies.sweep import pool_of, stepped
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
@@ -225,7 +225,7 @@ def measure(case: Case) -> tuple[Results, dict[str, float]]:
     """
     bulk = condense(case, Bodies.of(case))
     begin = time.perf_counter()
-    result = Filling(case, Interface(bulk, case["quadrature"])).run()
+    result = LoadStepper(case, Interface(bulk, case["quadrature"])).run()
     done = time.perf_counter()
     with tempfile.TemporaryDirectory() as folder:
         tables.write(result, Path(folder))
@@ -558,7 +558,7 @@ def switches(kept: Kept) -> Table:
         return *seconds, seconds[0] / seconds[1]
 
     def filling(*about: object) -> Callable[[], object]:
-        return lambda: Filling(load("e", *about), joint).run()
+        return lambda: LoadStepper(load("e", *about), joint).run()
 
     def whole(*about: object) -> Callable[[], object]:
         return lambda: measure(load("a", *about))
@@ -626,8 +626,8 @@ def sweeps(kept: Kept) -> Table:
         with threadpool_limits(1):
             bulk, known, spent = condense(case, Bodies.of(case)), {}, []
             joint = Interface(bulk, case["quadrature"])
-            runs = [partial(filled, one, known, joint) for one in (first, above)]
-            runs += [Filling(load(name, main | s), joint).run for s in (weaker, stiffer)]
+            runs = [partial(stepped, one, known, joint) for one in (first, above)]
+            runs += [LoadStepper(load(name, main | s), joint).run for s in (weaker, stiffer)]
             for run_it in runs:
                 start = time.perf_counter()
                 run_it()
@@ -659,7 +659,7 @@ def one_of_the_grid(values: tuple) -> tuple:
     )
     with threadpool_limits(1):
         start = time.perf_counter()
-        result = Filling(case, interface_of(case)).run()
+        result = LoadStepper(case, interface_of(case)).run()
         spent = time.perf_counter() - start
     history = result.history
     level = history["level"][-1] if len(history["level"]) else 0.0

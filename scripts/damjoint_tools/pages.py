@@ -13,8 +13,9 @@ import sys
 import tempfile
 from pathlib import Path
 
+from damjoint.laws import COLUMNS
 from damjoint.model.parameters import declared
-from damjoint.model.results import FLUX, HARDENING, HISTORY, JOINT
+from damjoint.model.results import FLUX, HISTORY, JOINT
 from damjoint.statics.gravity import LOADS
 from damjoint.studies.branch import CRITICAL
 from damjoint.studies.check import CHECK
@@ -72,7 +73,7 @@ def results_page() -> str:
     """reference/results.md: the columns of the tables."""
     joint, history, check, loads, critical = (
         markdown([(f"`{n}`", u, m) for n, (u, m) in columns.items()], ("column", "unit", "meaning"))
-        for columns in (JOINT | HARDENING | FLUX, HISTORY, CHECK, LOADS, CRITICAL)
+        for columns in (JOINT | COLUMNS | FLUX, HISTORY, CHECK, LOADS, CRITICAL)
     )
     parts = [
         "# Results",

@@ -1,5 +1,7 @@
 """The two engines against one another: the laws point by point, and whole loadings."""
 
+from dataclasses import fields, replace
+
 import numpy as np
 import pytest
 from damjoint import run
@@ -64,20 +66,20 @@ def laws_agree(law_name, seed, works):
     case = load("ssnp142", changed | {"law": law_name})
     jumps = random_path(law_name, seed, case)
     expected = law.evaluate(law_name, jumps, settings=changed)
-    model, memory = LAWS[law_name](case), LAWS[law_name](case).start(1)
+    model, variables = case.law, case.law.initial(1)
     scale = np.abs(expected["sigma_n"]).max()
     for i, jump in enumerate(jumps[:, None, :]):
-        memory = model.stage(memory, i, i + 1)
-        traction, _ = model.respond(jump, memory)
-        memory = model.remember(jump, memory)
-        found = [*traction[0], memory.scalar[0], *memory.vector[0]]
-        if law_name == "rupture":
-            found.append(np.ravel(memory.thickness)[0])
-        wanted = [expected[n][i] for n in ("sigma_n", "tau_1", "tau_2", *law.MEMORY[law_name])]
+        variables = model.begin_step(variables, i, i + 1)
+        traction, _ = model.traction_and_tangent(jump, variables)
+        variables = model.update_internal_variables(jump, variables)
+        numbers = [n for f in fields(variables) for n in np.ravel(getattr(variables, f.name))]
+        names = model.variable_names
+        found = [*traction[0], *numbers[: len(names)]]
+        wanted = [expected[n][i] for n in ("sigma_n", "tau_1", "tau_2", *names)]
         assert np.allclose(found[:3], wanted[:3], rtol=1e-9, atol=1e-9 * scale)
         assert np.allclose(found[3:], wanted[3:], rtol=1e-9, atol=1e-9 * np.abs(jumps).max())
-        assert model.damage(jump, memory)[0] == pytest.approx(expected["damage"][i], abs=1e-9)
-        assert model.open(jump, memory)[0] == expected["open"][i]
+        assert model.damage(jump, variables)[0] == pytest.approx(expected["damage"][i], abs=1e-9)
+        assert model.is_open(jump, variables)[0] == expected["open"][i]
 
 
 @pytest.mark.parametrize(
@@ -94,18 +96,20 @@ def test_tangent_is_the_derivative(law_name, works):
         "G_t": 1e-5,
     }
     case = load("ssnp142", settings | {"law": law_name})
-    model = LAWS[law_name](case)
+    model = case.law
     jumps = random_path(law_name, 7, case)
-    memory = model.start(len(jumps))
-    memory.vector[:] = 0.1 * jumps[:, 1:]
-    memory = model.stage(memory, 49.5, 49.8)
+    variables = model.initial(len(jumps))
+    tangential = fields(variables)[1].name
+    variables = replace(variables, **{tangential: 0.1 * jumps[:, 1:]})
+    variables = model.begin_step(variables, 49.5, 49.8)
     step = 1e-6 * np.abs(jumps).max()
-    _, tangent = model.respond(jumps, memory)
+    _, tangent = model.traction_and_tangent(jumps, variables)
     agree = np.zeros(len(jumps), bool)
     for component in range(3):
         shift = np.eye(3)[component] * step
         slope = (
-            model.respond(jumps + shift, memory)[0] - model.respond(jumps - shift, memory)[0]
+            model.traction_and_tangent(jumps + shift, variables)[0]
+            - model.traction_and_tangent(jumps - shift, variables)[0]
         ) / (2 * step)
         close = np.abs(slope - tangent[:, :, component]).max(axis=1) < 1e-4 * case["K_T"]
         agree = close if component == 0 else agree & close

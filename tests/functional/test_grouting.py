@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from damjoint.fem.elasticity import body_force, elasticity
 from damjoint.fem.elements import JOINT, Space, points_of
-from damjoint.laws.rupture import Rupture
 from damjoint.model.case import load
 from damjoint.model.mesh import Body
 from scipy import sparse
@@ -42,19 +41,19 @@ def test_published_openings_of_a_grouted_joint():
     )
     opening = 2 * points.values @ pick
     free = np.flatnonzero(np.repeat(space.place[:, 1] > 0, 2))
-    law = Rupture(load("ssnp142", LAW | {"grout_pressure": PRESSURE, "grout_t": 2.0}))
-    memory, u = law.start(len(points.weights)), np.zeros(2 * functions)
+    law = load("ssnp142", LAW | {"grout_pressure": PRESSURE, "grout_t": 2.0}).law
+    variables, u = law.initial(len(points.weights)), np.zeros(2 * functions)
     for time in (1, 2, 3):
-        memory, residual = law.stage(memory, time - 1, time), weight
+        variables, residual = law.begin_step(variables, time - 1, time), weight
         while np.linalg.norm(residual[free]) > 1e-9 * np.linalg.norm(weight):
             jump = np.pad((opening @ u)[:, None], ((0, 0), (0, 2)))
-            traction, tangent = law.respond(jump, memory)
+            traction, tangent = law.traction_and_tangent(jump, variables)
             # each block has its half of the joint's work
             half = opening.T @ sparse.diags(points.weights / 2)
             residual = weight - stiffness @ u - half @ traction[:, 0]
             matrix = stiffness + half @ sparse.diags(tangent[:, 0, 0]) @ opening
             u[free] += spsolve(matrix[free][:, free].tocsc(), residual[free])
-        memory = law.remember(jump, memory)
+        variables = law.update_internal_variables(jump, variables)
     assert traction[:, 0] == pytest.approx(-PRESSURE, rel=1e-6)
     for y, (published, tolerance) in PUBLISHED.items():
         (node,) = np.flatnonzero((space.place[:, 0] == 0) & (space.place[:, 1] == y))

@@ -8,9 +8,10 @@ from functools import partial
 import numpy as np
 import pytest
 from damjoint import InputError, run
+from damjoint.laws import COLUMNS
 from damjoint.model.case import load
 from damjoint.model.parameters import declared
-from damjoint.model.results import FLUX, HARDENING, HISTORY, JOINT
+from damjoint.model.results import FLUX, HISTORY, JOINT
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from own_mesh import OwnMesh, Shuffled
@@ -116,7 +117,7 @@ def in_units(case, units):
     told = lambda heights: ",".join(repr(height * factor("m")) for height in heights)
     case = load("dam", values, told(case.levels), told(case.tail_levels))
     lengths = {n: [case.shared[n][0] * factor("m")] for n in ("sudden", "crack_aperture")}
-    columns = (JOINT | HARDENING | FLUX | HISTORY).items()
+    columns = (JOINT | COLUMNS | FLUX | HISTORY).items()
     scaled = {name: partial(np.multiply, factor(unit)) for name, (unit, _) in columns}
     return replace(case, shared=case.shared | lengths), scaled
 

@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-from damjoint.laws import Memory
-from damjoint.laws.friction import Friction
-from damjoint.laws.rupture import Rupture
+from damjoint.laws import Mode
+from damjoint.laws.friction import FrictionVariables
 from damjoint.model.case import load
 from damjoint.statics.verdict import verdict
 
@@ -39,15 +38,15 @@ def test_stiff_friction_without_hardening(solve, overrides):
 
 
 def test_secant_of_friction_is_stress_over_jump():
-    law = Friction(load("ssnp142", {"law": "friction", "K_T": 9e14}))
+    law = load("ssnp142", {"law": "friction", "K_T": 9e14}).law
     rng = np.random.default_rng(1)
     jump = rng.normal(0, [1e-8, 2e-11, 2e-11], (200, 3)) - [5e-8, 0, 0]
-    memory = Memory(np.zeros(200), rng.normal(0, 2e-11, (200, 2)))
-    traction, secant = law.respond(jump, memory, secant=True)
-    slid = law.trial(jump, memory)[3] > 0
+    variables = FrictionVariables(np.zeros(200), rng.normal(0, 2e-11, (200, 2)))
+    traction, secant = law.evaluate(jump, variables, Mode(secant=True))
+    slid = law.trial(jump, variables).slip > 0
     assert 0 < slid.sum() < 200
     np.testing.assert_allclose(
-        np.einsum("qij,qj->qi", secant, jump - np.pad(memory.vector, ((0, 0), (1, 0)))),
+        np.einsum("qij,qj->qi", secant, jump - np.pad(variables.plastic, ((0, 0), (1, 0)))),
         traction,
         rtol=1e-9,
     )
@@ -55,14 +54,14 @@ def test_secant_of_friction_is_stress_over_jump():
 
 
 def test_line_of_the_release_is_the_law_inside_it_and_its_extension_outside():
-    law = Rupture(load("ssnp142", {"sigma_max": 0}))
-    memory = law.start(3)
+    law = load("ssnp142", {"sigma_max": 0}).law
+    variables = law.initial(3)
     jump = np.array([[0.25, 1e6, 0], [-3.0, 1e6, 0], [5.0, 1e6, 0]]) * law.L_CT
-    line, tangent = law.respond(jump, memory, within=np.ones(3, bool))
+    line, tangent = law.evaluate(jump, variables, Mode(releasing=np.ones(3, bool)))
     np.testing.assert_allclose(line[:, 1], law.K_T * np.array([0.75, 4, -4]) * 1e6 * law.L_CT)
     np.testing.assert_allclose(tangent[:, 1, 0], -law.K_T * 1e6)
-    assert law.side(jump, memory).tolist() == [0, -1, 1]
-    np.testing.assert_array_equal(line[0], law.respond(jump, memory)[0][0])
+    assert law.release_side(jump, variables).tolist() == [0, -1, 1]
+    np.testing.assert_array_equal(line[0], law.traction_and_tangent(jump, variables)[0][0])
 
 
 def test_the_weight_comes_first_where_the_first_step_fails(solve):

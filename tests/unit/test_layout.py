@@ -9,7 +9,7 @@ from damjoint_tools import pages
 
 PACKAGE = Path(damjoint.__file__).parent
 #: Each part uses only those before it.
-PARTS = ["", "storage", "model", "laws", "fem", "joint", "solver", "engines", "statics", "post"]
+PARTS = ["", "storage", "laws", "model", "fem", "joint", "solver", "engines", "statics", "post"]
 PARTS += ["accuracy", "run", "studies", "gui", "cli", "__main__"]
 
 

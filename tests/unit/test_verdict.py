@@ -59,7 +59,7 @@ def test_a_bond_holds_by_the_cohesion_that_damage_has_left():
         result.joint.update(
             half | {"slip": np.zeros(2), "z": np.zeros(2), "damage": np.full(2, 0.5)}
         )
-        assert verdict.held(result) == pytest.approx(left * result.case["adhesion"] * length)
+        assert verdict.cohesion(result) == pytest.approx(left * result.case["adhesion"] * length)
 
 
 @pytest.mark.parametrize("engine, said", [("getdp", True), ("condensed", False)])

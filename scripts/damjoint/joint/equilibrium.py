@@ -10,10 +10,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
-from ..laws import LAWS, Memory
+from ..laws import TANGENT, Law, Mode
+from ..laws.base import Array
 from ..model.case import Case, flows, has_drains
 from ..model.loads import Loading, line_forces, quake_column, water_column
 from .interface import Change, Interface
@@ -35,9 +37,20 @@ class Pressure:
     leakage: float = 0.0
 
 
-class Joint:
-    """The joint of a case with the condensed bodies around it: residual, tangent and what is read
-    from them.
+@dataclass(frozen=True)
+class Residual:
+    """The forces out of balance at a jump and a level (j,), and their derivatives."""
+
+    value: Array
+    #: with the jump, a change of the undamaged joint's, by the law's tangent or by its secant
+    by_jump: Callable[[bool], Change]
+    #: with the level (j,)
+    by_level: Callable[[], Array]
+
+
+class Equilibrium:
+    """The joint of a case with the condensed bodies around it: residual, tangent and what is
+    evaluated from a jump.
     """
 
     def __init__(self, case: Case, interface: Interface) -> None:
@@ -47,10 +60,11 @@ class Joint:
         drained = self.flowing and has_drains(case)
         self.drains = interface.drains(case["drain_x"]) if drained else None
         self.unit_weight = case["rho_water"] * case["g"]
-        self.law = LAWS[case["law"]](case)
-        self.virgin = self.law.respond(np.zeros((1, 3)), self.law.start(1))[1][0]
+        self.law: Law[Any] = case.law
+        #: tangent (3, 3) of the undamaged joint
+        self.undamaged = self.law.traction_and_tangent(np.zeros((1, 3)), self.law.initial(1))[1][0]
         #: forces on the loaded unknowns and t_0; with the water in the joint: of the last loadings
-        self.pushed = lru_cache(maxsize=4)(self._pushed)
+        self.external_forces = lru_cache(maxsize=4)(self._external_forces)
         self.loads = lru_cache(maxsize=4)(self._loads)
 
     # -- loads
@@ -104,7 +118,7 @@ class Joint:
             found |= {f"{name}_{axis}": part for axis, part in zip("xy", force, strict=True)}
         return {name: value for name, value in found.items() if value and name in self.bulk.units}
 
-    def _pushed(self, loading: Loading) -> tuple[np.ndarray, np.ndarray]:
+    def _external_forces(self, loading: Loading) -> tuple[np.ndarray, np.ndarray]:
         """Forces on the loaded unknowns (m,), and t_0 (j,) of them and of the unit loads."""
         bulk = self.bulk
         forces = np.zeros(bulk.pressure.shape[1])
@@ -166,7 +180,7 @@ class Joint:
         return np.maximum(self.unit_weight * (self.head(loading, matrix) - y) + beyond, 0)
 
     def lift(self, loading: Loading, beyond: np.ndarray | float = 0.0) -> np.ndarray:
-        """How the water in the joint pushes its lips apart (j,)."""
+        """Forces of the water in the joint on its two faces (j,)."""
         interface = self.interface
         weights, y = interface.water_points.weights, interface.water_points.positions[:, 1]
         pressure = self.uplift(loading, interface.along.at_water, y, beyond)
@@ -174,16 +188,16 @@ class Joint:
 
     def _loads(self, loading: Loading) -> np.ndarray:
         """t_0 and, unless it flows, the water in the joint together (j,)."""
-        total = self.pushed(loading)[1]
+        total = self.external_forces(loading)[1]
         return total + self.lift(loading) if self.wet and not self.flowing else total
 
-    def beyond(self, inner: np.ndarray) -> np.ndarray:
+    def expand_to_nodes(self, inner: np.ndarray) -> np.ndarray:
         """The pressure at all of the joint's nodes from that at the inner ones."""
         whole = np.zeros(self.interface.along.nodes)
         whole[self.interface.along.inside] = inner
         return whole
 
-    def aperture(self, jump: np.ndarray, memory: Memory) -> tuple[np.ndarray, np.ndarray, float]:
+    def aperture(self, jump: np.ndarray, variables: Any) -> tuple[np.ndarray, np.ndarray, float]:
         """Conductivity at the law's points over that of the closed joint, its derivative with the
         opening, and the closed joint's aperture [m].
 
@@ -196,14 +210,14 @@ class Joint:
         else:
             shared = self.case.shared
             narrowest, most = (shared[f"crack_{n}"][0] for n in ("aperture", "most"))
-            opening = opening - self.law.opens_at(memory)
+            opening = opening - self.law.opening_of_crack(variables, len(opening))
         wider = np.maximum(opening, 0) / narrowest
         factor = 1 + np.minimum(wider, most)
         growing = (wider > 0) & (wider < most)
         return factor**3, np.where(growing, 3 / narrowest * factor**2, 0), narrowest
 
     def solve_flow(
-        self, jump: np.ndarray, memory: Memory, loading: Loading
+        self, jump: np.ndarray, variables: Any, loading: Loading
     ) -> tuple[np.ndarray, object]:
         """Pressure beyond the imposed one at the inner nodes; and for each solution it is made of
         its share in it and what its sensitivity wants.
@@ -214,7 +228,7 @@ class Joint:
         takes their effect (EM 1110-2-2200).
         """
         case, flow = self.case, self.interface.flow
-        factor = self.aperture(jump, memory)[0]
+        factor = self.aperture(jump, variables)[0]
         conductivity = factor * self.interface.points.weights
         head = self.head(loading)
         free, solution = flow.solve(conductivity, self.unit_weight * head)
@@ -223,7 +237,7 @@ class Joint:
         nodes, points = self.drains
         own = self.bulk.joint.points[nodes, 1]
         outlet = np.maximum(own, max(case["drain_level"], loading.tail))
-        there = head[nodes] + self.beyond(free)[nodes] / self.unit_weight
+        there = head[nodes] + self.expand_to_nodes(free)[nodes] / self.unit_weight
         cracked = case["uplift"] == "cracked" and (factor[points] > 1).any()
         effect = case["drain_effectiveness"]
         if cracked or not (there > outlet).all() or effect == 0:
@@ -235,63 +249,60 @@ class Joint:
         return (1 - effect) * free + effect * drawn, parts
 
     def flowing_lift(
-        self, jump: np.ndarray, memory: Memory, loading: Loading
+        self, jump: np.ndarray, variables: Any, loading: Loading
     ) -> tuple[np.ndarray, object]:
-        """How flowing water pushes the joint's lips apart (j,), and its flow's solution."""
-        inner, solution = self.solve_flow(jump, memory, loading)
-        return self.lift(loading, self.interface.along.at_water @ self.beyond(inner)), solution
+        """Forces of flowing water on the faces of the joint (j,), and its flow's solution."""
+        inner, solution = self.solve_flow(jump, variables, loading)
+        beyond = self.interface.along.at_water @ self.expand_to_nodes(inner)
+        return self.lift(loading, beyond), solution
 
     def residual(
         self,
-        jump: np.ndarray,
-        memory: Memory,
+        jump: Array,
+        variables: Any,
         loading: Loading,
-        within: np.ndarray | None = None,
-        held_lift: np.ndarray | None = None,
-    ) -> tuple[np.ndarray, Callable[[bool], Change], Callable[[], np.ndarray]]:
-        """The residual (j,), and functions that give its derivatives with jump (a change of the
-        virgin joint's, by the law's tangent or by its secant) and with the level (j,).
+        mode: Mode = TANGENT,
+        frozen_lift: Array | None = None,
+    ) -> Residual:
+        """The residual and its derivatives.
 
-        within: see the law's `respond`; held_lift: what takes the place of the flowing water's
-        lift, whatever the jump.
+        mode: of the law; frozen_lift (j,): replaces the lift of the flowing water.
         """
         interface = self.interface
         at_points = interface.jumps(interface.at_points, jump)
-        traction, tangent = self.law.respond(at_points, memory, within=within)
-
-        def law_change(secant: bool) -> Change:
-            stiffness = self.law.respond(at_points, memory, True)[1] if secant else tangent
-            return interface.change(stiffness, self.virgin)
-
+        traction, tangent = self.law.evaluate(at_points, variables, mode)
         value = self.bulk.stiffness @ jump - self.loads(loading) + interface.forces(traction)
 
-        flowing, solution = self.flowing and held_lift is None, None
+        flowing, solution = self.flowing and frozen_lift is None, None
         if flowing:
-            lift, solution = self.flowing_lift(jump, memory, loading)
+            lift, solution = self.flowing_lift(jump, variables, loading)
             value = value - lift
-        elif held_lift is not None:
-            value = value - held_lift
+        elif frozen_lift is not None:
+            value = value - frozen_lift
 
         def by_jump(secant: bool) -> Change:
-            change = law_change(secant)
+            stiffness = tangent
+            if secant:
+                stiffness = self.law.evaluate(at_points, variables, Mode(True, mode.frozen))[1]
+            change = interface.change(stiffness, self.undamaged)
             if flowing:
-                growing = self.aperture(jump, memory)[1] * interface.points.weights
+                growing = self.aperture(jump, variables)[1] * interface.points.weights
                 found = [interface.flow.sensitivity(part, growing) for _, part in solution]
                 change.columns = found[0][1]
                 shares = (share for share, _ in solution)
                 change.pressure = sum(s * p for s, (p, _) in zip(shares, found, strict=True))
             return change
 
-        def by_level() -> np.ndarray:
+        def by_level() -> Array:
             slope = -self.rate(self._loads, loading)
             if flowing:
-                lifted = lambda other: self.flowing_lift(jump, memory, other)[0]
+                lifted = lambda other: self.flowing_lift(jump, variables, other)[0]
                 slope = slope - self.rate(lifted, loading)
             return slope
 
-        return value, by_jump, by_level
+        return Residual(value, by_jump, by_level)
 
-    def pressure(self, jump: np.ndarray, memory: Memory, loading: Loading) -> Pressure:
+    def pressure(self, jump: np.ndarray, variables: Any, loading: Loading) -> Pressure:
         """The water's pressure in the joint for an opening."""
         interface, bulk = self.interface, self.bulk
         place = interface.space.place
@@ -300,14 +311,14 @@ class Joint:
             return Pressure(*(np.zeros(len(x)) for x in here))
         along = interface.along
         matrices = along.at_points, along.at_water, along.at_places
-        inner = self.solve_flow(jump, memory, loading)[0] if self.flowing else 0.0
-        whole = self.beyond(inner)
+        inner = self.solve_flow(jump, variables, loading)[0] if self.flowing else 0.0
+        whole = self.expand_to_nodes(inner)
         found = [
             self.uplift(loading, m, x[:, 1], m @ whole) for m, x in zip(matrices, here, strict=True)
         ]
         if self.case["uplift"] != "flow":
             return Pressure(*found)
-        factor, _, narrowest = self.aperture(jump, memory)
+        factor, _, narrowest = self.aperture(jump, variables)
         conductivity = self.case["rho_water"] * narrowest**3 * factor / (12 * self.case["visc"])
         total = self.unit_weight * self.head(loading) + whole
         nodes = () if self.drains is None else (self.drains[0],)
@@ -316,12 +327,12 @@ class Joint:
     def crest(self, jump: np.ndarray, loading: Loading) -> float:
         """The crest's displacement along x [m]."""
         bulk = self.bulk
-        value = bulk.crest_pressure @ self.pushed(loading)[0] + bulk.crest_jump @ jump
+        value = bulk.crest_pressure @ self.external_forces(loading)[0] + bulk.crest_jump @ jump
         for name, size in self.units_of(loading).items():
             value += size * bulk.crest_units[name]
         return float(value)
 
     def crest_rate(self, loading: Loading) -> float:
         """Its derivative with the level."""
-        forces = self.rate(lambda other: self._pushed(other)[0], loading)
+        forces = self.rate(lambda other: self._external_forces(other)[0], loading)
         return float(self.bulk.crest_pressure @ forces)

@@ -1,63 +1,190 @@
-"""The joint laws of pro/law_*.pro once more, for many points at once: the condensed engine's.
+"""What a joint law provides, for many points at once; what the rest of the package knows of it.
 
-A law is a class with `start`, `stage`, `respond`, `side`, `hold` and `remember`, and what its
-memory means.
-Arrays: jump (q, 3) is delta_n, delta_t1, delta_t2 [m]; traction (q, 3) is sigma_n (effective),
-tau_1, tau_2 [Pa]; tangent (q, 3, 3) its derivative [Pa/m]; the memory a scalar (q,) and a vector
-(q, 2).
-Formulas: design of JOINT_MECA_RUPT and JOINT_MECA_FROT (code_aster R7.01.25).
+Arrays: jump (q, 3) is the displacement jump delta_n, delta_t1, delta_t2 [m]; traction (q, 3) is
+sigma_n (effective), tau_1, tau_2 [Pa]; tangent (q, 3, 3) is its derivative with the jump [Pa/m].
+Signs: opening > 0, tension > 0, downstream > 0.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+V = TypeVar("V")
 
 
-@dataclass
-class Memory:
-    """What a joint remembers at q points: scalar (q,), vector (q, 2) [m]; and what is done to it in
-    the step at hand.
+@dataclass(frozen=True)
+class Mode:
+    """How the solver evaluates a law in an iteration."""
+
+    #: the secant stiffness in place of the tangent
+    secant: bool = False
+    #: the law with frozen damage, see `Law.freeze`
+    frozen: Law[Any] | None = None
+    #: points (q,) that are placed inside the release of their shear, see `Law.shear_release`
+    releasing: Mask | None = None
+
+
+TANGENT = Mode()
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What a run shows of a law's weak side, see `Law.hints`."""
+
+    crack_length: float
+    #: whether a crack has grown unstably, or the run has not converged
+    unstable: bool
+    #: part of the overturning moment that the tension of the open points balances; nan: unknown
+    tension_share: float
+
+
+class Law(Generic[V]):
+    """A law's response, internal variables V, strength and meaning; the defaults are those of an
+    elastic joint of one law-specific method, `traction_and_tangent`.
     """
 
-    scalar: np.ndarray
-    vector: np.ndarray
-    #: grout that has set (q,) [m]
-    thickness: np.ndarray | float = 0.0
-    #: thickness sawn away [m], and the opening that liquid grout leaves [m]
-    sawn: float = 0.0
-    most: float = np.inf
-    #: while a burst is followed, in which nothing breaks or lets go any further (see `hold`): the
-    #: share (q,) that is left of the shear stiffness (rupture) or of the bond (bond)
-    held: np.ndarray | None = None
+    #: names of the scalars in V, in the order of `LawVariables` of its .pro file
+    variable_names: tuple[str, ...] = ()
+    #: columns of joint.csv besides those of every law: {name: (unit, meaning)}
+    columns: Mapping[str, tuple[str, str]] = {}
+    #: what joint.csv calls the slip of this law
+    slip_name = "slip"
+    #: whether it softens, so that a crack can grow unstably
+    softens = False
+    #: whether its shear stress is bounded, so that a dam can slide
+    limits_shear = True
+    #: parameter of its hardening modulus [Pa/m]; empty: it does not harden
+    hardening_parameter = ""
+    #: whether slip raises the shear strength
+    hardens = False
+    #: whether it includes grouting and sawing
+    has_works = False
+    #: whether a dam stands after all of its joint has slipped, without hardening
+    stands_slipped = False
+    #: tension [Pa] at which a closed point opens, and that an open point still transmits
+    tensile_strength = 0.0
+    open_tension = 0.0
+    #: whether opening releases the shear stiffness
+    releases_shear = False
 
+    def __init__(self, parameters: Mapping[str, Any]) -> None:
+        """parameters: of pro/parameters.pro, by name."""
 
-class Law:
-    """What a law has that knows no works on the joint, releases no shear by opening, and does not
-    break.
-    """
+    @classmethod
+    def least_energies(cls, parameters: Mapping[str, Any]) -> dict[str, tuple[float, str]]:
+        """The energies [N/m] that the joint stores before it softens, and their formulas, by the
+        parameter of the fracture energy that must be larger.
+        """
+        return {}
 
-    releases = breaks = False
+    # -- internal variables
 
-    def stage(self, memory: Memory, begin: float, end: float) -> Memory:
-        """The memory for a step from t = begin to end."""
-        return memory
+    def initial(self, points: int) -> V:
+        """Internal variables of the undamaged joint."""
+        return None  # type: ignore[return-value]
 
-    def side(self, jump: np.ndarray, memory: Memory) -> np.ndarray:
-        """Where a point is in that release: nowhere."""
+    def begin_step(self, variables: V, begin: float, end: float) -> V:
+        """Internal variables for a step from t = begin to end."""
+        return variables
+
+    def update_internal_variables(self, jump: Array, variables: V) -> V:
+        """Internal variables after a converged step."""
+        return variables
+
+    # -- response
+
+    def traction_and_tangent(self, jump: Array, variables: V) -> tuple[Array, Array]:
+        """Traction (q, 3) and consistent tangent (q, 3, 3)."""
+        raise NotImplementedError
+
+    def secant_stiffness(self, jump: Array, variables: V) -> Array:
+        """A positive stiffness (q, 3, 3) that does not soften; here the tangent."""
+        return self.traction_and_tangent(jump, variables)[1]
+
+    def freeze(self, jump: Array, variables: V) -> Law[V]:
+        """This law with the damage frozen that it has at a jump; here itself."""
+        return self
+
+    def release_side(self, jump: Array, variables: V) -> NDArray[np.int_]:
+        """Where a point is: before the release of its shear (-1), in it (0), beyond it (1)."""
         return np.zeros(len(jump), int)
 
-    def hold(self, jump: np.ndarray, memory: Memory) -> Memory:
-        """The memory with which nothing breaks or lets go beyond what it has at a jump; the next
-        memory that it leads to holds nothing.
+    def shear_release(self, jump: Array, variables: V) -> tuple[Array, Array]:
+        """Shear stress (q, 2) on the line of the release, wherever a point is, and its derivative
+        with the opening (q, 2).
         """
-        return memory
+        raise NotImplementedError
 
-    def shear_strength(self, jump: np.ndarray, memory: Memory) -> np.ndarray | None:
-        """The shear stress (q,) that slip cannot raise [Pa]; None if there is no such bound."""
+    def evaluate(self, jump: Array, variables: V, mode: Mode = TANGENT) -> tuple[Array, Array]:
+        """Traction and stiffness in a mode of the solver."""
+        law: Law[V] = mode.frozen or self
+        traction, tangent = law.traction_and_tangent(jump, variables)
+        if mode.secant:
+            tangent = law.secant_stiffness(jump, variables)
+        if mode.releasing is not None and mode.releasing.any():
+            shear, slope = law.shear_release(jump, variables)
+            traction[mode.releasing, 1:] = shear[mode.releasing]
+            tangent[mode.releasing, 1:, 0] = slope[mode.releasing]
+        return traction, tangent
 
-    def in_process_zone(self, jump: np.ndarray, memory: Memory) -> np.ndarray:
-        """Whether the point softens: part of its strength is used up, and it is not open."""
-        damage = self.damage(jump, memory)
-        return (damage > 0) & (damage < 1) & ~self.open(jump, memory)
+    # -- meaning of jump and internal variables
+
+    def damage(self, jump: Array, variables: V) -> Array:
+        """Used part of the strength: 0 undamaged to 1 broken; here 1 where the point is open."""
+        return self.is_open(jump, variables).astype(float)
+
+    def is_open(self, jump: Array, variables: V) -> Mask:
+        """Whether a point belongs to the crack."""
+        return jump[:, 0] > 0
+
+    def opening_of_crack(self, variables: V, points: int) -> Array:
+        """The opening [m] beyond which a point belongs to the crack."""
+        return np.zeros(points)
+
+    def slip(self, variables: V, points: int) -> Array:
+        """Size of the plastic or released slip (q,) [m]."""
+        return np.zeros(points)
+
+    def has_slipped(self, variables: V, points: int) -> Mask:
+        """Whether a point has slipped, or its shear has been released."""
+        return self.slip(variables, points) > 0
+
+    def in_process_zone(self, jump: Array, variables: V) -> Mask:
+        """Whether a point softens: it is damaged, and neither broken nor open."""
+        damage = self.damage(jump, variables)
+        return (damage > 0) & (damage < 1) & ~self.is_open(jump, variables)
+
+    def column_values(self, variables: V) -> dict[str, Array]:
+        """The values (q,) of `columns`."""
+        return {}
+
+    # -- strength
+
+    def shear_strength(self, sigma_n: Array, damage: Array | float, slip: Array | float) -> Array:
+        """Largest shear stress (q,) [Pa] at an effective normal stress, damage and slip [m];
+        infinite without a bound.
+        """
+        return np.full(np.shape(sigma_n), np.inf)
+
+    #: its formula, for legends, without hardening
+    shear_strength_formula = ""
+
+    def shear_bound(self, normal: Array, length: float) -> Array:
+        """Largest shear force [N/m] that a joint of a length [m] transmits under an effective
+        normal force (compression > 0), however the stress is distributed; infinite without a bound.
+        """
+        return np.full(np.shape(normal), np.inf)
+
+    # -- words
+
+    def hints(self, evidence: Evidence) -> Iterator[str]:
+        """What an engineer should know of a result of this law."""
+        yield from ()

@@ -1,151 +1,214 @@
-"""A bond that breaks and slides."""
+"""Coupled cohesive-frictional law, after Alfano and Sacco (Int. J. Numer. Meth. Eng. 68, 2006).
+
+Tension and cohesion soften together with one damage D, the larger of what the opening and what the
+slip has done; friction acts on the pressed joint from the beginning. Internal variables: D and the
+plastic slip.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..model.case import Case
-from .base import Law, Memory
+from .base import Array, Law, Mask
 
 
-class Bond(Law):
-    """A bond that breaks and slides (pro/law_bond.pro).
+@dataclass(frozen=True)
+class BondVariables:
+    """Internal variables at q points."""
 
-    Memory: the damage D of tension and cohesion, and the slip.
-    """
+    #: (q,), 0 to 1
+    damage: Array
+    #: (q, 2) [m]
+    plastic: Array
 
-    breaks = True
 
-    def __init__(self, case: Case) -> None:
-        self.K_N, self.K_T = case["K_N"], case["K_T"]
-        self.strength, self.cohesion, self.mu = case["sigma_max"], case["adhesion"], case["mu"]
-        self.artificial = case.shared["artificial"][0]
-        self.delta_e = self.strength / self.K_N
-        self.delta_c = 2 * case["G_f"] / (self.strength or self.cohesion or 1.0)
-        self.per_slip = self.cohesion / (2 * case["G_t"])
-        self.K_soft = self.K_T - self.cohesion * self.per_slip
+class Trial(NamedTuple):
+    """The elastic predictor and what it leads to (q,)."""
 
-    def start(self, points: int) -> Memory:
-        """The virgin joint."""
-        return Memory(np.zeros(points), np.zeros((points, 2)))
+    #: size of the elastic shear stress [Pa], its direction (q, 2), slip of the step, new damage
+    size: Array
+    direction: Array
+    slip: Array
+    damage: Array
+    #: whether the damage is the opening's, and whether the slip has used up the cohesion
+    by_opening: Mask
+    broken: Mask
 
-    def opened(self, opening: np.ndarray, damage: np.ndarray) -> np.ndarray:
-        """Damage by the opening."""
+
+class Bond(Law[BondVariables]):
+    """Strengths in tension and in shear that soften together, then friction."""
+
+    variable_names = ("D", "slip_1", "slip_2")
+    softens = stands_slipped = True
+
+    def __init__(self, parameters: Mapping[str, Any]) -> None:
+        p = parameters
+        self.K_N, self.K_T, self.artificial = p["K_N"], p["K_T"], p["artificial"]
+        self.tensile_strength, self.cohesion, self.mu = p["sigma_max"], p["adhesion"], p["mu"]
+        self.delta_e = self.tensile_strength / self.K_N
+        self.delta_c = 2 * p["G_f"] / (self.tensile_strength or self.cohesion or 1.0)
+        self.damage_per_slip = self.cohesion / (2 * p["G_t"])
+        #: stiffness in slip: cohesion is lost while the point slips
+        self.K_slip = self.K_T - self.cohesion * self.damage_per_slip
+
+    @classmethod
+    def least_energies(cls, parameters: Mapping[str, Any]) -> dict[str, tuple[float, str]]:
+        """See `Law`."""
+        p = parameters
+        return {
+            "G_f": (p["sigma_max"] * p["sigma_max"] / (2 * p["K_N"]), "sigma_max^2/(2 K_N)"),
+            "G_t": (p["adhesion"] * p["adhesion"] / (2 * p["K_T"]), "adhesion^2/(2 K_T)"),
+        }
+
+    # -- internal variables
+
+    def initial(self, points: int) -> BondVariables:
+        """See `Law`."""
+        return BondVariables(np.zeros(points), np.zeros((points, 2)))
+
+    def update_internal_variables(self, jump: Array, variables: BondVariables) -> BondVariables:
+        """See `Law`."""
+        trial = self.trial(jump, variables)
+        plastic = variables.plastic + trial.slip[:, None] * trial.direction
+        return BondVariables(trial.damage, plastic)
+
+    # -- response
+
+    def damage_by_opening(self, opening: Array, damage: Array) -> Array:
+        """The damage after an opening (q,) [m]."""
         share = (opening - self.delta_e) / (self.delta_c - self.delta_e)
         return np.maximum(damage, np.clip(share, 0, 1))
 
-    def softening(self, memory: Memory) -> tuple[float, float]:
-        """The stiffness in slip, and the damage per slip [1/m]."""
-        return (self.K_soft, self.per_slip) if memory.held is None else (self.K_T, 0.0)
-
-    def hold(self, jump: np.ndarray, memory: Memory) -> Memory:
-        """See `Law`: the damage stays what it is there, and a point that slides does not soften."""
-        return replace(memory, held=1 - self.opened(jump[:, 0], memory.scalar))
-
-    def trial(self, jump: np.ndarray, memory: Memory) -> tuple[np.ndarray, ...]:
-        """Size and direction of the elastic shear stress, slip of this step, new damage, whether
-        it is the opening's, and whether the bond is gone by the slip.
-
-        The new damage is the larger of the opening's and the slip's, D + slip/lambda_c.
+    def trial(self, jump: Array, variables: BondVariables) -> Trial:
+        """The elastic predictor, and slip and damage that return it to the yield surface; the new
+        damage is the larger of the opening's and the slip's, D + slip/lambda_c.
         """
-        K_soft, per_slip = self.softening(memory)
-        shear = self.K_T * (jump[:, 1:] - memory.vector)
+        before, per_slip = variables.damage, self.damage_per_slip
+        shear = self.K_T * (jump[:, 1:] - variables.plastic)
         size = np.linalg.norm(shear, axis=1)
         excess = size + self.mu * self.K_N * np.minimum(jump[:, 0], 0)
-        before, held = memory.scalar, memory.held
-        opened = self.opened(jump[:, 0], before) if held is None else 1 - held
+        opened = self.damage_by_opening(jump[:, 0], before)
         if_opening = np.maximum((excess - self.cohesion * (1 - opened)) / self.K_T, 0)
-        if_slip = (excess - self.cohesion * (1 - before)) / K_soft
+        if_slip = (excess - self.cohesion * (1 - before)) / self.K_slip
         by_opening = before + per_slip * if_opening <= opened
-        gone = ~by_opening & (before + per_slip * if_slip >= 1)
-        slip = np.select([by_opening, gone], [if_opening, excess / self.K_T], if_slip)
-        damage = np.select([by_opening, gone], [opened, 1.0], before + per_slip * if_slip)
-        return size, shear / np.maximum(size, 1e-300)[:, None], slip, damage, by_opening, gone
+        broken = ~by_opening & (before + per_slip * if_slip >= 1)
+        slip = np.select([by_opening, broken], [if_opening, excess / self.K_T], if_slip)
+        damage = np.select([by_opening, broken], [opened, 1.0], before + per_slip * if_slip)
+        direction = shear / np.maximum(size, 1e-300)[:, None]
+        return Trial(size, direction, slip, damage, by_opening, broken)
 
-    def back(self, damage: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Slope of the line to the origin in tension, and its derivative with the damage."""
-        if not self.strength:
+    def unloading(self, damage: Array) -> tuple[Array, Array]:
+        """Slope of the line to the origin in tension, and its derivative with the damage (q,)."""
+        if not self.tensile_strength:
             return np.zeros_like(damage), np.zeros_like(damage)
         kappa = self.delta_e + damage * (self.delta_c - self.delta_e)
-        return self.strength * (1 - damage) / kappa, -self.strength * self.delta_c / kappa**2
+        strength = self.tensile_strength
+        return strength * (1 - damage) / kappa, -strength * self.delta_c / kappa**2
 
-    def respond(
-        self,
-        jump: np.ndarray,
-        memory: Memory,
-        secant: bool = False,
-        within: np.ndarray | None = None,
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Traction and (unsymmetric) tangent.
-
-        secant: a positive stiffness that never softens instead of the tangent; within: none here.
-        """
-        size, n, slip, damage, by_opening, gone = self.trial(jump, memory)
-        K_soft, per_slip = self.softening(memory)
-        opening, sliding = jump[:, 0], slip > 0
+    def traction_and_tangent(self, jump: Array, variables: BondVariables) -> tuple[Array, Array]:
+        """See `Law`; the tangent is not symmetric."""
+        size, n, slip, damage, by_opening, gone = self.trial(jump, variables)
+        opening, slides = jump[:, 0], slip > 0
         closed = opening <= 0
-        slope, d_slope = self.back(damage)
+        slope, d_slope = self.unloading(damage)
         normal = np.where(closed, self.K_N, slope) * opening
         traction = np.column_stack([normal, (size - self.K_T * slip)[:, None] * n])
-        left = 1 - self.K_T * slip / np.maximum(size, 1e-300)
-        tangent = np.zeros((len(jump), 3, 3))
-        weak = self.artificial * self.K_N
-        if secant:
-            tangent[:, 0, 0] = np.where(closed, self.K_N, np.maximum(slope, weak))
-            shear = self.K_T * np.maximum(left, self.artificial)
-            tangent[:, 1, 1] = tangent[:, 2, 2] = shear
-            return traction, tangent
-        growing = by_opening & (damage > memory.scalar) & (damage < 1)
+
+        growing = by_opening & (damage > variables.damage) & (damage < 1)
         d_opened = np.where(growing, 1 / (self.delta_c - self.delta_e), 0)
-        softens = ~(by_opening | gone)  # slip does the damage
-        stiffness = np.where(softens, K_soft, self.K_T)
-        with_size = self.K_T / stiffness * sliding
+        softens = ~(by_opening | gone)  # the slip does the damage
+        stiffness = np.where(softens, self.K_slip, self.K_T)
+        with_size = self.K_T / stiffness * slides
         pressing = self.mu * self.K_N * (opening < 0)
-        with_opening = (pressing + self.cohesion * d_opened) / stiffness * sliding
-        per_slip = per_slip * softens
+        with_opening = (pressing + self.cohesion * d_opened) / stiffness * slides
+        per_slip = self.damage_per_slip * softens
         d_damage = d_opened + per_slip * with_opening
-        open_stiffness = slope + opening * d_slope * d_damage
-        broken = (damage >= 1) | (self.strength == 0)
-        tangent[:, 0, 0] = np.select([closed, broken], [self.K_N, weak], open_stiffness)
+        broken = (damage >= 1) | (self.tensile_strength == 0)
+
+        tangent = np.zeros((len(jump), 3, 3))
+        tangent[:, 0, 0] = np.select(
+            [closed, broken],
+            [self.K_N, self.artificial * self.K_N],
+            slope + opening * d_slope * d_damage,
+        )
         by_slip = opening * d_slope * per_slip * with_size
         tangent[:, 0, 1:] = np.where(closed | broken, 0, by_slip)[:, None] * n
         tangent[:, 1:, 0] = (-self.K_T * with_opening)[:, None] * n
+        across = 1 - self.K_T * slip / np.maximum(size, 1e-300)
         outer, eye = n[:, :, None] * n[:, None, :], np.eye(2)
         tangent[:, 1:, 1:] = self.K_T * (
-            left[:, None, None] * (eye - outer)
+            across[:, None, None] * (eye - outer)
             + (1 - with_size)[:, None, None] * outer
             + self.artificial * eye
         )
         return traction, tangent
 
-    def shear_strength(self, jump: np.ndarray, memory: Memory) -> np.ndarray:
-        """The cohesion that is left, and friction."""
-        pressed = self.K_N * np.minimum(jump[:, 0], 0)
-        return self.cohesion * (1 - memory.scalar) - self.mu * pressed
+    def secant_stiffness(self, jump: Array, variables: BondVariables) -> Array:
+        """See `Law`."""
+        size, _, slip, damage, *_ = self.trial(jump, variables)
+        weak, slope = self.artificial * self.K_N, self.unloading(damage)[0]
+        share = 1 - self.K_T * slip / np.maximum(size, 1e-300)
+        matrix = np.zeros((len(jump), 3, 3))
+        matrix[:, 0, 0] = np.where(jump[:, 0] <= 0, self.K_N, np.maximum(slope, weak))
+        matrix[:, 1, 1] = matrix[:, 2, 2] = self.K_T * np.maximum(share, self.artificial)
+        return matrix
 
-    def remember(self, jump: np.ndarray, memory: Memory) -> Memory:
-        """The memory after convergence."""
-        _, n, slip, damage, *_ = self.trial(jump, memory)
-        if memory.held is not None:
-            by_slip = np.minimum(memory.scalar + self.per_slip * slip, 1)
-            damage = np.maximum(self.opened(jump[:, 0], memory.scalar), by_slip)
-        return Memory(damage, memory.vector + slip[:, None] * n)
+    def freeze(self, jump: Array, variables: BondVariables) -> FrozenBond:
+        """See `Law`."""
+        return FrozenBond(self, self.damage_by_opening(jump[:, 0], variables.damage))
 
-    def damage(self, jump: np.ndarray, memory: Memory) -> np.ndarray:
-        """0 virgin to 1 broken."""
-        return memory.scalar
+    # -- meaning
 
-    def open(self, jump: np.ndarray, memory: Memory) -> np.ndarray:
-        """Whether the point is open and its bond gone."""
-        return (jump[:, 0] > 0) & ((memory.scalar >= 1) | (self.strength == 0))
+    def damage(self, jump: Array, variables: BondVariables) -> Array:
+        """See `Law`."""
+        return variables.damage
 
-    def opens_at(self, memory: Memory) -> np.ndarray:
-        """The opening from which on a point is open [m]."""
-        bonded = (memory.scalar < 1) & (self.strength > 0)
+    def is_open(self, jump: Array, variables: BondVariables) -> Mask:
+        """See `Law`: open, and broken."""
+        return (jump[:, 0] > 0) & ((variables.damage >= 1) | (self.tensile_strength == 0))
+
+    def opening_of_crack(self, variables: BondVariables, points: int) -> Array:
+        """See `Law`."""
+        bonded = (variables.damage < 1) & (self.tensile_strength > 0)
         return np.where(bonded, self.delta_c, 0.0)
 
-    def slid(self, jump: np.ndarray, memory: Memory) -> np.ndarray:
-        """Whether the point has slipped."""
-        return np.linalg.norm(memory.vector, axis=1) > 0
+    def slip(self, variables: BondVariables, points: int) -> Array:
+        """See `Law`: the plastic slip."""
+        return np.linalg.norm(variables.plastic, axis=1)
+
+    # -- strength
+
+    def shear_strength(self, sigma_n: Array, damage: Array | float, slip: Array | float) -> Array:
+        """See `Law`: c (1 - D) + mu |sigma_n| where it is pressed."""
+        return self.cohesion * (1 - damage) - self.mu * np.minimum(sigma_n, 0)
+
+    shear_strength_formula = "c (1 - D) + mu |sigma'|"
+
+    def shear_bound(self, normal: Array, length: float) -> Array:
+        """See `Law`: tension elsewhere adds at most the strength times the length to N."""
+        pressed = np.maximum(normal + self.tensile_strength * length, 0)
+        return self.mu * pressed + self.cohesion * length
+
+
+class FrozenBond(Bond):
+    """The law with frozen damage: a point that slips does not soften."""
+
+    def __init__(self, law: Bond, frozen: Array) -> None:
+        vars(self).update(vars(law))
+        self.law, self.frozen, self.damage_per_slip, self.K_slip = law, frozen, 0.0, law.K_T
+
+    def damage_by_opening(self, opening: Array, damage: Array) -> Array:
+        """See `Bond`."""
+        return self.frozen
+
+    def update_internal_variables(self, jump: Array, variables: BondVariables) -> BondVariables:
+        """See `Law`: the damage that opening and slip of the step do is known after it."""
+        trial = self.trial(jump, variables)
+        by_slip = np.minimum(variables.damage + self.law.damage_per_slip * trial.slip, 1)
+        damage = np.maximum(self.law.damage_by_opening(jump[:, 0], variables.damage), by_slip)
+        plastic = variables.plastic + trial.slip[:, None] * trial.direction
+        return BondVariables(damage, plastic)

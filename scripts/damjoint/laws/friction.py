@@ -1,101 +1,169 @@
-"""Mohr-Coulomb friction."""
+"""Mohr-Coulomb friction with hardening (JOINT_MECA_FROT, code_aster R7.01.25), implicit return.
+
+Internal variables: lambda, the accumulated plastic slip [m], and the plastic slip.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
 import numpy as np
 
-from ..model.case import Case
-from .base import Law, Memory
+from .base import Array, Evidence, Law, Mask
+
+#: Parameters of a joint that stays elastic under any load.
+UNBREAKABLE: dict[str, float | str] = {
+    "law": "friction",
+    "mu": 1.0,
+    "adhesion": 1e30,
+    "pena_tang": 0.0,
+}
 
 
-class Friction(Law):
-    """Mohr-Coulomb friction with hardening, implicit return.
+@dataclass(frozen=True)
+class FrictionVariables:
+    """Internal variables at q points."""
 
-    Memory: lambda, the cumulated slip, and the slip.
-    """
+    #: (q,) [m]
+    accumulated: Array
+    #: (q, 2) [m]
+    plastic: Array
 
-    def __init__(self, case: Case) -> None:
-        self.K_N, self.K_T, self.H = case["K_N"], case["K_T"], case["pena_tang"]
-        self.mu, self.adhesion = case["mu"], case["adhesion"]
-        self.artificial = case.shared["artificial"][0]
+
+class Trial(NamedTuple):
+    """The elastic predictor and what it leads to (q,)."""
+
+    #: normal stress, size of the elastic shear stress [Pa], its direction (q, 2), slip of the step
+    normal: Array
+    size: Array
+    direction: Array
+    slip: Array
+
+
+class Friction(Law[FrictionVariables]):
+    """Contact that transmits tension up to c/mu, and shear up to c - mu sigma_n + H lambda."""
+
+    variable_names = ("lambda", "slip_1", "slip_2")
+    columns: Mapping[str, tuple[str, str]] = {
+        "lambda": ("m", "friction: cumulated plastic slip, which hardens")
+    }
+    hardening_parameter = "pena_tang"
+
+    def __init__(self, parameters: Mapping[str, Any]) -> None:
+        p = parameters
+        self.K_N, self.K_T, self.H = p["K_N"], p["K_T"], p["pena_tang"]
+        self.mu, self.adhesion, self.artificial = p["mu"], p["adhesion"], p["artificial"]
+        self.hardens = bool(self.H)
+        self.tensile_strength = self.open_tension = self.adhesion / self.mu
         self.cap_opening = self.adhesion / (self.mu * self.K_N)
 
-    def start(self, points: int) -> Memory:
-        """The virgin joint."""
-        return Memory(np.zeros(points), np.zeros((points, 2)))
+    # -- internal variables
 
-    def trial(self, jump: np.ndarray, memory: Memory) -> tuple[np.ndarray, ...]:
-        """Normal stress, size and direction of the elastic shear stress, slip of this step."""
+    def initial(self, points: int) -> FrictionVariables:
+        """See `Law`."""
+        return FrictionVariables(np.zeros(points), np.zeros((points, 2)))
+
+    def update_internal_variables(
+        self, jump: Array, variables: FrictionVariables
+    ) -> FrictionVariables:
+        """See `Law`."""
+        trial = self.trial(jump, variables)
+        return FrictionVariables(
+            variables.accumulated + trial.slip,
+            variables.plastic + trial.slip[:, None] * trial.direction,
+        )
+
+    # -- response
+
+    def trial(self, jump: Array, variables: FrictionVariables) -> Trial:
+        """The elastic predictor and the slip that returns it to the yield surface."""
         normal = self.K_N * np.minimum(jump[:, 0], self.cap_opening)
-        shear = self.K_T * (jump[:, 1:] - memory.vector)
+        shear = self.K_T * (jump[:, 1:] - variables.plastic)
         size = np.linalg.norm(shear, axis=1)
-        beyond = size + self.mu * normal - self.H * memory.scalar - self.adhesion
-        return (
-            normal,
-            size,
-            shear / np.maximum(size, 1e-300)[:, None],
-            np.maximum(beyond / (self.K_T + self.H), 0),
-        )
+        excess = size + self.mu * normal - self.H * variables.accumulated - self.adhesion
+        direction = shear / np.maximum(size, 1e-300)[:, None]
+        return Trial(normal, size, direction, np.maximum(excess / (self.K_T + self.H), 0))
 
-    def respond(
-        self,
-        jump: np.ndarray,
-        memory: Memory,
-        secant: bool = False,
-        within: np.ndarray | None = None,
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Traction and (unsymmetric) tangent.
-
-        secant: stress over jump, without the coupling, instead of the tangent; within: none here.
-        """
-        normal, size, n, slip = self.trial(jump, memory)
+    def traction_and_tangent(
+        self, jump: Array, variables: FrictionVariables
+    ) -> tuple[Array, Array]:
+        """See `Law`; the tangent is not symmetric."""
+        normal, size, n, slip = self.trial(jump, variables)
         traction = np.column_stack([normal, (size - self.K_T * slip)[:, None] * n])
-        closed, sliding = jump[:, 0] <= self.cap_opening, slip > 0
+        closed, slides = jump[:, 0] <= self.cap_opening, slip > 0
         tangent = np.zeros((len(jump), 3, 3))
-        tangent[:, 0, 0] = np.where(closed, self.K_N, self.artificial * self.K_N)
-        left = np.where(sliding, 1 - self.K_T * slip / np.maximum(size, 1e-300), 1.0)
-        if secant:
-            along = self.K_T * np.maximum(left, self.artificial)
-            tangent[:, 1, 1] = tangent[:, 2, 2] = along
-            return traction, tangent
-        along = np.where(sliding, self.H / (self.K_T + self.H), 1.0)
-        outer = n[:, :, None] * n[:, None, :]
-        eye = np.eye(2)
+        tangent[:, 0, 0] = self.normal_stiffness(jump)
+        across = np.where(slides, 1 - self.K_T * slip / np.maximum(size, 1e-300), 1.0)
+        along = np.where(slides, self.H / (self.K_T + self.H), 1.0)
+        outer, eye = n[:, :, None] * n[:, None, :], np.eye(2)
         tangent[:, 1:, 1:] = self.K_T * (
-            left[:, None, None] * (eye - outer)
+            across[:, None, None] * (eye - outer)
             + along[:, None, None] * outer
-            + self.artificial * sliding[:, None, None] * eye
+            + self.artificial * slides[:, None, None] * eye
         )
-        # where nothing slides the direction does not matter: K_T times the unit matrix
-        tangent[~sliding, 1:, 1:] = self.K_T * eye
-        coupling = np.where(
-            sliding & closed, -self.K_T / (self.K_T + self.H) * self.mu * self.K_N, 0
-        )
-        tangent[:, 1:, 0] = coupling[:, None] * n
+        tangent[~slides, 1:, 1:] = self.K_T * eye  # whatever the direction, without rounding
+        coupling = -self.K_T / (self.K_T + self.H) * self.mu * self.K_N
+        tangent[:, 1:, 0] = np.where(slides & closed, coupling, 0)[:, None] * n
         return traction, tangent
 
-    def shear_strength(self, jump: np.ndarray, memory: Memory) -> np.ndarray | None:
-        """adhesion - mu sigma_n, if nothing hardens."""
-        normal, *_ = self.trial(jump, memory)
-        return None if self.H else self.adhesion - self.mu * normal
+    def secant_stiffness(self, jump: Array, variables: FrictionVariables) -> Array:
+        """See `Law`: stress over jump, without coupling."""
+        _, size, _, slip = self.trial(jump, variables)
+        matrix = np.zeros((len(jump), 3, 3))
+        share = np.where(slip > 0, 1 - self.K_T * slip / np.maximum(size, 1e-300), 1.0)
+        matrix[:, 0, 0] = self.normal_stiffness(jump)
+        matrix[:, 1, 1] = matrix[:, 2, 2] = self.K_T * np.maximum(share, self.artificial)
+        return matrix
 
-    def remember(self, jump: np.ndarray, memory: Memory) -> Memory:
-        """The memory after convergence."""
-        _, _, n, slip = self.trial(jump, memory)
-        return Memory(memory.scalar + slip, memory.vector + slip[:, None] * n)
+    def normal_stiffness(self, jump: Array) -> Array:
+        """K_N, next to nothing where the point is open (q,)."""
+        return np.where(jump[:, 0] <= self.cap_opening, self.K_N, self.artificial * self.K_N)
 
-    def damage(self, jump: np.ndarray, memory: Memory) -> np.ndarray:
-        """1 where the joint is open."""
-        return self.open(jump, memory).astype(float)
+    # -- meaning
 
-    def open(self, jump: np.ndarray, memory: Memory) -> np.ndarray:
-        """Whether the opening is beyond that of the cap adhesion/mu."""
+    def is_open(self, jump: Array, variables: FrictionVariables) -> Mask:
+        """See `Law`: beyond the opening at which the tension reaches c/mu."""
         return jump[:, 0] > self.cap_opening
 
-    def opens_at(self, memory: Memory) -> np.ndarray:
-        """The opening from which on a point is open [m]."""
-        return np.full(len(memory.scalar), self.cap_opening)
+    def opening_of_crack(self, variables: FrictionVariables, points: int) -> Array:
+        """See `Law`."""
+        return np.full(points, self.cap_opening)
 
-    def slid(self, jump: np.ndarray, memory: Memory) -> np.ndarray:
-        """Whether the point has slipped."""
-        return memory.scalar > 0
+    def slip(self, variables: FrictionVariables, points: int) -> Array:
+        """See `Law`: the plastic slip."""
+        return np.linalg.norm(variables.plastic, axis=1)
+
+    def has_slipped(self, variables: FrictionVariables, points: int) -> Mask:
+        """See `Law`."""
+        return variables.accumulated > 0
+
+    def column_values(self, variables: FrictionVariables) -> dict[str, Array]:
+        """See `Law`."""
+        return {"lambda": variables.accumulated}
+
+    # -- strength
+
+    def shear_strength(self, sigma_n: Array, damage: Array | float, slip: Array | float) -> Array:
+        """See `Law`: c - mu sigma_n + H slip."""
+        return self.adhesion - self.mu * sigma_n + self.H * slip
+
+    shear_strength_formula = "c + mu |sigma'|"
+
+    def shear_bound(self, normal: Array, length: float) -> Array:
+        """See `Law`: tension lowers the strength elsewhere by as much as it presses there."""
+        if self.hardens:
+            return super().shear_bound(normal, length)
+        return np.maximum(self.mu * normal + self.adhesion * length, 0)
+
+    def hints(self, evidence: Evidence) -> Iterator[str]:
+        """See `Law`."""
+        if self.open_tension * evidence.crack_length:
+            share = evidence.tension_share
+            part = "" if np.isnan(share) else f" ({share:.0%} of the overturning moment)"
+            yield (
+                f"the joint is open over {evidence.crack_length:.3g} m and transmits tension "
+                f"there, adhesion/mu = {self.open_tension / 1e3:.4g} kPa{part}, at any opening, as "
+                "the friction law is published: law = bond does not"
+            )

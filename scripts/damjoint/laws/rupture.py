@@ -1,167 +1,235 @@
-"""Cohesive rupture, with grouting and sawing."""
+"""Cohesive rupture (JOINT_MECA_RUPT, code_aster R7.01.25), with grouting and sawing.
+
+Internal variables: kappa, the largest opening so far [m]; the tangential jump at which the shear
+was released; the thickness of grout that has set. Openings here are those beyond the thickness that
+grout and saw leave.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..model.case import Case
-from .base import Law, Memory
+from .base import Array, Evidence, Law, Mask
 
 
-class Rupture(Law):
-    """Cohesive rupture, with grouting and sawing.
+@dataclass(frozen=True)
+class RuptureVariables:
+    """Internal variables at q points, and the works on the joint in the step under way."""
 
-    Memory: kappa, the largest opening so far, and the released slip. Openings here are those beyond
-    the thickness that grout and saw leave.
-    """
+    #: (q,) [m]
+    kappa: Array
+    #: (q, 2) [m]
+    released: Array
+    #: (q,) [m]
+    thickness: Array | float = 0.0
+    #: thickness sawn away [m], and the largest opening that liquid grout leaves [m]
+    sawn: float = 0.0
+    largest: float = np.inf
 
-    breaks = True
 
-    def __init__(self, case: Case) -> None:
-        self.K_N, self.K_T, self.contact = (
-            case["K_N"],
-            case["K_T"],
-            case["pena_contact"] * case["K_N"],
-        )
-        p = case["pena_rupture"]
-        self.delta_e = case["sigma_max"] / self.K_N
-        self.L_C = (1 + p) * self.delta_e
-        self.sigma_c = case["sigma_max"] * (1 + p) / p
-        self.artificial = case.shared["artificial"][0]
+class Rupture(Law[RuptureVariables]):
+    """Softening in tension, elastic shear that the opening releases, contact."""
+
+    variable_names = ("kappa", "released_1", "released_2", "thickness")
+    slip_name = "released slip"
+    softens = has_works = True
+    limits_shear = False
+
+    def __init__(self, parameters: Mapping[str, Any]) -> None:
+        p, penalty = parameters, parameters["pena_rupture"]
+        self.K_N, self.K_T, self.K_contact = p["K_N"], p["K_T"], p["pena_contact"] * p["K_N"]
+        self.alpha, self.artificial = p["alpha"], p["artificial"]
+        self.tensile_strength = p["sigma_max"]
+        self.delta_e = p["sigma_max"] / self.K_N
+        self.L_C = (1 + penalty) * self.delta_e
+        self.sigma_c = p["sigma_max"] * (1 + penalty) / penalty
         self.L_CT = (
             np.inf
-            if case["alpha"] >= 2
-            else max(self.L_C * np.tan(case["alpha"] * np.pi / 4), case.shared["sudden"][0])
+            if self.alpha >= 2
+            else max(self.L_C * np.tan(self.alpha * np.pi / 4), p["sudden"])
         )
-        self.grout, self.grout_t = case["grout_pressure"] / self.contact, case["grout_t"]
-        self.saw, self.saw_t = case["saw_thickness"], case["saw_t"]
+        self.releases_shear = bool(np.isfinite(self.L_CT))
+        self.grout, self.grout_t = p["grout_pressure"] / self.K_contact, p["grout_t"]
+        self.saw, self.saw_t = p["saw_thickness"], p["saw_t"]
 
-    def start(self, points: int) -> Memory:
-        """The virgin joint."""
-        return Memory(np.full(points, self.delta_e), np.zeros((points, 2)))
+    @classmethod
+    def least_energies(cls, parameters: Mapping[str, Any]) -> dict[str, tuple[float, str]]:
+        """See `Law`."""
+        strength, stiffness = parameters["sigma_max"], parameters["K_N"]
+        return {"G_f": (strength * strength / (2 * stiffness), "sigma_max^2/(2 K_N)")}
 
-    def stage(self, memory: Memory, begin: float, end: float) -> Memory:
-        """The memory for a step from t = begin to end: grout_in and sawn_at of pro/law.pro."""
+    # -- internal variables
+
+    def initial(self, points: int) -> RuptureVariables:
+        """See `Law`."""
+        return RuptureVariables(np.full(points, self.delta_e), np.zeros((points, 2)))
+
+    def begin_step(self, variables: RuptureVariables, begin: float, end: float) -> RuptureVariables:
+        """See `Law`; grout_in and sawn_at of pro/law_rupture.pro."""
         if not (self.grout or self.saw):
-            return memory
+            return variables
         liquid = self.grout > 0 and begin < self.grout_t and end > self.grout_t - 1
-        most = -self.grout * min(end - self.grout_t + 1, 1) if liquid else np.inf
-        return replace(memory, sawn=self.saw * min(max(end - self.saw_t + 1, 0), 1), most=most)
+        largest = -self.grout * min(end - self.grout_t + 1, 1) if liquid else np.inf
+        sawn = self.saw * min(max(end - self.saw_t + 1, 0), 1)
+        return replace(variables, sawn=sawn, largest=largest)
 
-    def opening(self, jump: np.ndarray, memory: Memory) -> np.ndarray:
-        """The opening beyond the thickness that grout and saw leave."""
-        return np.minimum(jump[:, 0] - memory.thickness + memory.sawn, memory.most)
+    def update_internal_variables(
+        self, jump: Array, variables: RuptureVariables
+    ) -> RuptureVariables:
+        """See `Law`."""
+        v, opening = variables, self.opening(jump, variables)
+        free = self.shear_share(opening) <= 0
+        grouted = np.maximum(jump[:, 0] - v.thickness + v.sawn - v.largest, 0)
+        return replace(
+            v,
+            kappa=np.maximum(v.kappa, opening),
+            released=np.where(free[:, None], jump[:, 1:], v.released),
+            thickness=v.thickness + grouted,
+        )
 
-    def broken(self, opening: np.ndarray, memory: Memory) -> np.ndarray:
-        """Whether the bond has gone."""
-        before = (memory.scalar >= self.L_C) | (memory.sawn > 0)
-        return before | (opening >= self.L_C) if memory.held is None else before
+    # -- response
 
-    def share(self, opening: np.ndarray, memory: Memory) -> np.ndarray:
-        """What is left of the tangential stiffness, 0 to 1."""
-        if memory.held is not None:
-            return memory.held
+    def opening(self, jump: Array, variables: RuptureVariables) -> Array:
+        """The opening beyond the thickness that grout and saw leave (q,) [m]."""
+        v = variables
+        return np.minimum(jump[:, 0] - v.thickness + v.sawn, v.largest)
+
+    def is_broken(self, opening: Array, variables: RuptureVariables) -> Mask:
+        """Whether a point has lost its tensile strength."""
+        return self.was_broken(variables) | (opening >= self.L_C)
+
+    def was_broken(self, variables: RuptureVariables) -> Mask:
+        """Whether it had at the beginning of the step."""
+        return (variables.kappa >= self.L_C) | (variables.sawn > 0)
+
+    def unloads(self, opening: Array, variables: RuptureVariables) -> Mask:
+        """Whether a point is on the line between the origin and its largest opening."""
+        return opening <= variables.kappa
+
+    def shear_share(self, opening: Array) -> Array:
+        """What is left of the shear stiffness (q,): 1 to 0."""
         return np.where(opening <= 0, 1, np.maximum(1 - opening / self.L_CT, 0))
 
-    def hold(self, jump: np.ndarray, memory: Memory) -> Memory:
-        """See `Law`: the shear's share as it is, and no larger opening counts as one."""
-        return replace(memory, held=self.share(self.opening(jump, memory), memory))
+    def shear_slope(self, opening: Array) -> Array:
+        """Derivative of the shear stiffness with the opening (q,) [Pa/m2]."""
+        return np.where((opening > 0) & (opening < self.L_CT), -self.K_T / self.L_CT, 0)
 
-    @property
-    def releases(self) -> bool:
-        """Whether opening ends the tangential stiffness."""
-        return np.isfinite(self.L_CT)
-
-    def side(self, jump: np.ndarray, memory: Memory) -> np.ndarray:
-        """Where a point is: before the release of its shear (-1), in it (0), beyond it (1)."""
-        opening = self.opening(jump, memory)
-        return np.select([opening <= 0, opening < self.L_CT], [-1, 0], 1)
-
-    def respond(
-        self,
-        jump: np.ndarray,
-        memory: Memory,
-        secant: bool = False,
-        within: np.ndarray | None = None,
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Traction and tangent.
-
-        secant: the positive stiffness that never softens instead of the tangent; within: the points
-        whose shear is on the line of its release, wherever they are.
-        """
-        opening, kappa, slip = (
-            self.opening(jump, memory),
-            memory.scalar,
-            jump[:, 1:] - memory.vector,
-        )
-        closed, broken = opening <= 0, self.broken(opening, memory)
-        liquid = opening >= memory.most
-        unloading = opening <= (kappa if memory.held is None else np.inf)
+    def normal_response(
+        self, opening: Array, variables: RuptureVariables
+    ) -> tuple[Array, Array, Array]:
+        """Normal stress, its tangent, and a secant stiffness that is positive (q,)."""
+        v, weak = variables, self.artificial * self.K_N
+        closed, broken = opening <= 0, self.is_broken(opening, v)
+        unloads = self.unloads(opening, v)
         with np.errstate(divide="ignore", invalid="ignore"):
-            back = self.sigma_c * (1 - kappa / self.L_C) / kappa  # secant stiffness
+            unloading = self.sigma_c * (1 - v.kappa / self.L_C) / v.kappa
             normal = np.select(
-                [closed, broken, unloading],
-                [self.contact * opening, 0, back * opening],
+                [closed, broken, unloads],
+                [self.K_contact * opening, 0, unloading * opening],
                 self.sigma_c * (1 - opening / self.L_C),
             )
-            softening = (
-                normal / opening
-                if secant
-                else np.full_like(opening, -self.sigma_c / self.L_C if self.L_C else 0)
+            secant = normal / opening
+        softening = -self.sigma_c / self.L_C if self.L_C else 0.0
+        branches = [(opening >= v.largest) | broken & ~closed, closed, unloads]
+        stiffness = [weak, self.K_contact, unloading]
+        return (
+            normal,
+            np.select(branches, stiffness, softening),
+            np.maximum(np.select(branches, stiffness, secant), weak),
+        )
+
+    def stiffness(self, normal: Array, opening: Array) -> Array:
+        """The diagonal stiffness (q, 3, 3): normal, and what is left of the shear stiffness."""
+        shear = np.maximum(self.K_T * self.shear_share(opening), self.artificial * self.K_T)
+        matrix = np.zeros((len(opening), 3, 3))
+        matrix[:, 0, 0], matrix[:, 1, 1], matrix[:, 2, 2] = normal, shear, shear
+        return matrix
+
+    def traction_and_tangent(self, jump: Array, variables: RuptureVariables) -> tuple[Array, Array]:
+        """See `Law`."""
+        opening, slip = self.opening(jump, variables), jump[:, 1:] - variables.released
+        normal, slope, _ = self.normal_response(opening, variables)
+        shear = (self.K_T * self.shear_share(opening))[:, None] * slip
+        tangent = self.stiffness(slope, opening)
+        tangent[:, 1:, 0] = self.shear_slope(opening)[:, None] * slip
+        return np.column_stack([normal, shear]), tangent
+
+    def secant_stiffness(self, jump: Array, variables: RuptureVariables) -> Array:
+        """See `Law`."""
+        opening = self.opening(jump, variables)
+        return self.stiffness(self.normal_response(opening, variables)[2], opening)
+
+    def freeze(self, jump: Array, variables: RuptureVariables) -> FrozenRupture:
+        """See `Law`."""
+        return FrozenRupture(self, self.shear_share(self.opening(jump, variables)))
+
+    def release_side(self, jump: Array, variables: RuptureVariables) -> NDArray[np.int_]:
+        """See `Law`."""
+        opening = self.opening(jump, variables)
+        return np.select([opening <= 0, opening < self.L_CT], [-1, 0], 1)
+
+    def shear_release(self, jump: Array, variables: RuptureVariables) -> tuple[Array, Array]:
+        """See `Law`."""
+        opening, slip = self.opening(jump, variables), jump[:, 1:] - variables.released
+        line = self.K_T * (1 - opening / self.L_CT)
+        return line[:, None] * slip, -self.K_T / self.L_CT * slip
+
+    # -- meaning
+
+    def damage(self, jump: Array, variables: RuptureVariables) -> Array:
+        """See `Law`: the used part of the softening."""
+        kappa = variables.kappa
+        used = 0 * kappa
+        if self.delta_e < self.L_C:
+            used = (kappa - self.delta_e) / (self.L_C - self.delta_e)
+        return np.where(self.is_open(jump, variables), 1.0, used)
+
+    def is_open(self, jump: Array, variables: RuptureVariables) -> Mask:
+        """See `Law`: whether it is broken."""
+        return self.is_broken(self.opening(jump, variables), variables) & (variables.kappa > 0)
+
+    def opening_of_crack(self, variables: RuptureVariables, points: int) -> Array:
+        """See `Law`."""
+        return np.where(variables.kappa >= self.L_C, 0.0, self.L_C)
+
+    def slip(self, variables: RuptureVariables, points: int) -> Array:
+        """See `Law`: the tangential jump at the last free slide."""
+        return np.linalg.norm(variables.released, axis=1)
+
+    def hints(self, evidence: Evidence) -> Iterator[str]:
+        """See `Law`."""
+        if self.releases_shear and evidence.unstable:
+            yield (
+                f"law = rupture with alpha = {self.alpha:g} loses its shear stiffness where it "
+                "opens, and has no friction: the crack grows unstably; alpha = 2 keeps the "
+                "stiffness, law = bond has friction"
             )
-        stiffness = np.select(
-            [liquid | broken & ~closed, closed, unloading],
-            [self.artificial * self.K_N, self.contact, back],
-            softening,
-        )
-        shear = self.K_T * self.share(opening, memory)
-        traction = np.column_stack([normal, shear[:, None] * slip])
-        tangent = np.zeros((len(jump), 3, 3))
-        tangent[:, 0, 0] = (
-            np.maximum(stiffness, self.artificial * self.K_N) if secant else stiffness
-        )
-        tangent[:, 1, 1] = tangent[:, 2, 2] = np.maximum(shear, self.artificial * self.K_T)
-        if not secant and memory.held is None:
-            falling = np.where((opening > 0) & (opening < self.L_CT), -self.K_T / self.L_CT, 0)
-            tangent[:, 1:, 0] = falling[:, None] * slip
-        if within is not None and within.any():
-            line = self.K_T * (1 - opening[within] / self.L_CT)
-            traction[within, 1:] = line[:, None] * slip[within]
-            tangent[within, 1:, 0] = -self.K_T / self.L_CT * slip[within]
-        return traction, tangent
 
-    def remember(self, jump: np.ndarray, memory: Memory) -> Memory:
-        """The memory after convergence."""
-        opening = self.opening(jump, memory)
-        free = self.share(opening, memory) <= 0
-        grouted = np.maximum(jump[:, 0] - memory.thickness + memory.sawn - memory.most, 0)
-        return replace(
-            memory,
-            scalar=np.maximum(memory.scalar, opening),
-            vector=np.where(free[:, None], jump[:, 1:], memory.vector),
-            thickness=memory.thickness + grouted,
-            held=None,
-        )
 
-    def damage(self, jump: np.ndarray, memory: Memory) -> np.ndarray:
-        """0 virgin to 1 broken."""
-        partly = (
-            (memory.scalar - self.delta_e) / (self.L_C - self.delta_e)
-            if self.delta_e < self.L_C
-            else 0 * memory.scalar
-        )
-        return np.where(self.open(jump, memory), 1.0, partly)
+class FrozenRupture(Rupture):
+    """Rupture with frozen damage: nothing breaks, and opening releases no more shear."""
 
-    def open(self, jump: np.ndarray, memory: Memory) -> np.ndarray:
-        """Whether the point belongs to the crack."""
-        return self.broken(self.opening(jump, memory), memory) & (memory.scalar > 0)
+    def __init__(self, law: Rupture, share: Array) -> None:
+        vars(self).update(vars(law))
+        self.share = share
 
-    def opens_at(self, memory: Memory) -> np.ndarray:
-        """The opening from which on a point is open [m]."""
-        return np.where(memory.scalar >= self.L_C, 0.0, self.L_C)
+    def is_broken(self, opening: Array, variables: RuptureVariables) -> Mask:
+        """See `Rupture`."""
+        return self.was_broken(variables)
 
-    def slid(self, jump: np.ndarray, memory: Memory) -> np.ndarray:
-        """Whether the point has let go along the joint."""
-        return np.linalg.norm(memory.vector, axis=1) > 0
+    def unloads(self, opening: Array, variables: RuptureVariables) -> Mask:
+        """See `Rupture`."""
+        return np.ones(len(opening), bool)
+
+    def shear_share(self, opening: Array) -> Array:
+        """See `Rupture`."""
+        return self.share
+
+    def shear_slope(self, opening: Array) -> Array:
+        """See `Rupture`."""
+        return np.zeros(len(opening))

@@ -7,9 +7,12 @@ import operator
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 from .. import RUN_GEO, InputError, data
+from ..laws import LAWS, Law
 from . import casefile
 from .parameters import (
     INCLUDE,
@@ -84,6 +87,12 @@ class Case:
 
     def __getitem__(self, name: str) -> float | str:
         return self.values[name]
+
+    @cached_property
+    def law(self) -> Law[Any]:
+        """The joint's law with its parameters."""
+        solver = {name: self.shared[name][0] for name in ("artificial", "sudden")}
+        return LAWS[self.values["law"]](self.values | solver)
 
     @property
     def joint_length(self) -> float:
@@ -397,20 +406,8 @@ def check_energies(found: Mapping[str, list]) -> None:
             f"G_f, pena_rupture = {values['G_f']:g}, {values['pena_rupture']:g}: must be one of "
             "them, the other -1 (G_f = sigma_max^2 (1 + pena_rupture) / (2 K_N))"
         )
-    elastic = {
-        "G_f": (
-            law != "friction",
-            values["sigma_max"] * values["sigma_max"] / (2 * values["K_N"]),
-            "sigma_max^2/(2 K_N)",
-        ),
-        "G_t": (
-            law == "bond",
-            values["adhesion"] * values["adhesion"] / (2 * values["K_T"]),
-            "adhesion^2/(2 K_T)",
-        ),
-    }
-    for name, (matters, least, formula) in elastic.items():
-        if matters and not values[name] > least:
+    for name, (least, formula) in LAWS[law].least_energies(values).items():
+        if not values[name] > least:
             raise InputError(
                 f"{name} = {values[name]:g}: must be > {least:.4g} N/m ({formula}, what the joint "
                 "stores before it softens)"
@@ -480,13 +477,15 @@ def check_drains(values: Mapping, length: float) -> None:
 
 
 def check_works(values: Mapping) -> None:
-    """Raise InputError if a joint is to be grouted or sawn that does not know it."""
-    known = values["law"] == "rupture" and not flows(values)
+    """Raise InputError if a joint is grouted or sawn whose law or uplift does not include it."""
+    included = LAWS[values["law"]].has_works and not flows(values)
     for name in ("grout_pressure", "saw_thickness"):
-        if values[name] > 0 and not known:
+        if values[name] > 0 and not included:
+            laws = " or ".join(name for name, law in LAWS.items() if law.has_works)
             raise InputError(
                 f"{name} = {values[name]:g}: must be 0 with law = {values['law']}, uplift = "
-                f"{values['uplift']} (known to law = rupture, and to none, imposed and drained)"
+                f"{values['uplift']} (only law = {laws} includes it, with uplift = none, imposed "
+                "or drained)"
             )
 
 

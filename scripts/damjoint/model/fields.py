@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..laws import COLUMNS
 from .mesh import Body
-from .results import FLUX, HARDENING, Results
+from .results import FLUX, Results
 
 BODIES = ("dam", "foundation")
 
@@ -40,7 +41,7 @@ OF_JOINT = {
     "p": ("Pa", ("p",)),
     "damage": ("-", ("damage",)),
     "slip": ("m", ("slip",)),
-    **{name: (unit, (name,)) for name, (unit, _) in (HARDENING | FLUX).items()},
+    **{name: (unit, (name,)) for name, (unit, _) in (COLUMNS | FLUX).items()},
 }
 
 

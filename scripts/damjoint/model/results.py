@@ -30,8 +30,6 @@ JOINT = {
     "s": ("m", "distance from the heel along the joint"),
     "sigma_n_eff": ("Pa", "effective normal stress, sigma_n + p"),
 }
-#: One more where friction hardens with it.
-HARDENING = {"lambda": ("m", "friction: cumulated plastic slip, which hardens")}
 #: One more where water flows.
 FLUX = {"flux": ("kg/(m s)", "mass flux towards the toe, mean of the elements around the node")}
 
@@ -115,8 +113,7 @@ def rows_at(table: dict[str, np.ndarray], time: float | None = None) -> dict[str
 
 def joint_columns(case: Case) -> dict[str, tuple[str, str]]:
     """The columns of a case's joint.csv: unit and meaning."""
-    hardening, flux = case["law"] == "friction", case["uplift"] == "flow"
-    return JOINT | (HARDENING if hardening else {}) | (FLUX if flux else {})
+    return JOINT | dict(case.law.columns) | (FLUX if case["uplift"] == "flow" else {})
 
 
 def joint_table(case: Case, blocks: list[np.ndarray]) -> dict[str, np.ndarray]:

@@ -114,19 +114,13 @@ def heading(result: Results) -> str:
 
 
 def shear_limit(case: Case, rows: dict[str, np.ndarray]) -> tuple[str, np.ndarray] | None:
-    """What the joint holds in shear at each row [Pa], and how it is made up; None for rupture.
-
-    Friction: c - mu sigma' with the hardening of the slip; bond: the cohesion that is left, and
-    friction on contact.
-    """
-    if case["law"] == "rupture":
+    """The joint's shear strength at each row [Pa], and its formula; None if it has none."""
+    law = case.law
+    if not law.limits_shear:
         return None
-    pressed = -case["mu"] * rows["sigma_n_eff"]
-    if case["law"] == "bond":
-        left = case["adhesion"] * (1 - rows["damage"])
-        return "limit: cohesion left + mu |sigma'|", left + np.maximum(pressed, 0)
-    said = "limit: c + mu |sigma'|" + (" + H slip" if case.hardening_asked else "")
-    return said, case["adhesion"] + pressed + case["pena_tang"] * rows["slip"]
+    hardening = " + H slip" if law.hardening_parameter and case.hardening_asked else ""
+    strength = law.shear_strength(rows["sigma_n_eff"], rows["damage"], rows["slip"])
+    return f"limit: {law.shear_strength_formula}{hardening}", strength
 
 
 def draw_joint(figure: FigureBase, result: Results, time: float) -> None:
@@ -156,12 +150,11 @@ def draw_joint(figure: FigureBase, result: Results, time: float) -> None:
 
 def draw_jumps(axes: Axes, case: Case, curves: dict[str, np.ndarray]) -> None:
     """Opening, tangential jump and slip."""
-    released = "released slip" if case["law"] == "rupture" else "slip"
     length, factor = unit([curves["delta_n"], curves["delta_t1"]], LENGTHS)
     for name, style, color, label in (
         ("delta_n", "-", BLUE, "opening"),
         ("delta_t1", "-", ORANGE, "tangential (downstream > 0)"),
-        ("slip", "--", ORANGE, f"{released}, size"),
+        ("slip", "--", ORANGE, f"{case.law.slip_name}, size"),
     ):
         axes.plot(curves["s"], curves[name] * factor, style, color=color, label=label)
     draw_published(axes, case, curves, {"delta_n": BLUE, "delta_t1": ORANGE}, factor)

@@ -1,4 +1,4 @@
-"""What is kept of a loading: a row of history per step, the joint's tables at the requested
+"""What is recorded of a loading: a row of history per step, the joint's tables at the requested
 levels.
 """
 
@@ -8,79 +8,47 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..joint.equilibrium import Joint, Pressure
-from ..laws import Memory
+from ..joint.equilibrium import Equilibrium
+from ..laws.base import Array
 from ..model.case import Case
-from ..model.loads import Loading
-from ..model.results import HISTORY, Results, history_table, joint_columns, joint_table
+from ..model.results import HISTORY, Results, history_table, joint_table
+from .model import StepResult
+from .state import State
 
-#: What is found at each step; the other columns of HISTORY are made from these.
-FOUND = (*(set(HISTORY) - {"load_factor", "x_resultant"}), "heel")
-
-
-@dataclass(frozen=True)
-class State:
-    """A converged state: what the next step starts from, with the memory of the law's points and of
-    the nodes.
-    """
-
-    time: float
-    loading: Loading
-    jump: np.ndarray
-    memory: Memory
-    #: by `rows` of the interface
-    nodes: Memory
-    #: of the water it is in equilibrium with: what had broken before lets in
-    pressure: Pressure | None = None
-
-    @staticmethod
-    def virgin(joint: Joint) -> State:
-        """Before any load."""
-        law, interface = joint.law, joint.interface
-        memories = law.start(len(interface.points.weights)), law.start(len(interface.rows))
-        return State(0.0, Loading(0.0, 0.0), np.zeros(len(joint.bulk.free)), *memories)
-
-    def staged(self, joint: Joint, time: float) -> State:
-        """The state with the memories for a step that goes on to a time."""
-        memories = (joint.law.stage(m, self.time, time) for m in (self.memory, self.nodes))
-        return replace(self, **dict(zip(("memory", "nodes"), memories, strict=True)))
-
-    def held(self, joint: Joint) -> State:
-        """The state with memories with which nothing breaks or lets go any further."""
-        at_points, at_nodes = seen(joint, self.jump)
-        memory, nodes = joint.law.hold(at_points, self.memory), joint.law.hold(at_nodes, self.nodes)
-        return replace(self, memory=memory, nodes=nodes)
-
-    def remember(self, joint: Joint, jump: np.ndarray) -> tuple[Memory, Memory]:
-        """The memories after a step to a jump."""
-        at_points, at_nodes = seen(joint, jump)
-        return joint.law.remember(at_points, self.memory), joint.law.remember(at_nodes, self.nodes)
-
-
-def seen(joint: Joint, jump: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The jump as the law's points and the nodes see it, (q, 3) each."""
-    interface = joint.interface
-    return tuple(interface.jumps(m, jump) for m in (interface.at_points, interface.at_nodes))
+#: What is recorded of each step; the other columns of HISTORY are made from these.
+RECORDED = (*(set(HISTORY) - {"load_factor", "x_resultant"}), "heel")
 
 
 @dataclass
-class Record:
+class History:
     """Rows and tables of a loading."""
 
-    joint: Joint
+    equilibrium: Equilibrium
     #: the state under the weight alone, from where displacements count; None: from no load at all
     at_rest: State | None = None
-    #: FOUND, a value per step
-    rows: dict[str, list[float]] = field(default_factory=lambda: {name: [] for name in FOUND})
+    #: RECORDED, a value per step
+    rows: dict[str, list[float]] = field(default_factory=lambda: {name: [] for name in RECORDED})
     #: per requested level: the joint's rows, and those extrapolated from element means
-    tables: list[tuple[np.ndarray, np.ndarray]] = field(default_factory=list)
+    tables: list[tuple[Array, Array]] = field(default_factory=list)
     #: the states of the tables
     saved: list[State] = field(default_factory=list)
 
-    def copy(self) -> Record:
-        """Another one, to go on with by itself."""
+    def copy(self) -> History:
+        """Another one, that can be continued independently."""
         rows = {name: list(values) for name, values in self.rows.items()}
         return replace(self, rows=rows, tables=list(self.tables), saved=list(self.saved))
+
+    @property
+    def last(self) -> dict[str, float]:
+        """The last row."""
+        return {name: values[-1] for name, values in self.rows.items()}
+
+    def iterations_since(self, rows: int) -> int:
+        """The Newton iterations of all steps after a number of rows."""
+        return int(sum(self.rows["iterations"][rows:]))
+
+    def __len__(self) -> int:
+        return len(self.rows["time"])
 
     @property
     def saved_until(self) -> float:
@@ -88,38 +56,40 @@ class Record:
         return self.saved[-1].time if self.saved else 0.0
 
     def complete(self, state: State) -> bool:
-        """Whether the row of a state is there, and whole: an interruption can come at any time."""
-        whole = len({len(values) for values in self.rows.values()}) == 1
-        return whole and self.rows["time"][-1:] == [state.time]
+        """Whether the row of a state is complete: an interruption can come at any time."""
+        equal = len({len(values) for values in self.rows.values()}) == 1
+        return equal and self.rows["time"][-1:] == [state.time]
 
-    def add(self, state: State, iterations: int, cuts: int, residual: float) -> None:
-        """The row of a converged step."""
-        joint, law, interface = self.joint, self.joint.law, self.joint.interface
+    def add(self, step: StepResult, cuts: int) -> None:
+        """The row of a converged step; cuts: how often it was shortened."""
+        state, equilibrium = step.state, self.equilibrium
+        law, interface = equilibrium.law, equilibrium.interface
         at_points = interface.jumps(interface.at_points, state.jump)
-        traction, _ = law.respond(at_points, state.memory)
-        weights = interface.points.weights / joint.bulk.width
+        traction, _ = law.traction_and_tangent(at_points, state.variables)
+        weights = interface.points.weights / equilibrium.bulk.width
         frames = interface.frames[interface.points.elements]
         along_axes = np.einsum("qk,qkc->qc", traction, frames)
         N, T, M = interface.chord.resultants(weights, interface.points.positions, along_axes)
         pressure = state.pressure
-        lifted = interface.bulk.joint.normals[interface.water_points.elements]
-        uplift = interface.water_points.weights * pressure.water_points / joint.bulk.width
+        assert pressure is not None  # of any converged state
+        normals = interface.bulk.joint.normals[interface.water_points.elements]
+        uplift = interface.water_points.weights * pressure.water_points / equilibrium.bulk.width
         row = {
             "time": state.time,
             "level": state.loading.level,
             "tail_level": state.loading.tail,
-            "iterations": iterations,
+            "iterations": step.iterations,
             "cuts": cuts,
-            "residual": residual,
-            "crack_length": weights @ law.open(at_points, state.memory),
-            "process_zone": weights @ law.in_process_zone(at_points, state.memory),
-            "slip_length": weights @ law.slid(at_points, state.memory),
+            "residual": step.residual,
+            "crack_length": weights @ law.is_open(at_points, state.variables),
+            "process_zone": weights @ law.in_process_zone(at_points, state.variables),
+            "slip_length": weights @ law.has_slipped(state.variables, len(weights)),
             "max_opening": interface.jumps(interface.at_nodes, state.jump)[:, 0].max(),
             "crest_ux": self.crest(state),
             "N": N,
             "T": T,
             "M": M,
-            "U": uplift @ lifted[:, :2] @ interface.chord.normal,
+            "U": uplift @ normals[:, :2] @ interface.chord.normal,
             "flux": pressure.leakage,
             "heel": interface.heel @ state.jump,
         }
@@ -127,64 +97,58 @@ class Record:
             self.rows[name].append(float(value))
 
     def crest(self, state: State) -> float:
-        """The crest's movement along x [m]."""
-        start = self.at_rest and self.joint.crest(self.at_rest.jump, self.at_rest.loading)
-        return self.joint.crest(state.jump, state.loading) - (start or 0.0)
+        """The crest's displacement along x [m]."""
+        crest, rest = self.equilibrium.crest, self.at_rest
+        return crest(state.jump, state.loading) - (crest(rest.jump, rest.loading) if rest else 0.0)
 
     def save(self, state: State) -> None:
         """The joint at the state last added, node by node; and with jump and stress made from
         element means.
         """
-        joint, law, interface = self.joint, self.joint.law, self.joint.interface
-        place, corners = interface.space.place, len(joint.bulk.joint.points)
-        pressure = state.pressure
+        equilibrium = self.equilibrium
+        law, interface = equilibrium.law, equilibrium.interface
+        place, corners = interface.space.place, len(equilibrium.bulk.joint.points)
+        pressure, variables = state.pressure, state.node_variables
+        assert pressure is not None  # of any converged state
         jump = interface.jumps(interface.at_nodes, state.jump)
-        traction, _ = law.respond(jump, state.nodes)
-        seen = interface.at_places(
-            np.column_stack(
-                [
-                    jump,
-                    traction,
-                    law.damage(jump, state.nodes),
-                    np.linalg.norm(state.nodes.vector, axis=1),
-                ]
-            )
-        )
-        seen[:, 3] -= pressure.nodes
+        traction, _ = law.traction_and_tangent(jump, variables)
+        damage, slip = law.damage(jump, variables), law.slip(variables, len(jump))
+        nodes = interface.at_places(np.column_stack([jump, traction, damage, slip]))
+        nodes[:, 3] -= pressure.nodes
         columns = [
             np.full((len(place), 2), (state.time, state.loading.level)),
             place,
-            seen[:, :6],
+            nodes[:, :6],
             pressure.nodes[:, None],
-            seen[:, 6:],
+            nodes[:, 6:],
             interface.way[:, None] * interface.length,
         ]
-        if "lambda" in joint_columns(joint.case):
-            columns.append(interface.at_places(state.nodes.scalar)[:, None])
+        of_law = law.column_values(variables)
+        columns += [interface.at_places(of_law[name])[:, None] for name in law.columns]
         if pressure.flux is not None:
             columns.append(self.node_means(pressure.flux[:, None], True))
         table = np.hstack(columns)
         at_points = interface.jumps(interface.at_points, state.jump)
-        stress, _ = law.respond(at_points, state.memory)
+        stress, _ = law.traction_and_tangent(at_points, state.variables)
         stress[:, 0] -= pressure.points
         weights, elements = interface.points.weights, interface.points.elements
         total = np.bincount(elements, weights)
         parts = (*at_points.T, *stress.T)
         means = np.column_stack([np.bincount(elements, weights * v) / total for v in parts])
-        extra = table.copy()
-        extra[:corners, 5:11] = self.node_means(means, False)
+        extrapolated = table.copy()
+        extrapolated[:corners, 5:11] = self.node_means(means, False)
         self.saved.append(state)
-        self.tables.append((table, extra))
+        self.tables.append((table, extrapolated))
 
-    def node_means(self, values: np.ndarray, middles: bool) -> np.ndarray:
+    def node_means(self, values: Array, middles: bool) -> Array:
         """Mean over the joint elements around each node (and each middle of an edge) of element
         values (e, m).
         """
-        space = self.joint.interface.space
+        space = self.equilibrium.interface.space
         number = len(space.place) if middles else len(space.body.points)
         total, count, start = np.zeros((number, values.shape[1])), np.zeros(number), 0
-        for (_, whole), (_, cells) in zip(space.connectivity, space.body.cells, strict=True):
-            table = whole if middles else cells
+        for (_, functions), (_, cells) in zip(space.connectivity, space.body.cells, strict=True):
+            table = functions if middles else cells
             rows = np.repeat(np.arange(start, start + len(table)), table.shape[1])
             np.add.at(total, table.ravel(), values[rows])
             np.add.at(count, table.ravel(), 1)

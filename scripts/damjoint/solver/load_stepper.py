@@ -1,11 +1,10 @@
-"""The loading of a case followed from its first to its last step, with the strategy of
-pro/strategy.pro.
-"""
+"""The loading of a case followed from its first to its last step, as in pro/strategy.pro."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from copy import copy
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
@@ -13,204 +12,306 @@ from ..joint.interface import Interface
 from ..model.case import Case
 from ..model.loads import Loading
 from ..model.results import Results
-from .history import State
+from .controls import DRIVES, Control, LevelControl
+from .history import History
+from .model import Model, StepResult
 from .path import ROUGH, SURE, Path, Point
-from .stepping import Stepper
+from .relaxation import over_unstable_growth
+
+#: Number of strategies by which a step from the equilibrium path to the prescribed level is tried.
+FROM_PATH = 3
 
 
-class Filling(Stepper):
-    """The loading of a case followed step by step; the converged steps are rows, the requested
-    levels tables.
-    """
+@dataclass(frozen=True)
+class Mechanism:
+    """How the dam fails, as its equilibrium path has shown."""
+
+    mode: str
+    #: how many times as far it was pushed as at its highest level
+    pushed: float
+    #: whose loads acted
+    time: float
+    #: the highest level [m]
+    level: float = np.nan
+
+
+class LoadStepper:
+    """Load stepping: the converged steps are rows of the history, the requested levels tables."""
 
     def __init__(
         self, case: Case, interface: Interface, on_step: Callable[[float], None] = lambda time: None
     ) -> None:
-        super().__init__(case, interface, on_step)
+        self.model, self.on_step = Model(case, interface), on_step
+        self.history = History(self.model.equilibrium)
+        self.state = self.model.start()
         self.stopped = False
-        #: whether a path has been followed to its end
-        self.followed = False
+        #: whether an equilibrium path has been followed to its end
+        self.path_ended = False
         #: how the dam fails, once its equilibrium path has shown that it does
-        self.mechanism: dict[str, float | str] = {}
-        #: the levels from which the path has fallen and to which it has come back, and its lowest
-        #: ones on the way [m]
-        self.snapped: tuple[tuple[float, float], ...] = ()
-        #: the levels at which the joint ran on, to a state that depends on the way there
-        self.ran_on: tuple[float, ...] = ()
+        self.mechanism: Mechanism | None = None
+        #: the levels of limit points that have been passed, and the lowest ones behind them [m]
+        self.limit_points: tuple[tuple[float, float], ...] = ()
+        #: the levels at which a crack grew unstably, to a state that depends on the steps
+        self.relaxed_at: tuple[float, ...] = ()
+        #: the prescribed displacement at drive_begin, and the level at drive_end
+        self.displacement_at_begin = self.level_at_drive_end = 0.0
+
+    @property
+    def case(self) -> Case:
+        """The case whose loading is followed."""
+        return self.model.case
+
+    @property
+    def drives(self) -> bool:
+        """Whether the case prescribes a displacement."""
+        return bool(self.case["drive"] != "level")
+
+    def fork(self, case: Case) -> LoadStepper:
+        """The loading of a case that agrees with this one's up to its last step, to be continued
+        from there independently.
+        """
+        other = copy(self)
+        other.on_step = lambda time: None
+        other.model, other.history = self.model.with_case(case), self.history.copy()
+        return other
+
+    # -- the loading
+
+    def control(self, time: float) -> Control:
+        """What the case prescribes at a time."""
+        case, level = self.case, self.case.level_at(time)
+        if not self.drives:
+            return LevelControl(level)
+        begin, end, last = case["drive_begin"], case["drive_end"], case.times[-1]
+        if time > end + 1e-9:  # the level goes on from that at the end of the displacement
+            start = self.level_at_drive_end
+            share = (time - end) / (last - end)
+            return LevelControl(start + (case.level_at(last) - start) * share)
+        if not begin + 1e-9 < time:
+            return LevelControl(level)
+        share = (time - begin) / (end - begin)
+        return DRIVES[case["drive"]](self.displacement_at_begin + case["drive_by"] * share)
 
     def run(self) -> Results:
         """Follow all the times of the case that are still to come."""
         for target in self.case.times:
             if target > self.state.time and not self.stopped:
-                self.reach(target)
+                self.advance_to(target)
                 if target in self.case.requested and not self.stopped:
-                    self.record.save(self.state)
+                    self.history.save(self.state)
         if self.stopped:
-            self.keep_last()
+            self.save_last()
         return self.results()
 
-    def rest(self) -> bool:
+    def save_last(self) -> None:
+        """Make a table of the last converged state, if there is none yet."""
+        if self.state.time > 0 and self.history.saved_until < self.state.time:
+            self.history.save(self.state)
+
+    def weigh(self) -> bool:
         """The state under the weight alone, from where displacements count; whether there is one.
 
         It has no row in the history.
         """
-        found = self.solve_by(self.attempts(), 0.0)
+        found = self.model.advance(self.state, 0.0, self.control(0.0))
         if found is None:
             return False
-        self.state = found[0]
+        self.state = found.state
         if self.case["weight_first"]:
-            self.record.at_rest = self.state
-        if self.driven:
-            self.displacement = self.driven_displacement(self.state)
+            self.history.at_rest = self.state
+        if self.drives:
+            self.displacement_at_begin = self.driven_displacement()
         return True
 
-    def keep_last(self) -> None:
-        """Make a table of the last converged state, if there is none yet."""
-        if self.state.time > 0 and self.record.saved_until < self.state.time:
-            self.record.save(self.state)
+    def driven_displacement(self) -> float:
+        """The displacement that the case prescribes, in the last state [m]."""
+        return self.model.measure(DRIVES[self.case["drive"]](0.0), self.state)
 
-    def reach(self, target: float) -> None:
-        """Steps up to a time; a step that fails is cut, the next ones grow back.
+    def accept(self, step: StepResult, cuts: int) -> None:
+        """Commit a converged step; cuts: how often it was shortened."""
+        self.state = step.state.after(self.state)
+        self.history.add(step, cuts)
+        if self.drives:
+            if self.state.time < self.case["drive_begin"] + 1e-9:
+                self.displacement_at_begin = self.driven_displacement()
+            if self.state.time < self.case["drive_end"] + 1e-9:
+                self.level_at_drive_end = self.state.loading.level
+        self.on_step(self.state.time)
 
-        The first step holds the weight, too, at any length: it is cut to the weight alone first.
+    def step(self, time: float) -> bool:
+        """One step to a time by the first strategy; whether it converges."""
+        first = self.model.strategies[:1]
+        control = self.control(time)
+        found = self.model.advance(self.state, time, control, strategies=first, extrapolate=True)
+        if found:
+            self.accept(found, cuts=0)
+        return found is not None
+
+    def advance_to(self, target: float) -> None:
+        """Steps up to a time; a step that does not converge is cut, the next ones grow again.
+
+        The first step includes the weight at any length: it is cut to the weight alone first.
         """
-        # what is driven from t = 0 on counts from the weight alone, too
-        first = self.case["weight_first"] or (self.driven and self.case["drive_begin"] == 0)
+        case, model = self.case, self.model
+        # a displacement prescribed from t = 0 on counts from the weight alone, too
+        first = case["weight_first"] or (self.drives and case["drive_begin"] == 0)
         if first and self.state.time == 0 and not self.state.jump.any():
-            self.rest()
-        *attempts, last_resort = self.attempts()
+            self.weigh()
+        *strategies, fallback = model.strategies
         cuts, dt, weighed = 0, np.inf, self.state.time > 0 or self.state.jump.any()
         while self.state.time < target and not self.stopped:
             time = min(self.state.time + dt, target)
             time = target if target - time < 1e-9 else time
-            smallest = time - self.state.time < self.case["smallest_step"] * (1 + 1e-9)
-            ended = self.followed and (self.mechanism or not smallest)
-            quick = ended or (self.ran_on and not smallest)
-            likely = attempts[:1] if quick else attempts
-            found = self.solve_by(likely, time, ahead=True, insist=smallest)
+            smallest = time - self.state.time < case["smallest_step"] * (1 + 1e-9)
+            ended = self.path_ended and (self.mechanism is not None or not smallest)
+            quick = ended or (self.relaxed_at and not smallest)
+            found = model.advance(
+                self.state,
+                time,
+                self.control(time),
+                strategies=strategies[:1] if quick else strategies,
+                extrapolate=True,
+                persist=smallest,
+            )
             if found is None and not weighed:
                 weighed = True
-                if self.rest():
+                if self.weigh():
                     cuts += 1
                     continue
             if found is None and not ended:
-                found = self.snap_through(time, cuts, smallest)
+                found = self.over_limit_point(time, cuts, smallest)
             if found is None:
-                tried, cuts = time - self.state.time, cuts + 1
-                dt = max(self.case.shared["cut"][0] * tried, self.case["smallest_step"])
+                length, cuts = time - self.state.time, cuts + 1
+                dt = max(case.shared["cut"][0] * length, case["smallest_step"])
                 if smallest and self.mechanism:
                     self.stopped = True
                 elif smallest:
-                    time, found = target, self.solve_by([last_resort], target)
+                    time = target
+                    control = self.control(time)
+                    found = model.advance(self.state, time, control, strategies=[fallback])
                     self.stopped = found is None
             if found:
                 dt = 2 * (time - self.state.time)
-                self.accept(cuts, *found)
+                self.accept(found, cuts)
                 cuts = 0
 
-    def snap_through(
-        self, time: float, cuts: int, smallest: bool
-    ) -> tuple[State, int, float] | None:
+    # -- beyond a limit point
+
+    def over_limit_point(self, time: float, cuts: int, smallest: bool) -> StepResult | None:
         """A step over unstable crack growth, after which there is no equilibrium near the last one.
 
-        Along the equilibrium path, unless opening ends the shear stiffness: such a path has a kink
-        and a turn at every point. Else, and where the path is not found, by relaxation.
+        Along the equilibrium path, unless opening releases the shear stiffness: such a path has a
+        kink and a turn at every point. Else, and where the path is lost, by relaxation.
         """
-        law, found = self.joint.law, None
-        if not (law.releases or self.driven or self.followed) and (smallest or not cuts):
+        equilibrium, found = self.model.equilibrium, None
+        law = equilibrium.law
+        follows = not (law.releases_shear or self.drives or self.path_ended)
+        if follows and (smallest or not cuts):
             found = self.along_path(time)
-            if self.followed and not smallest:  # shorter steps from where the path has ended
+            if self.path_ended and not smallest:  # shorter steps from where the path has ended
                 return None
-        if found is None and (law.breaks or self.joint.flowing):
-            known = self.ran_on or smallest or cuts > 0
-            if relaxed := self.relaxed(time, wherever=law.breaks and bool(known)):
-                *found, own = relaxed
+        if found is None and (law.softens or equilibrium.flowing):
+            known = bool(self.relaxed_at) or smallest or cuts > 0
+            control = self.control(time)
+            accept = law.softens and known
+            if step := over_unstable_growth(self.model, self.state, time, control, accept):
+                found, own = step
                 if not own:
-                    self.ran_on += (found[0].loading.level,)
+                    self.relaxed_at += (found.state.loading.level,)
         return found
 
-    def along_path(self, time: float) -> tuple[State, int, float] | None:
-        """A step along the equilibrium path, until the level of its time is there.
+    def along_path(self, time: float) -> StepResult | None:
+        """A step along the equilibrium path, until it reaches the level of its time.
 
-        If it never is the dam fails: `mechanism`. Then, and where the path is lost, its highest
+        If it never does the dam fails: `mechanism`. Then, and where the path is lost, its highest
         level is the last step if only the level changes in it; else shorter steps are to be tried.
         """
-        begin, wanted = self.state, self.case.level_at(time)
-        if begin.time == 0 or wanted < begin.loading.level:
+        begin, level = self.state, self.case.level_at(time)
+        if begin.time == 0 or level < begin.loading.level:
             return None
-        start = Point(self.fork(self.case))
-        path = Path([start], time)
+        path = Path([Point(self.model, begin, self.history.copy())], time)
         path.advance()
         if path.stuck:
             return None
-        same = self.same_but_for_level(path.points[1].filling.state.loading, begin.loading)
+        same = self.same_but_for_level(path.points[1].state.loading, begin.loading)
+        start = path.points[0]
         if not same:
             del path.points[0]  # no point of this path: other loads acted
-        while path.points[-1].level < wanted:
+        while path.points[-1].level < level:
             # an earlier path's mechanism, under other loads, does not end this one
-            failing = path.slides or path.settled(ROUGH if path.stuck else SURE)
-            if failing:
-                self.fails(path)
-            if failing or path.stuck:
+            fails = path.slides or path.settled(ROUGH if path.stuck else SURE)
+            if fails or path.stuck:
+                mechanism = self.mechanism_of(path)
                 path.refine()
-                if failing:
-                    self.mechanism["level"] = float(path.highest)
-                self.followed = same
+                if fails:
+                    self.mechanism = replace(mechanism, level=float(path.highest))
+                self.path_ended = same
                 if same:
-                    self.end_at_knee(path)
+                    self.end_at_limit_point(path)
                 return None
             path.advance()
         levels = [point.level for point in path.points]
-        last, beyond = start.filling, path.points[-1].filling
+        last, beyond = start, path.points[-1]
         jump = beyond.state.jump
         if len(levels) > 1:
-            last = path.points[-2].filling
-            share = (wanted - levels[-2]) / (levels[-1] - levels[-2])
+            last = path.points[-2]
+            share = (level - levels[-2]) / (levels[-1] - levels[-2])
             jump = last.state.jump + share * (jump - last.state.jump)
-        found = last.solve_by(self.attempts()[:3], time, start=(jump, wanted))
+        strategies = self.model.strategies[:FROM_PATH]
+        control = LevelControl(level)
+        found = self.model.advance(
+            last.state, time, control, strategies=strategies, guess=(jump, level)
+        )
         if found is None:
             return None
-        self.note_falls(levels)
-        spent = sum(beyond.record.rows["iterations"][len(self.record.rows["time"]) :])
-        return found[0], int(spent) + found[1], found[2]
+        self.record_limit_points(levels)
+        spent = beyond.history.iterations_since(len(self.history))
+        return replace(found, iterations=spent + found.iterations)
 
-    def note_falls(self, levels: list[float]) -> None:
-        """Remember from where, and how far, the level of a path has fallen on its way."""
+    def record_limit_points(self, levels: list[float]) -> None:
+        """Record the first limit point that a path has passed, and the lowest level behind it."""
         falls = np.flatnonzero(np.diff(levels) < 0)
         if len(falls):
-            self.snapped += ((float(levels[falls[0]]), float(min(levels[falls[0] :]))),)
+            self.limit_points += ((float(levels[falls[0]]), float(min(levels[falls[0] :]))),)
 
     def same_but_for_level(self, one: Loading, other: Loading) -> bool:
         """Whether two loadings differ in nothing else that acts."""
-        loads = (self.joint.loads(replace(loading, level=0.0)) for loading in (one, other))
-        return one.tail == other.tail and np.array_equal(*loads)
+        dry, other_dry = (
+            self.model.equilibrium.loads(replace(loads, level=0.0)) for loads in (one, other)
+        )
+        return one.tail == other.tail and np.array_equal(dry, other_dry)
 
-    def fails(self, path: Path) -> None:
-        """The mechanism of a path that has no equilibrium at the level asked for."""
-        pushed = path.points[-1].pushed / (path.points[path.knee].pushed or path.size)
-        self.mechanism = {"mode": path.mode, "pushed": float(pushed), "time": path.time}
+    def mechanism_of(self, path: Path) -> Mechanism:
+        """The mechanism of a path that does not reach the prescribed level."""
+        pushed = path.points[-1].pushed / (path.points[path.limit_point].pushed or path.size)
+        return Mechanism(path.mode, float(pushed), path.time)
 
-    def end_at_knee(self, path: Path) -> None:
-        """Take a path's highest level as a step, in which nothing else has changed."""
-        top, begin = path.points[path.knee], self.state
-        state, rise = top.filling.state, top.level - begin.loading.level
+    def end_at_limit_point(self, path: Path) -> None:
+        """Take a path's limit point as a step, in which nothing but the level has changed."""
+        top, begin = path.points[path.limit_point], self.state
+        rise = top.level - begin.loading.level
         if rise > 0:
             share = rise / (self.case.level_at(path.time) - begin.loading.level)
-            rows = top.filling.record.rows
-            reached = replace(state, time=begin.time + share * (path.time - begin.time))
-            spent = sum(rows["iterations"][len(self.record.rows["time"]) :])
-            self.accept(0, reached, int(spent), rows["residual"][-1])
-            self.note_falls([point.level for point in path.points[: path.knee + 1]])
+            time = begin.time + share * (path.time - begin.time)
+            spent = top.history.iterations_since(len(self.history))
+            reached = replace(top.state, time=time)
+            self.accept(StepResult(reached, spent, top.last["residual"]), cuts=0)
+            self.record_limit_points([point.level for point in path.points[: path.limit_point + 1]])
 
     def results(self) -> Results:
         """All tables so far, and what is known of failure and unstable crack growth."""
-        found = self.record.results(self.case, self.stopped)
+        results = self.history.results(self.case, self.stopped)
         if not self.stopped:
-            self.mechanism = {}  # another way has been found
+            self.mechanism = None  # the dam has been found to stand
         elif self.mechanism:  # the last steps of the level may have gone a little further
-            time, last = self.mechanism["time"], self.state.loading
+            time, last = self.mechanism.time, self.state.loading
             if self.same_but_for_level(Loading.at(self.case, time, 0.0, last.tail), last):
-                self.mechanism["level"] = max(self.mechanism["level"], float(last.level))
-        about = {"mechanism": self.mechanism, "snapped": self.snapped, "ran_on": self.ran_on}
-        found.info = {name: value for name, value in about.items() if value}
-        return found
+                highest = max(self.mechanism.level, float(last.level))
+                self.mechanism = replace(self.mechanism, level=highest)
+        info = {
+            "mechanism": self.mechanism and asdict(self.mechanism),
+            "limit_points": self.limit_points,
+            "unstable_growth": self.relaxed_at,
+        }
+        results.info = {name: value for name, value in info.items() if value}
+        return results

@@ -1,4 +1,4 @@
-"""Newton's method with a line search that lets the residual rise for a moment."""
+"""Newton's method with a line search that allows the residual to rise."""
 
 from __future__ import annotations
 
@@ -6,129 +6,135 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import linalg
 
+from ..laws.base import Array
 
-class Fallen(Exception):
-    """An iterate has gone so far that nothing is likely to hold it."""
+
+class Diverged(Exception):
+    """An iterate exceeds the displacement limit."""
 
 
 @dataclass(frozen=True)
-class Attempt:
-    """One way of trying a step."""
+class Strategy:
+    """One way of solving a step."""
 
     #: how much the residual may grow before a correction is halved
     growth: float
-    #: for how many iterations the law's secant stiffness takes the place of the tangent
+    #: number of iterations with the law's secant stiffness in place of the tangent
     secant: int
-    #: whether points that pass over the release of their shear stop in it first: no (0), those that
-    #: close (1), all (2)
+    #: whether points that cross the release interval of their shear are placed inside it for one
+    #: iteration: no (0), those that close (1), all (2)
     release: int
     iterations: int
     halvings: int
 
 
-@dataclass
+@dataclass(frozen=True)
 class Iterate:
-    """An iterate: jump and level, residual and its size, its correction (jump, level) by the law's
-    tangent or by its secant, and where its points are in the release of their shear.
+    """An iterate: jump and level, residual and its norm, its correction (jump, level) by the law's
+    tangent or by its secant, and the side of the shear release of each point.
     """
 
-    jump: np.ndarray
+    jump: Array
     level: float
-    residual: np.ndarray
+    residual: Array
     size: float
-    correction: Callable[[bool], tuple[np.ndarray, float]]
-    side: np.ndarray | None = None
+    correction: Callable[[bool], tuple[Array, float]]
+    side: NDArray[np.int_] | None = None
 
 
-#: The iterate at a jump and a level, that follows another one or none.
-Evaluate = Callable[..., Iterate]
+#: The iterate at a jump and a level, after another one or as the first.
+Evaluate = Callable[[Array, float, Iterate | None], Iterate]
 
 
 @dataclass(frozen=True)
-class Limit:
-    """When an iterate has converged: residual <= tolerance * reference, or what rounding alone
+class Convergence:
+    """When an iterate has converged: norm of the residual <= tolerance, or what rounding alone
     makes of it.
 
-    A dam that has slid by a centimetre has terms in its residual that are 1e9 times its loads and
-    cancel; no iteration gets below a few times their rounding. Noise: what the rounding of the
-    unknowns does to the residual.
+    After a slip of a centimetre the terms of the residual are 1e9 times the loads and cancel; no
+    iteration gets below a few times their rounding.
     """
 
-    size: float
-    #: residual up to which rounding is an excuse, and how many times the noise
+    tolerance: float
+    #: norm of the residual up to which rounding is accepted as its cause, and how many times the
+    #: residual of rounded unknowns it may be
     coarsest: float
     round_off: float
-    #: the largest jump that a dam that stands can have [m]
-    farthest: float
+    #: the largest jump of an equilibrium of small displacements [m]
+    largest_jump: float
 
-    def met(self, now: Iterate, before: float, evaluate: Evaluate) -> bool:
-        """Whether an iterate has converged; before: size of the residual one iteration ago."""
-        if now.size <= self.size:
+    def reached(self, now: Iterate, before: float, evaluate: Evaluate) -> bool:
+        """Whether an iterate has converged; before: norm of the residual one iteration ago."""
+        if now.size <= self.tolerance:
             return True
         if not 0.1 * before < now.size <= self.coarsest:  # it still falls, or is too large
             return False
-        return now.size <= self.round_off * noise(now, evaluate)
+        return bool(now.size <= self.round_off * rounding(now, evaluate))
 
 
-#: A residual that does not change by more than this part in DRIFT iterations: something slides or
-#: falls, and nothing will hold it.
-STILL, DRIFT = 1e-6, 4
+#: Relative change of the residual below which it stagnates, over so many iterations: something
+#: slides or falls.
+STAGNATION, ITERATIONS = 1e-6, 4
+
+#: Relative difference of residuals below which two iterates are the same.
+SAME = 1e-10
 
 #: x rounded to 43 of its 53 bits is x (2^10 + 1) - (x (2^10 + 1) - x): Veltkamp's splitting.
 SPLITTER = 2.0**10
 
 
-def noise(now: Iterate, evaluate: Evaluate) -> float:
-    """The norm of the residual's change when the last bit of every unknown is rounded away."""
+def rounding(now: Iterate, evaluate: Evaluate) -> float:
+    """Norm of the residual's change when the last bit of every unknown is rounded away."""
     larger = now.jump * (SPLITTER + 1)
     rounded = larger - (larger - now.jump)
-    return np.linalg.norm(evaluate(rounded, now.level, None).residual - now.residual) / SPLITTER
+    change = evaluate(rounded, now.level, None).residual - now.residual
+    return float(np.linalg.norm(change)) / SPLITTER
 
 
 def newton(
-    evaluate: Evaluate, start: Iterate, limit: Limit, attempt: Attempt
+    evaluate: Evaluate, start: Iterate, convergence: Convergence, strategy: Strategy
 ) -> tuple[Iterate, int] | None:
-    """The iterate that meets the limit, and the number of iterations; None if it is not found.
+    """The converged iterate and the number of iterations; None if there is none.
 
-    Raises Fallen.
+    Raises Diverged.
 
-    A correction is halved only while it makes the residual grow more than attempt.growth times:
-    while points open or break the residual has to rise, and a monotone line search would creep
-    there.
+    A correction is halved only while it makes the residual grow more than strategy.growth times:
+    while points open or break the residual has to rise, and a monotone line search would creep.
     """
-    now, sizes = start, []
-    for iterations in range(attempt.iterations + 1):
-        if limit.met(now, sizes[-1] if sizes else np.inf, evaluate):
+    now, sizes = start, list[float]()
+    for iterations in range(strategy.iterations + 1):
+        if convergence.reached(now, sizes[-1] if sizes else np.inf, evaluate):
             return now, iterations
-        if not np.isfinite(now.size) or iterations == attempt.iterations or hopeless(now, sizes):
+        if not np.isfinite(now.size) or iterations == strategy.iterations or stagnates(now, sizes):
             return None
-        if np.abs(now.jump).max() > limit.farthest:
-            raise Fallen
+        if np.abs(now.jump).max() > convergence.largest_jump:
+            raise Diverged
         sizes.append(now.size)
         try:
-            jump, level = now.correction(iterations < attempt.secant)
+            jump, level = now.correction(iterations < strategy.secant)
         except (linalg.LinAlgError, ValueError):  # singular, or not a number
             return None
         fraction = 1.0
-        for _ in range(attempt.halvings + 1):
-            tried = evaluate(now.jump + fraction * jump, now.level + fraction * level, now)
-            if tried.size <= attempt.growth * now.size:
+        for _ in range(strategy.halvings + 1):
+            new = evaluate(now.jump + fraction * jump, now.level + fraction * level, now)
+            if new.size <= strategy.growth * now.size:
                 break
             fraction /= 2
-        now = tried
+        now = new
     return None
 
 
-def hopeless(now: Iterate, sizes: list[float]) -> bool:
-    """Whether an iterate has been there before, or its residual drifts along unchanged."""
-    drifts = len(sizes) >= DRIFT and all(
-        repeated(now.size, [size], STILL) for size in sizes[-DRIFT:]
+def stagnates(now: Iterate, sizes: list[float]) -> bool:
+    """Whether the residual repeats, or has not changed over ITERATIONS iterations."""
+    unchanged = len(sizes) >= ITERATIONS and all(
+        repeats(now.size, [size], STAGNATION) for size in sizes[-ITERATIONS:]
     )
-    return drifts or repeated(now.size, sizes, 1e-10)
+    return unchanged or repeats(now.size, sizes, SAME)
 
 
-def repeated(size: float, sizes: list[float], part: float) -> bool:
-    """Whether a residual's size is one of earlier ones, but for a part of it."""
-    return any(abs(size - earlier) <= part * size for earlier in sizes)
+def repeats(size: float, sizes: list[float], tolerance: float) -> bool:
+    """Whether a residual's norm is one of earlier ones, within a relative tolerance."""
+    return any(abs(size - earlier) <= tolerance * size for earlier in sizes)

@@ -10,13 +10,24 @@ level rises no more, however far the dam is pushed, is a mechanism.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
+from ..laws.base import Array
 from ..model.case import Case
-from .stepping import Control, Stepper
+from .controls import (
+    DRIVES,
+    Control,
+    DisplacementControl,
+    LevelControl,
+    ProcessZoneControl,
+    process_zone,
+)
+from .history import History
+from .model import Model
+from .state import State
 
 #: Relative precision of a critical value.
 PRECISION = 1e-4
@@ -51,57 +62,90 @@ MOST_POINTS = 500
 
 @dataclass(frozen=True)
 class Point:
-    """An equilibrium, with all that led there."""
+    """An equilibrium, with the history that led to it."""
 
-    filling: Stepper
-    #: how far the dam has been pushed, with its displacement before the first push [m]; 0 where the
-    #: level is prescribed
+    model: Model
+    state: State
+    history: History
+    #: the displacement imposed so far, with that before the first push [m]; 0 where the level is
+    #: prescribed
     pushed: float = 0.0
-    #: what was prescribed: level, or `of` of a Control
+    #: what was prescribed: level, crest, zone or heel
     control: str = "level"
 
     @property
     def level(self) -> float:
         """The reservoir's level [m]."""
-        return self.filling.state.loading.level
+        return self.state.loading.level
 
     @cached_property
     def slides(self) -> bool:
-        """Whether a flat joint holds the shear by its whole strength, which slip cannot raise: more
-        water has no equilibrium, it pushes more and presses less.
+        """Whether a plane joint transmits the shear by its whole strength, which slip cannot raise:
+        a higher level has no equilibrium, it pushes more and presses less.
         """
-        joint, state = self.filling.joint, self.filling.state
-        interface = joint.interface
-        if not interface.flat:
+        equilibrium, state = self.model.equilibrium, self.state
+        law, interface = equilibrium.law, equilibrium.interface
+        if law.hardens or not interface.flat:
             return False
         jump = interface.jumps(interface.at_points, state.jump)
-        strength = joint.law.shear_strength(jump, state.memory)
-        if strength is None:
-            return False
-        shear = np.linalg.norm(joint.law.respond(jump, state.memory)[0][:, 1:], axis=1)
+        traction, _ = law.traction_and_tangent(jump, state.variables)
+        damage, slip = law.damage(jump, state.variables), law.slip(state.variables, len(jump))
+        strength = law.shear_strength(traction[:, 0], damage, slip)
+        shear = np.linalg.norm(traction[:, 1:], axis=1)
         weights = interface.points.weights
         return bool(weights @ shear >= (1 - PRECISION / 2) * (weights @ strength))
 
     @cached_property
     def compression(self) -> float:
         """Largest total compression at the toe [Pa]."""
-        joint, state = self.filling.joint, self.filling.state
-        interface = joint.interface
+        equilibrium, state = self.model.equilibrium, self.state
+        law, interface = equilibrium.law, equilibrium.interface
+        assert state.pressure is not None  # of any converged state
         jump = interface.jumps(interface.at_nodes, state.jump)
-        effective = interface.at_places(joint.law.respond(jump, state.nodes)[0][:, 0])
+        traction, _ = law.traction_and_tangent(jump, state.node_variables)
         toe = interface.way > 1 - 1e-9
-        return float((state.pressure.nodes - effective)[toe].max())
+        return float((state.pressure.nodes - interface.at_places(traction[:, 0]))[toe].max())
 
     @property
     def last(self) -> dict[str, float]:
-        """What is found there: columns of history.csv, and the heel's opening."""
-        return {name: values[-1] for name, values in self.filling.record.rows.items()}
+        """Columns of history.csv at it, and the heel's opening."""
+        return self.history.last
 
     @property
     def displacement(self) -> float:
         """The largest displacement of joint and crest [m]."""
-        state = self.filling.state
-        return max(np.abs(state.jump).max(), abs(self.filling.record.crest(state)))
+        return max(float(np.abs(self.state.jump).max()), abs(self.history.crest(self.state)))
+
+    @cached_property
+    def zone(self) -> Array | None:
+        """The process zone's mean jump from the unknowns, see `process_zone`."""
+        return process_zone(self.model.equilibrium, self.state)
+
+    @property
+    def zone_moved(self) -> float:
+        """By how much it has moved in the last step [m]."""
+        if self.zone is None or self.state.previous is None:
+            return 0.0
+        return float(self.zone @ (self.state.jump - self.state.previous.jump))
+
+    def moved(self, kind: str, by: float) -> DisplacementControl:
+        """The control that moves crest, zone or heel further than here by a length [m]."""
+        control: DisplacementControl
+        if kind == "zone" and self.zone is not None:
+            control = ProcessZoneControl(0.0, self.zone)
+        else:
+            control = DRIVES[kind](0.0)
+        return replace(control, value=self.model.measure(control, self.state) + by)
+
+    def step(self, time: float, control: Control) -> tuple[State, History] | None:
+        """The next equilibrium, by the first strategy; None if it does not converge."""
+        first = self.model.strategies[:1]
+        found = self.model.advance(self.state, time, control, strategies=first, extrapolate=True)
+        if found is None:
+            return None
+        history = self.history.copy()
+        history.add(found, cuts=0)
+        return found.state, history
 
 
 class Path:
@@ -142,7 +186,7 @@ class Path:
         return self.points[self.top].level if self.points else np.nan
 
     @property
-    def knee(self) -> int:
+    def limit_point(self) -> int:
         """The number of the point from which on the level rises by less than the precision."""
         levels = np.array([p.level for p in self.points])
         return int(np.argmax(levels >= (1 - PRECISION / 2) * self.highest))
@@ -167,14 +211,14 @@ class Path:
         """How the dam fails; empty if it is not seen."""
         if self.slides:
             return "sliding"
-        if not self.points or self.knee + 1 >= len(self.points):
+        if not self.points or self.limit_point + 1 >= len(self.points):
             return ""
-        knee, last = self.points[self.knee].filling, self.points[-1].filling
-        interface = last.joint.interface
-        moved = interface.jumps(interface.at_nodes, last.state.jump - knee.state.jump)
+        top, last = self.points[self.limit_point], self.points[-1]
+        interface = last.model.equilibrium.interface
+        moved = interface.jumps(interface.at_nodes, last.state.jump - top.state.jump)
         along = interface.way * interface.length
         crack = self.points[-1].last["crack_length"]
-        return movement(last.case, crack, along, interface.at_places(moved))
+        return movement(last.model.case, crack, along, interface.at_places(moved))
 
     # -- following it
     # ----------------------------------------------------------------------------------------------
@@ -197,9 +241,9 @@ class Path:
         comes first while the crest goes back; of the heel; of the crest, over a snap-back of all.
         """
         last = self.points[-1]
-        far, filling = last.pushed or self.size, last.filling
-        lengths = {"crest": self.push, "zone": ZONE_GROWTH * filling.zone_moved, "heel": self.push}
-        crest = filling.record.rows["crest_ux"][-2:]
+        far = last.pushed or self.size
+        lengths = {"crest": self.push, "zone": ZONE_GROWTH * last.zone_moved, "heel": self.push}
+        crest = last.history.rows["crest_ux"][-2:]
         backwards = last.control == "zone" and crest[-1] < crest[0]
         for of in sorted(lengths, key=lambda of: backwards and of == "crest"):
             smallest = 0.0 if of == "zone" else SMALLEST * far
@@ -207,15 +251,19 @@ class Path:
             yield from ((of, push) for push in wanted if push > smallest)
         yield from (("crest", part * far) for part in JUMPS)
 
-    def pushed(self, point: Point, by: float, of: str) -> Point | None:
+    def pushed(self, point: Point, by: float, kind: str) -> Point | None:
         """The equilibrium at which what is prescribed has moved further [m]."""
-        filling = point.filling.fork(point.filling.case)
-        row = filling.zone if of == "zone" else None
-        value = filling.measured(of, filling.state.jump, filling.state.loading, row) + by
-        time = max(filling.state.time, self.time) + self.tick
-        if not filling.step(time, Control(of, value, row)):
+        time = max(point.state.time, self.time) + self.tick
+        found = point.step(time, point.moved(kind, by))
+        if found is None:
             return None
-        return Point(filling, (point.pushed or self.size) + by, of)
+        return replace(
+            point,
+            state=found[0],
+            history=found[1],
+            pushed=(point.pushed or self.size) + by,
+            control=kind,
+        )
 
     # -- its highest level, more closely
     # ----------------------------------------------------------------------------------------------
@@ -256,7 +304,7 @@ class Path:
         a, b = self.points[left], self.points[left + 1]
         length, chord = b.pushed - (a.pushed or self.size), self.slope(left)
         before, beyond = self.slope(left - 1), self.slope(left + 1)
-        if before is None:
+        if before is None or chord is None:
             return 0.5, max(a.level, b.level) + abs(b.level - a.level)
         share = 0.5
         if beyond is not None and before > chord > beyond:
@@ -277,9 +325,10 @@ class Path:
         a, b = self.points[left], self.points[left + 1]
         if b.pushed:
             return self.pushed(a, share * (b.pushed - (a.pushed or self.size)), b.control)
-        times = a.filling.state.time, b.filling.state.time
-        filling = a.filling.fork(a.filling.case)
-        return Point(filling) if filling.step(times[0] + share * (times[1] - times[0])) else None
+        case, times = a.model.case, (a.state.time, b.state.time)
+        time = times[0] + share * (times[1] - times[0])
+        found = a.step(time, LevelControl(case.level_at(time)))
+        return replace(a, state=found[0], history=found[1]) if found else None
 
 
 def movement(case: Case, crack_length: float, x: np.ndarray, moved: np.ndarray) -> str:

@@ -267,17 +267,6 @@ def drained_head(case: Case, undrained: float, outlet: float) -> float:
     return undrained - case["drain_effectiveness"] * max(undrained - outlet, 0.0)
 
 
-def tensile_strength(case: Case) -> tuple[float, float]:
-    """Tension [Pa] at which the heel cracks, and at the tip of a crack.
-
-    Rupture and bond lose it at once where they crack; friction keeps its tension c/mu.
-    """
-    if case["law"] == "friction":
-        strength = case["adhesion"] / case["mu"]
-        return strength, strength
-    return case["sigma_max"], 0.0
-
-
 def sliding_factor(case: Case, normal: float, shear: float, uncracked: float) -> float:
     """SSF = (mu N' + c (L - a)) / |T|: shear friction factor, cohesion on the uncracked joint."""
     holds = case["mu"] * normal + case["adhesion"] * uncracked
@@ -422,7 +411,7 @@ class GravityMethod:
             )
         if not self.crack_length and self.tip_stress > 0:
             free = at(case, self.time, self.level, tension=False)
-            strength = tensile_strength(case)[0]
+            strength = case.law.tensile_strength
             found.append(
                 f"gravity method: uncracked, as its {self.tip_stress / 1e3:.4g} kPa at the heel "
                 f"are below the strength of {strength / 1e3:.4g} kPa; without tension: "
@@ -462,7 +451,8 @@ def at(case: Case, time: float, level: float | None = None, tension: bool = True
         uplift = Uplift(case, body, level, tail, crack)
         return GravityMethod(case, body, time, level, tail, loads, crack, uplift)
 
-    strength, at_tip = tensile_strength(case) if tension else (0.0, 0.0)
+    law = case.law
+    strength, at_tip = (law.tensile_strength, law.open_tension) if tension else (0.0, 0.0)
     if state(0.0).tip_stress <= strength:
         return state(0.0)
 

@@ -13,12 +13,11 @@ from dataclasses import replace
 import numpy as np
 
 from ..joint.interface import Interface
+from ..laws import UNBREAKABLE
 from ..model.case import Case, flows
-from ..solver.load_stepper import Filling
+from ..solver.load_stepper import LoadStepper
 
-#: Parameters of which N, T, M do not depend, with values that make a joint of the law `friction`
-#: elastic under any load.
-UNBREAKABLE = {"law": "friction", "mu": 1.0, "adhesion": 1e30, "pena_tang": 0.0}
+#: Parameters of which N, T, M do not depend.
 STRENGTHS = (*UNBREAKABLE, "sigma_max", "G_f", "G_t", "alpha", "pena_rupture", "pena_contact")
 
 #: Part of a bound by which it must be passed: far more than rounding makes.
@@ -34,7 +33,7 @@ def resultants(case: Case, interface: Interface) -> dict[str, np.ndarray]:
     if key not in _LAST:
         _LAST.clear()
         strong = replace(case, values=case.values | UNBREAKABLE)
-        _LAST[key] = Filling(strong, interface).run().history
+        _LAST[key] = LoadStepper(strong, interface).run().history
     return _LAST[key]
 
 
@@ -42,34 +41,26 @@ def elastic_heel_stress(case: Case, interface: Interface) -> float:
     """Largest effective normal stress [Pa] at the heel at the last level of a case whose joint does
     not fail: the heel is a corner, it depends on the mesh.
     """
-    rows = Filling(replace(case, values=case.values | UNBREAKABLE), interface).run().at()
+    rows = LoadStepper(replace(case, values=case.values | UNBREAKABLE), interface).run().at()
     return float(rows["sigma_n_eff"][rows["s"] <= rows["s"].min()].max())
 
 
 def mechanism(case: Case, interface: Interface) -> tuple[str, str]:
     """How a case fails for certain, and why, in words; both empty where the loads do not tell.
 
-    With the tensile strength f and the joint's length L: compression in it amounts to N + f L at
-    most, so that bond holds T <= mu (N + f L) + c L; friction without hardening, whose tension
-    takes from its shear, T <= mu N + c L; and no stress above f holds the dam down by more than
-    f L^2/2 about the toe.
+    Sliding: the shear exceeds the law's `shear_bound`. Overturning: with the tensile strength f
+    and the joint's length L, the tension holds the dam down by f L^2/2 about the toe at most.
     """
     if flows(case) or case["drive"] != "level":
         return "", ""
     history, length = resultants(case, interface), case.section["joint_length"][0]
-    law, mu, cohesion = case["law"], case["mu"], case["adhesion"]
-    tension = cohesion / mu if law == "friction" else case["sigma_max"]
-    shear = np.full_like(history["T"], np.inf)
-    if law == "bond":
-        shear = mu * np.maximum(history["N"] + tension * length, 0) + cohesion * length
-    elif law == "friction" and case["pena_tang"] == 0:
-        shear = np.maximum(mu * history["N"] + cohesion * length, 0)
+    shear = case.law.shear_bound(history["N"], length)
     for name, demand, bound, words in (
         ("sliding", np.abs(history["T"]), shear, "the shear T = {:.6g} N/m, what holds {:.6g} N/m"),
         (
             "overturning",
             -history["M"],
-            np.full_like(shear, tension * length**2 / 2),
+            np.full_like(shear, case.law.tensile_strength * length**2 / 2),
             "the moment -M = {:.6g} N, what holds {:.6g} N",
         ),
     ):

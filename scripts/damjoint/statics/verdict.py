@@ -1,12 +1,13 @@
-"""What a run has found, in words: whether the dam stands, and if not, how it fails.
+"""The verdict of a run: whether the dam stands, how it fails, and what to know of the result.
 
-This is the one place that reads a failure out of resultants.
+The one place where a failure is derived from resultants.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from ..laws import Evidence
 from ..model.case import Case, has_drains
 from ..model.results import Results
 from . import gravity
@@ -23,33 +24,32 @@ def verdict(results: Results) -> str:
         return "no equilibrium"
     if results.stopped:
         return why_stopped(results)
-    return "sliding" if loose_from(results) is not None else "stands"
+    return "sliding" if slipped_from(results) is not None else "stands"
 
 
 def failed(results: Results) -> bool:
-    """Whether the run's exit code has to be 1: stopped, or sliding on a hardening that nobody asked
-    for.
+    """Whether the run's exit code has to be 1: stopped, or sliding on a hardening that the user has
+    not set.
     """
     if results.stopped or not results.last:
         return True
-    asked = results.case["law"] == "friction" and results.case.hardening_asked
-    return loose_from(results) is not None and not asked
+    hardening_set = results.case.law.hardening_parameter and results.case.hardening_asked
+    return slipped_from(results) is not None and not hardening_set
 
 
-def loose_from(results: Results) -> float | None:
+def slipped_from(results: Results) -> float | None:
     """The level [m] from which on the whole joint has slipped or is open; None if a part of it
-    still holds.
+    still sticks, or if the law lets a slipped dam stand.
 
-    Once slipped, a joint counts as slipped. Seen at the integration points of every step, or at the
-    nodes of the last requested level. A bond does not harden: where all of it slips there is no
-    equilibrium, and a dam that has come to rest stands on friction.
+    A point that has slipped counts as slipped from then on. By the integration points of every
+    step, or by the nodes at the last requested level.
     """
-    if results.case["law"] == "bond":
+    if results.case.law.stands_slipped:
         return None
     history, base = results.history, results.case.joint_length
-    gone = np.maximum(history["slip_length"], history["crack_length"]) > base * (1 - 1e-9)
-    if gone.any() and gone[-1]:
-        return float(history["level"][np.flatnonzero(~gone)[-1] + 1 if not gone.all() else 0])
+    slipped = np.maximum(history["slip_length"], history["crack_length"]) > base * (1 - 1e-9)
+    if slipped.any() and slipped[-1]:
+        return float(history["level"][np.flatnonzero(~slipped)[-1] + 1 if not slipped.all() else 0])
     rows = results.at() if len(results.joint["time"]) else {}
     if rows and np.all((rows["damage"] >= 1) | (rows["slip"] > 0)):
         return float(rows["level"][0])
@@ -72,15 +72,13 @@ def why_stopped(results: Results) -> str:
     return shown.get("mode") or bound(results)[0] or "not converged"
 
 
-def held(results: Results) -> float:
-    """What the joint holds along itself apart from mu N, from the last saved state [N/m]: a bond's
-    cohesion that damage has left; friction's adhesion, on all of the joint as N holds the tension
-    c/mu of its open points, and what slip has hardened.
+def cohesion(results: Results) -> float:
+    """Shear resistance of the joint without normal stress, at the last saved state [N/m]; infinite
+    if its law does not bound the shear.
     """
-    case = results.case
-    if case["law"] == "bond":
-        return case["adhesion"] * (1 - mean(results, "damage")) * case.joint_along
-    return (case["adhesion"] + case["pena_tang"] * mean(results, "slip")) * case.joint_along
+    damage, slip = mean(results, "damage"), mean(results, "slip")
+    strength = results.case.law.shear_strength(np.zeros(1), damage, slip)[0]
+    return float(strength * results.case.joint_along)
 
 
 #: How near to a bound of statics a state counts as there, relatively: a run's last step is found
@@ -96,56 +94,58 @@ def bound(results: Results) -> tuple[str, str]:
     last one at the toe. Friction's tension c/mu of the open part is no compression.
     """
     case, last = results.case, results.last
-    length, holds = case.joint_along, case["mu"] * last["N"] + held(results)
+    length, resistance = case.joint_along, case["mu"] * last["N"] + cohesion(results)
     crack = last["crack_length"]
-    pull = case["adhesion"] / case["mu"] * crack if case["law"] == "friction" else 0.0
+    pull = case.law.open_tension * crack
     normal, moment = last["N"] + pull, last["M"] + pull * (length - crack / 2)
     arm = moment / normal if normal > 0 else 0.0
     if arm < max(0.01, 0.5 / case["n_joint"]) * length:
         side = "from" if arm >= 0 else "beyond"
         return "overturning", f"the resultant is {abs(arm):.3g} m {side} the toe"
-    if case["law"] != "rupture" and last["T"] >= (1 - AT_BOUND) * holds:
-        return "sliding", f"T = {last['T']:.5g} N/m of the {holds:.5g} N/m that the joint holds"
+    if last["T"] >= (1 - AT_BOUND) * resistance:
+        return (
+            "sliding",
+            f"T = {last['T']:.5g} N/m of the {resistance:.5g} N/m that the joint holds",
+        )
     return "", ""
 
 
 def highest_by_statics(case: Case, last: dict[str, float]) -> tuple[float, str, str]:
     """The level [m] above which a state has no equilibrium any more, how it fails and why, in
-    words; infinite and empty where statics does not tell.
+    words; infinite and empty where statics gives no bound.
 
-    Whatever the distribution of stress: with the tensile strength f, over the length l that is not
-    cracked, M >= -f l^2/2, and with friction T <= mu (N + f l) + c l; the crack does not close as
-    the level rises. The law friction keeps f = c/mu, of which its N has taken account, and l is the
-    whole joint.
+    Whatever the distribution of stress: with the tensile strength f over the length l that is not
+    cracked, M >= -f l^2/2, and the shear is at most the law's `shear_bound`; the crack does not
+    close as the level rises. A law whose open points transmit tension has l = the whole joint.
     """
     from scipy.optimize import brentq  # half of a run's start
 
-    law, time = case["law"], min(last["time"], case.times[-1])
+    law, time = case.law, min(last["time"], case.times[-1])
     if case.geometry or case["uplift"] == "flow":
         return np.inf, "", ""
-    strength, _ = gravity.tensile_strength(case)
-    crack = 0.0 if law == "friction" else last["crack_length"]
+    crack = 0.0 if law.open_tension else last["crack_length"]
     block = lambda level: gravity.with_crack(case, time, level, crack)
     here = block(last["level"])
     length = here.uncracked
-    tension = strength * length if law == "bond" else 0.0
 
     def moment(level: float) -> float:
-        return block(level).M + strength * length**2 / 2
+        return block(level).M + law.tensile_strength * length**2 / 2
 
     def shear(level: float) -> float:
         found = block(level)
-        return case["mu"] * max(found.N + tension, 0.0) + case["adhesion"] * length - found.T
+        return float(law.shear_bound(np.array(found.N), length)) - found.T
 
-    reasons = [(moment, "overturning", "the resultant leaves the joint")]
-    if law == "bond" or (law == "friction" and not case["pena_tang"]):
-        reasons.append((shear, "sliding", "the shear passes what the joint holds"))
+    reasons = (
+        (moment, "overturning", "the resultant leaves the joint"),
+        (shear, "sliding", "the shear passes what the joint holds"),
+    )
     found = [(np.inf, "", "")]
     # where the resultants are a hundredth of the base apart, the crack is another one
     if abs(here.M - last["M"]) < 0.01 * abs(here.N) * case.joint_along:
-        for spare, mode, words in reasons:
-            if spare(last["level"]) > 0 > spare(case.highest_level):
-                found.append((brentq(spare, last["level"], case.highest_level), mode, words))
+        for reserve, mode, words in reasons:
+            if reserve(last["level"]) > 0 > reserve(case.highest_level):
+                root = brentq(reserve, last["level"], case.highest_level)
+                found.append((root, mode, words))
     return min(found)
 
 
@@ -174,19 +174,19 @@ def statement(results: Results) -> str:
         return f"{found}: {why_there(results)}; the last converged state is saved"
     if found == "stands":
         return ""
-    said = (
-        f"sliding: the whole joint has slipped or is open from level {loose_from(results):.6g} m on"
-    )
-    if case["law"] != "friction":
-        return said + "; nothing holds it along the joint"
-    asked = "" if case.hardening_asked else ", a default that no joint has; set it if yours hardens"
+    level, hardening = slipped_from(results), case.law.hardening_parameter
+    slides = f"sliding: the whole joint has slipped or is open from level {level:.6g} m on"
+    if not hardening:
+        return f"{slides}; nothing holds it along the joint"
+    default = ", a default that no joint has; set it if yours hardens"
     return (
-        f"{said}; the dam stands on the hardening pena_tang = {case['pena_tang']:.4g} Pa/m{asked}"
+        f"{slides}; the dam stands on the hardening {hardening} = {case[hardening]:.4g} Pa/m"
+        f"{'' if case.hardening_asked else default}"
     )
 
 
 def why_there(results: Results) -> str:
-    """In words, what shows that a run has stopped for a reason, or that nothing does."""
+    """In words, what shows why a run has stopped, or that nothing does."""
     case, last, shown = results.case, results.last, results.info.get("mechanism")
     where = f"level {last['level']:.6g} m (t = {last['time']:.6g})"
     if shown:
@@ -229,7 +229,7 @@ def stiff_joint(results: Results) -> str:
 #: A foundation that reaches less far than this many heights of the dam makes the crack too long: a
 #: 45 m dam at 45 m has 10.7, 5.3, 4.2, 3.2 m of it with 5, 34, 60, 120 m.
 FOUNDATION = 1.5
-#: K_N L/E below which the joint gives way more than the dam: the stress is that of a rigid block.
+#: K_N L/E below which the joint is softer than the dam: the stress is that of a rigid block.
 SOFT = 1
 
 
@@ -245,7 +245,7 @@ def hints(results: Results) -> list[str]:
     soft = case["K_N"] * case.joint_length / min(case["E_dam"], case["E_found"])
     if soft < SOFT:
         found.append(
-            f"K_N L/E = {soft:.3g}: the joint gives way more than the dam; a closed joint of "
+            f"K_N L/E = {soft:.3g}: the joint is softer than the dam; a closed joint of "
             "concrete on rock has 10 to 1000"
         )
     reach = min(case["found_side"], case["found_depth"])
@@ -256,53 +256,46 @@ def hints(results: Results) -> list[str]:
             f"the foundation reaches {reach:g} m: less than {FOUNDATION:g} heights of the dam make "
             "the crack too long"
         )
-    if levels := results.info.get("ran_on"):
+    if levels := results.info.get("unstable_growth"):
         found.append(
             f"unstable crack growth at level {min(levels):.4g} m: the state after it depends on "
             "steps and mesh"
         )
-    for limit, lowest in results.info.get("snapped", ()):
+    for limit, lowest in results.info.get("limit_points", ()):
         found.append(
             f"unstable crack growth at level {limit:.4g} m: along the equilibrium path the level "
             f"falls to {lowest:.4g} m before it rises again"
         )
     if results.info.get("engine") == "getdp" and verdict(results) == "not converged":
         found.append(
-            "the plain engine does not follow the equilibrium path beyond a limit point: "
+            "the engine getdp does not follow the equilibrium path beyond a limit point: "
             "--engine condensed does"
         )
-    releases = case["law"] == "rupture" and case["alpha"] < 2
-    if releases and (levels or verdict(results) == "not converged"):
-        found.append(
-            f"where it opens, law = rupture with alpha = {case['alpha']:g} lets go of its shear, "
-            "and no friction takes it: the crack runs on at once; alpha = 2 keeps it, law = bond "
-            "slides"
-        )
     if last:
+        unstable = bool(levels) or verdict(results) == "not converged"
+        share = tension_share(case, last)
+        found += case.law.hints(Evidence(last["crack_length"], unstable, share))
         found += seen_in(results, last)
     return found
 
 
-def pulled_when_open(case: Case, last: dict[str, float]) -> str:
-    """In words, what the law friction's tension c/mu of open points holds; empty if it holds
-    nothing.
+def tension_share(case: Case, last: dict[str, float]) -> float:
+    """Part of the overturning moment that the tension of the open points balances; nan if it is not
+    known.
     """
-    crack = last["crack_length"]
-    if case["law"] != "friction" or not case["adhesion"] * crack:
-        return ""
-    tension, share = case["adhesion"] / case["mu"], ""
-    if not case.geometry:
-        time = min(last["time"], case.times[-1])
-        block = gravity.with_crack(case, time, last["level"], 0.0)
-        parts = [*(m for load in block.loads for m in load[3:]), last["M"] - block.resultant.moment]
-        turning = -sum(m for m in parts if m < 0)
-        pull = tension * crack * (block.body.length - crack / 2)
-        share = f" ({pull / turning:.0%} of the overturning moment)" if turning else ""
-    return (
-        f"the joint is open over {crack:.3g} m and pulls there with adhesion/mu = "
-        f"{tension / 1e3:.4g} kPa{share} at any opening, as the friction law is published: "
-        "law = bond lets go"
-    )
+    pull = case.law.open_tension * last["crack_length"]
+    if case.geometry or not pull:
+        return np.nan
+    time = min(last["time"], case.times[-1])
+    block = gravity.with_crack(case, time, last["level"], 0.0)
+    parts = [*(m for load in block.loads for m in load[3:]), last["M"] - block.resultant.moment]
+    overturning = -sum(m for m in parts if m < 0)
+    arm = block.body.length - last["crack_length"] / 2
+    return pull * arm / overturning if overturning else np.nan
+
+
+#: Part of the tensile strength from which on the heel counts as in tension.
+IN_TENSION = 1e-3
 
 
 def seen_in(results: Results, last: dict[str, float]) -> list[str]:
@@ -312,7 +305,7 @@ def seen_in(results: Results, last: dict[str, float]) -> list[str]:
     if crack > 0 and not (case.accuracy or case.geometry):
         found.append(
             f"the crack ({crack:.3g} m) ends somewhere in an element of {element:.2g} m; "
-            "--accuracy 3% finds the mesh, and says how wrong it is"
+            "--accuracy 3% chooses the mesh and estimates the error"
         )
     if has_drains(case) and len(results.joint["time"]):  # a section's mesh has a node there
         away = np.abs(results.at()["s"] - case["drain_x"]).min()
@@ -322,20 +315,18 @@ def seen_in(results: Results, last: dict[str, float]) -> list[str]:
                 f"nearest is {away:.2g} m away"
             )
     if has_drains(case) and crack > case["drain_x"]:
-        kept = "" if case["uplift"] == "cracked" else "; their effect is kept all the same"
+        unchanged = "" if case["uplift"] == "cracked" else "; the model keeps their effect"
         found.append(
-            f"the crack ({crack:.3g} m) has passed the drains ({case['drain_x']:g} m){kept}"
+            f"the crack ({crack:.3g} m) has passed the drains ({case['drain_x']:g} m){unchanged}"
         )
-    if pulled := pulled_when_open(case, last):
-        found.append(pulled)
-    elif len(results.joint["time"]):
+    if len(results.joint["time"]) and not case.law.open_tension * crack:
         rows = results.at()
         heel = rows["sigma_n_eff"][rows["s"] <= rows["s"].min()].mean()
-        strength = case["adhesion"] / case["mu"] if case["law"] == "friction" else case["sigma_max"]
-        if heel > 1e-3 * strength > 0:
+        strength = case.law.tensile_strength
+        if heel > IN_TENSION * strength > 0:
             found.append(
-                f"the heel is in tension, {heel / 1e3:.4g} kPa of the {strength / 1e3:.4g} kPa "
-                "that the joint is said to hold"
+                f"the heel is in tension, {heel / 1e3:.4g} kPa of the tensile strength of "
+                f"{strength / 1e3:.4g} kPa"
             )
     return found
 

@@ -13,7 +13,7 @@ import numpy as np
 from ..joint.interface import Interface
 from ..model.case import Case
 from ..model.results import HISTORY
-from ..solver.load_stepper import Filling
+from ..solver.load_stepper import LoadStepper
 from ..solver.path import Path, Point
 
 #: Columns of critical.csv: a row per equilibrium of each dam that was tried.
@@ -57,13 +57,13 @@ class Branch(Path):
         """
         self.case, self.on_step = case, on_step
         self.points: list[Point] = []
-        filling = Filling(case, interface, lambda _: self.add(Point(filling.fork(case))))
-        # from the weight alone on steps can be halved; else the first one holds it at any length
-        if not (case["weight_first"] and filling.rest()):
-            filling.reach(case.times[0])
-        if not filling.stopped:
-            fill(filling)
-        ahead = [v for t, v in enumerate(case.levels, 1) if t >= filling.state.time]
+        stepper = LoadStepper(case, interface, lambda _: self.add(point_of(stepper)))
+        # from the weight alone on steps can be halved; else the first one includes it at any length
+        if not (case["weight_first"] and stepper.weigh()):
+            stepper.advance_to(case.times[0])
+        if not stepper.stopped:
+            advance(stepper)
+        ahead = [v for t, v in enumerate(case.levels, 1) if t >= stepper.state.time]
         self.target = max(ahead) if target is None else target
         super().__init__(self.points, len(case.levels), TICK)
 
@@ -91,7 +91,7 @@ class Branch(Path):
         yet.
         """
         for number, point in enumerate(self.sound):
-            complete = point.control != "level" or point.filling.state.time == self.case.times[-1]
+            complete = point.control != "level" or point.state.time == self.case.times[-1]
             if complete and point.level >= self.target:
                 return number
         return None
@@ -151,13 +151,18 @@ class Branch(Path):
         return super().unknown()
 
 
-def fill(filling: Filling) -> None:
-    """Go on through the times of a filling's case until some steps have failed."""
+def point_of(stepper: LoadStepper) -> Point:
+    """The last converged step of a loading."""
+    return Point(stepper.model, stepper.state, stepper.history.copy())
+
+
+def advance(stepper: LoadStepper) -> None:
+    """Continue through the times of a case until some steps have not converged."""
     failures, length = 0, np.inf
-    for target in filling.case.times:
-        while filling.state.time < target:
-            ahead = min(length, target - filling.state.time)
-            if not filling.step(filling.state.time + ahead):
+    for target in stepper.case.times:
+        while stepper.state.time < target:
+            ahead = min(length, target - stepper.state.time)
+            if not stepper.step(stepper.state.time + ahead):
                 failures, length = failures + 1, ahead / 2
             if failures > FAILURES:
                 return

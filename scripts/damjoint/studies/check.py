@@ -137,7 +137,7 @@ def least_sliding_factor(case: Case) -> float:
     """What the case requires; at least 1 where its law has friction: below it there is no
     equilibrium.
     """
-    return max(case["required_SSF"], 0.0 if case["law"] == "rupture" else 1.0)
+    return max(case["required_SSF"], 1.0 if case.law.limits_shear else 0.0)
 
 
 def by_gravity(method: GravityMethod, name: str = GRAVITY) -> Answer:
@@ -251,9 +251,9 @@ class Check:
         case, found = self.gravity.case, []
         if not requires(case):
             found.append(f"nothing is required: the case sets none of {', '.join(REQUIREMENTS)}")
-        if case["law"] == "rupture":
-            given = f"mu = {case['mu']:g}, adhesion = {case['adhesion']:g} Pa"
-            found.append(f"SSF with {given}, which the law rupture does not have")
+        if not case.law.limits_shear:
+            values = f"mu = {case['mu']:g}, adhesion = {case['adhesion']:g} Pa"
+            found.append(f"SSF with {values}, which the law {case['law']} does not have")
         if case["uplift"] == "flow":
             found.append("gravity method: full head in the crack, linear beyond it")
         if case["f_c"]:

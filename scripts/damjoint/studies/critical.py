@@ -22,6 +22,7 @@ from tqdm import tqdm
 from .. import InputError
 from ..engines import Outcome
 from ..engines.condensed.solve import about
+from ..laws import Evidence
 from ..model.case import Case, load
 from ..model.parameters import parameter
 from ..model.results import Results
@@ -31,7 +32,7 @@ from ..run import save
 from ..solver.path import PRECISION, ROUGH, SURE, Point
 from ..statics import gravity
 from ..statics.limit import elastic_heel_stress
-from ..statics.verdict import bound, highest_by_statics, pulled_when_open, statement
+from ..statics.verdict import bound, highest_by_statics, statement, tension_share
 from .bodies import interface_of
 from .branch import CRITICAL, Branch, row
 
@@ -103,7 +104,7 @@ class Answer:
             mode = f" ({self.mode})" if self.mode else ""
             found = [f"{name}: critical {of} {self.value:.6g}{unit}{mode}"]
             found.append(self.why or f"not confirmed: {self.doubt}")
-        if self.point and self.point.filling.case["pena_tang"] and search.own.hardening_asked:
+        if self.point and self.point.model.equilibrium.law.hardens and search.own.hardening_asked:
             found += filter(None, [statement(last_state(search, self.point))])
         if self.gravity is not None:
             values = {"gravity method": self.gravity} | self.gravity_with
@@ -111,7 +112,9 @@ class Answer:
         if self.note:
             found.append(self.note)
         if self.point:
-            found += filter(None, [pulled_when_open(search.own, self.point.last)])
+            last, law = self.point.last, search.own.law
+            share = tension_share(search.own, last)
+            found += law.hints(Evidence(last["crack_length"], False, share))
         return found
 
 
@@ -134,8 +137,8 @@ class Search:
         self.of, self.name = of, {"uplift": "drain_effectiveness"}.get(of, of)
         own = load(case, settings, levels, tail_levels)
         self.settings = QUICK | dict(settings or {}) | {"drive": "level"}
-        if own["law"] == "friction" and not own.hardening_asked:
-            self.settings["pena_tang"] = 0.0
+        if own.law.hardening_parameter and not own.hardening_asked:
+            self.settings[own.law.hardening_parameter] = 0.0
         self.own, self.say = own, say
         self.trials: list[Trial] = []
         self.check()
@@ -318,8 +321,8 @@ class Search:
             last = failing.points[failing.top].last
             why = f"there the whole joint slips: T = {last['T']:.5g} N/m is all that it holds"
         elif failing.settled(SURE):
-            top, knee = failing.points[failing.top], failing.points[failing.knee]
-            far = failing.points[-1].pushed / (knee.pushed or failing.size)
+            top, limit = failing.points[failing.top], failing.points[failing.limit_point]
+            far = failing.points[-1].pushed / (limit.pushed or failing.size)
             why = (
                 f"beyond it, pushed {far:.2g} times as far, the dam holds {top.level:.6g} m at most"
             )
@@ -360,7 +363,7 @@ class Search:
         the heel does not; empty if it does not.
         """
         method = self.rigid_block(value)
-        strength, _ = gravity.tensile_strength(method.case)
+        strength = method.case.law.tensile_strength
         if method.crack_length or method.tip_stress <= 0:
             return ""
         case = method.case
@@ -414,7 +417,7 @@ class Search:
         if method is None:
             return None
         case, method = method.case, (method, *method.further)[-1] if longest else method
-        slides = case["law"] != "rupture" and method.SSF < 1
+        slides = case.law.limits_shear and method.SSF < 1
         crushed = 0 < case["f_c"] < -method.sigma_n_toe
         return method.stands and not slides and not crushed
 
@@ -493,11 +496,11 @@ def last_state(search: Search, point: Point) -> Results:
     """The results of an equilibrium and of what led there, with the parameters as they were asked
     for.
     """
-    case = point.filling.case
-    asked = {n: search.own[n] for n in (*QUICK, *DRIVE)}
-    filling = point.filling.fork(replace(case, values=case.values | asked))
-    filling.keep_last()
-    return filling.results()
+    case, history = point.model.case, point.history.copy()
+    required = {n: search.own[n] for n in (*QUICK, *DRIVE)}
+    if point.state.time > history.saved_until:
+        history.save(point.state)
+    return history.results(replace(case, values=case.values | required), stopped=False)
 
 
 def write(search: Search, answer: Answer, out: Path, seconds: float) -> None:
@@ -515,7 +518,7 @@ def write(search: Search, answer: Answer, out: Path, seconds: float) -> None:
         if answer.point:
             result = last_state(search, answer.point)
             found = {"critical": told_of(search, answer), "wall_seconds": {"search": seconds}}
-            result.info = about(answer.point.filling.joint.bulk) | found
+            result.info = about(answer.point.model.equilibrium.bulk) | found
             save(Outcome(result, lambda: None, dict, answer.error), case, out)
         write_csv(out / "critical.csv", table(search))
         draw(shown, out / f"{case.name}_critical.png")

@@ -24,7 +24,7 @@ from ..joint.interface import Interface
 from ..model.case import Case, first_mesh, load
 from ..model.results import HISTORY
 from ..post.tables import as_text
-from ..solver.load_stepper import Filling
+from ..solver.load_stepper import LoadStepper
 from ..statics.limit import mechanism
 from ..statics.verdict import failed, statement, verdict
 from ..storage import lock
@@ -56,18 +56,18 @@ UNDECIDED = (ERROR, "not converged", "interrupted")
 MOST = 8
 
 
-def filled(case: Case, known: dict[tuple, Filling], interface: Interface) -> Filling:
-    """The filling of a case, gone on with from its last level but one if that is known; known: by
-    levels and times.
+def stepped(case: Case, known: dict[tuple, LoadStepper], interface: Interface) -> LoadStepper:
+    """The loading of a case to its end, continued from its last level but one; known: those that
+    have been computed, by levels and times.
     """
     key = case.levels, case.tail_levels, case.times
     if key not in known:
         before = case.before_last_level()
-        filling = (
-            filled(before, known, interface).fork(case) if before else Filling(case, interface)
+        stepper = (
+            stepped(before, known, interface).fork(case) if before else LoadStepper(case, interface)
         )
-        filling.run()
-        known[key] = filling
+        stepper.run()
+        known[key] = stepper
     return known[key]
 
 
@@ -93,7 +93,7 @@ def last_rows(tasks: list[Task]) -> list[dict[str, float | str]]:
         return [last_row(task, known) | critical_value(task) for task in tasks]
 
 
-def last_row(task: Task, known: dict[tuple, Filling]) -> dict[str, float | str]:
+def last_row(task: Task, known: dict[tuple, LoadStepper]) -> dict[str, float | str]:
     """The row of a case; one whose computation fails, in whatever way, says why: the others go
     on.
     """
@@ -103,7 +103,7 @@ def last_row(task: Task, known: dict[tuple, Filling]) -> dict[str, float | str]:
         found, why = mechanism(task.case, interface) if task.quick else ("", "")
         if found:
             return row | dict(zip(SAID, (1, found, why), strict=True))
-        result = filled(task.case, known, interface).results()
+        result = stepped(task.case, known, interface).results()
     except Exception as error:
         return row | dict(zip(SAID, (1, ERROR, in_words(error)), strict=True))
     last = {name: f"{value:.12g}" for name, value in result.last.items()}

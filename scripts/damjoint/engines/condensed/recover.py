@@ -8,12 +8,12 @@ from scipy import sparse
 from ...fem.condensation import Bodies, body_of, material_of, unit_loads, unknowns
 from ...fem.elasticity import stress
 from ...fem.factor import solve_symmetric
-from ...joint.equilibrium import Joint
+from ...joint.equilibrium import Equilibrium
 from ...model.fields import Field
-from ...solver.history import Record
+from ...solver.history import History
 
 
-def recover(bodies: Bodies, scenes: list[tuple[Joint, Record]]) -> list[dict[float, Field]]:
+def recover(bodies: Bodies, scenes: list[tuple[Equilibrium, History]]) -> list[dict[float, Field]]:
     """The fields of the saved states of scenes on the same bodies, by scene and time: the bulk
     solved once more. Displacements count from the state under the weight alone, if there is one.
 

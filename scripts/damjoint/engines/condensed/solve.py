@@ -14,7 +14,7 @@ from ...joint.interface import Interface
 from ...model.case import Case
 from ...model.fields import Field
 from ...model.mesh import mesh_of
-from ...solver.load_stepper import Filling
+from ...solver.load_stepper import LoadStepper
 from .. import OnStep, Outcome
 from .cache import cached
 
@@ -45,7 +45,7 @@ def solve(case: Case, on_step: OnStep, _fields: bool) -> Iterator[Outcome]:
         start = time.perf_counter()
         bulk, made = cached(case)
         before = bulk.seconds if made else {"cache": time.perf_counter() - start}
-        interface, fillings, recovered = Interface(bulk, case["quadrature"]), [], []
+        interface, steppers, recovered = Interface(bulk, case["quadrature"]), [], []
 
         @lru_cache
         def bodies() -> Bodies:
@@ -53,22 +53,23 @@ def solve(case: Case, on_step: OnStep, _fields: bool) -> Iterator[Outcome]:
 
         def fields(number: int) -> dict[float, Field]:
             """All scenes at once: one factorisation."""
-            if len(recovered) < len(fillings):
+            if len(recovered) < len(steppers):
                 from .recover import recover
 
-                recovered[:] = recover(bodies(), [(f.joint, f.record) for f in fillings])
+                scenes = [(s.model.equilibrium, s.history) for s in steppers]
+                recovered[:] = recover(bodies(), scenes)
             return recovered[number]
 
         for number, scene in enumerate(case.scenes()):
             begin, error = time.perf_counter(), None
-            fillings.append(Filling(scene, interface, partial(on_step, number)))
+            steppers.append(LoadStepper(scene, interface, partial(on_step, number)))
             try:
-                fillings[-1].run()
+                steppers[-1].run()
             except BaseException as caught:  # an interruption, too: what has converged is a result
                 error = caught
-                if fillings[-1].record.complete(fillings[-1].state):
-                    fillings[-1].keep_last()
-            result = fillings[-1].results()
+                if steppers[-1].history.complete(steppers[-1].state):
+                    steppers[-1].save_last()
+            result = steppers[-1].results()
             seconds = before | {"solve": time.perf_counter() - begin}
             result.info |= about(bulk) | {"wall_seconds": seconds}
             yield Outcome(result, lambda: bodies().mesh, partial(fields, number), error)

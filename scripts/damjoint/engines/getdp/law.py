@@ -8,18 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from ... import RunError, data
+from ...laws import LAWS
 from ...model.case import load
 from ...model.parameters import assignments, listing, parameter
 from ...storage import check_end
 from . import process
-
-#: What the scalar and the vector of a law's memory are called, in the output; the vector's normal
-#: component last, if it has one.
-MEMORY = {
-    "rupture": ("kappa", "released_1", "released_2", "thickness"),
-    "friction": ("lambda", "slip_1", "slip_2"),
-    "bond": ("D", "slip_1", "slip_2"),
-}
 
 #: GetDP wants a mesh: one line, in the region JOINT (3).
 ONE_LINE = """$MeshFormat
@@ -42,7 +35,7 @@ def evaluate(
 ) -> dict[str, np.ndarray]:
     """The law along a path.
 
-    law: rupture, friction or bond; jumps: (n, 3) delta_n, delta_t1, delta_t2 [m], the i-th row one
+    law: its name; jumps: (n, 3) delta_n, delta_t1, delta_t2 [m], the i-th row one
     converged step to t = i, from the virgin state on; pressure: (n,) [Pa], 0 by default; settings:
     {parameter: value}.
     Returns columns sigma_n (total), tau_1, tau_2 [Pa] and the law's state. Raises InputError,
@@ -75,5 +68,5 @@ def evaluate(
                 raise ValueError(f"{len(table)} of {len(jumps)} rows")
         except (OSError, ValueError) as damage:
             raise RunError(f"GetDP: its table can not be read: {damage}") from None
-    names = "sigma_n", "tau_1", "tau_2", "damage", "open", "slid", *MEMORY[law]
+    names = "sigma_n", "tau_1", "tau_2", "damage", "open", "slid", *LAWS[law].variable_names
     return dict(zip(names, table.T, strict=False))

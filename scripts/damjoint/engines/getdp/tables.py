@@ -10,7 +10,7 @@ import numpy as np
 from ...model.case import Case
 from ...model.fields import Field
 from ...model.mesh import Mesh
-from ...model.results import FLUX, HARDENING, Results, history_table, joint_columns, joint_table
+from ...model.results import JOINT, Results, history_table, joint_columns, joint_table
 from ...storage import check_end
 
 BODIES = ("dam", "foundation")
@@ -105,7 +105,7 @@ def read_joint(
     more = [
         node_means(rows, table(name, 1)[1], len(nodes))
         for name in joint_columns(case)
-        if name in HARDENING | FLUX
+        if name not in JOINT
     ]
     when = np.tile([time, level], (len(nodes), 1))
     distance = case.joint_along * node_means(rows, table("way", 1)[1], len(nodes))

@@ -1,0 +1,102 @@
+"""What is prescribed in a step: the reservoir's level, or a displacement that is found with it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..joint.equilibrium import Equilibrium
+from ..laws.base import Array
+from ..model.loads import Loading
+from .state import State
+
+
+@dataclass(frozen=True)
+class LevelControl:
+    """The reservoir's level [m]."""
+
+    level: float
+
+
+@dataclass(frozen=True)
+class DisplacementControl:
+    """A displacement [m]; the level is unknown."""
+
+    value: float
+
+    def measure(self, equilibrium: Equilibrium, jump: Array, loading: Loading) -> float:
+        """The displacement [m] that is prescribed, at a jump (j,)."""
+        return float(self.gradient(equilibrium) @ jump)
+
+    def gradient(self, equilibrium: Equilibrium) -> Array:
+        """Its derivative with the jump (j,)."""
+        raise NotImplementedError
+
+    def rate(self, equilibrium: Equilibrium, loading: Loading) -> float:
+        """Its derivative with the level."""
+        return 0.0
+
+
+@dataclass(frozen=True)
+class CrestControl(DisplacementControl):
+    """The displacement of the crest along x."""
+
+    def measure(self, equilibrium: Equilibrium, jump: Array, loading: Loading) -> float:
+        """See `DisplacementControl`."""
+        return equilibrium.crest(jump, loading)
+
+    def gradient(self, equilibrium: Equilibrium) -> Array:
+        """See `DisplacementControl`."""
+        return equilibrium.bulk.crest_jump
+
+    def rate(self, equilibrium: Equilibrium, loading: Loading) -> float:
+        """See `DisplacementControl`."""
+        return equilibrium.crest_rate(loading)
+
+
+@dataclass(frozen=True)
+class HeelControl(DisplacementControl):
+    """The opening of the heel."""
+
+    def gradient(self, equilibrium: Equilibrium) -> Array:
+        """See `DisplacementControl`."""
+        return equilibrium.interface.heel
+
+
+@dataclass(frozen=True)
+class ProcessZoneControl(DisplacementControl):
+    """The mean jump of the points whose damage grew in a step, see `process_zone`."""
+
+    mean: Array
+
+    def gradient(self, equilibrium: Equilibrium) -> Array:
+        """See `DisplacementControl`."""
+        return self.mean
+
+
+Control = LevelControl | DisplacementControl
+
+#: By the value of the parameter `drive`.
+DRIVES = {"crest": CrestControl, "heel": HeelControl}
+
+
+def process_zone(equilibrium: Equilibrium, state: State) -> Array | None:
+    """The mean jump of the points whose damage has grown in the step to a state, weighted by that
+    growth, from the unknowns (j,): the opening of open ones, the slip of closed ones, each in the
+    direction of that step; None if no damage has grown.
+    """
+    if state.previous is None:
+        return None
+    law, interface = equilibrium.law, equilibrium.interface
+    ends = state.previous, state
+    jumps = [interface.jumps(interface.at_points, end.jump) for end in ends]
+    before, after = (law.damage(jump, end.variables) for jump, end in zip(jumps, ends, strict=True))
+    opened = np.array([True, False, False]) == (jumps[1][:, :1] > 0)
+    direction = (jumps[1] - jumps[0]) * opened
+    size = np.linalg.norm(direction, axis=1)
+    weights = interface.points.weights * np.maximum(after - before, 0) * (size > 0)
+    if not weights.any():
+        return None
+    direction *= (weights / np.where(size > 0, size, 1) / weights.sum())[:, None]
+    return interface.at_points.T @ direction[:, : interface.dim].ravel()

@@ -1,0 +1,224 @@
+"""The stepping interface: `Model(case, interface).start()`, then `advance` from state to state.
+
+A state is immutable; any number of steps can start from it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from .. import RunError
+from ..joint.equilibrium import Equilibrium
+from ..joint.interface import Interface
+from ..laws import TANGENT, Mode
+from ..laws.base import Array
+from ..model.case import Case
+from ..model.loads import STAGED, Loading
+from .controls import Control, DisplacementControl, LevelControl
+from .newton import Convergence, Diverged, Iterate, Strategy, newton
+from .state import Frozen, State
+
+#: Largest jump of an equilibrium of small displacements, over the size of the dam.
+LARGEST_JUMP = 0.1
+
+#: A step is extrapolated from the two states before it where it is at most this many times as long
+#: as the step between them.
+LONGEST_EXTRAPOLATION = 4
+
+
+@dataclass(frozen=True)
+class StepResult:
+    """A converged step."""
+
+    state: State
+    iterations: int
+    #: norm of the residual over the reference
+    residual: float
+
+
+class Model:
+    """The equilibrium of a case, and how a step of it is solved."""
+
+    def __init__(self, case: Case, interface: Interface) -> None:
+        if case.geometry:  # the ends of its joint follow from the mesh
+            case = replace(case, section=case.section | interface.section)
+        self.case, self.equilibrium = case, Equilibrium(case, interface)
+        self.reference = self.unbalanced()
+
+    def with_case(self, case: Case) -> Model:
+        """The same for another case that differs in its levels and times, or in values that the
+        equilibrium does not depend on.
+        """
+        if case is self.case:
+            return self
+        other = object.__new__(Model)
+        other.case, other.equilibrium = case, self.equilibrium
+        other.reference = other.unbalanced()
+        return other
+
+    def unbalanced(self) -> float:
+        """Norm of the residual of the undamaged joint under the highest water: what convergence is
+        measured by.
+        """
+        start, case = self.start(), self.case
+        highest = Loading(max(case.levels), max(case.tail_levels), (1.0,) * len(STAGED))
+        residual = self.equilibrium.residual(start.jump, start.variables, highest).value
+        size = float(np.linalg.norm(residual))
+        if not np.isfinite(size):
+            raise RunError("loads: are not finite numbers; look at densities, levels and gravity")
+        return size
+
+    @cached_property
+    def strategies(self) -> tuple[Strategy, ...]:
+        """The strategies for a step, in order; the last one, with many secant iterations, is the
+        fallback of a step that can be cut no more.
+        """
+        parts = ("growth", "secant", "release", "iterations")
+        table = zip(*(self.case.shared[f"attempt_{n}"] for n in parts), strict=True)
+        halvings = int(self.case["max_halvings"])
+        most = 2 if self.equilibrium.law.releases_shear else 1
+        return tuple(
+            Strategy(growth, int(secant), int(release), int(iterations), halvings)
+            for growth, secant, release, iterations in table
+            if release <= most
+        )
+
+    @property
+    def convergence(self) -> Convergence:
+        """When a step has converged."""
+        shared, reference = self.case.shared, self.reference
+        return Convergence(
+            self.case["tolerance"] * reference,
+            shared["coarsest"][0] * reference,
+            shared["round_off"][0],
+            LARGEST_JUMP * self.case.size,
+        )
+
+    def start(self) -> State:
+        """The state before any load."""
+        return State.undamaged(self.equilibrium)
+
+    def loading(self, time: float, level: float) -> Loading:
+        """The loads of a time, at a level [m]."""
+        return Loading.at(self.case, time, level, self.case.tail_at(time))
+
+    def advance(
+        self,
+        state: State,
+        time: float,
+        control: Control,
+        *,
+        strategies: Sequence[Strategy] | None = None,
+        extrapolate: bool = False,
+        persist: bool = True,
+        guess: tuple[Array, float] | None = None,
+        frozen: Frozen | None = None,
+        frozen_lift: Array | None = None,
+    ) -> StepResult | None:
+        """A step from a state to a time, by the first strategy that converges; None if none does.
+
+        strategies: those of the model by default; extrapolate: whether the first one starts from
+        the last two states; persist: whether the others follow one that has diverged; guess: jump
+        and level to start from; frozen: the law with frozen damage; frozen_lift: see
+        `Equilibrium.residual`.
+        """
+        strategies = self.strategies if strategies is None else strategies
+        for number, strategy in enumerate(strategies):
+            begin = guess or self.predict(state, time, control, extrapolate and number == 0)
+            try:
+                found = self.solve(state, time, control, strategy, begin, frozen, frozen_lift)
+            except Diverged:
+                if not persist:
+                    return None
+                continue
+            if found:
+                return found
+        return None
+
+    def predict(
+        self, state: State, time: float, control: Control, extrapolate: bool
+    ) -> tuple[Array, float]:
+        """Jump and level where Newton's method starts: the last state's, or extrapolated where the
+        loading goes on in the same direction.
+        """
+        level, before = state.loading.level, state.previous
+        prescribed = control.level if isinstance(control, LevelControl) else None
+        if extrapolate and before and before.time > 0:
+            if self.case["drive"] != "level":
+                new, now, old = time, state.time, before.time
+            elif isinstance(control, LevelControl):
+                new, now, old = control.level, level, before.loading.level
+            else:
+                new, (now, old) = control.value, (self.measure(control, s) for s in (state, before))
+            ahead = (new - now) / (now - old) if now != old else 0.0
+            if 0 < ahead < LONGEST_EXTRAPOLATION:
+                jump = state.jump + ahead * (state.jump - before.jump)
+                rise = level - before.loading.level
+                return jump, level + ahead * rise if prescribed is None else prescribed
+        return state.jump, level if prescribed is None else prescribed
+
+    def measure(self, control: DisplacementControl, state: State) -> float:
+        """The displacement of a control in a state [m]."""
+        return control.measure(self.equilibrium, state.jump, state.loading)
+
+    def solve(
+        self,
+        state: State,
+        time: float,
+        control: Control,
+        strategy: Strategy,
+        begin: tuple[Array, float],
+        frozen: Frozen | None = None,
+        frozen_lift: Array | None = None,
+    ) -> StepResult | None:
+        """A step by one strategy, from a jump and a level, see `advance`. Raises Diverged."""
+        equilibrium, start = self.equilibrium, state.begin_step(self.equilibrium.law, time)
+        interface, law, variables = equilibrium.interface, equilibrium.law, start.variables
+        law_points = frozen and frozen.points
+        loads, convergence = self.loading(time, begin[1]), self.convergence
+        stiffness = equilibrium.case["K_N"] * equilibrium.bulk.width
+
+        def evaluate(jump: Array, level: float, last: Iterate | None) -> Iterate:
+            side, mode = None, Mode(frozen=law_points) if law_points else TANGENT
+            if strategy.release:
+                side = law.release_side(interface.jumps(interface.at_points, jump), variables)
+                if last and last.side is not None:
+                    crossing = side * last.side < 0
+                    releasing = crossing & ((side < 0) | (strategy.release > 1))
+                    side, mode = np.where(releasing, 0, side), replace(mode, releasing=releasing)
+            here = replace(loads, level=level)
+            residual = equilibrium.residual(jump, variables, here, mode, frozen_lift)
+            size, border = float(np.linalg.norm(residual.value)), None
+            if isinstance(control, DisplacementControl):
+                gap = control.value - control.measure(equilibrium, jump, here)
+                border = control.gradient(equilibrium), control.rate(equilibrium, here), gap
+                size = float(np.hypot(size, stiffness * gap))
+
+            def correction(secant: bool) -> tuple[Array, float]:
+                edge = border and (residual.by_level(), *border)
+                change = residual.by_jump(secant)
+                return interface.solve(equilibrium.undamaged, change, -residual.value, edge)
+
+            return Iterate(jump, level, residual.value, size, correction, side)
+
+        with np.errstate(over="ignore", invalid="ignore"):  # a diverging iterate is discarded
+            found = newton(evaluate, evaluate(*begin, None), convergence, strategy)
+        if found is None:
+            return None
+        end, iterations = found
+        if np.abs(end.jump).max() > convergence.largest_jump:
+            raise Diverged
+        if not isinstance(control, LevelControl) and not 0 <= end.level <= self.case.highest_level:
+            return None
+        loading = replace(loads, level=end.level)
+        new = replace(
+            start.update(equilibrium, end.jump, frozen),
+            time=time,
+            loading=loading,
+            pressure=equilibrium.pressure(end.jump, variables, loading),
+        )
+        return StepResult(new.after(state), iterations, end.size / (self.reference or 1.0))

@@ -1,0 +1,85 @@
+"""Unstable crack growth at constant load: the state after it, where the law is in equilibrium."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from .controls import Control, LevelControl
+from .model import Model, StepResult
+from .newton import repeats
+from .state import State
+
+#: Rounds of the alternate minimisation at most.
+ROUNDS = 100
+
+#: Relative difference of residuals below which a round has led to the same state again.
+SAME = 1e-6
+
+
+def relax(model: Model, begin: State, time: float, control: Control) -> StepResult | None:
+    """The state after unstable crack growth, by alternate minimisation: the step is solved with
+    frozen damage, then the damage is updated, until the law is in equilibrium.
+
+    Where the flow cannot be solved for together with the jump its pressure is frozen, too. The
+    relaxed state is more damaged than a direct step would give.
+    """
+    equilibrium, state = model.equilibrium, begin
+    law, iterations, sizes = equilibrium.law, 0, list[float]()
+    strategies = [strategy for strategy in model.strategies[:-1] if not strategy.release]
+    for _ in range(ROUNDS):
+        start = state.begin_step(law, time)
+        frozen = start.freeze(equilibrium)
+        coupled = strategies[:1] if equilibrium.flowing else strategies
+        found = model.advance(
+            start, time, control, strategies=coupled, persist=False, frozen=frozen
+        )
+        if found is None and equilibrium.flowing:
+            level = control.level if isinstance(control, LevelControl) else start.loading.level
+            loading = model.loading(time, level)
+            lift, _ = equilibrium.flowing_lift(start.jump, start.variables, loading)
+            found = model.advance(
+                start,
+                time,
+                control,
+                strategies=strategies,
+                persist=False,
+                frozen=frozen,
+                frozen_lift=lift,
+            )
+        if found is None:
+            return None
+        iterations += found.iterations
+        state = replace(found.state, time=begin.time)
+        jump, variables = state.jump, state.begin_step(law, time).variables
+        residual = equilibrium.residual(jump, variables, state.loading).value
+        size = float(np.linalg.norm(residual))
+        if size <= model.convergence.tolerance:
+            pressure = equilibrium.pressure(jump, variables, state.loading)
+            relaxed = replace(found.state, pressure=pressure).after(begin)
+            return StepResult(relaxed, iterations, size / (model.reference or 1.0))
+        if repeats(size, sizes, SAME):
+            return None
+        sizes.append(size)
+    return None
+
+
+def over_unstable_growth(
+    model: Model, begin: State, time: float, control: Control, accept_relaxed: bool
+) -> tuple[StepResult, bool] | None:
+    """A step over unstable crack growth: Newton's method from the relaxed state; where that does
+    not converge and `accept_relaxed`, the relaxed state itself.
+
+    The last: whether it is the step's own state, by the law from the last one.
+    """
+    relaxed = relax(model, begin, time, control)
+    if relaxed is None:
+        return None
+    first, *others = model.strategies
+    strategies = [first, *(strategy for strategy in others if strategy.release)]
+    guess = relaxed.state.jump, relaxed.state.loading.level
+    found = model.advance(begin, time, control, strategies=strategies, persist=False, guess=guess)
+    if found:
+        return replace(found, iterations=relaxed.iterations + found.iterations), True
+    return (relaxed, False) if accept_relaxed else None
