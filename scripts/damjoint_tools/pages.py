@@ -17,8 +17,8 @@ from damjoint.laws import COLUMNS
 from damjoint.model.parameters import declared
 from damjoint.model.results import FLUX, HISTORY, JOINT
 from damjoint.statics.gravity import LOADS
-from damjoint.studies.branch import CRITICAL
 from damjoint.studies.check import CHECK
+from damjoint.studies.failure_path import CRITICAL
 from tabulate import tabulate
 
 REFERENCE = Path("reference")

@@ -247,7 +247,7 @@ def test_what_is_written(command, tmp_path):
     with (folder / "critical.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert max(float(row["level"]) for row in rows) == pytest.approx(told["critical"]["value"])
-    assert {row["driven"] for row in rows} == {"0", "1"}
+    assert {row["displacement_control"] for row in rows} == {"0", "1"}
     assert command("report", folder) == (0, "report.html\n", "")
     page = (tmp_path / "report.html").read_text()
     assert "<td>critical level, and the last state before it</td><td>6.63399 m; sliding;" in page

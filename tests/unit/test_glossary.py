@@ -11,8 +11,8 @@ from damjoint import cli
 from damjoint.laws import COLUMNS, LAWS
 from damjoint.model.parameters import declared
 from damjoint.model.results import FLUX, HISTORY, JOINT
-from damjoint.studies.branch import CRITICAL
 from damjoint.studies.check import CHECK
+from damjoint.studies.failure_path import CRITICAL
 
 PACKAGE = Path(damjoint.__file__).parent
 REFERENCE = Path(__file__).parents[2] / "reference"

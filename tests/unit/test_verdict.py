@@ -59,7 +59,9 @@ def test_a_bond_holds_by_the_cohesion_that_damage_has_left():
         result.joint.update(
             half | {"slip": np.zeros(2), "z": np.zeros(2), "damage": np.full(2, 0.5)}
         )
-        assert verdict.cohesion(result) == pytest.approx(left * result.case["adhesion"] * length)
+        assert verdict.shear_resistance(result, 0.0) == pytest.approx(
+            left * result.case["adhesion"] * length
+        )
 
 
 @pytest.mark.parametrize("engine, said", [("getdp", True), ("condensed", False)])
@@ -75,7 +77,12 @@ def test_what_a_path_has_shown_is_said():
     said = verdict.statement(result)
     assert said.startswith("not converged: no equilibrium is found beyond level 2 m")
     assert "the resultant is 2.5 m from the toe" in said
-    result.info["mechanism"] = {"mode": "sliding", "level": 2.5, "pushed": 4.2, "time": 1.0}
+    result.info["mechanism"] = {
+        "mode": "sliding",
+        "level": 2.5,
+        "displacement_ratio": 4.2,
+        "time": 1.0,
+    }
     said = verdict.statement(result)
     assert said.startswith("sliding: no equilibrium beyond level 2 m")
-    assert "pushed 4.2 times as far, holds 2.5 m at most" in said
+    assert "under 4.2 times that displacement, holds 2.5 m at most" in said

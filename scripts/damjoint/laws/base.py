@@ -69,6 +69,8 @@ class Law(Generic[V]):
     has_works = False
     #: whether a dam stands after all of its joint has slipped, without hardening
     stands_slipped = False
+    #: coefficient of friction
+    mu = 0.0
     #: tension [Pa] at which a closed point opens, and that an open point still transmits
     tensile_strength = 0.0
     open_tension = 0.0
@@ -176,6 +178,13 @@ class Law(Generic[V]):
 
     #: its formula, for legends, without hardening
     shear_strength_formula = ""
+
+    def shear_resistance(self, normal: float, length: float, damage: float, slip: float) -> float:
+        """Shear force [N/m] that a joint of a length [m] transmits under an effective normal force
+        (compression > 0), at a mean damage and slip [m]: mu N + c L of what is left of c.
+        """
+        cohesion = self.shear_strength(np.zeros(1), damage, slip)[0]
+        return float(self.mu * normal + cohesion * length)
 
     def shear_bound(self, normal: Array, length: float) -> Array:
         """Largest shear force [N/m] that a joint of a length [m] transmits under an effective

@@ -15,7 +15,7 @@ from ..model.results import Results
 from .controls import DRIVES, Control, LevelControl
 from .history import History
 from .model import Model, StepResult
-from .path import ROUGH, SURE, Path, Point
+from .path import ROUGH, SURE, EquilibriumPath, Point
 from .relaxation import over_unstable_growth
 
 #: Number of strategies by which a step from the equilibrium path to the prescribed level is tried.
@@ -27,8 +27,8 @@ class Mechanism:
     """How the dam fails, as its equilibrium path has shown."""
 
     mode: str
-    #: how many times as far it was pushed as at its highest level
-    pushed: float
+    #: its displacement over that at its highest level
+    displacement_ratio: float
     #: whose loads acted
     time: float
     #: the highest level [m]
@@ -229,9 +229,9 @@ class LoadStepper:
         begin, level = self.state, self.case.level_at(time)
         if begin.time == 0 or level < begin.loading.level:
             return None
-        path = Path([Point(self.model, begin, self.history.copy())], time)
+        path = EquilibriumPath([Point(self.model, begin, self.history.copy())], time)
         path.advance()
-        if path.stuck:
+        if path.ended:
             return None
         same = self.same_but_for_level(path.points[1].state.loading, begin.loading)
         start = path.points[0]
@@ -239,8 +239,8 @@ class LoadStepper:
             del path.points[0]  # no point of this path: other loads acted
         while path.points[-1].level < level:
             # an earlier path's mechanism, under other loads, does not end this one
-            fails = path.slides or path.settled(ROUGH if path.stuck else SURE)
-            if fails or path.stuck:
+            fails = path.slides or path.settled(ROUGH if path.ended else SURE)
+            if fails or path.ended:
                 mechanism = self.mechanism_of(path)
                 path.refine()
                 if fails:
@@ -281,12 +281,12 @@ class LoadStepper:
         )
         return one.tail == other.tail and np.array_equal(dry, other_dry)
 
-    def mechanism_of(self, path: Path) -> Mechanism:
+    def mechanism_of(self, path: EquilibriumPath) -> Mechanism:
         """The mechanism of a path that does not reach the prescribed level."""
-        pushed = path.points[-1].pushed / (path.points[path.limit_point].pushed or path.size)
-        return Mechanism(path.mode, float(pushed), path.time)
+        ratio = path.points[-1].imposed / path.imposed(path.points[path.limit_point])
+        return Mechanism(path.mode, float(ratio), path.time)
 
-    def end_at_limit_point(self, path: Path) -> None:
+    def end_at_limit_point(self, path: EquilibriumPath) -> None:
         """Take a path's limit point as a step, in which nothing but the level has changed."""
         top, begin = path.points[path.limit_point], self.state
         rise = top.level - begin.loading.level

@@ -1,10 +1,9 @@
-"""The equilibrium path beyond a level that is prescribed no more.
+"""The equilibrium path under displacement control, past limit points and unstable crack growth.
 
-A displacement is prescribed instead, and the level is found with it: limit points, plateaus and
-unstable crack growth are passed, where steps of the level would only fail. It is the crest's, or,
-where the crest turns back, the mean jump of the points whose damage grows, which does not turn back
-while they do [indirect displacement control: de Borst, Comput. Struct. 25, 1987]. A path whose
-level rises no more, however far the dam is pushed, is a mechanism.
+A displacement is prescribed, and the level is unknown. It is the crest's, or, where the crest moves
+back, the mean jump of the points whose damage grows, which increases while it does [indirect
+displacement control: de Borst, Comput. Struct. 25, 1987]. A path whose level does not rise any
+more, however large the displacement, is a mechanism.
 """
 
 from __future__ import annotations
@@ -32,22 +31,22 @@ from .state import State
 #: Relative precision of a critical value.
 PRECISION = 1e-4
 
-#: First push over the displacement so far; each one over the one before, at least and at most.
+#: First increment over the displacement so far; each one over the one before, at least and at most.
 FIRST, SHRINKING, GROWTH = 0.05, 0.25, 2.0
 
-#: A push that fails is tried at these parts of its length, but for what is smaller than this part
-#: of the displacement so far; then over a snap-back, these parts of it.
+#: An increment that does not converge is tried at these parts of its length, down to this part of
+#: the displacement so far; then over a snap-back, as these parts of it.
 PARTS, SMALLEST, JUMPS = (1, 1 / 4, 1 / 16), 1e-4, (0.01, 0.05, 0.25)
 
-#: A push of the process zone over what it moved in the last step.
+#: An increment of the process zone over what it moved in the last step.
 ZONE_GROWTH = 1.5
 
-#: By how much a push should raise the level, relatively: the highest level of a joint that softens
-#: depends on the steps by some hundredths of that.
+#: Relative rise of the level that an increment aims at: the limit point of a joint that softens
+#: depends on the steps by some hundredths of it.
 RISE = 0.005
 
-#: How many times as far a dam is pushed before its level counts as risen no more: for a first
-#: opinion, and for sure.
+#: How many times the displacement grows before a level counts as not rising any more: for a first
+#: estimate, and for the result.
 ROUGH, SURE = 1.5, 4.0
 
 #: Levels that differ relatively by less are the same.
@@ -67,9 +66,9 @@ class Point:
     model: Model
     state: State
     history: History
-    #: the displacement imposed so far, with that before the first push [m]; 0 where the level is
-    #: prescribed
-    pushed: float = 0.0
+    #: the displacement imposed so far, with that before the first increment [m]; 0 where the level
+    #: is prescribed
+    imposed: float = 0.0
     #: what was prescribed: level, crest, zone or heel
     control: str = "level"
 
@@ -148,36 +147,41 @@ class Point:
         return found.state, history
 
 
-class Path:
-    """Equilibria one after the other, each pushed a little further than the one before."""
+class EquilibriumPath:
+    """Equilibria one after the other, each with a larger displacement than the one before."""
 
     def __init__(self, points: list[Point], time: float, tick: float = 0.0) -> None:
-        """points: those known, the last one to go on from; time: whose loads act, but for the
-        level; tick: the time that a push takes, for its row in the tables.
+        """points: the first ones, the last of them to continue from; time: whose loads act, but for
+        the level; tick: the time that an increment takes, for its row in the tables.
         """
         self.points, self.time, self.tick = points, time, tick
-        #: whether no further push has been found
-        self.stuck = not points
-        #: the largest displacement of joint and crest before the first push, and the next push [m]
+        #: whether no further equilibrium has been found
+        self.ended = not points
+        #: the largest displacement of joint and crest before the first increment, and the next
+        #: increment [m]
         self.size = points[-1].displacement if points else 0.0
-        self.push = FIRST * self.size
+        self.increment = FIRST * self.size
 
     def add(self, point: Point) -> None:
-        """One more equilibrium."""
+        """Append an equilibrium."""
         self.points.append(point)
 
-    # -- what it shows
+    def imposed(self, point: Point) -> float:
+        """The displacement imposed at a point, with that before the first increment [m]."""
+        return point.imposed or self.size
+
+    # -- its shape
     # ----------------------------------------------------------------------------------------------
 
     @property
-    def sound(self) -> list[Point]:
-        """The points that count."""
+    def admissible(self) -> list[Point]:
+        """The points that are admissible."""
         return self.points
 
     @property
     def top(self) -> int:
         """The number of the point with the highest level; of a plateau, the first."""
-        levels = np.array([p.level for p in self.sound])
+        levels = np.array([p.level for p in self.admissible])
         return int(np.argmax(levels >= (1 - PLATEAU) * levels.max())) if len(levels) else 0
 
     @property
@@ -193,22 +197,22 @@ class Path:
 
     @property
     def slides(self) -> bool:
-        """Whether nothing of the joint's strength is left at its highest level."""
+        """Whether all of the joint's strength is used at its highest level."""
         return bool(self.points) and self.points[self.top].slides
 
     def settled(self, factor: float) -> bool:
-        """Whether the level has risen no more since the dam had been pushed so many times less, and
-        does not recover from a fall.
+        """Whether the level has not risen while the displacement grew so many times, and does not
+        recover from a fall.
         """
-        far = self.points[-1].pushed / factor
-        early = [p.level for p in self.points if (p.pushed or self.size) <= far]
+        far = self.points[-1].imposed / factor
+        early = [p.level for p in self.points if self.imposed(p) <= far]
         if not early or self.points[-1].level > early[-1] * (1 + PRECISION / 2):
             return False
         return self.points[self.top].level <= max(early) * (1 + PRECISION / 2)
 
     @property
     def mode(self) -> str:
-        """How the dam fails; empty if it is not seen."""
+        """How the dam fails; empty if the path does not show it."""
         if self.slides:
             return "sliding"
         if not self.points or self.limit_point + 1 >= len(self.points):
@@ -220,39 +224,39 @@ class Path:
         crack = self.points[-1].last["crack_length"]
         return movement(last.model.case, crack, along, interface.at_places(moved))
 
-    # -- following it
+    # -- its continuation
     # ----------------------------------------------------------------------------------------------
 
     def advance(self) -> None:
-        """The next push."""
+        """Append the next equilibrium."""
         last = self.points[-1]
-        for of, by in self.pushes():
-            found = self.pushed(last, by, of)
-            if found:
-                rise = max((found.level - last.level) / found.level, 1e-12)
-                self.push = by * min(max(RISE / rise, SHRINKING), GROWTH)
-                self.add(found)
-                self.stuck = len(self.points) >= MOST_POINTS
+        for kind, by in self.increments():
+            new = self.step(last, by, kind)
+            if new:
+                rise = max((new.level - last.level) / new.level, 1e-12)
+                self.increment = by * min(max(RISE / rise, SHRINKING), GROWTH)
+                self.add(new)
+                self.ended = len(self.points) >= MOST_POINTS
                 return
-        self.stuck = True
+        self.ended = True
 
-    def pushes(self) -> Iterator[tuple[str, float]]:
-        """What is tried for a push: of the crest; where it turns back, of the process zone, which
-        comes first while the crest goes back; of the heel; of the crest, over a snap-back of all.
+    def increments(self) -> Iterator[tuple[str, float]]:
+        """The increments to try: of the crest; where it moves back, of the process zone, which
+        comes first while it does; of the heel; of the crest, over a snap-back of all of them.
         """
         last = self.points[-1]
-        far = last.pushed or self.size
-        lengths = {"crest": self.push, "zone": ZONE_GROWTH * last.zone_moved, "heel": self.push}
+        far, zone = self.imposed(last), ZONE_GROWTH * last.zone_moved
+        lengths = {"crest": self.increment, "zone": zone, "heel": self.increment}
         crest = last.history.rows["crest_ux"][-2:]
         backwards = last.control == "zone" and crest[-1] < crest[0]
-        for of in sorted(lengths, key=lambda of: backwards and of == "crest"):
-            smallest = 0.0 if of == "zone" else SMALLEST * far
-            wanted = (part * lengths[of] for part in PARTS)
-            yield from ((of, push) for push in wanted if push > smallest)
+        for kind in sorted(lengths, key=lambda kind: backwards and kind == "crest"):
+            smallest = 0.0 if kind == "zone" else SMALLEST * far
+            parts = (part * lengths[kind] for part in PARTS)
+            yield from ((kind, length) for length in parts if length > smallest)
         yield from (("crest", part * far) for part in JUMPS)
 
-    def pushed(self, point: Point, by: float, kind: str) -> Point | None:
-        """The equilibrium at which what is prescribed has moved further [m]."""
+    def step(self, point: Point, by: float, kind: str) -> Point | None:
+        """The equilibrium at which crest, zone or heel have moved further than at a point [m]."""
         time = max(point.state.time, self.time) + self.tick
         found = point.step(time, point.moved(kind, by))
         if found is None:
@@ -261,19 +265,19 @@ class Path:
             point,
             state=found[0],
             history=found[1],
-            pushed=(point.pushed or self.size) + by,
+            imposed=self.imposed(point) + by,
             control=kind,
         )
 
-    # -- its highest level, more closely
+    # -- refinement of its highest level
     # ----------------------------------------------------------------------------------------------
 
     def refine(self, wanted: float = np.inf) -> None:
-        """Find more points where it ends, to the precision; no more than needed to see that a
-        wanted level is out of reach.
+        """Insert points around the highest level, to the precision; no more than needed to show
+        that a wanted level is out of reach.
         """
         for _ in range(MOST_REFINED):
-            left, share, possible = self.unknown()
+            left, share, possible = self.uncertain()
             known = not possible - self.highest > PRECISION / 2 * possible
             if known or possible < wanted < np.inf:
                 return
@@ -283,26 +287,25 @@ class Path:
             self.insert(left, middle)
 
     def insert(self, left: int, point: Point) -> None:
-        """One more equilibrium, after a point of a number."""
+        """Insert an equilibrium after a point of a number."""
         self.points.insert(left + 1, point)
 
-    def unknown(self) -> tuple[int, float, float]:
-        """Where its highest level is not known closely: the number of a point, the share of the way
-        to the next one, and the highest level [m] that may be there; the highest one found if it is
-        known.
+    def uncertain(self) -> tuple[int, float, float]:
+        """Where its highest level is uncertain: the number of a point, the fraction between it and
+        the next one, and an upper bound of the level [m] there; the highest level if it is certain.
         """
         if self.slides:
             return self.top, 0.5, self.highest
         inner = (i for i in (self.top - 1, self.top) if 0 <= i < len(self.points) - 1)
-        sides = [(i, *self.summit(i)) for i in inner if self.points[i + 1].pushed]
+        sides = [(i, *self.summit(i)) for i in inner if self.points[i + 1].imposed]
         return max(sides, key=lambda side: side[2], default=(self.top, 0.5, self.highest))
 
     def summit(self, left: int) -> tuple[float, float]:
-        """How high a path that gets no steeper can be between a point and the next one, and at
-        which share of the way it is likely to bend: where the lines through their neighbours meet.
+        """At which fraction between a point and the next one a concave path is likely to bend,
+        where the lines through their neighbours meet, and an upper bound of its level [m].
         """
         a, b = self.points[left], self.points[left + 1]
-        length, chord = b.pushed - (a.pushed or self.size), self.slope(left)
+        length, chord = b.imposed - self.imposed(a), self.slope(left)
         before, beyond = self.slope(left - 1), self.slope(left + 1)
         if before is None or chord is None:
             return 0.5, max(a.level, b.level) + abs(b.level - a.level)
@@ -312,19 +315,19 @@ class Path:
         return float(share), max(a.level + before * length, b.level)
 
     def slope(self, left: int) -> float | None:
-        """Rise of the level over the push between a point and the next one; None if there is no
-        push.
+        """Rise of the level over the increment between a point and the next one; None if the next
+        one has a prescribed level.
         """
-        if left < 0 or left + 1 >= len(self.points) or not self.points[left + 1].pushed:
+        if left < 0 or left + 1 >= len(self.points) or not self.points[left + 1].imposed:
             return None
         a, b = self.points[left], self.points[left + 1]
-        return (b.level - a.level) / (b.pushed - (a.pushed or self.size))
+        return (b.level - a.level) / (b.imposed - self.imposed(a))
 
     def between(self, left: int, share: float) -> Point | None:
-        """The equilibrium at a share of the way from a point to the next one."""
+        """The equilibrium at a fraction between a point and the next one."""
         a, b = self.points[left], self.points[left + 1]
-        if b.pushed:
-            return self.pushed(a, share * (b.pushed - (a.pushed or self.size)), b.control)
+        if b.imposed:
+            return self.step(a, share * (b.imposed - self.imposed(a)), b.control)
         case, times = a.model.case, (a.state.time, b.state.time)
         time = times[0] + share * (times[1] - times[0])
         found = a.step(time, LevelControl(case.level_at(time)))
@@ -332,12 +335,12 @@ class Path:
 
 
 def movement(case: Case, crack_length: float, x: np.ndarray, moved: np.ndarray) -> str:
-    """Broken through, overturning or sliding, from how a dam that has lost its equilibrium goes on.
+    """Broken through, overturning or sliding, by the motion beyond the limit point.
 
-    crack_length: [m], after it; x (n,): distance of the joint's nodes from the heel; moved (n, 3):
-    the change of their jumps.
+    crack_length: [m], after the motion; x (n,): distance of the joint's nodes from the heel; moved
+    (n, 3): the change of their jumps.
 
-    Sliding: the joint's slip is larger than what the rotation opens at the heel.
+    Sliding: the slip of the joint is larger than the opening at the heel by rotation.
     """
     if crack_length > case.joint_along * (1 - 1e-9):
         return "broken through"

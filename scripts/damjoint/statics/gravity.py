@@ -114,7 +114,7 @@ class Segment(NamedTuple):
         ).times(part)
 
 
-class Body:
+class RigidBlock:
     """The part of the section above the joint: outline, faces, marks, from the joint's toe [m]."""
 
     def __init__(self, case: Case) -> None:
@@ -170,7 +170,9 @@ def fluid_on(segments: list[Segment], weight: float, surface: float) -> list[Loa
     return [s.pressed(weight * (surface - s.y0), weight * (surface - s.y1)) for s in wet]
 
 
-def water_on(name: str, segments: list[Segment], case: Case, body: Body, level: float) -> Load:
+def water_on(
+    name: str, segments: list[Segment], case: Case, body: RigidBlock, level: float
+) -> Load:
     """Water up to a level, or of a uniform pressure, on the segments of a face."""
     weight = case["rho_water"] * case["g"]
     if case["face_load"] == "uniform":
@@ -178,14 +180,14 @@ def water_on(name: str, segments: list[Segment], case: Case, body: Body, level: 
     return together(name, fluid_on(segments, weight, level - body.toe[1]))
 
 
-def silt_on(case: Case, body: Body) -> Load:
+def silt_on(case: Case, body: RigidBlock) -> Load:
     """Silt on the upstream face: horizontal pressure of an equivalent fluid."""
     weight = case["rho_silt"] * case["g"] * case["silt_K0"]
     loads = fluid_on(body.segments("UP"), weight, case["silt_height"] - body.toe[1])
     return together("silt", loads)._replace(fy=0.0, moment_of_fy=0.0)
 
 
-def added_pressure(case: Case, body: Body, level: float) -> Load:
+def added_pressure(case: Case, body: RigidBlock, level: float) -> Load:
     """Westergaard's added pressure 7/8 k_h rho_water g Sqrt[H (H - y)] on the upstream face, H the
     level, times the normal's horizontal part [USACE EM 1110-2-2200, Westergaard 1933].
     """
@@ -196,7 +198,9 @@ def added_pressure(case: Case, body: Body, level: float) -> Load:
     return together("added water pressure", loads).times(size * case["added_mass"])
 
 
-def loads_on(case: Case, body: Body, time: float, level: float, tail: float) -> tuple[Load, ...]:
+def loads_on(
+    case: Case, body: RigidBlock, time: float, level: float, tail: float
+) -> tuple[Load, ...]:
     """All loads on the body above the joint but the water in the joint; the weight comes first,
     others only where there are any.
     """
@@ -229,7 +233,9 @@ class Uplift:
     without drains, the limit of the cubic law for a narrow closed joint.
     """
 
-    def __init__(self, case: Case, body: Body, level: float, tail: float, crack: float) -> None:
+    def __init__(
+        self, case: Case, body: RigidBlock, level: float, tail: float, crack: float
+    ) -> None:
         self.length, mode = body.length, case["uplift"]
         self.h1, self.h2 = h1, h2 = max(level - body.heel[1], 0.0), max(tail - body.toe[1], 0.0)
         #: distance from the heel and head of the outlet [m] of drains that the crack has not passed
@@ -294,7 +300,7 @@ class GravityMethod:
     """The rigid block at one time of a case. Stresses [Pa]: tension > 0, as in joint.csv."""
 
     case: Case
-    body: Body
+    body: RigidBlock
     time: float
     level: float
     tail_level: float
@@ -431,7 +437,7 @@ class GravityMethod:
 
 def with_crack(case: Case, time: float, level: float, crack: float) -> GravityMethod:
     """The rigid block at a time of a case, at a level [m] and with a crack [m] that are given."""
-    body, tail = Body(case), case.tail_at(time)
+    body, tail = RigidBlock(case), case.tail_at(time)
     loads, uplift = loads_on(case, body, time, level, tail), Uplift(case, body, level, tail, crack)
     return GravityMethod(case, body, time, level, tail, loads, crack, uplift)
 
@@ -443,7 +449,7 @@ def at(case: Case, time: float, level: float | None = None, tension: bool = True
     level: of the reservoir [m] where it is not the one prescribed for that time; tension: whether
     the joint has its tensile strength.
     """
-    body, tail = Body(case), case.tail_at(time)
+    body, tail = RigidBlock(case), case.tail_at(time)
     level = case.level_at(time) if level is None else level
     loads = loads_on(case, body, time, level, tail)
 
@@ -469,7 +475,7 @@ def at(case: Case, time: float, level: float | None = None, tension: bool = True
     return replace(first, further=tuple(further))
 
 
-def pieces(case: Case, body: Body, level: float, tail: float) -> list[tuple[float, float]]:
+def pieces(case: Case, body: RigidBlock, level: float, tail: float) -> list[tuple[float, float]]:
     """Crack lengths [m], from and to, between which the uplift follows one formula: the drains'
     effect begins where the crack raises the head above their outlet, and ends behind them.
     """

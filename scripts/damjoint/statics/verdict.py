@@ -72,13 +72,12 @@ def why_stopped(results: Results) -> str:
     return shown.get("mode") or bound(results)[0] or "not converged"
 
 
-def cohesion(results: Results) -> float:
-    """Shear resistance of the joint without normal stress, at the last saved state [N/m]; infinite
-    if its law does not bound the shear.
+def shear_resistance(results: Results, normal: float) -> float:
+    """Shear force [N/m] that the joint transmits at the last saved state under an effective normal
+    force; infinite if its law does not bound the shear.
     """
-    damage, slip = mean(results, "damage"), mean(results, "slip")
-    strength = results.case.law.shear_strength(np.zeros(1), damage, slip)[0]
-    return float(strength * results.case.joint_along)
+    case, damage, slip = results.case, mean(results, "damage"), mean(results, "slip")
+    return case.law.shear_resistance(normal, case.joint_along, damage, slip)
 
 
 #: How near to a bound of statics a state counts as there, relatively: a run's last step is found
@@ -94,7 +93,7 @@ def bound(results: Results) -> tuple[str, str]:
     last one at the toe. Friction's tension c/mu of the open part is no compression.
     """
     case, last = results.case, results.last
-    length, resistance = case.joint_along, case["mu"] * last["N"] + cohesion(results)
+    length, resistance = case.joint_along, shear_resistance(results, last["N"])
     crack = last["crack_length"]
     pull = case.law.open_tension * crack
     normal, moment = last["N"] + pull, last["M"] + pull * (length - crack / 2)
@@ -190,12 +189,11 @@ def why_there(results: Results) -> str:
     case, last, shown = results.case, results.last, results.info.get("mechanism")
     where = f"level {last['level']:.6g} m (t = {last['time']:.6g})"
     if shown:
-        pushed = f", pushed {shown['pushed']:.2g} times as far," if shown["pushed"] > 1 else ""
+        ratio = shown["displacement_ratio"]
+        moved = f", under {ratio:.2g} times that displacement," if ratio > 1 else ""
         most = shown["level"]
         with_all = f" under the loads of t = {shown['time']:g}" if most < last["level"] else ""
-        return (
-            f"no equilibrium beyond {where}: the dam{pushed} holds {most:.6g} m at most{with_all}"
-        )
+        return f"no equilibrium beyond {where}: the dam{moved} holds {most:.6g} m at most{with_all}"
     if reached := bound(results)[1]:
         return f"no equilibrium beyond {where}: {reached}"
     arm = case.joint_along - last["x_resultant"]

@@ -1,8 +1,8 @@
 """The level, the strength or any parameter at which a dam has no equilibrium left.
 
-A value stands if an equilibrium is found up to the case's last level, and fails if its branch (see
-branch.py) ends below. Between the two the value is halved to the precision; a level needs no
-halving, it is read from the branch itself.
+A value stands if there is an equilibrium at the case's last level, and fails if its equilibrium
+path (see failure_path.py) ends below. Between the two the interval is bisected to the precision; a
+level needs no bisection, it is the highest one of the path.
 """
 
 from __future__ import annotations
@@ -34,19 +34,19 @@ from ..statics import gravity
 from ..statics.limit import elastic_heel_stress
 from ..statics.verdict import bound, highest_by_statics, statement, tension_share
 from .bodies import interface_of
-from .branch import CRITICAL, Branch, row
+from .failure_path import CRITICAL, FailurePath, row
 
-#: What is divided by the strength reduction factor. The fracture energies, too: the jumps at which
-#: a bond has gone stay as they are, and its whole curve is lowered.
+#: Parameters that are divided by the strength reduction factor. With the fracture energies among
+#: them the softening curve is scaled in stress, at the same jumps.
 STRENGTH = ("sigma_max", "adhesion", "mu", "G_f", "G_t")
 
-#: Few attempts at a step of the level: where it fails the dam is pushed instead.
+#: Few strategies for a step of the level: where it fails a displacement is prescribed.
 QUICK = {"smallest_step": 1.0, "max_iterations": 15.0, "burst_iterations": 15.0}
 
-#: What says how the loading is driven.
+#: Parameters of a prescribed displacement.
 DRIVE = ("drive", "drive_begin", "drive_end", "drive_by")
 
-#: What the gravity method is asked for besides: tension, longest crack.
+#: Further assumptions of the gravity method: tension, longest crack.
 ASSUMED = {"with the crack past the drains": (True, True), "without tension": (False, True)}
 
 #: How much higher, relatively, statics may allow a level that it confirms.
@@ -58,36 +58,36 @@ TINY = 1e-30
 
 @dataclass(frozen=True)
 class Trial:
-    """A value, and the branch of the dam that has it."""
+    """A value, and the equilibrium path of the dam that has it."""
 
     value: float
-    branch: Branch
+    path: FailurePath
 
     @property
     def stands(self) -> bool:
-        """Whether there is an equilibrium at the level asked for."""
-        return self.branch.reached
+        """Whether there is an equilibrium at the target level."""
+        return self.path.reached
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What has been found."""
+    """The result of a search."""
 
     #: the largest load (or smallest strength) with an equilibrium; None if there is no limit
     value: float | None
     mode: str
-    #: what confirms it, and what does not; one of them is empty
+    #: what confirms it, and why it is not confirmed; one of them is empty
     why: str
     doubt: str
     #: the last equilibrium
     point: Point | None
     #: the same by the gravity method; None if it gives none
     gravity: float | None = None
-    #: and with other assumptions where they change it, by what they are
+    #: and with other assumptions where they change it, {assumption: value}
     gravity_with: Mapping[str, float] = field(default_factory=dict)
-    #: what to know of the gravity method's values
+    #: a note on the gravity method's values
     note: str = ""
-    #: what has ended the search before its time
+    #: what has interrupted the search
     error: BaseException | None = None
 
     @property
@@ -99,23 +99,23 @@ class Answer:
         """The answer in words."""
         of, name, unit = search.of, search.own.name, search.unit
         if self.value is None:
-            found = [f"{name}: no critical {of} found: {self.doubt}"]
+            lines = [f"{name}: no critical {of} found: {self.doubt}"]
         else:
             mode = f" ({self.mode})" if self.mode else ""
-            found = [f"{name}: critical {of} {self.value:.6g}{unit}{mode}"]
-            found.append(self.why or f"not confirmed: {self.doubt}")
+            lines = [f"{name}: critical {of} {self.value:.6g}{unit}{mode}"]
+            lines.append(self.why or f"not confirmed: {self.doubt}")
         if self.point and self.point.model.equilibrium.law.hardens and search.own.hardening_asked:
-            found += filter(None, [statement(last_state(search, self.point))])
+            lines += filter(None, [statement(last_state(search, self.point))])
         if self.gravity is not None:
             values = {"gravity method": self.gravity} | self.gravity_with
-            found.append("; ".join(f"{n}: {v:.6g}{unit}" for n, v in values.items()))
+            lines.append("; ".join(f"{n}: {v:.6g}{unit}" for n, v in values.items()))
         if self.note:
-            found.append(self.note)
+            lines.append(self.note)
         if self.point:
             last, law = self.point.last, search.own.law
             share = tension_share(search.own, last)
-            found += law.hints(Evidence(last["crack_length"], False, share))
-        return found
+            lines += law.hints(Evidence(last["crack_length"], False, share))
+        return lines
 
 
 class Search:
@@ -128,22 +128,22 @@ class Search:
         settings: dict | None = None,
         levels: str | None = None,
         tail_levels: str | None = None,
-        say: Callable[[str], None] = lambda _: None,
+        on_progress: Callable[[str], None] = lambda message: None,
     ) -> None:
-        """case, settings, levels, tail_levels: as in scene.case.load; of: level, strength, uplift
-        or a parameter; say: is told how far it is. Raises InputError.
+        """case, settings, levels, tail_levels: as in model.case.load; of: level, strength, uplift
+        or a parameter; on_progress: called with a message. Raises InputError.
         """
-        self.asked = case, levels, tail_levels
+        self.source = case, levels, tail_levels
         self.of, self.name = of, {"uplift": "drain_effectiveness"}.get(of, of)
         own = load(case, settings, levels, tail_levels)
         self.settings = QUICK | dict(settings or {}) | {"drive": "level"}
         if own.law.hardening_parameter and not own.hardening_asked:
             self.settings[own.law.hardening_parameter] = 0.0
-        self.own, self.say = own, say
+        self.own, self.on_progress = own, on_progress
         self.trials: list[Trial] = []
-        self.check()
+        self.check_quantity()
 
-    def check(self) -> None:
+    def check_quantity(self) -> None:
         """Raise InputError if the case has nothing to vary."""
         own = self.own
         drained = own["uplift"] == "drained" or (own["uplift"] == "cracked" and own["drains"])
@@ -177,26 +177,28 @@ class Search:
 
         Raises InputError.
         """
-        name, levels, tails = self.asked
+        name, levels, tails = self.source
         if self.of == "strength":
             changed = {n: self.own[n] / value for n in STRENGTH} | {"pena_rupture": -1.0}
         else:
             changed = {self.name: value}
         return load(name, self.settings | changed, levels, tails)
 
-    def branch(self, value: float, case: Case, target: float | None = None) -> Branch:
-        """The branch of a case, followed until a first opinion; one more trial."""
-        told = lambda level: self.say(f"{self.of} {value:.6g}{self.unit}: level {level:.6g} m")
+    def path(self, value: float, case: Case, target: float | None = None) -> FailurePath:
+        """The equilibrium path of a case, followed to a first estimate; one more trial."""
+        report = lambda level: self.on_progress(
+            f"{self.of} {value:.6g}{self.unit}: level {level:.6g} m"
+        )
         highest = max(target or 0, *case.levels)  # water may press on the crest
-        bodies = interface_of(replace(case, levels=(*case.levels[:-1], highest)))
-        found = Branch(case, bodies, target, told)
-        self.trials.append(Trial(value, found))
-        found.follow(ROUGH)
-        return found
+        interface = interface_of(replace(case, levels=(*case.levels[:-1], highest)))
+        path = FailurePath(case, interface, target, report)
+        self.trials.append(Trial(value, path))
+        path.follow(ROUGH)
+        return path
 
     def trial(self, value: float) -> Trial:
-        """A value tried."""
-        self.branch(value, self.case_at(value))
+        """The trial of a value."""
+        self.path(value, self.case_at(value))
         return self.trials[-1]
 
     # -- the search
@@ -208,47 +210,47 @@ class Search:
             return self.level() if self.of == "level" else self.value()
 
     def level(self) -> Answer:
-        """The highest level of the branch from the case's highest level on."""
-        name, *_ = self.asked
+        """The highest level of the path, beyond the case's highest level."""
+        name, *_ = self.source
         last = int(np.argmax(self.own.levels)) + 1
         lists = (self.own.levels[:last], self.own.tail_levels[:last])
         texts = (",".join(map(repr, values)) for values in lists)
         case = load(name, self.settings, *texts)
-        branch = self.branch(max(case.levels), case, case.highest_level)
-        branch.follow(SURE)
-        branch.refine()
-        if branch.reached:
-            beyond = f"{branch.target:g} m, twice the dam's height"
-            return Answer(None, "", "", f"there is an equilibrium at {beyond}", branch.points[-1])
-        point = branch.points[branch.top] if branch.points else None
-        return self.answer(point and point.level, branch, point)
+        path = self.path(max(case.levels), case, case.highest_level)
+        path.follow(SURE)
+        path.refine()
+        if path.reached:
+            beyond = f"{path.target:g} m, twice the dam's height"
+            return Answer(None, "", "", f"there is an equilibrium at {beyond}", path.points[-1])
+        point = path.points[path.top] if path.points else None
+        return self.answer(point and point.level, path, point)
 
     def value(self) -> Answer:
-        """Outwards from the case's own value until the answer changes, then halved."""
+        """Outwards from the case's own value until the answer changes, then bisected."""
         found = self.trial(1.0 if self.of == "strength" else self.own[self.name])
         other = self.change(found)
         if other is None:
             return self.no_change(found)
         stands, fails = (found, other) if found.stands else (other, found)
         while True:
-            stands, fails = self.halved(stands, fails)
-            fails.branch.follow(SURE)
-            fails.branch.refine()
+            stands, fails = self.bisect(stands, fails)
+            fails.path.follow(SURE)
+            fails.path.refine()
             if not fails.stands:
-                return self.answer(stands.value, fails.branch, arrived(stands))
-            step = fails.value - stands.value  # pushed further it does stand: on from there
+                return self.answer(stands.value, fails.path, arrived(stands))
+            step = fails.value - stands.value  # it does stand after all: continue from there
             stands = fails
             while fails.stands:
                 step *= 2
                 fails = self.trial(stands.value + step)
 
     def no_change(self, found: Trial) -> Answer:
-        """The answer where all values that have been tried end as one of them does."""
+        """The answer where all trials stand, or all fail."""
         tried = [t.value for t in self.trials]
         ends = "stands" if found.stands else "fails"
-        doubt = f"{ends} with all that was tried, {min(tried):.6g} to {max(tried):.6g}{self.unit}"
+        doubt = f"{ends} with all values tried, {min(tried):.6g} to {max(tried):.6g}{self.unit}"
         point = arrived(found) if found.stands else None
-        return Answer(None, found.branch.mode, "", doubt, point)
+        return Answer(None, found.path.mode, "", doubt, point)
 
     def change(self, first: Trial) -> Trial | None:
         """The first trial outwards from one that ends otherwise."""
@@ -275,25 +277,23 @@ class Search:
             return (value for value in by_turns if value is not None)
         return worse if first.stands else (down if worse is up else up)
 
-    def halved(self, stands: Trial, fails: Trial) -> tuple[Trial, Trial]:
-        """The two, as near to each other as the precision asks for; halved every third time at
-        least.
-        """
+    def bisect(self, stands: Trial, fails: Trial) -> tuple[Trial, Trial]:
+        """The two, as close to each other as the precision; halved every third time at least."""
         ends, turn = (stands.value, fails.value), 0
         while abs(ends[0] - ends[1]) > PRECISION * max(map(abs, ends)):
-            value = self.foreseen(*ends) if turn % 3 else None
+            value = self.extrapolate(*ends) if turn % 3 else None
             found = self.trial(middle(*ends) if value is None else value)
             stands, fails = (found, fails) if found.stands else (stands, found)
             ends, turn = (stands.value, fails.value), turn + 1
         return stands, fails
 
-    def foreseen(self, stands: float, fails: float) -> float | None:
-        """A value just before the one at which the highest levels of the last two trials that
-        failed say that the dam just fails, or just beyond it; None if they say nothing.
+    def extrapolate(self, stands: float, fails: float) -> float | None:
+        """A value just before or beyond the one at which the dam just fails, by the highest levels
+        of the last two trials that failed; None if these give none.
         """
-        known = [t for t in self.trials if not t.stands and t.branch.points][-2:]
+        known = [t for t in self.trials if not t.stands and t.path.points][-2:]
         values = [t.value for t in known]
-        missing = [t.branch.target - t.branch.highest for t in known]
+        missing = [t.path.target - t.path.highest for t in known]
         if len(set(missing)) < 2:
             return None
         root = values[1] - missing[1] * np.diff(values)[0] / np.diff(missing)[0]
@@ -302,29 +302,30 @@ class Search:
         return next((v for v in (root - aside, root + aside) if low < v < high), None)
 
     def so_far(self, error: BaseException) -> Answer:
-        """What is known when the search is interrupted."""
+        """The answer of an interrupted search."""
         standing = [t for t in self.trials if t.stands]
         ends = [f"{t.value:.6g} {'stands' if t.stands else 'fails'}" for t in self.trials[-2:]]
         doubt = f"interrupted: {', '.join(ends)}" if ends else "interrupted"
         point = arrived(standing[-1]) if standing else None
         return Answer(None, "", "", doubt, point, error=error)
 
-    def answer(self, value: float | None, failing: Branch, point: Point | None) -> Answer:
-        """The answer, with what the failing branch shows."""
+    def answer(self, value: float | None, failing: FailurePath, point: Point | None) -> Answer:
+        """The answer, with what the failing path shows."""
         mode, why = failing.mode, ""
         doubt = "no further equilibrium is found, but no mechanism either"
         if not failing.points:
-            doubt = "no equilibrium is found even at the first step"
+            doubt = "no equilibrium is found even in the first step"
         elif failing.crushed_at_top:
             why = f"beyond it the toe's compression passes f_c = {failing.case['f_c']:g} Pa"
         elif failing.slides:
             last = failing.points[failing.top].last
-            why = f"there the whole joint slips: T = {last['T']:.5g} N/m is all that it holds"
+            why = f"there the whole joint slips: T = {last['T']:.5g} N/m is its whole strength"
         elif failing.settled(SURE):
             top, limit = failing.points[failing.top], failing.points[failing.limit_point]
-            far = failing.points[-1].pushed / (limit.pushed or failing.size)
+            ratio = failing.points[-1].imposed / failing.imposed(limit)
             why = (
-                f"beyond it, pushed {far:.2g} times as far, the dam holds {top.level:.6g} m at most"
+                f"beyond it, under {ratio:.2g} times that displacement, the dam holds "
+                f"{top.level:.6g} m at most"
             )
             if reached := bound(last_state(self, top))[1]:
                 why += f"; there {reached}"
@@ -341,10 +342,10 @@ class Search:
                 others[name] = other
         return replace(found, gravity=beside, gravity_with=others, note=self.tension(value))
 
-    def by_statics(self, failing: Branch) -> tuple[str, str]:
-        """How a branch fails that is found no further, and why that is so: its resultants leave no
-        equilibrium above a level that is near (below the target, if it is no level that is sought).
-        Why is empty if they do.
+    def by_statics(self, failing: FailurePath) -> tuple[str, str]:
+        """How a path fails whose end is not confirmed, and why: its resultants allow no equilibrium
+        above a level that is near (or below the target, where no level is sought). Why is empty if
+        they do.
         """
         top = failing.points[failing.top]
         level, mode, words = highest_by_statics(failing.case, top.last)
@@ -355,12 +356,12 @@ class Search:
             f"one found is at {top.level:.6g} m"
         )
 
-    # -- beside it
+    # -- the gravity method
     # ----------------------------------------------------------------------------------------------
 
     def tension(self, value: float) -> str:
-        """In words, that the gravity method stays uncracked at a value where the elastic stress at
-        the heel does not; empty if it does not.
+        """A note where the gravity method is uncracked but the elastic stress of the finite
+        elements exceeds the tensile strength at the heel; else empty.
         """
         method = self.rigid_block(value)
         strength = method.case.law.tensile_strength
@@ -424,10 +425,10 @@ class Search:
 
 def arrived(trial: Trial) -> Point:
     """The equilibrium of a trial that stands."""
-    branch = trial.branch
-    if branch.points[branch.arrival].control != "level":
-        branch.refine()
-    return branch.points[branch.arrival]
+    path = trial.path
+    if path.points[path.arrival].control != "level":
+        path.refine()
+    return path.points[path.arrival]
 
 
 def middle(a: float, b: float) -> float:
@@ -449,7 +450,7 @@ def outwards(value: float, end: float) -> Iterator[float]:
         yield from (value * 2.0**k for k in range(1, 13))
 
 
-# -- the whole study
+# -- the study
 # --------------------------------------------------------------------------------------------------
 
 
@@ -461,10 +462,10 @@ def critical(
     tail_levels: str | None = None,
     out: Path | None = None,
 ) -> tuple[Answer, list[str]]:
-    """Find a critical value and write what belongs to it below out (default out/CASE_critical).
+    """Find a critical value and write its files below out (default out/CASE_critical).
 
-    Returns the answer, and in words. An interrupted search leaves what it has found. Raises
-    InputError, RunError.
+    Returns the answer, and its lines of text. An interrupted search leaves what it has found.
+    Raises InputError, RunError.
     """
     shown = tqdm(bar_format="{desc} {elapsed}", disable=not sys.stderr.isatty(), leave=False)
     search = Search(case, of, settings, levels, tail_levels, shown.set_description_str)
@@ -487,15 +488,13 @@ def table(search: Search) -> dict[str, np.ndarray]:
     rows = [
         {"trial": number, "value": trial.value, "stands": float(trial.stands)} | row(point)
         for number, trial in enumerate(search.trials, 1)
-        for point in trial.branch.points
+        for point in trial.path.points
     ]
     return {name: np.array([one[name] for one in rows]) for name in CRITICAL}
 
 
 def last_state(search: Search, point: Point) -> Results:
-    """The results of an equilibrium and of what led there, with the parameters as they were asked
-    for.
-    """
+    """The results of an equilibrium and of the steps to it, with the user's own parameters."""
     case, history = point.model.case, point.history.copy()
     required = {n: search.own[n] for n in (*QUICK, *DRIVE)}
     if point.state.time > history.saved_until:
@@ -510,22 +509,22 @@ def write(search: Search, answer: Answer, out: Path, seconds: float) -> None:
     from .critical_picture import Found, draw
 
     case = search.own
-    trials = [(t.value, t.stands, t.branch) for t in search.trials]
+    trials = [(t.value, t.stands, t.path) for t in search.trials]
     what = case.title, search.of, search.unit, trials
     shown = Found(*what, answer.value, answer.gravity, answer.mode)
     with folders.taken(case, out):
         folders.say(case, out, "interrupted" if answer.error else "complete", answer.doubt)
         if answer.point:
             result = last_state(search, answer.point)
-            found = {"critical": told_of(search, answer), "wall_seconds": {"search": seconds}}
+            found = {"critical": as_json(search, answer), "wall_seconds": {"search": seconds}}
             result.info = about(answer.point.model.equilibrium.bulk) | found
             save(Outcome(result, lambda: None, dict, answer.error), case, out)
         write_csv(out / "critical.csv", table(search))
         draw(shown, out / f"{case.name}_critical.png")
 
 
-def told_of(search: Search, answer: Answer) -> dict:
-    """What run.json says of the answer."""
+def as_json(search: Search, answer: Answer) -> dict:
+    """The answer in run.json."""
     return {
         "of": search.of,
         "value": answer.value,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import textwrap
-from pathlib import Path
 from typing import NamedTuple
 
 from matplotlib.axes import Axes
@@ -13,7 +12,7 @@ from matplotlib.figure import Figure
 from ..post.drawing import write_picture
 from ..post.pictures import BLUE, GREEN, LENGTHS, ORANGE, RED, unit
 from ..solver.path import Point
-from .branch import Branch
+from .failure_path import FailurePath
 
 
 class Found(NamedTuple):
@@ -24,7 +23,7 @@ class Found(NamedTuple):
     title: str
     of: str
     unit: str
-    trials: list[tuple[float, bool, Branch]]
+    trials: list[tuple[float, bool, FailurePath]]
     value: float | None
     gravity: float | None
     mode: str
@@ -98,7 +97,7 @@ def draw_branches(axes: Axes, found: Found) -> None:
     axes.set(xlabel=f"crest, downstream [{name}]", ylabel="level [m]")
 
 
-def until_beyond(branch: Branch) -> list[Point]:
-    """The points of a branch up to twice the push of its highest level."""
-    far = 2 * (branch.points[branch.top].pushed or branch.size)
-    return [p for p in branch.points if p.pushed <= far]
+def until_beyond(path: FailurePath) -> list[Point]:
+    """The points of a path up to twice the displacement of its highest level."""
+    far = 2 * path.imposed(path.points[path.top])
+    return [p for p in path.points if p.imposed <= far]

@@ -1,7 +1,7 @@
-"""One dam followed to the end of its equilibria.
+"""The equilibrium path of one dam to its failure.
 
-The levels are prescribed as far as a step is found, then its equilibrium path is followed (see
-solver/path.py), and where it ends is looked at to the precision.
+The levels are prescribed as far as the steps converge; then the path is followed under displacement
+control (see solver/path.py), and its highest level is refined to the precision.
 """
 
 from __future__ import annotations
@@ -14,36 +14,39 @@ from ..joint.interface import Interface
 from ..model.case import Case
 from ..model.results import HISTORY
 from ..solver.load_stepper import LoadStepper
-from ..solver.path import Path, Point
+from ..solver.path import EquilibriumPath, Point
 
 #: Columns of critical.csv: a row per equilibrium of each dam that was tried.
 CRITICAL = {
-    "trial": ("-", "number of the dam that was tried"),
+    "trial": ("-", "number of the trial"),
     "value": ("", "what was varied: level [m], strength, or the parameter"),
     "stands": ("-", "1: there is an equilibrium with this value, 0: none was found"),
-    "driven": ("-", "0: the level was prescribed, 1: a displacement, and the level found"),
+    "displacement_control": ("-", "0: the level was prescribed; 1: a displacement"),
     **{n: HISTORY[n] for n in ("level", "crest_ux", "crack_length", "slip_length", "N", "T", "M")},
-    "pushed": ("m", "how far the dam was pushed where a displacement was prescribed"),
+    "imposed_displacement": ("m", "since the first equilibrium under displacement control"),
     "compression": ("Pa", "total compression at the toe"),
 }
 
-#: How many steps of the level may fail, each one half of the one before, until the dam is pushed.
+#: How many steps of the level may fail, each half of the one before, until a displacement is
+#: prescribed.
 FAILURES = 2
 
-#: Time between two pushes, after the last level: only their order matters, and that all loads that
-#: grow in time are there.
+#: Time of an increment, after the last level: only the order matters, and that all loads that grow
+#: in time act fully.
 TICK = 1e-3
 
 
 def row(point: Point) -> dict[str, float]:
-    """What critical.csv says of a point, but for trial and value."""
-    found = {name: value for name, value in point.last.items() if name in CRITICAL}
-    driven = float(point.control != "level")
-    return found | {"driven": driven, "pushed": point.pushed, "compression": point.compression}
+    """The row of critical.csv of a point, but for trial and value."""
+    return {name: value for name, value in point.last.items() if name in CRITICAL} | {
+        "displacement_control": float(point.control != "level"),
+        "imposed_displacement": point.imposed,
+        "compression": point.compression,
+    }
 
 
-class Branch(Path):
-    """The equilibria of a case up to a level, if there is one there."""
+class FailurePath(EquilibriumPath):
+    """The equilibria of a case, up to a target level or to failure."""
 
     def __init__(
         self,
@@ -52,8 +55,8 @@ class Branch(Path):
         target: float | None = None,
         on_step: Callable[[float], None] = lambda level: None,
     ) -> None:
-        """target: the level [m] that it has to reach, the highest still to come by default; on_step
-        is called with each level found.
+        """target: the level [m] to reach, the highest still to come by default; on_step: called
+        with the level of each equilibrium.
         """
         self.case, self.on_step = case, on_step
         self.points: list[Point] = []
@@ -68,29 +71,27 @@ class Branch(Path):
         super().__init__(self.points, len(case.levels), TICK)
 
     def add(self, point: Point) -> None:
-        """One more equilibrium, if none before it is crushed."""
+        """Append an equilibrium, if the toe is not crushed before it."""
         if not self.crushed:
             self.points.append(point)
             self.on_step(point.level)
 
-    # -- what it shows
+    # -- its shape
     # ----------------------------------------------------------------------------------------------
 
     @property
     def crushed(self) -> bool:
-        """Whether the toe's compression has passed f_c at its last point."""
+        """Whether the toe is crushed at its last point."""
         return bool(self.points) and self.crushes(self.points[-1])
 
     def crushes(self, point: Point) -> bool:
-        """Whether the toe's compression passes f_c at a point."""
+        """Whether the compression at the toe exceeds f_c at a point."""
         return self.case["f_c"] > 0 and point.compression > self.case["f_c"]
 
     @property
     def arrival(self) -> int | None:
-        """The number of the first point at the target, or pushed above it; None if there is none
-        yet.
-        """
-        for number, point in enumerate(self.sound):
+        """The number of the first point at the target or above it; None if there is none."""
+        for number, point in enumerate(self.admissible):
             complete = point.control != "level" or point.state.time == self.case.times[-1]
             if complete and point.level >= self.target:
                 return number
@@ -102,53 +103,53 @@ class Branch(Path):
         return self.arrival is not None
 
     @property
-    def sound(self) -> list[Point]:
-        """The points that are not crushed."""
+    def admissible(self) -> list[Point]:
+        """The points before the toe is crushed."""
         return self.points[:-1] if self.crushed else self.points
 
     @property
     def crushed_at_top(self) -> bool:
-        """Whether it is the compression that ends it."""
+        """Whether crushing ends it."""
         return self.crushed and self.top + 2 == len(self.points)
 
     @property
     def mode(self) -> str:
-        """How the dam fails; empty if it is not seen."""
+        """How the dam fails; empty if the path does not show it."""
         return "crushed toe" if self.crushed_at_top else super().mode
 
-    # -- following it
+    # -- its continuation
     # ----------------------------------------------------------------------------------------------
 
     def follow(self, factor: float) -> None:
-        """Push the dam until the target is reached, it slides, the level has settled or no push is
-        found.
+        """Continue until the target is reached, the dam slides or is crushed, the level has settled
+        or no further equilibrium is found.
 
-        A highest level that is not far below the target is looked at more closely.
+        A highest level that is not far below the target is refined.
         """
         while not (
-            self.stuck or self.reached or self.crushed or self.slides or self.settled(factor)
+            self.ended or self.reached or self.crushed or self.slides or self.settled(factor)
         ):
             self.advance()
         if not self.reached:
             self.refine(self.target)
 
-    # -- its end, more closely
+    # -- refinement of its end
     # ----------------------------------------------------------------------------------------------
 
     def insert(self, left: int, point: Point) -> None:
-        """One more equilibrium; if it is crushed, the last one."""
+        """Insert an equilibrium; if the toe is crushed there, it is the last one."""
         if self.crushes(point):
             self.points[left + 1 :] = [point]
         else:
             super().insert(left, point)
 
-    def unknown(self) -> tuple[int, float, float]:
-        """Where to look next, see `Path.unknown`: also where it passes the target or f_c."""
+    def uncertain(self) -> tuple[int, float, float]:
+        """See `EquilibriumPath.uncertain`: also where it passes the target or f_c."""
         if self.crushed_at_top or self.arrival is not None:
             right = len(self.points) - 1 if self.crushed else self.arrival
             ends = [p.level for p in self.points[max(right - 1, 0) : right + 1]]
             return right - 1, 0.5, self.highest + max(ends) - min(ends)
-        return super().unknown()
+        return super().uncertain()
 
 
 def point_of(stepper: LoadStepper) -> Point:
