@@ -176,8 +176,8 @@ def of_cases(cases: Table, short: bool) -> list[str]:
     return [
         "## The eleven modelings",
         "With published meshes and steps, cold start (new process, no cache), all scenes, tables "
-        f"written: {cases['seconds'][-1]:.0f} s in all, {cases['times faster'][-1]:.0f} times faster than "
-        f"the published code; the smallest ratio is that of {cases['case'][slowest].upper()}, "
+        f"written: {cases['seconds'][-1]:.0f} s in all, {cases['times faster'][-1]:.0f} times "
+        f"faster than the published code; the smallest ratio is that of {cases['case'][slowest].upper()}, "
         f"{cases['times faster'][slowest]:.1f}.{plain} The table has the seconds in all and by "
         "phase, and the peak memory in MB.",
         as_text(cases, columns),
