@@ -177,9 +177,9 @@ def of_cases(cases: Table, short: bool) -> list[str]:
         "## The eleven modelings",
         "With published meshes and steps, cold start (new process, no cache), all scenes, tables "
         f"written: {cases['seconds'][-1]:.0f} s in all, {cases['times faster'][-1]:.0f} times "
-        f"faster than the published code; the smallest ratio is that of {cases['case'][slowest].upper()}, "
-        f"{cases['times faster'][slowest]:.1f}.{plain} The table has the seconds in all and by "
-        "phase, and the peak memory in MB.",
+        "faster than the published code; the smallest ratio is that of "
+        f"{cases['case'][slowest].upper()}, {cases['times faster'][slowest]:.1f}.{plain} The table has the "
+        "seconds in all and by phase, and the peak memory in MB.",
         as_text(cases, columns),
     ]
 
