@@ -178,8 +178,8 @@ def of_cases(cases: Table, short: bool) -> list[str]:
         "With published meshes and steps, cold start (new process, no cache), all scenes, tables "
         f"written: {cases['seconds'][-1]:.0f} s in all, {cases['times faster'][-1]:.0f} times "
         "faster than the published code; the smallest ratio is that of "
-        f"{cases['case'][slowest].upper()}, {cases['times faster'][slowest]:.1f}.{plain} The table has the "
-        "seconds in all and by phase, and the peak memory in MB.",
+        f"{cases['case'][slowest].upper()}, {cases['times faster'][slowest]:.1f}.{plain} The "
+        "table has the seconds in all and by phase, and the peak memory in MB.",
         as_text(cases, columns),
     ]
 
