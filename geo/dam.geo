@@ -1,8 +1,8 @@
-// dam.geo - the scene in the dimension that the parameter dim asks for.
+// dam.geo - the mesh of the section by parameters, in 2D or 3D (parameter dim).
 
 Include "../pro/parameters.pro";
 Include "../pro/check.pro";
-Mesh.MshFileVersion = 2.2;  // what a GetDP without Gmsh's library reads
+Mesh.MshFileVersion = 2.2;  // read by GetDP without Gmsh's library, too
 If(dim == 3)
   Include "dam3d.geo";
 Else

@@ -1,6 +1,12 @@
-// dam2d.geo - the plane scene: dam, foundation and the joint between them, from heel to toe (see
-// pro/section.pro). One conforming mesh: the joint is a line of ordinary elements, the two lips are
-// two function spaces on the same nodes (pro/spaces.pro). Sizes grow from the joint outwards.
+// dam2d.geo - plane mesh of dam, foundation and joint.
+//
+// One conforming mesh: the joint is a line of ordinary elements; its two faces are two function
+// spaces on the same nodes (pro/spaces.pro). Element sizes grow with the distance from the joint.
+//
+// Takes     the section: pro/section.pro; parameters of the mesh
+// Provides  physical groups (in 3D by dam3d.geo): the two bodies, joint, heel, toe, crest, fixed
+//           boundary, faces SEGMENT + i, line forces mark_region(k)
+//           for dam3d.geo: surfaces dam(), foundation(), lower(), n_first, n_rest, side_names()
 
 Include "../pro/parameters.pro";
 
@@ -9,7 +15,7 @@ regular = !StrCmp(mesh_pattern, "regular");
 
 Point(1) = {heel_x, heel_y, 0, h_joint};
 Point(2) = {toe_x, toe_y, 0, h_joint};
-n_first = n_joint;  // elements along the joint's first curve, and along a second one
+n_first = n_joint;  // elements on the first curve of the joint, and on a second one
 n_rest = 0;
 If(drained)  // a node at the drains: two curves
   n_first = Round(n_joint * drain_x / joint_length);
@@ -24,8 +30,8 @@ Transfinite Curve {1} = n_first + 1;
 side_names() = Str["upstream face", "downstream face", "crest surface", "reservoir floor",
                    "tailwater bed"];
 
-// The segments of the faces, cut at the marks: for each its curves, piece_start(i) to
-// piece_start(i + 1) in pieces().
+// Segments of the faces, divided at the marks: the curves of segment i are pieces() from
+// piece_start(i) to piece_start(i + 1) - 1.
 known_x() = {heel_x, toe_x};
 known_y() = {heel_y, toe_y};
 known_point() = {1, 2};
@@ -36,23 +42,23 @@ EndFor
 pieces() = {};
 piece_start() = {0};
 For i In {0 : #seg_side() - 1}
-  // where to stop: at the marks in their order along the segment, then at its end
+  // end points: the marks in their order along the segment, then its end
   dx = seg_x1(i) - seg_x0(i);
   dy = seg_y1(i) - seg_y0(i);
-  before = (regular && seg_side(i) >= FLOOR) ? 1 : 0;  // quadrangles divide these themselves
+  before = (regular && seg_side(i) >= FLOOR) ? 1 : 0;  // divided below
   from = 0;
   For stop In {0 : #mark_x() + 1}
     share = (stop == 0) ? 0 : 1;
     For k In {0 : #mark_x() - 1}
       mark_share = ((mark_x(k) - seg_x0(i)) * dx + (mark_y(k) - seg_y0(i)) * dy) / (dx^2 + dy^2);
-      // one that rounding has put beside a corner is at the corner
+      // within rounding of a corner: at the corner
       If(stop > 0 && mark_segment(k) == i &&
           mark_share > before + 1e-9 && mark_share < share - 1e-9)
         share = mark_share;
       EndIf
     EndFor
     If(before < 1)
-      // a corner exactly: others ask for it by its coordinates
+      // exactly, at a corner: it is compared by its coordinates
       x = (share == 1) ? seg_x1(i) : seg_x0(i) + share * dx;
       y = (share == 1) ? seg_y1(i) : seg_y0(i) + share * dy;
       point = 0;
@@ -63,7 +69,7 @@ For i In {0 : #seg_side() - 1}
       EndFor
       If(point == 0)
         point = newp;
-        // above the joint to h_dam at the crest, below it to h_found at the foundation's depth
+        // linear to h_dam at the crest, and to h_found at the depth of the foundation
         h = (seg_side(i) >= FLOOR && (x < 0 || x > dam_base)) ? h_found :
             (seg_body(i) == UPPER) ?
             h_joint + (h_dam - h_joint) * (y - heel_y) / (dam_height - heel_y) :
@@ -99,12 +105,12 @@ If(drained)
   joint_back() = {-100, -1};
 EndIf
 
-// The upper body; the lower one: under a lift joint the dam's concrete, with a base glued to the
-// foundation; the foundation
+// Upper body; lower body: the concrete below a lift joint, bonded to the foundation, and the
+// foundation
 upper() = {joint_line()};
 under() = {};
-surface_left() = {};  // of the foundation, from the heel outwards
-surface_right() = {};  // and towards the toe
+surface_left() = {};  // surface of the rock, upstream
+surface_right() = {};  // and downstream
 For i In {0 : #seg_side() - 1}
   For k In {piece_start(i) : piece_start(i + 1) - 1}
     If(seg_body(i) == UPPER)
@@ -165,8 +171,8 @@ If(!regular)
     lower() = {3};
   EndIf
 Else
-  // Quadrangles in the dam, under it and beside it; a few coarse triangles at the far sides, where
-  // the stress is almost uniform.
+  // Quadrangles in the dam, below and beside it; coarse triangles at the sides of the foundation,
+  // where the stress is almost uniform
   n_dam = Ceil(9 * n_joint / 50);
   n_depth = Ceil(7 * n_joint / 50);
   n_side = Ceil(5 * n_joint / 50);
@@ -212,7 +218,7 @@ Else
   Plane Surface(4) = {4};
   Plane Surface(5) = {5};
   Plane Surface(6) = {6};
-  If(drained)  // five curves: by their corners
+  If(drained)  // bounded by five curves: the corners are given
     Transfinite Surface {1} = {1, 2, known_point(2), known_point(3)};
     Transfinite Surface {2} = {1, 9, 10, 2};
     Transfinite Surface {3:4};
@@ -243,17 +249,17 @@ If(dim == 2)
     Physical Point(mark_region(k)) = {mark_point(k)};
   EndFor
   For i In {0 : #seg_side() - 1}
-    own() = {};
+    segment_curves() = {};
     If(seg_side(i) == FLOOR)
-      own() += surface_left();
+      segment_curves() += surface_left();
     ElseIf(seg_side(i) == BED)
-      own() += surface_right();
+      segment_curves() += surface_right();
     Else
       For k In {piece_start(i) : piece_start(i + 1) - 1}
-        own() += pieces(k);
+        segment_curves() += pieces(k);
       EndFor
     EndIf
     name = StrCat(Str(side_names(seg_side(i))), Sprintf(" %g", i));
-    Physical Curve(Str(name), SEGMENT + i) = {own()};
+    Physical Curve(Str(name), SEGMENT + i) = {segment_curves()};
   EndFor
 EndIf

@@ -1,7 +1,8 @@
-// dam3d.geo - the plane scene of dam2d.geo extruded along z over the thickness.
-// mesh_pattern free: tetrahedra; layers: prisms; split: layers cut into tetrahedra; regular:
-// hexahedra (and a few prisms). The joint itself is always a grid of n_joint x n_layers rectangles,
-// halved under tetrahedra.
+// dam3d.geo - the section of dam2d.geo extruded along z over the thickness.
+//
+// mesh_pattern free: tetrahedra; layers: prisms; split: prisms cut into tetrahedra; regular:
+// hexahedra (and some prisms). The joint is always a grid of n_joint x n_layers rectangles, each of
+// two triangles with tetrahedra.
 
 Include "dam2d.geo";
 
@@ -14,13 +15,14 @@ Else
   Extrude {0, 0, thickness} { Surface{sections()}; Layers{n_layers}; Recombine; }
 EndIf
 
-// The regions are found again by their place: in boxes around the segments that have been extruded,
-// eps around them, far beyond everything.
+// Entities of the extruded segments are selected by bounding boxes with a margin eps; far: beyond
+// the mesh
 far = 2 * (dam_base + dam_crest + 2 * found_side + found_depth + dam_height + thickness);
 eps = 1e-7 * far;
 end_x = dam_base + found_side;
 
-Macro Around  // the segment from (x0, y0) to (x1, y1): its surfaces around(), its end's curves
+// around(): the surfaces extruded from the segment from (x0, y0) to (x1, y1)
+Macro Around
   x_min = (x0 < x1) ? x0 : x1;
   y_min = (y0 < y1) ? y0 : y1;
   around() = Surface In BoundingBox {x_min - eps, y_min - eps, -eps,
@@ -71,7 +73,7 @@ If(!StrCmp(mesh_pattern, "free"))
   Transfinite Surface {joint()};
 EndIf
 
-// Volumes: each by the plane surface that it began with
+// Volumes, by the plane surface that each was extruded from
 bodies() = Volume In BoundingBox {-far, -far, -far, far, far, far};
 dam_volume() = {};
 foundation_volume() = {};
@@ -111,12 +113,12 @@ For i In {0 : #seg_side() - 1}
   x1 = seg_x1(i);
   y1 = seg_y1(i);
   Call Around;
-  around() -= joint();  // half of which, behind the drains, may lie in the box of a face
+  around() -= joint();  // part of it, behind the drains, may lie in the box of a face
   name = StrCat(Str(side_names(seg_side(i))), Sprintf(" %g", i));
   Physical Surface(Str(name), SEGMENT + i) = {around()};
 EndFor
 For k In {0 : #mark_x() - 1}
-  own() = Curve In BoundingBox {mark_x(k) - eps, mark_y(k) - eps, -eps,
+  mark_curves() = Curve In BoundingBox {mark_x(k) - eps, mark_y(k) - eps, -eps,
                                 mark_x(k) + eps, mark_y(k) + eps, thickness + eps};
-  Physical Curve(mark_region(k)) = {own()};
+  Physical Curve(mark_region(k)) = {mark_curves()};
 EndFor

@@ -1,5 +1,5 @@
-// stepped.geo - a 45 m dam on a base of three benches, which rise downstream: a joint that bends.
-// An example of a geometry of one's own: what counts are the names of the physical groups.
+// stepped.geo - a 45 m dam on three benches that rise downstream.
+// Example of a user's own geometry: only the names of the physical groups are prescribed.
 
 Include "../pro/parameters.pro";
 

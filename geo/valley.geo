@@ -1,18 +1,18 @@
-// valley.geo - a 45 m dam across a valley: its joint is a curved surface, y = flank (z / half)^2.
-// An example of a geometry of one's own in 3D: what counts are the names of the physical groups.
+// valley.geo - a 45 m dam across a valley: the joint is the curved surface y = flank (z / half)^2.
+// Example of a user's own geometry in 3D: only the names of the physical groups are prescribed.
 
 SetFactory("OpenCASCADE");
 Include "../pro/parameters.pro";
 
-half = 60;  // of the dam's length [m]
-flank = 35;  // height of the rock at both ends of the dam [m]
-beside = 40;  // rock beyond them [m]
+half = 60;  // half of the length of the dam [m]
+flank = 35;  // height of the rock at the ends of the dam [m]
+beside = 40;  // rock beyond the ends [m]
 up = 60;  // rock upstream, downstream and below [m]
 down = 94;
 depth = 60;
 h_joint = 34 / n_joint;
 
-// The rock: a profile across the valley, pulled along the river
+// Rock: a profile across the valley, extruded along the river
 n = 10;
 profile() = {};
 wide = half + beside;
@@ -35,7 +35,7 @@ Curve Loop(1) = {surface, surface + 1, surface + 2, surface + 3};
 Plane Surface(1) = {1};
 rock() = Extrude {up + down, 0, 0} { Surface{1}; };
 
-// The dam: the section, pulled across the valley and cut by the rock
+// Dam: the section, extruded across the valley, less the rock
 corner = newp;
 Point(corner) = {0, 0, -half};
 Point(corner + 1) = {34, 0, -half};
@@ -56,7 +56,7 @@ middle = newp;
 Point(middle) = {0, 45, 0};  // of the crest's upstream edge
 all() = BooleanFragments { Volume{cut(0)}; Delete; } { Volume{rock(1)}; Point{middle}; Delete; };
 
-// Found again by where they are
+// Entities of the physical groups, by shared surfaces and bounding boxes
 far = 1000;
 eps = 1e-3;
 dam = all(0);

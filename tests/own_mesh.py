@@ -74,8 +74,8 @@ class OwnMesh:
         regions = {own[n]: (dimension(n, dim), cells(b)) for n, b in mesh.bodies.items()}
         own = {what: name for name, what in OWN_FACES.items()}
         for face in mesh.faces.values():  # straight ones; one region for all of a side
-            _, before = regions.get(own[face.upper, face.side], (0, []))
-            regions[own[face.upper, face.side]] = dim - 1, before + cells(face.surface)
+            _, before = regions.get(own[face.body, face.side], (0, []))
+            regions[own[face.body, face.side]] = dim - 1, before + cells(face.surface)
         return OwnMesh(np.concatenate([dam.points, foundation.points])[first], regions)
 
     def moved(self, by: tuple[float, float, float], mirrored: str = "") -> OwnMesh:

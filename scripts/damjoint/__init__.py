@@ -1,6 +1,6 @@
 """Concrete gravity dams on a thin joint that opens, breaks, slides and lets water in.
 
-storage.py  files written whole or not at all, by one process at a time
+storage.py  atomic writes, locks on files and folders
 model/      what is asked and what comes out, as data: parameters, case, mesh, loads, results
 laws/       the joint laws, one file each
 fem/        finite elements of the bodies, condensed onto the joint
@@ -31,6 +31,9 @@ __version__ = "0.2.0"
 #: Environment variable; 1: Gmsh may run a user's .geo file, a program that can do anything the user
 #: can.
 RUN_GEO = "DAMJOINT_RUN_GEO"
+
+#: Relative round-off: computed coordinates, times and values that differ by less are equal.
+ROUND_OFF = 1e-9
 
 
 class InputError(ValueError):

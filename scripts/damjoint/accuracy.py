@@ -1,11 +1,10 @@
-"""The accuracy asked for, measured: a scene on finer and finer meshes until its answer changes by
-less.
+"""Mesh refinement until the estimated error of the results is below the required accuracy.
 
-First the load steps are halved on the coarsest mesh until that changes next to nothing. Then from
-mesh to mesh the elements along the joint are halved and those of the bodies follow. Each costs
-several times the one before, so that most of the time goes into the last one. The error left in a
-quantity is estimated from its last changes, as Roache's grid convergence index does (J. Fluids
-Eng. 116, 1994), and holds that of the load steps.
+First the load steps are halved on the coarsest mesh until the results hardly change. Then the
+elements along the joint are halved from mesh to mesh; those of the bodies follow. Each mesh costs
+several times the one before, so that the last one takes most of the time. The discretisation error
+of a quantity is estimated from its last changes, as by Roache's grid convergence index (J. Fluids
+Eng. 116, 1994), and includes the error of the load steps.
 """
 
 from __future__ import annotations
@@ -14,6 +13,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 
@@ -24,16 +24,18 @@ from .model.fields import along
 from .model.results import Results
 from .statics.verdict import stiffness_ratio
 
-#: What makes a finer mesh besides the sizes h_dam and h_found, which follow.
+#: Parameters that set the mesh, besides the sizes h_dam and h_found, which follow.
 REFINED = ("n_joint", "n_layers")
 
-#: Elements along the joint at most: in the plane, in 3D with one layer, in 3D with several.
+#: Most elements along the joint: in the plane, in 3D with one layer, in 3D with several.
 FINEST = {"plane": 512, "slice": 128, "solid": 32}
 
-#: The part of the accuracy that the load steps may take, and how often they are halved at most.
+#: Share of the accuracy that the error of the load steps may use, and most halvings of them.
 STEP_SHARE, HALVINGS = 0.25, 6
+#: Shift of a new step's time off the integer times, at which levels are prescribed.
+OFF_LEVEL = 1e-3
 
-#: What is compared: words and unit, by name.
+#: Compared quantities: label and unit.
 QUANTITIES = {
     "level": ("level found", "m"),
     "max_opening": ("largest opening", "m"),
@@ -44,95 +46,105 @@ QUANTITIES = {
     "flux": ("leakage", "kg/(m s)"),
     "toe_stress": ("stress at the toe", "Pa"),
 }
-#: Those that are counted in whole elements.
-LENGTHS = ("crack_length", "slip_length")
+#: Quantities with a resolution of one element of the joint.
+COUNTED_IN_ELEMENTS = ("crack_length", "slip_length")
 
-#: K_N h/E up to which a joint is so soft beside the bodies that no stress concentrates at its ends.
+#: Largest K_N h/E of a joint so soft that the stress at its ends is not singular.
 SOFT = 1.0
 
-#: Change of a quantity over the change before it: at best that of order 2; above the largest one,
-#: where it hardly converges, the error is taken for three times the change.
-BEST, WORST = 0.25, 0.75
-#: Roache's factors of safety, for three meshes and for two.
-SAFETY, OF_TWO = 1.25, 3.0
+#: Bounds of the ratio of a change to the one before: 0.25 is second order; above 0.75 there is
+#: hardly any convergence, and the error is three times the change.
+MIN_RATIO, MAX_RATIO = 0.25, 0.75
+#: Roache's factors of safety for three meshes and for two.
+SAFETY_OF_THREE, SAFETY_OF_TWO = 1.25, 3.0
+#: Most elements by which a length may differ: one, and round-off.
+ONE_ELEMENT = 1.001
+#: Relative error of the load steps below which the summary does not mention it.
+NEGLIGIBLE = 1e-4
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """What is likely to be wrong with a quantity on the last mesh."""
+    """Estimated error of a quantity on the last mesh, in the quantity's unit."""
 
     name: str
-    #: the quantity at the last level that was compared
+    #: value at the last compared level
     value: float
-    #: the largest error at the levels that were compared
+    #: largest error at the compared levels
     error: float
-    #: what the error is relative to: the largest value at those levels; of an opening the joint's
-    #: largest jump, in whatever direction
+    #: reference of the relative error: the largest value at those levels; of an opening the
+    #: largest jump of the joint in any direction
     scale: float
-    #: an error that is let pass because the quantity is counted in elements
+    #: error that is accepted because the quantity is counted in elements
     slack: float = 0.0
-    #: whether the accuracy is asked of it
+    #: whether the accuracy is required of it
     used: bool = True
-    #: the part of the error that the load steps make
-    of_steps: float = 0.0
+    #: part of the error due to the load steps
+    step_error: float = 0.0
 
     @property
     def relative(self) -> float:
-        """The error over the scale."""
+        """Error over scale."""
         return self.error / self.scale if self.scale else 0.0
 
     def within(self, accuracy: float) -> bool:
-        """Whether it is as small as asked for."""
+        """Whether the error meets an accuracy, or none is required of the quantity."""
         return not self.used or self.error <= max(accuracy * self.scale, self.slack)
 
     @property
-    def words(self) -> str:
-        """In a summary."""
-        words, unit = QUANTITIES[self.name]
-        counted = self.name in LENGTHS and self.error
+    def description(self) -> str:
+        """Label and relative error, for a summary."""
+        label, unit = QUANTITIES[self.name]
+        counted = self.name in COUNTED_IN_ELEMENTS and self.error
         length = f" ({self.error:.2g} {unit}, counted in elements)" if counted else ""
         of = " of the joint's largest jump" if self.name == "max_opening" else ""
-        return f"{words} {percent(self.relative)}{of}{length}"
+        return f"{label} {percent(self.relative)}{of}{length}"
 
 
 def percent(part: float) -> str:
-    """A part as a percentage of two digits."""
+    """Format a ratio as a percentage with two digits."""
     return f"{100 * part:.2g} %"
 
 
 def solve(case: Case, engine: ModuleType, on_step: OnStep, fields: bool) -> Iterator[Outcome]:
-    """The scenes of a case as the engine's `solve` gives them, each on the mesh that the case's
-    accuracy asks for; on its own mesh if it asks for none.
+    """Yield the outcomes of a case's scenes, each on the mesh that the case's accuracy requires; on
+    the case's own mesh if it requires none.
 
-    Adds `error_estimate` to what run.json says. Raises RunError.
+    Adds `error_estimate` to the content of run.json. Raises RunError.
     """
     if not case.accuracy:
         yield from engine.solve(case, on_step, fields)
         return
     for number, scene in enumerate(case.scenes()):
 
-        def once(meshed: Case, number: int = number) -> Outcome:
-            return next(engine.solve(meshed, lambda _, now: on_step(number, now), fields))
+        def solve_mesh(meshed: Case, number: int = number) -> Outcome:
+            outcomes: Iterator[Outcome]
+            outcomes = engine.solve(meshed, lambda _, now: on_step(number, now), fields)
+            return next(outcomes)
 
-        yield refined(replace(scene, also_uplift=()), once)
+        yield refine_until_accurate(replace(scene, also_uplift=()), case.accuracy, solve_mesh)
 
 
-def refined(case: Case, once: Callable[[Case], Outcome]) -> Outcome:
-    """The outcome of a scene on the first mesh that is fine enough; once: what solves it on one.
+def refine_until_accurate(
+    case: Case, accuracy: float, solve_mesh: Callable[[Case], Outcome]
+) -> Outcome:
+    """Return the outcome of a scene on the first mesh with small enough errors.
 
-    A mesh that fails or is too large leaves the outcome of the one before; so does an interruption,
-    as that outcome's error. Raises RunError if there is none before.
+    solve_mesh: solves the scene on one mesh. If a mesh fails or is too large the outcome of the one
+    before is returned; after an interrupt too, with the interrupt as its error. Raises RunError if
+    the first mesh fails.
     """
     begin = time.perf_counter()
-    case, outcome, of_steps = stepped(case, once)
-    (_, *finer), why = meshes(case), "no finer mesh is tried"
-    tried, found = [outcome.result], []
+    case, outcome, step_errors = refine_steps(case, accuracy, solve_mesh)
+    (_, *finer), why = mesh_sequence(case), "no finer mesh is tried"
+    tried, estimates = [outcome.result], list[Estimate]()
     for meshed in finer:
         if outcome.error:
             break
         start = time.perf_counter()
+        error: BaseException | None
         try:
-            after = once(meshed)
+            after = solve_mesh(meshed)
             error = after.error
         except (RunError, MemoryError, KeyboardInterrupt) as caught:
             error = caught
@@ -147,38 +159,41 @@ def refined(case: Case, once: Callable[[Case], Outcome]) -> Outcome:
         outcome = after
         outcome.result.info["wall_seconds"]["coarser meshes"] = start - begin
         tried.append(outcome.result)
-        found = estimates(tried[-3:], of_steps)
-        if all(one.within(case.accuracy) for one in found):
+        estimates = estimate_errors(tried[-3:], accuracy, step_errors)
+        if all(estimate.within(accuracy) for estimate in estimates):
             why = ""
             break
-    outcome.result.info["error_estimate"] = told(case.accuracy, tried, found, why)
+    outcome.result.info["error_estimate"] = as_json(accuracy, tried, estimates, why)
     return outcome
 
 
-def stepped(case: Case, once: Callable[[Case], Outcome]) -> tuple[Case, Outcome, dict[str, float]]:
-    """The case with as many load steps as its accuracy asks for, its outcome, and the error that
-    these steps leave in each quantity.
+def refine_steps(
+    case: Case, accuracy: float, solve_mesh: Callable[[Case], Outcome]
+) -> tuple[Case, Outcome, dict[str, float]]:
+    """Halve the load steps until their error is a small share of the accuracy.
 
-    The error of a step is of order 1 in its length, hence twice the change from halving all steps.
+    Returns the case with these steps, its outcome, and the remaining error of each quantity. The
+    error of a step is of first order in its length: twice the change when all steps are halved.
     """
-    outcome, errors = once(case), {}
+    outcome, errors = solve_mesh(case), dict[str, float]()
     for _ in range(HALVINGS):
         if outcome.error:
             break
         halved = halve_steps(case)
-        after = once(halved)
+        after = solve_mesh(halved)
         if after.error:
             return case, replace(outcome, error=after.error), errors
         pair = [outcome.result, after.result]
-        times = [t for t in case.requested if all(t in reached(one) for one in pair)]
-        values = [read(one, times) for one in pair]
-        scales = {name: scale_of(pair[0], name, values, times) for name in values[0]}
+        times = common_times(pair)
+        coarse, fine = values = [quantities_at(result, times) for result in pair]
+        scales = {name: scale_of(pair[0], name, values, times) for name in coarse}
         errors = {
-            name: 2 * float(np.abs(np.subtract(*(v[name] for v in values))).max(initial=0.0))
-            for name in values[0]
+            name: 2 * float(np.abs(np.subtract(coarse[name], fine[name])).max(initial=0.0))
+            for name in coarse
         }
-        asked = {n: e for n, e in errors.items() if n != "toe_stress" and n not in LENGTHS}
-        if all(e <= STEP_SHARE * case.accuracy * scales[n] for n, e in asked.items()):
+        excluded = ("toe_stress", *COUNTED_IN_ELEMENTS)
+        allowed = {n: STEP_SHARE * accuracy * scales[n] for n in errors if n not in excluded}
+        if all(errors[name] <= limit for name, limit in allowed.items()):
             break
         case, outcome = halved, after
         errors = {name: error / 2 for name, error in errors.items()}
@@ -186,126 +201,140 @@ def stepped(case: Case, once: Callable[[Case], Outcome]) -> tuple[Case, Outcome,
 
 
 def halve_steps(case: Case) -> Case:
-    """The case with each of its load steps cut in two, none of them at the time of a level."""
+    """Cut each load step of a case in two; no new step ends at an integer time, those of levels."""
     middles = [(a + b) / 2 for a, b in zip((0.0, *case.times), case.times, strict=False)]
-    middles = [t + 1e-3 * (t == round(t)) for t in middles]
+    middles = [t + OFF_LEVEL * (t == round(t)) for t in middles]
     return replace(case, times=tuple(sorted({*case.times, *middles})))
 
 
-def meshes(case: Case) -> list[Case]:
-    """The case on its own mesh, then on finer ones."""
+def mesh_sequence(case: Case) -> list[Case]:
+    """Return the case on its own mesh and on finer ones, up to FINEST."""
     kind = "plane" if case["dim"] == 2 else "slice" if has_plane_fields(case) else "solid"
-    found = [case]
-    while 2 * found[-1]["n_joint"] <= FINEST[kind]:
-        found.append(finer(found[-1]))
-    return found
+    cases = [case]
+    while 2 * cases[-1]["n_joint"] <= FINEST[kind]:
+        cases.append(refine_mesh(cases[-1]))
+    return cases
 
 
-def finer(case: Case, times: float = 2) -> Case:
-    """The case with so many times as many elements along the joint; the sizes far away follow as
-    automatic ones do.
+def refine_mesh(case: Case, factor: float = 2) -> Case:
+    """Multiply the number of elements along the joint; the sizes far from it follow as automatic
+    ones do.
     """
-    now = case.values
-    values = {
-        "n_joint": times * now["n_joint"],
-        "n_layers": now["n_layers"] * (1 if has_plane_fields(case) else times),
-        **{name: now[name] / times**0.5 for name in ("h_dam", "h_found")},
+    refined = {
+        "n_joint": factor * case["n_joint"],
+        "n_layers": case["n_layers"] * (1 if has_plane_fields(case) else factor),
+        **{name: case[name] / factor**0.5 for name in ("h_dam", "h_found")},
     }
-    return replace(case, values=now | values)
+    return replace(case, values=case.values | refined)
 
 
-def estimates(tried: list[Results], of_steps: dict[str, float]) -> list[Estimate]:
-    """The error left on the last of two or three meshes, with that of the load steps, at every
-    requested level that all of them have reached, and in the last level itself where it is not
-    prescribed or not reached.
+def estimate_errors(
+    results: list[Results], accuracy: float, step_errors: dict[str, float]
+) -> list[Estimate]:
+    """Estimate the errors on the last of two or three meshes, load steps included.
+
+    Compared are the requested levels that all runs have reached, and the last level itself if it is
+    not prescribed or not reached.
     """
-    last = tried[-1]
+    last = results[-1]
     case = last.case
-    times = [t for t in case.requested if all(t in reached(one) for one in tried)]
-    values = [read(one, times) for one in tried]
-    if case["drive"] == "level" and not any(one.stopped for one in tried):
-        values = [{n: v for n, v in one.items() if n != "level"} for one in values]
+    times = common_times(results)
+    values = [quantities_at(result, times) for result in results]
+    if case["drive"] == "level" and not any(result.stopped for result in results):
+        values = [{n: v for n, v in row.items() if n != "level"} for row in values]
     element = case.joint_along / case["n_joint"]
-    found = []
+    estimates = []
     for name in values[-1]:
-        table = np.array([one[name] for one in values])
+        table = np.array([row[name] for row in values])
         if not table.size:
             continue
         scale, slack = scale_of(last, name, values, times), 0.0
-        error = float(left(table, name in LENGTHS).max()) + of_steps.get(name, 0.0)
-        if name in LENGTHS and scale:
+        counted, step_error = name in COUNTED_IN_ELEMENTS, step_errors.get(name, 0.0)
+        error = float(discretisation_error(table, counted).max()) + step_error
+        if counted and scale:
             error = max(error, element)
-            # a little more, for lengths that differ by just an element
-            slack = 1.001 * element if case.accuracy * case["n_joint"] >= 1 else 0.0
-        used = name != "toe_stress" or stiffness_ratio(tried[0]) <= SOFT
+            slack = ONE_ELEMENT * element if accuracy * case["n_joint"] >= 1 else 0.0
+        used = name != "toe_stress" or stiffness_ratio(results[0]) <= SOFT
         value = float(table[-1, -1])
-        found.append(Estimate(name, value, error, scale, slack, used, of_steps.get(name, 0.0)))
-    return found
+        estimates.append(Estimate(name, value, error, scale, slack, used, step_error))
+    return estimates
 
 
 def scale_of(
     last: Results, name: str, values: list[dict[str, list[float]]], times: list[float]
 ) -> float:
-    """What an error is relative to, see `Estimate`."""
+    """Reference of the relative error of a quantity, see `Estimate`."""
     if name == "max_opening" and times:
         return max(largest_jump(last, t) for t in times)
-    return float(np.abs([one[name] for one in values]).max(initial=0.0))
+    return float(np.abs([row[name] for row in values]).max(initial=0.0))
 
 
-def reached(result: Results) -> set[float]:
-    """The requested times that a run has reached."""
+def reached_times(result: Results) -> set[float]:
+    """Requested times that a run has reached."""
     times = np.unique(result.joint["time"])
     return {t for t in result.case.requested if np.isclose(times, t).any()}
 
 
-def read(result: Results, times: list[float]) -> dict[str, list[float]]:
-    """QUANTITIES at some requested times; the level also where the run has ended."""
+def common_times(results: list[Results]) -> list[float]:
+    """Requested times of the last run that all runs have reached, in order."""
+    reached = set.intersection(*map(reached_times, results))
+    return [t for t in results[-1].case.requested if t in reached]
+
+
+def quantities_at(result: Results, times: list[float]) -> dict[str, list[float]]:
+    """QUANTITIES at requested times; the level also at the end of the run."""
     from scipy.integrate import trapezoid  # half of a run's start
 
-    case, states = result.case, [result.state(t) for t in times]
+    states = [result.state(t) for t in times]
     means = [along(result.at(t)) for t in times]
-    found = {
+    values = {
         name: [state[name] for state in states] for name in QUANTITIES if name in result.history
     }
-    if case["uplift"] != "flow":
-        del found["flux"]
-    found["level"] = [*found["level"], result.last.get("level", 0.0)]
-    found["slip"] = [trapezoid(m["delta_t1"], m["s"]) / m["s"][-1] for m in means]
-    found["toe_stress"] = [m["sigma_n"][-1] for m in means]
-    return {name: found[name] for name in QUANTITIES if name in found}
+    if result.case["uplift"] != "flow":
+        del values["flux"]
+    values["level"] = [*values["level"], result.last.get("level", 0.0)]
+    values["slip"] = [trapezoid(m["delta_t1"], m["s"]) / m["s"][-1] for m in means]
+    values["toe_stress"] = [m["sigma_n"][-1] for m in means]
+    return {name: values[name] for name in QUANTITIES if name in values}
 
 
 def largest_jump(result: Results, time: float) -> float:
-    """Of the joint's nodes, in whatever direction, at a requested time [m]."""
+    """Largest displacement jump of the joint's nodes in any direction at a requested time [m]."""
     rows = result.at(time)
     jumps = [rows[name] for name in ("delta_n", "delta_t1", "delta_t2")]
     return float(np.linalg.norm(jumps, axis=0).max())
 
 
-def left(values: np.ndarray, counted: bool) -> np.ndarray:
-    """The error left in the last row of values on finer and finer meshes (two or three of them).
+def discretisation_error(values: np.ndarray, counted: bool) -> np.ndarray:
+    """Estimate the error of the last row of values on two or three meshes, coarse to fine.
 
-    Richardson's extrapolation with a factor of safety and the order that three values show, held
-    between BEST and WORST, and no less than what order 2 leaves of the change before: two values
-    may agree by accident. Values that go to and fro show no order: half of their range is left
-    (Stern et al., J. Fluids Eng. 123, 2001). Two values leave the change at order 1, with a larger
-    factor; of those counted in elements it is the last change itself.
+    values: (meshes, n); counted: in elements. Of three values, Richardson's extrapolation with a
+    factor of safety and the observed ratio of changes, within MIN_RATIO and MAX_RATIO; at least
+    what second order leaves of the change before, as two values may agree by accident. Values that
+    oscillate show no order: half of their range (Stern et al., J. Fluids Eng. 123, 2001). Of two
+    values, the change at first order with a larger factor; of those counted in elements the last
+    change.
     """
     steps = np.diff(values, axis=0)
     changes = np.abs(steps)
     if counted or len(changes) == 1:
-        return (1 if counted else OF_TWO) * changes[-1]
+        last_change: np.ndarray = changes[-1]
+        return last_change if counted else SAFETY_OF_TWO * last_change
     before, last = changes
-    ratio = np.divide(last, before, out=np.full_like(last, BEST), where=before > 0)
-    ratio = np.clip(ratio, BEST, WORST)
-    error = np.maximum(last * ratio / (1 - ratio), before * BEST**2 / (1 - BEST))
-    to_and_fro = steps[0] * steps[1] < 0
-    return SAFETY * np.where(to_and_fro, np.maximum(before, last) / 2, error)
+    ratio = np.divide(last, before, out=np.full_like(last, MIN_RATIO), where=before > 0)
+    ratio = np.clip(ratio, MIN_RATIO, MAX_RATIO)
+    least = before * MIN_RATIO**2 / (1 - MIN_RATIO)
+    error: np.ndarray = np.maximum(last * ratio / (1 - ratio), least)
+    oscillates = steps[0] * steps[1] < 0
+    error = np.where(oscillates, np.maximum(before, last) / 2, error)
+    return SAFETY_OF_THREE * error
 
 
-def told(accuracy: float, tried: list[Results], found: list[Estimate], why: str) -> dict:
-    """What run.json says; why: the accuracy is not reached, in words."""
-    sizes = [int(one.case["n_joint"]) for one in tried]
+def as_json(
+    accuracy: float, tried: list[Results], estimates: list[Estimate], why: str
+) -> dict[str, Any]:
+    """Entry `error_estimate` of run.json; why: the reason if the accuracy is not reached."""
+    sizes = [int(result.case["n_joint"]) for result in tried]
     steps = len(tried[-1].case.times)
     return {
         "accuracy": accuracy,
@@ -313,33 +342,34 @@ def told(accuracy: float, tried: list[Results], found: list[Estimate], why: str)
         "n_joint": sizes,
         "steps": steps,
         "quantities": {
-            one.name: {
-                "value": one.value,
-                "error": one.error,
-                "relative": one.relative,
-                "unit": QUANTITIES[one.name][1],
-                "used": one.used,
-                "of_steps": one.of_steps,
+            estimate.name: {
+                "value": estimate.value,
+                "error": estimate.error,
+                "relative": estimate.relative,
+                "unit": QUANTITIES[estimate.name][1],
+                "used": estimate.used,
+                "step_error": estimate.step_error,
             }
-            for one in found
+            for estimate in estimates
         },
-        "statement": summary(accuracy, sizes, steps, found, why),
+        "statement": summary(accuracy, sizes, steps, estimates, why),
     }
 
 
-def summary(accuracy: float, sizes: list[int], steps: int, found: list[Estimate], why: str) -> str:
-    """The estimate in one line."""
-    asked = f"accuracy {100 * accuracy:g} %"
-    if not found:
-        return f"{asked}: not known on one mesh, n_joint = {sizes[0]}; {why}"
+def summary(
+    accuracy: float, sizes: list[int], steps: int, estimates: list[Estimate], why: str
+) -> str:
+    """Describe the estimated errors in one line."""
+    head = f"accuracy {100 * accuracy:g} %"
+    if not estimates:
+        return f"{head}: errors not estimated, only one mesh (n_joint = {sizes[0]}); {why}"
     coarser = ", ".join(map(str, sizes[:-1]))
-    errors = ", ".join(one.words for one in found if one.used and one.scale)
-    said = f"{asked}: {f'not reached, {why}' if why else 'reached'}; "
-    said += f"errors with n_joint = {sizes[-1]} (after {coarser}) and {steps} load steps: {errors}"
-    of_steps = max((one.of_steps / one.scale for one in found if one.used and one.scale), default=0)
-    if of_steps > 1e-4:
-        said += f"; the load steps make up to {percent(of_steps)} of them"
-    corner = "; ".join(one.words for one in found if not one.used)
-    return said + (
-        f"; not asked of the {corner}, a corner that needs K_N h/E < 1" if corner else ""
-    )
+    used = [estimate for estimate in estimates if estimate.used and estimate.scale]
+    errors = ", ".join(estimate.description for estimate in used)
+    text = f"{head}: {f'not reached, {why}' if why else 'reached'}; estimated errors with n_joint "
+    text += f"= {sizes[-1]} (coarser: {coarser}) and {steps} load steps: {errors}"
+    of_steps = max((estimate.step_error / estimate.scale for estimate in used), default=0)
+    if of_steps > NEGLIGIBLE:
+        text += f"; of these up to {percent(of_steps)} by the load steps"
+    corner = "; ".join(estimate.description for estimate in estimates if not estimate.used)
+    return text + (f"; not required: {corner}, singular unless K_N h/E < 1" if corner else "")

@@ -293,17 +293,17 @@ def do_check(arguments: argparse.Namespace) -> int:
     """damjoint check; 1 if a check is not met."""
     from .model import parameters
     from .model.case import load
-    from .studies.check import check, text_table
+    from .studies.check import check_cases, text_table
 
     settings = parameters.settings(arguments.settings)
     water = arguments.levels, arguments.tail_levels
     cases = [load(name, settings, *water, accuracy=arguments.accuracy) for name in arguments.cases]
     if any(case["dim"] == 3 for case in cases):
         warn_if_slow()
-    checks = check(cases, arguments.out)
+    checks = check_cases(cases, arguments.out)
     said = [f"{one.gravity.case.name}: {one.accuracy}" for one in checks if one.accuracy]
     print("\n\n".join([text_table(checks), *said, str(arguments.out / "check.csv")]))
-    return int(any(answer.fails for one in checks for answer in one.answers))
+    return int(any(result.failures for check in checks for result in check.results))
 
 
 def do_plot(arguments: argparse.Namespace) -> int:
@@ -399,7 +399,7 @@ def do_critical(arguments: argparse.Namespace) -> int:
 def do_sweep(arguments: argparse.Namespace) -> int:
     """damjoint sweep."""
     from .model import parameters
-    from .studies.plan import Loading, plan_of, sample_of
+    from .studies.plan import Schedule, plan_of, sample_of
     from .studies.sweep import meshed, sweep
 
     out = arguments.out or Path(f"{Path(arguments.case).stem}_sweep.csv")
@@ -409,7 +409,7 @@ def do_sweep(arguments: argparse.Namespace) -> int:
         raise InputError(f"--correlate {arguments.correlate[0]}: needs --sample")
     sample = sample_of(arguments.sample, **how) if arguments.sample else None
     plan = plan_of(arguments.vary, arguments.tie, sample, settings, arguments.critical)
-    loading = Loading(arguments.levels, arguments.tail_levels, arguments.steps, arguments.accuracy)
+    loading = Schedule(arguments.levels, arguments.tail_levels, arguments.steps, arguments.accuracy)
     if loading.accuracy:
         settings, loading, said = meshed(arguments.case, settings, loading)
         print(f"one mesh for all rows, that of the case itself: {said}")

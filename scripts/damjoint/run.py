@@ -1,7 +1,8 @@
-"""One case, solved and written."""
+"""Solve a case and write its results."""
 
 from __future__ import annotations
 
+import contextlib
 import re
 import resource
 import sys
@@ -15,12 +16,13 @@ from . import __version__, accuracy
 from .engines import Outcome, engine_of
 from .model.case import Case
 from .model.fields import Solution
+from .model.results import Results
 from .post import folder as folders
 from .post import tables
 
 
 class Progress:
-    """A bar over the times of all scenes, on a terminal only."""
+    """Progress bar over the times of all scenes, on a terminal only."""
 
     def __init__(self, case: Case, show: bool) -> None:
         count = len(case.scenes())
@@ -34,7 +36,7 @@ class Progress:
         self.reached = [0.0] * count
 
     def step(self, scene: int, now: float) -> None:
-        """What the engines call."""
+        """Advance to the time of a converged step; called by the engines."""
         self.bar.update(now - self.reached[scene])
         self.reached[scene] = now
 
@@ -46,64 +48,64 @@ def run(
     picture: bool = True,
     progress: bool = True,
     engine: str = "auto",
-) -> list[tables.Results]:
-    """Run all scenes of a case and write their results below out, in place of an earlier run's.
+) -> list[Results]:
+    """Solve all scenes of a case and write their results below out, replacing an earlier run's.
 
-    fields: also displacement, stress and joint fields for Gmsh and ParaView; picture: also a PNG;
-    engine: condensed (auto) or getdp, the plain problem definition.
-    Returns the results in the order of case.scenes(). A run that stops early, or is interrupted,
-    leaves what has converged. Raises InputError, RunError.
+    fields: also write displacement, stress and joint fields for Gmsh and ParaView; picture: also a
+    PNG; engine: condensed (auto) or getdp, the reference model.
+    Returns the results in the order of case.scenes(). A run that stops early or is interrupted
+    writes its converged steps. Raises InputError, RunError.
     """
     chosen = engine_of(case, engine)
-    bar, found = Progress(case, progress), []
-    with folders.taken(case, out):  # only now: bad input leaves an earlier run as it is
+    bar, outcomes = Progress(case, progress), list[Outcome]()
+    with folders.claim_output_folder(case, out):  # after the checks: bad input removes nothing
         try:
             for outcome in accuracy.solve(case, chosen, bar.step, fields or picture):
                 save(outcome, case, out)
-                found.append(outcome)
+                outcomes.append(outcome)
                 if outcome.error:
                     raise outcome.error
         except BaseException as error:
-            if not found:
+            if not outcomes:
                 state = "failed" if isinstance(error, Exception) else "interrupted"
-                folders.say(case, out, state, str(error) or "nothing had converged")
+                folders.write_state(case, out, state, str(error) or "no step had converged")
             raise
         bar.bar.close()
-        for outcome in found if fields or picture else []:
-            finish(outcome, case, out, fields, picture)
-    return [outcome.result for outcome in found]
+        for outcome in outcomes if fields or picture else []:
+            write_fields_and_picture(outcome, case, out, fields, picture)
+    return [outcome.result for outcome in outcomes]
 
 
-def keep(case: Case, outcomes: list[Outcome], out: Path) -> None:
-    """Write outcomes of a case below out as `run` does, in place of an earlier run's.
+def write_outcomes(case: Case, outcomes: list[Outcome], out: Path) -> None:
+    """Write outcomes of a case below out as `run` does, replacing an earlier run's.
 
     Raises InputError if out can not be written.
     """
-    with folders.taken(case, out):
+    with folders.claim_output_folder(case, out):
         for outcome in outcomes:
             save(outcome, case, out)
         for outcome in outcomes:
-            finish(outcome, case, out, fields=True, picture=True)
+            write_fields_and_picture(outcome, case, out, fields=True, picture=True)
 
 
 def save(outcome: Outcome, case: Case, out: Path) -> None:
-    """Write the tables of a scene of a case below out, and run.json with what it took."""
+    """Write the tables of a scene of a case below out, and run.json with memory and times."""
     folder = folders.scene_folder(case, outcome.result.case, out)
     folder.mkdir(exist_ok=True)
     start, result = time.perf_counter(), outcome.result
     tables.write(result, folder)
     result.info["wall_seconds"]["post"] = time.perf_counter() - start
     versions = {"damjoint": __version__, "gmsh": version("gmsh"), "python": sys.version.split()[0]}
-    plain = result.info.pop("getdp", {})
-    if plain.get("version"):
-        versions["getdp"] = plain["version"]
-    memory = max(peak_memory(), plain.get("peak_memory_mb") or 0.0)
+    getdp = result.info.pop("getdp", {})
+    if getdp.get("version"):
+        versions["getdp"] = getdp["version"]
+    memory = max(peak_memory(), getdp.get("peak_memory_mb") or 0.0)
     result.info |= {"peak_memory_mb": round(memory, 1), "versions": versions}
-    folders.write_info(result, folder, *ended(outcome))
+    folders.write_info(result, folder, *early_end(outcome))
 
 
-def ended(outcome: Outcome) -> tuple[str, str]:
-    """How a scene ended before its time, failed or interrupted, and why; empty if it did not."""
+def early_end(outcome: Outcome) -> tuple[str, str]:
+    """State (failed or interrupted) and message of a scene that an error ended; else empty."""
     if not outcome.error:
         return "", ""
     last = outcome.result.last
@@ -112,8 +114,10 @@ def ended(outcome: Outcome) -> tuple[str, str]:
     return state, f"{state}{where}" + (f": {outcome.error}" if str(outcome.error) else "")
 
 
-def finish(outcome: Outcome, case: Case, out: Path, fields: bool, picture: bool) -> None:
-    """Write fields and picture of a scene, and the time that all writing took."""
+def write_fields_and_picture(
+    outcome: Outcome, case: Case, out: Path, fields: bool, picture: bool
+) -> None:
+    """Write fields and picture of a scene, and into run.json the time of all writing."""
     start, result = time.perf_counter(), outcome.result
     folder = folders.scene_folder(case, result.case, out)
     solution = Solution(result, outcome.mesh().bodies, outcome.fields())
@@ -126,13 +130,12 @@ def finish(outcome: Outcome, case: Case, out: Path, fields: bool, picture: bool)
 
         draw(solution, folder)
     result.info["wall_seconds"]["post"] += time.perf_counter() - start
-    folders.write_info(result, folder, *ended(outcome))
+    folders.write_info(result, folder, *early_end(outcome))
 
 
 def peak_memory() -> float:
     """Peak resident memory of this process [MB]."""
-    try:  # getrusage also counts what the parent had before exec
-        told = Path("/proc/self/status").read_text()
-        return float(re.search(r"VmHWM:\s+(\d+)", told)[1]) / 1024
-    except (OSError, TypeError):
-        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    with contextlib.suppress(OSError):  # getrusage includes memory of the parent before exec
+        if match := re.search(r"VmHWM:\s+(\d+)", Path("/proc/self/status").read_text()):
+            return float(match[1]) / 1024
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024

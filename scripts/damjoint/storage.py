@@ -1,4 +1,4 @@
-"""Files that are there whole or not at all, written by one process at a time."""
+"""Atomic writes, locks on files and folders, detection of truncated files."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from pathlib import Path
 
 from . import InputError
 
-#: What the name of a file that is being written begins with.
+#: Prefix of the temporary file beside the one that is being written.
 PART = ".part."
 
 
 @contextlib.contextmanager
-def whole(path: Path) -> Iterator[Path]:
-    """A path to write to, whose file takes the place of `path` when all is written.
+def atomic_write(path: Path) -> Iterator[Path]:
+    """Yield a temporary path that replaces `path` at the end of the block.
 
-    What fails or is interrupted leaves what was there. A link is replaced, not followed, also one
-    in place of the file being written; a device is written to. Raises OSError, naming the path.
+    An error or interrupt in the block leaves the old file. A link is replaced, not followed, also
+    one at the temporary path; a device is written directly. Raises OSError with the path.
     """
     if path.exists() and not (path.is_file() or path.is_dir()):  # /dev/stdout
         yield path
@@ -41,9 +41,9 @@ def whole(path: Path) -> Iterator[Path]:
 
 
 def check_end(path: Path, *ends: str) -> None:
-    """Raise OSError (no space left) if a file that another program has written is missing or does
-    not end in one of the ways it should: programs that do not check their writes leave half of a
-    file on a full disk.
+    """Raise OSError (no space left) if a file is missing or ends in none of `ends`.
+
+    GetDP and Gmsh do not check their writes: on a full disk they leave a truncated file.
     """
     last = b""
     with contextlib.suppress(FileNotFoundError), path.open("rb") as file:
@@ -51,15 +51,14 @@ def check_end(path: Path, *ends: str) -> None:
         last = file.read()
     if not last.endswith(tuple(end.encode() for end in ends)):
         free = shutil.disk_usage(path.parent).free
-        said = f"not written whole ({free} bytes are free in its folder)"
-        raise OSError(errno.ENOSPC, said, str(path))
+        message = f"truncated; its folder has {free} bytes free"
+        raise OSError(errno.ENOSPC, message, str(path))
 
 
 def lock(file: int, path: Path) -> None:
-    """Keep an open file, or folder, from all who ask for it so, until it is closed or the process
-    ends.
+    """Take an exclusive lock on an open file or folder, until it is closed or the process ends.
 
-    Raises InputError if another has it.
+    Raises InputError if another process holds it.
     """
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -70,8 +69,11 @@ def lock(file: int, path: Path) -> None:
 
 
 @contextlib.contextmanager
-def held(folder: Path) -> Iterator[None]:
-    """`lock` for a folder."""
+def locked_folder(folder: Path) -> Iterator[None]:
+    """Hold the exclusive lock on a folder.
+
+    Raises InputError if another process holds it.
+    """
     number = os.open(folder, os.O_RDONLY)
     try:
         lock(number, folder)

@@ -22,18 +22,19 @@ import numpy as np
 from damjoint import RunError
 from damjoint import accuracy as on_request
 from damjoint.engines import engine_of
-from damjoint.fem.condensation import Bodies, condense
+from damjoint.engines.condensed.cache import interface_of
+from damjoint.fem.bodies import Bodies
+from damjoint.fem.condensation import condense
 from damjoint.joint.interface import Interface
 from damjoint.model.case import ACCURACIES, Case, load
 from damjoint.model.fields import along
 from damjoint.model.results import Results
 from damjoint.post import tables
-from damjoint.post.validation import read_at
+from damjoint.post.validation import reference_time
 from damjoint.run import run
 from damjoint.solver.load_stepper import LoadStepper
 from damjoint.statics.verdict import statement
-from damjoint.storage import whole
-from damjoint.studies.bodies import interface_of
+from damjoint.storage import atomic_write
 from damjoint.studies.sweep import pool_of, stepped
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
@@ -126,7 +127,7 @@ class Kept:
                     key, value = json.loads(line)
                     self.known[json.dumps(key)] = value
         pairs = [[json.loads(key), value] for key, value in self.known.items()]
-        with whole(path) as part:
+        with atomic_write(path) as part:
             lines = [[short, self.provenance], *pairs]
             part.write_text("".join(json.dumps(one) + "\n" for one in lines))
 
@@ -242,7 +243,7 @@ def read_off(result: Results) -> np.ndarray:
     prescribed displacement), means over z; the crack's tip where the opening interpolates to zero.
     """
     times = result.history["time"]
-    reached = np.flatnonzero(np.isclose(times, read_at(result.case)))
+    reached = np.flatnonzero(np.isclose(times, reference_time(result.case)))
     step = reached[0] if len(reached) else -1  # a mesh far too coarse may stop before
     mean = along(result.at(times[step]))
     x, opening = mean["x"], mean["delta_n"]
@@ -450,7 +451,7 @@ def on_finest(case: Case, n: float) -> Case:
     """A case on a mesh of n elements along the joint, by the rule of --accuracy, each load step cut
     in four.
     """
-    found = on_request.finer(case, n / case["n_joint"])
+    found = on_request.refine_mesh(case, n / case["n_joint"])
     return replace(on_request.halve_steps(on_request.halve_steps(found)), accuracy=None)
 
 
@@ -459,8 +460,8 @@ def off(name: str, told: dict, result: Results, exact: Results) -> str:
     if name not in told:
         return ""
     one = told[name]
-    times = [t for t in on_request.reached(result) if t in on_request.reached(exact)]
-    pair = [np.array(on_request.read(r, sorted(times))[name]) for r in (result, exact)]
+    times = [t for t in on_request.reached_times(result) if t in on_request.reached_times(exact)]
+    pair = [np.array(on_request.quantities_at(r, sorted(times))[name]) for r in (result, exact)]
     scale = one["error"] / one["relative"] if one["relative"] else np.abs(pair[1]).max() or 1.0
     return f"{100 * one['relative']:.2g} / {100 * np.abs(pair[0] - pair[1]).max() / scale:.2g}"
 

@@ -13,7 +13,7 @@ import numpy as np
 from damjoint.model.case import Case, load
 from damjoint.post import validation
 from damjoint.run import run
-from damjoint.storage import held
+from damjoint.storage import locked_folder
 from tabulate import tabulate
 from threadpoolctl import threadpool_limits
 
@@ -258,7 +258,7 @@ def bench(out: Path, short: bool) -> None:
     What is measured is kept in out/measured.jsonl until the page is written.
     """
     out.mkdir(parents=True, exist_ok=True)
-    with held(out):
+    with locked_folder(out):
         kept = Kept(out / "measured.jsonl", short)
         tables, precise = measure(kept)
         for name, table in tables.items():

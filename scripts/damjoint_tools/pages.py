@@ -48,15 +48,12 @@ def parameters_page() -> str:
     ]
     groups: dict[str, list[tuple]] = {}
     for parameter in declared().values():
-        description, _, unit = parameter.meaning.rpartition(" [")
-        if not unit.endswith("]"):
-            description, unit = parameter.meaning, ""
-        notes = parameter.help if not parameter.follows else ""
+        notes = parameter.help if not parameter.automatic else ""
         groups.setdefault(parameter.group, []).append(
             (
                 f"`{parameter.name}`",
-                description,
-                unit.rstrip("]"),
+                parameter.description,
+                parameter.unit,
                 parameter.default,
                 parameter.allowed(),
                 parameter.matters,

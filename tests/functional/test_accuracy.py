@@ -33,18 +33,20 @@ def test_the_error_left_of_a_power(order):
     for some in (values, values[1:]):
         true = np.abs(some[-1] - [3.0, -2.0])
         change = np.abs(some[-1] - some[-2]) * (1.25 if len(some) > 2 else 3)
-        found = accuracy.left(some, counted=False)
+        found = accuracy.discretisation_error(some, counted=False)
         assert np.all(found >= true * (1 - 1e-12)) and np.all(found <= change * (1 + 1e-12))
 
 
 def test_two_values_that_agree_by_accident():
-    assert accuracy.left(np.array([[1.0], [2.0], [2.0]]), counted=False) == pytest.approx(1.25 / 12)
+    assert accuracy.discretisation_error(
+        np.array([[1.0], [2.0], [2.0]]), counted=False
+    ) == pytest.approx(1.25 / 12)
 
 
 def test_values_that_go_to_and_fro_show_no_order():
     """The slip of a dam whose crack is two elements long: 32, 64, 128, 512 elements."""
     values, limit = np.array([[2.1486e-05], [2.0175e-05], [2.0186e-05]]), 1.96e-05
-    error = accuracy.left(values, counted=False)
+    error = accuracy.discretisation_error(values, counted=False)
     assert error == pytest.approx(1.25 * (values.max() - values.min()) / 2)
     assert error > values[-1] - limit
 
@@ -56,11 +58,11 @@ def test_what_is_said_is_true(scene):
     outcome = solved(case)
     told = outcome.result.info["error_estimate"]
     assert told["reached"] and told["n_joint"][-1] == outcome.result.case["n_joint"]
-    fine = accuracy.finer(outcome.result.case, 4)
+    fine = accuracy.refine_mesh(outcome.result.case, 4)
     exact = solved(replace(fine, accuracy=None)).result
-    times = sorted(accuracy.reached(exact))
+    times = sorted(accuracy.reached_times(exact))
     assert len(times) == 2
-    pair = [accuracy.read(one, times) for one in (outcome.result, exact)]
+    pair = [accuracy.quantities_at(one, times) for one in (outcome.result, exact)]
     names = [name for name, one in told["quantities"].items() if one["used"]]
     assert {"max_opening", "slip", "crest_ux"} <= set(names) and ("flux" in names) == (
         scene == "flow"
@@ -68,7 +70,7 @@ def test_what_is_said_is_true(scene):
     for name in names:
         true = np.abs(np.subtract(*(one[name] for one in pair))).max()
         assert true <= told["quantities"][name]["error"], name
-        if name not in accuracy.LENGTHS:
+        if name not in accuracy.COUNTED_IN_ELEMENTS:
             assert told["quantities"][name]["relative"] <= 0.03
 
 
@@ -89,7 +91,7 @@ def test_run_writes_and_says_it(command, tmp_path):
     assert code == 0 and estimate["statement"] in said.splitlines()
     assert estimate["accuracy"] == 0.05 and estimate["reached"]
     assert not estimate["quantities"]["toe_stress"]["used"]
-    assert "not asked of the stress at the toe" in estimate["statement"]
+    assert "not required: stress at the toe" in estimate["statement"]
     mesh = {n: told["parameters"][n] for n in ("n_joint", "h_dam", "h_found", "order")}
     assert command(*asked, *words(mesh), "--out", "y")[0] == 0
     pair = [(tmp_path / name / "history.csv").read_text() for name in "xy"]
@@ -98,7 +100,7 @@ def test_run_writes_and_says_it(command, tmp_path):
 
 def test_sizes_far_away_follow_as_automatic_ones():
     for n in (64, 256):
-        found = accuracy.finer(load("dam", DAM, accuracy="fine"), n / 32)
+        found = accuracy.refine_mesh(load("dam", DAM, accuracy="fine"), n / 32)
         own = load("dam", DAM | {"n_joint": n, "order": 2, "mesh_pattern": "free"})
         assert found.values == pytest.approx(own.values)
 

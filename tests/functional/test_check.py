@@ -11,10 +11,10 @@ from damjoint.post import folder as folders
 from damjoint.post.check_picture import draw_joint
 from damjoint.statics import gravity
 from damjoint.studies.check import (
-    Check,
+    SafetyCheck,
     by_finite_elements,
     by_gravity,
-    compared,
+    compare_methods,
     hand_calculation,
     picture_table,
     text_table,
@@ -91,12 +91,12 @@ def test_two_combinations(command, combinations, tmp_path):
 def test_a_check_that_is_not_met(solve, setting, said):
     (result,) = solve("d", "7", dim=2.0, n_joint=20.0)
     for answer in (by_finite_elements(result), by_gravity(hand_calculation(result))):
-        assert not answer.fails and answer.row["verdict"] == "not checked"
+        assert not answer.failures and answer.row["verdict"] == "not checked"
         met = replace(answer.case, values=answer.case.values | {"required_OSF": 1.01})
         assert replace(answer, case=met).row["verdict"] == "pass"
         stricter = replace(answer, case=replace(answer.case, values=answer.case.values | setting))
         expected = said.format(**answer.numbers, toe=-answer.numbers["sigma_n_toe"])
-        assert stricter.fails == [expected]
+        assert stricter.failures == [expected]
         assert (stricter.row["verdict"], stricter.row["why"]) == ("fail", expected)
 
 
@@ -161,12 +161,13 @@ def test_a_partial_load_is_no_pass(solve):
     (result,) = solve("d", "7", dim=2.0, n_joint=20.0)
     longer = replace(result, case=replace(result.case, levels=(7.0, 7.0), tail_levels=(0.0,) * 2))
     longer = replace(longer, case=replace(longer.case, times=(1.0, 2.0)))
-    found = Check(by_finite_elements(longer), by_gravity(hand_calculation(longer)))
+    found = SafetyCheck(by_finite_elements(longer), by_gravity(hand_calculation(longer)))
     computed, by_hand = found.rows
-    assert computed["verdict"] == "fail" and computed["why"].startswith("t = 1 of 2")
+    assert computed["verdict"] == "fail" and computed["why"].startswith("ended at t = 1 of 2")
     assert by_hand["verdict"] == "not checked"
     assert ("load", "partial", "full", "") in picture_table(found)
-    assert len(Check(by_finite_elements(result), by_gravity(hand_calculation(result))).rows) == 3
+    full = SafetyCheck(by_finite_elements(result), by_gravity(hand_calculation(result)))
+    assert len(full.rows) == 3
 
 
 def test_drains_that_leave_two_cracks(command, tmp_path):
@@ -189,7 +190,7 @@ def test_drains_that_leave_two_cracks(command, tmp_path):
 
 def test_a_joint_that_tension_keeps_uncracked(solve):
     (result,) = solve("dam", "45", law="rupture", sigma_max=2e6, G_f=100.0, n_joint=20.0)
-    (note,) = (note for note in compared(result).notes if "tension" in note)
+    (note,) = (note for note in compare_methods(result).notes if "tension" in note)
     assert "below the strength of 2000 kPa; without tension: crack 0." in note
 
 
@@ -228,7 +229,7 @@ def test_a_difference_beyond_the_digits_of_the_table_is_not_shown(solve):
     for much, shown in ((1e-7, "0"), (1e-3, "-")):
         more = computed.numbers["N"] * (1 + much)
         other = replace(computed, numbers={**computed.numbers, "N": more})
-        found = Check(computed, other)
+        found = SafetyCheck(computed, other)
         assert found.rows[2]["N"] < 0
         (line,) = (line for line in text_table([found]).splitlines() if "difference" in line)
         assert line.split()[3].startswith(shown)
@@ -239,7 +240,7 @@ def test_stresses_have_one_sign(solve):
     table beside the picture and at the ends of its diagram, and each of them says so."""
     (result,) = solve("dam", "45", n_joint=20, h_dam=8, h_found=30)
     method = hand_calculation(result)
-    found = Check(by_finite_elements(result), by_gravity(method))
+    found = SafetyCheck(by_finite_elements(result), by_gravity(method))
     heel, toe = (found.rows[1][f"sigma_n_eff_{end}"] for end in ("heel", "toe"))
     assert heel > 0 > toe
     shown = [f"{value / 1e6:.5g}" for value in (heel, toe)]

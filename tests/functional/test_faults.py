@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 from damjoint.fem import factor
-from damjoint.storage import held, whole
+from damjoint.storage import atomic_write, locked_folder
 
 BARE = ("--set", "n_joint=10", "--set", "h_dam=3", "--set", "h_found=4", "--no-fields")
 RUN = ("run", "c", *BARE, "--no-picture", "--levels", "6")
@@ -85,7 +85,7 @@ def test_a_full_disk(command, tmp_path):
 def test_a_file_is_whole_or_as_it_was(tmp_path):
     path = tmp_path / "table.csv"
     path.write_text("old")
-    with contextlib.suppress(KeyboardInterrupt), whole(path) as part:
+    with contextlib.suppress(KeyboardInterrupt), atomic_write(path) as part:
         part.write_text("ne")
         raise KeyboardInterrupt
     assert path.read_text() == "old" and list(tmp_path.iterdir()) == [path]
@@ -107,7 +107,7 @@ def test_links_lead_nowhere(command, tmp_path):
 def test_nor_through_a_file_that_is_being_written(tmp_path):
     (tmp_path / "mine.csv").write_text("mine")
     (tmp_path / ".part.table.csv").symlink_to(tmp_path / "mine.csv")
-    with whole(tmp_path / "table.csv") as part:
+    with atomic_write(tmp_path / "table.csv") as part:
         part.write_text("new")
     assert (tmp_path / "mine.csv").read_text() == "mine"
     assert (tmp_path / "table.csv").read_text() == "new"
@@ -116,7 +116,7 @@ def test_nor_through_a_file_that_is_being_written(tmp_path):
 def test_another_run_in_the_folder(command, tmp_path):
     assert command(*RUN)[0] == 0
     before = {p: p.read_bytes() for p in (tmp_path / "out" / "c").iterdir()}
-    with held(tmp_path / "out" / "c"):
+    with locked_folder(tmp_path / "out" / "c"):
         code, _, err = command(*RUN)
     assert code == 2 and "out/c: another damjoint is writing there" in err
     assert {p: p.read_bytes() for p in (tmp_path / "out" / "c").iterdir()} == before
@@ -299,7 +299,7 @@ def test_getdp_is_refused_what_it_has_no_memory_for(command, monkeypatch):
     words = "run", "dam", "--engine", "getdp", "--levels", "30", "--no-fields", "--no-picture"
     code, _, err = command(*words, "--set", "n_joint=50000")
     assert code == 1 and "need about" in err and len(err.splitlines()) == 1
-    monkeypatch.setattr("damjoint.fem.memory.left", lambda: 1e6)
+    monkeypatch.setattr("damjoint.fem.memory.available", lambda: 1e6)
     monkeypatch.setattr("damjoint.engines.getdp.solve.bulk_size", lambda _: 0)
     code, _, err = command(*words, "--set", "n_joint=20")
     assert code == 1 and "need about" in err and len(err.splitlines()) == 1

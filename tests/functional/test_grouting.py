@@ -33,14 +33,14 @@ def test_published_openings_of_a_grouted_joint():
     space, face = block()
     stiffness = elasticity(space, 2, {"dam": (3e12, 0.25)})
     weight = -2400 * 9.81 * body_force(space, 2, 1)
-    points, functions = points_of(face, JOINT["published"][2]), len(space.place)
+    points, functions = points_of(face, JOINT["published"][2]), len(space.locations)
     # the joint opens by twice what the face moves
     pick = sparse.csr_matrix(
-        (np.ones(len(face.place)), (range(len(face.place)), 2 * space.find(face))),
-        (len(face.place), 2 * functions),
+        (np.ones(len(face.locations)), (range(len(face.locations)), 2 * space.find(face))),
+        (len(face.locations), 2 * functions),
     )
     opening = 2 * points.values @ pick
-    free = np.flatnonzero(np.repeat(space.place[:, 1] > 0, 2))
+    free = np.flatnonzero(np.repeat(space.locations[:, 1] > 0, 2))
     law = load("ssnp142", LAW | {"grout_pressure": PRESSURE, "grout_t": 2.0}).law
     variables, u = law.initial(len(points.weights)), np.zeros(2 * functions)
     for time in (1, 2, 3):
@@ -56,5 +56,5 @@ def test_published_openings_of_a_grouted_joint():
         variables = law.update_internal_variables(jump, variables)
     assert traction[:, 0] == pytest.approx(-PRESSURE, rel=1e-6)
     for y, (published, tolerance) in PUBLISHED.items():
-        (node,) = np.flatnonzero((space.place[:, 0] == 0) & (space.place[:, 1] == y))
+        (node,) = np.flatnonzero((space.locations[:, 0] == 0) & (space.locations[:, 1] == y))
         assert 2 * u[2 * node] == pytest.approx(published, rel=tolerance)

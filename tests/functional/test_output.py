@@ -30,7 +30,7 @@ def test_a_text_is_no_formula(tmp_path):
 def test_a_matplotlibrc_of_the_present_folder_changes_nothing(tmp_path):
     (tmp_path / "matplotlibrc").write_text("axes.facecolor: red\nfont.size: 40\n")
     script = (
-        "from damjoint.results import drawing\nimport matplotlib as m\n"
+        "from damjoint.post import drawing\nimport matplotlib as m\n"
         "print(m.rcParams['axes.facecolor'], m.rcParams['font.size'])"
     )
     done = subprocess.run(

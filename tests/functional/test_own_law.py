@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from damjoint.engines.condensed.cache import interface_of
 from damjoint.laws import LAWS, Law
 from damjoint.model.case import load
 from damjoint.post.pictures import shear_limit
 from damjoint.solver.load_stepper import LoadStepper
 from damjoint.statics.verdict import hints, verdict
-from damjoint.studies.bodies import interface_of
 
 
 class Springs(Law):

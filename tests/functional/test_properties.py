@@ -116,7 +116,7 @@ def in_units(case, units):
     }
     told = lambda heights: ",".join(repr(height * factor("m")) for height in heights)
     case = load("dam", values, told(case.levels), told(case.tail_levels))
-    lengths = {n: [case.shared[n][0] * factor("m")] for n in ("sudden", "crack_aperture")}
+    lengths = {n: [case.shared[n][0] * factor("m")] for n in ("release_length", "crack_aperture")}
     columns = (JOINT | COLUMNS | FLUX | HISTORY).items()
     scaled = {name: partial(np.multiply, factor(unit)) for name, (unit, _) in columns}
     return replace(case, shared=case.shared | lengths), scaled

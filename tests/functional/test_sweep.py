@@ -247,14 +247,14 @@ def test_a_critical_level_is_a_column(command, tmp_path):
 
 
 def test_a_row_that_fails_says_why_and_the_others_go_on(command, tmp_path, monkeypatch):
-    whole = sweep.filled
+    whole = sweep.stepped
 
     def broken(case, known, interface):
         if case["mu"] == 0.4:
             raise MemoryError("no room\nfor it")
         return whole(case, known, interface)
 
-    monkeypatch.setattr(sweep, "filled", broken)
+    monkeypatch.setattr(sweep, "stepped", broken)
     assert command("sweep", "c", "--vary", "mu=0.4,0.5", "--jobs", "1", "--out", "s.csv")[0] == 0
     bad, good = rows(tmp_path / "s.csv")
     assert (bad["failed"], bad["verdict"]) == ("1", "failed")

@@ -107,7 +107,7 @@ def test_only_what_matters_shows_and_followers_say_what_they_follow(open_window)
     assert hand.entry("mu")["visible"] and not hand.entry("sigma_max")["visible"]
     hand.type("E", 2e10)
     entry = hand.entry("E_dam")
-    assert entry["values"] == [-1] and entry["label"].startswith("E_dam = 2e+10 (E): ")
+    assert entry["values"] == [-1] and entry["label"].startswith("E_dam = 2e+10 (-1: E): ")
     assert hand.session.tree.sheet.case["E_dam"] == 2e10
     hand.type("E_dam", 3e10)
     assert hand.session.tree.sheet.case["E_dam"] == 3e10
@@ -263,7 +263,7 @@ def test_the_title_follows_law_and_water(open_window):
     hand.run()
     hand.type("law", "rupture")
     hand.type("uplift", "none")
-    changed = ["C, changed", "law rupture, uplift none"]
+    changed = ["case c, changed", "law rupture, uplift none"]
     assert shown_results()[2] == changed
     hand.run()
     assert [line for line in shown_results()[2] if line in changed] == changed
@@ -343,7 +343,7 @@ def test_stop_keeps_what_has_converged(open_window, tmp_path):
     hand.press("stop")
     hand.press("stop")
     hand.wait()
-    assert hand.session.status in ("stopped at once, nothing kept", "stopped before the first step")
+    assert hand.session.status in ("stopped at once, no results", "stopped before the first step")
     hand.type(tree.STEPS, "1")
     assert hand.run().startswith("done in")
 
@@ -363,7 +363,7 @@ def test_nothing_to_save_before_a_run(open_window, tmp_path):
     hand = open_window("e")
     hand.press(tree.SAVE_ACTION)
     hand.wait()
-    assert hand.session.status == "nothing to save yet: press Run first"
+    assert hand.session.status == "nothing to save: press Run first"
 
 
 def test_a_case_of_ones_own_is_not_overwritten(open_window, tmp_path):
@@ -380,7 +380,9 @@ def test_a_case_of_ones_own_is_not_overwritten(open_window, tmp_path):
         gmsh.onelab.setString(tree.FOLDER, [str(tmp_path / folder)])
         hand.press(tree.SAVE_ACTION)
         hand.wait()
-        assert hand.session.status.endswith("has a c.case of its own: choose another folder")
+        assert hand.session.status.endswith(
+            "must not have a c.case of your own; choose another folder"
+        )
         assert [p.name for p in (tmp_path / folder).iterdir()] == ["c.case"]
     assert own.read_text() == "// mine\n" and behind.read_text() == "mine, too\n"
     hand.save(tmp_path / "new")
@@ -399,7 +401,7 @@ def test_an_engine_that_dies_is_started_again(open_window):
     hand.wait(lambda session: "level 3." in session.status)
     hand.session.engine.process.kill()
     hand.wait()
-    assert hand.session.status == "the engine has ended (-9); press Run"
+    assert hand.session.status == "the engine's process ended (exit code -9): press Run"
     hand.type(tree.STEPS, "1")
     assert hand.run().startswith("done in")
 

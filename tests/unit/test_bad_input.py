@@ -272,7 +272,7 @@ def test_a_bad_case_does_not_spoil_the_next_one(tmp_path):
     )
     script = """
 from damjoint import InputError
-from damjoint.scene.case import load
+from damjoint.model.case import load
 try:
     load("bad.case")
 except InputError:

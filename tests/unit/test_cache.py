@@ -1,4 +1,5 @@
-"""Condensed bodies on disk: whole, of this scene and version, or made anew; nothing is executed."""
+"""Condensed bodies on disk: complete, of this scene and version, or computed again; no file is
+executed."""
 
 import os
 import pickle
@@ -12,25 +13,29 @@ SMALL = {"n_joint": 6.0, "h_dam": 4.0, "h_found": 4.0}
 
 
 @pytest.fixture
-def kept(tmp_path, monkeypatch):
-    """A cache with one entry: the file, and what it holds."""
+def entry(tmp_path, monkeypatch):
+    """A cache with one entry: its file and the condensed bodies in it."""
     monkeypatch.setenv("DAMJOINT_CACHE", str(tmp_path))
-    made, bodies = cache.cached(load("a", SMALL))
+    written, bodies = cache.cached(load("a", SMALL))
     assert bodies is not None
     (file,) = tmp_path.iterdir()
-    return file, made
+    return file, written
 
 
-def same(one, other):
-    return np.array_equal(one.stiffness, other.stiffness) and one.counts == other.counts
+def same(first, second):
+    return np.array_equal(first.stiffness, second.stiffness) and first.counts == second.counts
 
 
-def test_an_entry_is_found_again(kept):
-    _, made = kept
-    found, bodies = cache.cached(load("a", SMALL))
-    assert bodies is None and same(found, made)
-    assert [shape for shape, _ in found.joint.cells] == [shape for shape, _ in made.joint.cells]
-    assert list(found.faces) == ["face2"] and found.width == made.width
+def test_an_entry_is_read(entry):
+    """All of it: types, names, numbers, arrays."""
+    _, written = entry
+    result, bodies = cache.cached(load("a", SMALL))
+    assert bodies is None and list(result.faces) == ["face2"]
+    arrays = {}, {}
+    trees = [cache.pack(c, "", a) for c, a in zip((result, written), arrays, strict=True)]
+    assert trees[0] == trees[1] and len(arrays[0]) > 20
+    for name, array in arrays[0].items():
+        assert array.dtype == arrays[1][name].dtype and np.array_equal(array, arrays[1][name])
 
 
 class Trap:
@@ -44,8 +49,8 @@ class Trap:
 
 
 @pytest.mark.parametrize("damage", ["truncated", "foreign", "pickle", "empty", "other header"])
-def test_a_bad_entry_is_made_anew(kept, tmp_path, damage):
-    file, made = kept
+def test_a_bad_entry_is_computed_again(entry, tmp_path, damage):
+    file, written = entry
     whole = file.read_bytes()
     if damage == "truncated":
         file.write_bytes(whole[: len(whole) // 2])
@@ -56,12 +61,12 @@ def test_a_bad_entry_is_made_anew(kept, tmp_path, damage):
     elif damage == "empty":
         file.write_bytes(b"")
     else:
-        with np.load(file) as found:
-            np.savez(file, **{**found, "header": np.array("0.0.0")})
-    found, bodies = cache.cached(load("a", SMALL))
-    assert bodies is not None and same(found, made)
+        with np.load(file) as result:
+            np.savez(file, **{**result, "header": np.array("0.0.0")})
+    result, bodies = cache.cached(load("a", SMALL))
+    assert bodies is not None and same(result, written)
     assert not (tmp_path / "trap").exists()
-    assert cache.cached(load("a", SMALL))[1] is None  # and kept again
+    assert cache.cached(load("a", SMALL))[1] is None  # and stored again
 
 
 @pytest.mark.parametrize(
@@ -73,36 +78,38 @@ def test_a_bad_entry_is_made_anew(kept, tmp_path, damage):
         pytest.param(46, 0, id="name"),
     ],
 )
-def test_a_flipped_byte_is_a_miss_once(kept, place, value):
+def test_a_flipped_byte_is_a_miss_once(entry, place, value):
     """In an entry of the zip file's directory."""
-    file, made = kept
+    file, written = entry
     data = bytearray(file.read_bytes())
     data[data.index(b"PK\x01\x02") + place] = value
     file.write_bytes(data)
-    found, bodies = cache.cached(load("a", SMALL))
-    assert bodies is not None and same(found, made)
+    result, bodies = cache.cached(load("a", SMALL))
+    assert bodies is not None and same(result, written)
     assert cache.cached(load("a", SMALL))[1] is None  # and replaced
 
 
-def test_an_array_that_is_missing_is_a_miss(kept):
+def test_an_array_that_is_missing_is_a_miss(entry):
     """As one of the loads is if the length of the entry before it in the directory is damaged."""
-    file, made = kept
-    with np.load(file) as found:
-        np.savez(file, **{name: found[name] for name in found.files if name != "units/dam_x"})
-    found, bodies = cache.cached(load("a", SMALL))
-    assert bodies is not None and found.units.keys() == made.units.keys()
+    file, written = entry
+    with np.load(file) as result:
+        np.savez(
+            file, **{name: result[name] for name in result.files if name != "bodies/units/dam_x"}
+        )
+    result, bodies = cache.cached(load("a", SMALL))
+    assert bodies is not None and result.units.keys() == written.units.keys()
 
 
-def test_a_pipe_in_place_of_an_entry(kept):
-    file, made = kept
+def test_a_pipe_in_place_of_an_entry(entry):
+    file, written = entry
     file.unlink()
     os.mkfifo(file)
-    found, bodies = cache.cached(load("a", SMALL))
-    assert bodies is not None and same(found, made)
+    result, bodies = cache.cached(load("a", SMALL))
+    assert bodies is not None and same(result, written)
 
 
-def test_nothing_is_written_through_links(kept, tmp_path_factory):
-    file, _ = kept
+def test_nothing_is_written_through_links(entry, tmp_path_factory):
+    file, _ = entry
     mine = tmp_path_factory.mktemp("mine") / "mine"
     mine.write_text("mine")
     file.with_suffix(f".{os.getpid()}").symlink_to(mine)
@@ -112,14 +119,14 @@ def test_nothing_is_written_through_links(kept, tmp_path_factory):
     assert cache.cached(load("a", SMALL))[1] is None
 
 
-def test_an_array_of_objects_is_not_loaded(kept, tmp_path):
-    file, made = kept
-    with np.load(file) as found:
-        arrays = dict(found)
-    arrays["stiffness"] = np.array([Trap(tmp_path / "trap")], dtype=object)
+def test_an_array_of_objects_is_not_loaded(entry, tmp_path):
+    file, written = entry
+    with np.load(file) as result:
+        arrays = dict(result)
+    arrays["bodies/stiffness"] = np.array([Trap(tmp_path / "trap")], dtype=object)
     np.savez(file, **arrays)
-    found, bodies = cache.cached(load("a", SMALL))
-    assert bodies is not None and same(found, made) and not (tmp_path / "trap").exists()
+    result, bodies = cache.cached(load("a", SMALL))
+    assert bodies is not None and same(result, written) and not (tmp_path / "trap").exists()
 
 
 def test_a_folder_that_can_not_be_written_costs_time_only(tmp_path, monkeypatch):
@@ -128,8 +135,8 @@ def test_a_folder_that_can_not_be_written_costs_time_only(tmp_path, monkeypatch)
     assert cache.cached(load("a", SMALL))[1] is not None
 
 
-def test_another_mesh_makes_other_bodies(kept, monkeypatch):
-    """After a change of geo/ or of the elements nothing old is found."""
+def test_another_mesh_makes_other_bodies(entry, monkeypatch):
+    """After a change of geo/ or of the elements nothing old is read."""
     monkeypatch.setattr(cache, "sources", lambda: "changed")
     assert cache.cached(load("a", SMALL))[1] is not None
 

@@ -84,9 +84,11 @@ def test_patch_test_of_order_2(shape, shake):
     density = -mu * np.einsum("cii->c", second) - (lam + mu) * np.einsum("iic->c", second)
     load = sum(density[c] * body_force(space, dim, c) for c in range(dim))
     stiffness = elasticity(space, dim, {"dam": (YOUNG, POISSON)})
-    wanted = spsolve(space.at_places(2).tocsc(), field(space.place))
+    wanted = spsolve(space.interpolation(2).tocsc(), field(space.locations))
     size = body.points[:, :dim].max()
-    outside = np.isclose(space.place[:, :dim] * (size - space.place[:, :dim]), 0).any(axis=1)
+    outside = np.isclose(space.locations[:, :dim] * (size - space.locations[:, :dim]), 0).any(
+        axis=1
+    )
     free = np.flatnonzero(np.repeat(~outside, dim))
     found = wanted.ravel().copy()
     found[free] = 0
@@ -112,8 +114,8 @@ def test_a_face_finds_its_functions(shape, corners):
     face = Body(body.points[used], body.node_tags[used], quads, used[:1])
     whole, part = Space(body, 2), Space(face, 2)
     found = whole.find(part)
-    assert len(np.unique(found)) == len(part.place) == 9
-    assert whole.place[found] == pytest.approx(part.place, abs=1e-12)
-    here = whole.at_places(2)[found].toarray()
-    assert here[:, found] == pytest.approx(part.at_places(2).toarray(), abs=1e-15)
+    assert len(np.unique(found)) == len(part.locations) == 9
+    assert whole.locations[found] == pytest.approx(part.locations, abs=1e-12)
+    here = whole.interpolation(2)[found].toarray()
+    assert here[:, found] == pytest.approx(part.interpolation(2).toarray(), abs=1e-15)
     assert np.abs(here).sum() == pytest.approx(np.abs(here[:, found]).sum())

@@ -1,15 +1,20 @@
-"""The joint's linear systems: the changed points' system is the whole one; flow's derivatives are
-derivatives."""
+"""Linear systems of the joint: the reduced system against the full one; derivatives of the flow
+against differences."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from damjoint.fem.condensation import Bodies, condense
-from damjoint.joint.interface import Interface, lu_solve
+from damjoint.fem.bodies import Bodies
+from damjoint.fem.condensation import condense
+from damjoint.joint.flow import FlowDerivative
+from damjoint.joint.interface import Interface
+from damjoint.joint.linear_system import Border, lu_solve
 from damjoint.model.case import load
 from numpy.testing import assert_allclose
 
 SMALL = {"n_joint": 10.0, "h_dam": 3.0, "h_found": 4.0, "order": 2.0}
-VIRGIN = np.diag([1e12, 2e12, 2e12])
+UNDAMAGED = np.diag([1e12, 2e12, 2e12])
 
 
 @pytest.fixture(scope="module", params=[2, 3])
@@ -25,24 +30,25 @@ def interface(request):
 
 @pytest.mark.parametrize("flowing", [False, True])
 @pytest.mark.parametrize("bordered", [False, True])
-def test_the_changed_points_make_the_whole_system(interface, flowing, bordered):
+def test_the_reduced_system_has_the_solution_of_the_full_one(interface, flowing, bordered):
     """A third of the points with another, unsymmetric tangent; pressures that depend on some of the
     unknowns."""
     rng = np.random.default_rng(142)
-    number, size = len(interface.points.weights), len(interface.bulk.free)
-    tangent = np.broadcast_to(VIRGIN, (number, 3, 3)).copy()
+    number, size = len(interface.points.weights), len(interface.bulk.stiffness)
+    tangent = np.broadcast_to(UNDAMAGED, (number, 3, 3)).copy()
     changed = rng.permutation(number)[: number // 3]
     tangent[changed] = 1e11 * rng.normal(size=(len(changed), 3, 3)) + np.diag([1e8, 2e12, 1e8])
-    change = interface.change(tangent, VIRGIN)
+    change = interface.change(tangent, UNDAMAGED)
     assert 0 < len(change.rows) < size
     matrix = interface.bulk.stiffness + interface.stiffness(tangent, np.arange(number)).toarray()
     if flowing:
-        change.columns = np.sort(rng.permutation(size)[: size // 4])
-        change.pressure = 1e10 * rng.normal(size=(interface.flow.lift.shape[1], size // 4))
-        matrix[:, change.columns] -= interface.flow.lift @ change.pressure
+        columns = np.sort(rng.permutation(size)[: size // 4])
+        pressure = 1e10 * rng.normal(size=(interface.flow.lift.shape[1], size // 4))
+        matrix[:, columns] -= interface.flow.lift @ pressure
+        change = replace(change, flow=FlowDerivative(pressure=pressure, columns=columns))
     right, slope, row = rng.normal(size=(3, size))
-    interface.compliance(VIRGIN)
-    x, s = interface.solve(VIRGIN, change, right, (slope, row, 0.3, 0.7) if bordered else None)
+    border = Border(slope, row, 0.3, 0.7) if bordered else None
+    x, s = interface.solve(UNDAMAGED, change, right, border)
     if bordered:
         whole = np.block([[matrix, slope[:, None]], [row[None, :], np.array([[0.3]])]])
         expected = np.linalg.solve(whole, np.append(right, 0.7))
@@ -58,21 +64,25 @@ def test_pressures_derivatives(interface):
     """With the jump, against central differences; and linear in the imposed head."""
     rng = np.random.default_rng(142)
     flow, weights = interface.flow, interface.points.weights
-    jump, imposed = rng.normal(1, 0.3, len(interface.bulk.free)), 9e4 * (1 - interface.along.way)
+    jump, imposed = (
+        rng.normal(1, 0.3, len(interface.bulk.stiffness)),
+        9e4 * (1 - interface.fields.xi),
+    )
 
     def pressure(jump, imposed=imposed):
         opening = np.maximum(flow.opening @ jump, 0)
         return flow.solve((1 + opening) ** 3 * weights, imposed)
 
     opening = np.maximum(flow.opening @ jump, 0)
-    by_jump, columns = flow.sensitivity(
-        pressure(jump)[1], np.where(opening > 0, 3 * (1 + opening) ** 2, 0) * weights
+    derivative = flow.derivative(
+        pressure(jump), np.where(opening > 0, 3 * (1 + opening) ** 2, 0) * weights
     )
     along = rng.normal(size=len(jump))
-    given = by_jump @ along[columns]
-    ahead, behind = (pressure(jump + h * along)[0] for h in (1e-5, -1e-5))
+    given = derivative.pressure @ along[derivative.columns]
+    ahead, behind = (pressure(jump + h * along).pressure for h in (1e-5, -1e-5))
     assert_allclose(given, (ahead - behind) / 2e-5, rtol=0, atol=1e-5 * np.abs(given).max())
-    assert_allclose(pressure(jump, 3 * imposed)[0], 3 * pressure(jump)[0], rtol=1e-9)
+    tripled = pressure(jump, 3 * imposed).pressure
+    assert_allclose(tripled, 3 * pressure(jump).pressure, rtol=1e-9)
 
 
 @pytest.mark.parametrize("condition", [1e2, 1e6, 1e11])

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import pytest
 from closed_forms import BASE, resultants
+from damjoint.engines.condensed.cache import interface_of
 from damjoint.model.case import load
 from damjoint.statics.limit import mechanism
-from damjoint.studies.bodies import interface_of
 
 COARSE = {"n_joint": 10, "pena_tang": 0, "law": "friction", "uplift": "imposed"}
 

@@ -13,8 +13,8 @@ from damjoint.model.fields import (
     state_of,
 )
 from damjoint.model.mesh import Body
-from damjoint.post.outline import filled, section_of, skin
-from damjoint.post.units import FORCES, LENGTHS, told, unit
+from damjoint.post.outline import fill_to_level, section_of, skin
+from damjoint.post.units import FORCES, LENGTHS, unit, with_unit
 from numpy.testing import assert_allclose
 
 
@@ -56,9 +56,9 @@ def test_outlines_of_a_lift_joint(lift):
     assert_allclose(section.crest, [(4, 8), (2, 8)])
     assert_allclose(section.floor, [(1, 4), (0, 0), (-5, 0)])
     assert_allclose(section.bed, [(20, 0), (12, 0), (8, 4)])
-    for plane, lip in section.lips:
-        assert_allclose(plane.points[lip], ends)
-    assert {name: len(*tables) for name, tables in section.under.faces.items()} == {
+    for body, face in section.joint_faces:
+        assert_allclose(body.points[face], ends)
+    assert {name: len(*tables) for name, tables in section.foundation.faces.items()} == {
         "foundation": 3,
         "lower": 1,
     }
@@ -93,7 +93,7 @@ def test_no_section_where_none_is_seen(lift):
 
 def test_a_shore_with_an_overhang():
     shore = np.array([(0.0, 3.0), (1.0, 2.0), (0.0, 1.0), (0.0, 0.0), (-2.0, 0.0)])
-    assert area(filled(shore, 2.0)) == pytest.approx(2 * 2 + 0.5)
+    assert area(fill_to_level(shore, 2.0)) == pytest.approx(2 * 2 + 0.5)
 
 
 def test_skin_of_a_solid():
@@ -148,5 +148,5 @@ def test_curves_of_a_joint_whose_nodes_stand_in_no_rows():
     ],
 )
 def test_units_by_size(value, units, said):
-    assert told(value, units) == said
+    assert with_unit(value, units) == said
     assert unit([np.array([0, -value])], units)[0] == said.split()[1]

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
+from ..arrays import Array, IntArray, Sparse
 from .elements import BULK, Space, basis, corners_of, geometry, nodal, points_of, tabulated
 
 #: Young's modulus [Pa] and Poisson's ratio [-] by region.
@@ -19,10 +20,9 @@ def lame(young: float, poisson: float) -> tuple[float, float]:
     return young * poisson / ((1 + poisson) * (1 - 2 * poisson)), young / (2 * (1 + poisson))
 
 
-def elasticity(space: Space, dim: int, material: Material) -> sparse.csr_matrix:
-    """Stiffness matrix [N/m] of an isotropic body; unknown dim * function + component.
-
-    Plane strain in 2D.
+def elasticity(space: Space, dim: int, material: Material) -> Sparse:
+    """Assemble the stiffness matrix [N/m] of an isotropic body, plane strain in 2D; degree of
+    freedom dim * function + component.
     """
     points, rows, columns, values = space.body.points[:, :dim], [], [], []
     for (shape, table), region in zip(space.connectivity, space.body.regions, strict=True):
@@ -41,8 +41,8 @@ def elasticity(space: Space, dim: int, material: Material) -> sparse.csr_matrix:
         for product, dn in zip(products, nodal_gradients, strict=True):
             measure, inverse = geometry(points, cells, dn)
             inverse = np.moveaxis(inverse, 1, 0)
-            # lambda div div + mu (grad : grad + grad : grad^T), from reference (k, l) to real
-            # gradients (i, j): k, l, e, i, j
+            # lambda div div + mu (grad : grad + grad : grad^T), from reference gradients (k, l) to
+            # real ones (i, j); axes k, l, e, i, j
             outer = (measure[:, None] * inverse)[:, None, :, :, None] * inverse[None, :, :, None, :]
             laplace = np.einsum("kleii->kle", outer)
             hooke = (
@@ -52,52 +52,53 @@ def elasticity(space: Space, dim: int, material: Material) -> sparse.csr_matrix:
             )
             block += product @ hooke.reshape(dim * dim, -1)
         block = block.reshape(n, n, len(table), dim, dim).transpose(2, 0, 3, 1, 4)
-        unknowns = (dim * table[:, :, None] + np.arange(dim)).reshape(len(table), -1)
-        rows.append(np.repeat(unknowns, n * dim, axis=1).ravel())
-        columns.append(np.tile(unknowns, (1, n * dim)).ravel())
+        dofs = (dim * table[:, :, None] + np.arange(dim)).reshape(len(table), -1)
+        rows.append(np.repeat(dofs, n * dim, axis=1).ravel())
+        columns.append(np.tile(dofs, (1, n * dim)).ravel())
         values.append(block.ravel())
-    size = dim * len(space.place)
+    size = dim * len(space.locations)
     return sparse.coo_matrix(
         (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), (size, size)
     ).tocsr()
 
 
-#: How straight Gmsh's meshes are, relative to the element.
-DIGITS = 1e-9
+#: Distortion up to which an element counts as affine, relative to its size: rounding of Gmsh's
+#: nodes.
+DISTORTION = 1e-9
 
 
-def affine(points: np.ndarray, cells: np.ndarray, nodal_gradients: np.ndarray) -> bool:
-    """Whether none of some elements is distorted: simplices, parallelograms, straight prisms.
+def affine(points: Array, cells: IntArray, nodal_gradients: Array) -> bool:
+    """Whether all elements are affine: simplices, parallelograms, straight prisms.
 
     nodal_gradients: (q, m, d) at several points.
     """
     change = nodal_gradients[1:] - nodal_gradients[:1]
     if not change.any():
         return True
-    here = points[cells] - points[cells[:, :1]]
-    distortion = np.abs(np.einsum("qmd,eml->eqdl", change, here)).max(axis=(1, 2, 3))
-    return bool((distortion < DIGITS * np.abs(here).max(axis=(1, 2))).all())
+    edges = points[cells] - points[cells[:, :1]]
+    distortion = np.abs(np.einsum("qmd,eml->eqdl", change, edges)).max(axis=(1, 2, 3))
+    return bool((distortion < DISTORTION * np.abs(edges).max(axis=(1, 2))).all())
 
 
-def body_force(space: Space, dim: int, component: int, region: str | None = None) -> np.ndarray:
-    """Load vector of a unit force density along a component [m3 per function], in one of the body's
-    regions only or everywhere.
+def body_force(space: Space, dim: int, component: int, region: str | None = None) -> Array:
+    """Load vector of a unit force density along a component [m3 per function], in one region of the
+    body or in all.
     """
     points = points_of(space, BULK[space.order])
     sizes = [len(table) for _, table in space.connectivity]
     inside = np.repeat([region in (None, own) for own in space.body.regions], sizes)
-    load = np.zeros((len(space.place), dim))
+    load = np.zeros((len(space.locations), dim))
     load[:, component] = points.values.T @ (points.weights * inside[points.elements])
     return load.ravel()
 
 
-def stress(space: Space, displacements: np.ndarray, material: Material) -> np.ndarray:
+def stress(space: Space, displacements: Array, material: Material) -> Array:
     """Stress xx, yy, zz, xy, yz, xz (states, elements, 6) at the middle of each element.
 
     displacements: (states, functions, 2 or 3)
     """
     number, _, dim = displacements.shape
-    found = []
+    blocks = []
     for (shape, table), region in zip(space.connectivity, space.body.regions, strict=True):
         lam, mu = lame(*material[region])
         middle = corners_of(shape).mean(axis=0)
@@ -113,5 +114,5 @@ def stress(space: Space, displacements: np.ndarray, material: Material) -> np.nd
         for i in range(3):
             full[:, :, i, i] += lam * np.trace(strain, axis1=2, axis2=3)
         parts = [full[:, :, i, k] for i, k in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))]
-        found.append(np.stack(parts, axis=2))
-    return np.concatenate(found, axis=1)
+        blocks.append(np.stack(parts, axis=2))
+    return np.concatenate(blocks, axis=1)

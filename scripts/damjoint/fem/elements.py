@@ -2,7 +2,7 @@
 
 The same spaces as pro/spaces.pro: nodal functions N_a of order 1; order 2 adds the products
 N_a N_b, on the same straight mesh. The quadrature rules are those of pro/spaces.pro, so that both
-engines solve one discrete problem. Wedges and hexahedra are this engine's alone.
+engines solve one discrete problem. Wedges and hexahedra are of the condensed engine only.
 """
 
 from __future__ import annotations
@@ -14,10 +14,11 @@ from itertools import combinations, product
 import numpy as np
 from scipy import sparse
 
+from ..arrays import Array, IntArray, Sparse
 from ..model.mesh import Body
 
 #: Corners of the reference elements, by node number.
-CORNERS = {
+CORNERS: dict[str, list[tuple[float, ...]]] = {
     "vertex": [()],
     "line": [(-1,), (1,)],
     "triangle": [(0, 0), (1, 0), (0, 1)],
@@ -29,38 +30,40 @@ CORNERS["hexahedron"] = [(*c, w) for w in (-1, 1) for c in CORNERS["quad"]]
 
 
 @cache
-def corners_of(shape: str) -> np.ndarray:
+def corners_of(shape: str) -> Array:
     """Corners of a reference element (n, d)."""
     return np.array(CORNERS[shape], float)
 
 
 @cache
-def pairs_of(shape: str) -> np.ndarray:
-    """The pairs of nodes whose products N_a N_b are the functions that order 2 adds to an element,
+def pairs_of(shape: str) -> IntArray:
+    """Pairs of nodes whose products N_a N_b are the functions that order 2 adds to an element,
     (n, k, 2): k pairs with the same product; fewer are repeated.
 
-    Pairs with the same middle have it: an edge's ends; both diagonals of a quadrangular face; the
-    four of a hexahedron. With these the functions span all products of quadratic ones of the
-    coordinates: on simplices the full quadratic space, on other elements one that contains it.
+    Pairs with the same midpoint have the same product: the ends of an edge; both diagonals of a
+    quadrangular face; the four diagonals of a hexahedron. The functions span all products of
+    quadratic ones of the coordinates: on simplices the full quadratic space, on other elements one
+    that contains it.
     """
-    corners, found = corners_of(shape), {}
+    corners = corners_of(shape)
+    by_midpoint: dict[tuple[float, ...], list[tuple[int, int]]] = {}
     for a, b in combinations(range(len(corners)), 2):
-        found.setdefault(tuple(corners[a] + corners[b]), []).append((a, b))
-    most = max(map(len, found.values()), default=1)
-    repeated = [(pairs * most)[:most] for pairs in found.values()]
+        by_midpoint.setdefault(tuple(corners[a] + corners[b]), []).append((a, b))
+    most = max(map(len, by_midpoint.values()), default=1)
+    repeated = [(pairs * most)[:most] for pairs in by_midpoint.values()]
     return np.array(repeated, int).reshape(-1, most, 2)
 
 
 @cache
-def places_of(shape: str, order: int) -> np.ndarray:
-    """Where the functions of an order are, (n, d): the nodes, then the middles of pairs."""
+def locations_of(shape: str, order: int) -> Array:
+    """Location of each function of an order, (n, d): the nodes, then the midpoints of pairs."""
     corners = corners_of(shape)
     middles = corners[pairs_of(shape)[:, 0]].mean(axis=1)
     return np.concatenate([corners, middles]) if order == 2 else corners
 
 
-def nodal(shape: str, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Nodal functions (n,) and their reference gradient (n, d) at a reference point u (d,)."""
+def nodal(shape: str, u: Array) -> tuple[Array, Array]:
+    """Nodal functions (n,) and their reference gradients (n, d) at a reference point u (d,)."""
     if shape in ("vertex", "triangle", "tetra"):
         d = len(u)
         return np.array([1 - u.sum(), *u]), np.vstack([-np.ones(d), np.eye(d)])
@@ -78,10 +81,8 @@ def nodal(shape: str, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return factors.prod(axis=1), gradient
 
 
-def basis(shape: str, order: int, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """All functions of an element of this order, and their reference gradient, at a reference
-    point.
-    """
+def basis(shape: str, order: int, u: Array | tuple[float, ...]) -> tuple[Array, Array]:
+    """All functions (n,) of an order and their gradients (n, d) at a reference point u (d,)."""
     n, dn = nodal(shape, np.asarray(u, float))
     if order == 1:
         return n, dn
@@ -93,7 +94,7 @@ def basis(shape: str, order: int, u: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 # Triangle rules with 1, 3, 6 and 7 points (degrees 1, 2, 4, 5): Strang and Fix, Dunavant
 _A6, _B6, _A7, _B7 = 0.091576213509771, 0.445948490915965, 0.101286507323456, 0.470142064105115
-TRIANGLE = {
+TRIANGLE: dict[int, tuple[list[tuple[float, ...]], list[float]]] = {
     1: ([(1 / 3, 1 / 3)], [0.5]),
     3: ([(1 / 6, 1 / 6), (2 / 3, 1 / 6), (1 / 6, 2 / 3)], [1 / 6] * 3),
     6: (
@@ -124,7 +125,7 @@ TRIANGLE = {
 _A4, _B4 = 0.1381966011250105, 0.5854101966249685
 
 
-def tensor(n: int, d: int) -> tuple[np.ndarray, np.ndarray]:
+def tensor(n: int, d: int) -> tuple[Array, Array]:
     """Gauss points (n^d, d) and weights on [-1, 1]^d."""
     x, w = np.polynomial.legendre.leggauss(n)
     return np.array(list(product(x, repeat=d))), np.array(
@@ -132,7 +133,7 @@ def tensor(n: int, d: int) -> tuple[np.ndarray, np.ndarray]:
     )
 
 
-def rule(shape: str, points: int) -> tuple[np.ndarray, np.ndarray]:
+def rule(shape: str, points: int) -> tuple[Array, Array]:
     """Quadrature with a number of points on a reference element: points (n, d), weights (n,)."""
     if shape == "vertex":
         return np.zeros((1, 0)), np.ones(1)
@@ -159,13 +160,13 @@ def rule(shape: str, points: int) -> tuple[np.ndarray, np.ndarray]:
     return np.array(x, float), np.array(w, float)
 
 
-#: Points of the rules, by order and shape.
+#: Number of quadrature points in a body, by order and shape.
 BULK = {
     1: {"triangle": 1, "quad": 4, "tetra": 1, "wedge": 6, "hexahedron": 8},
     2: {"triangle": 3, "quad": 9, "tetra": 4, "wedge": 21, "hexahedron": 27},
 }
-#: Of the joint, by quadrature, too. Published quadrangles of order 2 have 3 x 3 points; they take 2
-#: x 2 here, so that layers repeat the plane scene.
+#: In the joint, by parameter `quadrature`, order and shape. Published quadrangles of order 2 have 3
+#: x 3 points; 2 x 2 are used instead, so that layers repeat the plane scene.
 JOINT = {
     "full": {1: {"line": 2, "triangle": 3, "quad": 4}, 2: {"line": 3, "triangle": 6, "quad": 9}},
     "published": {
@@ -173,13 +174,12 @@ JOINT = {
         2: {"line": 2, "triangle": 6, "quad": 4},
     },
 }
+#: For water pressure and other loads on surfaces and lines.
 WATER = {"vertex": 1, "line": 4, "triangle": 6, "quad": 16}
 
 
 @cache
-def tabulated(
-    shape: str, order: int, points: int
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def tabulated(shape: str, order: int, points: int) -> tuple[Array, Array, Array, Array]:
     """At the points of a rule: functions (q, n), reference gradients (q, n, d), nodal gradients (q,
     m, d), weights (q,).
     """
@@ -189,22 +189,24 @@ def tabulated(
 
 
 class Space:
-    """The scalar functions of an order on a body: nodes first, then (order 2) products of two.
+    """Scalar functions of an order on a region: nodal ones, then (order 2) products of two.
 
-    place: (n, 3) the node, or the middle of the edge, face or element, of each function.
+    locations: (n, 3) of each function: the node, or the midpoint of the edge, face or element.
     """
 
     def __init__(self, body: Body, order: int) -> None:
-        self.body, self.order, self.connectivity = body, order, body.cells
-        self.place = body.points
-        #: what tells a product from others, on this body and on its parts, sorted
+        self.body, self.order = body, order
+        #: functions of each element, by shape: (elements, functions)
+        self.connectivity: list[tuple[str, IntArray]] = body.cells
+        self.locations = body.points
+        #: a number for each product, equal on a region and on its parts, sorted
         self.codes = np.zeros(0, np.int64)
         if order == 2:
             pairs = [cells[:, pairs_of(shape)] for shape, cells in body.cells]
             codes = np.concatenate([codes_of(body.node_tags[p]).ravel() for p in pairs])
             middles = [body.points[p].mean(axis=(2, 3)).reshape(-1, 3) for p in pairs]
             self.codes, first, inverse = np.unique(codes, return_index=True, return_inverse=True)
-            self.place = np.vstack([body.points, np.concatenate(middles)[first]])
+            self.locations = np.vstack([body.points, np.concatenate(middles)[first]])
             cuts = np.cumsum([m.size // 3 for m in middles])[:-1]
             products = np.split(len(body.points) + inverse, cuts)
             self.connectivity = [
@@ -212,24 +214,25 @@ class Space:
                 for (shape, cells), p, own in zip(body.cells, pairs, products, strict=True)
             ]
 
-    def find(self, part: Space) -> np.ndarray:
-        """The functions of this space that are those of a part (a face, an edge of the body, the
-        joint).
+    def find(self, part: Space) -> IntArray:
+        """Functions of this space that are those of a part: a face, an edge, the joint.
+
+        Raises KeyError if a node of the part is not in this space.
         """
-        place = {t: i for i, t in enumerate(self.body.node_tags)}
-        nodes = np.array([place[t] for t in part.body.node_tags], int)
+        index = {t: i for i, t in enumerate(self.body.node_tags)}
+        nodes = np.array([index[t] for t in part.body.node_tags], int)
         products = np.searchsorted(self.codes, part.codes)
         return np.concatenate([nodes, len(self.body.points) + products])
 
-    def at_places(self, order: int) -> sparse.csr_matrix:
-        """Values at the places, from the functions up to an order (places, functions)."""
+    def interpolation(self, order: int) -> Sparse:
+        """Values at the locations, from the functions up to an order (locations, functions)."""
         rows, matrices = [], []
         for shape, table in self.connectivity:
-            local = [basis(shape, order, u)[0] for u in places_of(shape, self.order)]
+            local = [basis(shape, order, u)[0] for u in locations_of(shape, self.order)]
             columns = np.repeat(table[:, : len(local[0])], len(local), axis=0)
             pointers = columns.shape[1] * np.arange(len(columns) + 1)
             data = np.tile(np.ravel(local), len(table))
-            size = len(columns), len(self.place) if order == 2 else len(self.body.points)
+            size = len(columns), len(self.locations) if order == 2 else len(self.body.points)
             matrices.append(sparse.csr_matrix((data, columns.ravel(), pointers), size))
             rows.append(table.ravel())
         _, first = np.unique(np.concatenate(rows), return_index=True)
@@ -238,46 +241,42 @@ class Space:
         return values
 
 
-def codes_of(pairs: np.ndarray) -> np.ndarray:
-    """A number for each product (..., n), from the tags of its pairs (..., n, k, 2): the same for
-    all elements that share an edge or a face.
+def codes_of(pairs: IntArray) -> IntArray:
+    """Number of each product (..., n), from the node tags of its pairs (..., n, k, 2): equal in all
+    elements that share the edge or face.
     """
     ends = np.sort(pairs.astype(np.int64), axis=-1)
-    return (ends[..., 0] << 32 | ends[..., 1]).min(axis=-1)
+    return np.asarray((ends[..., 0] << 32 | ends[..., 1]).min(axis=-1))
 
 
-def geometry(
-    points: np.ndarray, cells: np.ndarray, dn: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Measure of the element per reference measure (e,), and reference-to-real gradient (e, d, 3 or
-    less).
+def geometry(points: Array, cells: IntArray, dn: Array) -> tuple[Array, Array]:
+    """Jacobian determinant of each element (e,) and the map from reference to real gradients
+    (e, d, D).
 
-    dn: (m, d) nodal gradients at one point; points (n, D). For d < D the pseudo-inverse: gradients
-    along the element.
+    points (n, D); dn: (m, d) nodal gradients at one point. For d < D the pseudo-inverse of the
+    Jacobian: gradients along the element.
     """
     jacobian = np.einsum("md,eml->edl", dn, points[cells])
     metric = jacobian @ jacobian.transpose(0, 2, 1)
     return np.sqrt(np.linalg.det(metric)), np.linalg.solve(metric, jacobian)
 
 
-@dataclass
+@dataclass(frozen=True, kw_only=True)
 class Points:
-    """Quadrature points of a space: weights (q,), positions (q, 3), functions and their gradients
-    as sparse matrices.
-    """
+    """Quadrature points of a space: weights (q,), positions (q, 3), functions, gradients."""
 
-    weights: np.ndarray
-    positions: np.ndarray
+    weights: Array
+    positions: Array
     #: (q, functions)
-    values: sparse.csr_matrix
-    #: (q, functions) for x, y and z
-    gradients: tuple[sparse.csr_matrix, ...]
+    values: Sparse
+    #: (q, functions) for x, y and z; empty if not wanted
+    gradients: tuple[Sparse, ...]
     #: element of each point
-    elements: np.ndarray
+    elements: IntArray
 
 
 def points_of(space: Space, numbers: dict[str, int], gradients: bool = False) -> Points:
-    """The points of the rules with these numbers of points; element by element."""
+    """Quadrature points of rules with these numbers of points by shape, element by element."""
     weights, positions, tables, coefficients, slopes, elements, start = [], [], [], [], [], [], 0
     for shape, table in space.connectivity:
         values, dg, dn, w = tabulated(shape, space.order, numbers[shape])
@@ -303,13 +302,16 @@ def points_of(space: Space, numbers: dict[str, int], gradients: bool = False) ->
         [np.full(len(t) * numbers[s], t.shape[1]) for s, t in space.connectivity]
     )
     pointers = np.concatenate([[0], np.cumsum(widths)])
-    size = (len(widths), len(space.place))
-    build = lambda data: sparse.csr_matrix((data, np.concatenate(tables), pointers), size)
+    size = (len(widths), len(space.locations))
+
+    def build(data: Array) -> Sparse:
+        return sparse.csr_matrix((data, np.concatenate(tables), pointers), size)
+
     slope = np.concatenate(slopes)
     return Points(
-        np.concatenate(weights),
-        np.concatenate(positions),
-        build(np.concatenate(coefficients)),
-        tuple(build(slope[:, i]) for i in range(3)) if gradients else (),
-        np.concatenate(elements),
+        weights=np.concatenate(weights),
+        positions=np.concatenate(positions),
+        values=build(np.concatenate(coefficients)),
+        gradients=tuple(build(slope[:, i]) for i in range(3)) if gradients else (),
+        elements=np.concatenate(elements),
     )

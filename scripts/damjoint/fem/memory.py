@@ -1,4 +1,4 @@
-"""Memory: what is left of it, and what a case needs, known before it is meshed."""
+"""Memory that is available, and estimates of what a case needs, before it is meshed."""
 
 from __future__ import annotations
 
@@ -9,15 +9,18 @@ from pathlib import Path
 from .. import RunError
 from ..model.case import Case
 
-#: Of an address space that is limited, what the libraries' own buffers take [bytes].
+#: Part of a limited address space that buffers of libraries take [bytes].
 BUFFERS = 0.15e9
+
+#: Memory of a factorised body [bytes per unknown], measured in 2D by `damjoint bench`.
+PER_UNKNOWN = 2400
 
 
 def bulk_size(case: Case) -> float:
-    """About the number of unknowns of both bodies, before any meshing.
+    """Estimate the number of unknowns of all bodies.
 
-    A triangle has half of the product of the sizes at both ends of the body, order 2 four unknowns
-    a triangle. (Prisms and tetrahedra: within a factor of three.)
+    A triangle covers half of the product of the element sizes at both ends of its body; order 2 has
+    four unknowns a triangle. (Prisms and tetrahedra: within a factor of three.)
     """
     dim, order, near = int(case["dim"]), int(case["order"]), case.joint_length / case["n_joint"]
     dam = (case["dam_base"] + case["dam_crest"]) / 2 * case["dam_height"]
@@ -26,27 +29,60 @@ def bulk_size(case: Case) -> float:
     return triangles * order**2 * (1 if dim == 2 else 1.5 * case["n_layers"])
 
 
-def left() -> float:
-    """Memory [bytes] that this process can still get: of the machine, and of its own address space
-    where that is limited (`ulimit -v`). Infinite where nothing tells.
+def joint_size(case: Case) -> int:
+    """Number of jump unknowns (free meshes of order 2 have a few less)."""
+    dim, order = int(case["dim"]), int(case["order"])
+    return (
+        dim
+        * (order * int(case["n_joint"]) + 1)
+        * (order * int(case["n_layers"]) + 1 if dim == 3 else 1)
+    )
+
+
+def dense_memory(unknowns: int) -> float:
+    """Memory [bytes] of a Schur complement of so many unknowns, its factors and products."""
+    return 8.0 * unknowns**2 * 6
+
+
+def check_size(case: Case) -> None:
+    """Raise RunError if the condensation of a case needs more memory than is available."""
+    joint, bulk = joint_size(case), bulk_size(case)
+    what = f"{bulk:.0f} unknowns, {joint} of them on the joint,"
+    check_memory(dense_memory(joint) + PER_UNKNOWN * bulk, what)
+
+
+def available() -> float:
+    """Memory [bytes] that this process can still allocate: of the machine, and of its address space
+    where that is limited (`ulimit -v`). Infinite if the system does not report it.
     """
-    found = [float("inf")]
+    bounds = [float("inf")]
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
     try:
-        told = re.search(r"MemAvailable:\s+(\d+)", Path("/proc/meminfo").read_text())
-        found.append(float(told[1]) * 1024)
+        bounds.append(kilobytes("/proc/meminfo", "MemAvailable"))
         if limit != resource.RLIM_INFINITY:
-            taken = re.search(r"VmSize:\s+(\d+)", Path("/proc/self/status").read_text())
-            found.append(max(0.0, limit - float(taken[1]) * 1024 - BUFFERS))
-    except (OSError, TypeError):
+            bounds.append(max(0.0, limit - kilobytes("/proc/self/status", "VmSize") - BUFFERS))
+    except (OSError, ValueError):
         pass
-    return min(found)
+    return min(bounds)
+
+
+def kilobytes(path: str, name: str) -> float:
+    """An entry "name: number kB" of a file of the system [bytes].
+
+    Raises OSError, ValueError.
+    """
+    match = re.search(rf"{name}:\s+(\d+)", Path(path).read_text())
+    if match is None:
+        raise ValueError(f"{path}: no {name}")
+    return float(match[1]) * 1024
 
 
 def check_memory(needed: float, what: str) -> None:
-    """Raise RunError if more memory [bytes] is needed than is left; what: the unknowns in words."""
-    if needed > left():
+    """Raise RunError if more memory [bytes] is needed than is available; what: the unknowns, for
+    the message.
+    """
+    if needed > available():
         raise RunError(
-            f"memory: {what} need about {needed / 1e9:.1f} GB and {left() / 1e9:.1f} GB are left; "
-            "use a coarser mesh (n_joint, n_layers, h_dam, h_found)"
+            f"memory: {what} need about {needed / 1e9:.1f} GB, {available() / 1e9:.1f} GB are "
+            "available; use a coarser mesh (n_joint, n_layers, h_dam, h_found)"
         )

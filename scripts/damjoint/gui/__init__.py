@@ -1,12 +1,12 @@
 """The Gmsh window: damjoint gui.
 
-sheet.py    what a request from the window comes to: the case, and its ONELAB parameters
-tree.py     the ONELAB tree: parameters, choices and results shown in it; what the user asks for
+sheet.py    request of the user; the case it gives, with its ONELAB parameters
+tree.py     the ONELAB tree: shows parameters and results, reads the request
 worker.py   the engine in a process of its own: checks, runs, stops, saves
 shapes.py   the deformed scene as lines and faces, step by step
-camera.py   how the scene lies in the window
+camera.py   view: clipping, rotation, position, scale
 views.py    results as Gmsh views: the deformed dam, curves, maps
-window.py   one session: what happens when something is pressed or comes back; the event loop
+window.py   session: actions of the user, messages of the engine; the event loop
 
-Everything but the event loop works without a window, and is tested so.
+Everything but the event loop works, and is tested, without a window.
 """

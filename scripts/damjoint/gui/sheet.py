@@ -1,7 +1,6 @@
-"""What a request from the window comes to: a checked case, and its parameters for the tree.
+"""Requests of the window's user, and the checked case with its parameters for the tree.
 
-Works where Gmsh's parser may be used freely (reading a case empties the ONELAB database): in the
-engine's process, not in the window's.
+Loading a case empties the ONELAB database: only for the engine's process, not for the window's.
 """
 
 from __future__ import annotations
@@ -9,6 +8,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import gmsh
 
@@ -21,7 +21,7 @@ from ..model.parameters import declared
 
 @dataclass(frozen=True)
 class Request:
-    """What the user asks for: a case (letter, name or path) and what differs from it.
+    """A case (letter, name or path) and the user's changes to it.
 
     levels, tail_levels: 'a,b,c' [m]; steps: equal steps between two levels; accuracy: coarse,
     standard, fine or a percentage. None: the case's own.
@@ -35,7 +35,7 @@ class Request:
     accuracy: str | None = None
 
     def load(self) -> Case:
-        """The case, as `damjoint run` reads it.
+        """Load the case as `damjoint run` does.
 
         Raises InputError.
         """
@@ -45,81 +45,81 @@ class Request:
         return load(self.case, self.overrides, self.levels, self.tail_levels, steps, self.accuracy)
 
 
-#: What the titles of cases tell of.
+#: Parameters that the titles of the package's cases mention.
 TITLED = {"law", "uplift", "dim", "order", "mesh_pattern", "drive"}
 
 
 @dataclass(frozen=True)
 class Sheet:
-    """A request that has been checked: the case it comes to, and what the tree shows of it."""
+    """A checked request with its case and the tree's entries."""
 
     request: Request
     case: Case
-    #: ONELAB parameters as the declarations have them, with their values before -1 is resolved,
-    #: and whether they matter in this scene
-    entries: list[dict]
+    #: declared ONELAB parameters, with values before -1 is resolved and visibility in this scene
+    entries: list[dict[str, Any]]
     #: path of the case file
     path: str
 
     @property
     def heading(self) -> tuple[str, str]:
-        """What the case is called, and its joint law and water.
+        """Title of the case, and its joint law and uplift.
 
-        Of a title that tells of more ("C: friction, 2D"), the name, once that has been changed.
+        A title that may mention a parameter that was changed is replaced by the case's name.
         """
         case, title = self.case, self.case.title
         if TITLED & set(self.request.overrides):
-            title = f"{title.partition(':')[0]}, changed"
+            title = f"case {case.name}, changed"
         water = " and ".join([case["uplift"], *case.also_uplift])
         return title, f"law {case['law']}, uplift {water}"
 
 
-def fill(request: Request) -> Sheet:
-    """Check a request.
+def check_request(request: Request) -> Sheet:
+    """Check a request and load its case.
 
-    Values that are the case's own count as not asked for: a case that is published with two uplifts
-    keeps both. Raises InputError.
+    Values equal to the case's own are no changes: a case published with two uplifts keeps both.
+    Raises InputError.
     """
     path = case_file(request.case)
     declared()
     replace(request, overrides={}, levels=None, tail_levels=None, steps=None).load()
     own = {name: gmsh_value(declared()[name].label) for name in declared()}
-    asked = {n: v for n, v in request.overrides.items() if v != own[n]}
-    request = replace(request, overrides=asked)
+    changes = {n: v for n, v in request.overrides.items() if v != own[n]}
+    request = replace(request, overrides=changes)
     case = request.load()
-    # one by one: Gmsh does not mask quotes, which paths among its own entries may have
+    # one by one: Gmsh does not escape quotes, which may occur in paths among its own entries
     entries = [json.loads(gmsh.onelab.get(known.label)) for known in declared().values()]
     return Sheet(request, case, entries, str(path))
 
 
 def gmsh_value(label: str) -> float | str:
-    """The value that the parser has left in the ONELAB database."""
+    """Value of a parameter in the ONELAB database after parsing."""
     numbers = gmsh.onelab.getNumber(label)
     return float(numbers[0]) if len(numbers) else gmsh.onelab.getString(label)[0]
 
 
 def titles() -> dict[str, str]:
-    """The menu of cases: {name: what it is}, the verification's modelings first."""
-    found = {p.stem: casefile.read(p).texts["title"] for p in sorted(CASES.glob("*.case"))}
-    found.pop("ssnp142", None)  # what the modelings share, and no modeling
-    return dict(sorted(found.items(), key=lambda item: (len(item[0]), item)))
+    """Menu of cases: title by name, the modelings of SSNP142 (one letter) first."""
+    cases = {p.stem: casefile.read(p).texts["title"] for p in sorted(CASES.glob("*.case"))}
+    cases.pop("ssnp142", None)  # common part of the modelings
+    return dict(sorted(cases.items(), key=lambda item: (len(item[0]), item)))
 
 
 def case_text(sheet: Sheet, run: Case) -> str:
-    """The case file that repeats a request, all that differs from the declarations' defaults; run:
-    the case as it was solved, on the mesh that its accuracy has asked for.
+    """Write the case file that repeats a run, with all that differs from the declared defaults.
+
+    run: the case as solved, on the mesh that its accuracy requires.
     """
     case, request = sheet.case, sheet.request
-    said = casefile.read(case_file(request.case))
-    said.defaults |= first_mesh(case) if request.accuracy else {}
-    said.defaults |= request.overrides
-    said.defaults |= {name: run[name] for name in REFINED} if request.accuracy else {}
-    said.texts = {"title": case.title}
+    file = casefile.read(case_file(request.case))
+    file.defaults |= first_mesh(case) if request.accuracy else {}
+    file.defaults |= request.overrides
+    file.defaults |= {name: run[name] for name in REFINED} if request.accuracy else {}
+    file.texts = {"title": case.title}
     if case.also_uplift:
-        said.texts["also_uplift"] = " ".join(case.also_uplift)
-    said.lists = {
+        file.texts["also_uplift"] = " ".join(case.also_uplift)
+    file.lists = {
         "levels": list(case.levels),
         "tail_levels": list(case.tail_levels),
         "times": list(case.times),
     }
-    return casefile.written(said)
+    return casefile.written(file)

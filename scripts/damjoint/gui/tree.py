@@ -1,4 +1,4 @@
-"""The ONELAB tree: parameters, choices and results shown in it; what the user asks for read back.
+"""The ONELAB tree: shows parameters, choices and results; reads the user's request.
 
 Works on the current Gmsh session, with or without a window.
 """
@@ -10,18 +10,19 @@ import json
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import gmsh
 import numpy as np
 
 from .. import InputError
-from ..model.case import ACCURACIES, Case, numbers
-from ..model.parameters import AUTOMATIC, Parameter
+from ..model.case import ACCURACIES, Case
+from ..model.parameters import AUTOMATIC, Parameter, levels_of
 from ..statics.verdict import verdict
 from .sheet import Request, Sheet
 from .worker import Scene
 
-# Names in the tree. Digits order it and are not shown; Gmsh's own "0Modules" comes after results.
+# Names in the tree. Digits order it and are not shown; Gmsh's own "0Modules" follows the results.
 CASE = "00Case/0Case"
 FILE = "00Case/1Case file"
 STATUS = "01Results/00Status"
@@ -31,25 +32,25 @@ LEVELS = "Parameters/1Water levels/0Levels, reached at t = 1, 2, ... [m]"
 TAIL_LEVELS = "Parameters/1Water levels/1Tailwater, one or as many [m]"
 STEPS = "Parameters/1Water levels/2Steps between two levels"
 TIMES = "Parameters/1Water levels/3Converged steps at t"
-#: What the tree has of the water levels.
+#: Entries on the water levels.
 OF_LEVELS = (LEVELS, TAIL_LEVELS, STEPS, TIMES)
 ACCURACY = "Parameters/3Mesh/0Accuracy"
 FOLDER = "Parameters/8Output/0Folder"
 KEEP = "Parameters/8Output/1Keep the last views for comparison"
 SAVE = "Parameters/8Output/2Save tables, fields, picture and case file"
 
-#: The action that its button tells; Gmsh's own "save" is of the database.
+#: Action of its button; "save" is Gmsh's own, for the database.
 SAVE_ACTION = "save results"
-#: What stands for "as the case has it" among choices, and for the choice of a case file.
+#: Choices: the case's own value; a case file of the user.
 OWN, OPEN = "as the case", "open a case file ..."
 
-#: The verdict of what has not been run.
+#: Verdict before a run.
 NOT_RUN = "not run yet"
 
 #: Colors of the status line.
 CALM, GOOD, WARN, BAD = "LightSteelBlue1", "DarkSeaGreen1", "Orange", "LightCoral"
 
-#: Results by column of history.csv: name in the tree; empty where the scene has none.
+#: Results by column of history.csv: name in the tree.
 RESULTS = {
     "level": "Water level [m]",
     "tail_level": "Tailwater level [m]",
@@ -67,76 +68,90 @@ RESULTS = {
 }
 
 
-def put(*entries: dict) -> None:
-    """Set ONELAB parameters; whether the user has closed their group is kept."""
+def put(*entries: dict[str, Any]) -> None:
+    """Set ONELAB parameters; their groups stay open or closed."""
     for entry in entries:
-        told = {"visible": True, "readOnly": False, **entry}
-        told["attributes"] = {**opened(entry["name"]), **entry.get("attributes", {})}
-        gmsh.onelab.set(json.dumps(told, ensure_ascii=False))
+        attributes = {**open_state(entry["name"]), **entry.get("attributes", {})}
+        full = {"visible": True, "readOnly": False, **entry, "attributes": attributes}
+        gmsh.onelab.set(json.dumps(full, ensure_ascii=False))
 
 
-def opened(name: str) -> dict[str, str]:
-    """Whether the group of a parameter that is there has been closed or opened by the user."""
+def open_state(name: str) -> dict[str, str]:
+    """Attribute of an existing parameter on whether its group is closed."""
     with contextlib.suppress(ValueError, KeyError):
         return {"Closed": json.loads(gmsh.onelab.get(name))["attributes"]["Closed"]}
     return {}
 
 
-def text(name: str, value: str, **more: object) -> dict:
-    """A text parameter."""
+def text(name: str, value: str, **more: Any) -> dict[str, Any]:
+    """Entry of a text."""
     return {"type": "string", "name": name, "values": [value], **more}
 
 
-def number(name: str, value: float, **more: object) -> dict:
-    """A number."""
+def number(name: str, value: float, **more: Any) -> dict[str, Any]:
+    """Entry of a number."""
     return {"type": "number", "name": name, "values": [float(value)], **more}
 
 
 def get_text(name: str) -> str:
-    """The text that stands in the tree; empty if there is none."""
+    """Read a text from the tree; empty if there is none."""
     return next(iter(gmsh.onelab.getString(name)), "").strip()
 
 
 def get_number(name: str) -> float:
-    """The number that stands in the tree."""
+    """Read a number from the tree."""
     return float(gmsh.onelab.getNumber(name)[0])
 
 
-def listed(levels: tuple[float, ...]) -> str:
-    """Levels as the user writes them."""
+def levels_text(levels: tuple[float, ...]) -> str:
+    """Format levels as the user writes them."""
     return ", ".join(f"{v:.10g}" for v in levels)
 
 
 def level_texts(case: Case) -> dict[str, str]:
-    """Levels and tailwater of a case in the tree."""
+    """Texts of the levels and tailwater levels of a case, by entry."""
     tails = case.tail_levels
     tails = tails[:1] if len(set(tails)) == 1 else tails
-    return {LEVELS: listed(case.levels), TAIL_LEVELS: listed(tails)}
+    return {LEVELS: levels_text(case.levels), TAIL_LEVELS: levels_text(tails)}
 
 
 class Tree:
-    """The parameters of one sheet after the other, and what the user has made of them."""
+    """The current sheet in the tree, and the user's changes to it."""
 
     def __init__(self, titles: Mapping[str, str], known: Mapping[str, Parameter]) -> None:
         self.titles, self.known = titles, known
-        #: what each parameter showed when it was last set: only what differs was asked for
+        #: value of each parameter when it was last set: only what differs is a change of the user
         self.shown: dict[str, float | str] = {}
         self.sheet: Sheet | None = None
 
     def show(self, sheet: Sheet) -> None:
         """Put a sheet into the tree."""
-        other = self.sheet is None or sheet.path != self.sheet.path or not get_text(SAVE)
+        new_case = self.sheet is None or sheet.path != self.sheet.path or not get_text(SAVE)
         self.sheet = sheet
+        put(*self.scene_entries(sheet), *map(self.entry, sheet.entries))
+        if new_case:
+            put(
+                text(FOLDER, str(Path("out") / sheet.case.name), help="folder that Save writes"),
+                number(KEEP, 0, choices=[0, 1], help="views of the last run stay beside the new"),
+                text(SAVE, SAVE_ACTION, attributes={"Macro": "Action", "Aspect": "Button"}),
+            )
+        # read back, since the database may round a number
+        self.shown = {e["name"]: value_of(e["name"]) for e in sheet.entries} | {
+            name: value_of(name) for name in (CASE, FILE, LEVELS, TAIL_LEVELS, STEPS, ACCURACY)
+        }
+
+    def scene_entries(self, sheet: Sheet) -> list[dict[str, Any]]:
+        """Entries of case, water levels, steps and accuracy."""
         case, request = sheet.case, sheet.request
         menu = self.menu(sheet)
         texts = level_texts(case)
         times = ", ".join(f"{t:.4g}" for t in case.times)
-        put(
+        return [
             number(
                 CASE,
                 menu.index(self.title(request.case)),
                 choices=list(range(len(menu))),
-                valueLabels={title: place for place, title in enumerate(menu)},
+                valueLabels={title: index for index, title in enumerate(menu)},
                 help="the modelings of SSNP142, your own dam, a case file",
             ),
             text(FILE, sheet.path, kind="file", help="choose a case file of your own"),
@@ -160,62 +175,57 @@ class Tree:
                 help="coarse: 3 %, standard: 1 %, fine: 0.2 %, or any percentage; refines the mesh "
                 "until the results' estimated error is smaller",
             ),
-            *map(self.entry, sheet.entries),
-        )
-        if other:
-            put(
-                text(FOLDER, str(Path("out") / case.name), help="where Save writes"),
-                number(KEEP, 0, choices=[0, 1], help="views of the last run stay beside the new"),
-                text(SAVE, SAVE_ACTION, attributes={"Macro": "Action", "Aspect": "Button"}),
-            )
-        # read back, since the database may round a number
-        self.shown = {e["name"]: value_of(e["name"]) for e in sheet.entries} | {
-            name: value_of(name) for name in (CASE, FILE, LEVELS, TAIL_LEVELS, STEPS, ACCURACY)
-        }
+        ]
 
     def title(self, case: str) -> str:
-        """How a case is called in the menu."""
+        """Title of a case in the menu."""
         name = case.lower()
         if name not in self.titles:
             return Path(case).stem
-        said = self.titles[name]
-        return said if said.lower().startswith(f"{name}:") else f"{name}: {said}"
+        title = self.titles[name]
+        return title if title.lower().startswith(f"{name}:") else f"{name}: {title}"
 
     def menu(self, sheet: Sheet) -> list[str]:
-        """The entries of the menu of cases, in order; a file's case is there while it is open."""
+        """Entries of the menu of cases, in order, with that of an open case file."""
         own = [self.title(name) for name in self.titles]
         title = self.title(sheet.request.case)
         return [*own, *([] if title in own else [title]), OPEN]
 
-    def entry(self, told: dict) -> dict:
-        """A declared parameter as the window shows it.
+    def entry(self, declared: dict[str, Any]) -> dict[str, Any]:
+        """Entry of a declared parameter; the label of an automatic one has its value.
 
-        Without a step or bare choices: Gmsh's buttons for loops, which would do nothing, are off
-        then. One that follows others says what, and its value.
+        Has no step, and labels for its choices: else Gmsh shows buttons for loops, which have no
+        effect.
         """
-        parameter = next(p for p in self.known.values() if p.label == told["name"])
-        entry = {k: told[k] for k in ("type", "name", "values", "visible", "choices") if k in told}
+        parameter = next(p for p in self.known.values() if p.label == declared["name"])
+        copied = "type", "name", "values", "visible", "choices"
+        entry = {k: declared[k] for k in copied if k in declared}
         allowed = f"{parameter.name}: {parameter.allowed()}"
-        note = told.get("help", "") if not parameter.follows else ""
+        note = declared.get("help", "") if not parameter.automatic else ""
         entry["help"] = f"{allowed}. {note}" if note else allowed
         entry["label"] = parameter.meaning
         if parameter.text:
             return entry
-        choices = told.get("choices", [])
+        choices = declared.get("choices", [])
         if choices and choices != [0, 1]:
-            labels = told.get("valueLabels") or {f"{choice:g}": choice for choice in choices}
+            labels = declared.get("valueLabels") or {f"{choice:g}": choice for choice in choices}
             entry["valueLabels"] = labels
-        entry |= {"min": told["min"], "max": told["max"], "attributes": {"ReadOnlyRange": "1"}}
-        if parameter.follows and told["values"][0] == AUTOMATIC:
-            leader = parameter.follows.split(",")[0]
+        entry |= {
+            "min": declared["min"],
+            "max": declared["max"],
+            "attributes": {"ReadOnlyRange": "1"},
+        }
+        if parameter.automatic and declared["values"][0] == AUTOMATIC:
             value = self.sheet.case[parameter.name]
-            entry["label"] = f"{parameter.name} = {value:.6g} ({leader}): {parameter.meaning}"
+            entry["label"] = (
+                f"{parameter.name} = {value:.6g} ({parameter.help}): {parameter.meaning}"
+            )
         return entry
 
-    def asked(self) -> Request:
-        """What the user asks for now.
+    def request(self) -> Request:
+        """Read the user's request; another case starts without changes.
 
-        Another case starts afresh. Raises InputError where no case has been chosen yet.
+        Raises InputError if no case file has been chosen yet.
         """
         request, shown = self.sheet.request, self.shown
         case, file = get_number(CASE), get_text(FILE)
@@ -243,39 +253,38 @@ class Tree:
         )
 
     def levels(self, name: str, before: str | None) -> str | None:
-        """A list of levels: what was asked before, unless the numbers have changed."""
+        """Read a list of levels; the earlier text if the numbers have not changed."""
         now = get_text(name).replace(";", ",")
         try:
-            same = numbers(name, now) == numbers(name, self.shown[name])
-        except InputError:  # said when the case is read
+            same = levels_of(name, now) == levels_of(name, self.shown[name])
+        except InputError:  # reported when the case is loaded
             same = False
         return before if same else now
 
 
 def value_of(name: str) -> float | str:
-    """The value of a parameter in the tree, a number or a text."""
-    found = gmsh.onelab.getNumber(name)
-    return float(found[0]) if len(found) else get_text(name)
+    """Read a parameter from the tree, a number or a text."""
+    values = gmsh.onelab.getNumber(name)
+    return float(values[0]) if len(values) else get_text(name)
 
 
-def say(status: str, color: str) -> None:
-    """Put a line into the status."""
+def show_status(status: str, color: str) -> None:
+    """Show the status line."""
     put(text(STATUS, status, readOnly=True, help=status, attributes={"Highlight": color}))
 
 
-def show_verdict(said: str, color: str, why: str) -> None:
-    """Put a verdict into the tree; why: in words, for its tooltip."""
-    put(text(VERDICT, said, readOnly=True, help=why, attributes={"Highlight": color}))
+def show_verdict(name: str, color: str, why: str) -> None:
+    """Show a verdict; why: its tooltip."""
+    put(text(VERDICT, name, readOnly=True, help=why, attributes={"Highlight": color}))
 
 
 def show_results(scenes: list[Scene], shown: int) -> None:
-    """Put a scene's results into the tree: the last step's, all steps' as their range."""
+    """Show the results of a scene: values of the last step, those of all steps as choices."""
     scene = scenes[shown]
     result, history = scene.result, scene.result.history
-    said = scene.said or "the dam stands"
-    color = WARN if scene.failed or scene.said else GOOD
+    color = WARN if scene.failed or scene.message else GOOD
     modes = [s.result.case["uplift"] for s in scenes]
-    show_verdict(scene.ended or verdict(result), color, said)
+    show_verdict(scene.end_state or verdict(result), color, scene.message or "the dam stands")
     put(
         text(
             SCENE,
@@ -287,23 +296,23 @@ def show_results(scenes: list[Scene], shown: int) -> None:
     )
     for i, (column, name) in enumerate(RESULTS.items()):
         values = history[column]
-        there = len(values) > 0 and bool(np.isfinite(values[-1]))
-        if column in ("tail_level", "U", "flux", "process_zone"):  # only where there is one
-            there = there and bool(np.any(values != 0))
+        has_value = len(values) > 0 and bool(np.isfinite(values[-1]))
+        if column in ("tail_level", "U", "flux", "process_zone"):  # not of every scene
+            has_value = has_value and bool(np.any(values != 0))
         put(
             number(
                 f"01Results/{10 + i}{name}",
-                values[-1] if there else 0,
-                choices=[float(v) for v in values] if there else [],
+                values[-1] if has_value else 0,
+                choices=[float(v) for v in values] if has_value else [],
                 readOnly=True,
-                visible=there,
+                visible=has_value,
                 attributes={"Highlight": "LightYellow", "NumberFormat": "%.6g"},
             )
         )
 
 
 def hide_results() -> None:
-    """Take the results of an earlier run out of the tree: what it asks for has not been run."""
+    """Remove the results from the tree: they are not those of its parameters."""
     for name in gmsh.onelab.getNames("01Results/.*"):
         if name not in (STATUS, VERDICT):
             gmsh.onelab.clear(name)
@@ -311,16 +320,14 @@ def hide_results() -> None:
 
 
 def chosen_scene(scenes: list[Scene]) -> int:
-    """Which of the scenes the user wants to see."""
+    """Index of the scene that the user has chosen."""
     modes = [scene.result.case["uplift"] for scene in scenes]
     mode = get_text(SCENE)
     return modes.index(mode) if mode in modes else 0
 
 
-def drop_plain_levels() -> None:
-    """Drop the water levels of the plain problem definition, one entry each, which a .geo brings
-    along: here they are lists.
-    """
+def drop_level_entries() -> None:
+    """Remove the water levels that a .geo declares one by one; in this tree they are lists."""
     for name in gmsh.onelab.getNames("Parameters/1Water levels/.*"):
         if name not in OF_LEVELS:
             gmsh.onelab.clear(name)

@@ -1,5 +1,5 @@
-"""Results as Gmsh views: list data with a step per requested level, so that Gmsh's arrows play the
-filling.
+"""Results as Gmsh views: list data with a step per requested level, so that Gmsh's arrows step
+through the levels.
 
 Works on the current Gmsh session, with or without a window.
 """
@@ -13,11 +13,12 @@ from dataclasses import dataclass
 import gmsh
 import numpy as np
 
+from .. import ROUND_OFF
 from ..model.case import Case
 from ..model.fields import CLOSED, OPEN, SOFTENING, along, distance, row_of_nodes, state_of
-from ..post.units import LENGTHS, STRESSES, unit
+from ..post.units import LENGTHS, STRESSES, Units, unit, with_unit
 from .camera import CLIPPED, MAPS, clip, frame
-from .shapes import Deformed, Pieces, extruded, planned
+from .shapes import Deformed, Pieces, is_extruded, undeformed_loads
 from .worker import Scene
 
 Color = tuple[int, int, int, int]
@@ -32,27 +33,33 @@ GREY: Color = (150, 150, 150, 255)
 LAKE: Color = (61, 155, 224, 255)
 WATER: Color = (*LAKE[:3], 130)
 SILT: Color = (140, 110, 70, 150)
-#: From little to much displacement, and from pressed to free.
+#: Color scales: from small to large displacement, and from compression to tension.
 STONE = ((226, 222, 212), (168, 187, 205), (88, 137, 186), (11, 60, 120))
 FIRE = ((11, 60, 120), (88, 137, 186), (226, 222, 212), (200, 60, 30))
 
-#: Pixels of a graph, from its left edge and top to those of the next, and of both columns.
+#: Pixels: size of a graph, pitch of the graphs, width of both columns.
 GRAPH_SIZE, GRAPH_PITCH = (175, 118), (268, 218)
 GRAPHS_WIDTH = 2 * GRAPH_PITCH[0]
+#: Pixels: left edge of the text; lines of title, scene, state, legend of the joint, notes, message.
+LEFT, TITLE, SCENE, STATE, LEGEND, NOTES, MESSAGE = 20, 28, 50, 74, 97, 118, 144
+#: Offset of a layer along z over the dam's size: lines and faces in one plane hide one another.
+LAYER = 5e-4
+#: Maps of a 3D joint: largest stretch along the joint; least depth over the length drawn.
+STRETCH, MAP_DEPTH = 2.5, 0.25
 
 
 class Gallery:
-    """The views of one run; `close` takes them away."""
+    """The views of one run; `close` removes them."""
 
     def __init__(self) -> None:
         self.tags: list[int] = []
-        #: those that wait for the user to tick them
-        self.spare: list[int] = []
+        #: those that are hidden until the user ticks them
+        self.hidden: list[int] = []
 
     def add(
-        self, name: str, pieces: list[Pieces], colors: Sequence[tuple], **numbers: float
+        self, name: str, pieces: list[Pieces], colors: Sequence[tuple[int, ...]], **numbers: float
     ) -> int:
-        """A view of some pieces, in one color or a scale of colors; numbers: its options.
+        """Add a view of pieces in one color or a color scale; numbers: its options.
 
         Returns its tag.
         """
@@ -60,12 +67,9 @@ class Gallery:
         self.tags.append(tag)
         blocks: dict[str, list[np.ndarray]] = {}
         for piece in pieces:
-            blocks.setdefault(piece.kind(), []).append(piece.listed())
-        for (
-            kind,
-            some,
-        ) in blocks.items():  # a second call with the same kind would replace the first
-            data = np.vstack(some)
+            blocks.setdefault(piece.kind(), []).append(piece.list_data())
+        for kind, parts in blocks.items():  # a second call with a kind would replace the first
+            data = np.vstack(parts)
             gmsh.view.addListData(tag, kind, len(data), data.ravel())
         steps = max((piece.values.shape[0] for piece in pieces), default=1)
         for option, value in {"TimeStep": steps - 1, "ShowTime": 0, **numbers}.items():
@@ -75,7 +79,7 @@ class Gallery:
         return tag
 
     def write(self, x: float, y: float, lines: list[str], color: Color, size: int) -> int:
-        """Text in pixels from the top left (negative x: from the right), a line per step."""
+        """Write text at pixels from the top left (negative x: from the right), a line per step."""
         tag = gmsh.view.add("text")
         self.tags.append(tag)
         label(tag, x, y, lines, size)
@@ -83,33 +87,33 @@ class Gallery:
         gmsh.view.option.setNumber(tag, "TimeStep", len(lines) - 1)
         return tag
 
-    def put_aside(self, prefix: str) -> None:
-        """Hide all of it, with a word before the names, for the user to tick."""
+    def archive(self, prefix: str) -> None:
+        """Hide all views and prefix their names, for the user to tick."""
         for tag in set(self.tags) & set(gmsh.view.getTags()):
             name = gmsh.view.option.getString(tag, "Name")
             gmsh.view.option.setString(tag, "Name", f"{prefix} {name}")
             gmsh.view.option.setNumber(tag, "Visible", 0)
 
     def show(self, shown: bool) -> None:
-        """Show or hide all of it."""
+        """Show or hide all views."""
         for tag in set(self.tags) & set(gmsh.view.getTags()):
-            gmsh.view.option.setNumber(tag, "Visible", shown and tag not in self.spare)
+            gmsh.view.option.setNumber(tag, "Visible", shown and tag not in self.hidden)
 
     def close(self) -> None:
-        """Remove those of the views that are still there."""
+        """Remove the views that the user has not removed."""
         for tag in set(self.tags) & set(gmsh.view.getTags()):
             gmsh.view.remove(tag)
         self.tags = []
 
 
 def label(tag: int, x: float, y: float, lines: list[str], size: int) -> None:
-    """Text of a view, in pixels."""
+    """Add text to a view, at pixels."""
     style = ["Align", "Left", "Font", "Helvetica", "FontSize", str(size)]
     gmsh.view.addListDataString(tag, [x, y], lines, style)
 
 
-def paint(tag: int, colors: Sequence[tuple]) -> None:
-    """Give a view its scale of colors: one, or some between which the others lie."""
+def paint(tag: int, colors: Sequence[tuple[int, ...]]) -> None:
+    """Set the color table of a view: one color, or interpolated between several."""
     table = np.array([(*color, 255)[:4] for color in colors], float)
     at = np.linspace(0, len(table) - 1, 64)
     shades = np.column_stack([np.interp(at, range(len(table)), c) for c in table.T]).round()
@@ -121,40 +125,41 @@ def paint(tag: int, colors: Sequence[tuple]) -> None:
     gmsh.parser.clear()
 
 
-#: What acts on the dam, by the names in shapes: color and layer. Water is behind the bodies, since
-#: it reaches under what leans over it.
-BESIDE = {"water": (WATER, -2), "silt": (SILT, -1), "forces": (DARK, 3)}
+#: Color and layer of the loads. Water is behind the bodies: it reaches under an overhang.
+LOADS = {"water": (WATER, -2), "silt": (SILT, -1), "forces": (DARK, 3)}
 
 
-def show_planned(case: Case) -> Gallery:
-    """What acts on the undeformed dam in the end: what is seen before a run."""
+def show_undeformed_loads(case: Case) -> Gallery:
+    """Show the loads of the last level on the undeformed dam, before a run."""
     gallery = Gallery()
-    show_beside(gallery, case, planned(case), {"ShowScale": 0, "Light": 0})
+    show_loads(gallery, case, undeformed_loads(case), {"ShowScale": 0, "Light": 0})
     return gallery
 
 
-def show_beside(gallery: Gallery, case: Case, beside: dict[str, Pieces], options: dict) -> None:
-    """Water, silt and forces, each in its layer."""
-    for name, pieces in beside.items():
-        color, number = BESIDE[name]
+def show_loads(
+    gallery: Gallery, case: Case, loads: dict[str, Pieces], options: dict[str, float]
+) -> None:
+    """Show water, silt and forces, each in its layer."""
+    for name, pieces in loads.items():
+        color, number = LOADS[name]
         gallery.add(name, [pieces], [color], **options, **layer(case, number), LineWidth=3)
 
 
 def layer(case: Case, number: int) -> dict[str, float]:
-    """Options of a layer: lines and faces in one plane would hide one another."""
-    return {"OffsetZ": number * 5e-4 * case.size}
+    """Options of a layer."""
+    return {"OffsetZ": number * LAYER * case.size}
 
 
 def show_heading(gallery: Gallery, heading: tuple[str, str]) -> None:
-    """The first two lines: what the case is called, and its joint law and water."""
+    """Show two lines: title of the case; joint law and uplift."""
     title, scene = heading
-    tag = gallery.write(20, 28, [title], DARK, 18)
-    label(tag, 20, 50, [scene], 14)
+    tag = gallery.write(LEFT, TITLE, [title], DARK, 18)
+    label(tag, LEFT, SCENE, [scene], 14)
     gmsh.view.option.setString(tag, "Name", "heading")
 
 
 def show(scene: Scene, title: str, before: Sequence[Scene] = ()) -> Gallery:
-    """All views of a scene; its heading and history alone if no requested level was reached.
+    """Show all views of a scene; heading and history alone if no requested level was reached.
 
     title: of the case; before: earlier runs, whose last curves are drawn in grey for comparison.
     """
@@ -165,80 +170,65 @@ def show(scene: Scene, title: str, before: Sequence[Scene] = ()) -> Gallery:
         show_deformed(gallery, deformed)
         if scene.result.case["dim"] == 3:
             show_maps(gallery, deformed)
-        if extruded(scene.result.case):
+        if is_extruded(scene.result.case):
             show_curves(graphs, scene, [other for other in before if other.times.size])
-        gallery.write(20, 74, captions(deformed), DARK, 15)
+        gallery.write(LEFT, STATE, captions(deformed), DARK, 15)
     if len(scene.result.history["time"]):
         show_history(graphs, scene, before)
     if before:
-        gallery.write(180, 118, ["grey curves: before"], GREY, 13)
+        gallery.write(180, NOTES, ["grey curves: earlier runs"], GREY, 13)
     case = scene.result.case
     show_heading(gallery, (title, f"law {case['law']}, uplift {case['uplift']}"))
     return gallery
 
 
 def captions(deformed: Deformed) -> list[str]:
-    """A line per step: level, opening, crack, fracture process zone."""
+    """Describe each step in a line: level, opening, crack, fracture process zone."""
     result, lines = deformed.scene.result, []
     for time in deformed.times:
         now = result.state(time)
         tail = f", tailwater {now['tail_level']:.4g} m" if now["tail_level"] > 0 else ""
-        opened = now["max_opening"]
-        said = f"opening {in_unit(opened)}" if opened > 0 else "closed"
-        said += f", crack {now['crack_length']:.3g} m"
+        opening = now["max_opening"]
+        line = f"opening {with_unit(opening, LENGTHS, 3)}" if opening > 0 else "closed"
+        line += f", crack {now['crack_length']:.3g} m"
         if now["process_zone"] > 0:
-            said += f", softening {now['process_zone']:.3g} m"
-        lines.append(f"level {now['level']:.4g} m{tail}: {said}")
+            line += f", softening {now['process_zone']:.3g} m"
+        lines.append(f"level {now['level']:.4g} m{tail}: {line}")
     return lines
 
 
-def in_unit(length: float) -> str:
-    """A length in a unit that suits it."""
-    name, factor = unit([np.array([length])], LENGTHS)
-    return f"{length * factor:.3g} {name}"
-
-
 def show_deformed(gallery: Gallery, deformed: Deformed) -> None:
-    """Dam and foundation, their outline, water, crack and slip, all displaced by one factor."""
+    """Show dam and foundation, outline, loads, crack and slip, all displaced by one factor."""
     case = deformed.scene.result.case
     clip(case)
     moves = {"VectorType": 5, "DisplacementFactor": deformed.scale, "Clip": CLIPPED}
     scale = scale_at(0)
     gallery.add("displacement [m]", deformed.bodies(), STONE, **moves, **scale, Light=0)
-    gallery.spare.append(
-        gallery.add(
-            "vertical stress [Pa]",
-            deformed.stress(),
-            FIRE,
-            **scale,
-            Clip=CLIPPED,
-            Light=0,
-            Visible=0,
-        )
-    )
+    options = {**scale, "Clip": CLIPPED, "Light": 0, "Visible": 0}
+    gallery.hidden.append(gallery.add("vertical stress [Pa]", deformed.stress(), FIRE, **options))
     flat = {**moves, "ShowScale": 0, "Light": 0}
-    show_beside(gallery, case, deformed.beside(), flat)
+    show_loads(gallery, case, deformed.loads(), flat)
     gallery.add("outline", [deformed.outline()], [DARK], **flat, **layer(case, 1), LineWidth=1.5)
     marks = deformed.marks()
     above = {**flat, **layer(case, 2), "LineWidth": 3}
     slipped = gallery.add("slipped joint", [marks["slipped"]], [ORANGE], **above)
     broken = gallery.add("open or broken joint", [marks["open"]], [RED], **above)
-    label(broken, 20, 97, ["red: joint open or broken"], 13)
-    label(slipped, 210, 97, ["orange: joint slipped"], 13)
-    if (deformed.at_lip(state_of) == SOFTENING).any():
+    label(broken, LEFT, LEGEND, ["red: joint open or broken"], 13)
+    label(slipped, 210, LEGEND, ["orange: joint slipped"], 13)
+    if (deformed.along_joint(state_of) == SOFTENING).any():
         softening = gallery.add("softening joint", [marks["softening"]], [VIOLET], **above)
-        label(softening, 370, 97, ["violet: joint softening"], 13)
-    gallery.write(20, 118, [f"displacement x {deformed.scale:g}"], DARK, 13)
+        label(softening, 370, LEGEND, ["violet: joint softening"], 13)
+    gallery.write(LEFT, NOTES, [f"displacement x {deformed.scale:g}"], DARK, 13)
 
 
 def scale_at(place: int) -> dict[str, float]:
-    """Options of a scale of colors at one of four places, bottom left."""
+    """Options of a color scale at one of four places, bottom left."""
     x, y = 40 + 240 * (place % 2), -60 - 70 * (place // 2)
     return {"AutoPosition": 0, "PositionX": x, "PositionY": y, "Width": 180, "Height": 12}
 
 
 def show_maps(gallery: Gallery, deformed: Deformed) -> None:
-    """In 3D, the joint laid out below the foundation: opening, pressure, state."""
+    """Show maps of the unrolled 3D joint below the foundation: opening, state, pressure."""
     scene, rows = deformed.scene, deformed.rows
     case, joint = scene.result.case, scene.bodies["joint"]
     nearest = row_of_nodes(joint, rows[0])
@@ -251,12 +241,12 @@ def show_maps(gallery: Gallery, deformed: Deformed) -> None:
     ]
     if case["uplift"] != "none":
         shown.append((f"water pressure [{stress}]", [r["p"] * per_pa for r in rows], STONE))
-    # as wide as the foundation, and deep enough to be seen
-    way, depth = distance(rows[0])[nearest], joint.points[:, 2].max()
-    unrolled, base = np.column_stack([way, 0 * way, joint.points[:, 2]]), way.max()
+    # as wide as the foundation, and deep enough to be visible
+    s, depth = distance(rows[0])[nearest], joint.points[:, 2].max()
+    unrolled, base = np.column_stack([s, 0 * s, joint.points[:, 2]]), s.max()
     (left, bottom, _), (right, *_) = frame(case)
-    wider = 1.0 if case.geometry else min(2.5, (right - left) / base)
-    stretch = np.array([wider, 1.0, max(wider, 0.25 * wider * base / depth)])
+    wider = 1.0 if case.geometry else min(STRETCH, (right - left) / base)
+    stretch = np.array([wider, 1.0, max(wider, MAP_DEPTH * wider * base / depth)])
     for i, (name, values, colors) in enumerate(shown):
         below = np.array([0, bottom - (i + 1) * MAPS * case.size, 0])
         below += (1 - stretch) * np.array([base / 2, 0, depth])
@@ -265,17 +255,17 @@ def show_maps(gallery: Gallery, deformed: Deformed) -> None:
             Pieces(points[table], np.array(values)[:, nearest][:, table, None])
             for _, table in joint.cells
         ]
-        whole = {"RangeType": 2, "CustomMin": CLOSED, "CustomMax": OPEN} if values is state else {}
-        gallery.add(name, pieces, colors, **scale_at(i + 1), **whole, Light=0)
+        limits = {"RangeType": 2, "CustomMin": CLOSED, "CustomMax": OPEN} if values is state else {}
+        gallery.add(name, pieces, colors, **scale_at(i + 1), **limits, Light=0)
 
 
-#: The name of curves of earlier runs.
+#: Name of the curves of earlier runs.
 BEFORE = "before"
 
 
 @dataclass
 class Curve:
-    """A line of a graph: x (n,), y (steps, n)."""
+    """Curve of a graph: x (n,), y (steps, n)."""
 
     name: str
     x: np.ndarray
@@ -284,11 +274,11 @@ class Curve:
 
 
 def show_curves(graphs: Graphs, scene: Scene, before: Sequence[Scene]) -> None:
-    """Along the joint (means over z in 3D): opening, slip, stresses, pressure."""
+    """Show opening, slip, stresses and pressure along the joint (means over z in 3D)."""
     rows = [along(scene.result.at(time)) for time in scene.times]
     olds = [along(other.result.at()) for other in before]
     wet = scene.result.case["uplift"] != "none"
-    shown: list[tuple[str, tuple, list]] = [
+    shown: list[tuple[str, Units, list[tuple[str, str, Color]]]] = [
         ("opening", LENGTHS, [("", "delta_n", BLUE)]),
         ("slip", LENGTHS, [("jump", "delta_t1", ORANGE), ("slip", "slip", DARK)]),
         ("normal stress", STRESSES, [("total", "sigma_n", BLUE)]),
@@ -308,7 +298,7 @@ def show_curves(graphs: Graphs, scene: Scene, before: Sequence[Scene]) -> None:
 
 
 def show_history(graphs: Graphs, scene: Scene, before: Sequence[Scene]) -> None:
-    """Level over opening, crest movement and crack length, all converged steps."""
+    """Show the level over opening, crest displacement and crack length, all converged steps."""
     driven = scene.result.case["drive"] != "level"
     shown = (
         ("heel opening" if driven else "largest opening", "max_opening", LENGTHS, BLUE),
@@ -330,17 +320,17 @@ def show_history(graphs: Graphs, scene: Scene, before: Sequence[Scene]) -> None:
 
 
 class Graphs:
-    """Graphs on the right, in two columns from the top left."""
+    """Graphs on the right of the window, in two columns from the top left."""
 
     def __init__(self, gallery: Gallery) -> None:
         self.gallery, self.count = gallery, 0
 
     def add(
-        self, title: str, units: tuple, x_label: str, curves: list[Curve], points: bool = False
+        self, title: str, units: Units, x_label: str, curves: list[Curve], points: bool = False
     ) -> None:
-        """One more graph, with curves on common axes; these hold zero.
+        """Add a graph with curves on common axes, which include zero.
 
-        units: of which the values get the one that suits them; points: marked on the curves.
+        units: of the values; points: whether to mark them on the curves.
         """
         name, factor = unit([curve.y for curve in curves], units)
         x_range, y_range = (
@@ -384,19 +374,19 @@ class Graphs:
 
 
 def span(values: np.ndarray) -> tuple[float, float]:
-    """The range of some values, zero in it; never empty."""
+    """Range of values and zero; never empty."""
     ends = np.array([min(0.0, values.min()), max(0.0, values.max())])
-    ends[np.abs(ends) < 1e-9 * np.abs(ends).max()] = 0  # what round-off leaves
+    ends[np.abs(ends) < ROUND_OFF * np.abs(ends).max()] = 0
     return (ends[0], ends[1]) if ends[1] > ends[0] else (0.0, 1.0)
 
 
-def pieces_of(curve: Curve, factor: float, x_range: tuple, beyond: float) -> Pieces:
-    """A curve as lines along x.
+def pieces_of(curve: Curve, factor: float, x_range: tuple[float, float], beyond: float) -> Pieces:
+    """Convert a curve to lines along x.
 
-    Gmsh takes the range of x from the curve itself. So that several share one, each gets a line
-    over all of it with a value beyond the range of y, which is not drawn.
+    Gmsh takes the range of x from the curve. For a common range, each curve gets a line over all of
+    it with a value beyond the range of y, which is not drawn.
     """
-    x = np.zeros((max(len(curve.x), 2), 3))  # one point alone: twice
+    x = np.zeros((max(len(curve.x), 2), 3))  # a single point is doubled
     x[:, 0] = curve.x
     y = np.broadcast_to(curve.y, (len(curve.y), len(x))) * factor
     ends = np.zeros((1, 2, 3))

@@ -1,8 +1,7 @@
 """The engine in a process of its own.
 
-Reading a case and meshing empty Gmsh's model and the ONELAB database, which the window needs; and a
-window has to stay alive while its engine works. The process is started once and kept, with all
-imports done: the second run is as fast as it can be.
+Loading a case and meshing empty Gmsh's model and the ONELAB database, which the window needs; and
+the window must respond while the engine works. The process is started once, with all imports.
 """
 
 from __future__ import annotations
@@ -16,6 +15,7 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
 from types import FrameType
+from typing import Any
 
 import numpy as np
 
@@ -26,113 +26,115 @@ from ..model.fields import Field
 from ..model.mesh import Body
 from ..model.parameters import declared
 from ..model.results import Results
-from ..run import ended, keep
+from ..run import early_end, write_outcomes
 from ..statics.verdict import failed, statement
-from ..storage import whole
-from .sheet import Request, Sheet, case_text, fill, titles
+from ..storage import atomic_write
+from .sheet import Request, Sheet, case_text, check_request, titles
 
-#: What a case file begins with that a save may replace.
+#: First line of case files that Save may replace.
 SAVED = "// Saved by the window of damjoint, which writes it anew when a run is saved here again.\n"
 
 
 @dataclass
 class Scene:
-    """A scene that has been run, as the window needs it."""
+    """A solved scene for the window."""
 
     result: Results
     bodies: dict[str, Body]
     #: displacement and stress by requested time
     fields: dict[float, Field]
-    #: "", or how it ended before its time: interrupted, failed
-    ended: str
-    #: in words why; empty if the dam stands
-    said: str
+    #: interrupted or failed; empty if no error ended the run
+    end_state: str
+    #: why it ended or failed; empty if the dam stands
+    message: str
     failed: bool
 
     @staticmethod
     def of(outcome: Outcome) -> Scene:
-        """What an outcome shows; computes the bodies' fields."""
-        result, (how, _) = outcome.result, ended(outcome)
-        said = statement(result)
-        if how and isinstance(outcome.error, (InputError, RunError)):
-            said = str(outcome.error)
-        elif how:
-            said = f"{how} at level {result.last['level']:.4g} m" if result.last else how
-        bodies = outcome.mesh().bodies
-        return Scene(result, bodies, outcome.fields(), how, said, bool(how) or failed(result))
+        """Convert an outcome; computes the bodies' fields."""
+        result, (state, _) = outcome.result, early_end(outcome)
+        message = statement(result)
+        if state and isinstance(outcome.error, (InputError, RunError)):
+            message = str(outcome.error)
+        elif state:
+            message = f"{state} at level {result.last['level']:.4g} m" if result.last else state
+        return Scene(
+            result,
+            outcome.mesh().bodies,
+            outcome.fields(),
+            end_state=state,
+            message=message,
+            failed=bool(state) or failed(result),
+        )
 
     @property
     def times(self) -> np.ndarray:
-        """The requested times that were reached: the steps of every view."""
+        """Requested times that were reached: the steps of every view."""
         return np.unique(self.result.joint["time"])
 
 
 class Stop:
-    """The wish to stop, told by SIGINT.
+    """Request to stop, by SIGINT.
 
-    Before the first step it ends what is under way at once; from then on the engine asks for it
-    after each converged step, when all that is kept of the step is there.
+    Before the first step it interrupts at once; later after the next converged step.
     """
 
     def __init__(self) -> None:
-        self.wanted = self.at_once = False
-        signal.signal(signal.SIGINT, self.take)
+        self.requested = self.at_once = False
+        signal.signal(signal.SIGINT, self.on_signal)
 
-    def take(self, _number: int, _frame: FrameType | None) -> None:
-        """What the signal calls."""
-        self.wanted = True
+    def on_signal(self, _number: int, _frame: FrameType | None) -> None:
+        """Handle the signal."""
+        self.requested = True
         if self.at_once:
             self.at_once = False
             raise KeyboardInterrupt
 
     def after_step(self) -> None:
-        """Raises KeyboardInterrupt if it is wanted."""
+        """Raise KeyboardInterrupt if a stop is requested."""
         self.at_once = False
-        if self.wanted:
+        if self.requested:
             raise KeyboardInterrupt
 
 
 def serve(pipe: Connection) -> None:
-    """Answer the window's messages until it is gone.
+    """Answer the messages of the window until it closes.
 
     In: ("check", Request), ("run", Request), ("save", folder). Out: ("ready", titles, parameters),
-    ("checked", Sheet), ("bad", why), ("step", number of the scene, time), ("done", [Scene]),
-    ("failed", why), ("saved", folder).
+    ("checked", Sheet), ("rejected", message), ("step", (number of the scene, time)),
+    ("done", [Scene]), ("failed", message), ("saved", folder).
     """
     stop = Stop()
     pipe.send(("ready", titles(), declared()))
-    # what a first run would load while somebody waits for it
-
     last: tuple[Sheet, list[Outcome]] | None = None
     while True:
         try:
-            kind, asked = pipe.recv()
+            kind, argument = pipe.recv()
         except (EOFError, OSError):
             return
         try:
             if kind == "save":
-                save(asked, last)
-                pipe.send(("saved", asked))
+                save(argument, last)
+                pipe.send(("saved", argument))
                 continue
-            sheet = fill(asked)
+            sheet = check_request(argument)
             pipe.send(("checked", sheet))
             if kind == "run":
-                outcomes = follow(sheet, pipe, stop)
+                outcomes = run_case(sheet, pipe, stop)
                 pipe.send(("done", [Scene.of(outcome) for outcome in outcomes]))
                 last = sheet, outcomes
         except InputError as error:
-            pipe.send(("bad", str(error)))
+            pipe.send(("rejected", str(error)))
         except KeyboardInterrupt:
             pipe.send(("failed", "stopped before the first step"))
-        except Exception as error:  # the window says it and lives on
+        except Exception as error:  # shown in the window, which goes on
             pipe.send(("failed", str(error) or type(error).__name__))
 
 
-def follow(sheet: Sheet, pipe: Connection, stop: Stop) -> list[Outcome]:
-    """The scenes of a case; each converged step is told.
+def run_case(sheet: Sheet, pipe: Connection, stop: Stop) -> list[Outcome]:
+    """Solve the scenes of a case; sends a message after each converged step.
 
-    Raises what ends it before its first step (KeyboardInterrupt, RunError); later that is an
-    outcome.
+    Raises the error that ends the run before its first step; a later one is in the outcome.
     """
     outcomes = []
 
@@ -140,7 +142,7 @@ def follow(sheet: Sheet, pipe: Connection, stop: Stop) -> list[Outcome]:
         pipe.send(("step", (scene, time)))
         stop.after_step()
 
-    stop.wanted, stop.at_once = False, True
+    stop.requested, stop.at_once = False, True
     try:
         for outcome in accuracy.solve(sheet.case, engine, on_step, True):
             outcomes.append(outcome)
@@ -154,49 +156,51 @@ def follow(sheet: Sheet, pipe: Connection, stop: Stop) -> list[Outcome]:
 
 
 def save(folder: str, last: tuple[Sheet, list[Outcome]] | None) -> None:
-    """Write the last run and the case file that repeats it, in place of one that the window has
-    written before.
+    """Write the last run and a case file that repeats it.
 
-    Raises InputError if there is none, or no folder, or it can not be written.
+    Replaces only case files written by the window. Raises InputError if there is no run or no
+    folder, or the folder can not be written.
     """
     if last is None:
-        raise InputError("nothing to save yet: press Run first")
+        raise InputError("nothing to save: press Run first")
     if not folder.strip():
         raise InputError("out: name a folder")
     sheet, outcomes = last
     file = Path(folder) / f"{sheet.case.name}.case"
     if file.exists() and not file.read_bytes().startswith(SAVED.encode()):
-        raise InputError(f"out = {folder}: has a {file.name} of its own: choose another folder")
-    keep(sheet.case, outcomes, Path(folder))
-    with whole(file) as part:
+        raise InputError(
+            f"out = {folder}: must not have a {file.name} of your own; choose another folder"
+        )
+    write_outcomes(sheet.case, outcomes, Path(folder))
+    with atomic_write(file) as part:
         part.write_text(SAVED + case_text(sheet, outcomes[0].result.case), encoding="utf-8")
 
 
-class Engine:
-    """The window's end: sends messages, and hands out those that have come back."""
+class EngineProcess:
+    """The engine's process, from the window's side: sends and receives messages."""
 
     def __init__(self) -> None:
         self.start()
 
     def start(self) -> None:
         """Start the process."""
-        context = multiprocessing.get_context("spawn")  # a fork would share Gmsh's state
+        context = multiprocessing.get_context("spawn")  # a forked process shares Gmsh's state
         self.pipe, other = context.Pipe()
         self.process = context.Process(target=serve, args=(other,), daemon=True)
         self.process.start()
         other.close()
         self.interrupted = self.killed = False
 
-    def send(self, kind: str, asked: Request | str) -> None:
-        """Ask for something: see serve."""
+    def send(self, kind: str, argument: Request | str) -> None:
+        """Send a message, see `serve`."""
         self.interrupted = False
-        with contextlib.suppress(OSError):  # a process that is gone is told by `messages`
-            self.pipe.send((kind, asked))
+        with contextlib.suppress(OSError):  # `messages` reports a dead process
+            self.pipe.send((kind, argument))
 
-    def messages(self, wait: float = 0.0) -> Iterator[tuple]:
-        """What has come back; wait: at most so many seconds for a first one.
+    def messages(self, wait: float = 0.0) -> Iterator[tuple[Any, ...]]:
+        """Receive messages; wait: longest time for the first one [s].
 
-        A process that has died gives ("died", why), and another one is started.
+        If the process has died: ("died", message), and a new process is started.
         """
         try:
             while self.pipe.poll(wait):
@@ -204,13 +208,13 @@ class Engine:
                 wait = 0.0
         except (EOFError, OSError):
             self.process.join(1)
-            why = f"the engine has ended ({self.process.exitcode}); press Run"
-            why = "stopped at once, nothing kept" if self.killed else why
+            message = f"the engine's process ended (exit code {self.process.exitcode}): press Run"
+            message = "stopped at once, no results" if self.killed else message
             self.start()
-            yield "died", why
+            yield "died", message
 
     def stop(self) -> None:
-        """End a run after what has converged; the second time, at once and with nothing kept."""
+        """Stop a run after the next converged step; at the second call at once, without results."""
         if self.interrupted:
             self.killed = True
             self.process.kill()

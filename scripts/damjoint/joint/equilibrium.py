@@ -1,4 +1,4 @@
-"""The equilibrium of the joint with the condensed bodies around it (see bulk.py).
+"""The equilibrium of the joint with the condensed bodies around it (see fem/condensation.py).
 
 Unknown: the jump. Residual R = N^T W t(jump) - (water in the joint) + S jump - t_0(loading) = 0;
 the pressure of flowing water is solved for the jump at hand before every residual, and its
@@ -18,6 +18,7 @@ from ..laws import TANGENT, Law, Mode
 from ..laws.base import Array
 from ..model.case import Case, flows, has_drains
 from ..model.loads import Loading, line_forces, quake_column, water_column
+from .flow import FlowSolution
 from .interface import Change, Interface
 from .wet_faces import WetFace
 
@@ -123,8 +124,8 @@ class Equilibrium:
         bulk = self.bulk
         forces = np.zeros(bulk.pressure.shape[1])
         for name, face in self.interface.faces.items():
-            places = bulk.places[name]
-            np.add.at(forces, places[places >= 0], self.face_forces(face, loading)[places >= 0])
+            dofs = bulk.dof_of_face[name]
+            np.add.at(forces, dofs[dofs >= 0], self.face_forces(face, loading)[dofs >= 0])
         total = bulk.pressure @ forces
         for name, size in self.units_of(loading).items():
             total += size * bulk.units[name]
@@ -147,14 +148,14 @@ class Equilibrium:
 
     def head(self, loading: Loading, matrix: object = None) -> np.ndarray:
         """Head [m] in a joint that conducts alike everywhere, at the joint's nodes or at places
-        that a matrix of `Along` leads to: linear on the way from the reservoir's level to the
+        that a matrix of `JointFields` leads to: linear on the way from the reservoir's level to the
         tailwater's; a dry end has its own height, or the other end's head if that is lower.
 
         Drains take away their part of the head above their outlet, the tailwater or their own
         height (EM 1110-2-2200).
         """
-        case, along = self.case, self.interface.along
-        fields = along.heel_y, along.toe_y, along.way
+        case, along = self.case, self.interface.fields
+        fields = along.heel_y, along.toe_y, along.xi
         heel, toe, way = fields if matrix is None else (matrix @ field for field in fields)
         level, tail = loading.level, loading.tail
         first = np.maximum(level, np.minimum(heel, tail))
@@ -174,8 +175,8 @@ class Equilibrium:
     def uplift(
         self, loading: Loading, matrix: object, y: np.ndarray, beyond: np.ndarray | float = 0.0
     ) -> np.ndarray:
-        """Pressure [Pa], never below the air's, at places of height y that a matrix of `Along`
-        leads to; beyond: what flowing water adds there to the pressure imposed.
+        """Pressure [Pa], never below the air's, at places of height y that a matrix of
+        `JointFields` leads to; beyond: what flowing water adds there to the pressure imposed.
         """
         return np.maximum(self.unit_weight * (self.head(loading, matrix) - y) + beyond, 0)
 
@@ -183,8 +184,8 @@ class Equilibrium:
         """Forces of the water in the joint on its two faces (j,)."""
         interface = self.interface
         weights, y = interface.water_points.weights, interface.water_points.positions[:, 1]
-        pressure = self.uplift(loading, interface.along.at_water, y, beyond)
-        return interface.water.T @ (weights * pressure)
+        pressure = self.uplift(loading, interface.fields.at_water, y, beyond)
+        return interface.opening_at_water.T @ (weights * pressure)
 
     def _loads(self, loading: Loading) -> np.ndarray:
         """t_0 and, unless it flows, the water in the joint together (j,)."""
@@ -193,8 +194,8 @@ class Equilibrium:
 
     def expand_to_nodes(self, inner: np.ndarray) -> np.ndarray:
         """The pressure at all of the joint's nodes from that at the inner ones."""
-        whole = np.zeros(self.interface.along.nodes)
-        whole[self.interface.along.inside] = inner
+        whole = np.zeros(self.interface.fields.nodes)
+        whole[self.interface.fields.inside] = inner
         return whole
 
     def aperture(self, jump: np.ndarray, variables: Any) -> tuple[np.ndarray, np.ndarray, float]:
@@ -216,11 +217,8 @@ class Equilibrium:
         growing = (wider > 0) & (wider < most)
         return factor**3, np.where(growing, 3 / narrowest * factor**2, 0), narrowest
 
-    def solve_flow(
-        self, jump: np.ndarray, variables: Any, loading: Loading
-    ) -> tuple[np.ndarray, object]:
-        """Pressure beyond the imposed one at the inner nodes; and for each solution it is made of
-        its share in it and what its sensitivity wants.
+    def solve_flow(self, jump: np.ndarray, variables: Any, loading: Loading) -> FlowSolution:
+        """Pressure beyond the imposed one at the inner nodes.
 
         Drains: of the head that the joint would have there, they take away their part above their
         outlet, the tailwater or their own height; the pressure is that part of one with the
@@ -231,29 +229,28 @@ class Equilibrium:
         factor = self.aperture(jump, variables)[0]
         conductivity = factor * self.interface.points.weights
         head = self.head(loading)
-        free, solution = flow.solve(conductivity, self.unit_weight * head)
+        free = flow.solve(conductivity, self.unit_weight * head)
         if self.drains is None:
-            return free, [(1.0, solution)]
+            return free
         nodes, points = self.drains
-        own = self.bulk.joint.points[nodes, 1]
+        own = self.interface.surface.points[nodes, 1]
         outlet = np.maximum(own, max(case["drain_level"], loading.tail))
-        there = head[nodes] + self.expand_to_nodes(free)[nodes] / self.unit_weight
+        there = head[nodes] + self.expand_to_nodes(free.pressure)[nodes] / self.unit_weight
         cracked = case["uplift"] == "cracked" and (factor[points] > 1).any()
         effect = case["drain_effectiveness"]
         if cracked or not (there > outlet).all() or effect == 0:
-            return free, [(1.0, solution)]
-        drawn, drained = flow.solve(
+            return free
+        drained = flow.solve(
             conductivity, self.unit_weight * head, nodes, self.unit_weight * outlet
         )
-        parts = [(1 - effect, solution), (effect, drained)]
-        return (1 - effect) * free + effect * drawn, parts
+        return free.mixed(effect, drained)
 
     def flowing_lift(
         self, jump: np.ndarray, variables: Any, loading: Loading
-    ) -> tuple[np.ndarray, object]:
+    ) -> tuple[np.ndarray, FlowSolution]:
         """Forces of flowing water on the faces of the joint (j,), and its flow's solution."""
-        inner, solution = self.solve_flow(jump, variables, loading)
-        beyond = self.interface.along.at_water @ self.expand_to_nodes(inner)
+        solution = self.solve_flow(jump, variables, loading)
+        beyond = self.interface.fields.at_water @ self.expand_to_nodes(solution.pressure)
         return self.lift(loading, beyond), solution
 
     def residual(
@@ -285,13 +282,10 @@ class Equilibrium:
             if secant:
                 stiffness = self.law.evaluate(at_points, variables, Mode(True, mode.frozen))[1]
             change = interface.change(stiffness, self.undamaged)
-            if flowing:
-                growing = self.aperture(jump, variables)[1] * interface.points.weights
-                found = [interface.flow.sensitivity(part, growing) for _, part in solution]
-                change.columns = found[0][1]
-                shares = (share for share, _ in solution)
-                change.pressure = sum(s * p for s, (p, _) in zip(shares, found, strict=True))
-            return change
+            if solution is None:
+                return change
+            growing = self.aperture(jump, variables)[1] * interface.points.weights
+            return replace(change, flow=interface.flow.derivative(solution, growing))
 
         def by_level() -> Array:
             slope = -self.rate(self._loads, loading)
@@ -305,13 +299,13 @@ class Equilibrium:
     def pressure(self, jump: np.ndarray, variables: Any, loading: Loading) -> Pressure:
         """The water's pressure in the joint for an opening."""
         interface, bulk = self.interface, self.bulk
-        place = interface.space.place
+        place = interface.space.locations
         here = [interface.points.positions, interface.water_points.positions, place]
         if not self.wet:
             return Pressure(*(np.zeros(len(x)) for x in here))
-        along = interface.along
-        matrices = along.at_points, along.at_water, along.at_places
-        inner = self.solve_flow(jump, variables, loading)[0] if self.flowing else 0.0
+        along = interface.fields
+        matrices = along.at_points, along.at_water, along.at_locations
+        inner = self.solve_flow(jump, variables, loading).pressure if self.flowing else 0.0
         whole = self.expand_to_nodes(inner)
         found = [
             self.uplift(loading, m, x[:, 1], m @ whole) for m, x in zip(matrices, here, strict=True)

@@ -1,8 +1,8 @@
-"""Wet faces: the forces of what presses on them, exact in spite of the kink at a waterline.
+"""Wet faces: forces of the pressure on them, exact in spite of the kink at a waterline.
 
-On a straight face the quadrature is corrected by a factor a + b (y - low), which gives back the
-exact resultant and moment (pro/loads.pro does the same); on any other the elements that the
-waterline cuts are integrated over their wet part alone.
+On a straight face the quadrature is corrected by a factor a + b (y - low) that makes resultant and
+moment exact (as in pro/loads.pro); on any other face the elements that the waterline cuts are
+integrated over their wet part only.
 """
 
 from __future__ import annotations
@@ -12,21 +12,22 @@ from functools import cached_property
 
 import numpy as np
 
+from ..arrays import Array, IntArray
 from ..fem import elements
-from ..model.mesh import SIDES, Body
+from ..model.mesh import Face
 
 #: Height of pressure [m] for a surface at a level [m], at heights y [m] where the normal's
-#: horizontal part has a size (0 to 1); and its column (see scene/loads.py) from low to high.
-Height = Callable[[float, np.ndarray, np.ndarray], np.ndarray]
+#: horizontal part has a size (0 to 1); and its column (see model/loads.py) from low to high.
+Height = Callable[[float, Array, Array], Array]
 Column = Callable[[float, float, float], tuple[float, float]]
 
 
 class WetFace:
     """A face with its quadrature; forces are (functions * dim,)."""
 
-    def __init__(self, surface: Body, kind: np.ndarray, order: int, dim: int) -> None:
-        self.side, self.dim = SIDES[int(kind[0])], dim
-        self.low, self.high = kind[1:]
+    def __init__(self, face: Face, order: int, dim: int) -> None:
+        self.face, self.side, self.dim = face, face.side, dim
+        self.low, self.high, surface = face.low, face.high, face.surface
         self.surface, self.space = surface, elements.Space(surface, order)
         self.points = elements.points_of(self.space, elements.WATER)
         self.normals = surface.normals[self.points.elements][:, :dim]
@@ -35,33 +36,33 @@ class WetFace:
         self.flat = np.ptp(surface.points[:, 1]) < 1e-9 * np.abs(surface.points).max()
 
     @cached_property
-    def elements(self) -> list[tuple[str, np.ndarray]]:
+    def elements(self) -> list[tuple[str, IntArray]]:
         """Shape and functions of each element."""
         return [(shape, row) for shape, table in self.space.connectivity for row in table]
 
-    def spread(self, traction: np.ndarray) -> np.ndarray:
-        """Forces of a traction (q, dim) [Pa]."""
-        return (self.points.values.T @ (self.points.weights[:, None] * traction)).ravel()
+    def spread(self, traction: Array) -> Array:
+        """Nodal forces of a traction (q, dim) [Pa]."""
+        return np.ravel(self.points.values.T @ (self.points.weights[:, None] * traction))
 
-    def press(self, level: float, height: Height, column: Column) -> np.ndarray:
-        """Forces [m x area] of a height of pressure against the face."""
+    def press(self, level: float, height: Height, column: Column) -> Array:
+        """Nodal forces [m x area] of a height of pressure on the face."""
         if self.flat or not self.straight:
-            cut = [] if self.flat else self.cut_by(level)
+            cut = np.zeros(0, int) if self.flat else self.cut_by(level)
             outside = ~np.isin(self.points.elements, cut)
             forces = self.spread(
                 -(height(level, self.y, self.tilt) * outside)[:, None] * self.normals
             )
             for element in cut:
-                self.add_wet_part(forces, element, level, height)
+                self.add_wet_part(forces, int(element), level, height)
         else:
             forces = self.spread(-self.corrected(level, height, column)[:, None] * self.normals)
         return forces
 
-    def corrected(self, level: float, height: Height, column: Column) -> np.ndarray:
+    def corrected(self, level: float, height: Height, column: Column) -> Array:
         """Heights of pressure at the points, times the factor that makes force and moment exact.
 
-        Where the waterline leaves not enough points wet to tell force and moment apart, it is
-        raised, for the shape of the pressure alone.
+        Where too few points are wet to distinguish force and moment, the waterline is raised, for
+        the shape of the pressure only.
         """
         stretch = self.points.weights.sum() / (self.high - self.low)
         force, moment = (stretch * part for part in column(level, self.low, self.high))
@@ -78,41 +79,41 @@ class WetFace:
             shape_level = max(shape_level, self.low) + RAISE * (self.high - self.low)
         b = (m0 * moment - m1 * force) / determinant
         a = (force - b * m1) / m0
-        return shape * (a + b * y)
+        return np.asarray(shape * (a + b * y))
 
     # -- elements that the waterline cuts
 
-    def cut_by(self, level: float) -> np.ndarray:
-        """The elements with the waterline inside."""
+    def cut_by(self, level: float) -> IntArray:
+        """Elements that the waterline cuts."""
         heights = [self.surface.points[table][:, :, 1] for _, table in self.surface.cells]
         least, most = (np.concatenate([f(h, axis=1) for h in heights]) for f in (np.min, np.max))
         return np.flatnonzero((least < level) & (level < most))
 
-    def add_wet_part(self, forces: np.ndarray, element: int, level: float, height: Height) -> None:
-        """Add what presses on an element below the waterline, a straight line on a flat element."""
+    def add_wet_part(self, forces: Array, element: int, level: float, height: Height) -> None:
+        """Add the forces on an element below the waterline, a straight line on a plane element."""
         shape, functions = self.elements[element]
         corners = elements.corners_of(shape)
-        place = self.surface.points[functions[: len(corners)]]
+        nodes = self.surface.points[functions[: len(corners)]]
         normal = self.surface.normals[element, : self.dim]
         of_functions = forces.reshape(-1, self.dim)
         simplex, points = ("line", 4) if len(corners) == 2 else ("triangle", 6)
-        for part in below(corners, place[:, 1] - level):
+        for part in below(corners, nodes[:, 1] - level):
             for x, weight in zip(*elements.rule(simplex, points), strict=True):
                 u = elements.nodal(simplex, x)[0] @ part
                 n, dn = elements.nodal(shape, u)
-                jacobian = dn.T @ place
+                jacobian = dn.T @ nodes
                 area = measure(part) * weight * np.sqrt(np.linalg.det(jacobian @ jacobian.T))
-                here = area * height(level, n @ place[:, 1], abs(normal[0]))
+                force = area * height(level, n @ nodes[:, 1], abs(normal[0]))
                 values = elements.basis(shape, self.space.order, u)[0]
-                of_functions[functions] -= here * np.outer(values, normal)
+                of_functions[functions] -= force * np.outer(values, normal)
 
 
-#: Moments that tell a force and its lever apart: m0 m2 - m1^2 over m1^2; and by how much of the
-#: face's height the waterline is raised until they do.
+#: m0 m2 - m1^2 over m1^2 from which force and lever can be distinguished; and part of the face's
+#: height by which the waterline is raised until they can.
 DISTINCT, RAISE = 1e-3, 0.01
 
 
-def below(corners: np.ndarray, height: np.ndarray) -> list[np.ndarray]:
+def below(corners: Array, height: Array) -> list[Array]:
     """The part of a convex reference element where a linear height is negative, as simplices."""
     polygon, number = [], len(corners)
     closed = number if number > 2 else 1
@@ -128,9 +129,9 @@ def below(corners: np.ndarray, height: np.ndarray) -> list[np.ndarray]:
     return [np.array([polygon[0], *polygon[i : i + 2]]) for i in range(1, len(polygon) - 1)]
 
 
-def measure(simplex: np.ndarray) -> float:
+def measure(simplex: Array) -> float:
     """Measure of a simplex in reference coordinates over that of its rule's own simplex."""
     if len(simplex) == 2:
-        return abs(simplex[1, 0] - simplex[0, 0]) / 2
+        return float(abs(simplex[1, 0] - simplex[0, 0]) / 2)
     (a, b), (c, d) = simplex[1] - simplex[0], simplex[2] - simplex[0]
-    return abs(a * d - b * c)
+    return float(abs(a * d - b * c))

@@ -51,7 +51,7 @@ class Rupture(Law[RuptureVariables]):
         self.L_CT = (
             np.inf
             if self.alpha >= 2
-            else max(self.L_C * np.tan(self.alpha * np.pi / 4), p["sudden"])
+            else max(self.L_C * np.tan(self.alpha * np.pi / 4), p["release_length"])
         )
         self.releases_shear = bool(np.isfinite(self.L_CT))
         self.grout, self.grout_t = p["grout_pressure"] / self.K_contact, p["grout_t"]

@@ -6,27 +6,28 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..arrays import Array, IntArray, Table
 from ..laws import COLUMNS
 from .mesh import Body
 from .results import FLUX, Results
+from .scene import SOLIDS
 
-BODIES = ("dam", "foundation")
+BODIES = tuple(SOLIDS)
 
 
 @dataclass
 class Field:
-    """The bulk at one time: displacement (nodes, 3) [m] and stress (elements, 6) [Pa] by body.
-
-    Stress: xx, yy, zz, xy, yz, xz at the middle of each element.
+    """The bodies at one time: displacement (nodes, 3) [m], stress (elements, 6) [Pa] at the
+    middle of each element: xx, yy, zz, xy, yz, xz.
     """
 
-    displacement: dict[str, np.ndarray]
-    stress: dict[str, np.ndarray]
+    displacement: dict[str, Array]
+    stress: dict[str, Array]
 
 
 @dataclass
 class Solution:
-    """A scene solved: its tables, the bodies of its mesh, fields by requested time (or none)."""
+    """A solved scene: its tables, the bodies of its mesh, fields by requested time (or none)."""
 
     result: Results
     bodies: dict[str, Body]
@@ -45,14 +46,14 @@ OF_JOINT = {
 }
 
 
-def distance(rows: dict[str, np.ndarray]) -> np.ndarray:
+def distance(rows: Table) -> Array:
     """Distance from the heel along the joint [m]."""
     return rows.get("s", rows["x"])
 
 
-def along(rows: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """The joint's rows as curves over the distance s from the heel: means over z, of equal parts of
-    the joint where the nodes of a mesh stand in no rows across.
+def along(rows: Table) -> Table:
+    """The joint's rows as curves over the distance s from the heel: means over z, or over equal
+    parts of the joint where the mesh has no rows of nodes along z.
     """
     s = np.round(distance(rows), 9)
     if np.ptp(rows["z"]) > 0 and len(np.unique(s)) > len(s) / 2:
@@ -63,31 +64,31 @@ def along(rows: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     return {name: np.bincount(place, column) / number for name, column in rows.items()} | {"s": s}
 
 
-#: States of the joint, each drawn in a color of its own.
+#: States of the joint.
 CLOSED, SLIPPED, SOFTENING, OPEN = range(4)
 
 
-def state_of(rows: dict[str, np.ndarray]) -> np.ndarray:
-    """Of each row of the joint's table: OPEN (or broken), SOFTENING, SLIPPED, or CLOSED."""
+def state_of(rows: Table) -> IntArray:
+    """The state at each row of the joint's table: OPEN (or broken), SOFTENING, SLIPPED, CLOSED."""
     # friction, whose rows have lambda, does not soften: what is between is a mean over z
     softening = (rows["damage"] > 0) & ("lambda" not in rows)
-    found = np.where(rows["slip"] > 0, SLIPPED, CLOSED)
-    return np.where(rows["damage"] >= 1, OPEN, np.where(softening, SOFTENING, found))
+    unbroken = np.where(rows["slip"] > 0, SLIPPED, CLOSED)
+    return np.where(rows["damage"] >= 1, OPEN, np.where(softening, SOFTENING, unbroken))
 
 
-def nearest_rows(points: np.ndarray, rows: dict[str, np.ndarray]) -> np.ndarray:
-    """For each of some points (n, 3) the row of the joint's table at one time that is nearest."""
+def nearest_rows(points: Array, rows: Table) -> IntArray:
+    """For each of some points (n, 3) the nearest row of the joint's table at one time (n,)."""
     places = np.column_stack([rows[axis] for axis in "xyz"])
-    # one by one: all distances at once would fill the memory for a fine joint in 3D
+    # in turn: all distances at once need too much memory for a fine joint in 3D
     return np.array([np.argmin(((places - point) ** 2).sum(axis=1)) for point in points], int)
 
 
-def row_of_nodes(body: Body, rows: dict[str, np.ndarray]) -> np.ndarray:
+def row_of_nodes(body: Body, rows: Table) -> IntArray:
     """For each mesh node of the joint (n,) its row in the joint's table at one time."""
     return nearest_rows(body.points, rows)
 
 
-def joint_data(result: Results, body: Body, time: float) -> dict[str, np.ndarray]:
+def joint_data(result: Results, body: Body, time: float) -> Table:
     """The joint's table at its mesh nodes: OF_JOINT by name, vectors along x, y, z."""
     rows = result.at(time)
     nearest = row_of_nodes(body, rows)

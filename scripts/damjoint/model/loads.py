@@ -1,7 +1,7 @@
-"""What loads a dam besides its weight: how far each has grown, where water stands, and its columns.
+"""Loads besides the weight: their factors in time, the faces under water, resultants of pressures.
 
-Coordinates: y = 0 at the heel of the base. A column is the pressure per unit weight [m] on a
-straight face, integrated over the height: force [m2] and moment about y = 0 [m3].
+Coordinates: y = 0 at the heel of the base. A column is the resultant of a pressure per unit weight
+[m] on a straight face, integrated over the height: force [m2] and moment about y = 0 [m3].
 """
 
 from __future__ import annotations
@@ -11,15 +11,16 @@ from dataclasses import dataclass
 
 from .case import Case
 from .mesh import Face
+from .scene import DOWN, TOP, UP
 
-#: Loads that grow by themselves, to all at t = <name>_t.
+#: Loads that grow linearly from t = <name>_t - 1 to t = <name>_t.
 STAGED = ("silt", "ice", "force", "anchor", "quake")
 
 
 @dataclass(frozen=True)
 class Loading:
-    """What acts at a time: reservoir and tailwater level [m], and the part of each staged load that
-    is there, in the order of STAGED.
+    """The loading at a time: reservoir and tailwater level [m], and the factors of the loads in the
+    order of STAGED, 0 to 1.
     """
 
     level: float
@@ -33,42 +34,44 @@ class Loading:
         return Loading(level, tail, tuple(parts))
 
     def part(self, name: str) -> float:
-        """How much of a staged load is there, 0 to 1."""
+        """The factor of a load of STAGED, 0 to 1."""
         return self.grown[STAGED.index(name)]
 
 
 def line_forces(case: Case, loading: Loading) -> dict[str, tuple[float, float]]:
-    """The line forces that a case has, in the order of the section's marks: how large each is at a
-    loading, along x and y [N/m].
+    """The line forces of a case at a loading along x and y [N/m], in the order of the section's
+    marks.
     """
-    lean = math.radians(case["anchor_angle"])
-    whole = {
-        "ice": (case["ice_force"], 0.0),
-        "force": (case["force_x"], case["force_y"]),
-        "anchor": tuple(-case["anchor_force"] * f(lean) for f in (math.sin, math.cos)),
+    loads, angle = case.loads, math.radians(case.loads.anchor_angle)
+    full = {
+        "ice": (loads.ice_force, 0.0),
+        "force": (loads.force_x, loads.force_y),
+        "anchor": (-loads.anchor_force * math.sin(angle), -loads.anchor_force * math.cos(angle)),
     }
     return {
-        n: tuple(loading.part(n) * f for f in force) for n, force in whole.items() if any(force)
+        name: (loading.part(name) * x, loading.part(name) * y)
+        for name, (x, y) in full.items()
+        if x or y
     }
 
 
 def wet(case: Case, face: Face) -> bool:
     """Whether water (or silt) may press on a face in a case."""
-    if face.side == "up":
+    if face.side == UP:
         return True
-    highest = max(case.tail_levels) if face.side in ("down", "bed") else case.reached
-    loaded = {"down": True, "top": overtopped(case)}.get(face.side, bool(case["floor_water"]))
+    highest = max(case.tail_levels) if face.tailwater else case.reached
+    loaded = {DOWN: True, TOP: overtopped(case)}.get(face.side, bool(case["floor_water"]))
     return loaded and highest > face.surface.points[:, 1].min()
 
 
 def overtopped(case: Case) -> bool:
-    """Whether water may stand on the crest; a uniform pressure is one of the faces only."""
+    """Whether water may stand on the crest; a uniform pressure does not act there."""
     deep = case["crest_water"] and case["face_load"] == "hydrostatic"
     return bool(deep and (case.geometry or case.reached > case["dam_height"]))
 
 
 def water_column(level: float, low: float, high: float) -> tuple[float, float]:
-    """Column of still water up to a level on a face from low to high: p = level - y."""
+    """Column of hydrostatic pressure p = level - y on a face from low to high."""
     top = max(min(level, high), low)
     return (
         level * (top - low) - (top**2 - low**2) / 2,

@@ -5,24 +5,28 @@ from __future__ import annotations
 import tempfile
 import time
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
+from typing import NamedTuple
 
 import gmsh
 import numpy as np
 from scipy import sparse
 
 from .. import InputError, RunError, data
+from ..arrays import Array, BoolArray, IntArray, Value
 from ..storage import check_end
 from .case import Case, has_drains
 from .parameters import assignments, constants, start_gmsh
+from .scene import BED, DOWN, FLOOR, JOINT, JOINTS, SIDES, SOLIDS, TOP, UP
 
-#: Parameters that the mesh depends on, and nothing else.
+#: Parameters that the mesh always depends on.
 GEOMETRY = (
     *("dim", "mesh_pattern", "n_joint", "n_layers", "h_dam", "h_found"),
     *("dam_base", "dam_crest", "dam_height", "batter", "batter_height", "neck_height"),
     *("joint_slope", "joint_height", "found_side", "found_depth", "thickness"),
 )
-#: Those that matter only where a line force acts.
+#: Those on which it depends only if a line force acts.
 MARKS = {
     "ice_force": ("ice_level",),
     "anchor_force": ("anchor_at",),
@@ -49,8 +53,9 @@ REGIONS = {
 LINES = ("ice", "force", "anchor")
 #: Those that every geometry has.
 NEEDED = ("dam", "foundation", "joint", "fixed", "heel", "toe", "crest")
-#: What stands before a face, in the order of the numbers in pro/section.pro.
-SIDES = ("up", "down", "top", "floor", "bed")
+
+#: Limit of the joint's element tags: six digits in the keys of GetDP's internal variables.
+MOST_TAGS = 1_000_000
 
 #: Gmsh element types of order 1 by their VTK name.
 SHAPES = {
@@ -78,13 +83,13 @@ OWN_NAMES = {
     **{name: name for name in LINES},
 }
 OWN_FACES = {
-    "upstream": (True, "up"),
-    "downstream": (True, "down"),
-    "crest surface": (True, "top"),
-    "lower upstream": (False, "up"),
-    "lower downstream": (False, "down"),
-    "reservoir floor": (False, "floor"),
-    "tailwater bed": (False, "bed"),
+    "upstream": ("dam", UP),
+    "downstream": ("dam", DOWN),
+    "crest surface": ("dam", TOP),
+    "lower upstream": ("foundation", UP),
+    "lower downstream": ("foundation", DOWN),
+    "reservoir floor": ("foundation", FLOOR),
+    "tailwater bed": ("foundation", BED),
 }
 
 
@@ -95,68 +100,127 @@ def dimension(region: str, dim: int) -> int:
 
 @dataclass
 class Body:
-    """One region of the mesh, or several: points (n, 3), their node tags, cells by shape, element
-    tags in that order.
+    """One or several regions of the mesh: points (n, 3) [m], their node tags (n,), cells by shape
+    as indices of points, element tags in that order.
     """
 
-    points: np.ndarray
-    node_tags: np.ndarray
-    cells: list[tuple[str, np.ndarray]]
-    element_tags: np.ndarray
+    points: Array
+    node_tags: IntArray
+    cells: list[tuple[str, IntArray]]
+    element_tags: IntArray
     #: the region of each block of cells
     regions: list[str] = field(default_factory=list)
     #: of a surface: unit normals (elements, 3), out of the body it belongs to
-    normals: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    normals: Array = field(default_factory=lambda: np.zeros((0, 3)))
 
-    def middles(self) -> np.ndarray:
+    def middles(self) -> Array:
         """The middle of each element (elements, 3)."""
         return np.concatenate([self.points[table].mean(axis=1) for _, table in self.cells])
 
 
 @dataclass
 class Face:
-    """A face that water can press on: its surface, whether it is one of the upper body, which of
-    SIDES it is, and for a straight one from where to where [m] it reaches (not a number for any
-    other).
+    """A face that water can press on: its surface, normals outwards; the name of its body; its side
+    (one of SIDES); lowest and highest y [m] of a straight face (nan for any other).
     """
 
     surface: Body
-    upper: bool
+    body: str
     side: str
     low: float = np.nan
     high: float = np.nan
 
+    @property
+    def tailwater(self) -> bool:
+        """Whether tailwater, not the reservoir, presses on it."""
+        return self.side in (DOWN, BED)
 
-def shares(case: Case) -> dict[str, float | str]:
+
+@dataclass
+class JointMesh:
+    """The mesh of a joint: its surface, normals from the lower to the upper body; the lines (in the
+    plane: points) where it ends; names of its bodies.
+    """
+
+    dim: int
+    surface: Body
+    heel: Body
+    toe: Body
+    upper: str
+    lower: str
+
+    @property
+    def heel_nodes(self) -> IntArray:
+        """Indices of the surface's nodes at the heel."""
+        return np.flatnonzero(np.isin(self.surface.node_tags, self.heel.node_tags))
+
+    @property
+    def toe_nodes(self) -> IntArray:
+        """Indices of the surface's nodes at the toe."""
+        return np.flatnonzero(np.isin(self.surface.node_tags, self.toe.node_tags))
+
+    @property
+    def width(self) -> float:
+        """Extent along z [m]; 1 in the plane."""
+        return float(np.ptp(self.surface.points[:, 2])) if self.dim == 3 else 1.0
+
+    @property
+    def ends(self) -> dict[str, list[float]]:
+        """Heel, toe and length, by the names of pro/section.pro."""
+        heel, toe = (line.points[:, :2].mean(axis=0) for line in (self.heel, self.toe))
+        return ends_of(heel, toe, area(self.surface) / self.width)
+
+
+def shares(case: Case) -> dict[str, Value]:
     """The parameters that the mesh of a case depends on."""
     names = [*GEOMETRY, *(n for force, needs in MARKS.items() if case[force] for n in needs)]
+    values: dict[str, Value] = {name: case[name] for name in names}
     # whether there is a force, not how large
-    there = {name: float(bool(case[name])) for name in MARKS}
-    # drains want a node, however they act
-    drains = {"uplift": "drained", "drain_x": case["drain_x"]} if has_drains(case) else {}
-    return {name: case[name] for name in names} | there | drains
+    values |= {name: float(bool(case[name])) for name in MARKS}
+    if has_drains(case):  # they need a node in all modes of uplift
+        values |= {"uplift": "drained", "drain_x": case["drain_x"]}
+    return values
 
 
-def heel_normal(joint: Body, heel: Body) -> np.ndarray:
+def heel_normal(joint: Body, heel: Body) -> Array:
     """The joint's normal at its heel, a mean of the elements there."""
     near = [np.isin(joint.node_tags[t], heel.node_tags).any(axis=1) for _, t in joint.cells]
-    return joint.normals[np.concatenate(near)].mean(axis=0)
+    normal: Array = joint.normals[np.concatenate(near)].mean(axis=0)
+    return normal
 
 
-#: The mesh last made, by what it was made of: a user's own one is looked at before it is used.
-LAST: dict[str, tuple] = {}
+@dataclass(frozen=True)
+class OwnGeometry:
+    """A user's own geometry in its present state: what its mesh depends on."""
+
+    file: Path
+    changed: int
+    size: int
+    parameters: tuple[tuple[str, Value], ...]
+    #: for making the mesh
+    case: Case = field(compare=False)
+
+
+@lru_cache(maxsize=1)
+def mesh_of_own(geometry: OwnGeometry) -> Mesh:
+    """The mesh of a user's own geometry: its fingerprint is needed before the mesh itself."""
+    return Mesh(geometry.case)
 
 
 def mesh_of(case: Case) -> Mesh:
-    """The mesh of a case; the last one, if it is that of a user's own geometry and still Gmsh's."""
+    """The mesh of a case; that of a user's own geometry is read again only if it is no longer
+    Gmsh's current one.
+    """
     if not case.geometry:
         return Mesh(case)
-    told = case.geometry.stat()
-    key = case.geometry, told.st_mtime_ns, told.st_size, tuple(shares(case).items())
-    if LAST.get("key") != key or LAST["model"] != gmsh.model.getFileName():
-        mesh = Mesh(case)
-        LAST.update(key=key, mesh=mesh, model=gmsh.model.getFileName())
-    return LAST["mesh"]
+    state = case.geometry.stat()
+    key = tuple(shares(case).items())
+    geometry = OwnGeometry(case.geometry, state.st_mtime_ns, state.st_size, key, case)
+    mesh = mesh_of_own(geometry)
+    if not mesh.is_current:
+        mesh_of_own.cache_clear()
+        mesh = mesh_of_own(geometry)
+    return mesh
 
 
 def generate(case: Case) -> None:
@@ -169,7 +233,7 @@ def generate(case: Case) -> None:
     gmsh.parser.clear()
     gmsh.onelab.clear()
     own = case.geometry
-    # in a folder of its own: beside a file Gmsh looks for options, FILE.opt, and runs them
+    # in a folder of its own: Gmsh runs a file of options, FILE.opt, beside the file it opens
     with tempfile.TemporaryDirectory(prefix="damjoint-") as folder:
         path = Path(folder) / f"scene{own.suffix if own else '.geo'}"
         if not own:
@@ -184,49 +248,80 @@ def generate(case: Case) -> None:
                 gmsh.model.mesh.generate(int(case["dim"]))
         except Exception as error:  # what gmsh raises
             if own:
-                gmsh.finalize()  # which else stays busy for ever with what it could not read
+                gmsh.finalize()  # else Gmsh remains busy with a file that it could not read
                 raise InputError(f"geometry = {own}: {error}") from None
             raise RunError(f"mesh: {error}") from None
-    if own:  # tags from 1 on: tables by tag stay small, and so do the keys of GetDP's memory
+    if own:  # tags from 1 on, for small tables by tag and small keys in GetDP
         gmsh.model.mesh.renumberNodes()
         gmsh.model.mesh.renumberElements()
 
 
+class FaceRegion(NamedTuple):
+    """The physical group of a face, and the face's attributes but for its surface."""
+
+    tag: int
+    body: str
+    side: str
+    low: float = np.nan
+    high: float = np.nan
+
+
 class Mesh:
-    """The mesh of a case: its bodies by the names of REGIONS (foundation: with what lies under a
-    lift joint), its faces, and its size.
+    """The mesh of a case: solids and joints by the names of model/scene.py, faces, number of nodes;
+    in `bodies` solids, joints and the other REGIONS.
 
     Raises RunError with Gmsh's message if there is no mesh for the parameters, InputError if a
-    user's own geometry is not what is needed.
+    user's own geometry lacks something.
     """
 
     def __init__(self, case: Case) -> None:
         start = time.perf_counter()
         self.dim, self.own = int(case["dim"]), case.geometry
         generate(case)
+        #: Gmsh's name of it
+        self.model = gmsh.model.getFileName()
         self._read()
         bodies, faces = self._own_regions() if self.own else self._section_regions(case)
-        groups = {name: [(name, tag)] for name, tag in bodies.items() if name != "lower"}
-        if "lower" in bodies:
-            groups["foundation"].append(("lower", bodies["lower"]))
+        groups = {
+            n: [(r, bodies.pop(r)) for r in s.materials if r in bodies] for n, s in SOLIDS.items()
+        }
+        groups |= {name: [(name, tag)] for name, tag in bodies.items()}
         self.bodies = {
             name: self._body(dimension(name, self.dim), parts) for name, parts in groups.items()
         }
+        self.solids = {name: self.bodies[name] for name in SOLIDS}
+        self.joints = {
+            name: JointMesh(
+                dim=self.dim,
+                surface=self.bodies[name],
+                heel=self.bodies[joint.heel],
+                toe=self.bodies[joint.toe],
+                upper=joint.upper,
+                lower=joint.lower,
+            )
+            for name, joint in JOINTS.items()
+        }
         self.faces = {}
-        for i, (tag, upper, side, low, high) in enumerate(faces):
-            surface = self._body(self.dim - 1, [(f"face{i}", tag)])
-            self.faces[f"face{i}"] = Face(surface, upper, side, low, high)
+        for i, face in enumerate(faces):
+            surface = self._body(self.dim - 1, [(f"face{i}", face.tag)])
+            self.faces[f"face{i}"] = Face(surface, *face[1:])
         self._turn_outwards()
-        joint = self.bodies["joint"].element_tags
-        if joint.max() >= 1_000_000:  # the keys of the joint's memory in GetDP hold six digits
+        last = max(joint.surface.element_tags.max() for joint in self.joints.values())
+        if last >= MOST_TAGS:
             raise RunError(
-                f"mesh: joint element tag {joint.max()}: must be below 1000000; use a coarser mesh"
+                f"mesh: joint element tag {last}: must be below {MOST_TAGS}; use a coarser mesh"
             )
         #: wall seconds it took
         self.seconds = time.perf_counter() - start
 
-    def _section_regions(self, case: Case) -> tuple[dict[str, int], list[tuple]]:
-        """Physical groups of the bodies, and of the faces with what is known of them."""
+    @property
+    def is_current(self) -> bool:
+        """Whether it is Gmsh's current mesh, which `write` writes."""
+        start_gmsh()
+        return bool(gmsh.model.getFileName() == self.model)
+
+    def _section_regions(self, case: Case) -> tuple[dict[str, int], list[FaceRegion]]:
+        """Physical groups by region, and those of the faces."""
         numbers = constants()
         present = {group for _, group in gmsh.model.getPhysicalGroups()}
         tag_of = {name: int(numbers[name.upper()][0]) for name in REGIONS}
@@ -239,13 +334,14 @@ class Mesh:
         for i, side in enumerate(section["seg_side"]):
             ends = section["seg_y0"][i], section["seg_y1"][i]
             upper = section["seg_body"][i] == numbers["UPPER"][0]
+            body = JOINTS[JOINT].upper if upper else JOINTS[JOINT].lower
             tag = int(numbers["SEGMENT"][0]) + i
-            faces.append((tag, upper, SIDES[int(side)], min(ends), max(ends)))
+            faces.append(FaceRegion(tag, body, SIDES[int(side)], min(ends), max(ends)))
         return bodies, faces
 
-    def _own_regions(self) -> tuple[dict[str, int], list[tuple]]:
-        """The same by the names of the physical groups; they get the numbers of the package's
-        own geometries.
+    def _own_regions(self) -> tuple[dict[str, int], list[FaceRegion]]:
+        """The same by the names of the physical groups, which get the numbers of the package's own
+        geometries.
         """
         numbers, named = constants(), {}
         for d, tag in gmsh.model.getPhysicalGroups():
@@ -258,7 +354,8 @@ class Mesh:
         if missing := [name for name in needed if name not in named]:
             raise self._bad(f"no region {', '.join(missing)}; the names of physical groups count")
         gmsh.model.removePhysicalGroups()
-        bodies, faces = {}, []
+        bodies: dict[str, int] = {}
+        faces: list[FaceRegion] = []
         for name, (d, entities) in named.items():
             region = OWN_NAMES.get(name, "joint")  # a face is as large as the joint
             if d != dimension(region, self.dim):
@@ -270,12 +367,12 @@ class Mesh:
                 tag = bodies[region] = int(numbers[region.upper()][0])
             else:
                 tag = int(numbers["SEGMENT"][0]) + len(faces)
-                faces.append((tag, *OWN_FACES[name], np.nan, np.nan))
+                faces.append(FaceRegion(tag, *OWN_FACES[name]))
             gmsh.model.addPhysicalGroup(d, entities, tag)
         return bodies, faces
 
     def _bad(self, why: str) -> InputError:
-        """What is wrong with a user's own geometry."""
+        """The error of a user's own geometry."""
         return InputError(f"geometry = {self.own}: {why}")
 
     def _read(self) -> None:
@@ -288,7 +385,8 @@ class Mesh:
 
     def _body(self, dimension: int, parts: list[tuple[str, int]]) -> Body:
         """Some regions (name, number of the physical group) as one body."""
-        blocks, numbers = {}, {}
+        blocks: dict[tuple[str, int], list[IntArray]] = {}
+        numbers: dict[tuple[str, int], list[IntArray]] = {}
         for name, group in parts:
             for entity in gmsh.model.getEntitiesForPhysicalGroup(dimension, group):
                 for kind, elements, nodes in zip(
@@ -301,7 +399,8 @@ class Mesh:
             raise RunError(f"mesh: nothing in {parts[0][0]}; look at the geometry's proportions")
         flat = np.concatenate([b.ravel() for block in blocks.values() for b in block])
         used, cells = np.unique(flat, return_inverse=True)
-        shapes, start = [], 0
+        shapes: list[tuple[str, IntArray]] = []
+        start = 0
         for (_, kind), block in blocks.items():
             table = np.vstack(block)
             if kind not in SHAPES:
@@ -320,72 +419,62 @@ class Mesh:
         """Give joint and faces their normals: the joint's from foundation to dam, a face's out of
         its body.
         """
-        joint, dam, foundation = (self.bodies[n] for n in ("joint", "dam", "foundation"))
+        joint = self.joints[JOINT]
+        upper, lower = self.solids[joint.upper], self.solids[joint.lower]
         if self.own:
-            shared = np.intersect1d(dam.node_tags, foundation.node_tags)
-            apart = np.setdiff1d(shared, joint.node_tags)
+            shared = np.intersect1d(upper.node_tags, lower.node_tags)
+            apart = np.setdiff1d(shared, joint.surface.node_tags)
             if len(apart):
                 x, y, z = self._coordinates[self._place[apart[0]]]
                 raise self._bad(
                     f"dam and foundation also meet beside the joint, at {x:g}, {y:g}, {z:g}"
                 )
-            heel, toe = (self.joint_ends[name][0] for name in ("heel_x", "toe_x"))
+            heel, toe = (joint.ends[name][0] for name in ("heel_x", "toe_x"))
             if toe < heel:
                 raise self._bad(
                     f"toe at x = {toe:g}, heel at {heel:g}: x must point downstream (mirror it)"
                 )
-            if np.isin(joint.node_tags, self.bodies["fixed"].node_tags).any():
+            if np.isin(joint.surface.node_tags, self.bodies["fixed"].node_tags).any():
                 raise self._bad("fixed: must not touch the joint")
-            if outward(joint, dam) is None:
+            if outward(joint.surface, upper) is None:
                 raise self._bad(
                     "joint: its elements must be sides of the dam's (a conforming mesh)"
                 )
         kinds = {kind: name for name, kind in OWN_FACES.items()}
-        surfaces = [("joint", joint, foundation)]
+        surfaces = [(JOINT, joint.surface, lower)]
         for face in self.faces.values():
-            body = dam if face.upper else foundation
-            surfaces.append((kinds[face.upper, face.side], face.surface, body))
+            surfaces.append((kinds[face.body, face.side], face.surface, self.solids[face.body]))
         for name, surface, body in surfaces:
-            found = outward(surface, body)
-            if found is None:
+            normals = outward(surface, body)
+            if normals is None:
                 raise self._bad(f"{name}: its elements must be sides of its body's (conforming)")
-            surface.normals, turned = found
+            surface.normals, turned = normals
             if self.own and turned.any():  # for GetDP, which goes by the elements
                 gmsh.model.mesh.reverseElements(surface.element_tags[turned])
 
     def bearer(self, line: str) -> str:
-        """The body that bears the force on one of LINES: the dam where it is a line of both."""
-        dam = self.bodies["dam"].node_tags
-        return "dam" if np.isin(self.bodies[line].node_tags, dam).all() else "foundation"
-
-    @property
-    def joint_ends(self) -> dict[str, list[float]]:
-        """Where the joint's heel and toe are, by the names of pro/section.pro."""
-        heel, toe = (self.bodies[n].points[:, :2].mean(axis=0) for n in ("heel", "toe"))
-        return ends_of(heel, toe, area(self.bodies["joint"]) / self.width)
-
-    @property
-    def width(self) -> float:
-        """Extent of the joint along z [m]; 1 in the plane."""
-        return float(np.ptp(self.bodies["joint"].points[:, 2])) if self.dim == 3 else 1.0
+        """The body that bears the force on one of LINES: the first that has all nodes of it."""
+        nodes = self.bodies[line].node_tags
+        whole = (n for n, s in self.solids.items() if np.isin(nodes, s.node_tags).all())
+        return next(whole, JOINTS[JOINT].lower)
 
     @property
     def counts(self) -> dict[str, int]:
-        """Nodes, elements (of dam and foundation) and joint_elements."""
-        size = {name: len(body.element_tags) for name, body in self.bodies.items()}
+        """Numbers of nodes, elements (of the solids) and joint_elements."""
+        joints = [joint.surface for joint in self.joints.values()]
         return {
             "nodes": self.nodes,
-            "elements": size["dam"] + size["foundation"],
-            "joint_elements": size["joint"],
+            "elements": sum(len(solid.element_tags) for solid in self.solids.values()),
+            "joint_elements": sum(len(surface.element_tags) for surface in joints),
         }
 
     def write(self, path: Path) -> None:
         """Write the mesh for GetDP (MSH 2.2, binary); only while it is Gmsh's current one.
 
-        Raises OSError if the disk is full: Gmsh itself says nothing then.
+        Raises OSError if the disk is full, which Gmsh does not report.
         """
         gmsh.option.setNumber("Mesh.MshFileVersion", 2.2)
-        # else elements are numbered anew, shape by shape
+        # else elements are renumbered, shape by shape
         gmsh.option.setNumber("Mesh.PreserveNumberingMsh2", 1)
         gmsh.option.setNumber("Mesh.Binary", 1)
         gmsh.write(str(path))
@@ -402,7 +491,7 @@ def write_mesh(case: Case, path: Path) -> dict[str, int]:
     return mesh.counts
 
 
-def ends_of(heel: np.ndarray, toe: np.ndarray, along: float) -> dict[str, list[float]]:
+def ends_of(heel: Array, toe: Array, along: float) -> dict[str, list[float]]:
     """The joint by the names of pro/section.pro, from its ends (2,) and its length [m]."""
     length = float(np.linalg.norm(toe - heel))
     values = (*heel, *toe, length, along)
@@ -422,9 +511,9 @@ def area(surface: Body) -> float:
     return float(total)
 
 
-def outward(surface: Body, body: Body) -> tuple[np.ndarray, np.ndarray] | None:
-    """Unit normals (elements, 3) of a surface, out of the body whose skin it is a part of, and
-    which elements are numbered the other way round; None if not all are sides of the body's.
+def outward(surface: Body, body: Body) -> tuple[Array, BoolArray] | None:
+    """Unit normals (elements, 3) of a part of a body's surface, out of the body, and which elements
+    are numbered the other way round; None if not all are sides of the body's elements.
     """
     # the body's cells that hold all nodes of an element
     size = int(max(surface.node_tags.max(), body.node_tags.max())) + 1
@@ -436,19 +525,19 @@ def outward(surface: Body, body: Body) -> tuple[np.ndarray, np.ndarray] | None:
     inside[shared.row[whole]] = shared.col[whole]
     if (inside < 0).any():
         return None
-    middles = surface.middles()
-    normals = []
+    directions = []
     for _, table in surface.cells:
         edges = surface.points[table[:, 1:3]] - surface.points[table[:, :1]]
         if table.shape[1] == 2:  # a line in the plane
             across = np.column_stack([edges[:, 0, 1], -edges[:, 0, 0], np.zeros(len(table))])
         else:
             across = np.cross(edges[:, 0], edges[:, 1])
-        normals.append(across / np.linalg.norm(across, axis=1)[:, None])
-    normals = np.concatenate(normals)
-    inwards = np.einsum("ij,ij->i", normals, middles - body.middles()[inside]) < 0
+        directions.append(across / np.linalg.norm(across, axis=1)[:, None])
+    normals = np.concatenate(directions)
+    from_body = surface.middles() - body.middles()[inside]
+    inwards = np.einsum("ij,ij->i", normals, from_body) < 0
     normals[inwards] *= -1
-    # no digits that only the mesh generator has made: a level joint's normal is (0, 1, 0)
+    # without the mesh generator's rounding: a level joint's normal is (0, 1, 0)
     return np.round(normals, 12) + 0.0, inwards
 
 

@@ -1,6 +1,4 @@
-"""Parameters: names, defaults, labels and ranges are read from pro/parameters.pro by Gmsh's
-parser.
-"""
+"""Parameters: names, defaults, labels and ranges, read from pro/parameters.pro by Gmsh's parser."""
 
 from __future__ import annotations
 
@@ -11,13 +9,15 @@ import re
 import signal
 import tempfile
 import threading
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import gmsh
 
 from .. import InputError, data
+from ..arrays import Value
 
 DECLARATIONS = data("pro") / "parameters.pro"
 #: The line by which a text includes the declarations.
@@ -25,6 +25,8 @@ INCLUDE = f'Include "{DECLARATIONS}";\n'
 
 #: The value of a parameter that follows others.
 AUTOMATIC = -1.0
+#: Limits that stand for > 0 and < 0.5 in the declarations; ONELAB's limit of what has none.
+TINY, BELOW_HALF, ANY = 1e-30, 0.5 - 1e-9, 1e200
 
 
 def start_gmsh() -> None:
@@ -33,13 +35,13 @@ def start_gmsh() -> None:
         handlers = {n: signal.getsignal(n) for n in (signal.SIGTERM, signal.SIGHUP)}
         gmsh.initialize(readConfigFiles=False, interruptible=False)
         if threading.current_thread() is threading.main_thread():
-            for number, handler in handlers.items():  # Gmsh has put back the system's
+            for number, handler in handlers.items():  # Gmsh has reset them to the system's
                 signal.signal(number, handler)
-        gmsh.option.setNumber("General.Verbosity", 0)  # what goes wrong is raised, told in one line
+        gmsh.option.setNumber("General.Verbosity", 0)  # errors are raised instead
 
 
 def number(text: str) -> float:
-    """A number as Gmsh reads it: Python alone knows 1_000, or the digits of other scripts.
+    """A number as Gmsh reads it; 1_000 and the digits of other scripts are numbers in Python only.
 
     Raises ValueError.
     """
@@ -53,66 +55,72 @@ class Parameter:
     """One declared parameter: ONELAB label with its unit, range or choices."""
 
     name: str
+    #: path in the ONELAB tree, and its parts: group, description, unit (empty for a text)
     label: str
+    group: str
+    description: str
+    unit: str
     help: str = ""
     text: bool = False
     minimum: float = -math.inf
     maximum: float = math.inf
-    choices: tuple = ()
+    choices: tuple[Value, ...] = ()
     integer: bool = False
-    #: what it follows when it is -1, in words; empty: it can not
-    follows: str = ""
-    #: default, and the scene it matters in (empty: any), as the declaration has them
+    #: whether it may be -1 and then follows others, as the help says
+    automatic: bool = False
+    #: default, and the scenes in which it matters (empty: all), as in the declaration
     default: str = ""
     matters: str = ""
 
     @property
-    def group(self) -> str:
-        """Its group in the ONELAB tree."""
-        return self.label.split("/")[-2].lstrip("0123456789")
-
-    @property
     def meaning(self) -> str:
-        """The label without its place in the ONELAB tree: description and unit."""
-        return self.label.split("/")[-1].lstrip("0123456789")
+        """Description and unit."""
+        return f"{self.description} [{self.unit}]" if self.unit else self.description
 
     def allowed(self) -> str:
-        """What is allowed, in words."""
+        """The allowed values in words."""
         if self.choices:
-            return "one of " + ", ".join(c if self.text else f"{c:g}" for c in self.choices)
+            return "one of " + ", ".join(
+                c if isinstance(c, str) else f"{c:g}" for c in self.choices
+            )
         limits = []
         if self.minimum > -math.inf:
-            limits.append("> 0" if self.minimum == 1e-30 else f">= {self.minimum:g}")
+            limits.append("> 0" if self.minimum == TINY else f">= {self.minimum:g}")
         if self.maximum < math.inf:
-            limits.append("< 0.5" if self.maximum == 0.5 - 1e-9 else f"<= {self.maximum:g}")
+            limits.append("< 0.5" if self.maximum == BELOW_HALF else f"<= {self.maximum:g}")
         words = ("an integer " if self.integer else "a number ") + " and ".join(limits)
-        return words.strip() + (f", or -1: {self.follows}" if self.follows else "")
+        return words.strip() + (f", or {self.help}" if self.automatic else "")
 
-    def check(self, value: float | str) -> float | str:
+    def check(self, value: Value) -> Value:
         """The value as a number or a choice.
 
         Raises InputError if it is not a number, out of range or not one of the choices.
         """
-        bad = InputError(f"{self.name} = {value}: must be {self.allowed()} ({self.meaning})")
-        if self.text:
-            if value not in self.choices:
-                raise bad
-            return value
-        try:
-            found = number(str(value))
-        except ValueError:
-            raise bad from None
-        if self.follows and found == AUTOMATIC:
-            return found
-        if not (math.isfinite(found) and self.minimum <= found <= self.maximum):
-            raise bad
-        if (self.choices and found not in self.choices) or (self.integer and found % 1):
-            raise bad
-        return found
+        result: Value = value
+        if not self.text:
+            try:
+                result = number(value) if isinstance(value, str) else float(value)
+            except (TypeError, ValueError):
+                result = math.nan
+        if not self.allows(result):
+            raise InputError(f"{self.name} = {value}: must be {self.allowed()} ({self.meaning})")
+        return result
+
+    def allows(self, value: Value) -> bool:
+        """Whether a value is one of the choices, or a number within the range."""
+        if self.choices:
+            return value in self.choices
+        if isinstance(value, str):
+            return False
+        if self.automatic and value == AUTOMATIC:
+            return True
+        within = math.isfinite(value) and self.minimum <= value <= self.maximum
+        return within and not (self.integer and value % 1)
 
 
-def parse(text: str) -> dict[str, list[float] | list[str]]:
-    """What Gmsh's parser knows after reading a text of our own: {name: values}.
+def parse(text: str) -> dict[str, list[Any]]:
+    """Variables of Gmsh's parser after it has read a text written by this package: {name: numbers
+    or texts}.
 
     Raises InputError.
     """
@@ -126,20 +134,22 @@ def parse(text: str) -> dict[str, list[float] | list[str]]:
             gmsh.parser.parse(file.name)
         except Exception as error:  # what gmsh raises
             raise InputError(str(error)) from None
-    found = {}
+    variables = {}
     for name in gmsh.parser.getNames():
         numbers = gmsh.parser.getNumber(name)
-        found[name] = numbers.tolist() if len(numbers) else list(gmsh.parser.getString(name))
-    return found
+        variables[name] = numbers.tolist() if len(numbers) else list(gmsh.parser.getString(name))
+    return variables
 
 
 #: A declaration of pro/parameters.pro: name, and everything up to its closing brace.
 DECLARED = re.compile(r"(\w+) = \{(?:Str\[)?default_\1\b((?:[^{}\"]|\"[^\"]*\"|\{[^{}]*\})*)\}")
+#: A label: group and description without the digits that order the ONELAB tree, unit.
+LABEL = re.compile(r"^Parameters/\d*([^/]+)/\d*([^/]*?)(?: \[(.*)\])?$")
 
 
 @lru_cache(maxsize=1)
-def constants() -> dict[str, list]:
-    """All values of the declarations by themselves: defaults, regions, what the solvers share."""
+def constants() -> dict[str, list[Any]]:
+    """Variables of the declarations without a case: defaults, regions, the solvers' constants."""
     return parse(INCLUDE)
 
 
@@ -148,37 +158,49 @@ def declared() -> dict[str, Parameter]:
     """All declared parameters by name."""
     parse(INCLUDE)
     text = re.sub(r"//[^\n]*", "", DECLARATIONS.read_text())
-    parameters = {}
-    for name, rest in DECLARED.findall(text):
-        label = re.search(r'Name\s+"([^"]+)"', rest)[1]
-        entry = json.loads(gmsh.onelab.get(label))
-        low, high = entry.get("min", -1e200), entry.get("max", 1e200)
-        minimum = low if low > -1e200 else -math.inf
-        follower = re.match(r"-1: (.*); else (>=?) 0$", entry.get("help", ""))
-        if follower:
-            minimum = 0.0 if follower[2] == ">=" else 1e-30
-        default = re.search(rf"default_{name} = ([^,\]]*?)\s*[,\]]", text)[1]
-        visible = re.search(r"Visible\s+(.*?),\s*Name", rest)
-        parameters[name] = Parameter(
-            name,
-            label,
-            entry.get("help", ""),
-            text=entry["type"] == "string",
-            minimum=minimum,
-            maximum=high if high < 1e200 else math.inf,
-            choices=tuple(entry.get("choices", ())),
-            integer=entry.get("step") == 1,
-            follows=follower[1] if follower else "",
-            default="-1" if default == "automatic" else default.strip('"'),
-            matters=in_words(visible[1]) if visible else "",
-        )
-    return parameters
+    return {name: declaration(name, rest, text) for name, rest in DECLARED.findall(text)}
+
+
+def declaration(name: str, rest: str, text: str) -> Parameter:
+    """A parameter from the rest of its declaration, the text of all declarations, and its entry in
+    the ONELAB database.
+    """
+    label = matched(r'Name\s+"([^"]+)"', rest)
+    group, description, unit = re.findall(LABEL, label)[0]
+    entry = json.loads(gmsh.onelab.get(label))
+    # Min of one that may be -1 is -1
+    otherwise = entry.get("attributes", {}).get("Otherwise")
+    low = {None: entry.get("min", -ANY), "> 0": TINY, ">= 0": 0.0}[otherwise]
+    high = entry.get("max", ANY)
+    default = matched(rf"default_{name} = ([^,\]]*?)\s*[,\]]", text)
+    return Parameter(
+        name=name,
+        label=label,
+        group=group,
+        description=description,
+        unit=unit,
+        help=entry.get("help", ""),
+        text=entry["type"] == "string",
+        minimum=low if low > -ANY else -math.inf,
+        maximum=high if high < ANY else math.inf,
+        choices=tuple(entry.get("choices", ())),
+        integer=entry.get("step") == 1,
+        automatic=otherwise is not None,
+        default="-1" if default == "automatic" else default.strip('"'),
+        matters=in_words(matched(r"Visible\s+(.*?),\s*Name", rest)),
+    )
+
+
+def matched(pattern: str, text: str) -> str:
+    """The first group of a pattern's first match; empty if there is none."""
+    match = re.search(pattern, text)
+    return match[1] if match else ""
 
 
 @lru_cache(maxsize=1)
 def independent() -> frozenset[str]:
-    """Names of the numbers that nothing follows, neither another parameter nor the section: they
-    stand nowhere in the declarations but in their own.
+    """Names of the numbers on which neither another parameter nor the section depends: those that
+    occur only in their own declaration.
     """
     texts = (DECLARATIONS, DECLARATIONS.with_name("section.pro"))
     rest = "".join(DECLARED.sub("", re.sub(r"//[^\n]*", "", t.read_text())) for t in texts)
@@ -187,7 +209,7 @@ def independent() -> frozenset[str]:
 
 
 def in_words(condition: str) -> str:
-    """A Visible clause of the declarations in words."""
+    """The condition of a Visible option in words."""
     words = re.sub(r'!StrCmp\((\w+), "(\w+)"\)', r"\1 = \2", condition)
     words = re.sub(r'StrCmp\((\w+), "(\w+)"\)', r"\1 not \2", words)
     for mark, word in (("==", "="), ("!= 0", "not 0"), ("||", "or")):
@@ -207,7 +229,7 @@ def parameter(name: str) -> Parameter:
     return known[name]
 
 
-def settings(pairs: Iterable[str]) -> dict[str, float | str]:
+def settings(pairs: Iterable[str]) -> dict[str, Value]:
     """{name: checked value} from texts 'name=value'.
 
     Raises InputError.
@@ -221,7 +243,23 @@ def settings(pairs: Iterable[str]) -> dict[str, float | str]:
     return values
 
 
-def assignments(values: dict[str, float | str]) -> str:
+def levels_of(name: str, levels: str | Sequence[float]) -> tuple[float, ...]:
+    """Water levels [m] from numbers, or a text 'a,b,c'.
+
+    Raises InputError if it is none.
+    """
+    if not isinstance(levels, str):
+        return tuple(map(float, levels))
+    try:
+        result = tuple(number(v) for v in levels.split(","))
+    except ValueError:
+        result = ()
+    if not result or not all(map(math.isfinite, result)):
+        raise InputError(f"{name} = {levels}: must be a list of levels in metres, such as 3,6,8,9")
+    return result
+
+
+def assignments(values: dict[str, Value]) -> str:
     """Lines default_name = value; in the common language of Gmsh and GetDP."""
     lines = (
         f'default_{n} = "{v}";\n' if isinstance(v, str) else f"default_{n} = {v!r};\n"
@@ -231,7 +269,7 @@ def assignments(values: dict[str, float | str]) -> str:
 
 
 def listing(name: str, values: Iterable[float]) -> str:
-    """A list in that language, a number a line: GetDP's parser loses its way in lines of some
-    thousand characters.
+    """A list in that language, a number a line: GetDP's parser fails on lines of some thousand
+    characters.
     """
     return f"{name}() = {{\n" + ",\n".join(repr(float(v)) for v in values) + "};\n"

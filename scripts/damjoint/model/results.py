@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
+from ..arrays import Array, Table
 from .case import Case
 
 #: Columns of joint.csv: a row per joint node and requested level.
@@ -58,28 +60,28 @@ HISTORY = {
 
 @dataclass
 class Results:
-    """What a run has found: tables as {column: array}."""
+    """The results of a run: tables as {column: array}."""
 
     case: Case
     #: a row per converged step, columns HISTORY
-    history: dict[str, np.ndarray]
+    history: Table
     #: a row per joint node and requested level, columns `joint_columns`
-    joint: dict[str, np.ndarray]
+    joint: Table
     #: the same rows with jumps and stresses extrapolated from element means, as published codes
     #: print them
-    extrapolated: dict[str, np.ndarray]
+    extrapolated: Table
     #: whether the run ended before its last level
     stopped: bool = False
     #: opening of the heel [m] at each row of history
-    heel: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    #: what run.json says of the run itself: engine, sizes, versions, seconds
-    info: dict = field(default_factory=dict)
+    heel: Array = field(default_factory=lambda: np.zeros(0))
+    #: about the run itself, for run.json: engine, sizes, versions, seconds
+    info: dict[str, Any] = field(default_factory=dict)
 
-    def at(self, time: float | None = None) -> dict[str, np.ndarray]:
+    def at(self, time: float | None = None) -> Table:
         """The joint rows of a requested time, the last one by default, from heel to toe."""
         return rows_at(self.joint, time)
 
-    def at_extrapolated(self, time: float | None = None) -> dict[str, np.ndarray]:
+    def at_extrapolated(self, time: float | None = None) -> Table:
         """As `at`, with jump and stress extrapolated from the integration points."""
         return rows_at(self.extrapolated, time)
 
@@ -95,14 +97,14 @@ class Results:
 
     @property
     def partial_load(self) -> bool:
-        """Whether the last state is short of the case's last time, at which levels and loads are
-        those asked for; a prescribed displacement asks for none.
+        """Whether the last state is before the case's last time, at which all loads act in full;
+        False with a prescribed displacement.
         """
         time = self.last.get("time", 0.0)
         return self.case["drive"] == "level" and time < self.case.times[-1] - 1e-9
 
 
-def rows_at(table: dict[str, np.ndarray], time: float | None = None) -> dict[str, np.ndarray]:
+def rows_at(table: Table, time: float | None = None) -> Table:
     """The rows of one time (the last one by default), sorted from heel to toe, then by z."""
     time = table["time"].max() if time is None else time
     rows = np.flatnonzero(np.isclose(table["time"], time))
@@ -116,16 +118,16 @@ def joint_columns(case: Case) -> dict[str, tuple[str, str]]:
     return JOINT | dict(case.law.columns) | (FLUX if case["uplift"] == "flow" else {})
 
 
-def joint_table(case: Case, blocks: list[np.ndarray]) -> dict[str, np.ndarray]:
-    """The joint's table from blocks of rows, one per requested time: its columns in their order,
-    but for sigma_n_eff.
+def joint_table(case: Case, blocks: list[Array]) -> Table:
+    """The joint's table from blocks of rows, one per requested time, whose columns are those of the
+    table but for sigma_n_eff.
 
-    Adds that one and sorts each block from heel to toe, then by z.
+    Adds sigma_n_eff and sorts each block from heel to toe, then by z.
     """
     columns = joint_columns(case)
-    given = [name for name in columns if name != "sigma_n_eff"]
-    rows = np.vstack(blocks) if blocks else np.zeros((0, len(given)))
-    table = dict(zip(given, rows.T, strict=True))
+    names = [name for name in columns if name != "sigma_n_eff"]
+    rows = np.vstack(blocks) if blocks else np.zeros((0, len(names)))
+    table = dict(zip(names, rows.T, strict=True))
     table["sigma_n_eff"] = table["sigma_n"] + table["p"]
     table = {name: table[name] for name in columns}
     times = list(dict.fromkeys(table["time"]))
@@ -135,10 +137,8 @@ def joint_table(case: Case, blocks: list[np.ndarray]) -> dict[str, np.ndarray]:
     }
 
 
-def history_table(case: Case, rows: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """The history from what an engine has found at each step; load_factor and x_resultant are made
-    here.
-    """
+def history_table(case: Case, rows: Table) -> Table:
+    """The history from an engine's output at each step; adds load_factor and x_resultant."""
     scheduled = np.array([case.level_at(time) for time in rows["time"]])
     factor = np.divide(rows["level"], scheduled, out=np.ones_like(scheduled), where=scheduled > 0)
     # where M = N (length - x)

@@ -6,12 +6,12 @@ import re
 from pathlib import Path
 
 from .. import InputError
-from ..storage import whole
+from ..storage import atomic_write
 from .parameters import Parameter, declared
 
 HEAD = """// {name} - a dam on rock. It runs as it is: damjoint run {name}
-// Change what is yours. Lines that begin with // are the other parameters at their defaults; -1
-// stands for "follows others", told behind it. Everything is SI.
+// Change the values of your dam. Lines that begin with // are the other parameters at their
+// defaults; -1: the value follows from others, as the line says. All units are SI.
 
 title = "{title}";
 
@@ -20,7 +20,7 @@ levels() = {{30, 40, 45}};
 tail_levels() = {{0, 0, 3}};
 """
 
-#: What most dams have to change.
+#: Parameters that differ from dam to dam.
 COMMON = (
     *("law", "uplift", "dam_base", "dam_crest", "dam_height", "E_dam", "E_found", "nu", "rho_dam"),
     *("K_N", "K_T", "sigma_max", "mu", "adhesion", "G_f"),
@@ -28,18 +28,18 @@ COMMON = (
 
 
 def line(parameter: Parameter, value: str) -> str:
-    """A statement with the parameter's meaning behind it; a comment unless it is a common one."""
+    """A statement and the parameter's meaning; a comment unless the parameter is a common one."""
     value = f'"{value}"' if parameter.text else value
     about = parameter.meaning + (f"; {parameter.matters}" if parameter.matters else "")
-    if parameter.follows:
-        about += f"; -1: {parameter.follows}"
+    if parameter.automatic:
+        about += f"; {parameter.help}"
     if parameter.choices:
         about += f"; {parameter.allowed()}"
     mark = "" if parameter.name in COMMON else "// "
     return f"{mark}default_{parameter.name} = {value};  // {about}"
 
 
-#: Values of the example that the defaults leave to others.
+#: Values of the example of parameters that are -1 by default.
 EXAMPLE = {"E_dam": "2.5e10", "E_found": "2.5e10", "G_f": "100"}
 
 
@@ -65,7 +65,7 @@ def write(path: Path) -> None:
         raise InputError(f"new = {path}: must not exist yet")
     try:
         title = re.sub(r'["\\\n]', "'", path.stem)
-        with whole(path) as part:
+        with atomic_write(path) as part:
             part.write_text(text(re.sub(r"\s", " ", path.name), title), encoding="utf-8")
     except OSError as error:
         raise InputError(f"new = {path}: {error}") from None

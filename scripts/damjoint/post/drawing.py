@@ -1,4 +1,4 @@
-"""What the pictures have in common: colors, sizes in inches, legends that cover nothing."""
+"""Common parts of the pictures: colors, figures with margins in inches, legends."""
 
 from __future__ import annotations
 
@@ -10,26 +10,29 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg  # not pyplot: it costs half of a 2D run
 from matplotlib.figure import Figure, FigureBase
 
-from ..storage import whole
+from ..storage import atomic_write
 
-matplotlib.rcdefaults()  # not what a matplotlibrc in the present folder says
+matplotlib.rcdefaults()  # a matplotlibrc in the current folder must not change the pictures
 
 BLUE, ORANGE, WATER, RED, GREEN = "#0b5394", "#cc7a00", "#3d9be0", "#b3261e", "#2e7d32"
 VIOLET = "#8e24aa"
 GREY, DARK, CONCRETE, ROCK, SILT = "#8a8a8a", "#333333", "#c3ccd6", "#d8c9ae", "#a1866f"
 
+#: Distance of a y label from the left edge of its figure [inches].
+LABEL = 0.2
+
 
 def figure_of(width: float, height: float) -> Figure:
-    """An empty figure, sizes in inches."""
+    """Create an empty figure; sizes in inches."""
     figure = Figure(figsize=(width, height))
     FigureCanvasAgg(figure)
     return figure
 
 
-def write_picture(figure: Figure, path: Path, dpi: int, **how: int) -> None:
-    """Write a figure; how: what PIL takes."""
-    with whole(path) as part:
-        figure.savefig(part, dpi=dpi, format="png", pil_kwargs=how)
+def write_picture(figure: Figure, path: Path, dpi: int, **options: int) -> None:
+    """Write a figure as PNG; options: of PIL."""
+    with atomic_write(path) as part:
+        figure.savefig(part, dpi=dpi, format="png", pil_kwargs=options)
 
 
 def panels(
@@ -44,28 +47,28 @@ def panels(
     across: float = 0.75,
     down: float = 0.35,
 ) -> np.ndarray:
-    """Axes (rows, columns) in a figure or a part of one; margins and gaps in inches."""
+    """Create axes (rows, columns) in a figure or subfigure; margins and gaps in inches."""
     width, height = figure.bbox.size / figure.dpi
-    inner = (width - left - right - (columns - 1) * across) / columns
-    deep = (height - bottom - top - (rows - 1) * down) / rows
-    where = {
+    axes_width = (width - left - right - (columns - 1) * across) / columns
+    axes_height = (height - bottom - top - (rows - 1) * down) / rows
+    grid = {
         "left": left / width,
         "right": 1 - right / width,
         "bottom": bottom / height,
         "top": 1 - top / height,
-        "wspace": across / inner,
-        "hspace": down / deep,
+        "wspace": across / axes_width,
+        "hspace": down / axes_height,
     }
-    found = figure.subplots(rows, columns, squeeze=False, gridspec_kw=where)
-    for axes in found.flat:
-        axes.locator_params(nbins=6)  # of the time of a picture, most goes into ticks
+    table = figure.subplots(rows, columns, squeeze=False, gridspec_kw=grid)
+    for axes in table.flat:
+        axes.locator_params(nbins=6)  # ticks take most of the time of a picture
         axes.tick_params(labelsize=9)
-        axes.yaxis.set_label_coords((0.2 - left) / inner, 0.5)
-    return found
+        axes.yaxis.set_label_coords((LABEL - left) / axes_width, 0.5)
+    return table
 
 
 def legend_above(axes: Axes, columns: int = 4) -> None:
-    """The legend over the panel, where it covers nothing."""
+    """Put the legend above the axes."""
     axes.legend(
         loc="lower left",
         bbox_to_anchor=(-0.01, 0.99),

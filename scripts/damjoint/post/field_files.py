@@ -8,90 +8,114 @@ import gmsh
 import meshio
 import numpy as np
 
-from ..model.fields import OF_JOINT, Solution, joint_data
+from ..model.fields import OF_JOINT, Field, Solution, joint_data
+from ..model.mesh import Body
 from ..model.parameters import constants, start_gmsh
-from ..storage import whole
+from ..storage import atomic_write
+
+#: Element types of order 1 in Gmsh by shape: number, dimension.
+ELEMENTS = {
+    "line": (1, 1),
+    "triangle": (2, 2),
+    "quad": (3, 2),
+    "tetra": (4, 3),
+    "hexahedron": (5, 3),
+    "wedge": (6, 3),
+}
+#: Components xx, xy, xz, yx, ... of a Gmsh tensor among those of `Field.stress`.
+TENSOR = [0, 3, 5, 3, 1, 4, 5, 4, 2]
+
+Cells = list[tuple[str, np.ndarray]]
+#: A field on a mesh: name, kind (NodeData or ElementData), values by time.
+View = tuple[str, str, dict[float, np.ndarray]]
 
 
 def write_fields(solution: Solution, folder: Path) -> None:
-    """Write, below folder, for a solution that has fields, bulk_*.vtu and joint_*.vtu per requested
-    time with fields.pvd (ParaView), and bulk.msh and joint.msh with a view per field, all times in
-    each (Gmsh).
+    """Write the fields of a solution below folder: bulk_*.vtu and joint_*.vtu per requested time
+    with fields.pvd (ParaView); bulk.msh and joint.msh with a view per field, all times in each
+    (Gmsh).
 
-    Dam and foundation have their own points on the joint, so that the opening shows.
+    Dam and foundation have their own points on the joint, so that the opening is visible.
     """
     folder.mkdir(exist_ok=True)
-    result, fields, joint = solution.result, solution.fields, solution.bodies["joint"]
+    fields, joint = solution.fields, solution.bodies["joint"]
     bodies = {n: solution.bodies[n] for n in next(iter(fields.values())).displacement}
-    points = np.concatenate([b.points for b in bodies.values()])
-    cells, body, first = [], [], 0
-    for own in bodies.values():
-        cells += [(shape, table + first) for shape, table in own.cells]
-        for region, (_, table) in zip(own.regions, own.cells, strict=True):
-            body.append(np.full(len(table), int(constants()[region.upper()][0])))
-        first += len(own.points)
-    cuts = np.cumsum([len(c) for _, c in cells])[:-1]
-    entries, joints, moved, stresses = [], {}, {}, {}
-    for time, field in fields.items():
-        joints[time] = joint_data(result, joint, time)
-        moved[time] = np.vstack([field.displacement[n] for n in bodies])
-        stresses[time] = np.vstack([field.stress[n] for n in bodies])
+    points = np.concatenate([body.points for body in bodies.values()])
+    cells, regions = bulk_cells(bodies)
+    displacement = {t: np.vstack([f.displacement[n] for n in bodies]) for t, f in fields.items()}
+    stress = {t: np.vstack([f.stress[n] for n in bodies]) for t, f in fields.items()}
+    on_joint = {time: joint_data(solution.result, joint, time) for time in fields}
+
+    cuts = np.cumsum([len(table) for _, table in cells])[:-1]
+    for time in fields:
         bulk = meshio.Mesh(
             points,
             cells,
-            point_data={"displacement": moved[time]},
-            cell_data={"stress": np.split(stresses[time], cuts), "body": body},
+            point_data={"displacement": displacement[time]},
+            cell_data={"stress": np.split(stress[time], cuts), "body": regions},
         )
-        names = f"bulk_t{time:g}.vtu", f"joint_t{time:g}.vtu"
-        with whole(folder / names[0]) as path:
-            bulk.write(path, compression=None)
-        lips = meshio.Mesh(joint.points, joint.cells, point_data=joints[time])
-        with whole(folder / names[1]) as path:
-            lips.write(path, compression=None)
-        entries += [(time, part, name) for part, name in enumerate(names)]
-    lines = "".join(f'<DataSet timestep="{t!r}" part="{k}" file="{n}"/>\n' for t, k, n in entries)
-    collection = f"<Collection>\n{lines}</Collection>"
-    with whole(folder / "fields.pvd") as path:
+        write_vtu(folder / f"bulk_t{time:g}.vtu", bulk)
+        write_vtu(
+            folder / f"joint_t{time:g}.vtu",
+            meshio.Mesh(joint.points, joint.cells, point_data=on_joint[time]),
+        )
+    write_collection(folder, fields)
+    bulk_views: list[View] = [
+        ("displacement [m]", "NodeData", displacement),
+        ("stress [Pa]", "ElementData", {t: s[:, TENSOR] for t, s in stress.items()}),
+    ]
+    joint_views: list[View] = [
+        (f"{name} [{OF_JOINT[name][0]}]", "NodeData", {t: d[name] for t, d in on_joint.items()})
+        for name in next(iter(on_joint.values()))
+    ]
+    with atomic_write(folder / "bulk.msh") as path:
+        write_views(path, points, cells, bulk_views)
+    with atomic_write(folder / "joint.msh") as path:
+        write_views(path, joint.points, joint.cells, joint_views)
+
+
+def bulk_cells(bodies: dict[str, Body]) -> tuple[Cells, list[np.ndarray]]:
+    """Collect the cells of bodies with common point numbers, and the region number of each cell."""
+    cells, regions, first = [], [], 0
+    for body in bodies.values():
+        cells += [(shape, table + first) for shape, table in body.cells]
+        for region, (_, table) in zip(body.regions, body.cells, strict=True):
+            regions.append(np.full(len(table), int(constants()[region.upper()][0])))
+        first += len(body.points)
+    return cells, regions
+
+
+def write_vtu(path: Path, mesh: meshio.Mesh) -> None:
+    """Write a mesh with its data for ParaView."""
+    with atomic_write(path) as part:
+        mesh.write(part, compression=None)
+
+
+def write_collection(folder: Path, fields: dict[float, Field]) -> None:
+    """Write fields.pvd, which lists the .vtu files of all times."""
+    entries = [
+        f'<DataSet timestep="{time!r}" part="{part}" file="{name}_t{time:g}.vtu"/>\n'
+        for time in fields
+        for part, name in enumerate(("bulk", "joint"))
+    ]
+    collection = f"<Collection>\n{''.join(entries)}</Collection>"
+    with atomic_write(folder / "fields.pvd") as path:
         path.write_text(f'<VTKFile type="Collection" version="0.1">\n{collection}\n</VTKFile>\n')
-    # xx, xy, xz, yx, ...: what Gmsh calls a tensor
-    tensor = [0, 3, 5, 3, 1, 4, 5, 4, 2]
-    of_bulk = [
-        ("displacement [m]", "NodeData", moved),
-        ("stress [Pa]", "ElementData", {t: s[:, tensor] for t, s in stresses.items()}),
-    ]
-    with whole(folder / "bulk.msh") as path:
-        write_views(path, points, cells, of_bulk)
-    of_joint = [
-        (f"{name} [{OF_JOINT[name][0]}]", "NodeData", {t: d[name] for t, d in joints.items()})
-        for name in next(iter(joints.values()))
-    ]
-    with whole(folder / "joint.msh") as path:
-        write_views(path, joint.points, joint.cells, of_joint)
 
 
-#: Gmsh's numbers of the shapes of order 1.
-TYPES = {"line": 1, "triangle": 2, "quad": 3, "tetra": 4, "hexahedron": 5, "wedge": 6}
-DIMENSION = {"line": 1, "triangle": 2, "quad": 2, "tetra": 3, "hexahedron": 3, "wedge": 3}
-
-
-def write_views(
-    path: Path, points: np.ndarray, cells: list, views: list[tuple[str, str, dict]]
-) -> None:
-    """A mesh and views on it, with a step per time: a file for Gmsh.
-
-    views: name, kind, values by time.
-    """
+def write_views(path: Path, points: np.ndarray, cells: Cells, views: list[View]) -> None:
+    """Write a mesh with views, a step per time, for Gmsh."""
     start_gmsh()
     before, own = gmsh.model.getCurrent(), "fields of damjoint"
     gmsh.model.add(own)
     tags = np.arange(1, len(points) + 1)
-    entity = gmsh.model.addDiscreteEntity(DIMENSION[cells[0][0]])
-    dimension = DIMENSION[cells[0][0]]
+    dimension = ELEMENTS[cells[0][0]][1]
+    entity = gmsh.model.addDiscreteEntity(dimension)
     gmsh.model.mesh.addNodes(dimension, entity, tags, points.ravel())
     first = 1
     for shape, table in cells:
         numbers = np.arange(first, first + len(table))
-        gmsh.model.mesh.addElementsByType(entity, TYPES[shape], numbers, (table + 1).ravel())
+        gmsh.model.mesh.addElementsByType(entity, ELEMENTS[shape][0], numbers, (table + 1).ravel())
         first += len(table)
     gmsh.option.setNumber("Mesh.Binary", 1)
     gmsh.option.setNumber("PostProcessing.SaveMesh", 0)

@@ -1,7 +1,6 @@
-"""The folder of a run: run.json, and what an earlier run has left there.
+"""The output folder of a run: run.json, removal of an earlier run's results.
 
-Only files that carry a run's own names, beside a run.json that damjoint has written, are ever
-removed.
+Removed are only files with the names that a run writes, and only beside a run.json of damjoint.
 """
 
 from __future__ import annotations
@@ -12,22 +11,26 @@ import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 from .. import InputError, __version__
 from ..model.case import Case, is_name
 from ..model.parameters import declared
 from ..model.results import HISTORY, Results, joint_columns
 from ..statics.verdict import hints, statement, verdict
-from ..storage import PART, held, whole
+from ..storage import PART, atomic_write, locked_folder
 
-#: Names that a run writes, besides its pictures.
+#: Files of a run: tables, pictures CASE....png, fields.
 TABLES = ("joint.csv", "history.csv", "curve.csv", "gravity.csv", "critical.csv", "run.json")
+PICTURES = ("", "_curve", "_check", "_critical")
 FIELDS = re.compile(r"(bulk|joint)(_t[\w.+-]+\.vtu|\.msh)|fields\.pvd")
 
 
 def check_writable(folder: Path) -> None:
-    """Raise InputError if the output folder can not be made or written, or what stands in it would
-    lead a run out of it; makes nothing.
+    """Raise InputError if the output folder can not be created or written, or if a link or special
+    file in it has the name of a file of a run.
+
+    Creates nothing.
     """
     existing = folder
     try:
@@ -35,68 +38,68 @@ def check_writable(folder: Path) -> None:
             existing = existing.parent
         if not existing.is_dir() or not os.access(existing, os.W_OK | os.X_OK):
             raise InputError(f"out = {folder}: must be a folder that can be written")
-        for name in ("fields", *declared()["uplift"].choices):
-            inner = folder / name
+        for inner in (folder / "fields", *scene_folders(folder)):
             if inner.is_symlink() or (inner.exists() and not inner.is_dir()):
+                name = inner.name
                 raise InputError(f"out = {folder}: its {name} must be a folder, and not a link")
         for name in TABLES:
             if (folder / name).exists() and not (folder / name).is_file():
-                raise InputError(f"out = {folder}: its {name} must be a file")
-    except OSError as error:  # too long a name, a circle of links
+                raise InputError(f"out = {folder}: its {name} must be a regular file")
+    except OSError as error:  # a name too long, a loop of links
         raise InputError(f"out = {folder}: {error.strerror}") from None
 
 
 @contextlib.contextmanager
-def taken(case: Case, folder: Path) -> Iterator[None]:
-    """Take a folder for a run of a case, in place of an earlier one's results.
+def claim_output_folder(case: Case, folder: Path) -> Iterator[None]:
+    """Create and lock the output folder of a run, and remove an earlier run's results.
 
-    Raises InputError if that can not be, and leaves an earlier run as it is.
+    Raises InputError if the folder can not be written or is locked; an earlier run stays then.
     """
     check_writable(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    with held(folder):
+    with locked_folder(folder):
         clear(folder)
-        say(case, folder, "running")
+        write_state(case, folder, "running")
         yield
 
 
 def scene_folder(case: Case, scene: Case, out: Path) -> Path:
-    """Where a scene's files go: the case's main scene into out, any further one into
-    out/<uplift>.
-    """
+    """Folder of a scene: out for the case's main scene, out/<uplift> for any other."""
     return out if scene["uplift"] == case["uplift"] else out / scene["uplift"]
 
 
-def earlier(folder: Path) -> dict | None:
-    """The run.json of an earlier run in this folder; None if there is none that damjoint has
-    written.
-    """
+def scene_folders(folder: Path) -> list[Path]:
+    """Folders that further scenes of a case may have below its own."""
+    return [folder / str(mode) for mode in declared()["uplift"].choices]
+
+
+def read_info(folder: Path) -> dict[str, Any] | None:
+    """Read run.json of a folder; None if there is none, or it is not of damjoint."""
     file = folder / "run.json"
     try:
-        told = json.loads(file.read_text(encoding="utf-8")) if file.is_file() else {}
-        json.dumps(told, ensure_ascii=False).encode()  # half of a letter can not be printed
-        return told if told["versions"]["damjoint"] and isinstance(told["case"], str) else None
+        info: dict[str, Any]
+        info = json.loads(file.read_text(encoding="utf-8")) if file.is_file() else {}
+        json.dumps(info, ensure_ascii=False).encode()  # a lone surrogate can not be printed
+        return info if info["versions"]["damjoint"] and isinstance(info["case"], str) else None
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return None
 
 
 def clear(folder: Path) -> None:
-    """Remove what an earlier run has left in a folder, and below it in the folders of further
+    """Remove the results of an earlier run from a folder and from the folders of its further
     scenes.
     """
-    told = earlier(folder)
-    for name in declared()["uplift"].choices:  # where further scenes of a case go
-        if told is not None and (folder / name).is_dir() and not (folder / name).is_symlink():
-            clear(folder / name)
-            remove_if_empty(folder / name)
-    if told is None:
+    info = read_info(folder)
+    if info is None:
         return
-    pictures = ("", "_curve", "_check", "_critical")
-    names = [*TABLES, *(f"{told['case']}{end}.png" for end in pictures)]
-    for name in names:
+    for inner in scene_folders(folder):
+        if inner.is_dir() and not inner.is_symlink():
+            clear(inner)
+            remove_if_empty(inner)
+    for name in (*TABLES, *(f"{info['case']}{end}.png" for end in PICTURES)):
         if is_name(name):
-            for mark in ("", PART):
-                (folder / (mark + name)).unlink(missing_ok=True)
+            for prefix in ("", PART):
+                (folder / (prefix + name)).unlink(missing_ok=True)
     fields = folder / "fields"
     if fields.is_dir() and not fields.is_symlink():
         for file in fields.iterdir():
@@ -106,24 +109,24 @@ def clear(folder: Path) -> None:
 
 
 def remove_if_empty(folder: Path) -> None:
-    """Remove a folder that has nothing in it."""
+    """Remove a folder if it is empty."""
     if not any(folder.iterdir()):
         folder.rmdir()
 
 
-def say(case: Case, folder: Path, state: str, statement: str = "") -> None:
-    """Make the folder of a case and say in its run.json how far a run is that has no results yet:
-    running, interrupted or failed.
+def write_state(case: Case, folder: Path, state: str, statement: str = "") -> None:
+    """Create the folder of a case and write the run.json of a run without results: running,
+    interrupted or failed, and why.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    told = {"case": case.name, "state": state, "statement": statement}
-    write_json(folder, told | {"versions": {"damjoint": __version__}})
+    info = {"case": case.name, "state": state, "statement": statement}
+    write_json(folder, info | {"versions": {"damjoint": __version__}})
 
 
 def write_info(results: Results, folder: Path, state: str = "", why: str = "") -> None:
     """Write run.json: parameters, verdict, sizes, versions, seconds, memory, units of the tables.
 
-    state: interrupted or failed, and why; else it is stopped or complete.
+    state, why: interrupted or failed, and the message; by default stopped or complete.
     """
     case = results.case
     write_json(
@@ -140,7 +143,7 @@ def write_info(results: Results, folder: Path, state: str = "", why: str = "") -
             "tail_levels": case.tail_levels,
             "times": case.times,
             "geometry": str(case.geometry or ""),
-            "section": case.section if case.geometry else {},  # else it follows from parameters
+            "section": case.section if case.geometry else {},  # a built-in one: from parameters
             "published": case.published,
             "hardening_asked": case.hardening_asked,
             **results.info,
@@ -149,7 +152,7 @@ def write_info(results: Results, folder: Path, state: str = "", why: str = "") -
     )
 
 
-def write_json(folder: Path, told: dict) -> None:
+def write_json(folder: Path, info: dict[str, Any]) -> None:
     """Write run.json."""
-    with whole(folder / "run.json") as path:
-        path.write_text(json.dumps(told, indent=2) + "\n")
+    with atomic_write(folder / "run.json") as path:
+        path.write_text(json.dumps(info, indent=2) + "\n")

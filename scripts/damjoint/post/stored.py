@@ -1,23 +1,25 @@
-"""A run read back from the files in its folder."""
+"""Read a run from the files in its folder."""
 
 from __future__ import annotations
 
 import csv
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import meshio
 import numpy as np
 
 from .. import InputError
+from ..arrays import Value
 from ..model.case import SECTION, SHARED, Case, is_name
 from ..model.fields import Field, Solution
 from ..model.mesh import Body
 from ..model.parameters import INCLUDE, assignments, constants, declared, listing, parse
 from ..model.results import HISTORY, Results
-from .folder import earlier
+from .folder import read_info, scene_folders
 
-#: What is raised where files are not what a run writes; a SyntaxError by XML.
+#: Errors that reading damaged files can raise; SyntaxError: by XML.
 DAMAGED = (
     *(OSError, ValueError, LookupError, TypeError, AttributeError, ArithmeticError),
     *(RecursionError, SyntaxError, meshio.ReadError),
@@ -25,42 +27,45 @@ DAMAGED = (
 
 
 def runs_in(folder: Path) -> list[Path]:
-    """The folder of a run and those of its case's further scenes.
+    """List the folder of a run and those of its case's further scenes.
 
-    Raises InputError if it is none.
+    Raises InputError if it is not the folder of a run.
     """
-    if not folder.is_dir() or earlier(folder) is None:
+    if not folder.is_dir() or read_info(folder) is None:
         raise InputError(f"out = {folder}: must be the folder of a run (with its run.json)")
-    scenes = (folder / mode for mode in declared()["uplift"].choices)
-    return [folder, *(scene for scene in scenes if earlier(scene) is not None)]
+    return [folder, *(scene for scene in scene_folders(folder) if read_info(scene) is not None)]
 
 
 def read(folder: Path) -> Solution:
-    """What a run has written: tables, mesh, fields as far as there are any.
+    """Read tables, mesh and fields (if written) of a run.
 
-    Raises InputError, naming the folder, if the run has no results, or its files are damaged.
+    Raises InputError if the run has no results or its files are damaged.
     """
-    told = earlier(folder) or {}
-    if "parameters" not in told:
-        raise InputError(f"out = {folder}: has no results, its run is {told.get('state', 'none')}")
+    info = read_info(folder) or {}
+    if "parameters" not in info:
+        state = info.get("state", "unknown")
+        raise InputError(f"out = {folder}: must be a run with results; its state is {state}")
     try:
-        result = results_of(told, folder)
-        bodies, fields = fields_in(folder / "fields", np.unique(result.joint["time"]))
+        result = read_results(info, folder)
+        bodies, fields = read_fields(folder / "fields", np.unique(result.joint["time"]))
     except DAMAGED as error:
         why = error if isinstance(error, InputError) else f"damaged: {error!r}"
         raise InputError(f"out = {folder}: {why}") from None
     return Solution(result, bodies, fields)
 
 
-def results_of(told: dict, folder: Path) -> Results:
-    """The tables with what run.json says; the rows extrapolated as published codes do are not
-    kept.
+def read_results(info: dict[str, Any], folder: Path) -> Results:
+    """Read the tables of a run; the extrapolated rows are not stored, and empty.
+
+    Raises InputError if a column is missing, as in files of earlier versions.
     """
     history = read_csv(folder / "history.csv")
     if missing := [name for name in HISTORY if name not in history]:
-        made = told["versions"]["damjoint"]
-        raise InputError(f"history.csv of damjoint {made} lacks {', '.join(missing)}: run it again")
-    case = case_of(told)
+        version = info["versions"]["damjoint"]
+        raise InputError(
+            f"history.csv of damjoint {version} lacks {', '.join(missing)}: run the case again"
+        )
+    case = case_of(info)
     heel = np.zeros(0)
     if case["drive"] != "level":
         heel = read_csv(folder / "curve.csv")["heel_opening"]
@@ -69,48 +74,63 @@ def results_of(told: dict, folder: Path) -> Results:
         history,
         read_csv(folder / "joint.csv"),
         {},
-        stopped=told["state"] == "stopped",
+        stopped=info["state"] == "stopped",
         heel=heel,
-        info=told,
+        info=info,
     )
 
 
-def case_of(told: dict) -> Case:
-    """The case that run.json tells of.
+def case_of(info: dict[str, Any]) -> Case:
+    """Build the case from the content of run.json.
 
-    Raises KeyError, TypeError, InputError (a ValueError) if it tells of none.
+    Raises KeyError, TypeError, InputError (a ValueError) if the content is incomplete or bad.
     """
-    if not is_name(told["case"]):
-        raise InputError(f"case {told['case']!r}: must be the name of a case")
-    if missing := [n for n in declared() if n not in told["parameters"]]:
-        made = told["versions"]["damjoint"]
-        raise InputError(f"parameters {', '.join(missing)} are unknown to its damjoint {made}")
-    values = {n: p.check(told["parameters"][n]) for n, p in declared().items()}
-    lists = {n: tuple(map(float, told[n])) for n in ("levels", "tail_levels", "times")}
-    for name, numbers in lists.items():
-        if not np.isfinite(numbers).all():
-            raise InputError(f"{name} = {','.join(map(str, numbers))}: must be finite")
-    found = parse(resolved(values, lists["levels"]))
+    if not is_name(info["case"]):
+        raise InputError(f"case {info['case']!r}: must be the name of a case")
+    if missing := [n for n in declared() if n not in info["parameters"]]:
+        version = info["versions"]["damjoint"]
+        raise InputError(f"run.json of damjoint {version} lacks parameters: {', '.join(missing)}")
+    values = {n: p.check(info["parameters"][n]) for n, p in declared().items()}
+    levels, tail_levels, times = (finite(n, info[n]) for n in ("levels", "tail_levels", "times"))
+    parsed = parse(parser_input(values, levels))
     return Case(
-        told["case"],
-        str(told["title"]).encode(errors="replace").decode(),
-        values,
-        **lists,
-        published=bool(told["published"]),
-        hardening_asked=bool(told["hardening_asked"]),
-        shared={n: found[n] for n in SHARED},
-        geometry=Path(told["geometry"]) if told["geometry"] else None,
-        section={n: found[n] for n in SECTION} | told["section"],
+        name=info["case"],
+        title=str(info["title"]).encode(errors="replace").decode(),
+        values=values,
+        levels=levels,
+        tail_levels=tail_levels,
+        times=times,
+        published=bool(info["published"]),
+        hardening_asked=bool(info["hardening_asked"]),
+        shared={n: parsed[n] for n in SHARED},
+        geometry=Path(info["geometry"]) if info["geometry"] else None,
+        section={n: parsed[n] for n in SECTION} | info["section"],
     )
 
 
-def resolved(values: dict, levels: tuple[float, ...]) -> str:
-    """A text by which Gmsh's parser finds what follows from some parameters and the levels."""
+def finite(name: str, values: list[float]) -> tuple[float, ...]:
+    """Convert a list of run.json to floats.
+
+    Raises InputError if one is infinite or not a number.
+    """
+    numbers = tuple(map(float, values))
+    if not np.isfinite(numbers).all():
+        raise InputError(f"{name} = {','.join(map(str, numbers))}: must be finite")
+    return numbers
+
+
+def parser_input(values: dict[str, Value], levels: tuple[float, ...]) -> str:
+    """Text from which Gmsh's parser computes the quantities that follow from parameters and
+    levels.
+    """
     return assignments(values) + listing("levels", levels) + INCLUDE
 
 
 def read_csv(path: Path) -> dict[str, np.ndarray]:
-    """A table of numbers by column; where there is none they are nan, but never infinite."""
+    """Read a table of numbers by column; they may be nan.
+
+    Raises OSError, ValueError.
+    """
     check_file(path)
     with path.open(newline="") as file:
         head, *rows = csv.reader(file)
@@ -121,33 +141,37 @@ def read_csv(path: Path) -> dict[str, np.ndarray]:
 
 
 def check_file(path: Path) -> None:
-    """Raise OSError if it is none: a pipe would be read without end."""
+    """Raise OSError if a path is no regular file: reading a pipe would not end."""
     if not path.is_file():
-        raise OSError(f"{path.name} is no file")
+        raise OSError(f"{path.name} is no regular file")
 
 
-def fields_in(folder: Path, times: np.ndarray) -> tuple[dict[str, Body], dict[float, Field]]:
-    """Bodies, and displacement and stress at the times of which there are files."""
-    bodies, fields = {}, {}
+def read_fields(folder: Path, times: np.ndarray) -> tuple[dict[str, Body], dict[float, Field]]:
+    """Read the bodies, and displacement and stress at the times that have files."""
+    bodies: dict[str, Body] = {}
+    fields: dict[float, Field] = {}
     for time in times.tolist():
         path = folder / f"bulk_t{time:g}.vtu"
         if path.is_file():
             check_file(folder / f"joint_t{time:g}.vtu")
-            # not meshio.read: it leaves the process where a file is damaged
+            # not meshio.read: it exits the process if a file is damaged
             bulk, joint = (meshio.vtu.read(p) for p in (path, folder / f"joint_t{time:g}.vtu"))
-            parts = {"dam": part(bulk, "dam"), "foundation": part(bulk, "foundation", "lower")}
+            parts = {
+                "dam": extract_body(bulk, "dam"),
+                "foundation": extract_body(bulk, "foundation", "lower"),
+            }
             bodies = {name: body for name, (body, _, _) in parts.items()}
             bodies["joint"] = body_of(joint.points, [(b.type, b.data) for b in joint.cells])
-            moved = bulk.point_data["displacement"]
+            displacement = bulk.point_data["displacement"]
             fields[time] = Field(
-                {name: moved[used] for name, (_, used, _) in parts.items()},
+                {name: displacement[points] for name, (_, points, _) in parts.items()},
                 {name: stress for name, (_, _, stress) in parts.items()},
             )
     return bodies, fields
 
 
-def part(bulk: meshio.Mesh, *regions: str) -> tuple[Body, np.ndarray, np.ndarray]:
-    """Some regions of a mesh: as a body, its points there, its stress."""
+def extract_body(bulk: meshio.Mesh, *regions: str) -> tuple[Body, np.ndarray, np.ndarray]:
+    """Extract regions of a mesh: body, indices of its points (n,), stress (elements, 6) [Pa]."""
     numbers = {constants()[name.upper()][0]: name for name in regions}
     blocks = [
         (numbers[number], block.type, block.data[own == number], stress[own == number])
@@ -166,7 +190,7 @@ def part(bulk: meshio.Mesh, *regions: str) -> tuple[Body, np.ndarray, np.ndarray
 def body_of(
     points: np.ndarray, cells: list[tuple[str, np.ndarray]], regions: Sequence[str] = ()
 ) -> Body:
-    """A body with tags of its own."""
+    """Build a body with consecutive tags."""
     count = sum(len(table) for _, table in cells)
     tags, elements = np.arange(1, len(points) + 1), np.arange(1, count + 1)
     return Body(points, tags, cells, elements, list(regions))

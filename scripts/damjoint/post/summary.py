@@ -1,8 +1,9 @@
-"""What a run has found, level by level, for people: in units by size."""
+"""Summary of a run by level, as a table for terminal and report."""
 
 from __future__ import annotations
 
 from textwrap import wrap
+from typing import NamedTuple
 
 import numpy as np
 from tabulate import tabulate
@@ -11,7 +12,7 @@ from ..model.results import Results
 from ..statics import gravity
 from .units import FLUXES, FORCES, LENGTHS, MOMENTS, Units, unit
 
-#: Columns of the history at the requested levels: name, head, units.
+#: Columns of the summary: name in the history, heading, units.
 SHOWN: tuple[tuple[str, str, Units], ...] = (
     ("level", "level", LENGTHS[:1]),
     ("tail_level", "tailwater", LENGTHS[:1]),
@@ -29,42 +30,60 @@ SHOWN: tuple[tuple[str, str, Units], ...] = (
 )
 
 
-def table(columns: list[tuple[str, np.ndarray, Units]]) -> dict:
-    """Heads with units by size, and rows of text."""
-    heads, cells = [], []
-    for head, values, units in columns:
-        name, factor = unit([np.nan_to_num(values)], units)
-        heads.append(f"{head} [{name}]")
+class Table(NamedTuple):
+    """A table of text: names and units of the columns (a unit may be empty), rows of cells."""
+
+    names: list[str]
+    units: list[str]
+    rows: list[tuple[str, ...]]
+
+    @property
+    def heads(self) -> list[str]:
+        """Names with units, for one line."""
+        return [
+            f"{name} [{unit}]" if unit else name
+            for name, unit in zip(self.names, self.units, strict=True)
+        ]
+
+
+def table_of(columns: list[tuple[str, np.ndarray, Units]]) -> Table:
+    """Format columns (name, values, units) in units that suit their size."""
+    names, sizes, cells = [], [], []
+    for name, values, units in columns:
+        size, factor = unit([np.nan_to_num(values)], units)
+        names.append(name)
+        sizes.append(size)
         cells.append([f"{v * factor + 0.0:.4g}" if np.isfinite(v) else "-" for v in values])
-    return {"heads": heads, "rows": list(zip(*cells, strict=True))}
+    return Table(names, sizes, list(zip(*cells, strict=True)))
 
 
-def levels_table(result: Results) -> dict:
-    """The history at the requested levels and where the run has stopped; where the resultant is."""
+def levels_table(result: Results) -> Table:
+    """Tabulate the history at the requested levels and at the end of the run."""
     history, case = result.history, result.case
     rows = np.flatnonzero([np.isclose(case.requested, t).any() for t in history["time"]])
     if len(history["time"]):
         rows = np.union1d(rows, len(history["time"]) - 1)
     # a joint that is closed everywhere has its "largest opening" below 0
     history = history | {"max_opening": np.maximum(history["max_opening"], 0)}
-    shown = [
-        (head, history[name][rows], units)
-        for name, head, units in SHOWN
-        if (name != "flux" or case["uplift"] == "flow")
-        and (name not in ("tail_level", "process_zone") or history[name].any())
-    ]
-    found = table(shown)
-    length = case.joint_length
-    found["heads"].append("N' in")
-    where = (gravity.position(x, length) for x in history["x_resultant"][rows])
-    found["rows"] = [(*row, at) for row, at in zip(found["rows"], where, strict=True)]
-    return found
+    names, sizes, cells = table_of(
+        [
+            (head, history[name][rows], units)
+            for name, head, units in SHOWN
+            if (name != "flux" or case["uplift"] == "flow")
+            and (name not in ("tail_level", "process_zone") or history[name].any())
+        ]
+    )
+    thirds = (gravity.position(x, case.joint_length) for x in history["x_resultant"][rows])
+    cells = [(*row, third) for row, third in zip(cells, thirds, strict=True)]
+    return Table([*names, "N' in"], [*sizes, ""], cells)
 
 
 def text(result: Results) -> str:
-    """The table of the levels as text, for the terminal."""
-    found = levels_table(result)
-    named = (head.partition(" [") for head in found["heads"])
-    heads = ["\n".join([*wrap(name, 10), mark.strip() + size]) for name, mark, size in named]
+    """Format the table of the levels for the terminal."""
+    names, sizes, rows = levels_table(result)
+    heads = [
+        "\n".join([*wrap(name, 10), f"[{size}]" if size else ""])
+        for name, size in zip(names, sizes, strict=True)
+    ]
     sides = *("right" for _ in heads[1:]), "left"
-    return tabulate(found["rows"], heads, disable_numparse=True, colalign=sides)
+    return str(tabulate(rows, heads, disable_numparse=True, colalign=sides))

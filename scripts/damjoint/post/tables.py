@@ -1,21 +1,25 @@
-"""Results as files: joint.csv, history.csv, curve.csv."""
+"""Tables of a run as CSV files: joint.csv, history.csv, curve.csv."""
 
 from __future__ import annotations
 
 import csv
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TextIO
 
 import numpy as np
 
 from ..model.results import Results
-from ..storage import whole
+from ..storage import atomic_write
+
+#: A column of a table: numbers or texts.
+Column = np.ndarray | Sequence[float | str]
+#: Decimals of coordinates in metres: the mesh generator's last digits differ between machines.
+DECIMALS = 9
 
 
 def as_text(cell: str) -> str:
-    """A cell of a table that a spreadsheet shows and does not compute: a text that begins as a
-    formula does gets an apostrophe before it, a number none.
-    """
+    """Escape a text that a spreadsheet would evaluate as a formula, by an apostrophe."""
     try:
         float(cell)
     except ValueError:
@@ -23,12 +27,12 @@ def as_text(cell: str) -> str:
     return cell
 
 
-def write_csv(target: Path | TextIO, table: dict[str, np.ndarray | list]) -> None:
+def write_csv(target: Path | TextIO, table: Mapping[str, Column]) -> None:
     """Write a table with its column names to a path or an open file; numbers with twelve digits,
-    texts so that no spreadsheet takes them for a formula.
+    texts escaped by `as_text`.
     """
     if isinstance(target, Path):
-        with whole(target) as path, path.open("w", newline="") as file:
+        with atomic_write(target) as path, path.open("w", newline="") as file:
             write_csv(file, table)
         return
     writer = csv.writer(target, lineterminator="\n")
@@ -40,13 +44,11 @@ def write_csv(target: Path | TextIO, table: dict[str, np.ndarray | list]) -> Non
 
 
 def write(results: Results, folder: Path) -> None:
-    """Write joint.csv and history.csv into a folder; curve.csv (load against opening) of a driven
-    case.
-    """
+    """Write joint.csv and history.csv into a folder; under displacement control also curve.csv."""
     case, history = results.case, results.history
     joint = dict(results.joint)
-    for axis in "xyz":  # the mesh generator's last digits
-        joint[axis] = np.round(joint[axis], 9) + 0.0
+    for axis in "xyz":
+        joint[axis] = np.round(joint[axis], DECIMALS) + 0.0
     write_csv(folder / "joint.csv", joint)
     write_csv(folder / "history.csv", history)
     if case["drive"] != "level":

@@ -1,4 +1,4 @@
-"""Units by size, for pictures and reports: name, how many of it make one of the base unit."""
+"""Units that suit the size of a value, for pictures and reports: name, number per SI unit."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ LENGTHS: Units = (("m", 1), ("mm", 1e3), ("µm", 1e6), ("nm", 1e9))
 STRESSES: Units = (("MPa", 1e-6), ("kPa", 1e-3), ("Pa", 1))
 FORCES: Units = (("MN/m", 1e-6), ("kN/m", 1e-3), ("N/m", 1))
 MOMENTS: Units = (("MN m/m", 1e-6), ("kN m/m", 1e-3), ("N m/m", 1))
-#: Mass flux per metre of thickness; that of a joint without a crack is next to nothing.
+#: Mass flux per metre of thickness; tiny in a joint without a crack.
 FLUXES: Units = tuple((f"{name}g/(m s)", 1000.0**i) for i, name in enumerate(["k", "", *"mµnp"]))
 
 
 def unit(values: Iterable[np.ndarray], units: Units) -> tuple[str, float]:
-    """The unit in which the largest of the values is at least one, and its factor."""
+    """Choose the first unit in which the largest value is at least 1; name and factor."""
     largest = max((np.abs(v).max(initial=0) for v in values), default=0)
     return next((u for u in units if largest * u[1] >= 1), units[-1])
 
 
-def told(value: float, units: Units) -> str:
-    """A value with four digits and its unit."""
+def with_unit(value: float, units: Units, digits: int = 4) -> str:
+    """Format a value with some digits and its unit."""
     name, factor = unit([np.atleast_1d(value)], units)
-    return f"{value * factor:.4g} {name}"
+    return f"{value * factor:.{digits}g} {name}"

@@ -1,4 +1,4 @@
-"""The comparison with the published numbers (reference/ssnp142.csv)."""
+"""Comparison with the published numbers of SSNP142 (reference/ssnp142.csv)."""
 
 from __future__ import annotations
 
@@ -13,11 +13,13 @@ from ..model.case import CASES, Case
 from ..model.results import Results
 
 REFERENCE = data("reference") / "ssnp142.csv"
+#: Distance along x [m] within which nodes count as one: those across a joint in 3D.
+SAME_NODE = 1e-6
 
 
 @dataclass(frozen=True)
 class Reference:
-    """One published number: where, how much, how exactly, from whom, and how it was read."""
+    """A published number: where, value, tolerance, source, and how it was read."""
 
     modeling: str
     uplift: str
@@ -25,99 +27,95 @@ class Reference:
     x: float
     value: float
     unit: str
-    #: None: information only
+    #: relative; None: for information only
     tolerance: float | None
     source: str
     note: str
-    #: "node", or "extrapolated": a node value made from integration points by the published code
+    #: "node", or "extrapolated": a node value that the published code extrapolates from integration
+    #: points
     read_as: str
+    #: whether it is for information only although it has a tolerance: its sources contradict
+    informative: bool = False
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """A reference and what was computed."""
+    """A published number and the computed value."""
 
     reference: Reference
     computed: float
 
     @property
     def difference(self) -> float:
-        """Relative difference, computed over reference minus one."""
+        """Relative difference: computed over reference, minus 1."""
         return self.computed / self.reference.value - 1
 
     @property
     def verdict(self) -> str:
-        """Pass, fail, or info where the reference carries no tolerance, or the document prints
-        another value.
-        """
-        if (
-            self.reference.tolerance is None
-            or self.reference.note == "the document prints another value"
-        ):
+        """Pass or fail; info if the reference is for information only."""
+        if self.reference.tolerance is None or self.reference.informative:
             return "info"
         return "pass" if abs(self.difference) <= self.reference.tolerance else "fail"
 
 
 @lru_cache(maxsize=1)
 def table() -> list[Reference]:
-    """All reference rows."""
+    """Read all published numbers."""
     with REFERENCE.open() as file:
         return [
             Reference(
-                r["modeling"],
-                r["uplift"],
-                r["quantity"],
-                float(r["x"]),
-                float(r["value"]),
-                r["unit"],
-                float(r["rel_tolerance"]) if r["rel_tolerance"] else None,
-                r["source"],
-                r["note"],
-                r["read_as"],
+                modeling=row["modeling"],
+                uplift=row["uplift"],
+                quantity=row["quantity"],
+                x=float(row["x"]),
+                value=float(row["value"]),
+                unit=row["unit"],
+                tolerance=float(row["rel_tolerance"]) if row["rel_tolerance"] else None,
+                source=row["source"],
+                note=row["note"],
+                read_as=row["read_as"],
+                informative=bool(row["informative"]),
             )
-            for r in csv.DictReader(file)
+            for row in csv.DictReader(file)
         ]
 
 
 def references(case: Case) -> list[Reference]:
-    """The reference rows of a scene, if it is what has been published."""
+    """Published numbers of a scene; empty if the scene differs from the published one."""
     if not case.published:
         return []
     return [r for r in table() if r.modeling == case.name.upper() and r.uplift == case["uplift"]]
 
 
-def read_at(case: Case) -> float:
-    """The time the references belong to: the last, or the end of the prescribed displacement."""
+def reference_time(case: Case) -> float:
+    """Time of the published numbers: the last, or the end of the displacement control."""
     return case.times[-1] if case["drive"] == "level" else case["drive_end"]
 
 
 def modelings() -> list[str]:
-    """The cases that have reference rows and a case file."""
+    """List the cases that have published numbers and a case file."""
     return sorted(
         {r.modeling.lower() for r in table() if (CASES / f"{r.modeling.lower()}.case").exists()}
     )
 
 
 def compare(result: Results) -> list[Comparison]:
-    """Every reference row of the scene beside the computed value: at the node of the same x, mean
-    over z.
-
-    Read at the last level, or at the end of the prescribed displacement.
+    """Compare a scene with its published numbers at the nodes of the same x (mean over z), at
+    `reference_time`.
     """
-    found = []
+    comparisons = []
     case = result.case
-    time = read_at(case)
+    time = reference_time(case)
     for reference in references(case):
         rows = result.at(time) if reference.read_as == "node" else result.at_extrapolated(time)
-        near = np.abs(rows["x"] - reference.x)
-        found.append(
-            Comparison(reference, float(rows[reference.quantity][near < near.min() + 1e-6].mean()))
-        )
-    return found
+        away = np.abs(rows["x"] - reference.x)
+        computed = rows[reference.quantity][away < away.min() + SAME_NODE].mean()
+        comparisons.append(Comparison(reference, float(computed)))
+    return comparisons
 
 
 def report(comparisons: list[Comparison], style: str = "simple") -> str:
-    """The table as text, and its summary line; style: as tabulate has them."""
+    """Format the comparisons as a table and a summary line; style: a format of tabulate."""
     from tabulate import tabulate
 
     rows = [

@@ -72,7 +72,7 @@ class History:
         N, T, M = interface.chord.resultants(weights, interface.points.positions, along_axes)
         pressure = state.pressure
         assert pressure is not None  # of any converged state
-        normals = interface.bulk.joint.normals[interface.water_points.elements]
+        normals = interface.surface.normals[interface.water_points.elements]
         uplift = interface.water_points.weights * pressure.water_points / equilibrium.bulk.width
         row = {
             "time": state.time,
@@ -107,13 +107,13 @@ class History:
         """
         equilibrium = self.equilibrium
         law, interface = equilibrium.law, equilibrium.interface
-        place, corners = interface.space.place, len(equilibrium.bulk.joint.points)
+        place, corners = interface.space.locations, len(interface.surface.points)
         pressure, variables = state.pressure, state.node_variables
         assert pressure is not None  # of any converged state
         jump = interface.jumps(interface.at_nodes, state.jump)
         traction, _ = law.traction_and_tangent(jump, variables)
         damage, slip = law.damage(jump, variables), law.slip(variables, len(jump))
-        nodes = interface.at_places(np.column_stack([jump, traction, damage, slip]))
+        nodes = interface.mean_at_nodes(np.column_stack([jump, traction, damage, slip]))
         nodes[:, 3] -= pressure.nodes
         columns = [
             np.full((len(place), 2), (state.time, state.loading.level)),
@@ -121,10 +121,10 @@ class History:
             nodes[:, :6],
             pressure.nodes[:, None],
             nodes[:, 6:],
-            interface.way[:, None] * interface.length,
+            interface.xi[:, None] * interface.length,
         ]
         of_law = law.column_values(variables)
-        columns += [interface.at_places(of_law[name])[:, None] for name in law.columns]
+        columns += [interface.mean_at_nodes(of_law[name])[:, None] for name in law.columns]
         if pressure.flux is not None:
             columns.append(self.node_means(pressure.flux[:, None], True))
         table = np.hstack(columns)
@@ -145,7 +145,7 @@ class History:
         values (e, m).
         """
         space = self.equilibrium.interface.space
-        number = len(space.place) if middles else len(space.body.points)
+        number = len(space.locations) if middles else len(space.body.points)
         total, count, start = np.zeros((number, values.shape[1])), np.zeros(number), 0
         for (_, functions), (_, cells) in zip(space.connectivity, space.body.cells, strict=True):
             table = functions if middles else cells

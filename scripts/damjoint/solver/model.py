@@ -14,6 +14,7 @@ import numpy as np
 from .. import RunError
 from ..joint.equilibrium import Equilibrium
 from ..joint.interface import Interface
+from ..joint.linear_system import Border
 from ..laws import TANGENT, Mode
 from ..laws.base import Array
 from ..model.case import Case
@@ -78,7 +79,7 @@ class Model:
         fallback of a step that can be cut no more.
         """
         parts = ("growth", "secant", "release", "iterations")
-        table = zip(*(self.case.shared[f"attempt_{n}"] for n in parts), strict=True)
+        table = zip(*(self.case.shared[f"strategy_{n}"] for n in parts), strict=True)
         halvings = int(self.case["max_halvings"])
         most = 2 if self.equilibrium.law.releases_shear else 1
         return tuple(
@@ -199,7 +200,7 @@ class Model:
                 size = float(np.hypot(size, stiffness * gap))
 
             def correction(secant: bool) -> tuple[Array, float]:
-                edge = border and (residual.by_level(), *border)
+                edge = border and Border(residual.by_level(), *border)
                 change = residual.by_jump(secant)
                 return interface.solve(equilibrium.undamaged, change, -residual.value, edge)
 

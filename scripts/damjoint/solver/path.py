@@ -102,8 +102,8 @@ class Point:
         assert state.pressure is not None  # of any converged state
         jump = interface.jumps(interface.at_nodes, state.jump)
         traction, _ = law.traction_and_tangent(jump, state.node_variables)
-        toe = interface.way > 1 - 1e-9
-        return float((state.pressure.nodes - interface.at_places(traction[:, 0]))[toe].max())
+        toe = interface.xi > 1 - 1e-9
+        return float((state.pressure.nodes - interface.mean_at_nodes(traction[:, 0]))[toe].max())
 
     @property
     def last(self) -> dict[str, float]:
@@ -220,9 +220,9 @@ class EquilibriumPath:
         top, last = self.points[self.limit_point], self.points[-1]
         interface = last.model.equilibrium.interface
         moved = interface.jumps(interface.at_nodes, last.state.jump - top.state.jump)
-        along = interface.way * interface.length
+        along = interface.xi * interface.length
         crack = self.points[-1].last["crack_length"]
-        return movement(last.model.case, crack, along, interface.at_places(moved))
+        return movement(last.model.case, crack, along, interface.mean_at_nodes(moved))
 
     # -- its continuation
     # ----------------------------------------------------------------------------------------------

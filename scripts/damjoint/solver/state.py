@@ -42,7 +42,7 @@ class State:
         """Before any load."""
         law, interface = equilibrium.law, equilibrium.interface
         number = len(interface.points.weights), len(interface.rows)
-        jump = np.zeros(len(equilibrium.bulk.free))
+        jump = np.zeros(len(equilibrium.bulk.stiffness))
         return State(0.0, Loading(0.0, 0.0), jump, *(law.initial(n) for n in number))
 
     def after(self, previous: State) -> State:

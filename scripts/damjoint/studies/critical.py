@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain, zip_longest
 from pathlib import Path
@@ -21,6 +21,7 @@ from tqdm import tqdm
 
 from .. import InputError
 from ..engines import Outcome
+from ..engines.condensed.cache import interface_of
 from ..engines.condensed.solve import about
 from ..laws import Evidence
 from ..model.case import Case, load
@@ -33,7 +34,6 @@ from ..solver.path import PRECISION, ROUGH, SURE, Point
 from ..statics import gravity
 from ..statics.limit import elastic_heel_stress
 from ..statics.verdict import bound, highest_by_statics, statement, tension_share
-from .bodies import interface_of
 from .failure_path import CRITICAL, FailurePath, row
 
 #: Parameters that are divided by the strength reduction factor. With the fracture energies among
@@ -126,8 +126,8 @@ class Search:
         case: str,
         of: str,
         settings: dict | None = None,
-        levels: str | None = None,
-        tail_levels: str | None = None,
+        levels: str | Sequence[float] | None = None,
+        tail_levels: str | Sequence[float] | None = None,
         on_progress: Callable[[str], None] = lambda message: None,
     ) -> None:
         """case, settings, levels, tail_levels: as in model.case.load; of: level, strength, uplift
@@ -166,7 +166,7 @@ class Search:
         """The unit of what is varied, with a blank before it."""
         if self.of in ("level", "strength"):
             return " m" if self.of == "level" else ""
-        unit = parameter(self.name).meaning.rpartition("[")[2].rstrip("]")
+        unit = parameter(self.name).unit
         return "" if unit == "-" else f" {unit.replace(' per ', '/')}"
 
     # -- one value
@@ -213,9 +213,7 @@ class Search:
         """The highest level of the path, beyond the case's highest level."""
         name, *_ = self.source
         last = int(np.argmax(self.own.levels)) + 1
-        lists = (self.own.levels[:last], self.own.tail_levels[:last])
-        texts = (",".join(map(repr, values)) for values in lists)
-        case = load(name, self.settings, *texts)
+        case = load(name, self.settings, self.own.levels[:last], self.own.tail_levels[:last])
         path = self.path(max(case.levels), case, case.highest_level)
         path.follow(SURE)
         path.refine()
@@ -512,8 +510,8 @@ def write(search: Search, answer: Answer, out: Path, seconds: float) -> None:
     trials = [(t.value, t.stands, t.path) for t in search.trials]
     what = case.title, search.of, search.unit, trials
     shown = Found(*what, answer.value, answer.gravity, answer.mode)
-    with folders.taken(case, out):
-        folders.say(case, out, "interrupted" if answer.error else "complete", answer.doubt)
+    with folders.claim_output_folder(case, out):
+        folders.write_state(case, out, "interrupted" if answer.error else "complete", answer.doubt)
         if answer.point:
             result = last_state(search, answer.point)
             found = {"critical": as_json(search, answer), "wall_seconds": {"search": seconds}}

@@ -1,103 +1,112 @@
-"""The picture of a critical value: how far each dam that was tried can be filled."""
+"""Picture of a critical value: levels that the tried dams reach, and two equilibrium paths."""
 
 from __future__ import annotations
 
 import textwrap
+from pathlib import Path
 from typing import NamedTuple
 
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from ..post.drawing import write_picture
-from ..post.pictures import BLUE, GREEN, LENGTHS, ORANGE, RED, unit
+from ..post.drawing import BLUE, GREEN, ORANGE, RED, write_picture
+from ..post.units import LENGTHS, unit
 from ..solver.path import Point
 from .failure_path import FailurePath
 
 
-class Found(NamedTuple):
-    """What is drawn: title, what is varied and its unit, (value, stands, branch) of each trial, the
-    critical value by both methods (or None), the mode.
+class Trial(NamedTuple):
+    """A tried value: whether the dam stands, its equilibrium path."""
+
+    value: float
+    stands: bool
+    path: FailurePath
+
+
+class Content(NamedTuple):
+    """Content of the picture: title, varied quantity and its unit, trials, critical value by both
+    methods (None: not found), failure mode.
     """
 
     title: str
     of: str
     unit: str
-    trials: list[tuple[float, bool, FailurePath]]
+    trials: list[Trial]
     value: float | None
     gravity: float | None
     mode: str
 
 
-def draw(found: Found, path: Path) -> None:
-    """Draw level against crest for the dams on both sides of the critical value and, but for a
-    critical level, the highest level with every value.
+def draw(content: Content, path: Path) -> None:
+    """Draw level against crest displacement on both sides of the critical value; unless that is a
+    level, also the highest level with each value.
     """
-    single = found.of == "level"
+    single = content.of == "level"
     figure = Figure(figsize=(7.5 if single else 12, 4.8), layout="constrained")
     FigureCanvasAgg(figure)
     *left, right = figure.subplots(1, 1 if single else 2, squeeze=False)[0]
-    said = textwrap.fill(heading(found), 75 if single else 120)
-    figure.suptitle(said, fontsize=11, parse_math=False)
+    title = textwrap.fill(heading(content), 75 if single else 120)
+    figure.suptitle(title, fontsize=11, parse_math=False)
     for axes in left:
-        draw_trials(axes, found)
-    draw_branches(right, found)
+        draw_trials(axes, content)
+    draw_paths(right, content)
     for axes in (*left, right):
         axes.grid(alpha=0.3)
         axes.legend(fontsize=8)
     write_picture(figure, path, 110)
 
 
-def heading(found: Found) -> str:
-    """What the picture shows, in a line."""
-    if found.value is None:
-        return f"{found.title}: no critical {found.of} found"
-    said = f"{found.title}: critical {found.of} {found.value:.5g}{found.unit}"
-    return said + (f", {found.mode}" if found.mode else "")
+def heading(content: Content) -> str:
+    """Title of the picture: critical value and failure mode."""
+    if content.value is None:
+        return f"{content.title}: no critical {content.of} found"
+    text = f"{content.title}: critical {content.of} {content.value:.5g}{content.unit}"
+    return text + (f", {content.mode}" if content.mode else "")
 
 
-def draw_trials(axes: Axes, found: Found) -> None:
-    """The highest level found with each value."""
+def draw_trials(axes: Axes, content: Content) -> None:
+    """Draw the highest level reached with each value."""
     for stands, color, mark, label in (
-        (True, GREEN, "^", "stands at the level asked for"),
+        (True, GREEN, "^", "stands at the required level"),
         (False, RED, "v", "fails: its highest level"),
     ):
-        branches = {v: branch for v, ends, branch in found.trials if ends == stands}
-        levels = [b.target if stands else b.highest for b in branches.values()]
-        axes.plot(list(branches), levels, mark, color=color, label=label)
-    for value, style, label in marks(found):
+        paths = {trial.value: trial.path for trial in content.trials if trial.stands == stands}
+        levels = [b.target if stands else b.highest for b in paths.values()]
+        axes.plot(list(paths), levels, mark, color=color, label=label)
+    for value, style, label in critical_lines(content):
         axes.axvline(value, color="black", linestyle=style, linewidth=0.9, label=label)
-    axes.set(xlabel=f"{found.of} [{found.unit.strip() or '-'}]", ylabel="level [m]")
+    axes.set(xlabel=f"{content.of} [{content.unit.strip() or '-'}]", ylabel="level [m]")
 
 
-def marks(found: Found) -> list[tuple[float, str, str]]:
-    """The critical values to be marked: value, line style, label."""
-    by = ((found.value, "-", "critical"), (found.gravity, ":", "gravity method"))
-    return [(v, style, f"{name} {v:.5g}") for v, style, name in by if v is not None]
+def critical_lines(content: Content) -> list[tuple[float, str, str]]:
+    """Lines that mark the critical values: value, line style, label."""
+    lines = ((content.value, "-", "critical"), (content.gravity, ":", "gravity method"))
+    return [(v, style, f"{name} {v:.5g}") for v, style, name in lines if v is not None]
 
 
-def draw_branches(axes: Axes, found: Found) -> None:
-    """Level against crest of the last dam that stands and of the last one that fails."""
-    last = {ends: (value, branch) for value, ends, branch in found.trials if branch.points}
-    shown = [(ends, value, until_beyond(branch)) for ends, (value, branch) in last.items()]
-    crests = [[p.last["crest_ux"] for p in points] for *_, points in shown]
+def draw_paths(axes: Axes, content: Content) -> None:
+    """Draw level against crest of the last dam that stands and of the last one that fails."""
+    last = {trial.stands: trial for trial in content.trials if trial.path.points}
+    paths = [points_shown(trial.path) for trial in last.values()]
+    crests = [[p.last["crest_ux"] for p in points] for points in paths]
     name, factor = unit([abs(max(crest, key=abs)) for crest in crests], LENGTHS)
-    for (stands, value, points), crest in zip(shown, crests, strict=True):
-        label = f"{found.of} {value:.6g}{found.unit}"
+    for trial, points, crest in zip(last.values(), paths, crests, strict=True):
+        label = f"{content.of} {trial.value:.6g}{content.unit}"
         axes.plot(
-            [moved * factor for moved in crest],
+            [ux * factor for ux in crest],
             [p.level for p in points],
             "o-",
-            color=GREEN if stands else BLUE,
+            color=GREEN if trial.stands else BLUE,
             markersize=3,
-            label="equilibria" if found.of == "level" else label,
+            label="equilibria" if content.of == "level" else label,
         )
-    for value, style, label in marks(found) if found.of == "level" else ():
+    for value, style, label in critical_lines(content) if content.of == "level" else ():
         axes.axhline(value, color=ORANGE, linestyle=style, linewidth=1.2, label=f"{label} m")
     axes.set(xlabel=f"crest, downstream [{name}]", ylabel="level [m]")
 
 
-def until_beyond(path: FailurePath) -> list[Point]:
-    """The points of a path up to twice the displacement of its highest level."""
+def points_shown(path: FailurePath) -> list[Point]:
+    """Points of a path up to twice the displacement at its highest level."""
     far = 2 * path.imposed(path.points[path.top])
     return [p for p in path.points if p.imposed <= far]

@@ -1,88 +1,116 @@
-"""What a sweep goes over: values that are varied, sampled, or tied to them; one case per row."""
+"""Plan of a sweep: values that are varied, sampled or tied to them; one case per row."""
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from .. import InputError
+from ..arrays import Array, Value, Values
 from ..model import parameters
 from ..model.arithmetic import parsed, value_of
 from ..model.case import Case, load
 
-#: The texts of a row, by column.
-Row = dict[str, str]
+#: A row of a result file: texts by column.
+Row: TypeAlias = dict[str, str]
 
-#: Rows of a sweep at most.
+#: Limit of the number of rows.
 MOST_ROWS = 1_000_000
+
+#: Significant digits of the values, which are those of a result file.
+DIGITS = 12
 
 
 @dataclass(frozen=True)
-class Loading:
-    """How the case is filled, as `load` takes it."""
+class Schedule:
+    """Levels, steps and accuracy, as `load` takes them; None: those of the case."""
 
-    levels: str | None = None
-    tail_levels: str | None = None
+    levels: str | Sequence[float] | None = None
+    tail_levels: str | Sequence[float] | None = None
     steps: int | None = None
     accuracy: str | None = None
 
+    def load(self, case: str, settings: Values) -> Case:
+        """The case with some settings.
 
-#: By the case's own levels and steps.
-AS_IT_IS = Loading()
+        Raises InputError.
+        """
+        return load(
+            case, settings, self.levels, self.tail_levels, self.steps, accuracy=self.accuracy
+        )
+
+
+#: Levels, steps and mesh of the case.
+AS_IN_CASE = Schedule()
 
 
 @dataclass(frozen=True)
 class Sample:
-    """Distributions by name, as texts, and how many values are drawn how."""
+    """Distributions by name, as texts; number of values, design and seed of the sample."""
 
     number: int
-    laws: dict[str, str]
+    distributions: dict[str, str]
     design: str = "latin"
     seed: int = 0
     #: rank correlations, 'A,B=R' each
     correlate: list[str] = field(default_factory=list)
 
-    def values(self) -> dict[str, list[str]]:
+    def values(self) -> dict[str, list[Value]]:
         """The values by name.
 
         Raises InputError.
         """
         from . import sampling
 
-        drawn = sampling.draw(self.number, self.laws, self.design, self.seed, self.correlate)
-        found = {name: [f"{v:.12g}" for v in values] for name, values in drawn.items()}
-        for name, values in found.items():
-            for value in values:
-                try:
-                    check(name, value)
-                except InputError as error:
-                    raise InputError(
-                        f"--sample {name}={self.laws[name]}: draws {error}; truncnorm, uniform or "
-                        "lognorm keep within bounds"
-                    ) from None
-        return found
+        drawn = sampling.draw(
+            self.number, self.distributions, self.design, self.seed, self.correlate
+        )
+        values = {}
+        for name, numbers in drawn.items():
+            try:
+                values[name] = [checked(name, rounded(number)) for number in numbers]
+            except InputError as error:
+                raise InputError(
+                    f"--sample {name}={self.distributions[name]}: draws {error}; truncnorm, "
+                    "uniform or lognorm keep within bounds"
+                ) from None
+        return values
 
 
-def check(name: str, value: str) -> None:
-    """Raise InputError if a row can not have this value; name: a parameter or level."""
+def checked(name: str, value: Value) -> Value:
+    """The value of a row, from a text or a number; name: a parameter or level.
+
+    Raises InputError.
+    """
     if name != "level":
-        parameters.parameter(name).check(value)
-        return
+        return parameters.parameter(name).check(value)
     try:
-        finite = math.isfinite(parameters.number(value))
+        level = parameters.number(value) if isinstance(value, str) else value
     except ValueError:
-        finite = False
-    if not finite:
+        level = math.nan
+    if not math.isfinite(level):
         raise InputError(f"level = {value}: must be a level in metres")
+    return level
 
 
-def values_of(text: str) -> tuple[str, list[str]]:
-    """('name', ['v1', ...]) from 'name=v1,v2,...' or 'name=first:last:step'.
+def rounded(number: float) -> float:
+    """A number with as many digits as a result file has."""
+    return float(in_file(number))
+
+
+def in_file(value: Value) -> str:
+    """A value as a result file has it."""
+    return value if isinstance(value, str) else f"{value:.{DIGITS}g}"
+
+
+def values_of(text: str) -> tuple[str, list[Value]]:
+    """('name', [v1, ...]) from 'name=v1,v2,...' or 'name=first:last:step'.
 
     Raises InputError.
     """
@@ -93,72 +121,74 @@ def values_of(text: str) -> tuple[str, list[str]]:
     )
     if not equals or not values:
         raise bad
+    name = name.strip()
     if ":" not in values:
-        found = [v.strip() for v in values.split(",")]
-    else:
-        try:
-            first, last, step = (parameters.number(v) for v in values.split(":"))
-        except ValueError:
-            raise bad from None
-        if not np.isfinite([first, last, step]).all() or step == 0 or (last - first) / step < 0:
-            raise bad
-        if (last - first) / step >= MOST_ROWS:
-            raise InputError(f"--vary {text}: must give at most {MOST_ROWS} values")
-        found = [f"{first + i * step:.12g}" for i in range(int((last - first) / step + 1e-9) + 1)]
-    for value in found:
-        check(name.strip(), value)
-    return name.strip(), found
+        return name, [checked(name, v.strip()) for v in values.split(",")]
+    try:
+        first, last, step = (parameters.number(v) for v in values.split(":"))
+    except ValueError:
+        raise bad from None
+    if not np.isfinite([first, last, step]).all() or step == 0 or (last - first) / step < 0:
+        raise bad
+    if (last - first) / step >= MOST_ROWS:
+        raise InputError(f"--vary {text}: must give at most {MOST_ROWS} values")
+    number = int((last - first) / step + ROUNDING) + 1
+    return name, [checked(name, rounded(first + i * step)) for i in range(number)]
 
 
-def sample_of(words: list[str], **how: object) -> Sample:
-    """The sample of the words N NAME=DISTRIBUTION ...; how: design, seed, correlate.
+#: Of a step: what the last value of FIRST:LAST:STEP may lie beyond LAST.
+ROUNDING = 1e-9
+
+
+def sample_of(
+    words: list[str], design: str = "latin", seed: int = 0, correlate: Sequence[str] = ()
+) -> Sample:
+    """The sample of the words N NAME=DISTRIBUTION ...; the rest as in Sample.
 
     Raises InputError.
     """
-    number, *laws = words
+    number, *texts = words
     bad = InputError(
         f"--sample {' '.join(words)}: must be N NAME=DISTRIBUTION ..., such as "
         "1000 mu=normal(1.0,0.15)"
     )
-    if not number.isdecimal() or not 1 <= int(number) <= MOST_ROWS or not laws:
+    if not number.isdecimal() or not 1 <= int(number) <= MOST_ROWS or not texts:
         raise bad
-    found = {}
-    for text in laws:
-        name, equals, law = (part.strip() for part in text.partition("="))
-        if not equals or not law:
+    distributions: dict[str, str] = {}
+    for text in texts:
+        name, equals, distribution = (part.strip() for part in text.partition("="))
+        if not equals or not distribution:
             raise bad
-        if name in found:
+        if name in distributions:
             raise InputError(f"--sample {name}: must be given once")
-        found[name] = law
-    return Sample(int(number), found, **how)
+        distributions[name] = distribution
+    return Sample(int(number), distributions, design, seed, list(correlate))
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What a sweep goes over: all combinations of the varied values, each with the whole sample."""
+    """The values of a sweep: all combinations of the varied ones, each with the entire sample."""
 
-    varied: dict[str, list[str]]
-    sampled: dict[str, list[str]]
-    #: expressions of the names that stand before
+    varied: dict[str, list[Value]]
+    sampled: dict[str, list[Value]]
+    #: expressions of varied, sampled and previous tied names
     tied: dict[str, str]
-    #: whose critical value is a column: level, strength, uplift or a parameter; empty: none
+    #: quantity whose critical value is computed: level, strength, uplift, a parameter; empty: none
     critical: str = ""
 
     @property
     def critical_columns(self) -> list[str]:
-        """The columns of the critical value: itself, the mode, whether it is confirmed (1, 0), and
-        what confirms it or does not.
-        """
+        """Columns of the critical value: value, mode, whether it is confirmed (1, 0), why (not)."""
         names = f"critical_{self.critical}", "mode", "confirmed", "confirmed_by"
         return list(names) if self.critical else []
 
     @property
     def names(self) -> list[str]:
-        """What every row has a value of."""
+        """Parameters of which each row has a value; level."""
         return [*self.varied, *self.sampled, *self.tied]
 
-    def rows(self) -> Iterator[Row]:
-        """The values of each row.
+    def rows(self) -> Iterator[dict[str, Value]]:
+        """The values of each row by name.
 
         Raises InputError.
         """
@@ -175,12 +205,12 @@ class Plan:
 
 
 def column_of(name: str) -> str:
-    """The column of a plan's name: that of the level is the one asked for, history has another."""
+    """The column of a plan's name; that of the level differs from the one of the history."""
     return f"{name}_asked" if name == "level" else name
 
 
-def numbers(rows: list[Row], column: str) -> np.ndarray:
-    """A column as numbers; nan where there is none."""
+def numbers(rows: list[Row], column: str) -> Array:
+    """A column as numbers; nan where it is empty."""
     return np.array([float(row[column]) if row[column] else np.nan for row in rows])
 
 
@@ -189,43 +219,39 @@ def beside(out: Path, ending: str) -> Path:
     return out.with_name(out.stem + ending)
 
 
-def tie(name: str, expression: str, row: Row) -> str:
+def tie(name: str, expression: str, row: Values) -> Value:
     """The value of an expression of a row's values.
 
     Raises InputError.
     """
-    known = {}
-    for other, value in row.items():
-        try:
-            known[other] = parameters.number(value)
-        except ValueError:  # a text, such as a law
-            continue
+    known = {other: value for other, value in row.items() if not isinstance(value, str)}
     try:
-        value = f"{value_of(parsed(expression), known):.12g}"
+        value = rounded(value_of(parsed(expression), known))
     except ValueError:
         raise InputError(
             f"--tie {name}={expression}: must be arithmetic with + - * / ^ ( ), Pi and the names "
             f"varied, sampled or tied before ({', '.join(known)})"
         ) from None
-    check(name, value)
-    return value
+    return checked(name, value)
 
 
 def plan_of(
-    vary: list[str], tied: list[str], sample: Sample | None, settings: dict, critical: str = ""
+    vary: list[str], tied: list[str], sample: Sample | None, settings: Values, critical: str = ""
 ) -> Plan:
-    """The plan of the texts NAME=VALUES, NAME=EXPRESSION and a sample; settings: what is set;
-    critical: as in Plan.
+    """The plan of the texts NAME=VALUES, NAME=EXPRESSION and a sample; settings: parameters that
+    are set for all rows; critical: as in Plan.
 
     Raises InputError.
     """
     axes = [values_of(text) for text in vary]
-    ties = [tuple(part.strip() for part in text.partition("=")[::2]) for text in tied]
-    for text, (_, expression) in zip(tied, ties, strict=True):
+    ties = []
+    for text in tied:
+        name, _, expression = (part.strip() for part in text.partition("="))
         if not expression:
             raise InputError(f"--tie {text}: must be NAME=EXPRESSION, such as adhesion=2e5*mu")
-    laws = [*sample.laws] if sample else []
-    names = [("--vary", n) for n, _ in axes] + [("--sample", n) for n in laws]
+        ties.append((name, expression))
+    sampled = [*sample.distributions] if sample else []
+    names = [("--vary", n) for n, _ in axes] + [("--sample", n) for n in sampled]
     names += [("--tie", n) for n, _ in ties]
     for place, (option, name) in enumerate(names):
         if name in settings or any(name == other for _, other in names[:place]):
@@ -243,41 +269,42 @@ def plan_of(
     return Plan(dict(axes), sample.values() if sample else {}, dict(ties), critical)
 
 
-def cases_of(case: str, plan: Plan, settings: dict, loading: Loading) -> Iterator[tuple[Row, Case]]:
+def cases_of(
+    case: str, plan: Plan, settings: Values, schedule: Schedule
+) -> Iterator[tuple[dict[str, Value], Case]]:
     """The values of each row, and the case with them.
 
-    level: the last level; the levels of the case (or the loading) below it come first. Raises
+    level: the last level, after the levels of the case (or the schedule) below it. Raises
     InputError.
     """
-    words, known = vars(loading), {}
-    base = load(case, settings, **words)
+    base, independent = schedule.load(case, settings), parameters.independent()
+    # Gmsh's parser resolves a case once for all rows that differ in independent parameters only
+    resolved: dict[tuple[Value, ...], Case] = {}
     for row in plan.rows():
-        alone = {n: v for n, v in row.items() if n in parameters.independent()}
+        alone = {n: v for n, v in row.items() if n in independent}
         key = tuple(v for n, v in row.items() if n not in alone)
-        if key not in known:
-            changed = settings | {n: v for n, v in row.items() if n != "level"}
-            ends = up_to(base, float(row["level"])) if "level" in row else {}
-            known[key] = load(case, changed, **(words | ends))
-        yield row, known[key].changed(alone)
+        if key not in resolved:
+            changed = {**settings, **{n: v for n, v in row.items() if n != "level"}}
+            own = replace(schedule, **up_to(base, row["level"])) if "level" in row else schedule
+            resolved[key] = own.load(case, changed)
+        yield row, resolved[key].changed(alone)
 
 
-def up_to(base: Case, top: float) -> dict[str, str]:
+def up_to(base: Case, top: Value) -> dict[str, Any]:
     """Levels and tailwater of a case up to a last level: those of its levels that lie below come
     first.
 
-    The tailwater of the last level is the case's own where it first reaches that level (or its last
-    one).
+    The tailwater at the last level is that of the case where it first reaches this level (or its
+    last one).
     """
+    top = float(top)
     below = [i for i, level in enumerate(base.levels) if level < top]
     first = next((i for i, level in enumerate(base.levels) if level >= top), None)
     tail = base.tail_levels[-1]
     if first is not None and len(set(base.tail_levels)) > 1:
         before = base.levels[first - 1] if first else 0.0
-        share = (
-            (top - before) / (base.levels[first] - before) if base.levels[first] > before else 1.0
-        )
-        tail = base.tail_at(first + share)
-    levels = [*(base.levels[i] for i in below), top]
-    tails = [*(base.tail_levels[i] for i in below), tail]
-    joined = lambda values: ",".join(f"{v:.12g}" for v in values)
-    return {"levels": joined(levels), "tail_levels": joined(tails)}
+        rise = base.levels[first] - before
+        tail = base.tail_at(first + ((top - before) / rise if rise > 0 else 1.0))
+    levels = *(base.levels[i] for i in below), top
+    tails = *(base.tail_levels[i] for i in below), tail
+    return {"levels": levels, "tail_levels": tails}

@@ -1,4 +1,4 @@
-"""Sweeps: one row per combination of a plan's values, resumable, on all cores or a dask cluster."""
+"""Sweep: one row per combination of a plan's values, resumable, on all cores or a dask cluster."""
 
 from __future__ import annotations
 
@@ -9,153 +9,154 @@ import multiprocessing
 import os
 import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
+from typing import TypeAlias
 
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from .. import InputError, RunError, __version__, accuracy
+from ..arrays import Value, Values
 from ..engines import engine_of
+from ..engines.condensed.cache import interface_of
 from ..joint.interface import Interface
-from ..model.case import Case, first_mesh, load
+from ..model.case import Case, first_mesh
 from ..model.results import HISTORY
 from ..post.tables import as_text
 from ..solver.load_stepper import LoadStepper
 from ..statics.limit import mechanism
 from ..statics.verdict import failed, statement, verdict
 from ..storage import lock
-from .bodies import interface_of
 from .critical import Search
-from .plan import AS_IT_IS, Loading, Plan, Row, cases_of, column_of
+from .plan import AS_IN_CASE, Plan, Row, Schedule, cases_of, column_of, in_file
 
 
 def key_of(case: Case) -> str:
-    """What identifies a scene and its loading in a result file."""
-    return hashlib.sha256(
-        repr(
-            (sorted(case.values.items()), case.levels, case.tail_levels, case.times, __version__)
-        ).encode()
-    ).hexdigest()[:16]
+    """The key of a scene and its loading in a result file."""
+    identity = sorted(case.values.items()), case.levels, case.tail_levels, case.times, __version__
+    return hashlib.sha256(repr(identity).encode()).hexdigest()[:16]
 
 
-#: What a row says of its run as a whole: whether it fails (1, the exit code of `damjoint run`) or
-#: stands (0), and how, in words.
-SAID = ("failed", "verdict", "statement")
+#: Columns of the outcome: whether the dam fails (1, the exit code of `damjoint run`) or stands (0),
+#: and how, in a word and in a sentence.
+OUTCOME = ("failed", "verdict", "statement")
 
-#: The verdict of a row whose computation has failed.
+#: The verdict of a row whose computation has raised an error.
 ERROR = "failed"
 
-#: Verdicts that do not tell whether there is an equilibrium.
+#: Verdicts from which it is not known whether there is an equilibrium.
 UNDECIDED = (ERROR, "not converged", "interrupted")
 
-#: Rows that are computed together at most: they share the steps up to the levels where they part.
-MOST = 8
+#: Limit of the rows that are computed together: they share the steps up to their common level.
+MOST_TOGETHER = 8
+
+#: Solved cases that differ in levels only, by levels, tailwater and times.
+Solved: TypeAlias = dict[tuple[tuple[float, ...], ...], LoadStepper]
 
 
-def stepped(case: Case, known: dict[tuple, LoadStepper], interface: Interface) -> LoadStepper:
-    """The loading of a case to its end, continued from its last level but one; known: those that
-    have been computed, by levels and times.
-    """
+def stepped(case: Case, solved: Solved, interface: Interface) -> LoadStepper:
+    """The loading of a case to its end, continued from its last level but one."""
     key = case.levels, case.tail_levels, case.times
-    if key not in known:
+    if key not in solved:
         before = case.before_last_level()
         stepper = (
-            stepped(before, known, interface).fork(case) if before else LoadStepper(case, interface)
+            stepped(before, solved, interface).fork(case)
+            if before
+            else LoadStepper(case, interface)
         )
         stepper.run()
-        known[key] = stepper
-    return known[key]
+        solved[key] = stepper
+    return solved[key]
 
 
 @dataclass(frozen=True)
 class Task:
-    """What one row asks for."""
+    """The computation of one row."""
 
     case: Case
-    #: no search for the last equilibrium of a dam whose loads are beyond what its joint can hold
+    #: whether a dam whose loads exceed the strength of its joint is not loaded up to its failure
     quick: bool
-    #: what `critical.Search` takes, if a critical value is asked for
-    search: tuple = ()
-    #: columns of that value
+    #: the search of its critical value, if there is one, and its columns
+    search: Callable[[], Search] | None = None
     columns: Sequence[str] = ()
 
 
-def last_rows(tasks: list[Task]) -> list[dict[str, float | str]]:
-    """For cases that differ in levels only: the columns of history.csv at the last level (empty if
-    there is no equilibrium), what it says in words, and the critical value.
+def last_rows(tasks: list[Task]) -> list[dict[str, Value]]:
+    """Rows of cases that differ in levels only: the columns of history.csv at the last level (empty
+    if there is no equilibrium), the outcome, the critical value.
     """
-    known = {}
+    solved: Solved = {}
     with threadpool_limits(1):
-        return [last_row(task, known) | critical_value(task) for task in tasks]
+        return [last_row(task, solved) | critical_value(task) for task in tasks]
 
 
-def last_row(task: Task, known: dict[tuple, LoadStepper]) -> dict[str, float | str]:
-    """The row of a case; one whose computation fails, in whatever way, says why: the others go
-    on.
-    """
-    row = dict.fromkeys((*HISTORY, *SAID), "")
+def last_row(task: Task, solved: Solved) -> dict[str, Value]:
+    """The row of a case, whose outcome may be an error: the sweep continues."""
+    row: dict[str, Value] = dict.fromkeys(HISTORY, "")
     try:
         interface = interface_of(task.case)
-        found, why = mechanism(task.case, interface) if task.quick else ("", "")
-        if found:
-            return row | dict(zip(SAID, (1, found, why), strict=True))
-        result = stepped(task.case, known, interface).results()
+        mode, why = mechanism(task.case, interface) if task.quick else ("", "")
+        if mode:
+            return row | dict(zip(OUTCOME, (1.0, mode, why), strict=True))
+        result = stepped(task.case, solved, interface).results()
     except Exception as error:
-        return row | dict(zip(SAID, (1, ERROR, in_words(error)), strict=True))
-    last = {name: f"{value:.12g}" for name, value in result.last.items()}
-    said = int(failed(result)), verdict(result), statement(result)
-    return row | last | dict(zip(SAID, said, strict=True))
+        return row | dict(zip(OUTCOME, (1.0, ERROR, in_words(error)), strict=True))
+    outcome = float(failed(result)), verdict(result), statement(result)
+    return row | result.last | dict(zip(OUTCOME, outcome, strict=True))
 
 
 def in_words(error: Exception) -> str:
-    """Why a computation has failed, in a line."""
+    """The message of an error in one line."""
     kind = "" if isinstance(error, RunError) else f"{type(error).__name__}: "
     return " ".join(f"{kind}{error}".split())
 
 
-def critical_value(task: Task) -> dict[str, float | str]:
-    """The columns of a critical value; where the search fails it says why."""
+def critical_value(task: Task) -> dict[str, Value]:
+    """The columns of a critical value, or of the error of its search."""
     if not task.search:
         return {}
     try:
-        answer = Search(*task.search).run()
+        answer = task.search().run()
     except Exception as error:
-        return dict(zip(task.columns, ("", "", 0, in_words(error)), strict=True))
-    value = "" if answer.value is None else f"{answer.value:.12g}"
-    said = value, answer.mode, int(answer.confirmed), answer.why or answer.doubt
-    return dict(zip(task.columns, said, strict=True))
+        return dict(zip(task.columns, ("", "", 0.0, in_words(error)), strict=True))
+    value = "" if answer.value is None else answer.value
+    cells = value, answer.mode, float(answer.confirmed), answer.why or answer.doubt
+    return dict(zip(task.columns, cells, strict=True))
 
 
-def search_for(
-    case: str, plan: Plan, settings: dict, loading: Loading, row: Row, one: Case
-) -> tuple:
-    """What `Search` takes for the critical value of a row of a plan, whose case is given."""
-    if not plan.critical:
-        return ()
-    changed = settings | {n: one[n] for n in row if n != "level"}
-    levels, tails = (",".join(map(repr, v)) for v in (one.levels, one.tail_levels))
-    return case, plan.critical, changed, levels, tails
+def task_of(case: str, plan: Plan, settings: Values, row: Values, loaded: Case) -> Task:
+    """The task of a row: its values, and the case with them."""
+    search = None
+    if plan.critical:
+        changed = {**settings, **{n: loaded[n] for n in row if n != "level"}}
+        search = partial(Search, case, plan.critical, changed, loaded.levels, loaded.tail_levels)
+    return Task(loaded, bool(plan.sampled), search, plan.critical_columns)
 
 
 def bundles(tasks: dict[str, Task]) -> list[list[str]]:
-    """The keys of cases that differ in levels only, together; at most MOST of them, for rows to
-    come in time.
+    """Keys of cases that differ in levels only; at most MOST_TOGETHER, so that rows are written
+    in time.
     """
-    groups: dict[tuple, list[str]] = {}
+    groups: dict[tuple[tuple[str, Value], ...], list[str]] = {}
     for key, task in tasks.items():
         groups.setdefault(tuple(sorted(task.case.values.items())), []).append(key)
-    return [keys[i : i + MOST] for keys in groups.values() for i in range(0, len(keys), MOST)]
+    return [
+        keys[i : i + MOST_TOGETHER]
+        for keys in groups.values()
+        for i in range(0, len(keys), MOST_TOGETHER)
+    ]
 
 
 def read_done(path: Path, columns: list[str], numeric: Sequence[str]) -> dict[str, Row]:
-    """The complete rows of a result file by key, its first column; a half-written last line is cut
-    off.
+    """The complete rows of a result file by key, its first column; an incomplete last line is
+    removed from the file.
 
-    numeric: the columns that hold nothing but numbers. Raises InputError.
+    numeric: columns of numbers. Raises InputError.
     """
     if not path.exists() or not path.stat().st_size:
         return {}
@@ -191,29 +192,32 @@ def read_done(path: Path, columns: list[str], numeric: Sequence[str]) -> dict[st
 
 @contextlib.contextmanager
 def pool_of(jobs: int) -> Iterator[ProcessPoolExecutor]:
-    """Processes that end with this one, even where it is killed; once one fails, or the caller,
-    nothing more is begun.
+    """Processes that end with this one, even if it is killed; after an error in one of them or in
+    the caller no further task starts.
     """
     with ProcessPoolExecutor(jobs, initializer=end_with_parent) as pool:
         try:
             yield pool
         except BaseException:
-            pool.shutdown(cancel_futures=True)  # waits: a pool that has gone cancels nothing
+            pool.shutdown(cancel_futures=True)  # waits: else nothing would be cancelled
             raise
 
 
 def end_with_parent() -> None:
-    """End this process when the one that has started it is gone."""
+    """End this process when the one that started it ends."""
 
     def wait() -> None:
-        multiprocessing.parent_process().join()
-        os._exit(1)
+        if parent := multiprocessing.parent_process():
+            parent.join()
+            os._exit(1)
 
     threading.Thread(target=wait, daemon=True).start()
 
 
-def spread(tasks: dict[str, Task], jobs: int, scheduler: str | None) -> Iterator[tuple[str, dict]]:
-    """(key, row) of each task as it is done: here, in `jobs` processes, or on a dask scheduler."""
+def spread(
+    tasks: dict[str, Task], jobs: int, scheduler: str | None
+) -> Iterator[tuple[str, dict[str, Value]]]:
+    """(key, row) of each finished task: in this process, in `jobs` processes, or by a scheduler."""
     work = bundles(tasks)
     chosen = [[tasks[key] for key in keys] for keys in work]
     if scheduler:
@@ -255,70 +259,74 @@ def spread(tasks: dict[str, Task], jobs: int, scheduler: str | None) -> Iterator
                 ) from None
 
 
-def meshed(case: str, settings: dict, loading: Loading) -> tuple[dict, Loading, str]:
-    """Settings and loading of a sweep on one mesh, that which the loading's accuracy asks for of
-    the case before anything is varied; and its errors there, in words.
+def meshed(
+    case: str, settings: Values, schedule: Schedule
+) -> tuple[dict[str, Value], Schedule, str]:
+    """Settings and schedule of a sweep on the mesh that the schedule's accuracy requires of the
+    case before anything is varied; the estimated errors, as a sentence.
 
     Raises InputError, RunError.
     """
-    one = load(case, settings, **vars(loading))
+    base = schedule.load(case, settings)
     (outcome, *_) = accuracy.solve(
-        replace(one, also_uplift=()), engine_of(one, "auto"), lambda *_: None, False
+        replace(base, also_uplift=()), engine_of(base, "auto"), lambda *_: None, False
     )
     if outcome.error:
         raise outcome.error
-    mesh = first_mesh(one) | settings | {n: outcome.result.case[n] for n in accuracy.REFINED}
-    steps = loading.steps or (1 if one["drive"] == "level" else None)
-    said = outcome.result.info["error_estimate"]["statement"]
-    return mesh, replace(loading, steps=steps, accuracy=None), said
+    refined = {n: outcome.result.case[n] for n in accuracy.REFINED}
+    steps = schedule.steps or (1 if base["drive"] == "level" else None)
+    estimate = outcome.result.info["error_estimate"]["statement"]
+    mesh = {**first_mesh(base), **settings, **refined}
+    return mesh, replace(schedule, steps=steps, accuracy=None), estimate
 
 
 def sweep(
     case: str,
     plan: Plan,
-    settings: dict,
+    settings: Values,
     out: Path,
-    loading: Loading = AS_IT_IS,
+    schedule: Schedule = AS_IN_CASE,
     jobs: int | None = None,
     scheduler: str | None = None,
-    progress: Callable = tqdm,
+    progress: Callable[..., Iterable[tuple[str, dict[str, Value]]]] = tqdm,
 ) -> tuple[int, list[Row]]:
-    """Compute what is missing in out (CSV); the number of rows computed, and all rows of the plan.
+    """Compute the rows of a plan that are missing in out (CSV).
 
-    Columns: key, the plan's names (level as level_asked), the columns of history.csv, whether it
-    failed, verdict and statement, the critical value. Each row is written whole when it is done; a
-    sweep that is interrupted goes on where it was. Raises InputError, RunError.
+    Returns their number, and all rows of the plan. Columns: key, the plan's names (level as
+    level_asked), the columns of history.csv, OUTCOME, the critical value. Each finished row is
+    written at once, so that an interrupted sweep can be continued. Raises InputError, RunError.
     """
     if jobs is not None and jobs < 1:
         raise InputError(f"jobs = {jobs}: must be an integer >= 1")
     if not out.parent.is_dir():
         raise InputError(f"out = {out}: must be a file in an existing folder")
-    chosen, tasks, keys = {}, {}, []
-    for values, one in cases_of(case, plan, settings, loading):
-        search = search_for(case, plan, settings, loading, values, one)
-        keys.append(key_of(one))
-        chosen[keys[-1]] = values
-        tasks[keys[-1]] = Task(one, bool(plan.sampled), search, plan.critical_columns)
-    results = [*HISTORY, *SAID, *plan.critical_columns]
+    values: dict[str, Values] = {}
+    tasks: dict[str, Task] = {}
+    keys = []
+    for row, loaded in cases_of(case, plan, settings, schedule):
+        keys.append(key_of(loaded))
+        values[keys[-1]] = row
+        tasks[keys[-1]] = task_of(case, plan, settings, row, loaded)
+    results = [*HISTORY, *OUTCOME, *plan.critical_columns]
     columns = ["key", *map(column_of, plan.names), *results]
     done = read_done(out, columns, (*HISTORY, "failed"))
     missing = {key: task for key, task in tasks.items() if key not in done}
     if missing:
         first = next(iter(missing.values()))
         if first.search:
-            Search(*first.search)  # what is asked for is checked here
-        interface_of(first.case)  # condensed once, before the processes start
+            first.search()  # checks the quantity
+        interface_of(first.case)  # condensed before the processes start, which read it
     with out.open("a", newline="") as file:
         lock(file.fileno(), out)
         writer = csv.writer(file, lineterminator="\n")
         if not file.tell():
             writer.writerow(columns)
         rows = spread(missing, jobs or os.cpu_count() or 1, scheduler) if missing else ()
-        for key, row in progress(
+        for key, result in progress(
             rows, total=len(missing), desc=f"sweep {case}", disable=not sys.stderr.isatty()
         ):
-            cells = *chosen[key].values(), *(row[c] for c in results)
-            writer.writerow([key, *(as_text(str(cell)) for cell in cells)])
+            cells = *values[key].values(), *(result[c] for c in results)
+            writer.writerow([key, *(as_text(in_file(cell)) for cell in cells)])
             file.flush()
-    found = read_done(out, columns, ())
-    return len(missing), [found[key] for key in keys]
+    done = read_done(out, columns, ())
+    return len(missing), [done[key] for key in keys]

@@ -1,6 +1,6 @@
-"""The condensed engine: bodies condensed onto the joint once, the loading followed there alone.
+"""The condensed engine: bodies condensed onto the joint once, then load steps on the joint only.
 
-cache.py    condensed bodies on disk
-recover.py  displacement and stress of the bodies, from the joint's jump
+cache.py    condensed bodies on disk, the last joint in memory
+recover.py  displacement and stress of the bodies, from the displacement jump
 solve.py    the interface to the rest
 """

@@ -1,7 +1,8 @@
-"""Condensed bodies kept on disk, by mesh and elasticity.
+"""Condensed bodies on disk, by mesh and elasticity; the joint interface last used in memory.
 
-A file is numpy's npz (arrays only, nothing that could be executed) with a header: the version and
-the scene it belongs to. What is foreign, damaged or of another version is ignored and made anew.
+A file is numpy's npz (arrays only, nothing that could be executed) with a header, the version and
+the scene it belongs to, and the tree of the values as JSON. A foreign or damaged file or one of
+another version is ignored and replaced.
 """
 
 from __future__ import annotations
@@ -11,27 +12,31 @@ import hashlib
 import json
 import os
 import zipfile
-from dataclasses import fields
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy import linalg
 
 from ... import RunError, __version__, data
-from ...fem.condensation import MATERIAL, Bodies, Condensed, check_size, condense
+from ...arrays import Array
+from ...fem.bodies import PARAMETERS, Bodies
+from ...fem.condensation import Condensed, CondensedJoint, condense
+from ...fem.memory import check_size
+from ...joint.interface import Interface
 from ...model.case import Case
 from ...model.loads import overtopped
-from ...model.mesh import Body, Mesh, mesh_of, shares
+from ...model.mesh import Body, Face, JointMesh, Mesh, mesh_of, shares
 
-#: The cache is kept below this size [bytes]; the files longest unused go first.
+#: Size up to which the cache may grow [bytes]; the files longest unused are deleted first.
 LIMIT = 2_000_000_000
 
 
 def folder() -> Path | None:
-    """Where condensed bodies are kept: $DAMJOINT_CACHE (empty: nowhere), else the user's cache
-    folder.
-    """
+    """Folder of the cache: $DAMJOINT_CACHE (empty: none), else in the user's cache folder."""
     named = os.environ.get("DAMJOINT_CACHE")
     if named is not None:
         return Path(named) if named else None
@@ -39,17 +44,18 @@ def folder() -> Path | None:
     return Path(home) / "damjoint" if os.path.isabs(home) else None
 
 
-def key_of(case: Case) -> tuple:
-    """What condensed bodies depend on."""
+def key_of(case: Case) -> tuple[object, ...]:
+    """All that condensed bodies depend on."""
     shape = fingerprint(mesh_of(case)) if case.geometry else tuple(shares(case).items())
-    faces = max(case.tail_levels) > 0, case["floor_water"], overtopped(case)
-    if case.geometry:  # which are under water is not known without their heights
-        faces = (*faces, case.reached, max(case.tail_levels))
-    return (shape, *(case[n] for n in MATERIAL), *faces)
+    tail = max(case.tail_levels)
+    faces = tail > 0, case["floor_water"], overtopped(case)
+    # which faces of an own geometry are under water depends on heights that only its mesh has
+    levels = (case.reached, tail) if case.geometry else ()
+    return (shape, *(case[n] for n in PARAMETERS), *faces, *levels)
 
 
 def fingerprint(mesh: Mesh) -> str:
-    """A fingerprint of a mesh: its bodies and faces."""
+    """Hash of a mesh: its bodies and faces."""
     surfaces = {name: face.surface for name, face in mesh.faces.items()}
     digest = hashlib.sha256()
     for name, body in (mesh.bodies | surfaces).items():
@@ -61,65 +67,87 @@ def fingerprint(mesh: Mesh) -> str:
 
 @lru_cache(maxsize=1)
 def sources() -> str:
-    """A fingerprint of all that makes condensed bodies of a case: meshes and elements."""
-    makers = sorted((Path(__file__).parents[2] / "fem").glob("*.py"))
-    texts = [path.read_bytes() for path in (*sorted(data("geo").glob("*.geo")), *makers)]
+    """Hash of the files that condensed bodies of a case are computed by: meshes and elements."""
+    code = sorted((Path(__file__).parents[2] / "fem").glob("*.py"))
+    texts = [path.read_bytes() for path in (*sorted(data("geo").glob("*.geo")), *code)]
     return hashlib.sha256(b"".join(texts)).hexdigest()
 
 
 def cached(case: Case) -> tuple[Condensed, Bodies | None]:
-    """The condensed bodies of a case, from the cache or made and kept there.
+    """Condensed bodies of a case, from the cache or computed and added to it; and the bodies they
+    were computed from, if they were.
 
-    Returns them, and if they had to be made what they were made of. Raises RunError (mesh, memory).
+    Raises RunError (mesh, memory).
     """
     header = json.dumps([__version__, sources(), key_of(case)])
-    place = folder()
-    path = place and place / (hashlib.sha256(header.encode()).hexdigest()[:24] + ".npz")
-    found = read(path, header) if path else None
-    if found:
-        return found, None
+    parent = folder()
+    path = parent and parent / (hashlib.sha256(header.encode()).hexdigest()[:24] + ".npz")
+    stored = read(path, header) if path else None
+    if stored:
+        return stored, None
     if not case.geometry:
         check_size(case)
     try:
         with np.errstate(over="raise", invalid="raise"):
             bodies = Bodies.of(case)
-            made = condense(case, bodies)
+            condensed = condense(case, bodies)
     except (ArithmeticError, RuntimeError, linalg.LinAlgError) as error:
         if isinstance(error, RunError):
             raise
         raise RunError(f"bodies: can not be eliminated ({error}); look at the geometry") from None
     if path:
-        keep(made, header, path)
-    return made, bodies
+        write(condensed, header, path)
+    return condensed, bodies
+
+
+@dataclass
+class LastInterface:
+    """A cache of one entry: a study computes its scenes mesh by mesh, and an interface with its
+    dense matrices may take gigabytes.
+    """
+
+    key: tuple[object, ...] = ()
+    interface: Interface | None = None
+
+    def of(self, case: Case) -> Interface:
+        """The joint of a case with its condensed bodies."""
+        key = *key_of(case), case["quadrature"]
+        if self.interface is None or key != self.key:
+            self.interface = None  # free its memory first
+            self.interface, self.key = Interface(cached(case)[0], case["quadrature"]), key
+        return self.interface
+
+
+#: The interface of this process: studies and tools share it.
+interface_of = LastInterface().of
 
 
 def read(path: Path, header: str) -> Condensed | None:
-    """The bodies in a file, if they are there, whole and those of the header."""
+    """Condensed bodies in a file; None if it is missing, damaged or of another header."""
     if not path.is_file():
         return None
     try:
         with np.load(path, allow_pickle=False) as file:
             if str(file["header"]) != header:
                 return None
-            found = unpacked({name: file[name] for name in file["names"].tolist()})
+            condensed: Condensed = unpack(json.loads(str(file["tree"])), file)
         path.touch()
-        return found
-    except Exception:  # numpy and zipfile raise whatever a damaged byte leads them to
+        return condensed
+    except Exception:  # a damaged byte can make numpy and zipfile raise anything
         return None
 
 
-def keep(made: Condensed, header: str, path: Path) -> None:
-    """Write bodies to a file, whole or not at all; a cache that can not be written costs time
-    only.
-    """
+def write(condensed: Condensed, header: str, path: Path) -> None:
+    """Write condensed bodies to a file, whole or not at all; an OSError only costs the entry."""
     part = path.with_suffix(f".{os.getpid()}")
+    arrays: dict[str, Array] = {}
+    tree = json.dumps(pack(condensed, "bodies", arrays))
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         part.unlink(missing_ok=True)
-        # as numpy.savez does it, but closed also where the disk is full, and never through a link
+        # as numpy.savez does it, but closed also if the disk is full, and never through a link
         with zipfile.ZipFile(part, "x") as file:
-            arrays = packed(made)
-            about = {"header": np.array(header), "names": np.array(list(arrays))}
+            about = {"header": np.array(header), "tree": np.array(tree)}
             for name, array in (about | arrays).items():
                 with file.open(f"{name}.npy", "w", force_zip64=True) as entry:
                     np.lib.format.write_array(entry, array, allow_pickle=False)
@@ -130,62 +158,47 @@ def keep(made: Condensed, header: str, path: Path) -> None:
             part.unlink(missing_ok=True)
 
 
-def packed(made: Condensed) -> dict[str, np.ndarray]:
-    """All of it as arrays: {"attribute", "attribute/name" or "attribute/name/part": array}."""
-    flat = {}
-    for field in fields(made):
-        value = getattr(made, field.name)
-        for name, item in value.items() if isinstance(value, dict) else [("", value)]:
-            place = f"{field.name}/{name}" if isinstance(value, dict) else field.name
-            if isinstance(item, Body):
-                flat |= {f"{place}/{part}": getattr(item, part) for part in BODY}
-                flat |= {f"{place}/cells/{i}/{s}": t for i, (s, t) in enumerate(item.cells)}
-            else:
-                flat[place] = np.asarray(item)
-    return flat
+#: The dataclasses of which condensed bodies are made.
+CLASSES = {cls.__name__: cls for cls in (Condensed, CondensedJoint, JointMesh, Face, Body)}
 
 
-BODY = ("points", "node_tags", "element_tags", "normals")
+def pack(value: Any, path: str, arrays: dict[str, Array]) -> object:
+    """Tree of a value for JSON; its arrays are added to `arrays` by their paths in the tree."""
+    if isinstance(value, np.ndarray):
+        arrays[path] = value
+        return {"array": path}
+    if type(value) in CLASSES.values():
+        content = {field.name: getattr(value, field.name) for field in fields(value)}
+        return {"class": type(value).__name__, "fields": pack(content, path, arrays)}
+    if isinstance(value, dict):
+        return {"dict": {key: pack(v, f"{path}/{key}", arrays) for key, v in value.items()}}
+    if isinstance(value, list | tuple):
+        items = [pack(v, f"{path}/{i}", arrays) for i, v in enumerate(value)]
+        return items if isinstance(value, list) else {"tuple": items}
+    return value
 
 
-def unpacked(flat: dict[str, np.ndarray]) -> Condensed:
-    """The bodies from their arrays.
+def unpack(tree: Any, arrays: Mapping[str, Array]) -> Any:
+    """The value of a tree.
 
-    Raises KeyError, ValueError if something is missing.
+    Raises KeyError, TypeError if something is missing.
     """
-
-    def body(place: str) -> Body:
-        cells = sorted(n for n in flat if n.startswith(f"{place}/cells/"))
-        return Body(
-            **{part: flat[f"{place}/{part}"] for part in BODY},
-            cells=[(n.rsplit("/", 1)[1], flat[n]) for n in cells],
-        )
-
-    found = {}
-    for field in fields(Condensed):
-        here = [n for n in flat if n == field.name or n.startswith(f"{field.name}/")]
-        if field.type == "Body":
-            found[field.name] = body(field.name)
-        elif field.type.startswith("dict"):
-            names = dict.fromkeys(n.split("/")[1] for n in here)
-            bodies = field.type == "dict[str, Body]"
-            found[field.name] = {
-                n: body(f"{field.name}/{n}") if bodies else plain(flat[f"{field.name}/{n}"])
-                for n in names
-            }
-        else:
-            found[field.name] = plain(flat[field.name])
-    return Condensed(**found)
+    if isinstance(tree, list):
+        return [unpack(item, arrays) for item in tree]
+    if not isinstance(tree, dict):
+        return tree
+    if "array" in tree:
+        return arrays[tree["array"]]
+    if "class" in tree:
+        return CLASSES[tree["class"]](**unpack(tree["fields"], arrays))
+    if "tuple" in tree:
+        return tuple(unpack(tree["tuple"], arrays))
+    return {key: unpack(item, arrays) for key, item in tree["dict"].items()}
 
 
-def plain(array: np.ndarray) -> np.ndarray | float | int:
-    """An array, or the number in it if it has no dimension."""
-    return array if array.ndim else array.item()
-
-
-def prune(place: Path) -> None:
-    """Delete the files longest unused until the cache is below its limit."""
-    files = sorted(place.glob("*.npz"), key=lambda f: f.stat().st_mtime)
+def prune(parent: Path) -> None:
+    """Delete the files longest unused until the cache is not above its limit."""
+    files = sorted(parent.glob("*.npz"), key=lambda f: f.stat().st_mtime)
     total = sum(f.stat().st_size for f in files)
     for file in files:
         if total <= LIMIT:

@@ -1,87 +1,128 @@
-"""Displacement and stress of the bodies, from the joint's jump."""
+"""Displacement and stress of the bodies, from the displacement jump of the joint."""
 
 from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
 
-from ...fem.condensation import Bodies, body_of, material_of, unit_loads, unknowns
+from ...arrays import Array, IntArray, Sparse
+from ...fem.bodies import Bodies, ElasticBody, material_of
 from ...fem.elasticity import stress
 from ...fem.factor import solve_symmetric
 from ...joint.equilibrium import Equilibrium
 from ...model.fields import Field
 from ...solver.history import History
+from ...solver.state import State
+
+
+@dataclass(frozen=True, kw_only=True)
+class GluedBodies:
+    """Both bodies of a joint, glued there: one elastic body, the lower one's numbers first."""
+
+    stiffness: Sparse
+    #: degrees of freedom that are not fixed
+    free: IntArray
+    #: number of each degree of freedom of the upper body, and the boolean matrix to that from them
+    number: IntArray
+    from_upper: Sparse
+
+    @staticmethod
+    def of(upper: ElasticBody, lower: ElasticBody) -> GluedBodies:
+        """Assemble two bodies."""
+        upper_size, lower_size = upper.stiffness.shape[0], lower.stiffness.shape[0]
+        number = np.full(upper_size, -1)
+        number[upper.joint_dofs] = lower.joint_dofs
+        own = np.flatnonzero(number < 0)
+        number[own] = lower_size + np.arange(len(own))
+        size = lower_size + len(own)
+        from_upper = sparse.csr_matrix(
+            (np.ones(upper_size), (np.arange(upper_size), number)), (upper_size, size)
+        )
+        empty = sparse.csr_matrix((len(own), len(own)))
+        stiffness = sparse.block_diag([lower.stiffness, empty]) + (
+            from_upper.T @ upper.stiffness @ from_upper
+        )
+        fixed = np.union1d(lower.fixed_dofs, number[upper.fixed_dofs])
+        free = np.setdiff1d(np.arange(size), fixed)
+        return GluedBodies(
+            stiffness=stiffness.tocsr(), free=free, number=number, from_upper=from_upper
+        )
+
+    def solve(self, loads: Array) -> Array:
+        """Displacements (n, m) under loads (n, m)."""
+        solution = np.zeros(loads.shape)
+        stiffness = self.stiffness[self.free][:, self.free]
+        solution[self.free] = solve_symmetric(stiffness, loads[self.free])
+        return solution
+
+
+def add_external_forces(
+    load: Array, body: ElasticBody, equilibrium: Equilibrium, state: State
+) -> None:
+    """Add water, weight and line forces of a state to the load vector (n,) of a body."""
+    for name, dofs in body.face_dofs.items():
+        face = equilibrium.interface.faces[name]
+        np.add.at(load, dofs, equilibrium.face_forces(face, state.loading))
+    for name, size in equilibrium.units_of(state.loading).items():
+        if name in body.unit_loads:
+            load += size * body.unit_loads[name]
 
 
 def recover(bodies: Bodies, scenes: list[tuple[Equilibrium, History]]) -> list[dict[float, Field]]:
-    """The fields of the saved states of scenes on the same bodies, by scene and time: the bulk
-    solved once more. Displacements count from the state under the weight alone, if there is one.
+    """Fields of the saved states of scenes on the same bodies, by scene and time. Displacements
+    count from the state under the weight alone, if there is one.
 
-    Dam and foundation glued at the joint are one elastic body, loaded besides by the forces that
-    the jump needs in the dam, -K_dam jump; the water in the joint acts on both lips and cancels.
+    The bodies glued at the joint are loaded also by the forces that the jump needs in the upper
+    one, -K_u jump; the water in the joint acts on both joint faces and cancels.
     """
-    dim, stiff_dam = bodies.dim, bodies.stiffness["dam"]
-    sizes = stiff_dam.shape[0], bodies.stiffness["foundation"].shape[0]
-    # glue: each unknown of the dam in the numbering of the whole, the foundation's first
-    lips = {name: unknowns(functions, dim) for name, functions in bodies.joint.items()}
-    glue = np.full(sizes[0], -1)
-    glue[lips["dam"]] = lips["foundation"]
-    own = np.flatnonzero(glue < 0)
-    glue[own] = sizes[1] + np.arange(len(own))
-    total = sizes[1] + len(own)
-    ones = np.ones(sizes[0])
-    spread = sparse.csr_matrix((ones, (np.arange(sizes[0]), glue)), (sizes[0], total))
-    nothing = sparse.csr_matrix((len(own), len(own)))
-    whole = sparse.block_diag([bodies.stiffness["foundation"], nothing]) + (
-        spread.T @ stiff_dam @ spread
-    )
-    held = np.union1d(bodies.held["foundation"], glue[bodies.held["dam"]])
-    free = np.setdiff1d(np.arange(total), held)
-
     states = [
-        (joint, state)
-        for joint, record in scenes
-        for state in (*record.saved, *filter(None, [record.at_rest]))
+        (equilibrium, state)
+        for equilibrium, history in scenes
+        for state in (*history.saved, *filter(None, [history.at_rest]))
     ]
-    if not any(record.saved for _, record in scenes):
+    if not any(history.saved for _, history in scenes):
         return [{} for _ in scenes]
-    case = states[0][0].case
-    units = {name: unit_loads(bodies, name) for name in bodies.spaces}
-    jumps = np.zeros((len(states), sizes[0]))
-    rights = np.zeros((total, len(states)))
-    for i, (joint, state) in enumerate(states):
-        jumps[i, lips["dam"][joint.bulk.free]] = state.jump
-        load = {"dam": -stiff_dam @ jumps[i], "foundation": np.zeros(sizes[1])}
-        for name, face in joint.interface.faces.items():
-            body, places = body_of(bodies.mesh.faces[name]), unknowns(bodies.faces[name], dim)
-            np.add.at(load[body], places, joint.face_forces(face, state.loading))
-        for name, size in joint.units_of(state.loading).items():
-            for body, columns in units.items():
-                if name in columns:
-                    load[body] += size * columns[name]
-        rights[:, i] = spread.T @ load["dam"]
-        rights[: sizes[1], i] += load["foundation"]
-    solution = np.zeros((total, len(states)))
-    solution[free] = solve_symmetric(whole.tocsr()[free][:, free], rights[free])
+    (joint,) = bodies.mesh.joints.values()
+    upper, lower = bodies.by_name[joint.upper], bodies.by_name[joint.lower]
+    lower_size = lower.stiffness.shape[0]
+    glued = GluedBodies.of(upper, lower)
+    jumps = np.zeros((len(states), upper.stiffness.shape[0]))
+    loads = np.zeros((glued.stiffness.shape[0], len(states)))
+    for i, (equilibrium, state) in enumerate(states):
+        jumps[i, upper.joint_dofs[equilibrium.interface.joint.free]] = state.jump
+        on_upper, on_lower = -upper.stiffness @ jumps[i], np.zeros(lower_size)
+        add_external_forces(on_upper, upper, equilibrium, state)
+        add_external_forces(on_lower, lower, equilibrium, state)
+        loads[:, i] = glued.from_upper.T @ on_upper
+        loads[:lower_size, i] += on_lower
+    solution = glued.solve(loads)
 
-    moved = {"dam": solution[glue].T + jumps, "foundation": solution[: sizes[1]].T}
-    moved = {name: u.reshape(len(states), -1, dim) for name, u in moved.items()}
-    material = material_of(case)
-    stresses = {name: stress(bodies.spaces[name], u, material) for name, u in moved.items()}
-    at_nodes = {name: u[:, : len(bodies.spaces[name].body.points)] for name, u in moved.items()}
-    at_nodes = {n: np.pad(u, ((0, 0), (0, 0), (0, 3 - dim))) for n, u in at_nodes.items()}
-    found, i = [], 0
-    for _, record in scenes:
-        number = len(record.saved)
-        start = {n: u[i + number] if record.at_rest else 0 * u[0] for n, u in at_nodes.items()}
-        found.append(
-            {
-                state.time: Field(
-                    {name: u[i + k] - start[name] for name, u in at_nodes.items()},
-                    {name: s[i + k] for name, s in stresses.items()},
-                )
-                for k, state in enumerate(record.saved)
-            }
-        )
-        i += number + (record.at_rest is not None)
-    return found
+    displacements = {
+        joint.upper: solution[glued.number].T + jumps,
+        joint.lower: solution[:lower_size].T,
+    }
+    at_nodes, stresses = {}, {}
+    material, dim = material_of(states[0][0].case), bodies.mesh.dim
+    for name, values in displacements.items():
+        space = bodies.by_name[name].space
+        u = values.reshape(len(states), -1, dim)
+        stresses[name] = stress(space, u, material)
+        at_nodes[name] = np.pad(u[:, : len(space.body.points)], ((0, 0), (0, 0), (0, 3 - dim)))
+
+    def fields_of(first: int, history: History) -> Iterator[tuple[float, Field]]:
+        """Times and fields of a scene whose states start at a number."""
+        rest = first + len(history.saved)
+        start = {n: u[rest] if history.at_rest else 0 * u[0] for n, u in at_nodes.items()}
+        for i, state in enumerate(history.saved, first):
+            moved = {name: u[i] - start[name] for name, u in at_nodes.items()}
+            yield state.time, Field(moved, {name: s[i] for name, s in stresses.items()})
+
+    counts = [len(history.saved) + (history.at_rest is not None) for _, history in scenes]
+    firsts = np.cumsum([0, *counts[:-1]])
+    return [
+        dict(fields_of(int(first), history))
+        for first, (_, history) in zip(firsts, scenes, strict=True)
+    ]

@@ -9,7 +9,9 @@ from functools import lru_cache, partial
 from threadpoolctl import threadpool_limits
 
 from ...fem import factor
-from ...fem.condensation import Bodies, Condensed, joint_size
+from ...fem.bodies import Bodies
+from ...fem.condensation import Condensed
+from ...fem.memory import joint_size
 from ...joint.interface import Interface
 from ...model.case import Case
 from ...model.fields import Field

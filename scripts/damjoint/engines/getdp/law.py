@@ -1,4 +1,4 @@
-"""A joint law along a path of jumps, evaluated by the very functions of the problem definition."""
+"""A joint law along a path of jumps, by the functions of the problem definition."""
 
 from __future__ import annotations
 
@@ -8,13 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from ... import RunError, data
-from ...laws import LAWS
 from ...model.case import load
 from ...model.parameters import assignments, listing, parameter
 from ...storage import check_end
 from . import process
 
-#: GetDP wants a mesh: one line, in the region JOINT (3).
+#: GetDP needs a mesh: one line, in the region JOINT (3).
 ONE_LINE = """$MeshFormat
 2.2 0 8
 $EndMeshFormat
@@ -35,11 +34,10 @@ def evaluate(
 ) -> dict[str, np.ndarray]:
     """The law along a path.
 
-    law: its name; jumps: (n, 3) delta_n, delta_t1, delta_t2 [m], the i-th row one
-    converged step to t = i, from the virgin state on; pressure: (n,) [Pa], 0 by default; settings:
-    {parameter: value}.
-    Returns columns sigma_n (total), tau_1, tau_2 [Pa] and the law's state. Raises InputError,
-    RunError.
+    law: its name; jumps: (n, 3) delta_n, delta_t1, delta_t2 [m], row i a converged step to t = i,
+    from the undamaged state; pressure: (n,) [Pa], 0 by default; settings: {parameter: value}.
+    Returns columns sigma_n (total), tau_1, tau_2 [Pa], damage, open, slid and the internal
+    variables. Raises InputError, RunError.
     """
     parameter("law").check(law)
     jumps = np.asarray(jumps, float).reshape(-1, 3)
@@ -63,10 +61,11 @@ def evaluate(
         process.execute(problem, ["-msh", str(folder / "one.msh"), "-solve", "Path"])
         try:
             check_end(folder / "law.txt", "\n")
-            table = np.loadtxt(folder / "law.txt", ndmin=2)
+            heading, *rows = (folder / "law.txt").read_text().splitlines()
+            _, names = heading.split(": ")
+            table = np.loadtxt(rows, ndmin=2)
             if len(table) != len(jumps):
                 raise ValueError(f"{len(table)} of {len(jumps)} rows")
         except (OSError, ValueError) as damage:
             raise RunError(f"GetDP: its table can not be read: {damage}") from None
-    names = "sigma_n", "tau_1", "tau_2", "damage", "open", "slid", *LAWS[law].variable_names
-    return dict(zip(names, table.T, strict=False))
+    return dict(zip(names.split(), table.T, strict=False))

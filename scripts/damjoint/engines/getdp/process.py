@@ -83,21 +83,22 @@ def environment(folder: Path, threads: int = 1) -> dict[str, str]:
 
 def own_lists(mesh: Mesh) -> dict[str, list[float]]:
     """What pro/section.pro has to know of a user's own geometry."""
-    ends, bodies = mesh.joint_ends, mesh.bodies
-    faces = mesh.faces.values()
-    heel = bodies["heel"]
-    length = area(heel) if mesh.dim == 3 else 1.0
-    normal, crest = heel_normal(bodies["joint"], heel), bodies["crest"].points[0]
+    (joint,), bodies, faces = mesh.joints.values(), mesh.bodies, mesh.faces.values()
+    length = area(joint.heel) if mesh.dim == 3 else 1.0
+    normal, crest = heel_normal(joint.surface, joint.heel), bodies["crest"].points[0]
     lines = [name for name in LINES if name in bodies]
-    shapes = {shape for name in ("dam", "foundation") for shape, _ in bodies[name].cells}
+    shapes = {shape for solid in mesh.solids.values() for shape, _ in solid.cells}
     return {
         "own_side": [float(SIDES.index(face.side)) for face in faces],
-        "own_body": [float(not face.upper) for face in faces],
+        "own_body": [float(face.body != joint.upper) for face in faces],
         "own_low": [float(face.surface.points[:, 1].min()) for face in faces],
-        "own_ends": [*(v[0] for v in ends.values()), mesh.width, length, *normal[:2], *crest],
+        "own_ends": [
+            *(values[0] for values in joint.ends.values()),
+            *(joint.width, length, *normal[:2], *crest),
+        ],
         "own_quadrangles": [float("quad" in shapes)],
         "own_mark_region": [constants()[name.upper()][0] for name in lines],
-        "own_mark_body": [float(mesh.bearer(name) != "dam") for name in lines],
+        "own_mark_body": [float(mesh.bearer(name) != joint.upper) for name in lines],
     }
 
 
@@ -108,12 +109,12 @@ def write_problem(
 
     mesh: of a user's own geometry.
     """
-    wanted = [float(t in case.requested) for t in case.times]
+    save_step = [float(t in case.requested) for t in case.times]
     lists = {
         "levels": case.levels,
         "tail_levels": case.tail_levels,
         "times": case.times,
-        "wanted": wanted,
+        "save_step": save_step,
     }
     if case.geometry:
         lists |= own_lists(mesh)

@@ -76,7 +76,8 @@ def solve(case: Case, on_step: OnStep, fields: bool) -> Iterator[Outcome]:
     with tempfile.TemporaryDirectory(prefix="damjoint-") as name, ThreadPoolExecutor(2) as pool:
         mesh_file = Path(name) / "scene.msh"
         mesh.write(mesh_file)
-        case = replace(case, section=case.section | mesh.joint_ends)
+        (joint,) = mesh.joints.values()
+        case = replace(case, section=case.section | joint.ends)
         scenes, waiting = case.scenes(), []
         for number, scene in enumerate(scenes):
             folder = Path(name) / scene["uplift"]

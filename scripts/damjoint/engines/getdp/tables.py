@@ -15,7 +15,7 @@ from ...storage import check_end
 
 BODIES = ("dam", "foundation")
 
-#: Columns of history.txt (pro/strategy.pro), behind the word "step".
+#: Columns of history.txt (pro/step_control.pro), behind the word "step".
 PRINTED = [
     "time",
     "level",
@@ -108,7 +108,7 @@ def read_joint(
         if name not in JOINT
     ]
     when = np.tile([time, level], (len(nodes), 1))
-    distance = case.joint_along * node_means(rows, table("way", 1)[1], len(nodes))
+    distance = case.joint_along * node_means(rows, table("path", 1)[1], len(nodes))
     whole = np.hstack([when, nodes, jump[:, order], traction[:, order], state, distance, *more])
     extra = whole.copy()
     corners, mean_jump = table("mean_jump")

@@ -1,0 +1,24 @@
+"""Types of arrays and of the values of parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array: TypeAlias = NDArray[np.float64]
+#: of any width: numbers of nodes, elements, unknowns; Gmsh's tags are unsigned
+IntArray: TypeAlias = NDArray[np.integer[Any]]
+BoolArray: TypeAlias = NDArray[np.bool_]
+#: scipy.sparse.csr_matrix, of which type checkers do not know that its product with an array is one
+Sparse: TypeAlias = Any
+
+#: A table of results, by column.
+Table: TypeAlias = dict[str, Array]
+
+#: The value of a parameter: a number, or one of its choices.
+Value: TypeAlias = float | str
+#: Values by the names of pro/parameters.pro.
+Values: TypeAlias = Mapping[str, Value]

@@ -1,0 +1,129 @@
+"""The elastic bodies of a case before elimination: function spaces, stiffness, unit loads."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Array, IntArray, Sparse
+from ..model.case import Case
+from ..model.loads import wet
+from ..model.mesh import LINES, Body, Mesh, mesh_of
+from ..model.scene import SOLIDS
+from .elasticity import Material, body_force, elasticity
+from .elements import WATER, Space, points_of
+
+#: Parameters that the bodies depend on besides those of the mesh.
+MATERIALS = dict.fromkeys(name for solid in SOLIDS.values() for name in solid.materials.values())
+PARAMETERS = ("order", "hold_z", *(f"{p}_{name}" for p in ("E", "nu") for name in MATERIALS))
+
+#: Weights that act, region and component: concrete also along x (earthquake).
+WEIGHTS = (("dam", 0), ("dam", 1), ("lower", 0), ("lower", 1), ("foundation", 1))
+
+
+def material_of(case: Case) -> Material:
+    """Elastic constants by region."""
+    return {
+        region: (case[f"E_{name}"], case[f"nu_{name}"])
+        for solid in SOLIDS.values()
+        for region, name in solid.materials.items()
+    }
+
+
+@dataclass(frozen=True, kw_only=True)
+class ElasticBody:
+    """A linear elastic body of n degrees of freedom, dim * function + component."""
+
+    space: Space
+    #: (n, n) [N/m]
+    stiffness: Sparse
+    #: load vectors (n,) by name: weight densities dam_x, dam_y, lower_x, ... [N/m3], forces per
+    #: metre of a line ice_x, ice_y, ... [N/m]
+    unit_loads: dict[str, Array]
+    #: degrees of freedom: zero; on the joint, in its order; of each wet face, in its order
+    fixed_dofs: IntArray
+    joint_dofs: IntArray
+    face_dofs: dict[str, IntArray]
+
+    @staticmethod
+    def of(case: Case, mesh: Mesh, name: str) -> ElasticBody:
+        """Number the degrees of freedom of a body and assemble it."""
+        dim, order = mesh.dim, int(case["order"])
+        (joint,) = mesh.joints.values()
+        body = mesh.solids[name]
+        space = Space(body, order)
+
+        def dofs(part: Body, components: Sequence[int] = range(dim)) -> IntArray:
+            functions = space.find(Space(part, order))
+            return np.ravel(dim * functions[:, None] + np.array(components))
+
+        fixed = [dofs(within(mesh.bodies["fixed"], body))]
+        if dim == 3 and case["hold_z"]:
+            fixed.append(dofs(within(mesh.bodies["sides"], body), [2]))
+        return ElasticBody(
+            space=space,
+            stiffness=elasticity(space, dim, material_of(case)),
+            unit_loads=dict(unit_loads(space, mesh, name)),
+            fixed_dofs=np.unique(np.concatenate(fixed)),
+            joint_dofs=dofs(joint.surface),
+            face_dofs={
+                n: dofs(face.surface)
+                for n, face in mesh.faces.items()
+                if face.body == name and wet(case, face)
+            },
+        )
+
+
+def unit_loads(space: Space, mesh: Mesh, name: str) -> Iterator[tuple[str, Array]]:
+    """Names and load vectors (n,) of the unit loads that can act on a body."""
+    dim = mesh.dim
+    for region, component in WEIGHTS:
+        if region in space.body.regions:
+            yield f"{region}_{'xyz'[component]}", body_force(space, dim, component, region)
+    for line in LINES:
+        if line in mesh.bodies and mesh.bearer(line) == name:
+            part = Space(mesh.bodies[line], space.order)
+            points = points_of(part, WATER)
+            for component in (0, 1):
+                load = np.zeros(dim * len(space.locations))
+                load[dim * space.find(part) + component] = points.values.T @ points.weights
+                yield f"{line}_{'xyz'[component]}", load
+
+
+def within(surface: Body, body: Body) -> Body:
+    """The part of a surface that belongs to a body."""
+    inside = np.isin(surface.node_tags, body.node_tags)
+    cells = [(shape, table[inside[table].all(axis=1)]) for shape, table in surface.cells]
+    used = np.unique(np.concatenate([table.ravel() for _, table in cells]))
+    number = np.zeros(len(surface.points), int)
+    number[used] = np.arange(len(used))
+    return Body(
+        surface.points[used],
+        surface.node_tags[used],
+        [(shape, number[table]) for shape, table in cells],
+        np.zeros(0, int),
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bodies:
+    """The bodies of a case on one mesh."""
+
+    mesh: Mesh
+    by_name: dict[str, ElasticBody]
+    #: wall seconds of their assembly
+    seconds: float
+
+    @staticmethod
+    def of(case: Case) -> Bodies:
+        """Mesh a case and assemble its bodies.
+
+        Raises RunError (mesh).
+        """
+        mesh = mesh_of(case)
+        start = time.perf_counter()
+        by_name = {name: ElasticBody.of(case, mesh, name) for name in mesh.solids}
+        return Bodies(mesh=mesh, by_name=by_name, seconds=time.perf_counter() - start)

@@ -1,0 +1,137 @@
+"""Linear systems of Newton's method on the joint.
+
+The tangent is that of the undamaged joint, A_0 = S + K_0, and its change where the joint has
+opened, broken or slipped: A = A_0 + L - B P (L: change by the law, on few rows; P: derivative of
+the pressures of flowing water; B: their nodal forces). With C = A_0^-1, computed once, A x = r is
+
+    x = C (r - f + B p),    f = L x,    p = P x,
+
+a system of the forces f on the rows of L and the pressures p only (Woodbury). Bordered by one more
+equation it stays regular at a limit point of the load, where A is singular.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.linalg import norm
+from scipy import linalg
+
+from ..arrays import Array, IntArray, Sparse
+from .flow import FlowDerivative
+
+
+@dataclass(frozen=True, kw_only=True)
+class Change:
+    """L (rows, j), without its zero rows, and P if water flows."""
+
+    law: Sparse
+    rows: IntArray
+    flow: FlowDerivative | None = None
+
+
+@dataclass(frozen=True)
+class Border:
+    """One more unknown s and equation: A x + slope s = right, row x + rate s = gap."""
+
+    slope: Array
+    row: Array
+    rate: float
+    gap: float
+
+
+class UndamagedSystem:
+    """The inverse tangent of the undamaged joint, C = A_0^-1 (j, j)."""
+
+    def __init__(self, tangent: Array, matrix: Array) -> None:
+        """tangent: (3, 3) of all Gauss points; matrix: A_0, overwritten.
+
+        Raises LinAlgError if A_0 is not positive definite: the joint does not support the dam.
+        """
+        self.tangent = tangent
+        factor, info = linalg.lapack.dpotrf(matrix.T, lower=True, overwrite_a=True, clean=False)
+        if info:
+            raise linalg.LinAlgError("tangent of the undamaged joint: not positive definite")
+        inverse, _ = linalg.lapack.dpotri(factor, lower=True, overwrite_c=True)
+        self.compliance: Array = np.tril(inverse) + np.tril(inverse, -1).T
+        self._by_pressure: Array | None = None
+
+    def by_pressure(self, lift: Sparse) -> Array:
+        """C B (j, p), the jumps by unit pressures with nodal forces B; computed once."""
+        if self._by_pressure is None:
+            self._by_pressure = np.ascontiguousarray((lift.T @ self.compliance).T)
+        return self._by_pressure
+
+    def solve(
+        self, change: Change, right: Array, border: Border | None = None, lift: Sparse | None = None
+    ) -> tuple[Array, float]:
+        """Solve A x = right (j,), bordered or not; x and s (0 without border).
+
+        lift: B, if water flows. Raises LinAlgError if the system is singular.
+        """
+        compliance, law, rows, flow = self.compliance, change.law, change.rows, change.flow
+        m, start = len(rows), compliance @ right
+        size = m + (len(flow.pressure) if flow else 0)
+        small = np.zeros((size + (border is not None),) * 2)
+        small_right = np.zeros(len(small))
+        touched = np.unique(law.indices)
+        small[:m, :m] = law[:, touched] @ compliance[np.ix_(touched, rows)]
+        small_right[:m] = law @ start
+        if flow:
+            by_pressure = self.by_pressure(lift)
+            small[:m, m:size] = -(law @ by_pressure)
+            small[m:size, :m] = flow.pressure @ compliance[np.ix_(flow.columns, rows)]
+            small[m:size, m:size] = -(flow.pressure @ by_pressure[flow.columns])
+            small_right[m:size] = flow.pressure @ start[flow.columns]
+        small[np.arange(size), np.arange(size)] += 1
+        if border:
+            by_slope, by_row = compliance @ border.slope, compliance @ border.row
+            small[:m, size], small[size, :m] = law @ by_slope, -by_row[rows]
+            if flow:
+                small[m:size, size] = flow.pressure @ by_slope[flow.columns]
+                small[size, m:size] = border.row @ by_pressure
+            small[size, size] = border.rate - border.row @ by_slope
+            small_right[size] = border.gap - border.row @ start
+        solution = lu_solve(small, small_right)
+        force = np.zeros(len(right))
+        force[rows] = solution[:m]
+        x = start - compliance @ force
+        if flow:
+            x += by_pressure @ solution[m:size]
+        if border is None:
+            return x, 0.0
+        s = solution[size]
+        x -= s * by_slope
+        return x, s
+
+
+#: Number of unknowns from which on single precision pays.
+SINGLE_PRECISION = 300
+
+
+def lu_solve(matrix: Array, right: Array) -> Array:
+    """Solve a linear system by LU; the matrix may be overwritten.
+
+    A large matrix is factorised in single precision, twice as fast, and the solution refined; in
+    double precision if the refinement does not converge. Raises LinAlgError if it is singular.
+    """
+    if not right.any():
+        return np.zeros_like(right)
+    if len(right) > SINGLE_PRECISION:
+        factors, pivots, info = linalg.lapack.sgetrf(matrix.T.astype(np.float32), overwrite_a=True)
+        solution: Array = np.zeros_like(right)
+        residual, size = right, norm(right)
+        for _ in range(0 if info else 8):
+            correction = linalg.lapack.sgetrs(factors, pivots, residual / size, trans=1)[0]
+            solution = solution + size * correction
+            residual, before = right - matrix @ solution, size
+            size = norm(residual)
+            if size <= 1e-12 * norm(right):
+                return solution
+            if not size < 0.1 * before:
+                break
+    factors, pivots, info = linalg.lapack.dgetrf(matrix.T, overwrite_a=True)
+    if info:
+        raise linalg.LinAlgError("singular matrix")
+    return np.asarray(linalg.lapack.dgetrs(factors, pivots, right, trans=1)[0])

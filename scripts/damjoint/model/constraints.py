@@ -1,0 +1,187 @@
+"""Constraints between the values of a case, one function each; that on a single value is
+`Parameter.check`.
+
+All raise InputError, "name = value: must be ...".
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Mapping, Sequence
+
+from .. import InputError
+from ..laws import LAWS
+from .parameters import constants, declared
+from .values import ParameterValues, Section, flows, has_drains
+
+#: Limits of the numbers of steps between two levels, and of levels, each of which has its table.
+MOST_STEPS, MOST_LEVELS = 100_000, 10_000
+
+
+def check_values(
+    case: ParameterValues, section: Mapping[str, Sequence[float]], by_parameters: bool
+) -> None:
+    """Values of a case; section: as in `Case`; by_parameters: whether they define its geometry."""
+    check_energies(case)
+    for name, parameter in declared().items():
+        parameter.check(case.values[name])
+    if by_parameters:
+        check_section(case, section)
+    check_drains(case, section["joint_length"][0])
+    check_works(case)
+
+
+def check_energies(case: ParameterValues) -> None:
+    """Fracture energies: larger than what the joint stores before it softens, else a point would
+    snap back.
+    """
+    for name, (least, formula) in LAWS[case["law"]].least_energies(case.values).items():
+        if not case[name] > least:
+            raise InputError(
+                f"{name} = {case[name]:g}: must be > {least:.4g} N/m ({formula}, what the joint "
+                "stores before it softens)"
+            )
+
+
+def check_softening(joint: Section, twice: bool) -> None:
+    """The softening of law = rupture: not given twice."""
+    if twice:
+        raise InputError(
+            f"G_f, pena_rupture = {joint.G_f:g}, {joint.pena_rupture:g}: must be one of them, the "
+            "other -1 (G_f = sigma_max^2 (1 + pena_rupture) / (2 K_N))"
+        )
+
+
+def check_section(case: ParameterValues, section: Mapping[str, Sequence[float]]) -> None:
+    """Lengths of the dam's section; places of line forces on it."""
+    dam, loads = case.dimensions, case.loads
+    height = dam.dam_height
+    for name, sign, holds in (
+        ("batter_height", "<=", operator.le),
+        ("neck_height", "<", operator.lt),
+        ("joint_height", "<", operator.lt),
+    ):
+        if not holds(case[name], height):
+            raise InputError(f"{name} = {case[name]:g}: must be {sign} dam_height ({height:g} m)")
+    if not dam.batter < dam.dam_base:
+        raise InputError(f"batter = {dam.batter:g}: must be < dam_base ({dam.dam_base:g} m)")
+    if not (section["toe_x"][0] > section["heel_x"][0] and section["toe_y"][0] < height):
+        raise InputError(
+            f"joint_slope = {dam.joint_slope:g}: must let the joint leave the dam below its "
+            f"crest ({height:g} m)"
+        )
+    marks, regions = section["mark_region"], constants()
+    for force, name, region, face in (
+        ("ice_force", "ice_level", "ICE", "the upstream face"),
+        ("force_x", "force_at", "FORCE", f"the {loads.force_face} face"),
+        ("force_y", "force_at", "FORCE", f"the {loads.force_face} face"),
+        ("anchor_force", "anchor_at", "ANCHOR", "the crest"),
+    ):
+        if case[force] and regions[region][0] not in marks:
+            raise InputError(f"{name} = {case[name]:g}: must lie on {face} of the dam")
+    simple = not (dam.batter or dam.neck_height or dam.joint_height or marks)
+    if case.mesh.mesh_pattern == "regular" and not simple:
+        raise InputError(
+            "mesh_pattern = regular: must be free, layers or split for a section with batter, "
+            "neck, lift joint or line forces"
+        )
+
+
+def check_drains(case: ParameterValues, length: float) -> None:
+    """Drains: on the joint, whose length is given [m]; pressure linear in the level where a
+    displacement is prescribed.
+    """
+    if not has_drains(case):
+        return
+    water, drive = case.water, case.scene.drive
+    if not water.drain_x < length:
+        raise InputError(
+            f"drain_x = {water.drain_x:g}: must be < the joint's length ({length:g} m)"
+        )
+    if not flows(case) and drive != "level" and water.drain_level > 0:
+        raise InputError(
+            f"drain_level = {water.drain_level:g}: must be 0 with drive = {drive} "
+            "(the pressure has to be linear in the level)"
+        )
+
+
+def check_works(case: ParameterValues) -> None:
+    """Grouting and sawing: of laws and uplifts that include them."""
+    included = LAWS[case["law"]].has_works and not flows(case)
+    for name in ("grout_pressure", "saw_thickness"):
+        if case[name] > 0 and not included:
+            laws = " or ".join(name for name, law in LAWS.items() if law.has_works)
+            raise InputError(
+                f"{name} = {case[name]:g}: must be 0 with law = {case['law']}, uplift = "
+                f"{case['uplift']} (only law = {laws} includes it, with uplift = none, imposed "
+                "or drained)"
+            )
+
+
+def check_steps(steps: int) -> None:
+    """Number of steps between two levels."""
+    if not 1 <= steps <= MOST_STEPS:
+        raise InputError(f"steps = {steps}: must be an integer >= 1 and <= {MOST_STEPS}")
+
+
+def highest_level(case: ParameterValues) -> float:
+    """The highest water level at a section [m]."""
+    return float(constants()["highest_level"][0] * case["dam_height"])
+
+
+def check_levels(name: str, levels: Sequence[float], highest: float) -> None:
+    """Water levels [m] from 0 to the highest one; above the crest the dam is overtopped."""
+    if len(levels) > MOST_LEVELS:
+        raise InputError(f"{name}: are {len(levels)}, must be at most {MOST_LEVELS}")
+    for level in levels:
+        if not 0 <= level <= highest:
+            limit = f"between 0 and {highest:g} m, twice the dam's height"
+            raise InputError(
+                f"{name} = {level:g}: must be {limit if highest < math.inf else '>= 0'}"
+            )
+
+
+def check_tail_levels(tails: Sequence[float], number: int, of_case: bool) -> None:
+    """Tailwater levels: as many as levels; of_case: whether they are those of the case file."""
+    if len(tails) != number:
+        listed = ",".join(f"{v:g}" for v in tails)
+        whose = " (the case's own; give --tail-levels)" if of_case else ""
+        raise InputError(
+            f"tail_levels = {listed}{whose}: must be one level or as many as levels ({number})"
+        )
+
+
+def check_times(times: Sequence[float], last: int) -> None:
+    """Times of the steps: increasing from above 0 to the last level's interval."""
+    listed = ",".join(f"{t:g}" for t in times)
+    for before, time in zip((0.0, *times), times, strict=False):
+        if not before < time <= last:
+            raise InputError(
+                f"times = {listed}: must increase from above 0 to at most {last} (level number i "
+                "is reached at t = i)"
+            )
+    if times[-1] <= last - 1:
+        raise InputError(
+            f"times = {listed}: must end after {last - 1}, on the way to the last level (reached "
+            f"at t = {last})"
+        )
+
+
+def check_drive(begin: float, end: float, last: int) -> None:
+    """Times between which a displacement is prescribed."""
+    if not 0 <= begin < end <= last:
+        raise InputError(
+            f"drive_begin, drive_end = {begin:g}, {end:g}: must be "
+            f"0 <= drive_begin < drive_end <= {last} (the last t)"
+        )
+
+
+def check_also_uplift(modes: Sequence[str], uplift: str) -> None:
+    """Further uplift modes of a published case: each once."""
+    for mode in modes:
+        declared()["uplift"].check(mode)
+    if len({uplift, *modes}) <= len(modes):
+        raise InputError(
+            f"also_uplift = {' '.join(modes)}: must be other modes than uplift, each once"
+        )
