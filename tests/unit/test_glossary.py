@@ -15,19 +15,35 @@ from damjoint.studies.check import CHECK
 from damjoint.studies.failure_path import CRITICAL
 
 PACKAGE = Path(damjoint.__file__).parent
-REFERENCE = Path(__file__).parents[2] / "reference"
+ROOT = Path(__file__).parents[2]
+REFERENCE = ROOT / "reference"
+PAGES = sorted([*ROOT.glob("*.md"), *REFERENCE.glob("*.md")])
 VERDICTS = "stands", "sliding", "overturning", "broken through", "out of range", "not converged"
 VERDICTS += "no equilibrium", "interrupted", "pass", "fail", "not checked", "crushed toe"
 #: Words that are no terms of the field, and what to write in their place.
 FORBIDDEN = {
+    "asked": "requested",
     "attempt": "strategy",
     "attempts": "strategies",
     "burst": "unstable crack growth",
+    "driven": "displacement-controlled",
+    "fallen": "diverged",
+    "filling": "load stepper",
+    "held": "frozen, fixed, locked",
+    "hold": "freeze",
     "jumped": "displacement jump",
+    "kept": "stored",
     "knee": "limit point",
+    "lip": "joint face",
+    "lips": "joint faces",
     "loose": "fully slipped",
+    "pushed": "displacement, external force",
+    "ran": "unstable crack growth",
     "remember": "update_internal_variables",
+    "respond": "traction_and_tangent",
+    "said": "message",
     "stage": "begin_step",
+    "told": "message",
     "virgin": "undamaged",
 }
 
@@ -66,6 +82,23 @@ def test_the_glossary_is_a_table_of_five_columns():
     assert all(row.count("|") == 6 for row in rows)
     terms = [row.split("|")[1].strip() for row in rows]
     assert len(set(terms)) == len(terms) <= 70
+
+
+def slug(heading):
+    """The anchor of a heading."""
+    return re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda path: path.stem)
+def test_links_and_paths_in_the_pages_exist(page):
+    text = page.read_text()
+    for target, anchor in re.findall(r"\]\((?!https?:)([^)#]*)#?([^)]*)\)", text):
+        linked = page.parent / target if target else page
+        assert linked.exists(), target
+        headings = re.findall(r"^#+ (.*)$", linked.read_text(), re.M) if anchor else []
+        assert not anchor or anchor in map(slug, headings), f"{target}#{anchor}"
+    for path in re.findall(r"`((?:pro|geo|cases|tests|scripts|reference)/[\w./]+)`", text):
+        assert "NAME" in path or (ROOT / path).exists(), path
 
 
 def public_names():
