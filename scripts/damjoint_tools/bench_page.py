@@ -152,23 +152,23 @@ def modelings(measurements: Measurements, cases: Table) -> Table:
 def page(
     tables: dict[str, Table], precise: list[str], beyond: str, short: bool, source: str
 ) -> str:
-    """The page: a finding in a sentence or two, and the table it comes from; source: in a line, by
-    which code, when and where all was measured.
+    """The page: for each study its result in a sentence or two, and the table; source: the line
+    with code version, date and machine of the measurements.
     """
     parts = [
         "# Benchmarks",
         f"{source} Written by `damjoint bench{' --short' if short else ''}`. "
-        "The published code is code_aster 15.2 on a machine of 2 cores, the whole job without its "
-        "mesh. Two digits are given; they vary by as much from run to run.",
+        "The published code is code_aster 15.2 on a machine of 2 cores, the complete job without "
+        "its mesh. Times have two digits; the second one varies from run to run.",
         *of_cases(tables["cases"], short),
         *of_accuracy(tables),
         *of_estimates(tables["estimates"]),
         *of_costs(tables["switches"], tables["sweeps"]),
-        "## Growth",
-        "; ".join(bench_cost.exponents(tables["growth"])) + ". Uniform refinement, cold. "
-        f"Beyond the memory: `{beyond}`",
+        "## Growth with size",
+        "; ".join(bench_cost.exponents(tables["growth"])) + ". Uniform refinement, cold start. "
+        f"A mesh beyond the memory ends with the message: `{beyond}`",
         as_text(tables["growth"]),
-        "## Precision at scale",
+        "## Precision on a fine mesh",
         "; ".join(precise) + ".",
         *of_stress(tables["stress"]),
     ]
@@ -183,16 +183,16 @@ def of_cases(cases: Table, short: bool) -> list[str]:
     if not short:
         columns |= {"GetDP": "GetDP", "times faster, GetDP": "times"}
         plain = (
-            f" The plain problem definition (GetDP) takes {cases['GetDP'][-1]:.0f} s, "
+            f" The reference GetDP model takes {cases['GetDP'][-1]:.0f} s, "
             f"{cases['times faster, GetDP'][-1]:.1f} times less than the published code."
         )
     return [
         "## The eleven modelings",
-        "With published meshes and steps, cold start, all scenes, tables written: "
-        f"{cases['seconds'][-1]:.0f} s in all, {cases['times faster'][-1]:.0f} times faster than "
-        f"the published code; the slowest by comparison is {cases['case'][slowest].upper()}, "
-        f"{cases['times faster'][slowest]:.1f} times.{plain} Seconds, and where they went; peak "
-        "memory in MB.",
+        "With published meshes and steps, cold start (new process, no cache), all scenes, tables "
+        f"written: {cases['seconds'][-1]:.0f} s in all, {cases['times faster'][-1]:.0f} times "
+        "faster than the published code; the smallest ratio is that of "
+        f"{cases['case'][slowest].upper()}, {cases['times faster'][slowest]:.1f}.{plain} The "
+        "table has the seconds in all and by phase, and the peak memory in MB.",
         as_text(cases, columns),
     ]
 
@@ -206,29 +206,30 @@ def of_accuracy(tables: dict[str, Table]) -> list[str]:
     best = efficient(tables["accuracy"])
     second = sum(order == 2 for order in best["order"])
     return [
-        "## To a given accuracy",
-        f"`--accuracy` refines the mesh until the estimated errors are smaller. Its meshes for 3 % "
-        f"(coarse) are wrong by at most {error} % in the modelings below and take "
-        f"{spent} s for all their main scenes. Worst error of opening, toe stress, crack, slip and "
-        "leakage against the overkill solution; seconds with the start of the process.",
+        "## Time for an accuracy",
+        f"`--accuracy` refines the mesh until the estimated errors are smaller. For 3 % (coarse) "
+        f"the true errors are at most {error} % in the modelings below, and all their main scenes "
+        f"take {spent} s. The error is the largest of opening, toe stress, crack, slip and leakage "
+        "relative to the overkill solution; the seconds include the start of the process.",
         as_text(recommended, heads),
-        "The overkill solution, triangles of order 2, and how it converges:",
+        "The overkill solution (triangles of order 2, much finer than needed) and its convergence:",
         as_text(tables["overkill"], digits=4),
         "![Error against time](pictures/accuracy.png)",
-        f"The efficient settings (of {len(tables['accuracy']['scene'])} in `accuracy.csv`): "
-        f"{second} of {len(best['order'])} are of order 2. One, two and four steps per level "
-        f"differ by {spread:.1g} % at most.",
+        f"Efficient settings, for which no other is both faster and more accurate (of "
+        f"{len(tables['accuracy']['scene'])} in `accuracy.csv`): {second} of {len(best['order'])} "
+        f"are of order 2. One, two and four steps per level differ by {spread:.1g} % at most.",
         as_text(best),
     ]
 
 
 def of_estimates(estimates: Table) -> list[str]:
-    """What --accuracy says of its errors."""
+    """Errors estimated by --accuracy, and the true ones."""
     return [
         "## Estimated and true errors",
-        "What `--accuracy` says of its errors, and what they are, in percent: estimated / true, "
-        "the worst of all levels, of dams with E = 20 and 30 GPa, K_N 1e11 or 1e12 Pa/m. A length "
-        "is counted in elements; an opening's error is relative to the joint's largest jump.",
+        "Errors estimated by `--accuracy`, and the true ones, in percent: estimated / true, "
+        "the largest of all levels, for dams with E = 20 and 30 GPa, K_N 1e11 or 1e12 Pa/m. "
+        "Lengths are counted in elements; the error of an opening is relative to the largest jump "
+        "of the joint.",
         as_text(estimates),
     ]
 
@@ -241,24 +242,24 @@ def of_costs(costs: Table, sweeps: Table) -> list[str]:
         for n in ("another level", "another strength")
     )
     return [
-        "## What a scene pays for",
-        "Seconds with and without, in one process, the best of three. The dearest is "
-        f'"{costs["option"][dear]}", {costs["ratio"][dear]:.0f} times.',
+        "## Cost of options",
+        "Seconds with and without the option, in one process, the best of three. The most "
+        f'expensive is "{costs["option"][dear]}", {costs["ratio"][dear]:.0f} times.',
         as_text(costs),
-        "## One row more in a sweep",
+        "## Cost of a row in a sweep",
         f"A further level costs {level}, another strength {strength}. Seconds on a mesh that is "
-        "condensed.",
+        "already condensed.",
         as_text(sweeps),
     ]
 
 
 def of_stress(grid: Table) -> list[str]:
-    """Flow pressed to its limits."""
+    """Flow with extreme parameters."""
     ends = ", ".join(f"{k} {v}" for k, v in Counter(grid["end"]).items())
     return [
-        "## Flow pressed to its limits",
+        "## Flow with extreme parameters",
         "aperture_min 1e-9 to 1e-4 m, K_N 1e9 to 1e14 Pa/m, E 1e10 to 3e12 Pa, level to the "
-        f"crest: the {len(grid['end'])} combinations end with {ends}; at most "
+        f"crest. Verdicts of the {len(grid['end'])} combinations: {ends}; at most "
         f"{max(grid['seconds']):.1f} s each (`stress.csv`).",
     ]
 

@@ -2,8 +2,10 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -23,6 +25,9 @@ def call(*words, **options):
 def test_the_wheel_runs_in_a_fresh_environment(tmp_path):
     call(sys.executable, "-m", "build", "--wheel", "--outdir", tmp_path, CHECKOUT)
     (wheel,) = tmp_path.glob("damjoint-*.whl")
+    with zipfile.ZipFile(wheel) as archive:
+        (name,) = (name for name in archive.namelist() if name.endswith("/METADATA"))
+        assert not re.search(rb"\]\((?!https?:)", archive.read(name))  # links work on an index
     call(sys.executable, "-m", "venv", tmp_path / "env")
     python = tmp_path / "env" / "bin" / "python"
     call(python, "-m", "pip", "install", "-q", wheel)
