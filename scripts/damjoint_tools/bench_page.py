@@ -17,9 +17,10 @@ from damjoint.storage import locked_folder
 from tabulate import tabulate
 from threadpoolctl import threadpool_limits
 
-from . import bench as measured
-from .bench import PARTS, QUANTITIES, SCENES, Kept, Table, front
-from .provenance import provenance, said
+from . import bench_accuracy, bench_cost
+from .bench_scenes import PARTS, QUANTITIES, SCENES
+from .bench_table import Measurements, Table
+from .provenance import provenance, source_line
 
 STYLES = {
     (2, "free"): ("o", "triangles"),
@@ -45,16 +46,16 @@ def draw(table: Table, path: Path) -> None:
     panels = figure.subplots(2, len(SCENES), sharex=True, sharey=True)
     for row, dim in zip(panels, (2, 3), strict=True):
         for axes, scene in zip(row, SCENES, strict=True):
-            here = (columns["scene"] == scene) & (columns["dim"] == dim)
+            shown = (columns["scene"] == scene) & (columns["dim"] == dim)
             patterns = [(p, s) for (d, p), s in STYLES.items() if d == dim]
             for (pattern, (marker, name)), order in product(patterns, (1, 2)):
-                some = here & (columns["pattern"] == pattern) & (columns["order"] == order)
+                some = shown & (columns["pattern"] == pattern) & (columns["order"] == order)
                 color = {1: "#cc7a00", 2: "#0b5394"}[order]
                 label = f"{name}, order {order}"
                 axes.loglog(
                     seconds[some], error[some], marker, color=color, ms=4, alpha=0.7, label=label
                 )
-            best = np.flatnonzero(here)
+            best = np.flatnonzero(shown)
             best = best[front(seconds[best], error[best])]
             axes.loglog(seconds[best], error[best], "k-", linewidth=0.8, label="efficient front")
             axes.set(title=f"{scene}, {dim}D")
@@ -69,8 +70,19 @@ def draw(table: Table, path: Path) -> None:
     figure.savefig(path, dpi=100)
 
 
+def front(seconds: np.ndarray, error: np.ndarray, gain: float = 1.0) -> np.ndarray:
+    """Return the indices of the efficient points by time: each has less than `gain` times the error
+    of all faster ones.
+    """
+    chosen = []
+    for i in np.argsort(seconds):
+        if not chosen or error[i] < gain * error[chosen[-1]]:
+            chosen.append(i)
+    return np.array(chosen)
+
+
 def short_number(value: object, digits: int = 2) -> str:
-    """A number with two or three digits, without exponents where they can be done without."""
+    """Format a number with few digits, without an exponent if it is readable without."""
     if not isinstance(value, (float, np.floating)):
         return str(value)
     if not np.isfinite(value):
@@ -83,30 +95,30 @@ def short_number(value: object, digits: int = 2) -> str:
 
 
 def as_text(table: Table, names: dict[str, str] | None = None, digits: int = 2) -> str:
-    """A table, or some of its columns under other names, in Markdown."""
+    """Format a table in Markdown; names: the columns that are shown, and their headings."""
     names = names or {n: n for n in table}
     columns = {head: [short_number(v, digits) for v in table[n]] for n, head in names.items()}
     return tabulate(columns, headers="keys", tablefmt="github", disable_numparse=True)
 
 
 def efficient(table: Table) -> Table:
-    """The efficient front of each scene and dimension with published steps, in strides of at least
-    a third.
+    """Return the efficient front of each scene and dimension with published steps, thinned: each
+    row has two thirds of the error of the row before or less.
     """
     heads = "scene", "dim", "pattern", "order", "n_joint", "grading", "unknowns", "seconds"
     chosen = Table("efficient", *heads, "worst error [%]")
     published = np.array([steps == "published" for steps in table["steps"]])
     error, seconds = (np.array(table[n]) for n in ("worst", "seconds"))
     for scene, dim in product(SCENES, (2, 3)):
-        here = table.rows(scene, dim)
-        here = here[published[here]]
-        for i in here[front(seconds[here], error[here], 2 / 3)]:
+        rows = table.rows_where(scene, dim)
+        rows = rows[published[rows]]
+        for i in rows[front(seconds[rows], error[rows], 2 / 3)]:
             chosen.add(*(table[n][i] for n in heads), 100 * error[i])
     return chosen
 
 
 def step_spread(table: Table) -> float:
-    """By how much the errors of SCENES differ between 1, 2 and 4 steps per level [%]."""
+    """Return the largest difference of errors between 1, 2 and 4 steps per level [%]."""
     rows = [i for i, steps in enumerate(table["steps"]) if steps != "published"]
     spread = 0.0
     for scene, quantity in product(SCENES, QUANTITIES):
@@ -115,24 +127,25 @@ def step_spread(table: Table) -> float:
     return 100 * spread
 
 
-def modelings(kept: Kept, cases: Table) -> Table:
-    """For README: what each modeling shows, the worst difference of its judged rows, and the
-    seconds.
+def modelings(measurements: Measurements, cases: Table) -> Table:
+    """Table of README.md: the subject of each modeling, the worst difference of its compared rows,
+    and the seconds.
     """
-    told = "shows", "rows", "worst difference", "seconds", "published code", "times faster"
-    table = Table("modelings", "case", *told)
+    columns = "shows", "rows", "worst difference", "seconds", "published code", "times faster"
+    table = Table("modelings", "case", *columns)
 
-    def one(row: int, case: Case) -> tuple:
+    def measure(row: int, case: Case) -> tuple:
         with tempfile.TemporaryDirectory() as folder:
-            found = run(case, Path(folder), False, False, False)
-        judged = [c for result in found for c in validation.compare(result) if c.verdict != "info"]
-        difference = 100 * max(abs(c.difference) for c in judged)
+            results = run(case, Path(folder), False, False, False)
+        rows = [c for result in results for c in validation.compare(result)]
+        compared = [c for c in rows if c.verdict != "info"]
+        difference = 100 * max(abs(c.difference) for c in compared)
         shows = case.title.split(": ", 1)[1]
         spent = (cases[n][row] for n in ("seconds", "published", "times faster"))
-        return shows, len(judged), f"{difference:.1f} %", *spent
+        return shows, len(compared), f"{difference:.1f} %", *spent
 
     for row, name in enumerate(cases["case"][:-1]):
-        table.once(kept, (name.upper(),), partial(one, row, load(name)))
+        table.add_measured(measurements, (name.upper(),), partial(measure, row, load(name)))
     return table
 
 
@@ -152,7 +165,7 @@ def page(
         *of_estimates(tables["estimates"]),
         *of_costs(tables["switches"], tables["sweeps"]),
         "## Growth with size",
-        "; ".join(measured.exponents(tables["growth"])) + ". Uniform refinement, cold start. "
+        "; ".join(bench_cost.exponents(tables["growth"])) + ". Uniform refinement, cold start. "
         f"A mesh beyond the memory ends with the message: `{beyond}`",
         as_text(tables["growth"]),
         "## Precision on a fine mesh",
@@ -252,36 +265,38 @@ def of_stress(grid: Table) -> list[str]:
 
 
 def bench(out: Path, short: bool) -> None:
-    """Run everything; write tables (CSV), benchmarks.md, modelings.md, accuracy.png and what has
-    measured them (provenance.json) into out; print the page.
+    """Run the benchmark; write tables (CSV), benchmarks.md, modelings.md, accuracy.png and the
+    provenance of all (provenance.json) into out; print the page.
 
-    What is measured is kept in out/measured.jsonl until the page is written.
+    out/measured.jsonl is the log from which an interrupted benchmark is resumed.
     """
     out.mkdir(parents=True, exist_ok=True)
     with locked_folder(out):
-        kept = Kept(out / "measured.jsonl", short)
-        tables, precise = measure(kept)
+        measurements = Measurements(out / "measured.jsonl", short)
+        tables, precise = measure(measurements)
         for name, table in tables.items():
-            measured.write_table(table, out / f"{name}.csv")
+            table.write(out / f"{name}.csv")
         draw(tables["accuracy"], out / "accuracy.png")
-        ended = kept.provenance | {"date": provenance()["date"]}
-        source = said([kept.provenance, ended])
+        last = measurements.provenance | {"date": provenance()["date"]}
+        source = source_line([measurements.provenance, last])
         (out / "modelings.md").write_text(f"{as_text(tables['modelings'])}\n\n{source}\n")
-        text = page(tables, precise, measured.beyond_memory(), short, source)
-        (out / "provenance.json").write_text(json.dumps(ended, indent=1) + "\n")
+        text = page(tables, precise, bench_cost.memory_message(), short, source)
+        (out / "provenance.json").write_text(json.dumps(last, indent=1) + "\n")
         (out / "benchmarks.md").write_text(text)
-        kept.path.unlink()
+        measurements.path.unlink()
     print(text)
 
 
-def measure(kept: Kept) -> tuple[dict[str, Table], list[str]]:
-    """All tables by name, and what holds to machine precision."""
-    found = [cases := measured.cases(kept)]
-    studies = measured.switches, measured.sweeps, measured.growth, measured.stress
-    found += [study(kept) for study in studies]
-    found.append(modelings(kept, cases))
+def measure(measurements: Measurements) -> tuple[dict[str, Table], list[str]]:
+    """Measure all tables, {name: table}, and what holds to machine precision."""
+    tables = [cases := bench_cost.cases(measurements)]
+    studies = bench_cost.switches, bench_cost.sweeps, bench_cost.growth, bench_cost.stress
+    tables += [study(measurements) for study in studies]
+    tables.append(modelings(measurements, cases))
     with threadpool_limits(1):
-        exact, overkill = measured.overkill(kept)
-        found += [overkill, measured.accuracy(kept, exact, cases["start"][0])]
-        found += [measured.recommended(kept, exact), measured.estimates(kept)]
-        return {table.name: table for table in found}, measured.checks(kept)
+        exact, overkill = bench_accuracy.overkill(measurements)
+        tables += [overkill, bench_accuracy.accuracy(measurements, exact, cases["start"][0])]
+        tables.append(bench_accuracy.recommended(measurements, exact))
+        tables.append(bench_accuracy.estimates(measurements))
+        precise = bench_cost.precision(measurements)
+    return {table.name: table for table in tables}, precise

@@ -130,7 +130,7 @@ def validation_page() -> str:
     from damjoint.post import validation
     from damjoint.run import run
 
-    from .provenance import provenance, said
+    from .provenance import provenance, source_line
 
     comparisons = []
     with tempfile.TemporaryDirectory() as folder:
@@ -148,7 +148,7 @@ def validation_page() -> str:
                 "meaning, or to a value that the document prints differently. The opening of I at "
                 "the heel is close to the tolerance of the GEFDYN value, but agrees with "
                 "code_aster.",
-                said([provenance()], "Computed"),
+                source_line([provenance()], "Computed"),
                 validation.report(comparisons, "github"),
                 "![Modeling K: past the critical load](pictures/k_curve.png)",
             ]
@@ -159,9 +159,10 @@ def validation_page() -> str:
 
 def tour_page() -> str:
     """reference/tour.md with its commands run again, one after the other in a temporary folder."""
-    from .provenance import provenance, said
+    from .provenance import provenance, source_line
 
-    page = between("figures", (REFERENCE / "tour.md").read_text(), said([provenance()], "Computed"))
+    source = source_line([provenance()], "Computed")
+    page = between("figures", (REFERENCE / "tour.md").read_text(), source)
     with tempfile.TemporaryDirectory() as folder:
         play = lambda block: f"```\n{played(block[1], Path(folder))}```"
         return re.sub(r"^```\n(.*?)^```$", play, page, flags=re.S | re.M)
@@ -182,15 +183,15 @@ def played(block: str, folder: Path) -> str:
     if file := re.match(r"// (\S+\.case)\n", block):
         (folder / file[1]).write_text(block)
         return block
-    said = ""
+    blocks = ""
     for command in re.findall(r"^\$ damjoint (?:.*\\\n)*.*\n", block, flags=re.M):
         words = [sys.executable, "-m", *shlex.split(command[2:].replace("\\\n", ""))]
         done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)
         if done.returncode not in (0, 1):
             raise ValueError(f"{command}{done.stderr}")
         printed = "\n".join(line.rstrip() for line in done.stdout.splitlines())
-        said += f"{command}{printed}\n" + f"(exit code {done.returncode})\n" * done.returncode
-    return said
+        blocks += f"{command}{printed}\n" + f"(exit code {done.returncode})\n" * done.returncode
+    return blocks
 
 
 def take_bench(out: Path) -> None:
@@ -240,12 +241,12 @@ def trust_page(results: Path) -> str:
         tables += lines
     tables.append(("all", *counts(rows).values()))
     slowest = sorted(rows, key=lambda row: -float(row["seconds"] or 0))[:5]
-    told = [
-        f"- {row['scene']}, {row['class']}: {row['found']}\n\n      {row['command']}"
+    unsolved = [
+        f"- {row['scene']}, {row['class']}: {row['findings']}\n\n      {row['command']}"
         for kind in (DEFECT, UNDECIDED)
         for row in of("class", kind)
     ]
-    worst = [(r["scene"], r["seconds"], r["iterations"], r["cuts"], r["found"]) for r in slowest]
+    worst = [(r["scene"], r["seconds"], r["iterations"], r["cuts"], r["findings"]) for r in slowest]
     return (
         "\n\n".join(
             [
@@ -258,16 +259,16 @@ def trust_page(results: Path) -> str:
                 "and earthquake, rising and falling water; one 2D scene in ten is a slender dam "
                 "with the stiffness of concrete on a brittle joint. Written by "
                 "`python -m damjoint_tools.pages trust FILE` from the result file.",
-                provenance.said(rows),
+                provenance.source_line(rows),
                 "## What is verified",
                 VERIFIED,
                 "## Result",
                 markdown(tables, ("scenes", *CLASSES)),
                 "## Defects and undecided stops",
-                "\n".join(told) or "None.",
+                "\n".join(unsolved) or "None.",
                 "## The slowest scenes",
                 "Seconds of the complete command, in one of several processes.",
-                markdown(worst, ("scene", "seconds", "iterations", "cuts", "found")),
+                markdown(worst, ("scene", "seconds", "iterations", "cuts", "findings")),
             ]
         )
         + "\n"

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from damjoint.engines.condensed.cache import interface_of
+from damjoint.joint.interface import interface_of
 from damjoint.laws import LAWS, Law
 from damjoint.model.case import load
 from damjoint.post.pictures import shear_limit
