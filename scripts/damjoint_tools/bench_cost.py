@@ -14,10 +14,9 @@ from pathlib import Path
 
 import numpy as np
 from damjoint import RunError
-from damjoint.joint.interface import interface_of
 from damjoint.fem.bodies import Bodies
 from damjoint.fem.condensation import condense
-from damjoint.joint.interface import Interface
+from damjoint.joint.interface import Interface, interface_of
 from damjoint.model.case import Case, load
 from damjoint.run import run
 from damjoint.solver.load_stepper import LoadStepper

@@ -178,12 +178,12 @@ def test_invalid_output_of_getdp_is_reported(command, tmp_path, fake_getdp, prin
 @pytest.mark.parametrize(
     "left, message",
     [
-        ("true", "ended without saying how far it went"),
+        ("true", "ended without writing status.txt"),
         ("echo 0 > status.txt; touch history.txt", "no step at t = 4"),
         ("echo 0 > status.txt; echo step 1 3 x y z 1 1 1 1 1 1 1 1 1 1 1 > history.txt", "'x'"),
         ("echo 0 > status.txt; head -c 900 /dev/urandom > history.txt", "tables can not be read"),
         ("echo 1 > status.txt; echo step 1 3 1 1 1 1 1 1 1 1 1 1 1 1 1 1 > history.txt", "jump_1"),
-        ("head -c 3000000 /dev/zero", "ended without saying how far it went"),
+        ("head -c 3000000 /dev/zero", "ended without writing status.txt"),
     ],
 )
 def test_an_invalid_file_of_getdp_is_reported(command, tmp_path, fake_getdp, left, message):
@@ -198,7 +198,7 @@ def test_an_invalid_file_of_getdp_is_reported(command, tmp_path, fake_getdp, lef
 @pytest.mark.parametrize(
     "name",
     [
-        *("scene.pre", "history.txt", "status.txt", "jump_1.txt", "traction_2.txt", "way_2.txt"),
+        *("scene.pre", "history.txt", "status.txt", "jump_1.txt", "traction_2.txt", "path_2.txt"),
         *("mean_jump_1.txt", "lambda_2.txt", "u_dam_1.txt", "stress_2.txt"),
     ],
 )

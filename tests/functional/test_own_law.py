@@ -1,12 +1,17 @@
 """A further law is a class: the engine, the tables and the verdict take it as it is."""
 
+import shutil
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from damjoint import data
+from damjoint.engines.getdp.process import Runner, write_problem
+from damjoint.engines.getdp.tables import read_history
 from damjoint.joint.interface import interface_of
 from damjoint.laws import LAWS, Law
 from damjoint.model.case import load
+from damjoint.model.mesh import mesh_of
 from damjoint.post.pictures import shear_limit
 from damjoint.solver.load_stepper import LoadStepper
 from damjoint.statics.verdict import hints, verdict
@@ -47,3 +52,42 @@ def test_a_toy_law_needs_nothing_else(result):
     assert not any("law" in hint for hint in hints(result))
     assert not result.at()["damage"][result.at()["delta_n"] < 0].any()
     assert not result.at()["slip"].any()
+
+
+#: The same law as a file of the problem definition
+SPRINGS = """
+law_variables = "unused unused_1 unused_2";
+law_column = "";
+law_has_works = 0;
+law_has_release = 0;
+Function {
+  law_tangent[] = TensorDiag[K_T, K_N, K_T];
+  law_secant[] = TensorDiag[K_T, K_N, K_T];
+  law_traction[] = TensorDiag[K_T, K_N, K_T] * $1;
+  law_initial_scalar[] = 0;
+  law_new_scalar[] = $2;
+  law_new_vector[] = $3;
+  law_damage[] = 0;
+  law_slip[] = 0;
+  law_open[] = 0;
+  law_slid[] = 0;
+  law_critical_opening[] = 0;
+}
+"""
+
+
+def test_a_toy_law_in_the_problem_definition(result, tmp_path):
+    """One file, pro/law_springs.pro: the resultants are those of the Python class."""
+    case = result.case
+    shutil.copytree(data("pro"), tmp_path / "pro")
+    (tmp_path / "pro/law_springs.pro").write_text(SPRINGS)
+    mesh = mesh_of(case)
+    mesh.write(tmp_path / "dam.msh")
+    problem = write_problem(case, None, tmp_path, {"views": 0.0})
+    problem.write_text(problem.read_text().replace(str(data("pro")), "pro"))
+    Runner().execute(problem, ["-msh", "dam.msh", "-solve", "Fill"])
+    history = read_history(case, tmp_path)
+    for name in ("N", "T", "M", "heel"):
+        expected = result.heel[-1] if name == "heel" else result.last[name]
+        assert history[name][-1] == pytest.approx(expected, rel=1e-6)
+    assert history["iterations"][-1] <= 1

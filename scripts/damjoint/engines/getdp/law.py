@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ... import RunError, data
+from ...arrays import Values
 from ...model.case import load
 from ...model.parameters import assignments, listing, parameter
 from ...storage import check_end
@@ -30,7 +31,7 @@ $EndElements
 
 
 def evaluate(
-    law: str, jumps: np.ndarray, pressure: np.ndarray | None = None, settings: dict | None = None
+    law: str, jumps: np.ndarray, pressure: np.ndarray | None = None, settings: Values | None = None
 ) -> dict[str, np.ndarray]:
     """The law along a path.
 
@@ -58,7 +59,7 @@ def evaluate(
             + "".join(listing(n, column) for n, column in columns.items())
             + f'out_dir = "./";\nInclude "{data("pro")}/law_path.pro";\n'
         )
-        process.execute(problem, ["-msh", str(folder / "one.msh"), "-solve", "Path"])
+        process.Runner().execute(problem, ["-msh", str(folder / "one.msh"), "-solve", "Path"])
         try:
             check_end(folder / "law.txt", "\n")
             heading, *rows = (folder / "law.txt").read_text().splitlines()

@@ -1,6 +1,4 @@
-"""GetDP as a process: it runs pro/damjoint.pro in a folder of its own and leaves its tables
-there.
-"""
+"""Processes of GetDP: each runs pro/damjoint.pro in a folder of its own, where its tables are."""
 
 from __future__ import annotations
 
@@ -9,45 +7,46 @@ import re
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
 from ... import InputError, RunError, data
 from ...model.case import Case
-from ...model.mesh import LINES, SIDES, Mesh, area, heel_normal
+from ...model.mesh import LINES, Mesh, area, heel_normal
 from ...model.parameters import assignments, constants, listing
+from ...model.scene import SIDES
 from ...storage import check_end
 
 OLDEST = (3, 2)
-#: One process talks to no other: without looking for networks Open MPI starts a quarter of a second
+#: Open MPI for a single process: without a search for networks it starts a quarter of a second
 #: sooner.
 ALONE = {
     "OMPI_MCA_ess_singleton_isolated": "1",
     "OMPI_MCA_btl": "self",
     "OMPI_MCA_pml": "ob1",
 }
-#: Seconds in which a program has to say its version.
+#: Time limit for a program to print its version [s].
 PATIENCE = 60
 
-
-#: A number that GetDP prints.
+#: A number as GetDP prints it.
 NUMBER = r"(\d+\.?\d*(?:e[+-]?\d+)?)"
 
 
 def find_getdp() -> str:
-    """The GetDP program: $GETDP, then PATH.
+    """Path of the GetDP program: $GETDP, then PATH.
 
-    Raises InputError if there is none that can be used.
+    Raises InputError if there is none, or it is too old.
     """
     program = os.environ.get("GETDP") or "getdp"
-    found = shutil.which(program)
+    path = shutil.which(program)
     why = "no such program"
-    if found:
-        told = version_of(found)
-        if tuple(map(int, re.findall(r"\d+", told)[:2])) >= OLDEST:
-            return found
-        why = f"version {told}" if told else "does not say a version"
+    if path:
+        version = version_of(path)
+        if tuple(map(int, re.findall(r"\d+", version)[:2])) >= OLDEST:
+            return path
+        why = f"version {version}" if version else "prints no version"
     raise InputError(
         f"GETDP = {program}: {why}; allowed: a GetDP >= 3.2 in $GETDP or on the PATH "
         "(Debian, Ubuntu: apt-get install getdp)"
@@ -56,7 +55,7 @@ def find_getdp() -> str:
 
 @lru_cache
 def version_of(program: str) -> str:
-    """The version that a GetDP says it has; empty if it says none."""
+    """The version that a GetDP program prints; empty if none."""
     with tempfile.TemporaryDirectory(prefix="damjoint-") as folder:
         try:
             done = subprocess.run(
@@ -70,19 +69,19 @@ def version_of(program: str) -> str:
             )
         except (OSError, subprocess.TimeoutExpired):
             return ""
-    told = re.search(r"^\d+\.\d+[\w.-]*", done.stdout.decode(errors="replace"), re.M)
-    return told[0] if told else ""
+    version = re.search(r"^\d+\.\d+[\w.-]*", done.stdout.decode(errors="replace"), re.M)
+    return version[0] if version else ""
 
 
 def environment(folder: Path, threads: int = 1) -> dict[str, str]:
-    """The environment of a GetDP that works in a folder; what Open MPI leaves stays there."""
+    """Environment of a GetDP in a folder, in which the temporary files of Open MPI are, too."""
     number = str(threads)
     own = {"TMPDIR": str(folder), "OPENBLAS_NUM_THREADS": number, "OMP_NUM_THREADS": number}
     return {**ALONE, **os.environ, **own}
 
 
 def own_lists(mesh: Mesh) -> dict[str, list[float]]:
-    """What pro/section.pro has to know of a user's own geometry."""
+    """The lists of pro/section.pro for a user's own geometry."""
     (joint,), bodies, faces = mesh.joints.values(), mesh.bodies, mesh.faces.values()
     length = area(joint.heel) if mesh.dim == 3 else 1.0
     normal, crest = heel_normal(joint.surface, joint.heel), bodies["crest"].points[0]
@@ -105,18 +104,17 @@ def own_lists(mesh: Mesh) -> dict[str, list[float]]:
 def write_problem(
     case: Case, mesh: Mesh | None, folder: Path, options: dict[str, float] | None = None
 ) -> Path:
-    """Write the problem file of a case into folder (scene.pro); its results go beside it.
+    """Write the problem file of a case, scene.pro, into the folder of its results.
 
-    mesh: of a user's own geometry.
+    mesh: of a user's own geometry; options: further constants of pro/*.pro.
     """
-    save_step = [float(t in case.requested) for t in case.times]
-    lists = {
+    lists: dict[str, Sequence[float]] = {
         "levels": case.levels,
         "tail_levels": case.tail_levels,
         "times": case.times,
-        "save_step": save_step,
+        "save_step": [float(t in case.requested) for t in case.times],
     }
-    if case.geometry:
+    if case.geometry and mesh:
         lists |= own_lists(mesh)
     path = folder / "scene.pro"
     path.write_text(
@@ -128,101 +126,110 @@ def write_problem(
     return path
 
 
-#: Processes under way, to be ended when their run is interrupted.
-RUNNING: list[subprocess.Popen] = []
+@dataclass
+class Usage:
+    """What a process of GetDP reports of itself; None: it failed."""
+
+    version: str | None = None
+    unknowns: int | None = None
+    #: wall time [s], peak memory [MB]
+    wall: float | None = None
+    memory: float | None = None
 
 
-def stop_all() -> None:
-    """End all processes under way."""
-    for process in RUNNING:
-        process.kill()
-
-
-def execute(
-    problem: Path,
-    arguments: list[str],
-    threads: int = 1,
-    on_line: Callable[[str], None] = lambda line: None,
-) -> dict:
-    """Run GetDP on a problem file, in its folder, and return {version, unknowns, wall, memory}.
-
-    arguments: after the problem file; threads: of the linear algebra; on_line: called with each
-    line printed. Raises RunError with GetDP's first error line, and its last lines where it ended
-    without one.
-    """
-    program = find_getdp()
-    command = [program, problem.name, *arguments, "-v", "4"]
-    errors, last = [], []
-    told = {"version": version_of(program), "unknowns": 0, "wall": 0.0, "memory": 0.0}
-    process = subprocess.Popen(
-        command,
-        cwd=problem.parent,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        env=environment(problem.parent, threads),
-        errors="replace",
-    )
-    RUNNING.append(process)
-    try:
-        for line in process.stdout:
-            last = [*last[-2:], line.strip()]
-            if line.startswith(("Error", "Fatal", "Warning")) or "Error   :" in line:
-                errors.append(line.strip())
-            elif match := re.search(r"System 1/\d+: (\d+) Dofs", line):
-                told["unknowns"] = int(match[1])
-            elif match := re.search(rf"Stopped.*Wall = {NUMBER}s.*Mem = {NUMBER}Mb", line):
-                told["wall"], told["memory"] = float(match[1]), float(match[2])
-            on_line(line)
-        process.wait()
-    finally:  # also where on_line has been interrupted
-        process.kill()
-        process.wait()  # its folder is removed next
-        RUNNING.remove(process)
-    if process.returncode or errors:
-        why = (
-            errors[0]
-            if errors
-            else f"ended with exit code {process.returncode}: {' | '.join(last)}"
-        )
-        raise RunError(f"GetDP: {why}")
-    return told
-
-
-#: With which of its blocks GetDP's numbering of the unknowns (.pre) can end.
+#: The last block of GetDP's numbering of the unknowns (.pre) is one of these.
 LAST_BLOCKS = "DofData", "ElementsXEdges", "ElementsXFacets", "ExtendedGroup"
 
 
-def fill(
-    case: Case,
-    mesh: Mesh,
-    mesh_file: Path,
-    folder: Path,
-    fields: bool = False,
-    on_step: Callable[[float], None] = lambda time: None,
-) -> dict:
-    """Follow the loading of a case.
+class Runner:
+    """Runs processes of GetDP, from several threads."""
 
-    Tables are left in folder (see tables.py); returns what `execute` tells.
+    def __init__(self) -> None:
+        self._running: list[subprocess.Popen[str]] = []
+
+    def stop(self) -> None:
+        """End all processes that are running."""
+        for process in self._running:
+            process.kill()
+
+    def execute(
+        self,
+        problem: Path,
+        arguments: list[str],
+        threads: int = 1,
+        on_line: Callable[[str], None] = lambda line: None,
+    ) -> Usage:
+        """Run GetDP on a problem file, in its folder.
+
+        arguments: after the problem file; threads: of the linear algebra; on_line: called with each
+        printed line. Raises RunError with GetDP's first error, or its last lines if it failed
+        without one.
+        """
+        program = find_getdp()
+        usage = Usage(version_of(program), 0, 0.0, 0.0)
+        errors: list[str] = []
+        last: list[str] = []
+        process = subprocess.Popen(
+            [program, problem.name, *arguments, "-v", "4"],
+            cwd=problem.parent,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            env=environment(problem.parent, threads),
+            errors="replace",
+        )
+        self._running.append(process)
+        try:
+            for line in process.stdout or ():
+                last = [*last[-2:], line.strip()]
+                if line.startswith(("Error", "Fatal", "Warning")) or "Error   :" in line:
+                    errors.append(line.strip())
+                elif match := re.search(r"System 1/\d+: (\d+) Dofs", line):
+                    usage.unknowns = int(match[1])
+                elif match := re.search(rf"Stopped.*Wall = {NUMBER}s.*Mem = {NUMBER}Mb", line):
+                    usage.wall, usage.memory = float(match[1]), float(match[2])
+                on_line(line)
+            process.wait()
+        finally:  # also if on_line was interrupted
+            process.kill()
+            process.wait()  # the caller removes its folder
+            self._running.remove(process)
+        if process.returncode or errors:
+            ended = f"ended with exit code {process.returncode}: {' | '.join(last)}"
+            raise RunError(f"GetDP: {errors[0] if errors else ended}")
+        return usage
+
+    def fill(
+        self,
+        case: Case,
+        mesh: Mesh,
+        mesh_file: Path,
+        folder: Path,
+        fields: bool = False,
+        on_step: Callable[[float], None] = lambda time: None,
+    ) -> Usage:
+        """Solve all load steps of a case; its tables are in folder (see tables.py).
+
         fields: also displacement and stress; on_step: called with the time of each converged step.
-    Raises RunError, OSError (a full disk, which GetDP itself does not notice).
-    """
-    problem, steps = write_problem(case, mesh, folder, {"views": 0.0, "fields": float(fields)}), []
+        Raises RunError, OSError (a full disk, which GetDP itself does not notice).
+        """
+        problem = write_problem(case, mesh, folder, {"views": 0.0, "fields": float(fields)})
+        steps = []
 
-    def watch(line: str) -> None:
-        if match := re.match(rf"step {NUMBER} ", line):
-            steps.append(line)
-            on_step(float(match[1]))
+        def watch(line: str) -> None:
+            if match := re.match(rf"step {NUMBER} ", line):
+                steps.append(line)
+                on_step(float(match[1]))
 
-    threads = 1 if case["dim"] == 2 else 2
-    told = execute(problem, ["-msh", str(mesh_file), "-solve", "Fill"], threads, watch)
-    if (numbering := problem.with_suffix(".pre")).exists():  # GetDP reads back what it wrote
-        check_end(numbering, *(f"$End{block}\n" for block in LAST_BLOCKS))
-    if steps:  # printed, and written
-        check_end(folder / "history.txt", "".join(steps))
-    status = folder / "status.txt"
-    if not status.exists():
-        raise RunError("GetDP: ended without saying how far it went")
-    check_end(status, "\n")
-    return told
+        threads = 1 if case["dim"] == 2 else 2
+        usage = self.execute(problem, ["-msh", str(mesh_file), "-solve", "Fill"], threads, watch)
+        if (numbering := problem.with_suffix(".pre")).exists():  # GetDP reads it, too
+            check_end(numbering, *(f"$End{block}\n" for block in LAST_BLOCKS))
+        if steps:
+            check_end(folder / "history.txt", "".join(steps))
+        status = folder / "status.txt"
+        if not status.exists():
+            raise RunError("GetDP: ended without writing status.txt")
+        check_end(status, "\n")
+        return usage

@@ -1,5 +1,5 @@
-"""The plain engine's side of the interface of engines/__init__.py: one GetDP process per scene, two
-at a time.
+"""The interface of engines/__init__.py for the reference GetDP model: one process of GetDP per
+scene, two at a time.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -20,12 +21,12 @@ from ...model.mesh import Mesh, mesh_of
 from .. import OnStep, Outcome
 from . import process, tables
 
-#: Patterns that pro/*.pro knows in 3D: GetDP's rules for prisms and hexahedra do not do.
+#: Mesh patterns in 3D: GetDP has no suitable quadrature for prisms and hexahedra.
 SOLID = ("free", "split")
 
 
 def check(case: Case) -> None:
-    """Raise InputError if there is no GetDP, or it can not run the case."""
+    """Raise InputError if there is no GetDP, or it cannot run the case."""
     process.find_getdp()
     if case["dim"] == 3 and case["mesh_pattern"] not in SOLID:
         raise InputError(
@@ -39,7 +40,7 @@ def check(case: Case) -> None:
 
 
 def check_own(mesh: Mesh, case: Case) -> None:
-    """Raise InputError if this engine can not run a user's own geometry."""
+    """Raise InputError if this engine cannot run a user's own geometry."""
     shapes = {shape for solid in mesh.solids.values() for shape, _ in solid.cells}
     if mesh.dim == 3 and shapes != {"tetra"}:
         raise InputError(f"geometry = {case.geometry}: must have tetrahedra with engine = getdp")
@@ -57,9 +58,9 @@ PER_UNKNOWN, EDGES = {2: 3000, 3: 8000}, {2: 4, 3: 8}
 
 
 def check_size(case: Case, unknowns: float) -> None:
-    """Raise RunError if so many unknowns need more memory than there is."""
+    """Raise RunError if so many unknowns need more memory than is available."""
     at_once = min(2, len(case.scenes()))
-    check_memory(at_once * PER_UNKNOWN[case["dim"]] * unknowns, f"{unknowns:.0f} unknowns")
+    check_memory(at_once * PER_UNKNOWN[int(case["dim"])] * unknowns, f"{unknowns:.0f} unknowns")
 
 
 def solve(case: Case, on_step: OnStep, fields: bool) -> Iterator[Outcome]:
@@ -71,7 +72,7 @@ def solve(case: Case, on_step: OnStep, fields: bool) -> Iterator[Outcome]:
     if not case.geometry:
         check_size(case, bulk_size(case))
     mesh = mesh_of(case)
-    functions = mesh.nodes if case["order"] == 1 else EDGES[case["dim"]] * mesh.nodes
+    functions = mesh.nodes if case["order"] == 1 else EDGES[int(case["dim"])] * mesh.nodes
     check_size(case, case["dim"] * functions)
     meshed = time.perf_counter() - start
     with tempfile.TemporaryDirectory(prefix="damjoint-") as name, ThreadPoolExecutor(2) as pool:
@@ -79,32 +80,33 @@ def solve(case: Case, on_step: OnStep, fields: bool) -> Iterator[Outcome]:
         mesh.write(mesh_file)
         (joint,) = mesh.joints.values()
         case = replace(case, section=case.section | joint.ends)
-        scenes, waiting = case.scenes(), []
+        scenes, running, runner = case.scenes(), [], process.Runner()
         for number, scene in enumerate(scenes):
             folder = Path(name) / scene["uplift"]
             folder.mkdir()
             watch = lambda now, number=number: on_step(number, now)
-            waiting.append(
-                (folder, pool.submit(process.fill, scene, mesh, mesh_file, folder, fields, watch))
+            running.append(
+                (folder, pool.submit(runner.fill, scene, mesh, mesh_file, folder, fields, watch))
             )
-        for scene, (folder, future) in zip(scenes, waiting, strict=True):
-            error, told = None, {}
+        for scene, (folder, future) in zip(scenes, running, strict=True):
+            error: BaseException | None = None
+            usage = process.Usage()
             try:
-                told = future.result()
+                usage = future.result()
             except BaseException as caught:
                 error = caught
-                if not isinstance(caught, Exception):  # interrupted: the others need not go on
-                    process.stop_all()
+                if not isinstance(caught, Exception):  # interrupted
+                    runner.stop()
             try:
                 result, saved = tables.read(scene, folder)
-                found = tables.read_fields(folder, saved, mesh) if fields and not error else {}
+                of_bodies = tables.read_fields(folder, saved, mesh) if fields and not error else {}
             except (OSError, ValueError, IndexError) as damage:
                 raise error or RunError(f"GetDP: its tables can not be read: {damage}") from None
             result.info = {
                 "engine": "getdp",
                 "mesh": mesh.counts,
-                "unknowns": told.get("unknowns"),
-                "wall_seconds": {"mesh": meshed, "solve": told.get("wall")},
-                "getdp": {"version": told.get("version"), "peak_memory_mb": told.get("memory")},
+                "unknowns": usage.unknowns,
+                "wall_seconds": {"mesh": meshed, "solve": usage.wall},
+                "getdp": {"version": usage.version, "peak_memory_mb": usage.memory},
             }
-            yield Outcome(result, lambda: mesh, lambda found=found: found, error)
+            yield Outcome(result, lambda: mesh, partial(dict, of_bodies), error)

@@ -1,4 +1,4 @@
-"""What GetDP has printed, as results."""
+"""Results from the tables of GetDP (pro/output.pro)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ...model.mesh import Mesh
 from ...model.results import JOINT, Results, history_table, joint_columns, joint_table
 from ...storage import check_end
 
-#: Columns of history.txt (pro/step_control.pro), behind the word "step".
+#: Columns of history.txt (pro/step_control.pro), after the word "step".
 PRINTED = [
     "time",
     "level",
@@ -35,10 +35,9 @@ PRINTED = [
 
 
 def read_simple_table(path: Path, components: int = 3) -> tuple[np.ndarray, np.ndarray]:
-    """GetDP's SimpleTable on elements: points (elements x nodes, 3) and values (elements x nodes,
-    components).
+    """Points (elements x nodes, 3) and values (elements x nodes, components) of a SimpleTable.
 
-    Raises OSError, ValueError if the file is missing or not whole.
+    Raises OSError, ValueError if the file is missing or incomplete.
     """
     check_end(path, "\n")
     table = np.loadtxt(path, ndmin=2)
@@ -47,25 +46,23 @@ def read_simple_table(path: Path, components: int = 3) -> tuple[np.ndarray, np.n
 
 
 def nodes_of(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Distinct points, sorted by x, then z, and for each given point the row of its node."""
+    """Distinct points, sorted by x, then z, and for each of the points the row of its node."""
     rounded = np.round(points / max(1e-300, np.abs(points).max()), 9)
     _, first, inverse = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
     return points[first], inverse.ravel()
 
 
 def node_means(rows: np.ndarray, values: np.ndarray, number: int) -> np.ndarray:
-    """Mean of the values that fall on each of `number` nodes; rows: the node of each value."""
+    """Mean of the values at each of `number` nodes; rows: the node of each value."""
     total = np.zeros((number, values.shape[1]))
     np.add.at(total, rows, values)
     return total / np.bincount(rows, minlength=number)[:, None]
 
 
 def read_history(case: Case, folder: Path) -> dict[str, np.ndarray]:
-    """The rows of history.txt up to the first that is not whole, {column of PRINTED: values}, and
-    tail_level.
-    """
+    """Complete rows of history.txt, {column of PRINTED: values}, and tail_level."""
     file = folder / "history.txt"
-    # what stands behind the last end of a line is not whole
+    # a line without its end is incomplete
     lines = file.read_text().split("\n")[:-1] if file.exists() else []
     rows = (line.split()[1:] for line in lines)
     steps = np.array([*takewhile(lambda row: len(row) == len(PRINTED), rows)], float)
@@ -74,12 +71,10 @@ def read_history(case: Case, folder: Path) -> dict[str, np.ndarray]:
 
 
 def saved_times(case: Case, history: dict[str, np.ndarray], stopped: bool) -> dict[int, float]:
-    """The requested times that have been reached, by the number that GetDP's files carry."""
+    """Requested times that were reached, by the number in the names of GetDP's files."""
     done = history["time"]
     saved = {i + 1: t for i, t in enumerate(case.times) if t in case.requested and t in done}
-    if (
-        stopped and len(done) and done[-1] not in case.times
-    ):  # the last state before a run has stopped
+    if stopped and len(done) and done[-1] not in case.times:  # the last converged state
         saved[int(np.isin(case.times, done).sum()) + 1] = float(done[-1])
     return saved
 
@@ -87,9 +82,9 @@ def saved_times(case: Case, history: dict[str, np.ndarray], stopped: bool) -> di
 def read_joint(
     case: Case, folder: Path, number: int, time: float, level: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The joint's rows of one requested time, and the same extrapolated from element means.
+    """Rows of the joint at a requested time, and the same extrapolated from element means.
 
-    Raises OSError, ValueError if a file is missing or not whole.
+    Raises OSError, ValueError if a file is missing or incomplete.
     """
 
     def table(name: str, components: int = 3) -> tuple[np.ndarray, np.ndarray]:
@@ -98,8 +93,8 @@ def read_joint(
     order = [1, 0, 2]  # y, x, z: normal, tangent 1, tangent 2
     points, jump = table("jump")
     nodes, rows = nodes_of(points)
-    found = jump, table("traction")[1], table("state")[1]
-    jump, traction, state = (node_means(rows, values, len(nodes)) for values in found)
+    tables = jump, table("traction")[1], table("state")[1]
+    jump, traction, state = (node_means(rows, values, len(nodes)) for values in tables)
     more = [
         node_means(rows, table(name, 1)[1], len(nodes))
         for name in joint_columns(case)
@@ -122,24 +117,23 @@ def read_joint(
 
 
 def read(case: Case, folder: Path) -> tuple[Results, dict[int, float]]:
-    """Read what GetDP has left in a folder, complete or not: everything up to the last converged
-    step.
+    """Read the tables of a run, finished or not, up to the last converged step.
 
     Returns the results, and the times of the files by their number. Raises OSError, ValueError if
-    what should be whole is not.
+    a table of a finished run is incomplete.
     """
     history = read_history(case, folder)
     status = folder / "status.txt"
-    said = status.read_text() if status.exists() else ""
-    finished, stopped = bool(said), said == "1\n"
+    text = status.read_text() if status.exists() else ""
+    finished, stopped = bool(text), text == "1\n"
     if finished and not stopped and not np.isclose(history["time"], case.times[-1]).any():
-        raise ValueError(f"no step at t = {case.times[-1]:g}, where it says to be")
+        raise ValueError(f"history.txt: no step at t = {case.times[-1]:g}, the last one")
     blocks, saved = [], {}
     for number, time in saved_times(case, history, stopped).items():
         level = history["level"][np.flatnonzero(history["time"] == time)[0]]
         try:
             blocks.append(read_joint(case, folder, number, time, level))
-        except (OSError, ValueError):  # GetDP has been ended while it was writing this one
+        except (OSError, ValueError):  # GetDP was stopped while it wrote this table
             if finished:
                 raise
             break
@@ -150,9 +144,9 @@ def read(case: Case, folder: Path) -> tuple[Results, dict[int, float]]:
 
 
 def read_values(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """GetDP's NodeTable or ElementTable with one value set each: numbers and values.
+    """Numbers of nodes or elements, and their values, of GetDP's NodeTable or ElementTable.
 
-    Raises OSError, ValueError if the file is missing or has not as many rows as its head says.
+    Raises OSError, ValueError if the file is missing or incomplete.
     """
     check_end(path, "\n")
     with path.open() as file:
@@ -163,26 +157,26 @@ def read_values(path: Path) -> tuple[np.ndarray, np.ndarray]:
 
 
 def pick(numbers: np.ndarray, values: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """The values that belong to the wanted numbers."""
+    """Values of the wanted numbers, in their order."""
     order = np.argsort(numbers)
     return values[order[np.searchsorted(numbers, wanted, sorter=order)]]
 
 
 def read_rest(path: Path, wanted: np.ndarray) -> np.ndarray | float:
-    """The displacement under the weight alone, from where displacements count; 0 without it."""
+    """Displacement under the weight alone, the reference of displacements; 0 without it."""
     return pick(*read_values(path), wanted) if path.exists() else 0.0
 
 
 def read_fields(folder: Path, saved: dict[int, float], mesh: Mesh) -> dict[float, Field]:
-    """The fields that GetDP has left in a folder, by time; saved: see `read`."""
-    found, solids = {}, mesh.solids.items()
+    """Fields of the bodies by time; saved: see `read`."""
+    result, solids = {}, mesh.solids.items()
     at_rest = {n: read_rest(folder / f"u_{n}_0.txt", solid.node_tags) for n, solid in solids}
     for number, time in saved.items():
         elements, stress = read_values(folder / f"stress_{number}.txt")
         stress = stress[:, [0, 3, 5, 1, 4, 2]]
         displacement = {n: read_values(folder / f"u_{n}_{number}.txt") for n, _ in solids}
-        found[time] = Field(
+        result[time] = Field(
             {n: pick(*displacement[n], solid.node_tags) - at_rest[n] for n, solid in solids},
             {n: pick(elements, stress, solid.element_tags) for n, solid in solids},
         )
-    return found
+    return result
