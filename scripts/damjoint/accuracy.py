@@ -37,7 +37,7 @@ OFF_LEVEL = 1e-3
 
 #: Compared quantities: label and unit.
 QUANTITIES = {
-    "level": ("level found", "m"),
+    "level": ("level reached", "m"),
     "max_opening": ("largest opening", "m"),
     "crack_length": ("crack length", "m"),
     "slip_length": ("slip length", "m"),

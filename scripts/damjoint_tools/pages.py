@@ -183,15 +183,15 @@ def played(block: str, folder: Path) -> str:
     if file := re.match(r"// (\S+\.case)\n", block):
         (folder / file[1]).write_text(block)
         return block
-    said = ""
+    blocks = ""
     for command in re.findall(r"^\$ damjoint (?:.*\\\n)*.*\n", block, flags=re.M):
         words = [sys.executable, "-m", *shlex.split(command[2:].replace("\\\n", ""))]
         done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)
         if done.returncode not in (0, 1):
             raise ValueError(f"{command}{done.stderr}")
         printed = "\n".join(line.rstrip() for line in done.stdout.splitlines())
-        said += f"{command}{printed}\n" + f"(exit code {done.returncode})\n" * done.returncode
-    return said
+        blocks += f"{command}{printed}\n" + f"(exit code {done.returncode})\n" * done.returncode
+    return blocks
 
 
 def take_bench(out: Path) -> None:
@@ -241,7 +241,7 @@ def trust_page(results: Path) -> str:
         tables += lines
     tables.append(("all", *counts(rows).values()))
     slowest = sorted(rows, key=lambda row: -float(row["seconds"] or 0))[:5]
-    told = [
+    unsolved = [
         f"- {row['scene']}, {row['class']}: {row['findings']}\n\n      {row['command']}"
         for kind in (DEFECT, UNDECIDED)
         for row in of("class", kind)
@@ -265,7 +265,7 @@ def trust_page(results: Path) -> str:
                 "## Result",
                 markdown(tables, ("scenes", *CLASSES)),
                 "## Defects and undecided stops",
-                "\n".join(told) or "None.",
+                "\n".join(unsolved) or "None.",
                 "## The slowest scenes",
                 "Seconds of the complete command, in one of several processes.",
                 markdown(worst, ("scene", "seconds", "iterations", "cuts", "findings")),
