@@ -62,6 +62,13 @@ def path(name: str, text: str) -> Path:
     return Path(text)
 
 
+def levels(name: str, text: str) -> tuple[float, ...]:
+    """Return an argument as water levels [m]. Raises InputError."""
+    from .model.parameters import levels_of
+
+    return levels_of(name, text)
+
+
 class Parser(argparse.ArgumentParser):
     """Parser of arguments that raises InputError."""
 
@@ -77,6 +84,10 @@ class Parser(argparse.ArgumentParser):
     def add_path(self, name: str, metavar: str, **options: object) -> None:
         """Add an argument that is a path."""
         self.add_argument(name, action=Checked, convert=path, metavar=metavar, **options)
+
+    def add_levels(self, name: str, **options: object) -> None:
+        """Add an option that is a list of water levels."""
+        self.add_argument(name, action=Checked, convert=levels, metavar="H1,H2,...", **options)
 
     def add_list(self, name: str, metavar: str, **options: object) -> None:
         """Add an option that may be repeated."""
@@ -105,13 +116,12 @@ def settings_options() -> Parser:
 def water_options() -> Parser:
     """Options of the commands that fill the reservoir."""
     options = Parser(add_help=False)
-    options.add_argument(
+    options.add_levels(
         "--levels",
-        metavar="H1,H2,...",
         help="water levels [m above the heel] at t = 1, 2, ..., rising or falling: 3,6,8,9 "
         "(default: those of the case)",
     )
-    options.add_argument("--tail-levels", metavar="H1,H2,...", help=TAIL_LEVELS)
+    options.add_levels("--tail-levels", help=TAIL_LEVELS)
     options.add_argument(
         "--accuracy",
         metavar="PERCENT",
@@ -387,13 +397,12 @@ def add_critical(commands: Commands) -> None:
         help="level [m], strength (factor that divides mu, c, f_t and the fracture energies), "
         "uplift (effectiveness of the drains), k_h or any other parameter (default: level)",
     )
-    command.add_argument(
+    command.add_levels(
         "--levels",
-        metavar="H1,H2,...",
         help="water levels [m above the heel] in this order; all but a critical level are "
         "searched at the last one (default: those of the case)",
     )
-    command.add_argument("--tail-levels", metavar="H1,H2,...", help=TAIL_LEVELS)
+    command.add_levels("--tail-levels", help=TAIL_LEVELS)
     command.add_path("--out", "FOLDER", help="output folder (default: out/CASE_critical)")
 
 
@@ -483,12 +492,17 @@ def do_sweep(arguments: argparse.Namespace) -> int:
         raise InputError(f"--correlate {arguments.correlate[0]}: needs --sample")
     sample = sample_of(arguments.sample, **options) if arguments.sample else None
     plan = plan_of(arguments.vary, arguments.tie, sample, settings, arguments.critical)
-    loading = Schedule(arguments.levels, arguments.tail_levels, arguments.steps, arguments.accuracy)
-    if loading.accuracy:
-        settings, loading, estimate = meshed(arguments.case, settings, loading)
+    schedule = Schedule(
+        levels=arguments.levels,
+        tail_levels=arguments.tail_levels,
+        steps=arguments.steps,
+        accuracy=arguments.accuracy,
+    )
+    if schedule.accuracy:
+        settings, schedule, estimate = meshed(arguments.case, settings, schedule)
         print(f"one mesh for all rows, refined for the case as it is: {estimate}")
     count, rows = sweep(
-        arguments.case, plan, settings, out, loading, arguments.jobs, arguments.scheduler
+        arguments.case, plan, settings, out, schedule, arguments.jobs, arguments.scheduler
     )
     print(f"{count} rows computed; {out}")
     report_sweep(arguments.case, plan, rows, out)
