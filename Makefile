@@ -1,43 +1,44 @@
-# make setup | run | check | test | test-all | bench | pages | clean; each sets up first what is missing.
+# make setup | run | check | test | test-all | bench | pages | clean; all but clean run setup first.
 # PYTHON=python3.12 make setup chooses the interpreter.
 
 BIN = .venv/bin
-# a file of tests in one process, as its tests share what they have computed
+# each file of tests in one process, as its tests share computed scenes
 PARALLEL = --numprocesses auto --dist loadfile
 
 .PHONY: setup run check test test-all bench pages clean
 
-# GetDP and libraries (Debian packages), Python packages in .venv
+# Install GetDP and libraries (Debian packages), and Python packages in .venv
 setup:
 	@scripts/setup.sh
 
-# The first published case beside its reference numbers; tables and picture in out/a
+# Run the first published case and compare it with its reference numbers; results in out/a
 run: setup
 	$(BIN)/damjoint validate a
 
-# Style and what a look at the code can tell
+# Check style and common errors
 check: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 
-# The tests but for the minutes-long ones; all of them in CI
+# Run the tests but those that take minutes (heavy); in CI all of them
 test: check
 	$(BIN)/pytest -q $(PARALLEL) $(if $(CI),,-m "not heavy")
 
 test-all: check
 	$(BIN)/pytest -q $(PARALLEL)
 
-# Half an hour, which an interruption does not cost again; refreshes reference/benchmarks.md, its
-# picture and the modelings' table in README.md
+# Measure for half an hour (resumed if interrupted); update reference/benchmarks.md, its picture and
+# the table of modelings in README.md
 bench: setup
 	$(BIN)/damjoint bench
 	$(BIN)/python -m damjoint_tools.pages bench out/bench
 
-# What is made from the code: reference/parameters.md, results.md; ssnp142.md from a validation of all cases
+# Make the pages in reference/ that come from the code or from runs: parameters.md, results.md,
+# tour.md, ssnp142.md
 pages: setup
 	$(BIN)/python -m damjoint_tools.pages all
 
-# Results and caches
+# Remove results and caches
 clean:
 	rm -rf out .pytest_cache .ruff_cache .hypothesis
 	find scripts tests -name __pycache__ -prune -exec rm -rf {} +

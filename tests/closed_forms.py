@@ -1,5 +1,4 @@
-"""What a rigid reading of the scene gives exactly: weight, thrust, moments; and the comparison of
-two runs."""
+"""Closed forms of a rigid dam (weight, thrust, moments), and the comparison of two runs."""
 
 import numpy as np
 
@@ -7,7 +6,7 @@ BASE, CREST, HEIGHT = 5.0, 1.5, 10.0
 WATER = 1000 * 9.81
 AREA = (BASE + CREST) / 2 * HEIGHT
 WEIGHT = 2400 * 9.81 * AREA
-#: of the trapezoid: rectangle under the crest and the triangle downstream of it
+#: x of the centroid of the trapezoid: rectangle below the crest, triangle downstream of it
 CENTROID = (
     CREST * HEIGHT * CREST / 2 + (BASE - CREST) * HEIGHT / 2 * (CREST + (BASE - CREST) / 3)
 ) / AREA
@@ -15,16 +14,14 @@ BATTER = (BASE - CREST) / HEIGHT
 
 
 def thrust(level):
-    """Of the water on the upstream face."""
+    """Thrust of the water on the upstream face [N/m]."""
     return WATER * level**2 / 2
 
 
 def resultants(level, tail, wet):
-    """N, T, M over the joint, M of the effective normal force about the toe; wet: linear uplift
-    from heel to toe.
-
-    The tailwater pushes on the inclined downstream face: back (T) and, with BATTER times that, down
-    (N).
+    """N, T, M of the joint; M of the effective normal force about the toe. wet: linear uplift from
+    heel to toe. The thrust of the tailwater on the inclined downstream face acts upstream (T) and,
+    times BATTER, downwards (N).
     """
     n = WEIGHT - wet * WATER * BASE * (level + tail) / 2 + BATTER * thrust(tail)
     t = thrust(level) - thrust(tail)
@@ -44,8 +41,9 @@ def slide_level(mu, adhesion, wet):
 
 
 def integral(x, *factors):
-    """Over the joint, of products of columns that are linear between the nodes (Simpson: exact up
-    to degree 3)."""
+    """Integral along the joint of a product of columns, linear between the nodes (Simpson: exact to
+    degree 3).
+    """
     ends = np.prod(factors, axis=0)
     middle = np.prod([(f[1:] + f[:-1]) / 2 for f in factors], axis=0)
     return np.sum(np.diff(x) * (ends[1:] + ends[:-1] + 4 * middle) / 6)
@@ -55,8 +53,9 @@ JUMPS_AND_STRESSES = "delta_n", "delta_t1", "sigma_n", "tau_1"
 
 
 def differences(one, other, time=None, names=JUMPS_AND_STRESSES, factors=()):
-    """Largest difference along the joint over the largest value, for each column; other scaled by
-    factors first."""
+    """Largest difference along the joint relative to the largest value, for each column; columns of
+    other are multiplied by factors first.
+    """
     a, b = one.at(time), other.at(time)
     return [
         np.abs(a[n] - dict(factors).get(n, 1) * np.interp(a["x"], b["x"], b[n])).max()

@@ -1,4 +1,4 @@
-"""Shared fixtures: a scene is computed once per session, whoever asks for it."""
+"""Shared fixtures. A scene is computed once per session."""
 
 import pytest
 from damjoint import run
@@ -7,7 +7,7 @@ from damjoint.model.case import load
 
 @pytest.fixture(scope="session", autouse=True)
 def empty_cache(tmp_path_factory):
-    """Nothing from earlier sessions, nothing left in the user's cache."""
+    """Use an empty cache instead of the user's."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("DAMJOINT_CACHE", str(tmp_path_factory.mktemp("cache")))
         yield
@@ -15,8 +15,9 @@ def empty_cache(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def solve(tmp_path_factory):
-    """solve(case, levels, tail_levels, steps, **settings): the list of results, one for each uplift
-    of the case."""
+    """solve(case, levels, tail_levels, steps, **settings): list of results, one for each uplift of
+    the case.
+    """
     done = {}
 
     def once(name, levels=None, tail_levels=None, steps=None, **settings):
@@ -37,8 +38,9 @@ def solve(tmp_path_factory):
 
 @pytest.fixture
 def command(capfd, tmp_path, monkeypatch):
-    """command(*words): exit code, standard output and error of the damjoint command, run in an
-    empty folder."""
+    """command(*words): exit code, standard output and standard error of damjoint, run in an empty
+    folder.
+    """
     from damjoint import cli
 
     monkeypatch.chdir(tmp_path)

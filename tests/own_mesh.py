@@ -1,5 +1,4 @@
-"""The mesh of a section as the file of a geometry of one's own, to be moved, mirrored and numbered
-otherwise."""
+"""The mesh of a section as a mesh file of a user geometry; moved, mirrored, renumbered."""
 
 from __future__ import annotations
 
@@ -14,26 +13,26 @@ KINDS = {shape: kind for kind, shape in SHAPES.items()}
 
 
 class InOrder:
-    """Numbers from 1 on, everything in the order it is in."""
+    """Numbers from 1, in the order of the mesh."""
 
     first = apart = 1
 
     def order(self, number: int) -> np.ndarray:
-        """That many things in an order."""
+        """Order of a number of items."""
         return np.arange(number)
 
     def tags(self, number: int) -> np.ndarray:
-        """Tags of that many things."""
+        """Tags of a number of items."""
         return self.first + self.apart * self.order(number)
 
     def corners(self, nodes: np.ndarray) -> np.ndarray:
-        """An element's corners, from any of them on, in either direction."""
+        """Corners of an element, from any of them on, in either direction."""
         return nodes
 
 
 @dataclass
 class Shuffled(InOrder):
-    """Tags from a first one on, some apart, and everything in disorder."""
+    """Tags from `first` on with gaps, and all items in random order."""
 
     seed: int
     first: int
@@ -51,15 +50,16 @@ class Shuffled(InOrder):
 
 @dataclass(frozen=True)
 class OwnMesh:
-    """Points (n, 3), and the regions by their names: dimension, and elements as Gmsh's type and
-    rows of points."""
+    """Points (n, 3), and regions by name: dimension, and elements as Gmsh's type and rows of
+    points.
+    """
 
     points: np.ndarray
     regions: dict[str, tuple[int, list[tuple[int, np.ndarray]]]]
 
     @staticmethod
     def of(case: Case) -> OwnMesh:
-        """The mesh of a section without a lift joint."""
+        """Mesh of a section without a lift joint."""
         mesh, dim = Mesh(case), int(case["dim"])
         dam, foundation = mesh.bodies["dam"], mesh.bodies["foundation"]
         tags, first = np.unique(
@@ -79,13 +79,14 @@ class OwnMesh:
         return OwnMesh(np.concatenate([dam.points, foundation.points])[first], regions)
 
     def moved(self, by: tuple[float, float, float], mirrored: str = "") -> OwnMesh:
-        """Mirrored at x, y or z = 0, then moved by a vector [m]."""
+        """Mirror at x, y or z = 0, then move by a vector [m]."""
         signs = [-1.0 if axis == mirrored else 1.0 for axis in "xyz"]
         return replace(self, points=self.points * signs + by)
 
     def write(self, path: Path, numbering: InOrder | None = None) -> None:
-        """Write it as MSH 2.2; numbering: of nodes, elements and regions (simplices only, if it is
-        another one)."""
+        """Write as MSH 2.2; numbering: of nodes, elements and regions (other than InOrder:
+        simplices only).
+        """
         n = numbering or InOrder()
         names, nodes = list(self.regions), n.tags(len(self.points))
         groups = dict(zip(names, n.tags(len(names)), strict=True))
@@ -103,6 +104,6 @@ class OwnMesh:
         }
         lines = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat"]
         for title, rows in sections.items():
-            told = [" ".join(map(str, rows[i])) for i in n.order(len(rows))]
-            lines += [f"${title}", str(len(rows)), *told, f"$End{title}"]
+            entries = [" ".join(map(str, rows[i])) for i in n.order(len(rows))]
+            lines += [f"${title}", str(len(rows)), *entries, f"$End{title}"]
         path.write_text("\n".join([*lines, ""]))

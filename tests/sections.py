@@ -1,5 +1,6 @@
-"""What acts on the part of a section above its joint, from its outline alone: an integration of its
-own, by parameters of the case, which knows nothing of segments, meshes or engines."""
+"""Loads on the part of a section above its joint, by integration over its outline: independent of
+segments, meshes and engines of the package.
+"""
 
 from itertools import pairwise
 
@@ -7,7 +8,7 @@ import numpy as np
 
 
 def clip(polygon, point, direction):
-    """The part of a polygon (n, 2) on the left of a line."""
+    """Part of a polygon (n, 2) on the left of a line."""
     across = np.array([-direction[1], direction[0]])
     heights = (polygon - point) @ across
     found = []
@@ -24,8 +25,7 @@ def clip(polygon, point, direction):
 
 
 def outline(case):
-    """The section counterclockwise from the heel of its base, and its joint's start and
-    direction."""
+    """Section counterclockwise from the heel of its base; start and direction of its joint."""
     v = case.values
     slope = np.radians(v["joint_slope"])
     toe_y = 0 if v["joint_height"] else v["dam_base"] * np.tan(slope)
@@ -44,8 +44,9 @@ def outline(case):
 
 
 def integrate(a, b, pressure, kinks):
-    """Force (2,) and moment about the origin of a pressure(y) on the edge from a to b, body on its
-    left; kinks: heights where it has one."""
+    """Force (2,) and moment about the origin of a pressure(y) on the edge from a to b, with the
+    body on its left; kinks: heights at which the pressure has a kink.
+    """
     along = b - a
     inwards = np.array([-along[1], along[0]])
     cuts = [(y - a[1]) / along[1] for y in kinks if along[1]]
@@ -61,14 +62,15 @@ def integrate(a, b, pressure, kinks):
     return force, moment
 
 
-def still(y, level):
-    """Height of still water above y."""
+def depth(y, level):
+    """Depth of a point at height y below a level; 0 above it."""
     return max(level - y, 0)
 
 
 def loads(case, level, tail):
-    """Everything but uplift with all staged loads there, per metre: force (2,), moment about the
-    origin."""
+    """All loads but uplift, with staged loads applied fully, per metre: force (2,), moment about
+    the origin.
+    """
     v = case.values
     polygon, start, direction = outline(case)
     nxt = np.roll(polygon, -1, axis=0)
@@ -90,19 +92,19 @@ def loads(case, level, tail):
         outwards = np.array([along[1], -along[0]])
         pressures = []
         if abs(outwards[0]) < 1e-9:
-            pressures = [(lambda y: unit * still(y, level), [level])] * int(v["crest_water"])
+            pressures = [(lambda y: unit * depth(y, level), [level])] * int(v["crest_water"])
         elif outwards[0] < 0:
             share = v["added_mass"] * 7 / 8 * v["k_h"] * -outwards[0]
-            quake = lambda y, share=share: share * np.sqrt(level * still(y, level))
-            pressures = [(lambda y, quake=quake: unit * (still(y, level) + quake(y)), [level])]
+            quake = lambda y, share=share: share * np.sqrt(level * depth(y, level))
+            pressures = [(lambda y, quake=quake: unit * (depth(y, level) + quake(y)), [level])]
         else:
-            pressures = [(lambda y: unit * still(y, tail), [tail])]
+            pressures = [(lambda y: unit * depth(y, tail), [tail])]
         for pressure, kinks in pressures:
             f, m = integrate(a, b, pressure, kinks)
             force, moment = force + f, moment + m
         if outwards[0] < -1e-9:
-            f, _ = integrate(a, b, lambda y: silt * still(y, top), [top])
-            arm, _ = integrate(a, b, lambda y: y * silt * still(y, top), [top])
+            f, _ = integrate(a, b, lambda y: silt * depth(y, top), [top])
+            arm, _ = integrate(a, b, lambda y: y * silt * depth(y, top), [top])
             force, moment = force + np.array([f[0], 0]), moment - arm[0]
     crest = v["dam_height"]
     if v["ice_force"]:
@@ -129,5 +131,5 @@ def resultants(case, level, tail, uplift=0.0, arm=0.0):
     toe = on_joint[np.argmax(on_joint[:, 0])]
     force, moment = loads(case, level, tail)
     moment -= toe[0] * force[1] - toe[1] * force[0]
-    # what the joint gives back: N across, T along, M holding down
+    # reaction of the joint: N across, T along, M > 0 restoring
     return -force @ across - uplift, force @ direction, moment - uplift * arm

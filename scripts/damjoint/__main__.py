@@ -1,36 +1,39 @@
-"""The command damjoint, and python -m damjoint: what has to be done before anything is imported."""
+"""Entry point of the command damjoint and of `python -m damjoint`: prepares the process (standard
+streams, signals, address space) before the libraries are imported.
+"""
 
 import os
 import resource
 import signal
 import sys
+from types import FrameType
 
-#: Address space [bytes] that the libraries need (`ulimit -v`); with less they do not load, or wait
-#: for memory without end.
-LEAST = 0.9e9
-#: With less than this each library gets one thread, as every thread takes address space.
-PLENTY = 8e9
+#: Least address space [bytes] (`ulimit -v`); below it the libraries do not load or wait for memory
+#: for ever.
+LEAST_ADDRESS_SPACE = 0.9e9
+#: Below this [bytes] the libraries run in one thread, as each thread takes address space.
+THREADED_ADDRESS_SPACE = 8e9
 
 #: Signals that end a command as Ctrl-C does.
-HEEDED = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
+INTERRUPTS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
 
 
 def open_streams() -> None:
-    """Give a process that was started without standard streams (`2>&-`) empty ones: else the next
-    file that is opened gets their number, and what libraries print.
+    """Open standard streams that are closed (`2>&-`) on the null device. Otherwise the next file
+    that is opened would get their number, and the output that libraries print.
     """
     for number, name, mode in ((0, "stdin", "r"), (1, "stdout", "w"), (2, "stderr", "w")):
         try:
             os.fstat(number)
         except OSError:
-            os.open(os.devnull, os.O_RDWR)  # gets the lowest number that is free
+            os.open(os.devnull, os.O_RDWR)  # gets the lowest free number
         if getattr(sys, name) is None:
             setattr(sys, name, os.fdopen(number, mode, closefd=False))
 
 
-def interrupt(number: int, frame: object) -> None:
-    """Raise KeyboardInterrupt, but not within an import: a module half imported raises anything,
-    and its next import, too. There the signal comes again when it is over.
+def interrupt(number: int, frame: FrameType | None) -> None:
+    """Raise KeyboardInterrupt, but not during an import: a module that is imported by half raises
+    other errors later. There the signal is sent again until the import is over.
     """
     while frame:
         if frame.f_code.co_filename.startswith("<frozen importlib"):
@@ -41,34 +44,39 @@ def interrupt(number: int, frame: object) -> None:
     raise KeyboardInterrupt
 
 
-def heed_signals() -> None:
-    """Let SIGTERM, and a terminal that is closed, end a command as Ctrl-C does; what is ignored
-    (nohup) stays so.
+def handle_signals() -> None:
+    """Let SIGTERM and SIGHUP (closed terminal) end a command as Ctrl-C does; signals that are
+    ignored (nohup) stay ignored.
     """
-    for number in HEEDED:
+    for number in INTERRUPTS:
         if signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
             signal.signal(number, interrupt)
 
 
-def enough_memory() -> bool:
-    """Whether the address space lets the libraries load; where it is small they get one thread."""
+def enough_address_space() -> bool:
+    """Return whether the libraries can be loaded; with little address space set them to one
+    thread.
+    """
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
     if limit == resource.RLIM_INFINITY:
         return True
-    if limit < PLENTY:
+    if limit < THREADED_ADDRESS_SPACE:
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    if limit < LEAST:
-        given = f"{limit / 1e9:.3g} GB of address space (ulimit -v)"
-        print(f"damjoint: memory: {given}, at least {LEAST / 1e9:g} are needed", file=sys.stderr)
-    return limit >= LEAST
+    if limit < LEAST_ADDRESS_SPACE:
+        print(
+            f"damjoint: out of memory: {limit / 1e9:.3g} GB of address space (ulimit -v); at least "
+            f"{LEAST_ADDRESS_SPACE / 1e9:g} GB are needed",
+            file=sys.stderr,
+        )
+    return limit >= LEAST_ADDRESS_SPACE
 
 
 def main() -> int:
-    """Entry point: 0 done, 1 failed, 2 bad input, 130 interrupted."""
+    """Run the command: 0 done, 1 failed, 2 bad input, 130 interrupted."""
     open_streams()
     try:
-        heed_signals()
-        if not enough_memory():
+        handle_signals()
+        if not enough_address_space():
             return 1
         from .cli import main as command
 
@@ -76,10 +84,10 @@ def main() -> int:
     except KeyboardInterrupt:  # before the command has begun
         print("damjoint: interrupted", file=sys.stderr)
         code = 130
-    finally:  # what is finished is not interrupted
-        for number in (*HEEDED, signal.SIGALRM):
+    finally:  # the clean-up at exit is not interrupted
+        for number in (*INTERRUPTS, signal.SIGALRM):
             signal.signal(number, signal.SIG_IGN)
-    if code == 130:  # at once: else Python may end by the signal
+    if code == 130:  # exit at once: Python might end by the signal instead
         for stream in (sys.stdout, sys.stderr):
             stream.flush()
         os._exit(code)

@@ -37,7 +37,7 @@ OFF_LEVEL = 1e-3
 
 #: Compared quantities: label and unit.
 QUANTITIES = {
-    "level": ("level found", "m"),
+    "level": ("level reached", "m"),
     "max_opening": ("largest opening", "m"),
     "crack_length": ("crack length", "m"),
     "slip_length": ("slip length", "m"),
@@ -367,7 +367,8 @@ def summary(
     used = [estimate for estimate in estimates if estimate.used and estimate.scale]
     errors = ", ".join(estimate.description for estimate in used)
     text = f"{head}: {f'not reached, {why}' if why else 'reached'}; estimated errors with n_joint "
-    text += f"= {sizes[-1]} (coarser: {coarser}) and {steps} load steps: {errors}"
+    plural = "s" if steps > 1 else ""
+    text += f"= {sizes[-1]} (coarser: {coarser}) and {steps} load step{plural}: {errors}"
     of_steps = max((estimate.step_error / estimate.scale for estimate in used), default=0)
     if of_steps > NEGLIGIBLE:
         text += f"; of these up to {percent(of_steps)} by the load steps"

@@ -1,258 +1,192 @@
-"""The command line: the commands of `damjoint --help`."""
+"""The command line: the options of each command and the function that runs it."""
 
 from __future__ import annotations
 
 import argparse
 import io
 import os
-import re
 import sys
+from collections.abc import Callable
+from functools import partial
+from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING
 
 from . import RUN_GEO, InputError, RunError, __version__
 
 if TYPE_CHECKING:
+    from argparse import _SubParsersAction as Commands
+
     from .studies.plan import Plan, Row
 
+CASE = "a letter a to k (verification case SSNP142), dam, or the path of a .case file"
+ENGINE = (
+    "auto (default), condensed (both bodies condensed onto the joint; fast) or getdp (the "
+    "reference GetDP model)"
+)
+TAIL_LEVELS = "tailwater levels [m], one or as many as levels (default: those of the case)"
+JOBS = "number of processes (default: one per core)"
+RESUMED = "CSV of results; rows that are already in it are not computed again"
 
-class Parser(argparse.ArgumentParser):
-    """Bad input gets one line here, too."""
 
-    def error(self, message: str) -> None:
-        """Raises InputError with argparse's message, which names the argument and its value."""
-        raise InputError(re.sub(r"^argument --([\w-]+): (\S+): must", r"\1 = \2: must", message))
+class Checked(argparse.Action):
+    """Action that stores `convert(name, text)`, which raises InputError. As a `type` its message
+    would be replaced by one of argparse.
+    """
+
+    def __init__(self, *, convert: Callable[[str, str], object], **options: object) -> None:
+        super().__init__(**options)
+        self.convert = partial(convert, self.dest)
+
+    def __call__(
+        self, parser: Parser, namespace: argparse.Namespace, values: object, _: str | None = None
+    ) -> None:
+        """Store the value, or the list of values."""
+        listed = isinstance(values, list)
+        value = [self.convert(text) for text in values] if listed else self.convert(str(values))
+        setattr(namespace, self.dest, value)
 
 
-def whole(text: str) -> int:
-    """An integer of at least 1."""
-    if not text.strip().isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"{text}: must be an integer >= 1")
+def integer(name: str, text: str, least: int) -> int:
+    """Return an argument as an integer of at least `least`. Raises InputError."""
+    if not text.strip().isdecimal() or int(text) < least:
+        raise InputError(f"{name} = {text}: must be an integer >= {least}")
     return int(text)
 
 
-def natural(text: str) -> int:
-    """An integer of at least 0."""
-    if not text.strip().isdecimal():
-        raise argparse.ArgumentTypeError(f"{text}: must be an integer >= 0")
-    return int(text)
-
-
-def path(text: str) -> Path:
-    """A path that has been named: an empty one would be the folder one happens to be in."""
+def path(name: str, text: str) -> Path:
+    """Return an argument as a path. Raises InputError if it is empty: the current folder."""
     if not text.strip():
-        raise argparse.ArgumentTypeError(f"{text!r}: must be a path")
+        raise InputError(f"{name} = {text!r}: must be a path")
     return Path(text)
 
 
-def parser() -> argparse.ArgumentParser:
-    """The argument parser of the command."""
-    top = Parser(
-        prog="damjoint",
-        description="Gravity dams on a thin joint that opens, breaks, slides and lets water in.",
-    )
-    top.add_argument("--version", action="version", version=__version__)
-    commands = top.add_subparsers(dest="command", required=True)
-    settings = Parser(add_help=False)
-    settings.add_argument(
+class Parser(argparse.ArgumentParser):
+    """Parser of arguments that raises InputError."""
+
+    def error(self, message: str) -> None:
+        """Raise InputError instead of printing the usage."""
+        raise InputError(message)
+
+    def add_integer(self, name: str, least: int, **options: object) -> None:
+        """Add an argument that is an integer >= least."""
+        convert = partial(integer, least=least)
+        self.add_argument(name, action=Checked, convert=convert, metavar="N", **options)
+
+    def add_path(self, name: str, metavar: str, **options: object) -> None:
+        """Add an argument that is a path."""
+        self.add_argument(name, action=Checked, convert=path, metavar=metavar, **options)
+
+    def add_list(self, name: str, metavar: str, **options: object) -> None:
+        """Add an option that may be repeated."""
+        self.add_argument(name, action="append", default=[], metavar=metavar, **options)
+
+
+def settings_options() -> Parser:
+    """Options of all commands that load a case."""
+    options = Parser(add_help=False)
+    options.add_list(
         "--set",
-        action="append",
-        default=[],
-        metavar="NAME=VALUE",
+        "NAME=VALUE",
         dest="settings",
-        help="change a parameter (repeatable)",
+        help="value of a parameter, in the unit of reference/parameters.md (repeatable; default: "
+        "that of the case)",
     )
-    settings.add_argument(
+    options.add_argument(
         "--run-geo",
         action="store_true",
-        help="let Gmsh run the .geo file that the case names as its geometry: it is a program",
+        help="allow Gmsh to run the .geo file that the case names as its geometry; such a file can "
+        "run any program (default: refused)",
     )
-    of_case = "a letter a..k, dam, or the path of a .case file"
-    of_engine = "auto, condensed (the bulk eliminated once) or getdp (the plain problem definition)"
+    return options
 
-    water = Parser(add_help=False)
-    add = water.add_argument
-    add("--levels", help="water levels [m] reached at t = 1, 2, ...: 3,6,8,9; may go down, too")
-    add(
-        "--tail-levels",
-        help="tailwater levels [m], one or as many as levels (default: the case's own)",
+
+def water_options() -> Parser:
+    """Options of the commands that fill the reservoir."""
+    options = Parser(add_help=False)
+    options.add_argument(
+        "--levels",
+        metavar="H1,H2,...",
+        help="water levels [m above the heel] at t = 1, 2, ..., rising or falling: 3,6,8,9 "
+        "(default: those of the case)",
     )
-    add(
+    options.add_argument("--tail-levels", metavar="H1,H2,...", help=TAIL_LEVELS)
+    options.add_argument(
         "--accuracy",
         metavar="PERCENT",
-        help="coarse (3 %%), standard (1 %%), fine (0.2 %%) or any percentage, such as 0.5%%: "
-        "refines the mesh until the results' estimated error is smaller",
+        help="refine the mesh until the estimated errors are smaller: coarse (3 %%), standard "
+        "(1 %%), fine (0.2 %%) or a percentage such as 0.5%% (default: no refinement)",
     )
+    return options
 
-    loading = Parser(add_help=False, parents=[water])
-    loading.add_argument("--steps", type=whole, help="equal steps between two levels (default 1)")
 
-    run = commands.add_parser(
-        "run", parents=[settings, loading], help="fill the reservoir of a case"
+def loading_options() -> Parser:
+    """Options of the water and of the load steps."""
+    options = Parser(add_help=False, parents=[water_options()])
+    options.add_integer(
+        "--steps",
+        1,
+        help="number of equal load steps between two levels (default: those of the case, or 1 if "
+        "--levels is given)",
     )
-    add = run.add_argument
-    add("case", help=of_case)
-    add("--out", type=path, help="output folder (default out/CASE)")
-    add("--no-fields", action="store_true", help="no displacement and stress fields")
-    add("--no-picture", action="store_true", help="no PNG")
-    add("--engine", default="auto", help=of_engine)
-    run.set_defaults(call=do_run)
+    return options
 
-    safety = commands.add_parser(
-        "check",
-        parents=[settings, water],
-        help="safety factors by finite elements and by hand; exit code 1 if one is too low",
-    )
-    add = safety.add_argument
-    add("cases", nargs="+", metavar="CASE", help=f"load combinations: {of_case}")
-    add(
-        "--out",
-        type=path,
-        default=Path("out/check"),
-        help="where check.csv and the cases' folders go (default out/check)",
-    )
-    safety.set_defaults(call=do_check)
 
-    plot = commands.add_parser("plot", help="redraw a run's pictures from its files")
-    plot.add_argument("out", type=path, metavar="OUT", help="a folder that a run has written")
-    plot.set_defaults(call=do_plot)
+def add_command(commands: Commands, call: Callable, summary: str, *options: Parser) -> Parser:
+    """Add the command `damjoint NAME`.
 
-    report = commands.add_parser("report", help="one HTML page from the files of runs")
-    add = report.add_argument
-    add("out", type=path, nargs="+", metavar="OUT", help="folders that runs have written")
-    add("--to", type=path, default=Path("report.html"), help="the page (default report.html)")
-    report.set_defaults(call=do_report)
+    call: function do_NAME of the parsed arguments; returns the exit code. options: shared options.
+    """
+    command = commands.add_parser(
+        call.__name__.removeprefix("do_"),
+        parents=options,
+        help=summary,
+        description=f"{summary[0].upper()}{summary[1:]}.",
+    )
+    command.set_defaults(call=call)
+    return command
 
-    window = commands.add_parser("gui", parents=[settings], help="a case in Gmsh's window")
-    window.add_argument("case", nargs="?", default="dam", help=of_case)
-    window.set_defaults(call=do_gui)
 
-    new = commands.add_parser("new", help="write a commented case file to begin with")
-    new.add_argument("path", type=path, metavar="MY.case", help="the file to write")
-    new.set_defaults(call=do_new)
-
-    check = commands.add_parser(
-        "validate", help="compare with the published numbers; exit code 1 if a row fails"
+def parser() -> Parser:
+    """Return the parser of the command."""
+    top = Parser(
+        prog="damjoint",
+        description="Concrete gravity dams on a thin joint: opening, cracking, sliding and uplift.",
+        epilog="damjoint COMMAND --help explains the options of a command.",
     )
-    add = check.add_argument
-    add("cases", nargs="*", metavar="CASE", help="letters; default: all")
-    add("--out", type=path, default=Path("out"), help="where the cases' folders go (default out)")
-    add("--engine", default="auto", help=of_engine)
-    check.set_defaults(call=do_validate)
-
-    limit = commands.add_parser(
-        "critical",
-        parents=[settings],
-        help="the level, strength or parameter at which no equilibrium is left",
-    )
-    add = limit.add_argument
-    add("case", help=of_case)
-    add(
-        "--of",
-        default="level",
-        metavar="WHAT",
-        help="level (default), strength (factor that divides mu, c, f_t and the fracture "
-        "energies), uplift (effectiveness of the drains), k_h or any parameter",
-    )
-    add("--levels", help="water levels [m] on the way; all but a critical level ask for the last")
-    add("--tail-levels", help="tailwater levels [m], one or as many as levels")
-    add("--out", type=path, help="output folder (default out/CASE_critical)")
-    limit.set_defaults(call=do_critical)
-
-    vary = commands.add_parser(
-        "sweep",
-        parents=[settings, loading],
-        help="one row per combination of parameters and levels, or per row of a sample; a chart",
-    )
-    add = vary.add_argument
-    add("case", help=of_case)
-    add(
-        "--vary",
-        action="append",
-        default=[],
-        metavar="NAME=VALUES",
-        help="NAME=V1,V2,... or NAME=FIRST:LAST:STEP; NAME may be level (repeatable)",
-    )
-    add(
-        "--tie",
-        action="append",
-        default=[],
-        metavar="NAME=EXPRESSION",
-        help="arithmetic of the names varied, sampled or tied before: adhesion=2e5*mu (repeatable)",
-    )
-    add(
-        "--sample",
-        nargs="+",
-        metavar=("N", "NAME=DISTRIBUTION"),
-        help="N rows for each combination of --vary, drawn from distributions with scipy.stats' "
-        "names and arguments (shapes, loc, scale): 1000 mu=normal(1.0,0.15)",
-    )
-    add("--design", choices=("latin", "monte-carlo"), default="latin", help="of the sample")
-    add("--seed", type=natural, default=0, help="of the sample (default 0)")
-    add(
-        "--correlate",
-        action="append",
-        default=[],
-        metavar="A,B=R",
-        help="rank correlation of two sampled names (repeatable)",
-    )
-    add(
-        "--critical",
-        nargs="?",
-        const="level",
-        default="",
-        metavar="WHAT",
-        help="also the critical level (default), strength, ... of each row, as damjoint critical",
-    )
-    add("--jobs", type=whole, help="processes (default: all cores)")
-    add("--scheduler", metavar="ADDRESS", help="a dask.distributed scheduler instead")
-    add("--out", type=path, help="result file, resumed if it exists (default CASE_sweep.csv)")
-    vary.set_defaults(call=do_sweep)
-
-    trial = commands.add_parser(
-        "stress", help="random scenes verified from their files; exit code 1 if one is a defect"
-    )
-    add = trial.add_argument
-    add("count", nargs="?", type=whole, default=500, metavar="N", help="scenes (default 500)")
-    add("--seed", type=whole, default=1, help="of the random numbers (default 1)")
-    add("--jobs", type=whole, help="processes (default: all cores)")
-    add(
-        "--out",
-        type=path,
-        default=Path("stress.csv"),
-        help="result file, resumed if it exists (default stress.csv)",
-    )
-    trial.set_defaults(call=do_stress)
-
-    speed = commands.add_parser("bench", help="time, error, growth and costs")
-    add = speed.add_argument
-    add("--short", action="store_true", help="two minutes instead of thirty")
-    add(
-        "--out",
-        type=path,
-        default=Path("out/bench"),
-        help="folder of page, tables and picture (default out/bench)",
-    )
-    speed.set_defaults(call=do_bench)
-
-    law = commands.add_parser(
-        "law", parents=[settings], help="evaluate a joint law along a path of jumps"
-    )
-    add = law.add_argument
-    add("law", help="rupture, friction or bond")
-    add(
-        "--path",
-        type=path,
-        required=True,
-        help="CSV with delta_n,delta_t1,delta_t2 [m] and optionally p [Pa]; row n: step to t = n",
-    )
-    add("--out", type=path, help="output CSV (default: standard output)")
-    law.set_defaults(call=do_law)
+    top.add_argument("--version", action="version", version=__version__)
+    commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    add_run(commands)
+    add_check(commands)
+    add_plot(commands)
+    add_report(commands)
+    add_gui(commands)
+    add_new(commands)
+    add_validate(commands)
+    add_critical(commands)
+    add_sweep(commands)
+    add_stress(commands)
+    add_bench(commands)
+    add_law(commands)
     return top
 
 
+def add_run(commands: Commands) -> None:
+    """Add damjoint run."""
+    summary = "fill the reservoir of a case; exit code 1 if the dam fails or the run stops early"
+    command = add_command(commands, do_run, summary, settings_options(), loading_options())
+    command.add_argument("case", metavar="CASE", help=CASE)
+    command.add_path("--out", "FOLDER", help="output folder (default: out/CASE)")
+    command.add_argument(
+        "--no-fields", action="store_true", help="write no files of displacement and stress"
+    )
+    command.add_argument("--no-picture", action="store_true", help="draw no PNG")
+    command.add_argument("--engine", default="auto", metavar="NAME", help=ENGINE)
+
+
 def do_run(arguments: argparse.Namespace) -> int:
-    """damjoint run; 0, or 1 if the dam does not stand or the run stopped before its last level."""
+    """Run damjoint run; 0, or 1 if the dam fails or the run stopped before its last level."""
     from .model import parameters
     from .model.case import load
     from .post import summary
@@ -281,16 +215,31 @@ def do_run(arguments: argparse.Namespace) -> int:
         if result.last:
             print(f"\n{summary.text(result)}")
         driven = case["drive"] != "level"
-        said = [path_statement(result) if driven else "", statement(result), *hints(result)]
-        said.append(result.info.get("error_estimate", {}).get("statement", ""))
-        if any(said):
-            print("", *filter(None, said), sep="\n")
+        lines = [path_statement(result) if driven else "", statement(result), *hints(result)]
+        lines.append(result.info.get("error_estimate", {}).get("statement", ""))
+        if any(lines):
+            print("", *filter(None, lines), sep="\n")
         code = max(code, int(failed(result)))
     return code
 
 
+def add_check(commands: Commands) -> None:
+    """Add damjoint check."""
+    summary = (
+        "safety factors by finite elements and by the gravity method; exit code 1 if one is too low"
+    )
+    command = add_command(commands, do_check, summary, settings_options(), water_options())
+    command.add_argument("cases", nargs="+", metavar="CASE", help=f"load combinations, each {CASE}")
+    command.add_path(
+        "--out",
+        "FOLDER",
+        default=Path("out/check"),
+        help="folder of check.csv, with a folder for each case (default: out/check)",
+    )
+
+
 def do_check(arguments: argparse.Namespace) -> int:
-    """damjoint check; 1 if a check is not met."""
+    """Run damjoint check; 1 if a safety factor is too low."""
     from .model import parameters
     from .model.case import load
     from .studies.check import check_cases, text_table
@@ -301,23 +250,38 @@ def do_check(arguments: argparse.Namespace) -> int:
     if any(case["dim"] == 3 for case in cases):
         warn_if_slow()
     checks = check_cases(cases, arguments.out)
-    said = [f"{one.gravity.case.name}: {one.accuracy}" for one in checks if one.accuracy]
-    print("\n\n".join([text_table(checks), *said, str(arguments.out / "check.csv")]))
+    errors = [f"{check.gravity.case.name}: {check.accuracy}" for check in checks if check.accuracy]
+    print("\n\n".join([text_table(checks), *errors, str(arguments.out / "check.csv")]))
     return int(any(result.failures for check in checks for result in check.results))
 
 
+def add_plot(commands: Commands) -> None:
+    """Add damjoint plot."""
+    command = add_command(commands, do_plot, "draw the pictures of a run again")
+    command.add_path("out", "FOLDER", help="output folder of the run")
+
+
 def do_plot(arguments: argparse.Namespace) -> int:
-    """damjoint plot."""
+    """Run damjoint plot."""
     from .post import pictures, stored
 
-    found = [(folder, stored.read(folder)) for folder in stored.runs_in(arguments.out)]
-    for folder, solution in found:
-        print(pictures.draw(solution, folder))
+    runs = [(folder, stored.read(folder)) for folder in stored.runs_in(arguments.out)]
+    for folder, result in runs:
+        print(pictures.draw(result, folder))
     return 0
 
 
+def add_report(commands: Commands) -> None:
+    """Add damjoint report."""
+    command = add_command(commands, do_report, "write one HTML page about runs")
+    command.add_path("out", "FOLDER", nargs="+", help="output folders of the runs")
+    command.add_path(
+        "--to", "FILE", default=Path("report.html"), help="the page (default: report.html)"
+    )
+
+
 def do_report(arguments: argparse.Namespace) -> int:
-    """damjoint report."""
+    """Run damjoint report."""
     from .studies import report
 
     report.write(arguments.out, arguments.to)
@@ -325,8 +289,16 @@ def do_report(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def add_gui(commands: Commands) -> None:
+    """Add damjoint gui."""
+    command = add_command(commands, do_gui, "open a case in a window", settings_options())
+    command.add_argument(
+        "case", nargs="?", default="dam", metavar="CASE", help=f"{CASE} (default: dam)"
+    )
+
+
 def do_gui(arguments: argparse.Namespace) -> int:
-    """damjoint gui; 0 when the window is closed."""
+    """Run damjoint gui; 0 when the window is closed."""
     from .gui.sheet import Request
     from .gui.window import gui
     from .model import parameters
@@ -336,19 +308,26 @@ def do_gui(arguments: argparse.Namespace) -> int:
 
 
 def warn_if_slow() -> None:
-    """Say before a 3D run that it takes several times longer than it need."""
+    """Print a warning if 3D runs are slow because MUMPS is not installed."""
     from .fem import factor
 
     if factor.is_slow():
         print(
-            f"damjoint: {factor.name()} factorises, several times slower in 3D than MUMPS; "
-            "'make setup' says what is missing",
+            f"damjoint: 3D runs take several times longer with {factor.name()} than with MUMPS; "
+            "'make setup' installs MUMPS or prints the packages that it needs",
             file=sys.stderr,
         )
 
 
+def add_new(commands: Commands) -> None:
+    """Add damjoint new."""
+    summary = "write a case file with all parameters, explained in comments"
+    command = add_command(commands, do_new, summary)
+    command.add_path("path", "MY.case", help="the file; it must not exist yet")
+
+
 def do_new(arguments: argparse.Namespace) -> int:
-    """damjoint new."""
+    """Run damjoint new."""
     from .model import template
 
     template.write(arguments.path)
@@ -356,8 +335,22 @@ def do_new(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def add_validate(commands: Commands) -> None:
+    """Add damjoint validate."""
+    summary = "compare with the published numbers of SSNP142; exit code 1 if a row fails"
+    command = add_command(commands, do_validate, summary)
+    command.add_argument("cases", nargs="*", metavar="CASE", help="letters a to k (default: all)")
+    command.add_path(
+        "--out",
+        "FOLDER",
+        default=Path("out"),
+        help="folder that gets a folder for each case (default: out)",
+    )
+    command.add_argument("--engine", default="auto", metavar="NAME", help=ENGINE)
+
+
 def do_validate(arguments: argparse.Namespace) -> int:
-    """damjoint validate; 1 if a row fails."""
+    """Run damjoint validate; 1 if a row fails."""
     from .model.case import load
     from .post import validation
     from .run import run
@@ -367,7 +360,7 @@ def do_validate(arguments: argparse.Namespace) -> int:
     for case in cases:
         if not validation.references(case):
             allowed = ", ".join(validation.modelings())
-            raise InputError(f"case {case.name}: has no reference values; allowed: {allowed}")
+            raise InputError(f"case {case.name}: has no reference values; must be one of {allowed}")
     comparisons = []
     for case in cases:
         out = arguments.out / case.name
@@ -379,12 +372,37 @@ def do_validate(arguments: argparse.Namespace) -> int:
     return int(any(c.verdict == "fail" for c in comparisons))
 
 
+def add_critical(commands: Commands) -> None:
+    """Add damjoint critical."""
+    summary = (
+        "find the level, strength factor or parameter beyond which there is no equilibrium; exit "
+        "code 1 if there is none or it is not confirmed"
+    )
+    command = add_command(commands, do_critical, summary, settings_options())
+    command.add_argument("case", metavar="CASE", help=CASE)
+    command.add_argument(
+        "--of",
+        default="level",
+        metavar="WHAT",
+        help="level [m], strength (factor that divides mu, c, f_t and the fracture energies), "
+        "uplift (effectiveness of the drains), k_h or any other parameter (default: level)",
+    )
+    command.add_argument(
+        "--levels",
+        metavar="H1,H2,...",
+        help="water levels [m above the heel] in this order; all but a critical level are "
+        "searched at the last one (default: those of the case)",
+    )
+    command.add_argument("--tail-levels", metavar="H1,H2,...", help=TAIL_LEVELS)
+    command.add_path("--out", "FOLDER", help="output folder (default: out/CASE_critical)")
+
+
 def do_critical(arguments: argparse.Namespace) -> int:
-    """damjoint critical; 0, or 1 if there is no critical value, or none that is confirmed."""
+    """Run damjoint critical; 1 if there is no critical value or it is not confirmed."""
     from .model import parameters
     from .studies.critical import critical
 
-    answer, said = critical(
+    answer, lines = critical(
         arguments.case,
         arguments.of,
         parameters.settings(arguments.settings),
@@ -392,37 +410,93 @@ def do_critical(arguments: argparse.Namespace) -> int:
         arguments.tail_levels,
         arguments.out,
     )
-    print("\n".join(said))
+    print("\n".join(lines))
     return int(not answer.confirmed)
 
 
+def add_sweep(commands: Commands) -> None:
+    """Add damjoint sweep."""
+    summary = "run a case with many values of its parameters, listed or random; CSV and chart"
+    command = add_command(commands, do_sweep, summary, settings_options(), loading_options())
+    command.add_argument("case", metavar="CASE", help=CASE)
+    command.add_list(
+        "--vary",
+        "NAME=VALUES",
+        help="values of a parameter, or of level, in its unit: NAME=V1,V2,... or "
+        "NAME=FIRST:LAST:STEP; all combinations are run (repeatable)",
+    )
+    command.add_list(
+        "--tie",
+        "NAME=EXPRESSION",
+        help="parameter computed from those varied, sampled or tied before: adhesion=2e5*mu "
+        "(repeatable)",
+    )
+    command.add_argument(
+        "--sample",
+        nargs="+",
+        metavar=("N", "NAME=DISTRIBUTION"),
+        help="N random rows for each combination of --vary, from distributions of scipy.stats "
+        "with their arguments (shapes, loc, scale): 1000 mu=normal(1.0,0.15)",
+    )
+    command.add_argument(
+        "--design",
+        choices=("latin", "monte-carlo"),
+        default="latin",
+        help="Latin hypercube or independent random rows of --sample (default: latin)",
+    )
+    command.add_integer(
+        "--seed", 0, default=0, help="seed of the random numbers of --sample (default: 0)"
+    )
+    command.add_list(
+        "--correlate",
+        "A,B=R",
+        help="rank correlation -1 < R < 1 of two sampled parameters (repeatable; default: 0)",
+    )
+    command.add_argument(
+        "--critical",
+        nargs="?",
+        const="level",
+        default="",
+        metavar="WHAT",
+        help="add the critical value of each row: level (default), strength, ... as --of of "
+        "damjoint critical",
+    )
+    command.add_integer("--jobs", 1, help=JOBS)
+    command.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="run on the dask.distributed scheduler at this address (default: this machine)",
+    )
+    command.add_path("--out", "FILE", help=f"{RESUMED} (default: CASE_sweep.csv)")
+
+
 def do_sweep(arguments: argparse.Namespace) -> int:
-    """damjoint sweep."""
+    """Run damjoint sweep."""
     from .model import parameters
     from .studies.plan import Schedule, plan_of, sample_of
     from .studies.sweep import meshed, sweep
 
     out = arguments.out or Path(f"{Path(arguments.case).stem}_sweep.csv")
     settings = parameters.settings(arguments.settings)
-    how = {name: getattr(arguments, name) for name in ("design", "seed", "correlate")}
+    options = {name: getattr(arguments, name) for name in ("design", "seed", "correlate")}
     if not arguments.sample and arguments.correlate:
         raise InputError(f"--correlate {arguments.correlate[0]}: needs --sample")
-    sample = sample_of(arguments.sample, **how) if arguments.sample else None
+    sample = sample_of(arguments.sample, **options) if arguments.sample else None
     plan = plan_of(arguments.vary, arguments.tie, sample, settings, arguments.critical)
     loading = Schedule(arguments.levels, arguments.tail_levels, arguments.steps, arguments.accuracy)
     if loading.accuracy:
-        settings, loading, said = meshed(arguments.case, settings, loading)
-        print(f"one mesh for all rows, that of the case itself: {said}")
+        settings, loading, estimate = meshed(arguments.case, settings, loading)
+        print(f"one mesh for all rows, refined for the case as it is: {estimate}")
     count, rows = sweep(
         arguments.case, plan, settings, out, loading, arguments.jobs, arguments.scheduler
     )
     print(f"{count} rows computed; {out}")
-    show(arguments.case, plan, rows, out)
+    report_sweep(arguments.case, plan, rows, out)
     return 0
 
 
-def show(case: str, plan: Plan, rows: list[Row], out: Path) -> None:
-    """Say what a sweep has found, and draw it beside its rows."""
+def report_sweep(case: str, plan: Plan, rows: list[Row], out: Path) -> None:
+    """Print the statistics of a sweep and draw its chart beside its CSV file."""
     from .studies import chart
     from .studies.plan import beside
 
@@ -431,33 +505,86 @@ def show(case: str, plan: Plan, rows: list[Row], out: Path) -> None:
 
         print(outcome.report(plan, rows, out))
     picture = beside(out, ".png")
-    said = chart.draw(plan, rows, f"{Path(case).stem}: {len(rows)} rows", picture)
-    print(said or picture)
+    reason = chart.draw(plan, rows, f"{Path(case).stem}: {len(rows)} rows", picture)
+    print(reason or picture)
+
+
+def add_stress(commands: Commands) -> None:
+    """Add damjoint stress."""
+    summary = "run random dams and verify their result files; exit code 1 if one is a defect"
+    command = add_command(commands, do_stress, summary)
+    command.add_integer(
+        "count", 1, nargs="?", default=500, help="number of random dams (default: 500)"
+    )
+    command.add_integer("--seed", 1, default=1, help="seed of the random numbers (default: 1)")
+    command.add_integer("--jobs", 1, help=JOBS)
+    command.add_path(
+        "--out", "FILE", default=Path("stress.csv"), help=f"{RESUMED} (default: stress.csv)"
+    )
 
 
 def do_stress(arguments: argparse.Namespace) -> int:
-    """damjoint stress; 1 if a scene is a defect."""
-    from damjoint_tools.stress import DEFECT, counts, stress
-
-    rows = stress(arguments.count, arguments.seed, arguments.out, arguments.jobs)
+    """Run damjoint stress; 1 if a dam is a defect."""
+    stress = tool("stress")
+    rows = stress.stress(arguments.count, arguments.seed, arguments.out, arguments.jobs)
     for row in rows:
-        if row["class"] == DEFECT:
-            print(f"{row['scene']}: {row['found']}\n  {row['command']}")
-    found = counts(rows)
-    print("; ".join(f"{number} {name}" for name, number in found.items()), arguments.out, sep="; ")
-    return int(found[DEFECT] > 0)
+        if row["class"] == stress.DEFECT:
+            print(f"{row['scene']}: {row['findings']}\n  {row['command']}")
+    numbers = stress.counts(rows)
+    counted = "; ".join(f"{number} {name}" for name, number in numbers.items())
+    print(counted, arguments.out, sep="; ")
+    return int(numbers[stress.DEFECT] > 0)
+
+
+def add_bench(commands: Commands) -> None:
+    """Add damjoint bench."""
+    summary = "measure time, memory and discretisation error; resumed if it was interrupted"
+    command = add_command(commands, do_bench, summary)
+    command.add_argument("--short", action="store_true", help="two minutes instead of thirty")
+    command.add_path(
+        "--out",
+        "FOLDER",
+        default=Path("out/bench"),
+        help="folder of the page, tables and picture (default: out/bench)",
+    )
 
 
 def do_bench(arguments: argparse.Namespace) -> int:
-    """damjoint bench."""
-    from damjoint_tools.bench_page import bench
-
-    bench(arguments.out, arguments.short)
+    """Run damjoint bench."""
+    tool("bench_page").bench(arguments.out, arguments.short)
     return 0
 
 
+def tool(name: str) -> ModuleType:
+    """Import a module of damjoint_tools. Raises RunError if the tools are not installed."""
+    try:
+        return import_module(f"damjoint_tools.{name}")
+    except ModuleNotFoundError as error:
+        if not str(error.name).startswith("damjoint_tools"):
+            raise
+        raise RunError(
+            "damjoint_tools is not installed: this command needs it; install damjoint from its "
+            "source folder (pip install .)"
+        ) from None
+
+
+def add_law(commands: Commands) -> None:
+    """Add damjoint law."""
+    summary = "evaluate a joint law along a path of displacement jumps"
+    command = add_command(commands, do_law, summary, settings_options())
+    command.add_argument("law", metavar="LAW", help="rupture, friction or bond")
+    command.add_path(
+        "--path",
+        "FILE",
+        required=True,
+        help="CSV with columns delta_n, delta_t1, delta_t2 [m] and, if there is water, p [Pa]; "
+        "row n is the state at t = n",
+    )
+    command.add_path("--out", "FILE", help="CSV of results (default: print it)")
+
+
 def do_law(arguments: argparse.Namespace) -> int:
-    """damjoint law."""
+    """Run damjoint law."""
     from .model import parameters
     from .studies import law_path
 
@@ -466,54 +593,59 @@ def do_law(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def check_text(word: str) -> None:
-    """Raise InputError if a word of the command has bytes that are no text in the locale."""
+def check_encoding(word: str) -> None:
+    """Raise InputError if a word of the command line is not text in the encoding of the locale."""
     try:
         word.encode()
     except UnicodeEncodeError:
         raise InputError(
             f"{word!a}: must be text in the locale's encoding ({sys.getfilesystemencoding()}); "
-            "LANG=C.UTF-8 knows all letters"
+            "LANG=C.UTF-8 has all letters"
         ) from None
 
 
 def one_line(error: BaseException) -> str:
-    """What went wrong, for a terminal: what would end the line or steer the terminal is escaped."""
-    letter = lambda c: c if c.isprintable() else c.encode("unicode_escape").decode()
-    return "damjoint: " + "".join(map(letter, str(error)))
+    """Return the message of an error in one line; line ends and control characters, which could
+    change the terminal's state, are escaped.
+    """
+    escape = lambda c: c if c.isprintable() else c.encode("unicode_escape").decode()
+    return "damjoint: " + "".join(map(escape, str(error)))
+
+
+def with_negative_lists(words: list[str]) -> list[str]:
+    """Return the words with `--levels -1,3` as `--levels=-1,3`: argparse takes a word that begins
+    with a minus sign for an option.
+    """
+    words = list(words)
+    for i in reversed(range(len(words) - 1)):
+        if words[i] in ("--levels", "--tail-levels"):
+            words[i : i + 2] = [f"{words[i]}={words[i + 1]}"]
+    return words
 
 
 def main(argv: list[str] | None = None) -> int:
-    """The command: 0 done, 1 failed, 2 bad input, 130 interrupted."""
+    """Run a command: 0 done, 1 failed, 2 bad input, 130 interrupted."""
     if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="replace")  # a locale without a mu for the micrometres
-    words = list(sys.argv[1:] if argv is None else argv)
-    for i in reversed(range(len(words) - 1)):
-        if words[i] in ("--levels", "--tail-levels"):  # a list that begins with a minus sign
-            words[i : i + 2] = [f"{words[i]}={words[i + 1]}"]
+        sys.stdout.reconfigure(errors="replace")  # µ and mathematical signs in a plain locale
+    words = sys.argv[1:] if argv is None else argv
     try:
         for word in words:
-            check_text(word)
-        arguments = parser().parse_args(words)
+            check_encoding(word)
+        arguments = parser().parse_args(with_negative_lists(words))
         if getattr(arguments, "run_geo", False):
-            os.environ[RUN_GEO] = "1"  # for the processes of a sweep, too
+            os.environ[RUN_GEO] = "1"  # an environment variable, for the processes of a sweep
         return arguments.call(arguments)
     except InputError as error:
-        print(one_line(error), file=sys.stderr)
-        return 2
-    except RunError as error:
-        print(one_line(error), file=sys.stderr)
-        return 1
+        message, code = one_line(error), 2
     except MemoryError as error:
-        print(f"damjoint: memory: none is left; {error}".rstrip("; "), file=sys.stderr)
-        return 1
-    except (OSError, ImportError) as error:  # no space, no permission, a library that has gone
-        print(one_line(error), file=sys.stderr)
-        return 1
+        message, code = f"damjoint: out of memory; {error}".rstrip("; "), 1
+    # OSError: full disk, no permission; ImportError: a library that has been removed
+    except (RunError, OSError, ImportError) as error:
+        message, code = one_line(error), 1
     except KeyboardInterrupt:
-        said = "interrupted; what has been finished is saved"
-        print(f"damjoint: {said}", file=sys.stderr)
-        return 130
+        message, code = "damjoint: interrupted; results finished so far are saved", 130
+    print(message, file=sys.stderr)
+    return code
 
 
 if __name__ == "__main__":

@@ -17,9 +17,10 @@ from damjoint.storage import locked_folder
 from tabulate import tabulate
 from threadpoolctl import threadpool_limits
 
-from . import bench as measured
-from .bench import PARTS, QUANTITIES, SCENES, Kept, Table, front
-from .provenance import provenance, said
+from . import bench_accuracy, bench_cost
+from .bench_scenes import PARTS, QUANTITIES, SCENES
+from .bench_table import Measurements, Table
+from .provenance import provenance, source_line
 
 STYLES = {
     (2, "free"): ("o", "triangles"),
@@ -45,16 +46,16 @@ def draw(table: Table, path: Path) -> None:
     panels = figure.subplots(2, len(SCENES), sharex=True, sharey=True)
     for row, dim in zip(panels, (2, 3), strict=True):
         for axes, scene in zip(row, SCENES, strict=True):
-            here = (columns["scene"] == scene) & (columns["dim"] == dim)
+            shown = (columns["scene"] == scene) & (columns["dim"] == dim)
             patterns = [(p, s) for (d, p), s in STYLES.items() if d == dim]
             for (pattern, (marker, name)), order in product(patterns, (1, 2)):
-                some = here & (columns["pattern"] == pattern) & (columns["order"] == order)
+                some = shown & (columns["pattern"] == pattern) & (columns["order"] == order)
                 color = {1: "#cc7a00", 2: "#0b5394"}[order]
                 label = f"{name}, order {order}"
                 axes.loglog(
                     seconds[some], error[some], marker, color=color, ms=4, alpha=0.7, label=label
                 )
-            best = np.flatnonzero(here)
+            best = np.flatnonzero(shown)
             best = best[front(seconds[best], error[best])]
             axes.loglog(seconds[best], error[best], "k-", linewidth=0.8, label="efficient front")
             axes.set(title=f"{scene}, {dim}D")
@@ -69,8 +70,19 @@ def draw(table: Table, path: Path) -> None:
     figure.savefig(path, dpi=100)
 
 
+def front(seconds: np.ndarray, error: np.ndarray, gain: float = 1.0) -> np.ndarray:
+    """Return the indices of the efficient points by time: each has less than `gain` times the error
+    of all faster ones.
+    """
+    chosen = []
+    for i in np.argsort(seconds):
+        if not chosen or error[i] < gain * error[chosen[-1]]:
+            chosen.append(i)
+    return np.array(chosen)
+
+
 def short_number(value: object, digits: int = 2) -> str:
-    """A number with two or three digits, without exponents where they can be done without."""
+    """Format a number with few digits, without an exponent if it is readable without."""
     if not isinstance(value, (float, np.floating)):
         return str(value)
     if not np.isfinite(value):
@@ -83,30 +95,30 @@ def short_number(value: object, digits: int = 2) -> str:
 
 
 def as_text(table: Table, names: dict[str, str] | None = None, digits: int = 2) -> str:
-    """A table, or some of its columns under other names, in Markdown."""
+    """Format a table in Markdown; names: the columns that are shown, and their headings."""
     names = names or {n: n for n in table}
     columns = {head: [short_number(v, digits) for v in table[n]] for n, head in names.items()}
     return tabulate(columns, headers="keys", tablefmt="github", disable_numparse=True)
 
 
 def efficient(table: Table) -> Table:
-    """The efficient front of each scene and dimension with published steps, in strides of at least
-    a third.
+    """Return the efficient front of each scene and dimension with published steps, thinned: each
+    row has two thirds of the error of the row before or less.
     """
     heads = "scene", "dim", "pattern", "order", "n_joint", "grading", "unknowns", "seconds"
     chosen = Table("efficient", *heads, "worst error [%]")
     published = np.array([steps == "published" for steps in table["steps"]])
     error, seconds = (np.array(table[n]) for n in ("worst", "seconds"))
     for scene, dim in product(SCENES, (2, 3)):
-        here = table.rows(scene, dim)
-        here = here[published[here]]
-        for i in here[front(seconds[here], error[here], 2 / 3)]:
+        rows = table.rows_where(scene, dim)
+        rows = rows[published[rows]]
+        for i in rows[front(seconds[rows], error[rows], 2 / 3)]:
             chosen.add(*(table[n][i] for n in heads), 100 * error[i])
     return chosen
 
 
 def step_spread(table: Table) -> float:
-    """By how much the errors of SCENES differ between 1, 2 and 4 steps per level [%]."""
+    """Return the largest difference of errors between 1, 2 and 4 steps per level [%]."""
     rows = [i for i, steps in enumerate(table["steps"]) if steps != "published"]
     spread = 0.0
     for scene, quantity in product(SCENES, QUANTITIES):
@@ -115,47 +127,48 @@ def step_spread(table: Table) -> float:
     return 100 * spread
 
 
-def modelings(kept: Kept, cases: Table) -> Table:
-    """For README: what each modeling shows, the worst difference of its judged rows, and the
-    seconds.
+def modelings(measurements: Measurements, cases: Table) -> Table:
+    """Table of README.md: the subject of each modeling, the worst difference of its compared rows,
+    and the seconds.
     """
-    told = "shows", "rows", "worst difference", "seconds", "published code", "times faster"
-    table = Table("modelings", "case", *told)
+    columns = "shows", "rows", "worst difference", "seconds", "published code", "times faster"
+    table = Table("modelings", "case", *columns)
 
-    def one(row: int, case: Case) -> tuple:
+    def measure(row: int, case: Case) -> tuple:
         with tempfile.TemporaryDirectory() as folder:
-            found = run(case, Path(folder), False, False, False)
-        judged = [c for result in found for c in validation.compare(result) if c.verdict != "info"]
-        difference = 100 * max(abs(c.difference) for c in judged)
+            results = run(case, Path(folder), False, False, False)
+        rows = [c for result in results for c in validation.compare(result)]
+        compared = [c for c in rows if c.verdict != "info"]
+        difference = 100 * max(abs(c.difference) for c in compared)
         shows = case.title.split(": ", 1)[1]
         spent = (cases[n][row] for n in ("seconds", "published", "times faster"))
-        return shows, len(judged), f"{difference:.1f} %", *spent
+        return shows, len(compared), f"{difference:.1f} %", *spent
 
     for row, name in enumerate(cases["case"][:-1]):
-        table.once(kept, (name.upper(),), partial(one, row, load(name)))
+        table.add_measured(measurements, (name.upper(),), partial(measure, row, load(name)))
     return table
 
 
 def page(
     tables: dict[str, Table], precise: list[str], beyond: str, short: bool, source: str
 ) -> str:
-    """The page: a finding in a sentence or two, and the table it comes from; source: in a line, by
-    which code, when and where all was measured.
+    """The page: for each study its result in a sentence or two, and the table; source: the line
+    with code version, date and machine of the measurements.
     """
     parts = [
         "# Benchmarks",
         f"{source} Written by `damjoint bench{' --short' if short else ''}`. "
-        "The published code is code_aster 15.2 on a machine of 2 cores, the whole job without its "
-        "mesh. Two digits are given; they vary by as much from run to run.",
+        "The published code is code_aster 15.2 on a machine of 2 cores, the complete job without "
+        "its mesh. Times have two digits; the second one varies from run to run.",
         *of_cases(tables["cases"], short),
         *of_accuracy(tables),
         *of_estimates(tables["estimates"]),
         *of_costs(tables["switches"], tables["sweeps"]),
-        "## Growth",
-        "; ".join(measured.exponents(tables["growth"])) + ". Uniform refinement, cold. "
-        f"Beyond the memory: `{beyond}`",
+        "## Growth with size",
+        "; ".join(bench_cost.exponents(tables["growth"])) + ". Uniform refinement, cold start. "
+        f"A mesh beyond the memory ends with the message: `{beyond}`",
         as_text(tables["growth"]),
-        "## Precision at scale",
+        "## Precision on a fine mesh",
         "; ".join(precise) + ".",
         *of_stress(tables["stress"]),
     ]
@@ -170,16 +183,16 @@ def of_cases(cases: Table, short: bool) -> list[str]:
     if not short:
         columns |= {"GetDP": "GetDP", "times faster, GetDP": "times"}
         plain = (
-            f" The plain problem definition (GetDP) takes {cases['GetDP'][-1]:.0f} s, "
+            f" The reference GetDP model takes {cases['GetDP'][-1]:.0f} s, "
             f"{cases['times faster, GetDP'][-1]:.1f} times less than the published code."
         )
     return [
         "## The eleven modelings",
-        "With published meshes and steps, cold start, all scenes, tables written: "
-        f"{cases['seconds'][-1]:.0f} s in all, {cases['times faster'][-1]:.0f} times faster than "
-        f"the published code; the slowest by comparison is {cases['case'][slowest].upper()}, "
-        f"{cases['times faster'][slowest]:.1f} times.{plain} Seconds, and where they went; peak "
-        "memory in MB.",
+        "With published meshes and steps, cold start (new process, no cache), all scenes, tables "
+        f"written: {cases['seconds'][-1]:.0f} s in all, {cases['times faster'][-1]:.0f} times "
+        "faster than the published code; the smallest ratio is that of "
+        f"{cases['case'][slowest].upper()}, {cases['times faster'][slowest]:.1f}.{plain} The "
+        "table has the seconds in all and by phase, and the peak memory in MB.",
         as_text(cases, columns),
     ]
 
@@ -193,29 +206,30 @@ def of_accuracy(tables: dict[str, Table]) -> list[str]:
     best = efficient(tables["accuracy"])
     second = sum(order == 2 for order in best["order"])
     return [
-        "## To a given accuracy",
-        f"`--accuracy` refines the mesh until the estimated errors are smaller. Its meshes for 3 % "
-        f"(coarse) are wrong by at most {error} % in the modelings below and take "
-        f"{spent} s for all their main scenes. Worst error of opening, toe stress, crack, slip and "
-        "leakage against the overkill solution; seconds with the start of the process.",
+        "## Time for an accuracy",
+        f"`--accuracy` refines the mesh until the estimated errors are smaller. For 3 % (coarse) "
+        f"the true errors are at most {error} % in the modelings below, and all their main scenes "
+        f"take {spent} s. The error is the largest of opening, toe stress, crack, slip and leakage "
+        "relative to the overkill solution; the seconds include the start of the process.",
         as_text(recommended, heads),
-        "The overkill solution, triangles of order 2, and how it converges:",
+        "The overkill solution (triangles of order 2, much finer than needed) and its convergence:",
         as_text(tables["overkill"], digits=4),
         "![Error against time](pictures/accuracy.png)",
-        f"The efficient settings (of {len(tables['accuracy']['scene'])} in `accuracy.csv`): "
-        f"{second} of {len(best['order'])} are of order 2. One, two and four steps per level "
-        f"differ by {spread:.1g} % at most.",
+        f"Efficient settings, for which no other is both faster and more accurate (of "
+        f"{len(tables['accuracy']['scene'])} in `accuracy.csv`): {second} of {len(best['order'])} "
+        f"are of order 2. One, two and four steps per level differ by {spread:.1g} % at most.",
         as_text(best),
     ]
 
 
 def of_estimates(estimates: Table) -> list[str]:
-    """What --accuracy says of its errors."""
+    """Errors estimated by --accuracy, and the true ones."""
     return [
         "## Estimated and true errors",
-        "What `--accuracy` says of its errors, and what they are, in percent: estimated / true, "
-        "the worst of all levels, of dams with E = 20 and 30 GPa, K_N 1e11 or 1e12 Pa/m. A length "
-        "is counted in elements; an opening's error is relative to the joint's largest jump.",
+        "Errors estimated by `--accuracy`, and the true ones, in percent: estimated / true, "
+        "the largest of all levels, for dams with E = 20 and 30 GPa, K_N 1e11 or 1e12 Pa/m. "
+        "Lengths are counted in elements; the error of an opening is relative to the largest jump "
+        "of the joint.",
         as_text(estimates),
     ]
 
@@ -228,59 +242,61 @@ def of_costs(costs: Table, sweeps: Table) -> list[str]:
         for n in ("another level", "another strength")
     )
     return [
-        "## What a scene pays for",
-        "Seconds with and without, in one process, the best of three. The dearest is "
-        f'"{costs["option"][dear]}", {costs["ratio"][dear]:.0f} times.',
+        "## Cost of options",
+        "Seconds with and without the option, in one process, the best of three. The most "
+        f'expensive is "{costs["option"][dear]}", {costs["ratio"][dear]:.0f} times.',
         as_text(costs),
-        "## One row more in a sweep",
+        "## Cost of a row in a sweep",
         f"A further level costs {level}, another strength {strength}. Seconds on a mesh that is "
-        "condensed.",
+        "already condensed.",
         as_text(sweeps),
     ]
 
 
 def of_stress(grid: Table) -> list[str]:
-    """Flow pressed to its limits."""
+    """Flow with extreme parameters."""
     ends = ", ".join(f"{k} {v}" for k, v in Counter(grid["end"]).items())
     return [
-        "## Flow pressed to its limits",
+        "## Flow with extreme parameters",
         "aperture_min 1e-9 to 1e-4 m, K_N 1e9 to 1e14 Pa/m, E 1e10 to 3e12 Pa, level to the "
-        f"crest: the {len(grid['end'])} combinations end with {ends}; at most "
+        f"crest. Verdicts of the {len(grid['end'])} combinations: {ends}; at most "
         f"{max(grid['seconds']):.1f} s each (`stress.csv`).",
     ]
 
 
 def bench(out: Path, short: bool) -> None:
-    """Run everything; write tables (CSV), benchmarks.md, modelings.md, accuracy.png and what has
-    measured them (provenance.json) into out; print the page.
+    """Run the benchmark; write tables (CSV), benchmarks.md, modelings.md, accuracy.png and the
+    provenance of all (provenance.json) into out; print the page.
 
-    What is measured is kept in out/measured.jsonl until the page is written.
+    out/measured.jsonl is the log from which an interrupted benchmark is resumed.
     """
     out.mkdir(parents=True, exist_ok=True)
     with locked_folder(out):
-        kept = Kept(out / "measured.jsonl", short)
-        tables, precise = measure(kept)
+        measurements = Measurements(out / "measured.jsonl", short)
+        tables, precise = measure(measurements)
         for name, table in tables.items():
-            measured.write_table(table, out / f"{name}.csv")
+            table.write(out / f"{name}.csv")
         draw(tables["accuracy"], out / "accuracy.png")
-        ended = kept.provenance | {"date": provenance()["date"]}
-        source = said([kept.provenance, ended])
+        last = measurements.provenance | {"date": provenance()["date"]}
+        source = source_line([measurements.provenance, last])
         (out / "modelings.md").write_text(f"{as_text(tables['modelings'])}\n\n{source}\n")
-        text = page(tables, precise, measured.beyond_memory(), short, source)
-        (out / "provenance.json").write_text(json.dumps(ended, indent=1) + "\n")
+        text = page(tables, precise, bench_cost.memory_message(), short, source)
+        (out / "provenance.json").write_text(json.dumps(last, indent=1) + "\n")
         (out / "benchmarks.md").write_text(text)
-        kept.path.unlink()
+        measurements.path.unlink()
     print(text)
 
 
-def measure(kept: Kept) -> tuple[dict[str, Table], list[str]]:
-    """All tables by name, and what holds to machine precision."""
-    found = [cases := measured.cases(kept)]
-    studies = measured.switches, measured.sweeps, measured.growth, measured.stress
-    found += [study(kept) for study in studies]
-    found.append(modelings(kept, cases))
+def measure(measurements: Measurements) -> tuple[dict[str, Table], list[str]]:
+    """Measure all tables, {name: table}, and what holds to machine precision."""
+    tables = [cases := bench_cost.cases(measurements)]
+    studies = bench_cost.switches, bench_cost.sweeps, bench_cost.growth, bench_cost.stress
+    tables += [study(measurements) for study in studies]
+    tables.append(modelings(measurements, cases))
     with threadpool_limits(1):
-        exact, overkill = measured.overkill(kept)
-        found += [overkill, measured.accuracy(kept, exact, cases["start"][0])]
-        found += [measured.recommended(kept, exact), measured.estimates(kept)]
-        return {table.name: table for table in found}, measured.checks(kept)
+        exact, overkill = bench_accuracy.overkill(measurements)
+        tables += [overkill, bench_accuracy.accuracy(measurements, exact, cases["start"][0])]
+        tables.append(bench_accuracy.recommended(measurements, exact))
+        tables.append(bench_accuracy.estimates(measurements))
+        precise = bench_cost.precision(measurements)
+    return {table.name: table for table in tables}, precise

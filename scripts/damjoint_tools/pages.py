@@ -33,17 +33,18 @@ def parameters_page() -> str:
     """reference/parameters.md: every parameter, by group."""
     parts = [
         "# Parameters",
-        "Made from [pro/parameters.pro](../pro/parameters.pro) by `make pages`. Each is set by "
-        "`--set name=value`, by `default_name = value;` in a case file, or in the Gmsh window. "
+        "Made from [pro/parameters.pro](../pro/parameters.pro) by `make pages`. A parameter is set "
+        "by `--set name=value`, by `default_name = value;` in a case file, or in the Gmsh window. "
         "The defaults are those of a 45 m dam of ordinary concrete on rock; "
-        "[cases/ssnp142.case](../cases/ssnp142.case) has those of the verification case. "
-        "A parameter whose default is -1 follows others.",
-        "The loading is a list in the case file, or an option: `levels() = {30, 40, 45};` "
-        "(`--levels`) [m above the base's heel], level number i being reached at t = i, from 0 at "
-        "t = 0; `tail_levels()` (`--tail-levels`) likewise, one value for all or as many as "
-        "levels; `times()` (`--steps` between two levels) the converged steps. Default: two "
-        "thirds and eight ninths of the height, and the crest. The Gmsh window has them as "
-        "numbers, in the group Water levels.",
+        "[cases/ssnp142.case](../cases/ssnp142.case) contains those of the verification case. "
+        "A parameter with the default -1 follows others. Terms and symbols: "
+        "[glossary](glossary.md).",
+        "The water levels are lists in the case file, or options: `levels() = {30, 40, 45};` "
+        "(`--levels`) [m above the base's heel], from 0 at t = 0, level number i reached at t = i; "
+        "`tail_levels()` (`--tail-levels`) likewise, one value for all or as many as "
+        "levels; `times()` (`--steps` between two levels) the times of the load steps. Default: "
+        "two thirds and eight ninths of the height, and the crest. In the Gmsh window they are in "
+        "the group Water levels.",
     ]
     groups: dict[str, list[tuple]] = {}
     for parameter in declared().values():
@@ -73,42 +74,47 @@ def results_page() -> str:
     )
     parts = [
         "# Results",
-        "The columns of the tables that a run writes; `run.json` repeats the units. Signs: "
-        "[theory.md](theory.md). Made by `make pages`.",
+        "The columns of the tables that the commands write; `run.json` repeats the units. Signs: "
+        "[theory](theory.md#1-conventions); terms and symbols: [glossary](glossary.md). Made by "
+        "`make pages`.",
         "## joint.csv",
-        "A row per joint node and requested level, sorted by level, x and z; order 2 lists the "
-        "middles of the edges and of rectangles, too. Every row obeys the joint law: nodes have a "
-        "memory of their own. `lambda` with law = friction, `flux` where water flows.",
+        "A row per joint node and requested level, sorted by level, x and z; with order 2 the "
+        "middles of edges and rectangles, too. Every row satisfies the joint law: nodes have "
+        "internal variables of their own. `lambda` only with law = friction, `flux` only with "
+        "uplift = flow.",
         joint,
         "## history.csv",
         "A row per converged step. Forces are per metre of thickness, in 3D too.",
         history,
         "## curve.csv",
-        "Of a run driven by a displacement: `time`, `level` [m], `pressure` [Pa] at the foot of "
-        "the face, `heel_opening` [m], `crest_ux` [m] of each converged step.",
+        "Written by a run under displacement control: `time`, `level` [m], `pressure` [Pa] at the "
+        "foot of the face, `heel_opening` [m], `crest_ux` [m] of each converged step.",
         "## check.csv",
-        "Of `damjoint check`: for each scene a row by the finite elements, one by the gravity "
-        "method, and, where both are for the same load, one with the first less the second.",
+        "Written by `damjoint check`: for each scene a row by the finite elements, one by the "
+        "gravity method, and, where both have the same load, one with their difference (first "
+        "minus second).",
         check,
         "## gravity.csv",
-        "Of `damjoint check`: the gravity method's resultants, a row per load, the uplift and the "
-        "sum.",
+        "Written by `damjoint check`: the resultants of the gravity method, a row per load, the "
+        "uplift and the sum.",
         loads,
         "## critical.csv",
-        "Of `damjoint critical`: a row per equilibrium of each trial, under displacement control "
-        "beyond its highest level where it fails.",
+        "Written by `damjoint critical`: a row per equilibrium of each trial; where the dam fails, "
+        "also those beyond its highest level, under displacement control.",
         critical,
         "## CASE_sweep.csv",
-        "Of `damjoint sweep`, a row per combination, in the order in which they are done: `key`; "
+        "Written by `damjoint sweep`, a row per combination, in the order of computation: `key`; "
         "the varied, sampled and tied values (a level as `level_asked`); the last row of "
         "history.csv; `failed` (1 where `damjoint run` ends with exit code 1), `verdict`, "
         "`statement`; with `--critical` the critical value, its `mode`, whether it is `confirmed` "
-        "and by what. A row of a sample whose loads are beyond what the joint could hold at most "
-        "says so and has no more. Beside it `_probability.csv` (with the interval of Clopper and "
-        "Pearson; rows without an answer are `undecided`, failures but for the lower limit), "
-        "`_sensitivity.csv` (Spearman's rank correlation of each sampled input with `failed` "
-        "and, over the rows that stand, with crack, opening and crest) and a chart of one or two "
-        "varied numbers or of the sample.",
+        "and by what. In a sample, a row whose loads exceed the largest possible strength of the "
+        "joint has only this as its statement. Beside it:",
+        "- `_probability.csv`: probability of failure with the interval of Clopper and Pearson. "
+        "Rows without a result are `undecided`; they count as failures, except for the lower "
+        "limit.\n"
+        "- `_sensitivity.csv`: Spearman's rank correlation of each sampled input with `failed` "
+        "and, over the rows that stand, with crack, opening and crest.\n"
+        "- a chart of one or two varied parameters, or of the sample.",
         "## fields/",
         "`bulk.msh` and `joint.msh` for Gmsh (a view per field with all levels as its steps); "
         "`fields.pvd` with `bulk_t*.vtu` and `joint_t*.vtu` for ParaView. Bulk: `displacement` "
@@ -119,12 +125,12 @@ def results_page() -> str:
 
 
 def validation_page() -> str:
-    """reference/ssnp142.md: the comparison with the published numbers, all cases run anew."""
+    """reference/ssnp142.md: the comparison with the published numbers, all cases computed again."""
     from damjoint.model.case import load
     from damjoint.post import validation
     from damjoint.run import run
 
-    from .provenance import provenance, said
+    from .provenance import provenance, source_line
 
     comparisons = []
     with tempfile.TemporaryDirectory() as folder:
@@ -134,14 +140,15 @@ def validation_page() -> str:
     return (
         "\n\n".join(
             [
-                "# SSNP142: computed beside published",
-                "As `damjoint validate` prints it; written by `make pages`. "
-                '"Extrapolated" rows were published as node values made from integration points, '
-                "and are compared with the same. Rows for information belong to another geometry, "
-                "to a variable with another meaning, or to a value that the document prints "
-                "otherwise. At the heel the opening of I is almost 7 % above the GEFDYN value, "
-                "whose tolerance is 7 %: the mesh-converged opening is 4.29e-7 m.",
-                said([provenance()], "Computed"),
+                "# SSNP142: computed and published values",
+                "The output of `damjoint validate`, written by `make pages`. "
+                '"Extrapolated" rows were published as node values extrapolated from integration '
+                "points, and are compared with values computed in the same way. Rows marked info "
+                "are not judged: they belong to another geometry, to a variable with another "
+                "meaning, or to a value that the document prints differently. The opening of I at "
+                "the heel is close to the tolerance of the GEFDYN value, but agrees with "
+                "code_aster.",
+                source_line([provenance()], "Computed"),
                 validation.report(comparisons, "github"),
                 "![Modeling K: past the critical load](pictures/k_curve.png)",
             ]
@@ -151,17 +158,18 @@ def validation_page() -> str:
 
 
 def tour_page() -> str:
-    """reference/tour.md with its commands run anew, one after the other in a temporary folder."""
-    from .provenance import provenance, said
+    """reference/tour.md with its commands run again, one after the other in a temporary folder."""
+    from .provenance import provenance, source_line
 
-    page = between("figures", (REFERENCE / "tour.md").read_text(), said([provenance()], "Computed"))
+    source = source_line([provenance()], "Computed")
+    page = between("figures", (REFERENCE / "tour.md").read_text(), source)
     with tempfile.TemporaryDirectory() as folder:
         play = lambda block: f"```\n{played(block[1], Path(folder))}```"
         return re.sub(r"^```\n(.*?)^```$", play, page, flags=re.S | re.M)
 
 
 def between(mark: str, text: str, new: str) -> str:
-    """A text with what stands between the comments <!-- mark --> and <!-- /mark --> replaced."""
+    """A text with `new` between the comments <!-- mark --> and <!-- /mark -->."""
     marks = rf"(<!-- {mark} -->\n).*?(<!-- /{mark} -->)"
     return re.sub(marks, lambda found: f"{found[1]}{new}\n{found[2]}", text, flags=re.S)
 
@@ -175,15 +183,15 @@ def played(block: str, folder: Path) -> str:
     if file := re.match(r"// (\S+\.case)\n", block):
         (folder / file[1]).write_text(block)
         return block
-    said = ""
+    blocks = ""
     for command in re.findall(r"^\$ damjoint (?:.*\\\n)*.*\n", block, flags=re.M):
         words = [sys.executable, "-m", *shlex.split(command[2:].replace("\\\n", ""))]
         done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)
         if done.returncode not in (0, 1):
             raise ValueError(f"{command}{done.stderr}")
         printed = "\n".join(line.rstrip() for line in done.stdout.splitlines())
-        said += f"{command}{printed}\n" + f"(exit code {done.returncode})\n" * done.returncode
-    return said
+        blocks += f"{command}{printed}\n" + f"(exit code {done.returncode})\n" * done.returncode
+    return blocks
 
 
 def take_bench(out: Path) -> None:
@@ -194,30 +202,30 @@ def take_bench(out: Path) -> None:
     readme.write_text(between("modelings", readme.read_text(), table.rstrip("\n")))
 
 
-#: What `damjoint stress` asks of every scene, in words.
-ASKED = """\
-- *Equilibrium*: $N + U$ and $T$ of every row of `history.csv`, and $M$ wherever there is a joint
-  table, are those of the [gravity method](theory.md#gravity-method)'s closed forms, to 1e-5 of the
+#: What `damjoint stress` verifies in every scene.
+VERIFIED = """\
+- *Equilibrium*: $N + U$ and $T$ of every row of `history.csv`, and $M$ where there is a joint
+  table, equal the closed forms of the [gravity method](theory.md#gravity-method), to 1e-5 of the
   dam's weight (times its base).
-- *Water*: $U$ is the integral of `p`, and the closed form where there is one; heads lie between
-  the reservoir's and the tailwater's; in 2D the flux is the same at every node, but for what drains
-  take.
-- *The law*: at every node of `joint.csv` a closed point is pressed by $K_N$ times its overlap, an
-  open one is not, there is no more tension than the damage leaves, and no more shear than friction,
-  cohesion and what has hardened hold. Damage, cumulated slip (friction), crack (rupture) and
-  slipped length never fall.
-- *The command*: parameters, times, levels, tailwater and exit code are those that were asked for.
-- *A stop*: no equilibrium is certain beyond it (a rigid block without strength but friction, under
-  the most uplift that a crack can bring, 5 % on the safe side), and the reason given is a limit
-  that the block is within 10 % of.
+- *Water*: $U$ is the integral of `p`, and the closed form where there is one; heads are between
+  those of reservoir and tailwater; in 2D the flux is the same at every node, except for the flow
+  into drains.
+- *Joint law*: at every node of `joint.csv` the stress of a closed point is $K_N$ times its overlap,
+  and an open point is not in compression. The tension is at most that of the damaged joint, the
+  shear at most the strength by friction, cohesion and hardening. Damage, cumulated slip (friction),
+  crack (rupture) and slipped length never decrease.
+- *Command*: parameters, times, levels, tailwater and exit code are those of the command line.
+- *A run that stops*: at no higher level is an equilibrium guaranteed (that of a rigid block with
+  friction as its only strength, under the largest uplift that a crack can cause, 5 % on the safe
+  side), and the block is within 10 % of the limit that the run names as reason.
 
-*Undecided* is a stop that these bounds neither prove right nor wrong: a displacement that leads no
-further, or a joint that is too stiff for its mesh ($K_N h/E \\ge 100$), which the run says.
-A command that does not end in time is a defect."""
+*Undecided* is a stop that these bounds neither justify nor refute: a prescribed displacement with
+no further equilibrium, or a joint that is too stiff for its mesh ($K_N h/E \\ge 100$), which the
+run reports. A command that exceeds its time limit is a defect."""
 
 
 def trust_page(results: Path) -> str:
-    """reference/trust.md: what random scenes have found, from the result file of the last run.
+    """reference/trust.md: random scenes verified, from the result file of the last run.
 
     Raises ValueError if its rows are of different code.
     """
@@ -233,33 +241,34 @@ def trust_page(results: Path) -> str:
         tables += lines
     tables.append(("all", *counts(rows).values()))
     slowest = sorted(rows, key=lambda row: -float(row["seconds"] or 0))[:5]
-    told = [
-        f"- {row['scene']}, {row['class']}: {row['found']}\n\n      {row['command']}"
+    unsolved = [
+        f"- {row['scene']}, {row['class']}: {row['findings']}\n\n      {row['command']}"
         for kind in (DEFECT, UNDECIDED)
         for row in of("class", kind)
     ]
-    worst = [(r["scene"], r["seconds"], r["iterations"], r["cuts"], r["found"]) for r in slowest]
+    worst = [(r["scene"], r["seconds"], r["iterations"], r["cuts"], r["findings"]) for r in slowest]
     return (
         "\n\n".join(
             [
                 "# What can be trusted",
-                f"{len(rows)} random scenes of `damjoint stress`, each run by the command and "
-                "verified from its files by code that shares nothing with the engines: dams from "
+                f"{len(rows)} random scenes of `damjoint stress`. Each is computed by the command "
+                "and verified from its files, by code that is independent of the engines. The "
+                "scenes: dams from "
                 "5 to 150 m, $E$ from 1e9 to 1e13 Pa, $K_N$ from 1e8 to 1e15 Pa/m, all laws and "
                 "uplifts, sections with batter, neck, sloping and lift joint, silt, ice, anchor "
-                "and earthquake, water up and down; one plane scene in ten is a slender dam of "
-                "real stiffness on a brittle joint. Made by "
-                "`python -m damjoint_tools.pages trust FILE` from its result file.",
-                provenance.said(rows),
-                "## What is asked of each",
-                ASKED,
-                "## What was found",
+                "and earthquake, rising and falling water; one 2D scene in ten is a slender dam "
+                "with the stiffness of concrete on a brittle joint. Written by "
+                "`python -m damjoint_tools.pages trust FILE` from the result file.",
+                provenance.source_line(rows),
+                "## What is verified",
+                VERIFIED,
+                "## Result",
                 markdown(tables, ("scenes", *CLASSES)),
                 "## Defects and undecided stops",
-                "\n".join(told) or "None.",
-                "## The slowest",
-                "Seconds of the whole command in one of several processes.",
-                markdown(worst, ("scene", "seconds", "iterations", "cuts", "found")),
+                "\n".join(unsolved) or "None.",
+                "## The slowest scenes",
+                "Seconds of the complete command, in one of several processes.",
+                markdown(worst, ("scene", "seconds", "iterations", "cuts", "findings")),
             ]
         )
         + "\n"
@@ -267,7 +276,7 @@ def trust_page(results: Path) -> str:
 
 
 def main(words: list[str]) -> None:
-    """Write the pages that are asked for."""
+    """Write the pages of a name: bench, trust, parameters, results, tour, validation or all."""
     if words[0] == "bench":
         take_bench(Path(words[1]))
     if words[0] == "trust":

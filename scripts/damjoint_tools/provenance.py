@@ -1,4 +1,4 @@
-"""By which code, when and on what machine figures were measured; no page mixes two versions."""
+"""Origin of measured figures: code, machine and date. A page has figures of one version only."""
 
 from __future__ import annotations
 
@@ -15,20 +15,22 @@ import damjoint
 from damjoint import __version__, data
 from damjoint.fem import factor
 
-#: What is recorded with measured figures: code is a fingerprint of all that is computed with.
+#: Fields that are recorded with measured figures; code: fingerprint of all source files.
 RECORDED = ("version", "commit", "code", "machine", "date")
-#: The checkout's folders whose changes a commit does not have.
-OF_CODE = ":/scripts", ":/pro", ":/geo", ":/cases"
+#: Folders of the checkout that hold the code.
+CODE_FOLDERS = ":/scripts", ":/pro", ":/geo", ":/cases"
 
 
 def provenance() -> dict[str, str]:
-    """RECORDED of what is measured now."""
-    found = __version__, commit(), sources(), machine(), f"{date.today()}"
-    return dict(zip(RECORDED, found, strict=True))
+    """Return RECORDED of figures that are measured now."""
+    values = __version__, commit(), code_fingerprint(), machine(), f"{date.today()}"
+    return dict(zip(RECORDED, values, strict=True))
 
 
 def commit() -> str:
-    """The checkout's commit, and whether its code has been changed since; empty outside of one."""
+    """Return the commit of the checkout, with a note if its code has changes; empty outside of a
+    checkout of this project.
+    """
     package = Path(__file__).parents[1]
 
     def git(*words: str) -> str:
@@ -38,15 +40,15 @@ def commit() -> str:
         return done.stdout.strip()
 
     try:
-        git("ls-files", "--error-unmatch", "damjoint_tools")  # or it is another project's checkout
-        changed = git("status", "--porcelain", "--", *OF_CODE)
+        git("ls-files", "--error-unmatch", "damjoint_tools")  # fails in another project's checkout
+        changed = git("status", "--porcelain", "--", *CODE_FOLDERS)
         return git("rev-parse", "--short=7", "HEAD") + (" with changes" if changed else "")
     except (OSError, subprocess.CalledProcessError):
         return ""
 
 
-def sources() -> str:
-    """A fingerprint of the code."""
+def code_fingerprint() -> str:
+    """Return the hash of all source files."""
     packages = Path(damjoint.__file__).parent, Path(__file__).parent
     files = [path for package in packages for path in package.rglob("*.py")]
     files += data("pro").rglob("*.pro")
@@ -55,23 +57,23 @@ def sources() -> str:
 
 
 def machine() -> str:
-    """Processor, cores, Python and factorisation, in a line."""
+    """Return processor, cores, Python and factorisation, in a line."""
     try:
-        told = Path("/proc/cpuinfo").read_text()
-        processor = re.search(r"model name\s*:\s*(.*)", told)[1]
+        processor = re.search(r"model name\s*:\s*(.*)", Path("/proc/cpuinfo").read_text())[1]
     except (OSError, TypeError):
         processor = platform.processor() or platform.machine()
     cores = len(os.sched_getaffinity(0))
     return f"{processor}, {cores} cores, Python {platform.python_version()}, {factor.name()}"
 
 
-def said(records: Sequence[Mapping[str, str]], how: str = "Measured") -> str:
-    """The line of a page on where its figures come from.
+def source_line(records: Sequence[Mapping[str, str]], verb: str = "Measured") -> str:
+    """Return the line of a page on the origin of its figures.
 
-    records: RECORDED of each. Raises ValueError if they are of different code, or do not say.
+    records: RECORDED of each figure. Raises ValueError if they are of different code, or of
+    unknown code.
     """
     if any(not record.get("version") or not record.get("code") for record in records):
-        raise ValueError("figures that do not say which damjoint has measured them")
+        raise ValueError("figures of an unknown version: version or code is not recorded")
     if len({record["code"] for record in records}) != 1:
         versions = sorted({f"{r['version']} ({r['commit'] or r['code'][:7]})" for r in records})
         raise ValueError(f"figures of different versions: damjoint {', '.join(versions)}")
@@ -79,4 +81,4 @@ def said(records: Sequence[Mapping[str, str]], how: str = "Measured") -> str:
     when = days[0] if len(days) == 1 else f"{days[0]} to {days[-1]}"
     code = f"commit {first['commit']}, {when}" if first["commit"] else when
     machines = " and ".join(dict.fromkeys(record["machine"] for record in records))
-    return f"{how} with damjoint {first['version']} ({code}) on {machines}."
+    return f"{verb} with damjoint {first['version']} ({code}) on {machines}."

@@ -1,4 +1,7 @@
-"""Random scenes, each run by the command in a process of its own and verified from its files."""
+"""Random dams, each run by the command in a new process and verified from its result files.
+
+The verification is independent of the engines and of laws/: see verification.py.
+"""
 
 from __future__ import annotations
 
@@ -21,29 +24,30 @@ from damjoint.studies.sweep import pool_of, read_done
 from tqdm import tqdm
 
 from .provenance import RECORDED, provenance
-from .verification import Written, unjustified, violations
+from .verification import RunFiles, judge_stop, violations
 
 #: Columns of the result file.
 COLUMNS = (
-    *("scene", "class", "found", "dim", "law", "uplift", "drive", "verdict", "level", "asked"),
+    *("scene", "class", "findings", "dim", "law", "uplift", "drive", "verdict", "level"),
+    "highest_level",
     *("steps", "iterations", "cuts", "seconds", "command"),
     *RECORDED,
 )
-#: What becomes of a scene.
+#: Outcomes of the verification.
 CLASSES = VERIFIED, JUSTIFIED, UNDECIDED, DEFECT = (
     *("converged and verified", "stopped and justified", "stopped, undecided", "defect"),
 )
 
-#: Seconds after which a scene counts as one that does not end.
-PATIENCE = 300
+#: Time limit of a scene [s].
+TIME_LIMIT = 300
 
-#: Every command in one thread: the scenes run side by side.
+#: One thread for each command, as several run at the same time.
 ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL")}
 
 
 @dataclass(frozen=True)
 class Scene:
-    """Parameters that differ from the default dam's, and its loading as the command takes it."""
+    """Random dam: parameters that differ from the default dam's, and levels as in the command."""
 
     settings: dict[str, float | str]
     levels: str
@@ -52,7 +56,7 @@ class Scene:
 
     @property
     def words(self) -> list[str]:
-        """The command's, after `damjoint`."""
+        """Arguments of the command `damjoint`."""
         changed = [
             word for item in self.settings.items() for word in ("--set", "{}={}".format(*item))
         ]
@@ -61,201 +65,204 @@ class Scene:
 
     @property
     def case(self) -> Case:
-        """What it asks for."""
+        """The case as the command loads it."""
         return load("dam", self.settings, self.levels, self.tail_levels, self.steps)
 
 
-class Dice:
-    """Random numbers of three digits, for commands that can be read."""
+class RandomNumbers:
+    """Random numbers, rounded to three digits to keep the commands readable."""
 
     def __init__(self, seed: int, number: int) -> None:
-        self.rng = np.random.default_rng([seed, number])
+        self.generator = np.random.default_rng([seed, number])
 
-    def between(self, low: float, high: float) -> float:
-        """Uniform."""
-        return float(f"{self.rng.uniform(low, high):.3g}")
+    def uniform(self, low: float, high: float) -> float:
+        """Draw a number, uniformly distributed."""
+        return float(f"{self.generator.uniform(low, high):.3g}")
 
-    def size(self, low: float, high: float) -> float:
-        """Uniform in the logarithm."""
-        return float(f"{np.exp(self.rng.uniform(np.log(low), np.log(high))):.3g}")
+    def log_uniform(self, low: float, high: float) -> float:
+        """Draw a number whose logarithm is uniformly distributed."""
+        return float(f"{np.exp(self.generator.uniform(np.log(low), np.log(high))):.3g}")
 
-    def one_of(self, *choices: float | str) -> float | str:
-        """Any of them, as likely as the others."""
-        return choices[self.rng.integers(len(choices))]
+    def choice(self, *choices: float | str) -> float | str:
+        """Draw one of the choices with equal probability."""
+        return choices[self.generator.integers(len(choices))]
 
-    def happens(self, probability: float) -> bool:
-        """Whether it does."""
-        return bool(self.rng.random() < probability)
+    def event(self, probability: float) -> bool:
+        """Draw whether an event of this probability happens."""
+        return bool(self.generator.random() < probability)
 
 
 def random_scene(seed: int, number: int) -> Scene:
-    """Scene of a number: any of the laws, uplifts, sections and loads, stiffnesses over orders of
-    magnitude, levels up and down.
+    """Draw scene `number` of a seed: any law, uplift, section and loads, stiffnesses over orders of
+    magnitude, rising and falling levels. New draws are appended, so that old seeds stay
+    reproducible.
     """
-    dice = Dice(seed, number)
-    height, plain = dice.size(5, 150), dice.happens(0.5)
-    solid = dice.happens(0.1)
-    settings = mesh(dice, height, solid, plain) | section(dice, height, plain) | joint(dice)
-    settings |= loads(dice, height) if not plain else {}
-    settings["uplift"] = dice.one_of("none", "imposed", "drained", "cracked", "flow")
+    rng = RandomNumbers(seed, number)
+    height, plain = rng.log_uniform(5, 150), rng.event(0.5)
+    solid = rng.event(0.1)
+    settings = mesh(rng, height, solid, plain) | section(rng, height, plain) | joint(rng)
+    settings |= loads(rng, height) if not plain else {}
+    settings["uplift"] = rng.choice("none", "imposed", "drained", "cracked", "flow")
     if settings["uplift"] == "flow":
-        settings["aperture_min"] = dice.size(1e-8, 1e-4)
+        settings["aperture_min"] = rng.log_uniform(1e-8, 1e-4)
     if settings["uplift"] == "cracked":
-        settings["drains"] = dice.one_of(0, 1)
-    settings["weight_first"] = dice.one_of(0, 1)
-    number_of_levels = int(dice.one_of(1, 2, 3))
-    levels = [dice.between(0.3 * height, 1.2 * height) for _ in range(number_of_levels)]
-    levels = levels if dice.happens(0.3) else sorted(levels)
-    tail = dice.between(0, 0.3 * height) if dice.happens(0.4) else 0.0
-    if dice.happens(0.15):
-        settings["drive"] = dice.one_of("heel", "crest")
-        settings["drive_by"] = dice.size(1e-6, 1e-3) * height / 10
-    steps, tails = int(dice.one_of(1, 1, 2, 4)), [tail]
-    # what was thought of later is drawn last: the scenes without it stay what they were
-    settings |= drains(dice, settings)
-    if not plain and "joint_height" in settings and dice.happens(0.5):
-        settings["joint_slope"] = dice.between(-5, 5)
-    if not plain and dice.happens(0.15):
-        settings["force_x"] = dice.size(5 * height**2, 150 * height**2)  # up to 3 % of the thrust
-    if tail and dice.happens(0.3):
-        tails = [dice.between(0, 0.3 * height) for _ in levels]
-    if not solid and dice.happens(0.1):
-        settings, tails = slender(dice, height), [0.0]
-        levels = sorted(dice.between(0.6 * height, height) for _ in levels)
+        settings["drains"] = rng.choice(0, 1)
+    settings["weight_first"] = rng.choice(0, 1)
+    number_of_levels = int(rng.choice(1, 2, 3))
+    levels = [rng.uniform(0.3 * height, 1.2 * height) for _ in range(number_of_levels)]
+    levels = levels if rng.event(0.3) else sorted(levels)
+    tail = rng.uniform(0, 0.3 * height) if rng.event(0.4) else 0.0
+    if rng.event(0.15):
+        settings["drive"] = rng.choice("heel", "crest")
+        settings["drive_by"] = rng.log_uniform(1e-6, 1e-3) * height / 10
+    steps, tails = int(rng.choice(1, 1, 2, 4)), [tail]
+    # draws added later
+    settings |= drains(rng, settings)
+    if not plain and "joint_height" in settings and rng.event(0.5):
+        settings["joint_slope"] = rng.uniform(-5, 5)
+    if not plain and rng.event(0.15):
+        # up to 3 % of the thrust
+        settings["force_x"] = rng.log_uniform(5 * height**2, 150 * height**2)
+    if tail and rng.event(0.3):
+        tails = [rng.uniform(0, 0.3 * height) for _ in levels]
+    if not solid and rng.event(0.1):
+        settings, tails = slender_dam(rng, height), [0.0]
+        levels = sorted(rng.uniform(0.6 * height, height) for _ in levels)
     water = (",".join(f"{level:g}" for level in heights) for heights in (levels, tails))
     return Scene(settings, *water, steps)
 
 
-def slender(dice: Dice, height: float) -> dict[str, float | str]:
-    """A slender dam of real stiffness on a joint that lets go of its shear where it opens: under
-    uplift its crack runs on at once.
+def slender_dam(rng: RandomNumbers, height: float) -> dict[str, float | str]:
+    """Draw a slender dam of realistic stiffness on a joint that loses its shear stiffness on
+    opening: under uplift its crack grows unstably.
     """
-    base = dice.between(0.68, 0.78) * height
+    base = rng.uniform(0.68, 0.78) * height
     return {
         "dam_height": height,
         "dam_base": base,
-        "dam_crest": dice.between(0.05 * base, 0.2 * base),
-        "n_joint": dice.one_of(20, 40, 80),
-        "E": dice.size(1e10, 4e10),
+        "dam_crest": rng.uniform(0.05 * base, 0.2 * base),
+        "n_joint": rng.choice(20, 40, 80),
+        "E": rng.log_uniform(1e10, 4e10),
         "found_side": height,
         "found_depth": height,
         "law": "rupture",
-        "K_N": dice.size(1e11, 1e13),
-        "K_T": dice.size(1e11, 1e13),
-        "sigma_max": dice.one_of(0, dice.size(1e2, 1e5)),
-        "alpha": dice.one_of(0, 0.5, 1, 1.5),
-        "uplift": dice.one_of("imposed", "cracked", "flow"),
+        "K_N": rng.log_uniform(1e11, 1e13),
+        "K_T": rng.log_uniform(1e11, 1e13),
+        "sigma_max": rng.choice(0, rng.log_uniform(1e2, 1e5)),
+        "alpha": rng.choice(0, 0.5, 1, 1.5),
+        "uplift": rng.choice("imposed", "cracked", "flow"),
         "weight_first": 1,
     }
 
 
-def mesh(dice: Dice, height: float, solid: bool, plain: bool) -> dict[str, float | str]:
-    """Dimension and mesh: coarse ones, as equilibrium holds on any."""
-    found = {"dam_height": height, "order": dice.one_of(1, 2), "n_joint": dice.one_of(10, 20, 40)}
+def mesh(rng: RandomNumbers, height: float, solid: bool, plain: bool) -> dict[str, float | str]:
+    """Draw dimension and mesh; coarse, as equilibrium holds on any mesh."""
+    settings = {"dam_height": height, "order": rng.choice(1, 2), "n_joint": rng.choice(10, 20, 40)}
     if not solid:
-        found["mesh_pattern"] = dice.one_of("free", "regular") if plain else "free"
-        return found
-    return found | {
+        settings["mesh_pattern"] = rng.choice("free", "regular") if plain else "free"
+        return settings
+    return settings | {
         "dim": 3,
         "n_joint": 10,
-        "mesh_pattern": dice.one_of("free", "layers", "split"),
-        "thickness": dice.between(0.1 * height, 0.3 * height),
-        "hold_z": dice.one_of(0, 1),
-        "n_layers": dice.one_of(1, 2),
+        "mesh_pattern": rng.choice("free", "layers", "split"),
+        "thickness": rng.uniform(0.1 * height, 0.3 * height),
+        "hold_z": rng.choice(0, 1),
+        "n_layers": rng.choice(1, 2),
         "h_dam": float(f"{height / 4:.3g}"),
         "h_found": float(f"{height / 2:.3g}"),
     }
 
 
-def section(dice: Dice, height: float, plain: bool) -> dict[str, float | str]:
-    """Outline and bulk."""
-    base = dice.between(0.45 * height, 1.0 * height)
-    found = {
+def section(rng: RandomNumbers, height: float, plain: bool) -> dict[str, float | str]:
+    """Draw outline and elasticity of the bodies."""
+    base = rng.uniform(0.45 * height, 1.0 * height)
+    drawn = {
         "dam_base": base,
-        "dam_crest": dice.between(0.05 * base, 0.2 * base),
-        "E": dice.size(1e9, 1e13),
-        "nu": dice.between(0, 0.35),
+        "dam_crest": rng.uniform(0.05 * base, 0.2 * base),
+        "E": rng.log_uniform(1e9, 1e13),
+        "nu": rng.uniform(0, 0.35),
         "found_side": height,
         "found_depth": height,
     }
     if plain:
-        return found
-    if dice.happens(0.3):
-        found["E_found"] = dice.size(1e9, 1e13)
-    if dice.happens(0.4):
-        found["batter"] = dice.between(0.02 * base, 0.2 * base)
-        found["batter_height"] = dice.between(0.3 * height, 0.9 * height)
-    if dice.happens(0.3):
-        found["neck_height"] = dice.between(0.02 * height, 0.15 * height)
-    if dice.happens(0.4):
-        found["joint_slope"] = dice.between(-8, 12)
-    elif dice.happens(0.3):
-        found["joint_height"] = dice.between(0.1 * height, 0.5 * height)
-    return found
+        return drawn
+    if rng.event(0.3):
+        drawn["E_found"] = rng.log_uniform(1e9, 1e13)
+    if rng.event(0.4):
+        drawn["batter"] = rng.uniform(0.02 * base, 0.2 * base)
+        drawn["batter_height"] = rng.uniform(0.3 * height, 0.9 * height)
+    if rng.event(0.3):
+        drawn["neck_height"] = rng.uniform(0.02 * height, 0.15 * height)
+    if rng.event(0.4):
+        drawn["joint_slope"] = rng.uniform(-8, 12)
+    elif rng.event(0.3):
+        drawn["joint_height"] = rng.uniform(0.1 * height, 0.5 * height)
+    return drawn
 
 
-def joint(dice: Dice) -> dict[str, float | str]:
-    """Law and strengths; fracture energies above what the joint stores before it softens."""
-    found = {
-        "law": dice.one_of("rupture", "friction", "bond"),
-        "K_N": dice.size(1e8, 1e15),
-        "sigma_max": dice.one_of(0, dice.size(1e3, 2e6)),
-        "adhesion": dice.one_of(0, dice.size(1e3, 1e6)),
-        "mu": dice.between(0.2, 1.2),
+def joint(rng: RandomNumbers) -> dict[str, float | str]:
+    """Draw law and strengths; fracture energies exceed the elastic energy at the strength."""
+    drawn = {
+        "law": rng.choice("rupture", "friction", "bond"),
+        "K_N": rng.log_uniform(1e8, 1e15),
+        "sigma_max": rng.choice(0, rng.log_uniform(1e3, 2e6)),
+        "adhesion": rng.choice(0, rng.log_uniform(1e3, 1e6)),
+        "mu": rng.uniform(0.2, 1.2),
     }
-    found["K_T"] = float(f"{found['K_N'] * dice.size(0.1, 2):.3g}")
-    if found["law"] == "rupture":
-        found["pena_rupture"] = dice.size(0.1, 1e3)
-        found["alpha"] = dice.one_of(0, 1, 1.5, 2)
-    if found["law"] == "friction":
-        found["pena_tang"] = dice.one_of(-1, 0, float(f"{0.05 * found['K_T']:.3g}"))
-    if found["law"] == "bond":
-        found["G_f"] = dice.size(1.5, 100) * max(found["sigma_max"] ** 2 / 2 / found["K_N"], 1)
-        found["G_t"] = dice.size(1.5, 100) * max(found["adhesion"] ** 2 / 2 / found["K_T"], 1)
-        found |= {name: float(f"{found[name]:.4g}") for name in ("G_f", "G_t")}
-    return found
+    drawn["K_T"] = float(f"{drawn['K_N'] * rng.log_uniform(0.1, 2):.3g}")
+    if drawn["law"] == "rupture":
+        drawn["pena_rupture"] = rng.log_uniform(0.1, 1e3)
+        drawn["alpha"] = rng.choice(0, 1, 1.5, 2)
+    if drawn["law"] == "friction":
+        drawn["pena_tang"] = rng.choice(-1, 0, float(f"{0.05 * drawn['K_T']:.3g}"))
+    if drawn["law"] == "bond":
+        pairs = ("G_f", "sigma_max", "K_N"), ("G_t", "adhesion", "K_T")
+        for energy, strength, stiffness in pairs:
+            elastic = drawn[strength] ** 2 / 2 / drawn[stiffness]
+            drawn[energy] = float(f"{rng.log_uniform(1.5, 100) * max(elastic, 1):.4g}")
+    return drawn
 
 
-def drains(dice: Dice, settings: dict[str, float | str]) -> dict[str, float | str]:
-    """Drains where the water flows, and where they stand, what they take away and down to which
-    level, wherever there are any.
+def drains(rng: RandomNumbers, settings: dict[str, float | str]) -> dict[str, float | str]:
+    """Draw whether there are drains where the water flows; position, effectiveness and outlet level
+    of all drains.
     """
-    found = {"drains": 1} if settings["uplift"] == "flow" and dice.happens(0.4) else {}
-    if not has_drains({"drains": 0} | settings | found) or dice.happens(0.5):
-        return found
+    drawn = {"drains": 1} if settings["uplift"] == "flow" and rng.event(0.4) else {}
+    if not has_drains({"drains": 0} | settings | drawn) or rng.event(0.5):
+        return drawn
     base, height = settings["dam_base"], settings["dam_height"]
-    found["drain_x"] = dice.between(0.05 * base, 0.4 * base)
-    found["drain_effectiveness"] = dice.between(0, 1)
+    drawn["drain_x"] = rng.uniform(0.05 * base, 0.4 * base)
+    drawn["drain_effectiveness"] = rng.uniform(0, 1)
     if "drive" not in settings:
-        found["drain_level"] = dice.between(0, 0.3 * height)
-    return found
+        drawn["drain_level"] = rng.uniform(0, 0.3 * height)
+    return drawn
 
 
-def loads(dice: Dice, height: float) -> dict[str, float | str]:
-    """Loads besides weight and water, sized by the water's thrust."""
-    thrust, found = 1000 * 9.81 * height**2 / 2, {}
-    if dice.happens(0.3):
-        found["silt_height"] = dice.between(0.05 * height, 0.4 * height)
-    if dice.happens(0.2):
-        found["ice_force"] = dice.size(0.001 * thrust, 0.03 * thrust)
-    if dice.happens(0.2):
-        found["anchor_force"] = dice.size(0.01 * thrust, 0.2 * thrust)
-        found["anchor_angle"] = dice.between(-5, 20)
-    if dice.happens(0.25):
-        found |= {"k_h": dice.between(-0.1, 0.2), "k_v": dice.between(-0.1, 0.1)}
-    if dice.happens(0.15):
-        found["floor_water"] = 1
-    return found
+def loads(rng: RandomNumbers, height: float) -> dict[str, float | str]:
+    """Draw loads besides weight and water, as shares of the thrust of the water."""
+    thrust, drawn = 1000 * 9.81 * height**2 / 2, {}
+    if rng.event(0.3):
+        drawn["silt_height"] = rng.uniform(0.05 * height, 0.4 * height)
+    if rng.event(0.2):
+        drawn["ice_force"] = rng.log_uniform(0.001 * thrust, 0.03 * thrust)
+    if rng.event(0.2):
+        drawn["anchor_force"] = rng.log_uniform(0.01 * thrust, 0.2 * thrust)
+        drawn["anchor_angle"] = rng.uniform(-5, 20)
+    if rng.event(0.25):
+        drawn |= {"k_h": rng.uniform(-0.1, 0.2), "k_v": rng.uniform(-0.1, 0.1)}
+    if rng.event(0.15):
+        drawn["floor_water"] = 1
+    return drawn
 
 
-def judged(scene: Scene, folder: Path) -> dict[str, object]:
-    """Run a scene by the command and verify what it has written: its row but for the number."""
+def run_and_verify(scene: Scene, folder: Path) -> dict[str, object]:
+    """Run a scene by the command and verify its files; returns its row without the number."""
     case, start = scene.case, time.perf_counter()
     words = [*scene.words, "--no-fields", "--no-picture", "--out", str(folder / "out")]
     environment = os.environ | ONE_THREAD | {"DAMJOINT_CACHE": str(folder / "cache")}
-    told = {
+    row = {
         "command": " ".join(["damjoint", *scene.words]),
-        "asked": max(case.levels),
+        "highest_level": max(case.levels),
         **{name: case[name] for name in ("dim", "law", "uplift", "drive")},
     }
     try:
@@ -264,25 +271,30 @@ def judged(scene: Scene, folder: Path) -> dict[str, object]:
             env=environment,
             capture_output=True,
             text=True,
-            timeout=PATIENCE,
+            timeout=TIME_LIMIT,
         )
     except subprocess.TimeoutExpired:
-        return told | {"class": DEFECT, "found": f"no end after {PATIENCE} s", "seconds": PATIENCE}
-    told["seconds"] = f"{time.perf_counter() - start:.2f}"
-    run = Written(case, folder / "out", done.returncode)
+        finding = f"not finished after {TIME_LIMIT} s"
+        return row | {"class": DEFECT, "findings": finding, "seconds": TIME_LIMIT}
+    row["seconds"] = f"{time.perf_counter() - start:.2f}"
+    run = RunFiles(case, folder / "out", done.returncode)
     try:
-        said = run.told["verdict"]
+        row["verdict"] = run.record["verdict"]
     except (OSError, KeyError):
-        last = (done.stderr.strip().splitlines() or ["nothing said"])[-1]
-        return told | {"class": DEFECT, "found": f"exit code {done.returncode}: {last}"}
+        last = (done.stderr.strip().splitlines() or ["no message"])[-1]
+        return row | {"class": DEFECT, "findings": f"exit code {done.returncode}: {last}"}
+    return row | verified(run)
+
+
+def verified(run: RunFiles) -> dict[str, object]:
+    """Verify a run; returns its class, findings and size."""
     broken = violations(run)
-    wrong, why = unjustified(run) if run.stopped else (False, "")
-    fine = UNDECIDED if why else JUSTIFIED if run.stopped else VERIFIED
+    wrong, remark = judge_stop(run) if run.stopped else (False, "")
+    fine = UNDECIDED if remark else JUSTIFIED if run.stopped else VERIFIED
     history = run.history
-    return told | {
+    return {
         "class": DEFECT if broken or wrong else fine,
-        "found": "; ".join(filter(None, [*broken, why])),
-        "verdict": said,
+        "findings": "; ".join(filter(None, [*broken, remark])),
         "level": f"{history['level'].max(initial=0):.6g}",
         "steps": len(history["time"]),
         "iterations": int(history["iterations"].sum()),
@@ -290,27 +302,28 @@ def judged(scene: Scene, folder: Path) -> dict[str, object]:
     }
 
 
-def one(seed: int, number: int) -> dict[str, object]:
-    """The row of a scene."""
+def row_of(seed: int, number: int) -> dict[str, object]:
+    """Return the row of a scene."""
     with tempfile.TemporaryDirectory() as folder:
-        row = judged(random_scene(seed, number), Path(folder))
+        row = run_and_verify(random_scene(seed, number), Path(folder))
     return {"scene": f"{seed}-{number}"} | row
 
 
-def spread(seed: int, numbers: list[int], jobs: int) -> Iterator[dict[str, object]]:
-    """The rows of scenes as they are done."""
+def rows_as_completed(seed: int, numbers: list[int], jobs: int) -> Iterator[dict[str, object]]:
+    """Compute the rows of scenes in parallel, in the order in which they are finished."""
     with pool_of(jobs) as pool:
-        waiting = [pool.submit(one, seed, number) for number in numbers]
+        waiting = [pool.submit(row_of, seed, number) for number in numbers]
         yield from (future.result() for future in as_completed(waiting))
 
 
 def stress(
     count: int, seed: int, out: Path, jobs: int | None = None, progress: Callable = tqdm
 ) -> list[dict[str, str]]:
-    """Run what is missing of the scenes 0 .. count - 1 of a seed, and return the rows of them all.
+    """Run those of the scenes 0 .. count - 1 of a seed that are not in the result file yet; returns
+    the rows of all.
 
-    out: CSV of COLUMNS, a row written whole when it is done; what is in it already is not run
-    again. Raises InputError, also where those are of other code.
+    out: CSV of COLUMNS; a row is written when its scene is finished. Raises InputError, also if the
+    rows in the file were computed by other code.
     """
     if not out.parent.is_dir():
         raise InputError(f"out = {out}: must be a file in an existing folder")
@@ -318,30 +331,32 @@ def stress(
     now = provenance()
     for row in done.values():
         if row["code"] != now["code"]:
-            begun = f"begun with damjoint {row['version']} ({row['commit'] or row['date']})"
-            raise InputError(f"out = {out}: {begun}, which is other code: name a new file")
-    missing = [number for number in range(count) if f"{seed}-{number}" not in done]
+            other = f"damjoint {row['version']} ({row['commit'] or row['date']})"
+            raise InputError(
+                f"out = {out}: must be a new file; this one was begun with {other}, other code"
+            )
+    names = [f"{seed}-{number}" for number in range(count)]
+    missing = [number for number, name in enumerate(names) if name not in done]
     with out.open("a", newline="") as file:
         lock(file.fileno(), out)
         writer = csv.DictWriter(file, COLUMNS, restval="", lineterminator="\n")
         if not file.tell():
             writer.writeheader()
-        rows = spread(seed, missing, jobs or os.cpu_count() or 1)
+        rows = rows_as_completed(seed, missing, jobs or os.cpu_count() or 1)
         for row in progress(
             rows, total=len(missing), desc="stress", disable=not sys.stderr.isatty()
         ):
             writer.writerow(row | now)
             file.flush()
-    wanted = {f"{seed}-{number}" for number in range(count)}
-    return [row for row in read_rows(out) if row["scene"] in wanted]
+    return [row for row in read_rows(out) if row["scene"] in names]
 
 
 def read_rows(path: Path) -> list[dict[str, str]]:
-    """The rows of a result file."""
+    """Read the rows of a result file."""
     with path.open() as file:
         return list(csv.DictReader(file))
 
 
 def counts(rows: list[dict[str, str]]) -> dict[str, int]:
-    """How many scenes are of each class."""
+    """Count the scenes of each class."""
     return {name: sum(row["class"] == name for row in rows) for name in CLASSES}

@@ -1,5 +1,4 @@
-"""--accuracy: meshes refined until the estimated errors are small enough, and what is said of
-them."""
+"""--accuracy: meshes refined until the estimated errors are small enough."""
 
 import json
 from dataclasses import replace
@@ -13,11 +12,11 @@ from damjoint.model.case import load
 #: A dam of ordinary stiffness that slips and opens at its heel.
 DAM = {"E_dam": 2e10, "E_found": 3e10, "K_N": 1e11, "K_T": 1e11}
 DAM |= {"law": "friction", "adhesion": 1e5, "mu": 1.0}
-PLAIN = "--no-fields", "--no-picture"
+TABLES_ONLY = "--no-fields", "--no-picture"
 
 
 def solved(case, engine=condensed):
-    """The one scene of a case."""
+    """Solve the only scene of a case."""
     return next(accuracy.solve(case, engine, lambda *_: None, False))
 
 
@@ -26,8 +25,8 @@ def words(settings):
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])
-def test_the_error_left_of_a_power(order):
-    """Of q + c h^p no less than what is left, and hardly more than what order 1 leaves."""
+def test_the_estimate_bounds_the_error_of_a_power_law(order):
+    """Of q + c h^p: not below the true error, and hardly above that of order 1."""
     h = np.array([1, 0.5, 0.25])[:, None]
     values = np.array([[3.0, -2.0]]) + np.array([[1.0, -0.2]]) * h**order
     for some in (values, values[1:]):
@@ -37,14 +36,14 @@ def test_the_error_left_of_a_power(order):
         assert np.all(found >= true * (1 - 1e-12)) and np.all(found <= change * (1 + 1e-12))
 
 
-def test_two_values_that_agree_by_accident():
+def test_two_values_that_agree_by_accident_do_not_give_a_zero_error():
     assert accuracy.discretisation_error(
         np.array([[1.0], [2.0], [2.0]]), counted=False
     ) == pytest.approx(1.25 / 12)
 
 
-def test_values_that_go_to_and_fro_show_no_order():
-    """The slip of a dam whose crack is two elements long: 32, 64, 128, 512 elements."""
+def test_oscillating_values_have_no_observed_order():
+    """Slip of a dam whose crack is two elements long, on 32, 64, 128 and 512 elements."""
     values, limit = np.array([[2.1486e-05], [2.0175e-05], [2.0186e-05]]), 1.96e-05
     error = accuracy.discretisation_error(values, counted=False)
     assert error == pytest.approx(1.25 * (values.max() - values.min()) / 2)
@@ -52,61 +51,61 @@ def test_values_that_go_to_and_fro_show_no_order():
 
 
 @pytest.mark.parametrize("scene", [pytest.param("imposed", marks=pytest.mark.heavy), "flow"])
-def test_what_is_said_is_true(scene):
-    """The errors on the mesh found, by one four times as fine; each within its estimate."""
+def test_true_errors_are_within_the_estimates(scene):
+    """True errors are those against a mesh four times as fine."""
     case = load("dam", DAM | {"uplift": scene}, "40,46", accuracy="3%")
     outcome = solved(case)
-    told = outcome.result.info["error_estimate"]
-    assert told["reached"] and told["n_joint"][-1] == outcome.result.case["n_joint"]
+    estimate = outcome.result.info["error_estimate"]
+    assert estimate["reached"] and estimate["n_joint"][-1] == outcome.result.case["n_joint"]
     fine = accuracy.refine_mesh(outcome.result.case, 4)
     exact = solved(replace(fine, accuracy=None)).result
     times = sorted(accuracy.reached_times(exact))
     assert len(times) == 2
     pair = [accuracy.quantities_at(one, times) for one in (outcome.result, exact)]
-    names = [name for name, one in told["quantities"].items() if one["used"]]
+    names = [name for name, one in estimate["quantities"].items() if one["used"]]
     assert {"max_opening", "slip", "crest_ux"} <= set(names) and ("flux" in names) == (
         scene == "flow"
     )
     for name in names:
         true = np.abs(np.subtract(*(one[name] for one in pair))).max()
-        assert true <= told["quantities"][name]["error"], name
+        assert true <= estimate["quantities"][name]["error"], name
         if name not in accuracy.COUNTED_IN_ELEMENTS:
-            assert told["quantities"][name]["relative"] <= 0.03
+            assert estimate["quantities"][name]["relative"] <= 0.03
 
 
-def test_a_summary_says_what_an_error_is_relative_to():
-    """An opening's error stands beside the joint's largest jump, which may be all slip."""
+def test_the_statement_names_the_scale_of_a_relative_error():
+    """The error of an opening is relative to the joint's largest jump, which may be slip only."""
     opening = accuracy.Estimate("max_opening", 1e-6, 7.2e-6, 1e-3)
     crest = accuracy.Estimate("crest_ux", 1e-2, 1e-4, 1e-2)
-    said = accuracy.summary(0.01, [20, 40], 3, [opening, crest], "")
-    assert said.endswith(": largest opening 0.72 % of the joint's largest jump, crest 1 %")
+    statement = accuracy.summary(0.01, [20, 40], 3, [opening, crest], "")
+    assert statement.endswith(": largest opening 0.72 % of the joint's largest jump, crest 1 %")
 
 
-def test_run_writes_and_says_it(command, tmp_path):
-    """One line; the folder is the last mesh's, and a run on that mesh gives the same."""
-    asked = "run", "dam", "--levels", "40", *words(DAM), *PLAIN
-    code, said, _ = command(*asked, "--accuracy", "5%", "--out", "x")
-    told = json.loads((tmp_path / "x" / "run.json").read_text())
-    estimate = told["error_estimate"]
-    assert code == 0 and estimate["statement"] in said.splitlines()
+def test_run_writes_and_prints_the_estimate(command, tmp_path):
+    """The folder is that of the last mesh, and a run on that mesh gives the same results."""
+    arguments = "run", "dam", "--levels", "40", *words(DAM), *TABLES_ONLY
+    code, out, _ = command(*arguments, "--accuracy", "5%", "--out", "x")
+    record = json.loads((tmp_path / "x" / "run.json").read_text())
+    estimate = record["error_estimate"]
+    assert code == 0 and estimate["statement"] in out.splitlines()
     assert estimate["accuracy"] == 0.05 and estimate["reached"]
     assert not estimate["quantities"]["toe_stress"]["used"]
     assert "not required: stress at the toe" in estimate["statement"]
-    mesh = {n: told["parameters"][n] for n in ("n_joint", "h_dam", "h_found", "order")}
-    assert command(*asked, *words(mesh), "--out", "y")[0] == 0
+    mesh = {n: record["parameters"][n] for n in ("n_joint", "h_dam", "h_found", "order")}
+    assert command(*arguments, *words(mesh), "--out", "y")[0] == 0
     pair = [(tmp_path / name / "history.csv").read_text() for name in "xy"]
     assert pair[0] == pair[1]
 
 
-def test_sizes_far_away_follow_as_automatic_ones():
+def test_refinement_scales_the_far_element_sizes_like_the_automatic_ones():
     for n in (64, 256):
         found = accuracy.refine_mesh(load("dam", DAM, accuracy="fine"), n / 32)
         own = load("dam", DAM | {"n_joint": n, "order": 2, "mesh_pattern": "free"})
         assert found.values == pytest.approx(own.values)
 
 
-class Stub:
-    """The condensed engine on meshes below a size; above, something happens."""
+class Limited:
+    """Condensed engine that raises an exception on meshes finer than `most`."""
 
     def __init__(self, most, what):
         self.most, self.what = most, what
@@ -117,45 +116,47 @@ class Stub:
         yield from condensed.solve(case, on_step, fields)
 
 
-def test_a_mesh_beyond_the_memory_leaves_the_one_before():
+def test_if_memory_is_exceeded_the_results_of_the_mesh_before_are_returned():
     case = load("dam", DAM, "40", accuracy="0.01%")
-    told = solved(case, Stub(64, RunError("memory: too much"))).result.info["error_estimate"]
-    assert not told["reached"] and told["n_joint"] == [32, 64]
-    assert "not reached, n_joint = 128: memory: too much" in told["statement"]
+    estimate = solved(case, Limited(64, RunError("memory: too much"))).result.info["error_estimate"]
+    assert not estimate["reached"] and estimate["n_joint"] == [32, 64]
+    assert "not reached, n_joint = 128: memory: too much" in estimate["statement"]
     with pytest.raises(RunError):
-        solved(case, Stub(16, RunError("memory: too much")))
+        solved(case, Limited(16, RunError("memory: too much")))
 
 
-def test_an_interruption_keeps_the_mesh_before(command, tmp_path, monkeypatch):
-    outcome = solved(load("dam", DAM, "40", accuracy="0.01%"), Stub(64, KeyboardInterrupt()))
+def test_if_interrupted_the_results_of_the_mesh_before_are_returned(command, tmp_path, monkeypatch):
+    outcome = solved(load("dam", DAM, "40", accuracy="0.01%"), Limited(64, KeyboardInterrupt()))
     assert isinstance(outcome.error, KeyboardInterrupt) and outcome.result.last["level"] == 40
     assert outcome.result.info["error_estimate"]["n_joint"] == [32, 64]
 
 
-def test_the_finest_mesh_is_said(monkeypatch):
+def test_the_statement_names_the_limit_of_refinement(monkeypatch):
     monkeypatch.setitem(accuracy.FINEST, "plane", 64)
-    told = solved(load("dam", DAM, "40", accuracy="0.01%")).result.info["error_estimate"]
-    assert not told["reached"] and "not reached, no finer mesh is tried" in told["statement"]
+    estimate = solved(load("dam", DAM, "40", accuracy="0.01%")).result.info["error_estimate"]
+    assert (
+        not estimate["reached"] and "not reached, no finer mesh is tried" in estimate["statement"]
+    )
 
 
-@pytest.mark.parametrize("asked", ["1", "0%", "-1%", "100%", "nan%", "x%", "best"])
-def test_bad_accuracies(command, asked, tmp_path):
-    code, _, error = command("run", "dam", f"--accuracy={asked}")
-    assert code == 2 and f"accuracy = {asked}: must be" in error and error.count("\n") == 1
+@pytest.mark.parametrize("accuracy", ["1", "0%", "-1%", "100%", "nan%", "x%", "best"])
+def test_a_bad_accuracy_is_refused(command, accuracy, tmp_path):
+    code, _, error = command("run", "dam", f"--accuracy={accuracy}")
+    assert code == 2 and f"accuracy = {accuracy}: must be" in error and error.count("\n") == 1
     assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.heavy
-def test_both_scenes_and_3d():
-    """Each scene of a case on a mesh of its own; a slice needs no layers."""
+def test_accuracy_of_two_scenes_and_in_3d():
+    """Each scene of a case has its own mesh; a slice is not refined in layers."""
     slice_ = {"dim": 3, "thickness": 1.0, "hold_z": 1.0, "uplift": "imposed"}
     two = load("a", accuracy="coarse")
     both = [one.result for one in accuracy.solve(two, condensed, lambda *_: None, False)]
     assert [one.case["uplift"] for one in both] == ["imposed", "none"]
     assert all(one.info["error_estimate"]["reached"] for one in both)
     case = load("dam", DAM | slice_, "40", accuracy="5%")
-    told = solved(case).result.info["error_estimate"]
+    estimate = solved(case).result.info["error_estimate"]
     plane = solved(load("dam", DAM | {"uplift": "imposed"}, "40", accuracy="5%")).result
-    assert told["reached"] and told["n_joint"][0] == 16
-    crest = told["quantities"]["crest_ux"]["value"]
+    assert estimate["reached"] and estimate["n_joint"][0] == 16
+    crest = estimate["quantities"]["crest_ux"]["value"]
     assert crest == pytest.approx(plane.last["crest_ux"], rel=0.01)

@@ -1,5 +1,6 @@
-"""The short form of the benchmark: what it writes, and that the numbers are what they say; nothing
-about speed."""
+"""The short form of the benchmark: its files and the consistency of its figures; no speed is
+asserted.
+"""
 
 import csv
 import json
@@ -8,16 +9,16 @@ import pytest
 
 
 @pytest.mark.heavy
-def test_short_form(command, tmp_path):
+def test_the_short_benchmark_writes_consistent_files(command, tmp_path):
     assert command("bench", "--short", "--out", "bench")[0] == 0
     text = (tmp_path / "bench" / "benchmarks.md").read_text()
     assert text.startswith("# Benchmarks\n") and text.count("\n## ") == 8
     assert (tmp_path / "bench" / "accuracy.png").read_bytes()[:4] == b"\x89PNG"
     *lines, blank, source = (tmp_path / "bench" / "modelings.md").read_text().splitlines()
     assert len(lines) == 13 and not blank and source in text
-    told = json.loads((tmp_path / "bench" / "provenance.json").read_text())
-    assert source.startswith(f"Measured with damjoint {told['version']} (")
-    assert told["date"] in source and told["machine"] in source and told["commit"] in source
+    origin = json.loads((tmp_path / "bench" / "provenance.json").read_text())
+    assert source.startswith(f"Measured with damjoint {origin['version']} (")
+    assert origin["date"] in source and origin["machine"] in source and origin["commit"] in source
 
     def table(name):
         with (tmp_path / "bench" / f"{name}.csv").open() as file:
@@ -35,7 +36,8 @@ def test_short_form(command, tmp_path):
             float(errors[scene, "2", "free", "2", "10", s]["error_heel_opening"])
             for s in ("1", "2", "4")
         ]
-        assert max(steps) == pytest.approx(min(steps), rel=1e-3)  # monotone filling: one step does
+        # monotone filling: one step is enough
+        assert max(steps) == pytest.approx(min(steps), rel=1e-3)
         plane, split, coarser = (
             float(errors[scene, dim, pattern, order, "20", "published"]["error_toe_stress"])
             for dim, pattern, order in (("2", "free", "2"), ("3", "split", "2"), ("2", "free", "1"))

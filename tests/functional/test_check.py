@@ -1,4 +1,6 @@
-"""Checks: the finite elements carry what the gravity method says, and the verdicts follow."""
+"""damjoint check: finite elements and gravity method have the same resultants; pass or fail by the
+required factors.
+"""
 
 import csv
 import math
@@ -21,7 +23,7 @@ from damjoint.studies.check import (
 )
 from matplotlib.figure import Figure
 
-#: SSNP142's dam on a coarse mesh: what load combinations share.
+#: Parameters common to all load combinations: SSNP142's dam on a coarse mesh.
 COMMON = """
 default_dam_base = 5; default_dam_crest = 1.5; default_dam_height = 10;
 default_found_side = 5; default_found_depth = 5; default_order = 1; default_n_joint = 20;
@@ -49,7 +51,7 @@ def rows(path):
         return {(row["case"], row["answer"]): row for row in csv.DictReader(file)}
 
 
-def test_two_combinations(command, combinations, tmp_path):
+def test_two_load_combinations(command, combinations, tmp_path):
     code, out, _ = command("check", *combinations)
     assert code == 0
     table = rows(tmp_path / "out/check/check.csv")
@@ -75,33 +77,33 @@ def test_two_combinations(command, combinations, tmp_path):
         assert float(loads[-1]["Fx"]) == pytest.approx(float(by_hand["T"]))
         folders.clear(folder)
         assert not list(folder.iterdir())
-    for said in ("usual", "flood", "gravity method", "required", "1.3", "pass"):
-        assert said in out
+    for message in ("usual", "flood", "gravity method", "required", "1.3", "pass"):
+        assert message in out
     assert "fail" not in out
 
 
 @pytest.mark.parametrize(
-    "setting, said",
+    "setting, message",
     [
         ({"required_SSF": 3.0}, "SSF {SSF:.4g} < 3"),
         ({"required_OSF": 5.0}, "OSF {OSF:.4g} < 5"),
         ({"f_c": 1.5e5}, "compression {toe:.4g} Pa at the toe > f_c = 150000 Pa"),
     ],
 )
-def test_a_check_that_is_not_met(solve, setting, said):
+def test_a_factor_below_the_required_one_fails(solve, setting, message):
     (result,) = solve("d", "7", dim=2.0, n_joint=20.0)
     for answer in (by_finite_elements(result), by_gravity(hand_calculation(result))):
         assert not answer.failures and answer.row["verdict"] == "not checked"
         met = replace(answer.case, values=answer.case.values | {"required_OSF": 1.01})
         assert replace(answer, case=met).row["verdict"] == "pass"
         stricter = replace(answer, case=replace(answer.case, values=answer.case.values | setting))
-        expected = said.format(**answer.numbers, toe=-answer.numbers["sigma_n_toe"])
+        expected = message.format(**answer.numbers, toe=-answer.numbers["sigma_n_toe"])
         assert stricter.failures == [expected]
         assert (stricter.row["verdict"], stricter.row["why"]) == ("fail", expected)
 
 
-def test_where_nothing_is_required_nothing_passes(command, combinations, tmp_path):
-    """A sliding factor of 0.35 under a law that has no friction is no pass, and no fail."""
+def test_without_required_factors_the_verdict_is_not_checked(command, combinations, tmp_path):
+    """Even with a sliding factor of 0.35, under a law without friction."""
     none = "required_SSF=0", "required_OSF=0", "f_c=0", "mu=0.2", "adhesion=0"
     words = [word for setting in ("law=rupture", *none) for word in ("--set", setting)]
     code, out, _ = command("check", "usual.case", *words, "--out", "here")
@@ -112,7 +114,7 @@ def test_where_nothing_is_required_nothing_passes(command, combinations, tmp_pat
     assert out.count("not checked") == 2 and "pass" not in out
     assert "nothing is required: the case sets none of required_SSF, required_OSF, f_c" in out
     assert not re.search(r"usual +required", out)
-    # friction asks for 1 by itself: less fails, more is not a pass either
+    # law = friction requires 1 by default: less fails, more is not checked
     code, out, _ = command("check", "usual.case", *words, "--set", "law=friction", "--out", "here")
     assert code == 1 and "fails, SSF" in out
     words[words.index("mu=0.2")] = "mu=2"
@@ -120,8 +122,8 @@ def test_where_nothing_is_required_nothing_passes(command, combinations, tmp_pat
     assert code == 0 and "pass" not in out and not re.search(r"usual +required", out)
 
 
-def test_a_dam_that_slides(command, combinations, tmp_path):
-    """It stops before its last level, which the gravity method finds too high."""
+def test_a_dam_that_slides_below_its_last_level_fails(command, combinations, tmp_path):
+    """The gravity method has the last level, the finite elements stop below it."""
     weak = "mu=0.25", "adhesion=1000", "pena_tang=0", "n_joint=8"
     short = "smallest_step=0.004", "burst_iterations=30"
     settings = "required_SSF=0", "required_OSF=0", *weak, *short
@@ -138,8 +140,8 @@ def test_a_dam_that_slides(command, combinations, tmp_path):
     assert "did not reach the last level" in out
 
 
-def test_an_earthquake_that_is_not_reached(command, tmp_path):
-    """The level is the same, the load is not: T grows with the earthquake."""
+def test_a_dam_that_stops_under_a_part_of_the_earthquake_fails(command, tmp_path):
+    """At constant level T grows with the earthquake."""
     weak = "law=bond", "sigma_max=0", "adhesion=0", "mu=0.8", "k_h=0.3", "n_joint=12"
     short = "smallest_step=0.02", "burst_iterations=30"
     words = [word for setting in (*weak, *short) for word in ("--set", setting)]
@@ -156,8 +158,8 @@ def test_an_earthquake_that_is_not_reached(command, tmp_path):
     assert f"with all loads, t = {float(computed['time']):.5g} of 2" in out
 
 
-def test_a_partial_load_is_no_pass(solve):
-    """Interrupted, nothing has failed; the picture's table and the differences say so, too."""
+def test_a_run_under_a_partial_load_does_not_pass(solve):
+    """E.g. interrupted. The table of the picture and the differences show it, too."""
     (result,) = solve("d", "7", dim=2.0, n_joint=20.0)
     longer = replace(result, case=replace(result.case, levels=(7.0, 7.0), tail_levels=(0.0,) * 2))
     longer = replace(longer, case=replace(longer.case, times=(1.0, 2.0)))
@@ -170,8 +172,8 @@ def test_a_partial_load_is_no_pass(solve):
     assert len(full.rows) == 3
 
 
-def test_drains_that_leave_two_cracks(command, tmp_path):
-    """The longer one is a row of its own, judged, too."""
+def test_a_second_crack_in_equilibrium_has_its_own_row(command, tmp_path):
+    """The drains stop the shorter crack; the longer one is checked as well."""
     dam = "dam_base=30", "uplift=cracked", "drains=1", "drain_x=6", "law=bond", "sigma_max=0"
     more = "adhesion=0", "mu=1.2", "n_joint=20", "required_SSF=1.2"
     words = [word for setting in (*dam, *more) for word in ("--set", setting)]
@@ -188,21 +190,21 @@ def test_drains_that_leave_two_cracks(command, tmp_path):
     assert "longer crack" in page and "past the drains (6 m)" in page
 
 
-def test_a_joint_that_tension_keeps_uncracked(solve):
+def test_a_note_gives_the_crack_without_tensile_strength(solve):
     (result,) = solve("dam", "45", law="rupture", sigma_max=2e6, G_f=100.0, n_joint=20.0)
     (note,) = (note for note in compare_methods(result).notes if "tension" in note)
     assert "below the strength of 2000 kPa; without tension: crack 0." in note
 
 
-def test_bad_input_leaves_nothing(command, combinations, tmp_path):
-    for words, said in (
+def test_bad_input_writes_no_file(command, combinations, tmp_path):
+    for words, message in (
         (("usual.case", "usual.case"), "case usual: must be given once"),
         (("usual.case", "none.case"), "case none.case: unknown"),
         (("usual.case", "--set", "f_c=-1"), "f_c = -1: must be"),
         (("usual.case", "--levels", "3,x"), "levels = 3,x: must be"),
     ):
         code, _, error = command("check", *words)
-        assert code == 2 and said in error and error.count("\n") == 1
+        assert code == 2 and message in error and error.count("\n") == 1
         assert not (tmp_path / "out").exists()
 
 
@@ -215,8 +217,8 @@ def test_bad_input_leaves_nothing(command, combinations, tmp_path):
         ("c", "8", "1", {"uplift": "drained", "drain_x": 1.0, "drain_level": 3.0, "n_joint": 20}),
     ],
 )
-def test_resultants(solve, name, levels, tail_levels, settings):
-    """Of the finite elements and the gravity method, whatever the joint does."""
+def test_resultants_of_both_methods_agree(solve, name, levels, tail_levels, settings):
+    """Finite elements and gravity method, in any state of the joint."""
     for result in solve(name, levels, tail_levels, **settings):
         computed, by_hand = by_finite_elements(result), by_gravity(hand_calculation(result))
         for column in ("level", "tail_level", "N", "T", "M", "U", "x_resultant", "OSF"):
@@ -224,7 +226,7 @@ def test_resultants(solve, name, levels, tail_levels, settings):
             assert computed.numbers[column] == expected, column
 
 
-def test_a_difference_beyond_the_digits_of_the_table_is_not_shown(solve):
+def test_differences_below_the_printed_digits_are_shown_as_zero(solve):
     computed = by_finite_elements(solve("c", None, "1,2,3,4")[0])
     for much, shown in ((1e-7, "0"), (1e-3, "-")):
         more = computed.numbers["N"] * (1 + much)
@@ -235,9 +237,10 @@ def test_a_difference_beyond_the_digits_of_the_table_is_not_shown(solve):
         assert line.split()[3].startswith(shown)
 
 
-def test_stresses_have_one_sign(solve):
-    """Of heel (pulled) and toe (pressed): tension > 0 in check.csv, in the printed table, in the
-    table beside the picture and at the ends of its diagram, and each of them says so."""
+def test_tension_is_positive_in_all_tables_and_pictures(solve):
+    """Heel in tension, toe in compression: in check.csv, in the printed table, in the table beside
+    the picture and at the ends of its diagram; each states its sign.
+    """
     (result,) = solve("dam", "45", n_joint=20, h_dam=8, h_found=30)
     method = hand_calculation(result)
     found = SafetyCheck(by_finite_elements(result), by_gravity(method))
@@ -255,15 +258,15 @@ def test_stresses_have_one_sign(solve):
     texts = [text.get_text() for text in axes.texts]
     name = texts.index("effective stress, tension > 0")
     assert texts[name + 1 : name + 3] == [f"{value / 1e6:.3g} MPa" for value in (heel, toe)]
-    # what presses hangs under the line, what pulls stands above it
+    # compression is drawn below the line, tension above it
     stress = axes.get_lines()[-3]
     assert stress.get_linestyle() == "--"
     level, depth = (line.get_ydata() for line in (axes.get_lines()[-5], stress))
     assert depth[1] > level[0] > depth[-2]
 
 
-def test_resultants_with_flow(solve):
-    """Their uplift differs; what it lifts does not."""
+def test_resultants_but_uplift_agree_with_flow(solve):
+    """The uplift differs between the methods, N + U does not."""
     (result,) = solve("e")
     method = gravity.at(result.case, result.case.times[-1])
     last = result.last

@@ -1,5 +1,4 @@
-"""Critical values: closed forms, mechanisms that confirm them, and what must not be taken for
-one."""
+"""damjoint critical: closed forms, mechanisms that confirm a value, states that are no limit."""
 
 import csv
 import json
@@ -12,14 +11,14 @@ from damjoint.model.case import load
 from damjoint.solver import path
 from damjoint.statics import gravity
 from damjoint.statics.verdict import highest_by_statics
-from damjoint.studies import branch
 from damjoint.studies.critical import Search, critical
+from damjoint.studies.failure_path import FailurePath
 from scipy.optimize import brentq
 
-#: A real dam, 45 m high, on a mesh that is enough for limits of the rigid block.
+#: A dam of 45 m on a mesh that is fine enough for limits of the rigid block.
 DAM = {"E_dam": 2e10, "E_found": 3e10, "n_joint": 20.0}
-#: Friction alone.
-PLAIN = {"law": "bond", "sigma_max": 0.0, "adhesion": 0.0}
+#: Friction without cohesion.
+UNBONDED = {"law": "bond", "sigma_max": 0.0, "adhesion": 0.0}
 
 
 def found(case, of="level", settings=None, levels=None, tail_levels=None):
@@ -40,7 +39,7 @@ def test_sliding_level(uplift):
 @pytest.mark.parametrize("wet", [False, True])
 def test_overturning_level(wet):
     """Without tension, above the crest by the trapezoid of pressure: 11.687 m dry, 10.019 m with
-    uplift, where N stands at the toe; here it can not go beyond the last point of integration.
+    uplift, where N acts at the toe; in the model no closer to it than the last integration point.
     """
 
     def moment(level, arm):
@@ -63,15 +62,15 @@ def test_overturning_level(wet):
     "mu, level, levels, tails",
     [(0.6, 40.619, None, "3"), (0.7, 43.161, None, "3"), (0.7, 43.161, "30,40", "0,3")],
 )
-def test_friction_alone(mu, level, levels, tails):
-    """Of a real dam with linear uplift and a tailwater of 3 m, which has risen or was there."""
-    _, answer = found("dam", "level", DAM | PLAIN | {"mu": mu}, levels, tails)
+def test_sliding_level_without_cohesion(mu, level, levels, tails):
+    """Linear uplift, and a tailwater of 3 m that rises or is constant."""
+    _, answer = found("dam", "level", DAM | UNBONDED | {"mu": mu}, levels, tails)
     assert answer.value == pytest.approx(level, abs=1e-3)
     assert answer.gravity == pytest.approx(level, abs=1e-3)
 
 
-def test_strength():
-    """(mu N + c L) / T at 45 m: (12683 + 34 x 200) / 9888, fracture energies and all."""
+def test_strength_factor():
+    """(mu N + c L) / T at 45 m: (12683 + 34 x 200) / 9888; fracture energies are divided, too."""
     settings = DAM | {"law": "friction", "mu": 1.0, "adhesion": 2e5}
     search, answer = found("dam", "strength", settings, tail_levels="3")
     assert answer.value == pytest.approx((12683 + 34 * 200) / 9888, rel=2e-4)
@@ -81,18 +80,19 @@ def test_strength():
 
 
 @pytest.mark.heavy
-def test_drains():
-    """The less they take away, the less the dam holds."""
-    settings = DAM | PLAIN | {"mu": 0.7, "uplift": "drained"}
+def test_critical_effectiveness_of_drains():
+    """The less effective the drains, the less the dam holds."""
+    settings = DAM | UNBONDED | {"mu": 0.7, "uplift": "drained"}
     _, answer = found("dam", "uplift", settings, tail_levels="3")
     assert 0 < answer.value < 0.5
     assert answer.value == pytest.approx(answer.gravity, rel=5e-4)
 
 
 @pytest.mark.heavy
-def test_earthquake():
-    """It comes with the only level: too strong a one lets no first step be found, but halves of it.
-    T = mu N, whatever the crack."""
+def test_critical_earthquake():
+    """It acts together with the only level: under a strong one there is no first step. T = mu N,
+    whatever the crack.
+    """
     settings = DAM | {"law": "friction", "mu": 0.6, "adhesion": 0.0, "uplift": "none"}
     _, answer = found("dam", "k_h", settings, levels="30", tail_levels="0")
     assert answer.confirmed and answer.mode == "sliding"
@@ -100,29 +100,29 @@ def test_earthquake():
 
 
 @pytest.mark.heavy
-def test_any_parameter_whatever_its_direction():
+def test_critical_value_of_a_parameter_that_must_not_be_less():
     """T = mu N at 45 m: no equilibrium with less."""
-    _, answer = found("dam", "mu", DAM | PLAIN, tail_levels="3")
+    _, answer = found("dam", "mu", DAM | UNBONDED, tail_levels="3")
     assert answer.value == pytest.approx(9888 / 12683, rel=2e-4)
 
 
 def test_the_gravity_method_without_tension(command, tmp_path):
-    """A strength that the heel's linear stress does not reach, and its elastic stress does."""
+    """Tensile strength above the linear stress at the heel and below the elastic one."""
     strong = "law=bond", "mu=5", "dam_base=30", "sigma_max=2e6", "G_f=100", "adhesion=5e6"
     settings = *strong, "G_t=1e5", "n_joint=60"
     words = [word for setting in settings for word in ("--set", setting)]
     _, out, _ = command("critical", "dam", *words, "--levels", "40,48")
-    told = json.loads((tmp_path / "out/dam_critical/run.json").read_text())["critical"]
-    free = told["gravity_method_with"]["without tension"]
-    assert told["value"] == pytest.approx(free, rel=0.02) and told["gravity_method"] > 70
-    assert f"gravity method: {told['gravity_method']:.6g} m; without tension: {free:.6g} m" in out
+    record = json.loads((tmp_path / "out/dam_critical/run.json").read_text())["critical"]
+    free = record["gravity_method_with"]["without tension"]
+    assert record["value"] == pytest.approx(free, rel=0.02) and record["gravity_method"] > 70
+    assert f"gravity method: {record['gravity_method']:.6g} m; without tension: {free:.6g} m" in out
     assert "(n_joint = 60), " in out and "kPa, exceeds the strength of 2000 kPa" in out
 
 
-def test_the_gravity_method_with_drains_that_are_passed():
-    """The short crack holds until it comes to the drains; mu N = T with the one past them."""
+def test_the_gravity_method_with_a_crack_past_the_drains():
+    """The short crack is in equilibrium up to the drains; mu N = T with the crack past them."""
     drains = {"dam_base": 30.0, "uplift": "cracked", "drains": 1.0, "drain_x": 6.0, "mu": 1.0}
-    search = Search("dam", "level", DAM | PLAIN | drains, "40,44", "3")
+    search = Search("dam", "level", DAM | UNBONDED | drains, "40,44", "3")
     first, longer = (search.by_gravity(44.4, True, longest) for longest in (False, True))
     method = gravity.at(search.own, 2.0, first - 1e-5)
     assert method.SSF > 1 and method.crack_length == pytest.approx(6, abs=1e-3)
@@ -130,22 +130,23 @@ def test_the_gravity_method_with_drains_that_are_passed():
     assert other.SSF == pytest.approx(1, abs=1e-4) and longer < first - 0.5
 
 
-def test_unstable_crack_growth_is_passed():
-    """A bond that breaks over 20 m at once: the level falls by a metre and more before it rises to
-    what friction holds; the branch goes on over that."""
+def test_the_search_goes_on_over_unstable_crack_growth():
+    """A bond that breaks over 20 m: the level falls by more than a metre, then rises to what
+    friction holds.
+    """
     brittle = {"law": "bond", "mu": 5.0, "dam_base": 30.0, "sigma_max": 2e6, "G_f": 100.0}
     brittle |= {"adhesion": 5e6, "G_t": 1e5, "n_joint": 60.0}
     search, answer = found("dam", settings=brittle, levels="40,48")
     (trial,) = search.trials
-    levels = np.array([point.level for point in trial.branch.points])
+    levels = np.array([point.level for point in trial.path.points])
     falls = np.maximum.accumulate(levels) - levels
-    top = trial.branch.top
+    top = trial.path.top
     assert answer.confirmed and answer.mode == "overturning" and falls[:top].max() > 1
     assert answer.value == pytest.approx(52.32, abs=0.01)
 
 
-def test_hardening_is_no_limit():
-    """Asked for, it carries the dam beyond T = mu N + c L, and it is said; else it is left out."""
+def test_only_hardening_set_by_the_user_counts_as_strength():
+    """It carries the dam beyond T = mu N + c L; the default one is left out."""
     _, hard = found("c")
     assert hard.value > 1.4 * slide_level(0.35, 1000, True) and "mu N" not in hard.why
     settings = DAM | {"law": "friction", "mu": 0.6, "adhesion": 0.0}
@@ -153,14 +154,14 @@ def test_hardening_is_no_limit():
     assert answer.value == pytest.approx(40.619, abs=1e-3)
 
 
-def test_crushed_toe():
+def test_critical_level_of_a_crushed_toe():
     _, answer = found("dam", settings=DAM | {"f_c": 5e6}, tail_levels="3")
     assert answer.mode == "crushed toe" and "f_c = 5e+06" in answer.why
     assert 0.999 * 5e6 < answer.point.compression <= 5e6
 
 
-def test_what_no_push_confirms_is_not_confirmed(monkeypatch, command):
-    monkeypatch.setattr(branch.Branch, "pushes", lambda self: ())
+def test_a_limit_without_a_mechanism_is_not_confirmed(monkeypatch, command):
+    monkeypatch.setattr(FailurePath, "increments", lambda self: ())
     code, out, _ = command("critical", "c", "--set", "pena_tang=0", "--levels", "6,8")
     assert code == 1 and "not confirmed: no further equilibrium is found" in out
 
@@ -172,7 +173,7 @@ def test_what_no_push_confirms_is_not_confirmed(monkeypatch, command):
         ("c", {"pena_tang": 0.0}, 6.63399, "sliding"),
     ],
 )
-def test_what_statics_allows(name, settings, limit, mode):
+def test_bounds_of_statics(name, settings, limit, mode):
     """The level at which the resultant leaves a joint without tension; T = mu N + c L."""
     case = load(name, settings, "6")
     method = gravity.at(case, 1.0)
@@ -183,9 +184,9 @@ def test_what_statics_allows(name, settings, limit, mode):
     assert highest_by_statics(strong, last)[0] > 1.2 * limit
 
 
-def test_statics_confirms_a_level_that_is_near(monkeypatch):
-    """Where the search is stuck, and only there; the value is that of an equilibrium."""
-    monkeypatch.setattr(branch.Branch, "pushes", lambda self: ())
+def test_statics_confirms_a_level_near_its_bound(monkeypatch):
+    """Only where the search does not progress; the value is that of an equilibrium."""
+    monkeypatch.setattr(FailurePath, "increments", lambda self: ())
     settings = {"uplift": "imposed", "sigma_max": 0.0, "crest_water": 0.0, "n_joint": 20.0}
     _, answer = found("i", settings=settings, levels="9,9.8,9.95,10.1")
     assert answer.confirmed and answer.mode == "overturning" and 9.9 < answer.value < 10.0171
@@ -194,32 +195,32 @@ def test_statics_confirms_a_level_that_is_near(monkeypatch):
     assert answer.value < 9.8 and not answer.confirmed
 
 
-def test_a_tension_that_lasts_is_said():
-    """c/mu of the law friction holds the open joint down; the value without it stands beside."""
+def test_the_value_without_lasting_tension_is_given_too():
+    """Tension c/mu of law = friction does not vanish on opening."""
     settings = {"law": "friction", "adhesion": 1e6, "n_joint": 20.0}
     search, answer = found("dam", settings=settings)
     lines = "\n".join(answer.lines(search))
-    assert "kPa (" in lines and "% of the overturning moment) at any opening" in lines
+    assert "kPa (" in lines and "% of the overturning moment), at any opening" in lines
     assert answer.gravity_with["without tension"] < answer.value
 
 
 @pytest.mark.heavy
 def test_a_rigid_block_that_opens_to_its_toe():
-    """Friction of 3 holds any shear; full head in the crack."""
-    settings = PLAIN | {"mu": 3.0, "uplift": "cracked", "n_joint": 40.0}
+    """mu = 3 resists any shear; full head in the crack."""
+    settings = UNBONDED | {"mu": 3.0, "uplift": "cracked", "n_joint": 40.0}
     _, answer = found("dam", settings=settings)
     assert answer.confirmed and answer.mode == "overturning"
     assert answer.value == pytest.approx(answer.gravity, rel=0.01)
 
 
-def test_no_limit_is_said(command):
+def test_a_missing_limit_is_reported(command):
     words = ("critical", "c", "--of", "visc", "--levels", "3")
     code, out, _ = command(*words)
-    assert code == 1 and "no critical visc found: stands with all that was tried" in out
+    assert code == 1 and "no critical visc found: stands with all values tried" in out
 
 
 @pytest.mark.parametrize(
-    "words, said",
+    "words, message",
     [
         (("--of", "law"), "--of law: must be level, strength, uplift or"),
         (("--of", "n_joint"), "--of n_joint: must be level, strength, uplift or"),
@@ -228,33 +229,33 @@ def test_no_limit_is_said(command):
         (("--levels", "21"), "levels = 21: must be between 0 and 20 m"),
     ],
 )
-def test_bad_input(command, tmp_path, words, said):
+def test_bad_input_is_refused(command, tmp_path, words, message):
     code, _, err = command("critical", "c", *words)
-    assert code == 2 and said in err and len(err.splitlines()) == 1
+    assert code == 2 and message in err and len(err.splitlines()) == 1
     assert not list(tmp_path.iterdir())
 
 
-def test_what_is_written(command, tmp_path):
+def test_files_of_a_search(command, tmp_path):
     words = ("critical", "c", "--set", "pena_tang=0")
     code, out, _ = command(*words)
     assert code == 0 and out.startswith("c: critical level 6.63399 m (sliding)\n")
     folder = tmp_path / "out/c_critical"
     names = {"run.json", "joint.csv", "history.csv", "critical.csv", "c_critical.png"}
     assert {path.name for path in folder.iterdir()} == names
-    told = json.loads((folder / "run.json").read_text())
-    assert told["critical"]["mode"] == "sliding" and told["critical"]["of"] == "level"
-    assert told["parameters"]["drive"] == "level"
+    record = json.loads((folder / "run.json").read_text())
+    assert record["critical"]["mode"] == "sliding" and record["critical"]["of"] == "level"
+    assert record["parameters"]["drive"] == "level"
     with (folder / "critical.csv").open() as file:
         rows = list(csv.DictReader(file))
-    assert max(float(row["level"]) for row in rows) == pytest.approx(told["critical"]["value"])
+    assert max(float(row["level"]) for row in rows) == pytest.approx(record["critical"]["value"])
     assert {row["displacement_control"] for row in rows} == {"0", "1"}
     assert command("report", folder) == (0, "report.html\n", "")
     page = (tmp_path / "report.html").read_text()
     assert "<td>critical level, and the last state before it</td><td>6.63399 m; sliding;" in page
 
 
-def test_an_interrupted_search_leaves_what_it_has_found(monkeypatch, tmp_path):
-    advance, calls = branch.Branch.advance, []
+def test_an_interrupted_search_writes_its_results_so_far(monkeypatch, tmp_path):
+    advance, calls = FailurePath.advance, []
 
     def interrupted(self):
         calls.append(self)
@@ -262,9 +263,9 @@ def test_an_interrupted_search_leaves_what_it_has_found(monkeypatch, tmp_path):
             raise KeyboardInterrupt
         advance(self)
 
-    monkeypatch.setattr(branch.Branch, "advance", interrupted)
+    monkeypatch.setattr(FailurePath, "advance", interrupted)
     with pytest.raises(KeyboardInterrupt):
         critical("c", "level", {"pena_tang": 0.0}, out=tmp_path / "out")
     assert (tmp_path / "out/critical.csv").read_text().count("\n") > 4
-    told = json.loads((tmp_path / "out/run.json").read_text())
-    assert told["state"] == "interrupted" in told["statement"]
+    record = json.loads((tmp_path / "out/run.json").read_text())
+    assert record["state"] == "interrupted" in record["statement"]

@@ -1,4 +1,4 @@
-"""The two engines against one another: the laws point by point, and whole loadings."""
+"""Both engines against each other: laws point by point, and complete runs."""
 
 from dataclasses import fields, replace
 
@@ -12,8 +12,9 @@ from damjoint.model.results import JOINT
 
 
 def random_path(law_name: str, seed: int, case: Case) -> np.ndarray:
-    """A random walk of jumps (n, 3) that closes, opens, softens, breaks and slides in both
-    directions."""
+    """Random walk of jumps (n, 3) that closes, opens, softens, breaks and slides in both
+    directions.
+    """
     rng = np.random.default_rng(seed)
     size = {
         "rupture": case["sigma_max"] / case["K_N"],
@@ -25,7 +26,7 @@ def random_path(law_name: str, seed: int, case: Case) -> np.ndarray:
     return walk
 
 
-#: Works on the joint: grouted in three of the path's 200 steps, sawn later, grouted once more.
+#: Grouted in three of the path's 200 steps, sawn later, grouted again.
 GROUTED = {"grout_pressure": 5e3, "grout_t": 50.0}
 WORKS = {
     "untouched": {},
@@ -37,15 +38,15 @@ WORKS = {
 
 
 @pytest.mark.parametrize("works", WORKS)
-def test_a_worked_joint_agrees_point_by_point(works):
-    """Grouting and sawing in both engines' law, along one path."""
+def test_grouted_and_sawn_laws_agree_point_by_point(works):
+    """The laws of both engines along one path."""
     laws_agree("rupture", 1, WORKS[works])
 
 
 @pytest.mark.parametrize("law_name", LAWS)
 @pytest.mark.parametrize("seed", range(3))
 def test_laws_agree_point_by_point(law_name, seed):
-    """The problem definition's law and the condensed engine's, along one path."""
+    """The laws of pro/ and of the condensed engine along one path."""
     laws_agree(law_name, seed, {})
 
 
@@ -86,8 +87,8 @@ def laws_agree(law_name, seed, works):
     "law_name, works",
     [*((name, {}) for name in LAWS), *(("rupture", works) for works in WORKS.values() if works)],
 )
-def test_tangent_is_the_derivative(law_name, works):
-    """Tangent against central differences, away from the law's corners."""
+def test_the_tangent_is_the_derivative(law_name, works):
+    """Central differences, away from kinks of the law."""
     settings = works | {
         "sigma_max": 1e4,
         "pena_tang": 1e11,
@@ -113,10 +114,10 @@ def test_tangent_is_the_derivative(law_name, works):
         ) / (2 * step)
         close = np.abs(slope - tangent[:, :, component]).max(axis=1) < 1e-4 * case["K_T"]
         agree = close if component == 0 else agree & close
-    assert agree.mean() > 0.98  # a difference may straddle a corner
+    assert agree.mean() > 0.98  # a difference may cross a kink
 
 
-#: Columns of joint.csv of one size.
+#: Columns of joint.csv of the same magnitude.
 GROUPS = [list(JOINT)[k] for k in map(slice, (0, 5, 8, 12, 14), (5, 8, 12, 13, 15))]
 GROUPS += [("slip", "lambda"), ("flux",)]
 
@@ -130,19 +131,19 @@ SCENES = {
     **dict.fromkeys("bd", THICK),
     **dict.fromkeys("fh", COARSE),
     "f split": COARSE | {"mesh_pattern": "split"},
-    # slides by a centimetre: its residual is rounding long before it is 1e-9 of the loads
+    # slides by a centimetre: rounding limits the residual before 1e-9 of the loads
     "a sliding": {"law": "friction"},
     "c without adhesion": {"adhesion": 0.0},
     "e bond": BOND,
     "f bond": COARSE | BOND,
-    # the crack grouted, and the level lowered; the bond sawn away
+    # the crack grouted and the level lowered; the bond removed by sawing
     "a grouted": {"grout_pressure": 1e4, "grout_t": 3.5, "levels": "3,6,9,9,2"},
     "a sawn": {"saw_thickness": 1e-6, "saw_t": 2.0, "levels": "3,6,6,8"},
     "g weak": {"mu": 0.06, "adhesion": 0.0, "pena_tang": 0.0, "nu": 0.3, "E": 1e10, "levels": "2"},
     "c stiff, no hardening": {"K_T": 9e14, "mu": 0.06, "pena_tang": 0.0, "levels": "1,2"},
     "i soft, no strength": {"E": 1e10, "sigma_max": 0.0, "K_N": 1e11, "K_T": 5e10, "nu": 0.2},
 }
-#: Sections and loads of the 45 m dam: what changes, levels, tailwater.
+#: Sections and loads of the 45 m dam: parameters, levels, tailwater.
 SMALL = {"n_joint": 20.0, "h_dam": 8.0, "h_found": 30.0}
 SHAPE = {"batter": 4.0, "batter_height": 20.0, "neck_height": 6.0}
 STAGED = {"silt_height": 12.0, "ice_force": 1e5, "ice_level": 40.0, "anchor_force": 2e6}
@@ -164,26 +165,26 @@ SECTIONS = {
 
 @pytest.mark.heavy
 @pytest.mark.parametrize("scene", SCENES)
-def test_engines_agree(scene, tmp_path):
-    """Whole loadings to the end: the same joint.csv to 1e-6 of the largest jump, stress, ..."""
+def test_runs_of_both_engines_agree(scene, tmp_path):
+    """joint.csv to 1e-6 of the largest jump, stress, ..."""
     settings = dict(SCENES[scene])
     agree(load(scene[0], settings, settings.pop("levels", None)), tmp_path)
 
 
 @pytest.mark.heavy
 @pytest.mark.parametrize("scene", SECTIONS)
-def test_engines_agree_on_sections_and_loads(scene, tmp_path):
+def test_runs_of_both_engines_agree_on_sections_and_loads(scene, tmp_path):
     settings, levels, tails = SECTIONS[scene]
     agree(load("dam", SMALL | {"tolerance": 1e-10} | settings, levels, tails), tmp_path)
 
 
 def agree(case, tmp_path):
-    """The same joint.csv to 1e-6 of the largest jump, stress, ..."""
-    plain, fast = (
+    """Assert equal joint.csv to 1e-6 of the largest jump, stress, ..."""
+    reference, fast = (
         run.run(case, tmp_path / name, fields=False, picture=False, progress=False, engine=name)
         for name in ("getdp", "condensed")
     )
-    for a, b in zip(plain, fast, strict=True):
+    for a, b in zip(reference, fast, strict=True):
         assert not a.stopped and not b.stopped
         for time in a.case.requested:
             rows = a.at(time), b.at(time)

@@ -1,4 +1,4 @@
-"""Equilibrium of every converged step, whatever the joint does: N, T, M against the loads."""
+"""Equilibrium of every converged step in any state of the joint: N, T, M against the loads."""
 
 from dataclasses import replace
 
@@ -11,8 +11,8 @@ from damjoint.statics import gravity
 from numpy.testing import assert_allclose
 
 
-def test_the_dam_itself():
-    """The numbers of the documentation: weight, centroid, sliding levels."""
+def test_weight_centroid_and_sliding_levels_of_ssnp142():
+    """The numbers of the documentation."""
     assert_allclose([WEIGHT, CENTROID], [765_180, 1.78205], rtol=1e-6)
     assert_allclose(
         [slide_level(0.35, 1000, False), slide_level(0.35, 1000, True)],
@@ -43,7 +43,7 @@ def test_the_dam_itself():
         ),
     ],
 )
-def test_without_flow(solve, name, levels, tail_levels, settings):
+def test_resultants_without_flow(solve, name, levels, tail_levels, settings):
     for result in solve(name, levels, tail_levels, **settings):
         case, history = result.case, result.history
         tail = np.interp(history["time"], range(len(case.levels) + 1), (0, *case.tail_levels))
@@ -56,9 +56,10 @@ def test_without_flow(solve, name, levels, tail_levels, settings):
 @pytest.mark.parametrize(
     "name", ["e", "g", *(pytest.param(name, marks=pytest.mark.heavy) for name in "fh")]
 )
-def test_with_flow(solve, name):
-    """The uplift is the computed pressure, linear between the nodes (in 3D: nearly so, on the mean
-    over z)."""
+def test_resultants_with_flow(solve, name):
+    """The uplift is the computed pressure, linear between the nodes (in 3D nearly, of the mean over
+    z).
+    """
     (result,) = solve(name)
     history = result.history
     accuracy = 1e-6 if result.case["dim"] == 2 else 2e-4
@@ -75,9 +76,8 @@ def test_with_flow(solve, name):
         )
 
 
-def test_uniform_face_load(solve):
-    """K: the level is a uniform pressure WATER level on the whole face; also while it is an
-    unknown."""
+def test_resultants_of_a_uniform_pressure(solve):
+    """K: the level is a uniform pressure WATER level on the face, also while it is an unknown."""
     (result,) = solve("k")
     p = WATER * result.history["level"]
     assert_allclose(result.history["N"], WEIGHT, rtol=1e-6)
@@ -86,9 +86,8 @@ def test_uniform_face_load(solve):
 
 
 @pytest.mark.parametrize("name", ["a", "c"])
-def test_joint_table_carries_the_resultants(solve, name):
-    """joint.csv: the node values, integrated along the base, give N and T but for the singular
-    ends."""
+def test_integrals_of_the_joint_table_are_the_resultants(solve, name):
+    """But for the singular stresses at the ends."""
     result = solve(name)[0]
     rows = result.at()
     assert integral(rows["x"], -(rows["sigma_n"] + rows["p"])) == pytest.approx(
@@ -101,14 +100,14 @@ def test_joint_table_carries_the_resultants(solve, name):
 @pytest.mark.parametrize(
     "level, tail, effectiveness, outlet, at_drains",
     [
-        (8, 0, 0, 0, 6.4),  # none: linear
+        (8, 0, 0, 0, 6.4),  # without effect: linear
         (8, 1, 0.5, 0, 1 + 0.5 * 5.6),  # down to the tailwater: 8 - 7/5 = 6.6
         (8, 1, 1, 3, 3),  # down to the gallery
         (3, 0, 1, 5, 2.4),  # the gallery is higher than the head
     ],
 )
-def test_drains(tmp_path, engine, level, tail, effectiveness, outlet, at_drains):
-    """Uplift linear from heel to drains (1 m) to toe: U, N, M by closed form, p in the table."""
+def test_resultants_with_drains(tmp_path, engine, level, tail, effectiveness, outlet, at_drains):
+    """Uplift linear from heel to drains (1 m) to toe: U, N, M in closed form, p in the table."""
     drains = {"drain_x": 1.0, "drain_effectiveness": effectiveness, "drain_level": outlet}
     settings = {"uplift": "drained", "n_joint": 20.0, **{n: float(v) for n, v in drains.items()}}
     case = load("c", settings, str(level), str(tail))
@@ -139,8 +138,10 @@ def test_drains(tmp_path, engine, level, tail, effectiveness, outlet, at_drains)
         ("condensed", "cracked", {"dim": 3, "n_layers": 2, "thickness": 10}),
     ],
 )
-def test_uplift_with_drains_anywhere(tmp_path, engine, uplift, settings, order):
-    """No element's length from heel to drains is that of the others."""
+def test_uplift_is_exact_with_drains_between_regular_nodes(
+    tmp_path, engine, uplift, settings, order
+):
+    """The element lengths from heel to drains differ from the others."""
     drains = {"uplift": uplift, "drains": float(uplift != "drained"), "drain_x": 6.1}
     case = load("dam", {"n_joint": 9, "order": order} | drains | settings, "30", "3")
     (result,) = run.run(case, tmp_path, False, False, False, engine)
@@ -151,10 +152,10 @@ def test_uplift_with_drains_anywhere(tmp_path, engine, uplift, settings, order):
     assert result.last["M"] == pytest.approx(method.M, rel=1e-6)
 
 
-def test_drains_where_there_are_none():
-    for settings, said in (
+def test_drains_beyond_the_joint_or_below_an_unknown_level_are_refused():
+    for settings, message in (
         ({"drain_x": 5.0}, "drain_x = 5: must be < the joint's length"),
         ({"drain_level": 1.0, "drive": "heel"}, "drain_level = 1: must be 0"),
     ):
-        with pytest.raises(InputError, match=said):
+        with pytest.raises(InputError, match=message):
             load("c", {"uplift": "drained"} | settings)

@@ -1,4 +1,4 @@
-"""What can go wrong around a run: signals, full disks, links, another run in the same place."""
+"""Faults of the environment: signals, full disks, links, a second run in the same folder."""
 
 import argparse
 import contextlib
@@ -21,22 +21,22 @@ RUN = ("run", "c", *BARE, "--no-picture", "--levels", "6")
 
 
 def wait_for(what, seconds=120):
-    """Until it is true."""
+    """Wait until a condition is true."""
     end = time.monotonic() + seconds
     while not what():
         assert time.monotonic() < end
         time.sleep(0.05)
 
 
-def test_a_run_that_is_told_to_end(tmp_path):
-    """By SIGTERM as by Ctrl-C, with the GetDP it waits for; nothing is left behind."""
-    fake, told = tmp_path / "getdp", tmp_path / "out" / "run.json"
+def test_sigterm_ends_a_run_as_ctrl_c_does(tmp_path):
+    """Its GetDP is ended, too, and no temporary file remains."""
+    fake, record = tmp_path / "getdp", tmp_path / "out" / "run.json"
     version = '[ "$1" = --version ] && echo 3.2.0 && exit'
     fake.write_text(f"#!/bin/sh\n{version}\ntouch begun\nexec sleep 600\n")
     fake.chmod(0o755)
     (tmp_path / "tmp").mkdir()
     process = subprocess.Popen(
-        [sys.executable, "-m", "damjoint", *RUN, "--engine", "getdp", "--out", told.parent],
+        [sys.executable, "-m", "damjoint", *RUN, "--engine", "getdp", "--out", record.parent],
         env=os.environ | {"GETDP": str(fake), "TMPDIR": str(tmp_path / "tmp")},
         stderr=subprocess.PIPE,
         text=True,
@@ -44,15 +44,15 @@ def test_a_run_that_is_told_to_end(tmp_path):
     )
     wait_for(lambda: list((tmp_path / "tmp").glob("*/*/begun")))
     process.send_signal(signal.SIGTERM)
-    _, said = process.communicate(timeout=120)
-    assert process.returncode == 130 and len(said.splitlines()) == 1
-    assert json.loads(told.read_text())["state"] == "interrupted"
+    _, error = process.communicate(timeout=120)
+    assert process.returncode == 130 and len(error.splitlines()) == 1
+    assert json.loads(record.read_text())["state"] == "interrupted"
     assert not any((tmp_path / "tmp").iterdir())
     with pytest.raises(ProcessLookupError):
         os.killpg(process.pid, 0)
 
 
-def test_processes_end_with_the_one_that_has_started_them(tmp_path):
+def test_worker_processes_end_with_their_parent(tmp_path):
     script = """
 import os, time
 from damjoint.studies.sweep import pool_of
@@ -64,13 +64,13 @@ with pool_of(2) as pool:
     with subprocess.Popen(command, stdout=subprocess.PIPE, start_new_session=True) as process:
         assert len(process.stdout.readline().split()) == 3
         process.kill()
-    # those that are dead, but not yet buried by init, can still be told
+    # ended processes (Z) may be listed until init has removed them
     alive = ["ps", "-o", "stat=", "--sid", str(process.pid)]
     wait_for(lambda: not subprocess.run(alive, capture_output=True).stdout.strip(b" Z\n"))
 
 
-def test_a_full_disk(command, tmp_path):
-    """One line with the file's name, no half of one, and a second try works."""
+def test_a_full_disk_leaves_no_partial_file(command, tmp_path):
+    """One line with the name of the file; the next run succeeds."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (2000, hard))
     try:
@@ -82,7 +82,7 @@ def test_a_full_disk(command, tmp_path):
     assert command(*RUN)[0] == 0
 
 
-def test_a_file_is_whole_or_as_it_was(tmp_path):
+def test_an_interrupted_write_leaves_the_old_file(tmp_path):
     path = tmp_path / "table.csv"
     path.write_text("old")
     with contextlib.suppress(KeyboardInterrupt), atomic_write(path) as part:
@@ -91,8 +91,7 @@ def test_a_file_is_whole_or_as_it_was(tmp_path):
     assert path.read_text() == "old" and list(tmp_path.iterdir()) == [path]
 
 
-def test_links_lead_nowhere(command, tmp_path):
-    """Out of the output folder nothing is written."""
+def test_nothing_is_written_through_links_in_the_output_folder(command, tmp_path):
     (tmp_path / "mine.csv").write_text("mine")
     out = tmp_path / "out" / "c"
     out.mkdir(parents=True)
@@ -104,7 +103,7 @@ def test_links_lead_nowhere(command, tmp_path):
     assert code == 2 and "fields must be a folder, and not a link" in err
 
 
-def test_nor_through_a_file_that_is_being_written(tmp_path):
+def test_nothing_is_written_through_a_link_at_the_temporary_file(tmp_path):
     (tmp_path / "mine.csv").write_text("mine")
     (tmp_path / ".part.table.csv").symlink_to(tmp_path / "mine.csv")
     with atomic_write(tmp_path / "table.csv") as part:
@@ -113,7 +112,7 @@ def test_nor_through_a_file_that_is_being_written(tmp_path):
     assert (tmp_path / "table.csv").read_text() == "new"
 
 
-def test_another_run_in_the_folder(command, tmp_path):
+def test_a_second_run_in_a_locked_folder_is_refused(command, tmp_path):
     assert command(*RUN)[0] == 0
     before = {p: p.read_bytes() for p in (tmp_path / "out" / "c").iterdir()}
     with locked_folder(tmp_path / "out" / "c"):
@@ -123,7 +122,7 @@ def test_another_run_in_the_folder(command, tmp_path):
     assert command(*RUN)[0] == 0
 
 
-def test_another_sweep_into_the_file(command, tmp_path):
+def test_a_second_sweep_into_a_locked_file_is_refused(command, tmp_path):
     words = "sweep", "c", *BARE[:-1], "--vary", "mu=0.5", "--out", "mu.csv"
     with (tmp_path / "mu.csv").open("a") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
@@ -132,7 +131,7 @@ def test_another_sweep_into_the_file(command, tmp_path):
     assert command(*words)[0] == 0
 
 
-def test_a_damaged_run_json(command, tmp_path):
+def test_a_damaged_run_json_is_reported(command, tmp_path):
     assert command(*RUN)[0] == 0
     file = tmp_path / "out" / "c" / "run.json"
     whole_one = json.loads(file.read_text())
@@ -161,8 +160,8 @@ NESTED = "[" * 100_000 + "]" * 100_000
         ('"levels": [', '"levels": [1e400, '),
     ],
 )
-def test_a_run_json_of_which_nothing_can_be_made(command, tmp_path, old, new):
-    """One line, and a run takes the folder again."""
+def test_an_invalid_value_in_run_json_is_reported(command, tmp_path, old, new):
+    """In one line; a new run may overwrite the folder."""
     assert command(*RUN)[0] == 0
     file = tmp_path / "out" / "c" / "run.json"
     text = file.read_text()
@@ -170,15 +169,15 @@ def test_a_run_json_of_which_nothing_can_be_made(command, tmp_path, old, new):
     file.write_text(text.replace(old, new, 1))
     for words in (("report", "out/c"), ("plot", "out/c")):
         code, _, err = command(*words)
-        drawn = words[0] == "plot" and "seconds" in new  # which it does not look at
+        drawn = words[0] == "plot" and "seconds" in new  # a value that is not used
         assert code == (0 if drawn else 2) and len(err.splitlines()) == (0 if drawn else 1)
     assert command(*RUN)[0] == 0
     assert command("plot", "out/c")[0] == 0
 
 
 @pytest.mark.parametrize("name", ["run.json", "history.csv"])
-def test_a_pipe_in_place_of_a_file(tmp_path, name):
-    """It is not waited for. (In a process of its own, which can be ended.)"""
+def test_a_pipe_in_place_of_a_file_is_not_read(tmp_path, name):
+    """In a process of its own, so that the test can end it."""
     call = [sys.executable, "-m", "damjoint"]
     subprocess.run([*call, *RUN], cwd=tmp_path, check=True)
     (tmp_path / "out" / "c" / name).unlink()
@@ -191,7 +190,7 @@ def test_a_pipe_in_place_of_a_file(tmp_path, name):
 
 
 @pytest.mark.parametrize("table", ["joint.csv", "history.csv"])
-def test_an_infinite_number_in_a_table(command, tmp_path, table):
+def test_an_infinite_number_in_a_table_is_reported(command, tmp_path, table):
     assert command(*RUN)[0] == 0
     file = tmp_path / "out" / "c" / table
     head, *rows = file.read_text().splitlines()
@@ -204,8 +203,7 @@ def test_an_infinite_number_in_a_table(command, tmp_path, table):
 
 
 @pytest.mark.parametrize("to", ["/", ".", "out/c/run.json", "out/c/../c/joint.csv", "out/c/c.png"])
-def test_a_report_that_would_be_in_the_way(command, tmp_path, to):
-    """Of itself, in place of a folder or of a run's own file."""
+def test_a_report_does_not_replace_a_folder_or_a_file_of_a_run(command, tmp_path, to):
     assert command(*RUN)[0] == 0
     before = {p: p.read_bytes() for p in (tmp_path / "out" / "c").iterdir()}
     code, _, err = command("report", "out/c", "--to", to)
@@ -213,8 +211,7 @@ def test_a_report_that_would_be_in_the_way(command, tmp_path, to):
     assert {p: p.read_bytes() for p in (tmp_path / "out" / "c").iterdir()} == before
 
 
-def test_a_locale_without_all_letters(tmp_path):
-    """Of the table's units."""
+def test_output_in_a_locale_without_the_letters_of_the_units(tmp_path):
     locale = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
     done = subprocess.run(
         [sys.executable, "-m", "damjoint", *RUN, "--set", "E=1e10"],
@@ -226,14 +223,14 @@ def test_a_locale_without_all_letters(tmp_path):
 
 
 @pytest.mark.parametrize("damage", [b"half", b"\xff", b'"', b"1,2"])
-def test_a_damaged_sweep(command, tmp_path, damage):
-    """It says where, and changes nothing."""
+def test_a_damaged_sweep_is_reported_and_not_changed(command, tmp_path, damage):
+    """With the line of the damage."""
     words = "sweep", "c", *BARE[:-1], "--vary", "mu=0.5", "--out", "mu.csv"
     assert command(*words)[0] == 0
     file = tmp_path / "mu.csv"
     head, row = file.read_bytes().splitlines()
     cells = row.split(b",")
-    cells[2] = damage  # the time
+    cells[2] = damage  # the column time
     file.write_bytes(damaged := head + b"\n" + b",".join(cells) + b"\n")
     code, _, err = command(*words)
     assert code == 2 and "mu.csv: line 2 is damaged" in err
@@ -241,7 +238,7 @@ def test_a_damaged_sweep(command, tmp_path, damage):
 
 
 def limited(address_space, *words, cwd):
-    """The command with so much address space [bytes]: exit code and standard error."""
+    """Run the command with limited address space [bytes]; exit code and standard error."""
     bound = lambda: resource.setrlimit(resource.RLIMIT_AS, (address_space, address_space))
     done = subprocess.run(
         [sys.executable, "-m", "damjoint", *words],
@@ -256,25 +253,25 @@ def limited(address_space, *words, cwd):
 
 
 @pytest.mark.parametrize("megabytes", [100, 310, 410])
-def test_too_little_memory_for_the_libraries(tmp_path, megabytes):
-    """They would crash."""
+def test_too_little_memory_for_the_libraries_is_one_line(tmp_path, megabytes):
+    """Otherwise they would crash."""
     code, err = limited(megabytes * 1_000_000, *RUN, cwd=tmp_path)
     assert code == 1 and "memory" in err and len(err.splitlines()) == 1
     assert not any(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("words", [("b", "--no-picture"), ("c", *BARE, "--set", "n_joint=1500")])
-def test_too_little_memory_for_the_case(tmp_path, words):
-    """It is refused before the linear algebra waits for memory that never comes."""
+def test_too_little_memory_for_the_case_is_one_line(tmp_path, words):
+    """Refused before the linear algebra would wait for memory for ever."""
     code, err = limited(921_600_000, "run", *words, cwd=tmp_path)
     assert code == 1 and "memory" in err and len(err.splitlines()) == 1, err
 
 
-def test_little_memory_that_is_enough(tmp_path):
+def test_a_run_in_little_memory(tmp_path):
     assert limited(921_600_000, *RUN[:-3], "--levels", "6", cwd=tmp_path) == (0, "")
 
 
-def test_a_computation_that_runs_out_of_memory(command, monkeypatch):
+def test_a_memory_error_is_one_line(command, monkeypatch):
     def full(*_):
         raise MemoryError("no 3 GB")
 
@@ -285,7 +282,7 @@ def test_a_computation_that_runs_out_of_memory(command, monkeypatch):
 
 
 @pytest.mark.skipif(factor.mumps is None, reason="MUMPS")
-def test_mumps_without_memory(monkeypatch):
+def test_mumps_out_of_memory_is_a_memory_error(monkeypatch):
     class Full(RuntimeError):
         error = -13
 
@@ -294,7 +291,7 @@ def test_mumps_without_memory(monkeypatch):
         raise Full("Not enough memory")
 
 
-def test_getdp_is_refused_what_it_has_no_memory_for(command, monkeypatch):
+def test_a_getdp_run_that_exceeds_the_memory_is_refused(command, monkeypatch):
     """By an estimate before meshing, and by the mesh."""
     words = "run", "dam", "--engine", "getdp", "--levels", "30", "--no-fields", "--no-picture"
     code, _, err = command(*words, "--set", "n_joint=50000")
@@ -307,8 +304,8 @@ def test_getdp_is_refused_what_it_has_no_memory_for(command, monkeypatch):
 
 @pytest.mark.parametrize("streams", ["2>&-", ">&-", "<&- >&- 2>&-"])
 @pytest.mark.parametrize("engine", ["condensed", "getdp"])
-def test_closed_standard_streams(tmp_path, streams, engine):
-    """As cron and services may start a command: it runs."""
+def test_a_run_with_closed_standard_streams(tmp_path, streams, engine):
+    """As cron and services may start a command."""
     words = " ".join([*RUN, "--out", "out", "--engine", engine])
     line = f"exec {sys.executable} -m damjoint {words} {streams}"
     done = subprocess.run(["bash", "-c", line], cwd=tmp_path, stdout=subprocess.PIPE)
@@ -316,8 +313,8 @@ def test_closed_standard_streams(tmp_path, streams, engine):
     assert {"run.json", "joint.csv"} <= {path.name for path in (tmp_path / "out").iterdir()}
 
 
-def test_an_interrupt_during_an_import(tmp_path):
-    """Waits until the import is over; nothing but one line is said."""
+def test_an_interrupt_during_an_import_is_delayed(tmp_path):
+    """Until the import is over; one line."""
     kill = "import os, signal\nos.kill(os.getpid(), signal.SIGINT)\n"
     (tmp_path / "argparse.py").write_text(kill + Path(argparse.__file__).read_text())
     paths = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])

@@ -1,4 +1,4 @@
-"""Water flowing through the joint: cubic law, mass balance, limits."""
+"""Flow through the joint: cubic law, mass balance, limits."""
 
 import numpy as np
 import pytest
@@ -7,8 +7,8 @@ from numpy.testing import assert_allclose
 
 
 @pytest.mark.parametrize("name, level, tail", [("e", 2, 0), ("g", 3, 1)])
-def test_closed_joint(solve, name, level, tail):
-    """Parallel aperture w: linear pressure, q = rho (p0 - pL) w^3 / (12 visc L)."""
+def test_flow_through_a_joint_of_uniform_aperture(solve, name, level, tail):
+    """Aperture w: linear pressure, q = rho (p0 - pL) w^3 / (12 visc L)."""
     (result,) = solve(name, str(level), str(tail), K_N=1e14, visc=2e-3)
     rows, w = result.at(), result.case["aperture_min"]
     assert rows["delta_n"].max() <= 0
@@ -23,9 +23,8 @@ def test_closed_joint(solve, name, level, tail):
 @pytest.mark.parametrize(
     "name", ["e", "g", *(pytest.param(name, marks=pytest.mark.heavy) for name in "fh")]
 )
-def test_what_goes_in_comes_out(solve, name):
-    """One flux from heel to toe, and in the history; in 3D nearly, the mean over z of element
-    values."""
+def test_the_flux_is_uniform_along_the_joint(solve, name):
+    """Equal to that of the history; in 3D nearly, as a mean over z of element values."""
     (result,) = solve(name)
     rows = result.at()
     q = result.history["flux"][-1]
@@ -50,9 +49,8 @@ def test_pressure_falls_from_heel_to_toe(solve, name):
 
 
 @pytest.mark.parametrize("name, tolerance", [("e", 0.02), ("g", 0.005)])
-def test_pressure_and_flux_of_the_openings_found(solve, name, tolerance):
-    """p0 - p(x) ~ int_0^x w^-3, q = rho p0 / (12 visc int w^-3), with the openings of joint.csv
-    (trapezoids)."""
+def test_pressure_and_flux_follow_from_the_openings(solve, name, tolerance):
+    """p0 - p(x) ~ int_0^x w^-3, q = rho p0 / (12 visc int w^-3), by trapezoids over joint.csv."""
     (result,) = solve(name)
     rows = result.at()
     x = rows["x"]
@@ -67,14 +65,14 @@ def test_pressure_and_flux_of_the_openings_found(solve, name, tolerance):
 
 @pytest.mark.parametrize("name", ["e", "g"])
 @pytest.mark.parametrize("steps", [5, 20])
-def test_filling_does_not_depend_on_the_steps(solve, name, steps):
+def test_monotone_filling_with_flow_does_not_depend_on_the_steps(solve, name, steps):
     one, many = solve(name, "9")[0], solve(name, "9", steps=steps)[0]
     assert (
         max(differences(one, many, names=("delta_n", "delta_t1", "sigma_n", "tau_1", "p"))) < 1e-4
     )
 
 
-def test_more_aperture_more_flux(solve):
-    """Closed joint: the cube of the aperture."""
+def test_the_flux_is_the_cube_of_the_aperture(solve):
+    """Closed joint."""
     q = [solve("e", "2", aperture_min=w)[0].history["flux"][-1] for w in (1e-8, 3e-8)]
     assert q[1] / q[0] == pytest.approx(27, rel=1e-6)

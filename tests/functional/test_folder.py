@@ -1,4 +1,4 @@
-"""The output folder: what a run leaves there, and what it must never do to what is there."""
+"""The output folder: the files of a run, and files that a run must not touch."""
 
 import json
 import shutil
@@ -17,8 +17,8 @@ BARE = (*SMALL, "--no-fields", "--no-picture")
 
 
 @pytest.mark.parametrize("engine", ["getdp", "condensed"])
-def test_what_a_user_keeps_in_the_folder_stays(command, tmp_path, engine):
-    """Also under the names work/ and fields/, beside an earlier run."""
+def test_files_of_the_user_in_the_folder_stay(command, tmp_path, engine):
+    """Also in work/ and fields/, beside an earlier run."""
     mine = [
         "work/history.txt",
         "work/deep/notes.txt",
@@ -36,7 +36,7 @@ def test_what_a_user_keeps_in_the_folder_stays(command, tmp_path, engine):
 
 
 @pytest.mark.parametrize("words", [(), ("--out", "here/there"), ("--out", 'it\'s "mine" é')])
-def test_the_plain_engine_takes_any_folder(command, tmp_path, words):
+def test_the_getdp_engine_accepts_any_folder_name(command, tmp_path, words):
     code, _, err = command("run", "c", *SMALL, "--levels", "3", "--engine", "getdp", *words)
     assert (code, err) == (0, "")
     folder = tmp_path / (words[1] if words else "out/c")
@@ -50,8 +50,8 @@ def test_the_plain_engine_takes_any_folder(command, tmp_path, words):
     ]
 
 
-def test_nothing_of_an_earlier_run_passes_for_results_of_this_one(command, tmp_path):
-    """A driven case with two uplifts and three levels, then a plain one with one level."""
+def test_results_of_an_earlier_run_are_removed(command, tmp_path):
+    """Displacement control, two uplifts and three levels; then level control with one level."""
     words = "run", "a", *SMALL, "--out", "out"
     driven = "--set", "drive=heel", "--set", "drive_by=1e-8"
     assert command(*words, "--levels", "3,6,7", *driven)[0] == 0
@@ -64,15 +64,15 @@ def test_nothing_of_an_earlier_run_passes_for_results_of_this_one(command, tmp_p
     assert after == tables | {f"fields/{name}" for name in fields}
 
 
-def test_bad_input_leaves_an_earlier_run_alone(command, tmp_path):
+def test_bad_input_leaves_an_earlier_run_unchanged(command, tmp_path):
     assert command("run", "c", *BARE, "--levels", "6", "--out", "out")[0] == 0
     before = {p: p.read_bytes() for p in (tmp_path / "out").iterdir()}
     assert command("run", "c", *BARE, "--levels", "60", "--out", "out")[0] == 2
     assert {p: p.read_bytes() for p in (tmp_path / "out").iterdir()} == before
 
 
-def test_a_foreign_run_json_protects_the_folder(command, tmp_path):
-    """Only what damjoint has written is removed; its own names are overwritten."""
+def test_only_files_of_damjoint_are_removed(command, tmp_path):
+    """A run.json of another program; files with names of damjoint are overwritten."""
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "run.json").write_text('{"case": "../../elsewhere", "by": "me"}')
     (tmp_path / "out" / "curve.csv").write_text("mine")
@@ -81,31 +81,31 @@ def test_a_foreign_run_json_protects_the_folder(command, tmp_path):
 
 
 @pytest.mark.parametrize("engine", ["getdp", "condensed"])
-def test_a_run_that_stops_leaves_its_last_state(command, tmp_path, engine):
-    """Tables, fields and picture, also in the middle between two requested levels."""
+def test_a_run_that_stops_writes_its_last_state(command, tmp_path, engine):
+    """Tables, fields and picture, also between two requested levels."""
     hardening = "--set", "pena_tang=0", "--set", "uplift=none"
     words = "run", "c", *SMALL, *hardening, "--levels", "7.4,7.6", "--engine", engine
     code, out, err = command(*words)
     assert code == 1 and "sliding: no equilibrium beyond level 7.45" in out and err == ""
-    told = json.loads((tmp_path / "out/c/run.json").read_text())
-    assert (told["state"], told["verdict"]) == ("stopped", "sliding")
+    record = json.loads((tmp_path / "out/c/run.json").read_text())
+    assert (record["state"], record["verdict"]) == ("stopped", "sliding")
     joint, history = read(tmp_path / "out/c/joint.csv"), read(tmp_path / "out/c/history.csv")
     assert joint["time"].max() == history["time"][-1] and 1 < joint["time"].max() < 2
     assert len(list((tmp_path / "out/c/fields").glob("bulk_t*.vtu"))) == 2
 
 
-def test_a_dam_on_the_default_hardening_slides(command, tmp_path):
-    """The whole joint slips: in words, in run.json, exit code 1; 0 where hardening is asked for."""
+def test_a_dam_on_the_default_hardening_is_reported_as_sliding(command, tmp_path):
+    """The whole joint slips: statement, run.json, exit code 1; 0 if hardening is set."""
     words = "run", "c", *BARE, "--set", "uplift=none", "--levels", "7,9", "--set"
     code, out, _ = command(*words, "pena_tang=-1", "--out", "default")
     assert code == 1 and "sliding: the whole joint has slipped or is open from level 9 m on" in out
-    told = json.loads((tmp_path / "default" / "run.json").read_text())
-    assert (told["state"], told["verdict"]) == ("complete", "sliding")
-    code, out, _ = command(*words, "pena_tang=2e11", "--out", "asked")
+    record = json.loads((tmp_path / "default" / "run.json").read_text())
+    assert (record["state"], record["verdict"]) == ("complete", "sliding")
+    code, out, _ = command(*words, "pena_tang=2e11", "--out", "set")
     assert code == 0 and "stands on the hardening pena_tang = 2e+11" in out
 
 
-def test_the_last_level_is_always_a_table(command, tmp_path):
+def test_the_last_level_always_has_a_joint_table(command, tmp_path):
     assert command("run", "k", *BARE)[0] == 0
     joint, history = (read(tmp_path / f"out/k/{name}.csv") for name in ("joint", "history"))
     assert joint["time"].max() == history["time"][-1] == 4.84
@@ -114,10 +114,10 @@ def test_the_last_level_is_always_a_table(command, tmp_path):
 
 def test_units_and_verdict_in_run_json(command, tmp_path):
     assert command("run", "e", *BARE, "--levels", "3")[0] == 0
-    told = json.loads((tmp_path / "out/e/run.json").read_text())
+    record = json.loads((tmp_path / "out/e/run.json").read_text())
     columns = [*read(tmp_path / "out/e/joint.csv"), *read(tmp_path / "out/e/history.csv")]
-    assert set(columns) == set(told["units"]) and told["units"]["sigma_n_eff"] == "Pa"
-    assert told["verdict"] == "stands" and told["state"] == "complete"
+    assert set(columns) == set(record["units"]) and record["units"]["sigma_n_eff"] == "Pa"
+    assert record["verdict"] == "stands" and record["state"] == "complete"
 
 
 def test_tailwater_in_the_history(command, tmp_path):
@@ -130,7 +130,7 @@ def test_tailwater_in_the_history(command, tmp_path):
 
 
 @pytest.mark.parametrize("engine", ["getdp", "condensed"])
-def test_an_interrupted_run_keeps_what_has_converged(tmp_path, monkeypatch, engine):
+def test_an_interrupted_run_writes_its_converged_steps(tmp_path, monkeypatch, engine):
     """Ctrl-C after the second step."""
     from damjoint import run
     from damjoint.model.case import load
@@ -145,13 +145,16 @@ def test_an_interrupted_run_keeps_what_has_converged(tmp_path, monkeypatch, engi
         run.run(case, tmp_path / "out", False, False, False, engine)
     history = read(tmp_path / "out" / "history.csv")
     assert 1 <= len(history["time"]) < 5
-    told = json.loads((tmp_path / "out" / "run.json").read_text())
-    assert told["state"] == told["verdict"] == "interrupted" and "after level" in told["statement"]
+    record = json.loads((tmp_path / "out" / "run.json").read_text())
+    assert (
+        record["state"] == record["verdict"] == "interrupted"
+        and "after level" in record["statement"]
+    )
 
 
 @pytest.fixture
 def fake_getdp(tmp_path, monkeypatch):
-    """fake_getdp(script, version): a shell script that stands for GetDP."""
+    """fake_getdp(script, version): use a shell script instead of GetDP."""
 
     def make(script, version="3.2.0"):
         fake = tmp_path / "getdp"
@@ -165,7 +168,7 @@ def fake_getdp(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("printed", ["rubbish", "step abc", "step 1e+-.5 x", "Error   : it hurts"])
-def test_a_getdp_that_prints_rubbish(command, tmp_path, fake_getdp, printed):
+def test_invalid_output_of_getdp_is_reported(command, tmp_path, fake_getdp, printed):
     fake_getdp(f"echo '{printed}'; exit 3")
     code, _, err = command("run", "c", *BARE, "--engine", "getdp")
     assert code == 1 and len(err.splitlines()) == 1 and printed in err
@@ -173,7 +176,7 @@ def test_a_getdp_that_prints_rubbish(command, tmp_path, fake_getdp, printed):
 
 
 @pytest.mark.parametrize(
-    "left, said",
+    "left, message",
     [
         ("true", "ended without writing status.txt"),
         ("echo 0 > status.txt; touch history.txt", "no step at t = 4"),
@@ -183,11 +186,11 @@ def test_a_getdp_that_prints_rubbish(command, tmp_path, fake_getdp, printed):
         ("head -c 3000000 /dev/zero", "ended without writing status.txt"),
     ],
 )
-def test_a_getdp_that_leaves_rubbish(command, tmp_path, fake_getdp, left, said):
-    """It ends as if all were well, as on a full disk."""
+def test_an_invalid_file_of_getdp_is_reported(command, tmp_path, fake_getdp, left, message):
+    """GetDP returns 0, as it does on a full disk."""
     fake_getdp(left)
     code, out, err = command("run", "c", *BARE, "--engine", "getdp")
-    assert (code, out) == (1, "") and len(err.splitlines()) == 1 and said in err
+    assert (code, out) == (1, "") and len(err.splitlines()) == 1 and message in err
     assert json.loads((tmp_path / "out/c/run.json").read_text())["state"] == "failed"
 
 
@@ -199,8 +202,8 @@ def test_a_getdp_that_leaves_rubbish(command, tmp_path, fake_getdp, left, said):
         *("mean_jump_1.txt", "lambda_2.txt", "u_dam_1.txt", "stress_2.txt"),
     ],
 )
-def test_a_file_of_getdp_that_is_not_whole(command, tmp_path, fake_getdp, name, size):
-    """GetDP does not notice a full disk: it is a fault, never the dam's."""
+def test_a_truncated_file_of_getdp_is_reported(command, tmp_path, fake_getdp, name, size):
+    """GetDP does not report a full disk; it must not be taken for a failure of the dam."""
     cut = f"head -c {size} {name} > cut && mv cut {name}"
     fake_getdp(f'{shutil.which("getdp")} "$@" && {cut}')
     code, out, err = command("run", "c", *BARE[:-2], "--levels", "3,6", "--engine", "getdp")
@@ -208,22 +211,24 @@ def test_a_file_of_getdp_that_is_not_whole(command, tmp_path, fake_getdp, name, 
     assert json.loads((tmp_path / "out/c/run.json").read_text())["state"] == "failed"
 
 
-def test_a_law_whose_table_lacks_a_row(command, tmp_path, fake_getdp):
+def test_a_law_table_of_getdp_without_a_row_is_reported(command, tmp_path, fake_getdp):
     (tmp_path / "path.csv").write_text("delta_n,delta_t1,delta_t2\n0,0,0\n1e-6,0,0\n")
     fake_getdp(f"{shutil.which('getdp')} \"$@\" && sed -i '$d' law.txt")
     code, out, err = command("law", "rupture", "--path", "path.csv")
     assert (code, out) == (1, "") and "1 of 2 rows" in err and len(err.splitlines()) == 1
 
 
-def test_a_mesh_that_is_not_whole(command, tmp_path, monkeypatch):
-    """Gmsh does not notice a full disk."""
+def test_a_truncated_mesh_is_reported(command, tmp_path, monkeypatch):
+    """Gmsh does not report a full disk."""
     monkeypatch.setattr(gmsh, "write", lambda path: Path(path).write_bytes(b"$MeshFormat"))
     code, out, err = command("run", "c", *BARE, "--levels", "3,6", "--engine", "getdp")
     assert (code, out) == (1, "") and len(err.splitlines()) == 1 and "scene.msh" in err
 
 
 @pytest.mark.parametrize("version", ["2.11.3", "rubbish"])
-def test_another_getdp_leaves_an_earlier_run_alone(command, tmp_path, fake_getdp, version):
+def test_a_wrong_version_of_getdp_leaves_an_earlier_run_unchanged(
+    command, tmp_path, fake_getdp, version
+):
     assert command("run", "c", *BARE, "--levels", "6")[0] == 0
     before = {p: p.read_bytes() for p in (tmp_path / "out/c").iterdir()}
     fake_getdp("exit 1", version)
@@ -232,8 +237,8 @@ def test_another_getdp_leaves_an_earlier_run_alone(command, tmp_path, fake_getdp
     assert {p: p.read_bytes() for p in (tmp_path / "out/c").iterdir()} == before
 
 
-def test_getdp_leaves_nothing_in_the_temporary_folder(command, tmp_path, monkeypatch):
-    """Nor does Open MPI below it."""
+def test_no_temporary_file_of_getdp_remains(command, tmp_path, monkeypatch):
+    """Nor of Open MPI."""
     (tmp_path / "tmp").mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "tmp"))
     monkeypatch.setenv("TMPDIR", str(tmp_path / "tmp"))
@@ -242,18 +247,18 @@ def test_getdp_leaves_nothing_in_the_temporary_folder(command, tmp_path, monkeyp
     assert list((tmp_path / "tmp").iterdir()) == []
 
 
-def test_a_run_that_fails_early_does_not_leave_an_earlier_ones_results(command, tmp_path):
-    """A mesh that can not be: one line, and run.json says so."""
+def test_a_run_that_fails_early_removes_the_results_of_an_earlier_one(command, tmp_path):
+    """The mesh is impossible: one line, also in run.json."""
     assert command("run", "c", *BARE, "--out", "out")[0] == 0
     thin = "--set", "dim=3", "--set", "thickness=1e-6", "--set", "mesh_pattern=split"
     code, _, err = command("run", "c", *BARE, *thin, "--out", "out")
     assert code == 1 and len(err.splitlines()) == 1
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["run.json"]
-    told = json.loads((tmp_path / "out" / "run.json").read_text())
-    assert told["state"] == "failed" and told["statement"] in err
+    record = json.loads((tmp_path / "out" / "run.json").read_text())
+    assert record["state"] == "failed" and record["statement"] in err
 
 
-def test_a_title_with_dollars_and_of_any_length(command, tmp_path):
+def test_a_title_may_be_long_and_contain_dollar_signs(command, tmp_path):
     (tmp_path / "ssnp142.case").write_text((CASES / "ssnp142.case").read_text())
     title = "costs $5_{ and $6 " * 12
     text = (

@@ -17,7 +17,7 @@ PUBLISHED = {2: (6.38e-7, 0.06), 5: (2.14e-6, 0.07), 8: (3.88e-6, 0.07)}
 
 
 def block():
-    """A block of N/2 x N quadrangles and its vertical face at x = 0, upwards."""
+    """A block of N/2 x N quadrangles and its vertical face at x = 0, listed upwards."""
     x, y = np.meshgrid(np.linspace(0, WIDTH, N // 2 + 1), np.linspace(0, HEIGHT, N + 1))
     points = np.column_stack([x.ravel(), y.ravel(), 0 * x.ravel()])
     nodes = np.arange(len(points)).reshape(x.shape)
@@ -29,12 +29,14 @@ def block():
 
 
 def test_published_openings_of_a_grouted_joint():
-    """Two mirrored blocks, held at their base; weight at t = 1, grouted at t = 2, read at t = 3."""
+    """Two mirrored blocks, fixed at their base; weight at t = 1, grouted at t = 2, compared at t =
+    3.
+    """
     space, face = block()
     stiffness = elasticity(space, 2, {"dam": (3e12, 0.25)})
     weight = -2400 * 9.81 * body_force(space, 2, 1)
     points, functions = points_of(face, JOINT["published"][2]), len(space.locations)
-    # the joint opens by twice what the face moves
+    # by symmetry the opening is twice the displacement of the face
     pick = sparse.csr_matrix(
         (np.ones(len(face.locations)), (range(len(face.locations)), 2 * space.find(face))),
         (len(face.locations), 2 * functions),
@@ -48,7 +50,7 @@ def test_published_openings_of_a_grouted_joint():
         while np.linalg.norm(residual[free]) > 1e-9 * np.linalg.norm(weight):
             jump = np.pad((opening @ u)[:, None], ((0, 0), (0, 2)))
             traction, tangent = law.traction_and_tangent(jump, variables)
-            # each block has its half of the joint's work
+            # each block has half of the joint's work
             half = opening.T @ sparse.diags(points.weights / 2)
             residual = weight - stiffness @ u - half @ traction[:, 0]
             matrix = stiffness + half @ sparse.diags(tangent[:, 0, 0]) @ opening

@@ -1,5 +1,4 @@
-"""The same physics put differently gives the same answer: order, dimension, scale, steps,
-engine."""
+"""Invariance: order, dimension, scale, steps and engine do not change the results."""
 
 import numpy as np
 import pytest
@@ -13,7 +12,8 @@ from numpy.testing import assert_allclose
 @pytest.mark.parametrize("name", ["a", "c"])
 def test_order_1_converges_to_order_2(solve, name):
     """At half the element size the difference is at least halved; well inside the joint it is below
-    0.3 %."""
+    0.3 %.
+    """
     crest = []
     for n in (25, 50):
         size = {"n_joint": n, "h_dam": 35 / n, "h_found": 70 / n, "uplift": "none"}
@@ -27,11 +27,11 @@ def test_order_1_converges_to_order_2(solve, name):
 @pytest.mark.parametrize(
     "name, flat, solid",
     [
-        ("a", {}, {"mesh_pattern": "layers", "n_layers": 2}),  # nu = 0: nothing happens along z
+        ("a", {}, {"mesh_pattern": "layers", "n_layers": 2}),  # nu = 0: nothing varies along z
         ("c", {}, {"n_layers": 1, "hold_z": 1}),
     ],
-)  # nu = 0.25, held along z: plane strain
-def test_3d_repeats_2d(solve, name, flat, solid):
+)  # nu = 0.25, fixed along z: plane strain
+def test_3d_is_equal_to_2d(solve, name, flat, solid):
     size = {"n_joint": 20, "h_dam": 2, "h_found": 3}
     (two,) = solve(name, "6,9", uplift="imposed", **size, **flat)
     (three,) = solve(name, "6,9", uplift="imposed", **size, **solid, dim=3, thickness=0.2)
@@ -40,8 +40,7 @@ def test_3d_repeats_2d(solve, name, flat, solid):
 
 
 def test_split_layers_contain_the_plane_solution(solve):
-    """Order 2, one layer as thick as the joint is long: as accurate as the plane scene, and near to
-    it."""
+    """Order 2, one layer as thick as the joint is long: as accurate as 2D, and close to it."""
     size = {"n_joint": 20, "h_dam": 2, "h_found": 3, "order": 2, "uplift": "imposed", "nu": 0.25}
     (two,) = solve("a", "6,9", **size)
     (three,) = solve("a", "6,9", **size, dim=3, mesh_pattern="split", thickness=5, hold_z=1)
@@ -53,8 +52,8 @@ def test_split_layers_contain_the_plane_solution(solve):
     "order, pattern, bound", [(1, "layers", 1e-9), (2, "layers", 1e-9), (2, "split", 5e-3)]
 )
 def test_nothing_varies_along_z(solve, order, pattern, bound):
-    """nu = 0: a plane scene in 3D stays plane; nearly so in split layers, whose halves of the
-    joint's rectangles look one way.
+    """nu = 0: the 3D solution is plane; nearly so in split layers, where the diagonals of the
+    joint's rectangles have one direction.
     """
     (result,) = solve(
         "a",
@@ -81,8 +80,8 @@ STIFF = {"E": 3e11, "K_N": 1e11}  # a tenth
 @pytest.mark.parametrize(
     "name, settings", [("a", {"K_T": 1e11}), ("c", {"K_T": 2e11, "pena_tang": 2e10})]
 )
-def test_softer_everything(solve, name, settings):
-    """All stiffnesses a tenth: the same stresses, ten times the jumps."""
+def test_a_tenth_of_all_stiffnesses_gives_ten_times_the_jumps(solve, name, settings):
+    """The stresses are the same."""
     one, other = solve(name)[0], solve(name, uplift="imposed", **STIFF, **settings)[0]
     assert max(differences(one, other, factors={"delta_n": 0.1, "delta_t1": 0.1})) < 1e-7
 
@@ -90,8 +89,7 @@ def test_softer_everything(solve, name, settings):
 @pytest.mark.parametrize(
     "name, settings", [("a", {"sigma_max": 1000}), ("c", {"adhesion": 10_000})]
 )
-def test_heavier_everything(solve, name, settings):
-    """Ten times the densities and the strengths: ten times everything."""
+def test_ten_times_all_loads_and_strengths_give_ten_times_all_results(solve, name, settings):
     one, other = (
         solve(name)[0],
         solve(name, uplift="imposed", rho_dam=24_000, rho_water=10_000, **settings)[0],
@@ -109,8 +107,9 @@ def test_monotone_filling_does_not_depend_on_the_steps(solve, name, steps):
 
 
 def test_emptying_depends_little_on_the_steps(solve):
-    """Friction, 6, 9, 2, 8 m: where the heel closes again the slip it keeps is the one of the step
-    before, so that the shear there knows the steps; the openings hardly do."""
+    """Friction, 6, 9, 2, 8 m: where the heel closes again, its slip is that of the step before, so
+    the shear there depends on the steps; the openings hardly do.
+    """
     one, twenty = (solve("c", "6,9,2,8", steps=steps, uplift="imposed")[0] for steps in (1, 20))
     for time in (1, 2, 3, 4):
         opening, slip, normal, shear = differences(one, twenty, time)
@@ -121,7 +120,7 @@ def test_emptying_depends_little_on_the_steps(solve):
     "name, levels", [("c", "6,9,2,8"), ("a", "6,9,2,8"), ("i", "9,1,9"), ("g", "9,4,9")]
 )
 def test_every_row_of_the_joint_table_obeys_the_law(solve, name, levels):
-    """Each node's jumps, level after level, through the law alone: the same stresses."""
+    """The law along the jumps of each node, level after level, gives the same stresses."""
     result = solve(name, levels, uplift=load(name)["uplift"])[0]
     steps = [result.at(time) for time in result.case.requested]
     picked = np.linspace(0, len(steps[0]["x"]) - 1, 12).astype(int)
@@ -155,9 +154,8 @@ def test_every_row_of_the_joint_table_obeys_the_law(solve, name, levels):
             )
 
 
-def test_condensed_bodies_from_the_cache(tmp_path, monkeypatch):
-    """A second run of the same dam finds its condensed bodies; another load or joint needs no
-    others."""
+def test_a_second_run_reads_the_condensed_bodies_from_the_cache(tmp_path, monkeypatch):
+    """Also with another load or joint."""
     monkeypatch.setenv("DAMJOINT_CACHE", str(tmp_path / "cache"))
     one, again, other = (
         run.run(load("c", settings), tmp_path / "out", False, False, False)[0]

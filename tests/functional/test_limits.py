@@ -1,5 +1,4 @@
-"""Where there is no equilibrium any more: sliding, overturning, and the branch beyond a prescribed
-opening."""
+"""Limit loads: sliding, overturning, and equilibrium beyond them under displacement control."""
 
 import numpy as np
 import pytest
@@ -12,8 +11,9 @@ from numpy.testing import assert_allclose
 @pytest.mark.parametrize("hardening", [0, 1e-3])
 @pytest.mark.parametrize("uplift, levels", [("none", "7.45,7.47"), ("imposed", "6.62,6.65")])
 def test_sliding(solve, uplift, levels, hardening):
-    """Without hardening T = mu N + c L is the end: 7.45784 m dry, 6.63399 m with uplift. The last
-    state is saved."""
+    """Without hardening up to T = mu N + c L: 7.45784 m dry, 6.63399 m with uplift. The last state
+    is written.
+    """
     (result,) = solve("c", levels, uplift=uplift, pena_tang=hardening)
     limit = slide_level(0.35, 1000, uplift == "imposed")
     last = result.history["level"][-1]
@@ -23,7 +23,7 @@ def test_sliding(solve, uplift, levels, hardening):
     assert result.history["slip_length"][-1] > 0.95 * BASE
 
 
-def test_stopping_exits_with_1_and_says_where(command):
+def test_a_run_that_stops_exits_with_1_and_prints_the_level(command):
     code, out, err = command(
         "run",
         "c",
@@ -52,8 +52,9 @@ def test_hardening_holds_the_dam_beyond_sliding(solve):
 
 
 def test_overturning(solve):
-    """A dam of half the weight without tension: the resultant leaves the base at level (6 W (b -
-    xc)/WATER)^(1/3) = 9.097 m."""
+    """Half the weight, no tension: the resultant leaves the base at level (6 W (b -
+    xc)/WATER)^(1/3) = 9.097 m.
+    """
     limit = (6 * WEIGHT / 2 * (BASE - CENTROID) / WATER) ** (1 / 3)
     (result,) = solve("i", "5,10", uplift="none", rho_dam=1200, K_N=1e13, K_T=1e13)
     assert "overturning" in statement(result)
@@ -62,9 +63,8 @@ def test_overturning(solve):
 
 @pytest.mark.parametrize("sigma_max", [0, 1.5e5])
 @pytest.mark.parametrize("opening", [1e-3, 1e-2])
-def test_beyond_the_critical_load_the_rigid_block_is_the_bound(solve, sigma_max, opening):
-    """K, heel opened far: W (b - xc) = p H^2/2, 5.02 m of uniform pressure, approached from below
-    and never passed."""
+def test_beyond_the_critical_load_the_rigid_block_is_an_upper_bound(solve, sigma_max, opening):
+    """K, heel opened far: W (b - xc) = p H^2/2, 5.02 m of uniform pressure, reached from below."""
     bound = WEIGHT * (BASE - CENTROID) / (WATER * 10**2 / 2)
     assert bound == pytest.approx(5.02, abs=5e-3)
     (result,) = solve(
@@ -75,9 +75,8 @@ def test_beyond_the_critical_load_the_rigid_block_is_the_bound(solve, sigma_max,
     assert result.heel[-1] - result.heel[11] == pytest.approx(opening, rel=1e-9)
 
 
-def test_published_opening_stays_below_the_bound_and_rises(solve):
-    """K as published: past 3.34 (the last load that load control reached) the curve goes on without
-    snap-back."""
+def test_the_published_load_curve_rises_below_the_bound(solve):
+    """K as published: beyond 3.34 (the last load of load control) the curve has no snap-back."""
     (result,) = solve("k")
     level, heel = result.history["level"], result.heel
     assert np.all(np.diff(level) > 0) and np.all(np.diff(heel) > 0)
@@ -86,9 +85,10 @@ def test_published_opening_stays_below_the_bound_and_rises(solve):
 
 
 @pytest.mark.parametrize("drive", ["heel", "crest"])
-def test_driven_by_a_displacement_passes_through_the_same_states(solve, drive):
-    """A from 8 m on by the heel's opening or the crest's displacement: at the levels found, level
-    control agrees."""
+def test_displacement_and_level_control_give_the_same_states(solve, drive):
+    """A from 8 m on by the heel's opening or the crest's displacement; then the levels found, as
+    level control.
+    """
     by = {"heel": 6e-7, "crest": 1e-6}[drive]
     (driven,) = solve(
         "a", steps=5, uplift="imposed", drive=drive, drive_begin=3, drive_end=4, drive_by=by
@@ -102,8 +102,7 @@ def test_driven_by_a_displacement_passes_through_the_same_states(solve, drive):
     assert_allclose(controlled.history["crest_ux"][-5:], driven.history["crest_ux"][-5:], rtol=1e-5)
 
 
-def test_module_entry_point():
-    """--version and --help of the console script."""
+def test_version_and_help_exit_with_0():
     for word in ("--version", "--help"):
         with pytest.raises(SystemExit) as stop:
             cli.main([word])
@@ -111,7 +110,7 @@ def test_module_entry_point():
 
 
 @pytest.mark.parametrize(
-    "settings, levels, said",
+    "settings, levels, message",
     [
         ({"found_side": 20}, "40", "the foundation reaches 20 m: less than 1.5 heights"),
         (
@@ -131,15 +130,15 @@ def test_module_entry_point():
         ({}, "30", ""),
     ],
 )
-def test_what_an_engineer_should_know(solve, settings, levels, said):
+def test_hints(solve, settings, levels, message):
     (result,) = solve("dam", levels, n_joint=40, **settings)
     found = "\n".join(hints(result))
-    assert said in found if said else not found
+    assert message in found if message else not found
 
 
 @pytest.mark.parametrize("weight_first", [0, 1])
-def test_driven_from_an_empty_reservoir(solve, weight_first):
-    """The thrust has no slope at level 0; the displacement counts from the dam under its weight."""
+def test_displacement_control_from_an_empty_reservoir(solve, weight_first):
+    """The thrust has no slope at level 0; displacements count from the state under weight."""
     settings = {"drive": "heel", "uplift": "none", "weight_first": weight_first}
     (driven,) = solve("ssnp142", "9", **settings)
     (weighed,) = solve("ssnp142", "1e-3", uplift="none", weight_first=1)
@@ -152,8 +151,8 @@ def test_driven_from_an_empty_reservoir(solve, weight_first):
 @pytest.mark.parametrize(
     "by, settings, nearly", [(-1e-7, {}, 0), (1e-3, {"sigma_max": 1e7, "uplift": "none"}, 20)]
 )
-def test_driven_out_of_the_reservoir(solve, by, settings, nearly):
-    """Below an empty reservoir, or beyond twice the dam's height."""
+def test_displacement_control_stops_at_levels_out_of_range(solve, by, settings, nearly):
+    """Below 0, or above twice the dam's height."""
     drive = {"drive": "heel" if by < 0 else "crest", "drive_by": by}
     (result,) = solve("ssnp142", "2,9", steps=8, **drive, **settings)
     assert result.stopped and verdict(result) == "out of range"

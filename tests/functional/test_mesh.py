@@ -1,11 +1,11 @@
-"""The meshes: as fine as the published ones, and on the joint's two lips."""
+"""Meshes: element counts as published, areas, nodes on the joint."""
 
 import numpy as np
 import pytest
 from damjoint.model import mesh
 from damjoint.model.case import load
 
-# Bulk and joint elements in the verification document's table.
+# Bulk and joint elements, from the table of the verification document.
 PUBLISHED = {
     "a": (2264, 50),
     "i": (2264, 50),
@@ -38,7 +38,7 @@ def test_element_counts(name, tmp_path):
     ],
 )
 def test_area_of_dam_and_foundation(tmp_path, settings):
-    """32.5 and 15 x 5 m2 (times the thickness), by the sum over the elements."""
+    """32.5 and 15 x 5 m2 (times the thickness), by summation over the elements."""
     import gmsh
 
     mesh.write_mesh(
@@ -71,7 +71,7 @@ def test_area_of_dam_and_foundation(tmp_path, settings):
     ],
 )
 def test_a_node_at_the_drains(settings, drain_x):
-    """Wherever they are, on a line along z; as many elements from heel to toe as ever."""
+    """At any position, on a line along z; the number of elements of the joint is the same."""
     case = load("dam", {"drains": 1, "uplift": "cracked", "drain_x": drain_x} | settings)
     points = mesh.Mesh(case).bodies["joint"].points
     heel = [case.section[name][0] for name in ("heel_x", "heel_y")]
@@ -80,7 +80,23 @@ def test_a_node_at_the_drains(settings, drain_x):
     assert np.sum(away == drain_x) == np.sum(away == 0) == (3 if case["dim"] == 3 else 1)
 
 
-def test_a_force_at_the_end_of_the_crest():
-    """Where rounding puts it 5e-16 m beside the corner: the corner is both."""
+def test_a_force_at_the_corner_of_the_crest():
+    """Rounding puts it 5e-16 m beside the corner; there must be one point only."""
     found = mesh.Mesh(load("dam", {"batter": 0.6, "dam_crest": 3.5, "force_x": 1e4, "n_joint": 5}))
     assert (found.bodies["force"].node_tags == found.bodies["crest"].node_tags).all()
+
+
+@pytest.mark.parametrize("settings", [{}, {"joint_height": 9.0}, {"dim": 3.0, "n_layers": 2.0}])
+def test_a_joint_lies_between_its_bodies(settings):
+    """Its nodes are nodes of both; its normals point to the upper one; its ends bound it."""
+    found = mesh.Mesh(load("dam", {"n_joint": 6.0, "mesh_pattern": "free"} | settings))
+    (joint,) = found.joints.values()
+    assert found.solids.keys() == {joint.upper, joint.lower}
+    for name, side in ((joint.upper, 1), (joint.lower, -1)):
+        body = found.solids[name]
+        assert np.isin(joint.surface.node_tags, body.node_tags).all()
+        away = body.points.mean(axis=0) - joint.surface.points.mean(axis=0)
+        assert (side * joint.surface.normals @ away > 0).all()
+    x = joint.surface.points[:, 0]
+    assert np.allclose(x[joint.heel_nodes], x.min()) and np.allclose(x[joint.toe_nodes], x.max())
+    assert {face.body for face in found.faces.values()} == set(found.solids)

@@ -1,4 +1,4 @@
-"""What a run leaves in its folder."""
+"""Files of a run."""
 
 import csv
 import json
@@ -18,8 +18,8 @@ HISTORY = (
 )
 
 
-def test_a_text_is_no_formula(tmp_path):
-    """Of a spreadsheet; a number stays one."""
+def test_a_text_in_a_table_is_not_a_formula_for_a_spreadsheet(tmp_path):
+    """A number stays a number."""
     table = {"case": ["=1+1", "+x", "-2.5", "@x", "a=1"], "n": np.array([-1.0] * 5)}
     write_csv(tmp_path / "t.csv", table)
     cells = [line.split(",") for line in (tmp_path / "t.csv").read_text().splitlines()[1:]]
@@ -27,7 +27,7 @@ def test_a_text_is_no_formula(tmp_path):
     assert {number for _, number in cells} == {"-1"}
 
 
-def test_a_matplotlibrc_of_the_present_folder_changes_nothing(tmp_path):
+def test_a_matplotlibrc_in_the_current_folder_has_no_effect(tmp_path):
     (tmp_path / "matplotlibrc").write_text("axes.facecolor: red\nfont.size: 40\n")
     script = (
         "from damjoint.post import drawing\nimport matplotlib as m\n"
@@ -79,18 +79,19 @@ def test_files_of_a_run(folder):
     dry = read(folder / "none" / "joint.csv")
     assert_allclose(dry["p"], 0)
 
-    told = json.loads((folder / "run.json").read_text())
-    assert told["parameters"]["n_joint"] == 20 and told["parameters"]["K_N"] == 1e12
-    assert told["levels"] == [6, 9] and told["statement"] == ""
-    assert told["mesh"]["joint_elements"] == 20 and told["unknowns"] > 0
-    assert set(told["wall_seconds"]) >= {"solve", "post"}
+    record = json.loads((folder / "run.json").read_text())
+    assert record["parameters"]["n_joint"] == 20 and record["parameters"]["K_N"] == 1e12
+    assert record["levels"] == [6, 9] and record["statement"] == ""
+    assert record["mesh"]["joint_elements"] == 20 and record["unknowns"] > 0
+    assert set(record["wall_seconds"]) >= {"solve", "post"}
 
     assert next(folder.glob("*.png")).read_bytes()[:4] == b"\x89PNG"
 
 
 def test_fields_for_paraview(folder):
-    """A file per level: the crest moves as in history.csv, the bottom does not; the joint's jumps
-    are those of joint.csv."""
+    """A file per level: crest displacement as in history.csv, none at the bottom; jumps as in
+    joint.csv.
+    """
     fields = folder / "fields"
     assert (
         "bulk_t1.vtu" in (fields / "fields.pvd").read_text()
@@ -114,7 +115,7 @@ def test_fields_for_paraview(folder):
 
 
 def test_fields_for_gmsh(folder):
-    """Each view has dam and foundation, a step per level with its time, and a unit in its name."""
+    """Each view has dam and foundation, a step per level with its time, the unit in its name."""
     import gmsh
     from damjoint.model.parameters import start_gmsh
 
@@ -146,33 +147,32 @@ def test_flux_in_the_fields(command, tmp_path):
     assert_allclose(lips.point_data["flux"], joint["flux"][0], rtol=1e-6)
 
 
-def test_stress_in_the_dam_carries_its_weight(folder):
-    """At 6 m, over the elements that a horizontal cut meets: the vertical stress near the crest is
-    that of the weight above."""
+def test_vertical_stress_in_the_dam_balances_its_weight(folder):
+    """At 6 m, over the elements that a horizontal section cuts near the crest: the weight above."""
     bulk = meshio.read(folder / "none" / "fields" / "bulk_t1.vtu")
     cells, stress = bulk.cells[0].data, bulk.cell_data["stress"][0]
     middle = bulk.points[cells].mean(axis=1)
     high = np.abs(middle[:, 1] - 8) < 1
     above = (
         2400 * 9.81 * (10 - middle[high, 1]) * (1.5 + 0.35 * (10 - middle[high, 1]) / 2)
-    )  # N per metre, of the trapezoid
+    )  # N/m, of the trapezoid
     assert np.mean(stress[high, 1] * (1.5 + 0.35 * (10 - middle[high, 1]))) == pytest.approx(
         -np.mean(above), rel=0.1
     )
 
 
-def test_a_joint_stiff_for_its_mesh_is_said(command, tmp_path):
-    """Stresses of its nodes oscillate: K_N h/E = 1e14 * 0.5 / 1e10 = 5000."""
+def test_a_hint_reports_a_joint_too_stiff_for_its_mesh(command, tmp_path):
+    """Nodal stresses oscillate: K_N h/E = 1e14 * 0.5 / 1e10 = 5000."""
     small = "--set", "n_joint=10", "--set", "h_dam=3", "--set", "h_found=4"
     stiff = "--set", "K_N=1e14", "--set", "E=1e10", "--no-fields", "--no-picture"
     code, out, _ = command("run", "c", *small, *stiff, "--levels", "3")
     assert code == 0 and "K_N h/E = 5e+03" in out
-    told = json.loads((tmp_path / "out/c/run.json").read_text())
-    assert told["hints"][0] in out and "oscillate" in told["hints"][0]
+    record = json.loads((tmp_path / "out/c/run.json").read_text())
+    assert record["hints"][0] in out and "oscillate" in record["hints"][0]
 
 
-def test_a_plain_run_loads_no_library_it_does_not_need(tmp_path):
-    """Optimisation, statistics and plotting take longer to load than a published case to solve."""
+def test_a_run_imports_no_library_that_it_does_not_need(tmp_path):
+    """Optimisation, statistics and plotting take longer to import than a short run takes."""
     words = ["run", "c", "--no-fields", "--no-picture", "--out", str(tmp_path / "out")]
     heavy = ["scipy.optimize", "scipy.stats", "scipy.integrate", "matplotlib"]
     tell = f"import sys; from damjoint import cli; cli.main({words})"
@@ -182,9 +182,10 @@ def test_a_plain_run_loads_no_library_it_does_not_need(tmp_path):
 
 
 @pytest.mark.parametrize("law", ["rupture", "bond", "friction"])
-def test_the_fracture_process_zone_is_a_number(command, tmp_path, law):
-    """No crack yet, but metres that soften: the integral over the Gauss points is, to an element,
-    the length from the heel over which the nodes' damage is between 0 and 1; both engines agree."""
+def test_length_of_the_fracture_process_zone(command, tmp_path, law):
+    """No crack yet, but metres of softening: the integral over the Gauss points is, to an element,
+    the length from the heel over which the nodal damage is between 0 and 1; both engines agree.
+    """
     settings = f"law={law}", "sigma_max=3e5", "G_f=300", "n_joint=20", "h_dam=8", "h_found=30"
     words = "--levels", "40,48", "--no-fields", "--no-picture"
     words += tuple(word for setting in settings for word in ("--set", setting))
@@ -205,7 +206,7 @@ def test_the_fracture_process_zone_is_a_number(command, tmp_path, law):
     assert_allclose(zones[0], zones[1], atol=1e-9)
 
 
-def test_a_history_without_a_column_is_of_an_earlier_version(command, folder):
+def test_a_history_without_a_column_is_refused_as_of_an_earlier_version(command, folder):
     path = folder / "history.csv"
     lines = (line.split(",") for line in path.read_text().splitlines())
     path.write_text("".join(",".join([*row[:7], *row[8:]]) + "\n" for row in lines))

@@ -1,5 +1,4 @@
-"""A geometry of one's own: equilibrium by integrals over its mesh, both engines, and what is said
-of a bad one."""
+"""User geometries: equilibrium by integrals over the mesh, both engines, bad meshes."""
 
 import gmsh
 import numpy as np
@@ -11,12 +10,12 @@ from damjoint.model.mesh import Mesh
 from damjoint.model.parameters import start_gmsh
 from damjoint.statics.verdict import hints
 
-#: Points and weights on a line and, their products, on a triangle: fine enough for a kink.
+#: Gauss points and weights on a line, their products for a triangle: enough for a kink.
 LINE, X, W = tensor(400, 1), *tensor(40, 1)
 
 
 def push(surface, pressure):
-    """Force and place of each small part of a surface under a pressure (y) [Pa]."""
+    """Force and point of action of each part of a surface under a pressure (y) [Pa]."""
     for _, table in surface.cells:
         for place, normal in zip(surface.points[table], surface.normals[: len(table)], strict=True):
             if len(place) == 2:
@@ -60,8 +59,8 @@ def resultants(case, level, tail):
 @pytest.mark.parametrize(
     "name, tolerance", [("stepped", 1e-6), pytest.param("valley", 1e-5, marks=pytest.mark.heavy)]
 )
-def test_equilibrium(solve, name, tolerance):
-    """The waterline cuts elements; the tolerance in 3D is the test's own integration's."""
+def test_equilibrium_of_a_user_geometry(solve, name, tolerance):
+    """The waterline cuts elements; in 3D the tolerance is that of the integration of this test."""
     (result,) = solve(name, "33.3", "6.1" if name == "stepped" else "0", uplift="none")
     expected = resultants(result.case, 33.3, result.last["tail_level"])
     found = [result.last[n] for n in "NTM"]
@@ -70,7 +69,7 @@ def test_equilibrium(solve, name, tolerance):
     assert wet["N"] + wet["U"] == pytest.approx(result.last["N"], rel=1e-9)
 
 
-def test_drains_without_a_node_are_said(solve):
+def test_a_hint_reports_drains_without_a_node(solve):
     (result,) = solve("stepped", "20", "0", uplift="drained", drain_x=6.4, n_joint=34)
     found = "\n".join(hints(result))
     assert "no node at the drains (drain_x = 6.4 m): the nearest is 0.1 m away" in found
@@ -80,8 +79,8 @@ def test_drains_without_a_node_are_said(solve):
 
 @pytest.mark.heavy
 @pytest.mark.parametrize("uplift", ["imposed", "drained", "flow", "cracked"])
-def test_a_bent_joint_in_both_engines(tmp_path, uplift):
-    """At a level where no waterline cuts an element: what the plain engine integrates exactly."""
+def test_both_engines_agree_on_a_bent_joint(tmp_path, uplift):
+    """At a level where the waterline cuts no element: there the GetDP model integrates exactly."""
     settings = {"n_joint": 34, "uplift": uplift, "drain_x": 6, "tolerance": 1e-11}
     case = load("stepped", settings, "45", "4")
     one, other = (
@@ -93,7 +92,7 @@ def test_a_bent_joint_in_both_engines(tmp_path, uplift):
         assert other[column] == pytest.approx(one[column], rel=0, abs=1e-6 * size), column
 
 
-def test_the_distance_follows_the_joint(solve):
+def test_the_coordinate_s_follows_the_joint(solve):
     (result,) = solve("stepped", "20", "0", uplift="none")
     rows = result.at()
     steps = np.hypot(np.diff(rows["x"]), np.diff(rows["y"]))
@@ -103,7 +102,7 @@ def test_the_distance_follows_the_joint(solve):
 
 @pytest.fixture
 def draw(tmp_path):
-    """draw(changes): the case file of a dam of two blocks whose mesh has been changed."""
+    """draw(changes): a case file of a dam of two blocks, with changes of its mesh."""
 
     def make(rename=(), apart=False, order=1):
         start_gmsh()
@@ -114,12 +113,12 @@ def draw(tmp_path):
         lines = [geo.addLine(p[i], p[i + 1]) for i in range(3)] + [geo.addLine(p[3], p[0])]
         under = [(0, 4), (4, 5), (5, 6), (6, 7), (7, 1)]
         below = [geo.addLine(p[i], p[k]) for i, k in under]
-        lip = geo.addLine(p[0], p[1]) if apart else lines[0]
+        face = geo.addLine(p[0], p[1]) if apart else lines[0]
         dam = geo.addPlaneSurface([geo.addCurveLoop(lines)])
-        rock = geo.addPlaneSurface([geo.addCurveLoop([*below, -lip])])
+        rock = geo.addPlaneSurface([geo.addCurveLoop([*below, -face])])
         geo.synchronize()
         if apart:
-            gmsh.model.mesh.setTransfiniteCurve(lip, 7)
+            gmsh.model.mesh.setTransfiniteCurve(face, 7)
         regions = {
             "dam": (2, [dam]),
             "foundation": (2, [rock]),
@@ -143,14 +142,14 @@ def draw(tmp_path):
     return make
 
 
-def test_a_mesh_of_one_s_own(draw, solve):
+def test_a_mesh_file_of_the_user(draw, solve):
     (result,) = solve(str(draw()), uplift="none")
     assert result.last["T"] == pytest.approx(9810 / 2)
     assert result.last["N"] == pytest.approx(2400 * 9.81 * 6)
 
 
 @pytest.mark.parametrize(
-    "changes, said",
+    "changes, message",
     [
         ({"rename": {"toe": ""}}, "no region toe"),
         ({"rename": {"upstream": "usptream"}}, 'region "usptream" is not known'),
@@ -163,42 +162,42 @@ def test_a_mesh_of_one_s_own(draw, solve):
         ({"order": 2}, "must be of order 1"),
     ],
 )
-def test_a_bad_geometry(draw, command, tmp_path, changes, said):
+def test_a_bad_geometry_is_refused(draw, command, tmp_path, changes, message):
     path = draw(**changes)
     before = sorted(tmp_path.rglob("*"))
     code, out, err = command("run", path)
     assert (code, out) == (2, "") and len(err.splitlines()) == 1, err
-    assert f"geometry = {tmp_path / 'own.msh'}" in err and said in err
+    assert f"geometry = {tmp_path / 'own.msh'}" in err and message in err
     assert sorted(tmp_path.rglob("*")) == before
 
 
-def test_the_wrong_dimension(draw):
+def test_a_mesh_of_the_wrong_dimension_is_refused(draw):
     with pytest.raises(InputError, match="has dimension 0: must be 1 with dim = 3"):
         Mesh(load(str(draw()), {"dim": 3}))
 
 
 @pytest.mark.parametrize("name", ["trap.geo", "trap.GEO", "trap.msh", "trap.txt", "trap.msh.gz"])
-def test_a_program_is_not_run_unasked(tmp_path, command, name):
-    """Gmsh runs whatever it does not know, under any name."""
+def test_a_geo_file_is_not_run_without_run_geo(tmp_path, command, name):
+    """Gmsh runs files of any unknown type."""
     (tmp_path / name).write_text(f'SystemCall "touch {tmp_path}/run";\nPoint(1) = {{0, 0, 0}};\n')
     (tmp_path / "own.case").write_text(f'geometry = "{name}";\n')
     code, _, err = command("run", tmp_path / "own.case")
     assert code == 2 and "--run-geo" in err and not (tmp_path / "run").exists()
 
 
-def test_options_beside_a_mesh_are_not_run(draw, tmp_path):
+def test_an_options_file_beside_a_mesh_is_not_run(draw, tmp_path):
     """Gmsh would read own.msh.opt after own.msh."""
     case = load(str(draw()))
     (tmp_path / "own.msh.opt").write_text(f'SystemCall "touch {tmp_path}/run";\n')
     assert Mesh(case).nodes and not (tmp_path / "run").exists()
 
 
-@pytest.mark.parametrize("kept", [11, 20, 300, 0.5])
-def test_a_truncated_mesh(draw, command, tmp_path, kept):
-    """And the next one is read."""
+@pytest.mark.parametrize("length", [11, 20, 300, 0.5])
+def test_a_truncated_mesh_is_refused(draw, command, tmp_path, length):
+    """A good mesh after it is read."""
     path, mesh = draw(), tmp_path / "own.msh"
     whole = mesh.read_bytes()
-    mesh.write_bytes(whole[: int(kept * len(whole)) if kept < 1 else kept])
+    mesh.write_bytes(whole[: int(length * len(whole)) if length < 1 else length])
     code, _, err = command("run", path)
     assert code == 2 and len(err.splitlines()) == 1 and f"geometry = {mesh}" in err
     mesh.write_bytes(whole)

@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from damjoint import data
-from damjoint.engines.condensed.cache import interface_of
 from damjoint.engines.getdp.process import Runner, write_problem
 from damjoint.engines.getdp.tables import read_history
+from damjoint.joint.interface import interface_of
 from damjoint.laws import LAWS, Law
 from damjoint.model.case import load
 from damjoint.model.mesh import mesh_of

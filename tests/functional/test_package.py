@@ -2,8 +2,10 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -20,9 +22,12 @@ def call(*words, **options):
 
 
 @pytest.mark.heavy
-def test_wheel_in_a_fresh_environment(tmp_path):
+def test_the_wheel_runs_in_a_fresh_environment(tmp_path):
     call(sys.executable, "-m", "build", "--wheel", "--outdir", tmp_path, CHECKOUT)
     (wheel,) = tmp_path.glob("damjoint-*.whl")
+    with zipfile.ZipFile(wheel) as archive:
+        (name,) = (name for name in archive.namelist() if name.endswith("/METADATA"))
+        assert not re.search(rb"\]\((?!https?:)", archive.read(name))  # links work on an index
     call(sys.executable, "-m", "venv", tmp_path / "env")
     python = tmp_path / "env" / "bin" / "python"
     call(python, "-m", "pip", "install", "-q", wheel)
@@ -36,7 +41,9 @@ def test_wheel_in_a_fresh_environment(tmp_path):
         assert json.loads((elsewhere / engine / "run.json").read_text())["verdict"] == "stands"
     call(command, "report", "condensed", cwd=elsewhere, env=environment)
     assert (elsewhere / "report.html").stat().st_size > 10_000
-    said = call(command, "validate", "c", cwd=elsewhere, env=environment)
-    assert ", 0 failed, " in said
+    out = call(command, "validate", "c", cwd=elsewhere, env=environment)
+    assert ", 0 failed, " in out
+    for tool in ("bench_page", "stress", "pages"):  # of the commands bench and stress, and make
+        call(python, "-c", f"import damjoint_tools.{tool}", cwd=elsewhere, env=environment)
     where = call(python, "-c", "import damjoint; print(damjoint.data('pro'))", cwd=elsewhere)
     assert where.startswith(str(tmp_path / "env"))

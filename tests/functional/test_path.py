@@ -1,24 +1,24 @@
-"""Plain filling in any number of steps, and the equilibrium path over unstable crack growth."""
+"""Monotone filling in any number of steps, and the equilibrium path over unstable crack growth."""
 
 import numpy as np
 import pytest
 from damjoint.statics.verdict import hints, statement, verdict
 from damjoint.studies.critical import Search
 
-#: 45 m, drains, on a joint that breaks and slides a little.
+#: 45 m dam with drains on a joint that cracks and slides slightly.
 DAM = {"E_dam": 2e10, "E_found": 3e10, "sigma_max": 1e5, "G_f": 100, "n_joint": 40}
 DAM |= {"uplift": "drained", "drain_x": 4, "drain_effectiveness": 0.5, "drain_level": 3}
-#: Each law with points that open, soften or slip at the end.
+#: Each law, with points that open, soften or slip at the last level.
 LAWS = {
     "bond": {"law": "bond", "adhesion": 1e5, "mu": 1},
     "friction": {"law": "friction", "adhesion": 2e4, "mu": 0.9},
     "rupture": {"law": "rupture", "alpha": 1},
     "rupture, shear kept": {"law": "rupture", "alpha": 2},
 }
-#: A bond so brittle that it breaks over 20 of 30 m at once, and friction that then holds the dam.
+#: A brittle bond that breaks over 20 of 30 m at constant level, and friction that holds the dam.
 BRITTLE = {"law": "bond", "mu": 5, "dam_base": 30, "sigma_max": 2e6, "G_f": 100}
 BRITTLE |= {"adhesion": 5e6, "G_t": 1e5}
-#: A bond without cohesion, near its limit of overturning (gravity method: 46.201 m).
+#: A bond without cohesion, close to overturning (gravity method: 46.201 m).
 NEAR_LIMIT = {"law": "bond", "dam_height": 46.55, "dam_base": 25.078, "dam_crest": 3.0817}
 NEAR_LIMIT |= {"E": 1.7599e10, "nu": 0.2, "K_N": 1.9375e12, "K_T": 1.3155e12, "n_joint": 56}
 NEAR_LIMIT |= {"sigma_max": 393620, "adhesion": 0, "mu": 2.0653, "G_f": 183.29, "G_t": 23797}
@@ -26,7 +26,7 @@ NEAR_LIMIT |= {"h_dam": 8.8075, "h_found": 20.086, "found_side": 51.842, "found_
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_a_plain_filling_does_not_depend_on_its_steps(solve, law):
+def test_monotone_filling_does_not_depend_on_the_steps(solve, law):
     """1, 4 and 16 steps per level: the same joint to 1e-6 of its largest value."""
     found = [solve("dam", "30,40,45", "0,0,3", steps, **DAM | LAWS[law])[0] for steps in (1, 4, 16)]
     rows = [result.at() for result in found]
@@ -38,23 +38,25 @@ def test_a_plain_filling_does_not_depend_on_its_steps(solve, law):
 
 
 @pytest.mark.parametrize("n_joint", [60, pytest.param(100, marks=pytest.mark.heavy)])
-def test_a_brittle_bond_stands_beyond_its_limit_point(solve, n_joint):
-    """The level falls by almost 2 m while the crack grows, and comes back; statics holds after."""
+def test_a_dam_on_a_brittle_bond_is_followed_beyond_its_limit_point(solve, n_joint):
+    """The level falls by almost 2 m while the crack grows, and rises again; the final state is in
+    equilibrium.
+    """
     (result,) = solve("dam", "40,48,51", **BRITTLE, n_joint=n_joint)
     assert verdict(result) == "stands" and result.last["level"] == 51
     assert result.last["crack_length"] == pytest.approx(24.37, abs=0.1)
     ((limit, lowest),) = result.info["limit_points"]
     assert 49.9 < limit < 50.3 and limit - lowest > 1
     assert any(f"unstable crack growth at level {limit:.4g} m" in hint for hint in hints(result))
-    # what the bond was is forgotten where it has gone: a dam without one is in nearly this state
-    (plain,) = solve("dam", "51", **BRITTLE | {"sigma_max": 0, "adhesion": 0}, n_joint=n_joint)
+    # where the bond is broken it has no influence: a dam without a bond has nearly the same state
+    (unbonded,) = solve("dam", "51", **BRITTLE | {"sigma_max": 0, "adhesion": 0}, n_joint=n_joint)
     for name in ("N", "T", "M"):
-        assert result.last[name] == pytest.approx(plain.last[name], rel=1e-6)
-    assert result.last["crest_ux"] == pytest.approx(plain.last["crest_ux"], rel=0.05)
+        assert result.last[name] == pytest.approx(unbonded.last[name], rel=1e-6)
+    assert result.last["crest_ux"] == pytest.approx(unbonded.last["crest_ux"], rel=0.05)
 
 
-def test_a_run_ends_where_the_critical_level_is(solve):
-    """Followed over a dip, it overturns at the level that `critical` finds, and says why."""
+def test_a_run_stops_at_the_critical_level(solve):
+    """Followed over a limit point, it overturns at the level that `critical` finds."""
     levels = "23.275,37.24,41.895,46.55"
     (result,) = solve("dam", levels, weight_first=0, **NEAR_LIMIT)
     answer = Search("dam", "level", NEAR_LIMIT | {"weight_first": 0.0}, levels).run()
@@ -68,9 +70,8 @@ def test_a_run_ends_where_the_critical_level_is(solve):
     "seed", [0, 1, *(pytest.param(s, marks=pytest.mark.heavy) for s in (2, 3))]
 )
 def test_more_strength_never_fails_earlier(solve, seed):
-    """Random dams of 20 to 60 m on brittle bonds: stronger in tension, tougher, more cohesive.
-
-    More cohesion lets less slip and so more open: up to 0.3 % of the level.
+    """Random dams of 20 to 60 m on brittle bonds, with more tensile strength, fracture energy or
+    cohesion. More cohesion causes less slip and so more opening: up to 0.3 % of the level.
     """
     rng = np.random.default_rng(seed)
     height = rng.uniform(20, 60)

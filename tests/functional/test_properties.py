@@ -1,5 +1,6 @@
-"""What holds for any dam, of random ones (hypothesis; the same ones every time): the same physics
-in other units, on a mesh that is numbered otherwise or stands elsewhere, in other steps."""
+"""Properties of random dams (hypothesis, with a fixed seed): results do not depend on units,
+numbering or position of the mesh, nor on the steps.
+"""
 
 import re
 from dataclasses import replace
@@ -16,12 +17,12 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from own_mesh import OwnMesh, Shuffled
 
-#: Without a search for a simpler example: that would take minutes.
+#: Without the search for a simpler failing example, which would take minutes.
 few = settings(max_examples=8, deadline=None, derandomize=True, phases=[Phase.generate])
 
-#: A coarse mesh of the default dam, with a section that is not the simplest one.
+#: A coarse mesh of the default dam, with batter and neck.
 SECTION = {"n_joint": 10.0, "h_dam": 15.0, "h_found": 60.0, "batter": 3.0, "neck_height": 5.0}
-#: Joints that crack, soften and slip below the levels asked for, and hold.
+#: Joints that crack, soften and slip below the requested levels, and still stand.
 LAWS = {
     "rupture": {"sigma_max": 1e4, "G_f": 10.0},
     "friction": {"adhesion": 1e4, "mu": 0.9},
@@ -35,7 +36,7 @@ joints = st.builds(
 )
 levels = st.floats(28, 44)
 
-#: Columns that are as large as the largest of them, and those that only count.
+#: Columns that are compared with the largest value of their group, and those of counts.
 GROUPS = [
     ("delta_n", "delta_t1", "delta_t2", "slip", "lambda"),
     ("sigma_n", "tau_1", "tau_2", "p", "sigma_n_eff"),
@@ -44,15 +45,14 @@ COUNTS = "iterations", "cuts", "residual"
 
 
 def differences(one, other):
-    """Of each column of two tables, over the largest value of its group."""
+    """Largest difference of each column of two tables, relative to the maximum of its group."""
     group = {name: group for group in GROUPS for name in group}
     size = {n: max(np.abs(one[g]).max() for g in group.get(n, [n]) if g in one) for n in one}
     return {n: np.abs(one[n] - other[n]).max() / max(size[n], 1e-300) for n in one}
 
 
 def same(one, other, changed=None):
-    """Whether two runs have found the same; changed: what makes a column of the first one that of
-    the other."""
+    """Whether two results agree; changed: conversion of a column of the first to the second."""
     for a, b in ((one.joint, other.joint), (one.history, other.history)):
         wanted = {n: (changed or {}).get(n, lambda v: v)(v) for n, v in a.items()}
         off = {n: d for n, d in differences(wanted, b).items() if n not in COUNTS and d > 1e-6}
@@ -61,14 +61,14 @@ def same(one, other, changed=None):
 
 @pytest.fixture(scope="module")
 def solve(tmp_path_factory):
-    """solve(case): its result."""
+    """solve(case): the result of its only scene."""
     folder = tmp_path_factory.mktemp("out")
     return lambda case: run.run(case, folder, fields=False, picture=False, progress=False)[0]
 
 
 @pytest.fixture(scope="module")
 def own(tmp_path_factory):
-    """own(mesh, numbering, settings, levels, tail): a case of a mesh of one's own."""
+    """own(mesh, numbering, settings, levels, tail): a case with a mesh file."""
     path = tmp_path_factory.mktemp("own") / "own.msh"
 
     def case(mesh, changed, level, tail=3.0, numbering=None):
@@ -82,14 +82,14 @@ def own(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def mesh():
-    """The section's mesh."""
+    """The mesh of the section."""
     return OwnMesh.of(load("dam", SECTION | {"joint_slope": 2.0}))
 
 
 # -- units
 # --------------------------------------------------------------------------------------------------
 
-#: Powers of length, stress and acceleration in each unit.
+#: Exponents of length, stress and acceleration in each unit.
 DIMENSIONS = {
     **dict.fromkeys(["-", "degrees"], (0, 0, 0)),
     "m": (1, 0, 0),
@@ -102,20 +102,20 @@ DIMENSIONS = {
     "Pa s": (0.5, 1, -0.5),
     "kg/(m s)": (0.5, 1, -0.5),
 }
-#: All there is of loads.
+#: All kinds of loads.
 LOADS = {"silt_height": 10.0, "ice_force": 1e5, "anchor_force": 1e5, "k_h": 0.05, "force_x": 1e4}
 
 
 def in_units(case, units):
-    """A case with units of length, stress and acceleration that are so many times smaller."""
+    """A case whose units of length, stress and acceleration are smaller by these factors."""
     factor = lambda unit: float(np.prod(np.power(units, DIMENSIONS[unit])))
     values = {
         name: case[name] * factor(re.search(r"\[(.*)\]$", p.label)[1]) if not p.text else case[name]
         for name, p in declared().items()
         if name != "pena_rupture"  # follows G_f
     }
-    told = lambda heights: ",".join(repr(height * factor("m")) for height in heights)
-    case = load("dam", values, told(case.levels), told(case.tail_levels))
+    text = lambda heights: ",".join(repr(height * factor("m")) for height in heights)
+    case = load("dam", values, text(case.levels), text(case.tail_levels))
     lengths = {n: [case.shared[n][0] * factor("m")] for n in ("release_length", "crack_aperture")}
     columns = (JOINT | COLUMNS | FLUX | HISTORY).items()
     scaled = {name: partial(np.multiply, factor(unit)) for name, (unit, _) in columns}
@@ -124,9 +124,8 @@ def in_units(case, units):
 
 @few
 @given(joints, levels, st.sampled_from(["level", "crest"]), st.tuples(*[st.floats(-3, 3)] * 3))
-def test_units(solve, joint, level, drive, powers):
-    """Every parameter in other units, by the one that its label tells: every column is in those of
-    the tables."""
+def test_results_do_not_depend_on_units(solve, joint, level, drive, powers):
+    """Each parameter is converted by the unit in its label, each column by that of the tables."""
     case = load("dam", SECTION | LOADS | joint | {"drive": drive}, f"30,{level!r}", "3")
     other, scaled = in_units(case, 10 ** np.array(powers))
     same(solve(case), solve(other), scaled)
@@ -142,14 +141,16 @@ def test_units(solve, joint, level, drive, powers):
     levels,
     st.builds(Shuffled, st.integers(0, 10**6), st.integers(1, 10**9), st.integers(1, 1000)),
 )
-def test_numbering(solve, own, mesh, joint, level, numbering):
-    """Nodes, elements, regions and corners in any order, their tags large and with gaps."""
+def test_results_do_not_depend_on_the_numbering_of_the_mesh(
+    solve, own, mesh, joint, level, numbering
+):
+    """Nodes, elements, regions and corners in any order, with large tags and gaps."""
     same(solve(own(mesh, joint, level)), solve(own(mesh, joint, level, numbering=numbering)))
 
 
 @few
 @given(joints, levels, st.floats(-1e3, 1e3), st.floats(0, 1e3))
-def test_a_dam_elsewhere(solve, own, mesh, joint, level, along, up):
+def test_results_do_not_depend_on_the_position(solve, own, mesh, joint, level, along, up):
     """Moved along the river and upwards, with its water."""
     one = solve(own(mesh, joint, level))
     case = own(mesh.moved((along, up, 0)), joint, level + up, 3.0 + up)
@@ -158,20 +159,20 @@ def test_a_dam_elsewhere(solve, own, mesh, joint, level, along, up):
     same(one, other, higher | {"x": lambda v: v + along})
 
 
-def test_the_reservoir_is_where_x_is_small(solve, own, mesh):
+def test_a_mesh_with_the_reservoir_at_large_x_is_refused(solve, own, mesh):
     with pytest.raises(InputError, match="heel at 0: x must point downstream"):
         solve(own(mesh.moved((0, 0, 0), "x"), {}, 40.0))
 
 
 @settings(few, max_examples=3)
 @given(joints)
-def test_a_mirrored_valley(solve, own, joint):
-    """The right bank for the left one, in 3D."""
+def test_results_of_a_mirrored_valley(solve, own, joint):
+    """In 3D."""
     solid = {"dim": 3.0, "n_joint": 4.0, "mesh_pattern": "split", "thickness": 20.0}
     mesh, joint = OwnMesh.of(load("dam", SECTION | solid)), joint | {"dim": 3.0, "order": 1.0}
     one, other = (solve(own(m, joint, 44.0)) for m in (mesh, mesh.moved((0, 0, 20), "z")))
     mirrored = {"z": lambda v: 20 - v} | dict.fromkeys(["delta_t2", "tau_2"], np.negative)
-    # the rows of a level go by s, then by z
+    # rows of a level are sorted by s, then by z
     order = np.lexsort((20 - one.joint["z"].round(6), one.joint["s"].round(6), one.joint["time"]))
     one.joint = {name: column[order] for name, column in one.joint.items()}
     same(one, other, mirrored)
@@ -183,8 +184,8 @@ def test_a_mirrored_valley(solve, own, joint):
 
 @few
 @given(joints, st.floats(35, 44), st.floats(0.01, 0.99))
-def test_filling_in_two_steps(solve, joint, level, share):
-    """From a level on at which no node's shear turns any more."""
+def test_filling_in_two_steps_instead_of_one(solve, joint, level, share):
+    """From a level on at which the shear of no node changes its direction."""
     case = load("dam", SECTION | joint, f"34,{level!r}", "3")
     one, two = solve(case), solve(replace(case, times=(1.0, 1 + share, 2.0)))
     assert not one.stopped
@@ -194,8 +195,8 @@ def test_filling_in_two_steps(solve, joint, level, share):
 
 @few
 @given(joints, levels, st.floats(0, 28), st.floats(0.01, 0.99))
-def test_emptying_in_two_steps(solve, joint, level, low, share):
-    """Within what theory.md allows where the loading turns back."""
+def test_emptying_in_two_steps_instead_of_one(solve, joint, level, low, share):
+    """Within the difference of theory.md for reversed loading."""
     case = load("dam", SECTION | joint, f"30,{level!r},{low!r},{level!r}", "0")
     times = (1.0, 2.0, 2 + share, 3.0, 3 + share, 4.0)
     one, two = solve(case), solve(replace(case, times=times))

@@ -1,4 +1,4 @@
-"""Quadrangles, prisms and hexahedra of order 2: as good as triangles, in both engines."""
+"""Quadrangles, prisms and hexahedra of order 2: as accurate as triangles, in both engines."""
 
 import numpy as np
 import pytest
@@ -8,8 +8,8 @@ from damjoint.engines import engine_of
 from damjoint.model.case import load
 from numpy.testing import assert_allclose
 
-#: A dam on a foundation of three blocks in rows and columns; regular: of quadrangles, but for the
-#: last block, else of their halves.
+#: A dam on a foundation of three blocks in rows and columns; regular: quadrangles but in the last
+#: block, else triangles (their halves).
 BLOCKS = """
 Include "PARAMETERS";
 x() = {0, 5, 1.5, 0, -5, -5, 0, 5, 10, 10};
@@ -60,9 +60,10 @@ def blocks(tmp_path, monkeypatch):
     return str(path)
 
 
-def test_as_accurate_as_triangles(blocks, solve):
-    """Opening of the heel, movement of the crest, stress at the toe: nearer to those of a fine mesh
-    than with the halves of the quadrangles, which have as many unknowns."""
+def test_quadrangles_are_as_accurate_as_triangles(blocks, solve):
+    """Opening of the heel, displacement of the crest, stress at the toe: closer to those of a fine
+    mesh than with triangles of as many unknowns.
+    """
 
     def found(pattern, n):
         (result,) = solve(blocks, mesh_pattern=pattern, n_joint=n, uplift="none", **STRONG)
@@ -75,9 +76,10 @@ def test_as_accurate_as_triangles(blocks, solve):
     assert np.all(np.abs(quads - fine) < 0.7 * np.abs(halves - fine))
 
 
-def test_both_engines_on_quadrangles_beside_triangles(blocks):
-    """The joint's rows, and displacement and stress of both bodies, element by element. (The
-    waterline cuts no element.)"""
+def test_both_engines_agree_on_quadrangles_beside_triangles(blocks):
+    """Rows of the joint; displacement and stress of both bodies, element by element. The waterline
+    cuts no element.
+    """
     settings = {"mesh_pattern": "regular", "n_joint": 5, "uplift": "imposed", "nu": 0.2, "order": 2}
     case, nothing = load(blocks, settings), lambda number, time: None
     (one,), (other,) = (engine_of(case, n).solve(case, nothing, True) for n in ("getdp", "auto"))
@@ -92,7 +94,7 @@ def test_both_engines_on_quadrangles_beside_triangles(blocks):
 
 @pytest.mark.parametrize("pattern, flat", [("layers", "free"), ("regular", "regular")])
 def test_3d_contains_the_plane_solution(solve, pattern, flat):
-    """A layer as thick as the joint is long, of prisms or hexahedra, held along z."""
+    """A layer of prisms or hexahedra as thick as the joint is long, fixed along z."""
     size = {"n_joint": 10, "h_dam": 2, "h_found": 3, "uplift": "imposed", "nu": 0.25, "order": 2}
     (two,) = solve("a", "6,9", mesh_pattern=flat, **size)
     (three,) = solve("a", "6,9", **size, dim=3, mesh_pattern=pattern, thickness=5, hold_z=1)
@@ -103,8 +105,8 @@ def test_3d_contains_the_plane_solution(solve, pattern, flat):
 @pytest.mark.parametrize(
     "law, uplift", [("rupture", "flow"), ("bond", "flow"), ("friction", "cracked")]
 )
-def test_a_slice_takes_the_iterations_of_the_plane_scene(solve, law, uplift):
-    """A joint that opens or slips: as many in every step, on the same mesh drawn out along z."""
+def test_a_slice_needs_as_many_iterations_as_2d(solve, law, uplift):
+    """In each step, on the same mesh extruded along z; the joint opens or slips."""
     scene = {"law": law, "uplift": uplift, "sigma_max": 1e4, "adhesion": 5e4, "mu": 0.8}
     scene |= {"E_dam": 2e10, "E_found": 3e10, "K_N": 1e11, "n_joint": 20, "h_dam": 8, "h_found": 30}
     (two,) = solve("dam", "30,40,45", **scene)

@@ -1,4 +1,4 @@
-"""Pictures and a page from the files of a run, without running."""
+"""Pictures and page of a run, made from its files."""
 
 import html
 import json
@@ -33,11 +33,11 @@ def ran(tmp_path_factory):
 
 @pytest.fixture
 def folder(ran, tmp_path):
-    """A copy of it, to do with what one likes."""
+    """A copy of it that a test may change."""
     return shutil.copytree(ran, tmp_path / "out" / "my")
 
 
-def test_plot_redraws_what_the_run_has_drawn(command, folder):
+def test_plot_redraws_the_pictures_of_a_run(command, folder):
     path = folder / "my.png"
     drawn = np.asarray(Image.open(path)).astype(float)
     path.unlink()
@@ -45,21 +45,22 @@ def test_plot_redraws_what_the_run_has_drawn(command, folder):
     assert (code, out, err) == (0, f"{path}\n", "")
     again = np.asarray(Image.open(path)).astype(float)
     assert again.shape == drawn.shape and np.ptp(again) > 100
-    # the tables have twelve digits, and a line may round to the next pixel
+    # the tables have 12 digits: a line may be rounded to the next pixel
     assert np.mean(np.abs(again - drawn) > 8) < 1e-3
 
 
-def test_plot_of_a_driven_run(command, tmp_path):
-    """Its load curve, too; a folder without fields has no section to be drawn."""
+def test_plot_of_a_run_with_displacement_control(command, tmp_path):
+    """Also its load curve; without fields there is no section."""
     assert command("run", "k", *SMALL, "--no-fields", "--no-picture")[0] == 0
     assert command("plot", "out/k")[0] == 0
     for name in ("k.png", "k_curve.png"):
         assert (tmp_path / "out" / "k" / name).stat().st_size > 10_000
 
 
-def test_a_geometry_of_ones_own(command, tmp_path):
-    """Section and page of a stepped base, the joint's ends read back from its mesh; no gravity
-    method, which knows sections by parameters."""
+def test_plot_and_report_of_a_user_geometry(command, tmp_path):
+    """A stepped base, with the ends of the joint read from the mesh; no gravity method, which needs
+    a section by parameters.
+    """
     few = "--set", "n_joint=20", "--set", "order=1", "--levels", "40", "--tail-levels", "4"
     assert command("run", "stepped", *few)[0] == 0
     path = tmp_path / "out/stepped/stepped.png"
@@ -79,7 +80,7 @@ def damaged(folder, name, text):
 
 @pytest.mark.parametrize("words", [("plot",), ("report", "--to", "page.html")])
 @pytest.mark.parametrize(
-    "harm, said",
+    "harm, message",
     [
         (lambda f: (f / "run.json").unlink(), "must be the folder of a run"),
         (lambda f: damaged(f, "joint.csv", "x,y\n1\n"), "damaged"),
@@ -88,22 +89,22 @@ def damaged(folder, name, text):
         (lambda f: change(f, case="../../elsewhere"), "must be the name of a case"),
     ],
 )
-def test_a_bad_folder_is_one_line(command, folder, tmp_path, harm, said, words):
+def test_a_bad_folder_is_reported_in_one_line(command, folder, tmp_path, harm, message, words):
     harm(folder)
     before = sorted(tmp_path.rglob("*"))
     code, out, err = command(*words, folder)
     assert (code, out) == (2, "") and len(err.splitlines()) == 1
-    assert said in err and str(folder) in err
+    assert message in err and str(folder) in err
     assert sorted(tmp_path.rglob("*")) == before
 
 
 def change(folder, **entries):
-    told = json.loads((folder / "run.json").read_text())
-    (folder / "run.json").write_text(json.dumps(told | entries))
+    record = json.loads((folder / "run.json").read_text())
+    (folder / "run.json").write_text(json.dumps(record | entries))
 
 
-def test_report(command, folder, tmp_path):
-    """One page: nothing from outside, what the run has found, what it was given."""
+def test_report_has_results_and_parameters(command, folder, tmp_path):
+    """One page without external files."""
     assert command("run", "a", *SMALL, "--set", "order=1")[0] == 0
     code, out, err = command("report", folder, "out/a", "--to", "page.html")
     assert (code, out, err) == (0, "page.html\n", "")
@@ -114,12 +115,12 @@ def test_report(command, folder, tmp_path):
     assert len(sections) == 3  # a has two scenes
     mine = sections[0]
     assert mine.count("data:image/svg+xml;base64,") == 3
-    assert re.search(r"SSF [\d.]+ &lt; 50", mine) and ">fail<" in mine  # what the case requires
-    assert ">not checked<" in sections[1] and ">pass<" not in page  # a requires nothing
+    assert re.search(r"SSF [\d.]+ &lt; 50", mine) and ">fail<" in mine  # required by the case
+    assert ">not checked<" in sections[1] and ">pass<" not in page  # case a requires none
     assert 'class="verdict not-checked"' in sections[1]
     words = re.sub(r"\s+", " ", re.sub(r"<[^>]*>", " ", mine))
     assert "K_N Normal stiffness K_N 2e+10 Pa per m 1e+11" in words
-    assert "dam_height" in words and "E_dam" not in words  # follows E, which nobody has set
+    assert "dam_height" in words and "E_dam" not in words  # follows E, which is not set
     assert (
         "reservoir" in words
         and "tailwater" in words
@@ -127,8 +128,8 @@ def test_report(command, folder, tmp_path):
     )
 
 
-def test_report_of_what_passes_with_its_estimated_error(command, tmp_path):
-    """What is required is met; the error that --accuracy has estimated is the one of run.json."""
+def test_report_of_a_dam_that_passes_with_its_estimated_error(command, tmp_path):
+    """The required factors are met; the estimated error of --accuracy is that of run.json."""
     needs = "--set", "required_SSF=0.1", "--levels", "40", "--accuracy", "coarse", "--no-picture"
     assert command("run", "dam", *needs)[0] == 0
     estimate = json.loads((tmp_path / "out/dam/run.json").read_text())["error_estimate"]
@@ -139,8 +140,8 @@ def test_report_of_what_passes_with_its_estimated_error(command, tmp_path):
     assert "not estimated" not in page
 
 
-def test_report_of_a_run_that_found_nothing(command, tmp_path):
-    """A dam too light to stand at all has no state to be drawn; the page says so."""
+def test_report_of_a_run_without_a_converged_step(command, tmp_path):
+    """A dam too light to stand has no state to draw; the page states it."""
     light = "--set", "rho_dam=10", "--set", "law=friction", "--set", "smallest_step=0.5"
     assert command("run", "c", *SMALL, *light, "--levels", "9", "--out", "light")[0] == 1
     assert command("report", "light")[0] == 0
@@ -148,8 +149,8 @@ def test_report_of_a_run_that_found_nothing(command, tmp_path):
 
 
 @pytest.mark.parametrize("law", ["friction", "bond"])
-def test_the_limit_drawn_is_that_of_the_law(solve, law):
-    """Where a node has slipped, its shear is on the limit; nowhere is it beyond."""
+def test_the_strength_drawn_is_that_of_the_law(solve, law):
+    """Where a node has slipped, its shear is at the limit; nowhere is it above."""
     (result,) = solve("c", levels="7", n_joint=20, law=law, adhesion=2e4, G_t=100)
     rows = result.at()
     _, limit = shear_limit(result.case, rows)

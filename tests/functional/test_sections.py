@@ -1,5 +1,6 @@
-"""Sections with batter, neck, sloping and lift joints, and every load: equilibrium against an
-integration of the tests' own; cracked uplift against the gravity method."""
+"""Sections with batter, neck, sloping and lift joints, and all loads: equilibrium against the
+integration of sections.py, cracked uplift against the gravity method.
+"""
 
 import numpy as np
 import pytest
@@ -36,7 +37,7 @@ SMALL = {"n_joint": 20, "h_dam": 6, "h_found": 30, "sigma_max": 1e6, "G_f": 1000
 
 
 def check(result, share=1.0):
-    """N, T, M of the last step against the loads and a pressure linear along the joint."""
+    """Assert N, T, M of the last step against loads and a pressure linear along the joint."""
     case, last = result.case, result.last
     assert not result.stopped
     length, unit = case.joint_length, case["rho_water"] * case["g"]
@@ -54,27 +55,27 @@ def check(result, share=1.0):
 
 @pytest.mark.parametrize("levels, tails", [("20,43", "0,3"), ("46.5", "24")])
 @pytest.mark.parametrize("shape", SHAPES)
-def test_water_on_a_section(solve, shape, levels, tails):
+def test_resultants_of_water_on_a_section(solve, shape, levels, tails):
     (result,) = solve("dam", levels, tails, **SMALL, **SHAPES[shape])
     check(result)
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-def test_all_loads_on_a_section(solve, shape):
-    """Loads whose mark lies on the lower body are none of the upper body's."""
+def test_resultants_of_all_loads_on_a_section(solve, shape):
+    """Loads that act on the lower body are not loads of the upper body."""
     (result,) = solve("dam", "20,44.5", "0", **SMALL, **SHAPES[shape], **LOADS)
     check(result)
 
 
-def test_low_water(solve):
-    """Lower than the first integration point of a coarse face."""
+def test_resultants_of_low_water(solve):
+    """Below the first integration point of a coarse face."""
     coarse = {"mesh_pattern": "regular", "h_dam": 20, "n_joint": 5, "uplift": "none"}
     (result,) = solve("dam", "0.5", **coarse)
     assert result.last["T"] == pytest.approx(1226.25, rel=1e-6)
 
 
 @pytest.mark.heavy
-def test_three_dimensions(solve):
+def test_resultants_in_3d(solve):
     solid = {"dim": 3, "mesh_pattern": "split", "thickness": 3, "n_layers": 2, "n_joint": 10}
     shape = {"batter": 4, "batter_height": 20, "neck_height": 6, "joint_slope": 4}
     (result,) = solve(
@@ -83,7 +84,7 @@ def test_three_dimensions(solve):
     check(result)
 
 
-def test_the_crest_moves_from_where_the_weight_has_left_it(solve):
+def test_crest_displacements_count_from_the_state_under_weight(solve):
     (first,), (both,) = (
         solve("dam", "0.001,20", uplift="none", weight_first=w, **SMALL) for w in (1, 0)
     )
@@ -93,8 +94,8 @@ def test_the_crest_moves_from_where_the_weight_has_left_it(solve):
     assert abs(whole[0]) > 0.1 * abs(moved[1])
 
 
-def test_loads_grow_over_the_unit_before(solve):
-    """Ice of 1e5 N/m from t = 1 to 2: all of it beyond."""
+def test_loads_increase_linearly_up_to_their_time(solve):
+    """Ice of 1e5 N/m from t = 1 to 2, constant beyond."""
     (result,) = solve(
         "dam", "30,30,30", steps=2, uplift="none", **SMALL, ice_force=1e5, ice_level=30, ice_t=2
     )
@@ -103,7 +104,7 @@ def test_loads_grow_over_the_unit_before(solve):
     assert_allclose(more, [0, 0, 5e4, 1e5, 1e5, 1e5], atol=1)
 
 
-#: So stiff a dam and rock that the joint's stress is linear, as the gravity method has it.
+#: Dam and rock so stiff that the joint's stress is linear, as in the gravity method.
 RIGID = {
     "E_dam": 1e15,
     "E_found": 1e15,
@@ -124,16 +125,17 @@ RIGID = {
         ("flow", 2.4149, 12_185_850),
     ],
 )
-def test_the_cracked_base_of_the_gravity_method(solve, uplift, crack, force):
+def test_the_crack_of_a_rigid_dam_is_that_of_the_gravity_method(solve, uplift, crack, force):
     """45 m dam without tension, level 45 m, tailwater 3 m. Flow with a tiny aperture is full head
-    in the crack and linear beyond."""
+    in the crack, linear beyond.
+    """
     (result,) = solve("dam", "40,45", "3", **RIGID, uplift=uplift, aperture_min=1e-9)
     assert result.last["crack_length"] == pytest.approx(crack, abs=0.05)
     assert result.last["N"] == pytest.approx(force, rel=2e-3)
 
 
-def test_a_bond_keeps_the_water_out_until_it_is_gone(solve):
-    """cracked counts what is broken; flow any opening."""
+def test_uplift_cracked_has_no_water_in_an_intact_bond(solve):
+    """uplift = cracked: full head in the broken part; uplift = flow: in any opening."""
     (cracked,), (flow,), (linear,) = (
         solve("dam", "40,45", "3", uplift=u, aperture_min=1e-8, n_joint=100)
         for u in ("cracked", "flow", "imposed")
@@ -144,7 +146,7 @@ def test_a_bond_keeps_the_water_out_until_it_is_gone(solve):
 
 
 @pytest.mark.parametrize(
-    "settings, said",
+    "settings, message",
     [
         ({"neck_height": 45}, "neck_height = 45: must be < dam_height"),
         ({"batter_height": 46}, "batter_height = 46: must be <= dam_height"),
@@ -157,14 +159,14 @@ def test_a_bond_keeps_the_water_out_until_it_is_gone(solve):
         ({"mesh_pattern": "regular", "batter": 4}, "mesh_pattern = regular: must be free"),
     ],
 )
-def test_no_such_section(settings, said):
-    with pytest.raises(InputError, match=said):
+def test_an_impossible_section_is_refused(settings, message):
+    with pytest.raises(InputError, match=message):
         load("dam", settings)
 
 
 @pytest.mark.parametrize("effectiveness", [0.0, 0.5, 1.0])
-def test_drains_in_what_the_crack_has_left(solve, effectiveness):
-    """As the gravity method has them, on a rigid dam; the drains stand on a node."""
+def test_drains_in_the_uncracked_part(solve, effectiveness):
+    """As in the gravity method, on a rigid dam; there is a node at the drains."""
     drains = {"drains": 1, "drain_x": 4, "drain_effectiveness": effectiveness}
     mesh = {"n_joint": 340, "uplift": "cracked"}
     (result,) = solve("dam", "40,45", "3", **RIGID | mesh | drains)
@@ -175,8 +177,9 @@ def test_drains_in_what_the_crack_has_left(solve, effectiveness):
 
 @pytest.mark.parametrize("uplift", ["cracked", "flow"])
 def test_drains_of_a_closed_lift_joint(solve, uplift):
-    """Their outlet, the base's heel, is below them: they draw no deeper than their own height, as
-    they do with uplift = drained; they stand on a node."""
+    """Their outlet, the heel of the base, is below them: they lower the head to their own height,
+    as with uplift = drained; there is a node at the drains.
+    """
     lift = {"joint_height": 20, "joint_slope": -3, "n_joint": 20}
     lift |= {"drains": 1, "drain_effectiveness": 0.8}
     lift["drain_x"] = 0.2 * load("dam", lift).joint_length
@@ -187,8 +190,7 @@ def test_drains_of_a_closed_lift_joint(solve, uplift):
 
 @pytest.mark.parametrize("name", ["e", pytest.param("f", marks=pytest.mark.heavy)])
 def test_drains_where_water_flows(solve, name):
-    """They take a part of the flow: what is left of it leaves at the toe, and the same in 2D and
-    3D."""
+    """They take a part of the flow, the rest leaves at the toe; in 2D and 3D the same."""
     (result,) = solve(name, drains=1, drain_x=1, drain_effectiveness=0.5)
     flux = result.at()["flux"]
     x = result.at()["s"]

@@ -1,7 +1,8 @@
-"""Random scenes verified from their files; and that the verification finds what is wrong."""
+"""Random dams verified from their result files, and the verification itself with altered files."""
 
 import csv
 import json
+import re
 import shutil
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from damjoint import __version__, run
 from damjoint.model.case import load
 from damjoint.post.tables import write_csv
 from damjoint_tools import pages, stress, verification
-from damjoint_tools.verification import Written, read_table, unjustified, violations
+from damjoint_tools.verification import RunFiles, judge_stop, read_table, violations
 
 SCENES = {
     "rupture": {"law": "rupture", "uplift": "flow", "sigma_max": 1e4, "G_f": 10.0},
@@ -22,8 +23,8 @@ DRAINED = {"drains": 1.0, "drain_x": 6.8}
 
 
 @pytest.fixture(scope="module")
-def written(tmp_path_factory):
-    """written(law, drained): a run of that law with cracks, as the command leaves it."""
+def run_files(tmp_path_factory):
+    """run_files(law, drained): the files of a run of that law with cracks."""
     done = {}
 
     def once(law, drained=False):
@@ -32,25 +33,25 @@ def written(tmp_path_factory):
             case = load("dam", settings, "30,44,35", "3")
             folder = tmp_path_factory.mktemp(law)
             run.run(case, folder, fields=False, picture=False, progress=False)
-            done[law, drained] = Written(case, folder, 0)
+            done[law, drained] = RunFiles(case, folder, 0)
         return done[law, drained]
 
     return once
 
 
 @pytest.mark.parametrize("law, drained", [*((law, False) for law in SCENES), ("rupture", True)])
-def test_what_a_run_has_written_stands_every_test(written, law, drained):
-    assert violations(written(law, drained)) == []
+def test_the_files_of_a_run_violate_no_rule(run_files, law, drained):
+    assert violations(run_files(law, drained)) == []
 
 
 @pytest.mark.parametrize("law", SCENES)
 @pytest.mark.parametrize(
-    "table, column, change, said",
+    "table, column, change, message",
     [
         ("history", "N", lambda v: v * 1.001, "N + U"),
         ("history", "T", lambda v: v * 1.001, "T ="),
         ("history", "M", lambda v: v * 1.001, "M ="),
-        ("history", "level", lambda v: v + 1e-3, "not at the level"),
+        ("history", "level", lambda v: v + 1e-3, "not at the prescribed level"),
         ("history", "slip_length", lambda v: 1 - 0.1 * np.arange(len(v)), "slip_length falls"),
         ("joint", "p", lambda v: v * 1.01, "the integral of p"),
         ("joint", "sigma_n_eff", lambda v: v + 1e6, "tension"),
@@ -58,33 +59,33 @@ def test_what_a_run_has_written_stands_every_test(written, law, drained):
         ("joint", "tau_1", lambda v: v * 100 + 1e6, "shear"),
     ],
 )
-def test_what_is_wrong_is_found(written, tmp_path, law, table, column, change, said):
-    found = violations(tampered(written(law), tmp_path, table, column, change))
-    assert any(said in line for line in found), found
+def test_an_altered_column_is_detected(run_files, tmp_path, law, table, column, change, message):
+    found = violations(altered(run_files(law), tmp_path, table, column, change))
+    assert any(message in line for line in found), found
 
 
-def tampered(whole, folder, table, column, change):
-    """A run's files with a column of a table changed."""
-    shutil.copytree(whole.folder, folder, dirs_exist_ok=True)
+def altered(files, folder, table, column, change):
+    """Copy the files of a run to a folder and change a column of a table."""
+    shutil.copytree(files.folder, folder, dirs_exist_ok=True)
     path = folder / f"{table}.csv"
-    changed = read_table(path)
-    changed[column] = change(changed[column])
-    write_csv(path, changed)
-    return Written(whole.case, folder, 0)
+    columns = read_table(path)
+    columns[column] = change(columns[column])
+    write_csv(path, columns)
+    return RunFiles(files.case, folder, 0)
 
 
-def falling(column):
-    """Nothing left in the last of three tables."""
+def zero_at_the_end(column):
+    """Set the values of the last of three times to 0."""
     return np.where(np.arange(len(column)) < len(column) * 2 // 3, column, 0)
 
 
 @pytest.mark.parametrize(
-    "law, table, column, change, said",
+    "law, table, column, change, message",
     [
-        ("rupture", "joint", "damage", falling, "damage falls"),
-        ("bond", "joint", "damage", falling, "damage falls"),
+        ("rupture", "joint", "damage", zero_at_the_end, "damage falls"),
+        ("bond", "joint", "damage", zero_at_the_end, "damage falls"),
         ("bond", "joint", "damage", lambda v: v + 1, "damage is out of its range"),
-        ("friction", "joint", "lambda", falling, "lambda falls"),
+        ("friction", "joint", "lambda", zero_at_the_end, "lambda falls"),
         ("friction", "joint", "lambda", lambda v: 0.999 * v, "shear: beyond the law"),
         ("friction", "joint", "lambda", lambda v: 0.999 * v, "slip is more than lambda"),
         ("friction", "joint", "lambda", np.negative, "lambda is out of its range"),
@@ -92,59 +93,61 @@ def falling(column):
         ("rupture", "joint", "p", lambda v: 0 * v + 1, "pressure below the tailwater's head"),
         ("rupture", "joint", "flux", lambda v: v * np.linspace(1, 1.01, len(v)), "flux varies"),
         ("bond", "joint", "sigma_n_eff", np.negative, "contact: off"),
-        ("bond", "history", "tail_level", lambda v: v + 1e-3, "not at the tailwater"),
+        ("bond", "history", "tail_level", lambda v: v + 1e-3, "not at the prescribed tailwater"),
         ("bond", "history", "time", lambda v: v[::-1], "times do not increase"),
     ],
 )
-def test_what_no_law_does_is_found(written, tmp_path, law, table, column, change, said):
-    found = violations(tampered(written(law), tmp_path, table, column, change))
-    assert any(said in line for line in found), found
+def test_a_value_that_no_law_allows_is_detected(
+    run_files, tmp_path, law, table, column, change, message
+):
+    found = violations(altered(run_files(law), tmp_path, table, column, change))
+    assert any(message in line for line in found), found
 
 
 @pytest.mark.parametrize(
-    "change, said",
+    "change, message",
     [
         (lambda v, s: np.where(s == s.min(), 1.01 * v, v), "flux varies"),
         (lambda v, s: np.where(s < 6.8, 0, v), "drains give"),
     ],
 )
-def test_drains_take_a_part_of_the_flux(written, tmp_path, change, said):
-    """As much is taken in everywhere before them, and no less than leaks."""
-    whole = written("rupture", drained=True)
-    s = read_table(whole.folder / "joint.csv")["s"]
-    found = violations(tampered(whole, tmp_path, "joint", "flux", lambda v: change(v, s)))
-    assert found and all(said in line for line in found), found
+def test_a_flux_that_drains_can_not_cause_is_detected(run_files, tmp_path, change, message):
+    """Upstream of the drains the flux is uniform and not less than the leakage."""
+    files = run_files("rupture", drained=True)
+    s = read_table(files.folder / "joint.csv")["s"]
+    found = violations(altered(files, tmp_path, "joint", "flux", lambda v: change(v, s)))
+    assert found and all(message in line for line in found), found
 
 
-def test_a_wrong_exit_code_is_found(written):
-    whole = written("rupture")
-    assert violations(Written(whole.case, whole.folder, 1)) == [
+def test_a_wrong_exit_code_is_detected(run_files):
+    files = run_files("rupture")
+    assert violations(RunFiles(files.case, files.folder, 1)) == [
         "exit code 1 with state complete, verdict stands"
     ]
 
 
 @pytest.mark.parametrize(
-    "level, mu, said, wrong",
+    "level, mu, verdict, remark",
     [
-        (30, 0.8, "sliding", "where an equilibrium is certain"),
+        (30, 0.8, "sliding", "but there certainly is an equilibrium"),
         (44, 0.6, "sliding", ""),
-        (44, 0.6, "overturning", "which the rigid block does not explain"),
+        (44, 0.6, "overturning", "but the rigid block is not near that limit"),
     ],
 )
-def test_a_stop_is_laid_beside_the_rigid_block(tmp_path, level, mu, said, wrong):
-    """The shear is within 40.6 m of what mu = 0.6 holds (T = mu N), the resultant well inside."""
+def test_the_reason_of_a_stop_is_judged_by_the_rigid_block(tmp_path, level, mu, verdict, remark):
+    """With mu = 0.6 it slides at 40.6 m (T = mu N), with the resultant well within the base."""
     settings = {"law": "friction", "adhesion": 0.0, "mu": mu, "pena_tang": 0.0, "n_joint": 20.0}
     case = load("dam", settings, str(level), "3")
     run.run(case, tmp_path, fields=False, picture=False, progress=False)
-    told = json.loads((tmp_path / "run.json").read_text())
-    told |= {"state": "stopped", "verdict": said}
-    (tmp_path / "run.json").write_text(json.dumps(told))
-    found, why = unjustified(Written(case, tmp_path, 1))
-    assert found == bool(wrong) and why.endswith(wrong) and bool(why) == bool(wrong)
+    record = json.loads((tmp_path / "run.json").read_text())
+    record |= {"state": "stopped", "verdict": verdict}
+    (tmp_path / "run.json").write_text(json.dumps(record))
+    wrong, found = judge_stop(RunFiles(case, tmp_path, 1))
+    assert wrong == bool(remark) and found.endswith(remark) and bool(found) == bool(remark)
 
 
-def test_stress_is_seeded_resumed_and_has_a_page(command, monkeypatch):
-    monkeypatch.setattr(stress, "PATIENCE", 60)
+def test_stress_is_reproducible_and_resumed_and_makes_a_page(command, monkeypatch):
+    monkeypatch.setattr(stress, "TIME_LIMIT", 60)
     code, out, _ = command("stress", 2, "--seed", 3, "--out", "s.csv")
     assert code == 0 and "0 defect; s.csv" in out
     before = Path("s.csv").read_text()
@@ -157,23 +160,25 @@ def test_stress_is_seeded_resumed_and_has_a_page(command, monkeypatch):
     assert "2 random scenes" in page and stress.VERIFIED in page
     assert f"Measured with damjoint {__version__} (" in page
     assert rows[0]["date"] in page and rows[0]["machine"] in page
-    # no row of other code is added to, and none gets into one page
+    # rows of different code are neither added to one file nor shown on one page
     other = before.replace(rows[0]["code"], "of-other-code", 1)
     Path("s.csv").write_text(other)
     code, _, error = command("stress", 3, "--seed", 3, "--out", "s.csv")
-    assert code == 2 and error.count("\n") == 1 and "s.csv: begun with damjoint" in error
+    assert code == 2 and error.count("\n") == 1 and "out = s.csv: must be a new file" in error
     assert Path("s.csv").read_text() == other
     with pytest.raises(ValueError, match="figures of different versions"):
         pages.trust_page(Path("s.csv"))
 
 
 @pytest.mark.heavy
-def test_random_scenes(tmp_path):
-    """Sixty scenes of the page's seed: each is verified, or its stop is justified."""
+def test_random_dams_have_no_defect(tmp_path):
     rows = stress.stress(60, 7, tmp_path / "stress.csv")
-    bad = [row for row in rows if row["class"] == stress.DEFECT]
-    assert len(rows) == 60 and not bad, bad
+    defects = [row for row in rows if row["class"] == stress.DEFECT]
+    assert len(rows) == 60 and not defects, defects
 
 
-def test_verification_knows_no_engine():
-    assert "engines" not in Path(verification.__file__).read_text()
+def test_verification_imports_neither_engines_nor_laws():
+    source = Path(verification.__file__).read_text()
+    imports = [line for line in source.splitlines() if line.startswith(("import ", "from "))]
+    assert len(imports) > 5
+    assert not [line for line in imports if re.search(r"\b(engines|laws|solver|joint|fem)\b", line)]

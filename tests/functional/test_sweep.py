@@ -1,4 +1,4 @@
-"""Sweeps: each row is the run of its own; a file is resumed."""
+"""Sweeps: each row is equal to a single run; a file is resumed."""
 
 import csv
 import os
@@ -22,7 +22,7 @@ def rows(path):
         return list(csv.DictReader(file))
 
 
-def test_rows_are_the_runs(solve, command, tmp_path):
+def test_rows_are_equal_to_single_runs(solve, command, tmp_path):
     words = (
         "sweep",
         "c",
@@ -51,7 +51,7 @@ def test_rows_are_the_runs(solve, command, tmp_path):
 
 
 def test_a_sweep_is_resumed(command, tmp_path):
-    """Half of it, then all of it on two processes: the rows already there stay as they are."""
+    """Half of the rows, then all on two processes: the first rows stay unchanged."""
     sweep = lambda mu: command(
         "sweep", "c", "--vary", f"mu={mu}", "--jobs", "2", "--out", "sweep.csv"
     )
@@ -82,15 +82,15 @@ def test_an_interrupted_sweep_ends_at_once_and_keeps_its_rows(tmp_path):
             time.sleep(0.05)
         os.killpg(process.pid, signal.SIGINT)
         try:
-            _, said = process.communicate(timeout=15)
+            _, error = process.communicate(timeout=15)
         except subprocess.TimeoutExpired:
             os.killpg(process.pid, signal.SIGKILL)
             raise
-    assert process.returncode == 130 and len(said.splitlines()) == 1
+    assert process.returncode == 130 and len(error.splitlines()) == 1
     assert 9 <= len(rows(out)) < 4001
 
 
-def test_a_dam_that_slides_is_a_row_that_says_so(command, tmp_path):
+def test_the_row_of_a_dam_that_slides_has_its_verdict(command, tmp_path):
     command(
         "sweep",
         "c",
@@ -112,9 +112,8 @@ def test_a_dam_that_slides_is_a_row_that_says_so(command, tmp_path):
         )
 
 
-def test_no_level_without_equilibrium(command, tmp_path):
-    """Without tensile strength the shear goes as soon as a point opens: a jump of the law that no
-    level may fall into."""
+def test_all_rows_of_close_levels_converge_and_their_openings_increase(command, tmp_path):
+    """Without tensile strength the shear is lost on opening, a jump of the law."""
     command(
         "sweep",
         "a",
@@ -153,8 +152,8 @@ def test_a_scheduler_with_two_workers(tmp_path):
         }
 
 
-def test_a_varied_level_keeps_the_tailwater(command, tmp_path):
-    """A constant one, and one that rises with the reservoir: interpolated at the level asked."""
+def test_a_varied_level_has_the_tailwater_of_the_case(command, tmp_path):
+    """Constant, or rising with the reservoir: interpolated at the varied level."""
     common = "default_n_joint = 10; default_h_dam = 3; levels() = {3, 6, 9}; times() = {3};"
     for name, tails, expected in (("same", "1", 1.0), ("rises", "0, 1, 2", 1.5)):
         text = f'Include "ssnp142.case"; {common} tail_levels() = {{{tails}}};'
@@ -168,24 +167,24 @@ def test_a_varied_level_keeps_the_tailwater(command, tmp_path):
         assert float(row["level"]) == 7.5
 
 
-#: The 45 m dam without bond at a level at which it slides for mu < 0.6, on a coarse mesh: N and T
-#: are those of any other.
+#: The 45 m dam without bond at a level at which it slides for mu < 0.6; N and T do not depend on
+#: the mesh, which is coarse.
 SLIDES = (
     *("sweep", "dam", "--levels", "40.619", "--tail-levels", "3", "--set", "n_joint=40"),
     *("--set", "law=bond", "--set", "sigma_max=0", "--set", "adhesion=0", "--out", "sweep.csv"),
 )
 
 
-def test_the_probability_of_failure_is_the_distributions(command, tmp_path):
-    """A Latin hypercube of the friction coefficient alone has its share below 0.6 to one row."""
+def test_the_probability_of_failure_is_that_of_the_distribution(command, tmp_path):
+    """Of a Latin hypercube of the friction coefficient the share below 0.6, to one row."""
     sample = "--sample", "40", "mu=normal(0.68,0.06)"
-    code, said, _ = command(*SLIDES, *sample)
-    assert code == 0 and "Probability of failure" in said and "nan" not in said
-    (told,) = rows(tmp_path / "sweep_probability.csv")
+    code, out, _ = command(*SLIDES, *sample)
+    assert code == 0 and "Probability of failure" in out and "nan" not in out
+    (row,) = rows(tmp_path / "sweep_probability.csv")
     exact = stats.norm.cdf(0.6, 0.68, 0.06)
-    assert float(told["low"]) < exact < float(told["high"])
-    assert abs(float(told["probability"]) - exact) <= 1 / 40
-    assert (told["rows"], told["undecided"]) == ("40", "0")
+    assert float(row["low"]) < exact < float(row["high"])
+    assert abs(float(row["probability"]) - exact) <= 1 / 40
+    assert (row["rows"], row["undecided"]) == ("40", "0")
     (of_mu,) = rows(tmp_path / "sweep_sensitivity.csv")
     assert of_mu["input"] == "mu" and float(of_mu["crest_ux"]) < -0.99
     for row in rows(tmp_path / "sweep.csv"):
@@ -194,13 +193,13 @@ def test_the_probability_of_failure_is_the_distributions(command, tmp_path):
             row["failed"] == "1"
         )
     before = (tmp_path / "sweep.csv").read_text()
-    assert command(*SLIDES, *sample)[1].replace("0 rows", "40 rows") == said
+    assert command(*SLIDES, *sample)[1].replace("0 rows", "40 rows") == out
     assert (tmp_path / "sweep.csv").read_text() == before
     assert (tmp_path / "sweep.png").stat().st_size > 10_000
 
 
 @pytest.mark.heavy
-def test_what_no_joint_can_hold_is_found_by_the_search_too(command, tmp_path):
+def test_rows_skipped_by_statics_fail_in_a_full_run_too(command, tmp_path):
     """The same verdicts without the shortcut of a sample."""
     assert command(*SLIDES, "--vary", "mu=0.598,0.602")[0] == 0
     assert sorted((r["mu"], r["verdict"]) for r in rows(tmp_path / "sweep.csv")) == [
@@ -209,19 +208,19 @@ def test_what_no_joint_can_hold_is_found_by_the_search_too(command, tmp_path):
     ]
 
 
-#: A mesh that --accuracy chooses, but for its fineness.
+#: The mesh of --accuracy but for its fineness.
 MESH = "mesh_pattern=free", "quadrature=full", "n_layers=1", "h_dam=-1", "h_found=-1"
 
 
 def test_ties_loading_and_accuracy(command, solve, tmp_path):
-    """A tied parameter and the loading of the words are those of the run; one mesh for all rows,
-    that of the case as it is.
+    """A row with a tied parameter and given levels equals the single run; one mesh for all rows,
+    refined for the case as it is.
     """
     loading = "--levels", "6,8", "--tail-levels", "1", "--steps", "2"
     words = "--vary", "mu=0.35,0.5", "--tie", "adhesion=1e4*mu", "--jobs", "1", "--out", "s.csv"
-    code, said, _ = command("sweep", "c", *loading, "--accuracy", "coarse", *words)
-    assert code == 0 and said.startswith("one mesh for all rows")
-    n = re.search(r"n_joint = (\d+)", said)[1]
+    code, out, _ = command("sweep", "c", *loading, "--accuracy", "coarse", *words)
+    assert code == 0 and out.startswith("one mesh for all rows")
+    n = re.search(r"n_joint = (\d+)", out)[1]
     mesh = [part for name in (f"n_joint={n}", "order=2", *MESH) for part in ("--set", name)]
     for row in rows(tmp_path / "s.csv"):
         assert float(row["adhesion"]) == pytest.approx(1e4 * float(row["mu"]))
@@ -235,7 +234,7 @@ def test_ties_loading_and_accuracy(command, solve, tmp_path):
 
 @pytest.mark.heavy
 def test_a_critical_level_is_a_column(command, tmp_path):
-    """That at which the dam slides; the file is not one of the plain sweep."""
+    """That at which the dam slides; the file is not one of a sweep without --critical."""
     words = *SLIDES, "--levels", "30", "--set", "n_joint=10", "--vary", "mu=0.6"
     assert command(*words, "--critical")[0] == 0
     (row,) = rows(tmp_path / "sweep.csv")
@@ -246,7 +245,7 @@ def test_a_critical_level_is_a_column(command, tmp_path):
     assert command(*words)[0] == 2
 
 
-def test_a_row_that_fails_says_why_and_the_others_go_on(command, tmp_path, monkeypatch):
+def test_a_failed_row_has_its_reason_and_the_others_are_computed(command, tmp_path, monkeypatch):
     whole = sweep.stepped
 
     def broken(case, known, interface):
@@ -273,8 +272,8 @@ def test_a_row_that_fails_says_why_and_the_others_go_on(command, tmp_path, monke
         (("--vary", "mu=0.4", "--vary", "level=9", "--vary", "adhesion=1,2"), False),
     ],
 )
-def test_a_chart_by_itself(command, tmp_path, words, drawn):
+def test_the_chart_of_a_sweep(command, tmp_path, words, drawn):
     common = "--set", "n_joint=10", "--jobs", "1", "--out", "s.csv"
-    code, said, _ = command("sweep", "c", *words, *common)
-    assert code == 0 and ("no chart" in said) != drawn
+    code, out, _ = command("sweep", "c", *words, *common)
+    assert code == 0 and ("no chart" in out) != drawn
     assert (tmp_path / "s.png").exists() == drawn

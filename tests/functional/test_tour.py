@@ -1,4 +1,4 @@
-"""The tour's commands print what the page says, and the page is made of nothing else."""
+"""The tour: its commands print what the page shows."""
 
 import re
 from pathlib import Path
@@ -13,8 +13,7 @@ NUMBER = re.compile(r"(?<![\w.])[+-]?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 
 
 def words_and_numbers(text):
-    """The text without its numbers, blanks, rules of tables, and the line of commit and date; the
-    numbers."""
+    """The text without numbers, blanks, rules of tables and the line of origin; the numbers."""
     text = pages.between("figures", text, "")
     words = re.sub(r"[\s-]+", " ", NUMBER.sub("#", text))
     return words, [float(number) for number in NUMBER.findall(text)]
@@ -22,19 +21,19 @@ def words_and_numbers(text):
 
 @pytest.mark.heavy
 def test_the_tour_is_current():
-    """`make pages` after a change of what a command prints; the last digits are the machine's."""
+    """After a change of printed output: `make pages`. The last digits depend on the machine."""
     words, numbers = words_and_numbers(PAGE.read_text())
     words_now, numbers_now = words_and_numbers(pages.tour_page())
     assert words_now == words
     assert_allclose(numbers_now, numbers, rtol=2e-3)
 
 
-def test_what_a_block_prints_stands_below_its_command(tmp_path):
+def test_the_output_of_a_command_is_written_below_it(tmp_path):
     block = "$ damjoint \\\n    --version\n1.2.3 of long ago\n"
     assert pages.played(block, tmp_path) == f"$ damjoint \\\n    --version\n{__version__}\n"
 
 
-def test_a_file_of_the_tour_is_written_and_a_command_that_is_refused_is_no_page(tmp_path):
+def test_a_case_file_of_the_tour_is_written_and_a_refused_command_is_an_error(tmp_path):
     block = '// my.case\ntitle = "no dam";\ndefault_dam_height = -1;\n'
     assert pages.played(block, tmp_path) == block
     assert (tmp_path / "my.case").read_text() == block

@@ -1,5 +1,5 @@
-"""The window by its real ONELAB server: opened, changed, run, stopped, saved; without a display
-but for the last test, which presses Run in the real window.
+"""The window, by its ONELAB server: open, change, run, stop, save; without a display but for the
+last test, which presses Run in the window itself.
 """
 
 import json
@@ -21,8 +21,8 @@ SMALL = {"n_joint": 10.0, "h_dam": 3.0, "h_found": 4.0}
 WORDS = [word for name, value in SMALL.items() for word in ("--set", f"{name}={value}")]
 
 
-class Hand:
-    """What a user does: types, presses, waits."""
+class User:
+    """Actions of a user: type, press, wait."""
 
     def __init__(self, case, **settings):
         self.session = Session(Request(case, settings))
@@ -39,7 +39,7 @@ class Hand:
         self.session.turn()
 
     def type(self, name, value):
-        """Into a field, by the parameter's name or the tree's."""
+        """Type into a field; name: of the parameter or of the tree entry."""
         known = self.session.tree.known
         label = known[name].label if name in known else name
         if isinstance(value, str):
@@ -72,67 +72,69 @@ class Hand:
 
 @pytest.fixture
 def open_window():
-    hands = []
+    users = []
 
     def opened(case, **settings):
-        hands.append(Hand(case, **settings))
-        return hands[-1]
+        users.append(User(case, **settings))
+        return users[-1]
 
     yield opened
-    for hand in hands:
-        hand.session.close()
+    for user in users:
+        user.session.close()
 
 
-def test_all_parameters_with_what_is_allowed_and_no_dead_button(open_window):
-    hand = open_window("a")
-    assert hand.session.status == "ready: press Run"
-    for name, parameter in hand.session.tree.known.items():
-        entry = hand.entry(name)
+def test_all_parameters_are_in_the_tree_with_their_range_and_without_buttons_of_no_effect(
+    open_window,
+):
+    user = open_window("a")
+    assert user.session.status == "ready: press Run"
+    for name, parameter in user.session.tree.known.items():
+        entry = user.entry(name)
         assert entry["help"].startswith(f"{name}: {parameter.allowed()}")
-        if entry["type"] == "number":  # no loop or graph button that would do nothing
+        if entry["type"] == "number":  # loop and graph buttons would have no effect
             choices = entry.get("choices", [])
             assert entry["step"] == 0 and (
                 choices in ([], [0, 1]) or len(entry["valueLabels"]) == len(choices)
             )
-    assert hand.entry(tree.CASE)["valueLabels"].keys() >= {"dam: own dam", "open a case file ..."}
-    assert len(hand.entry(tree.CASE)["choices"]) == len(hand.session.tree.titles) + 1
+    assert user.entry(tree.CASE)["valueLabels"].keys() >= {"dam: own dam", "open a case file ..."}
+    assert len(user.entry(tree.CASE)["choices"]) == len(user.session.tree.titles) + 1
     assert tree.get_text(tree.LEVELS) == "3, 6, 8, 9"
 
 
 def test_only_what_matters_shows_and_followers_say_what_they_follow(open_window):
-    hand = open_window("a")
-    assert hand.entry("sigma_max")["visible"] and not hand.entry("mu")["visible"]
-    assert not hand.entry("thickness")["visible"] and not hand.entry("visc")["visible"]
-    hand.type("law", "friction")
-    assert hand.entry("mu")["visible"] and not hand.entry("sigma_max")["visible"]
-    hand.type("E", 2e10)
-    entry = hand.entry("E_dam")
+    user = open_window("a")
+    assert user.entry("sigma_max")["visible"] and not user.entry("mu")["visible"]
+    assert not user.entry("thickness")["visible"] and not user.entry("visc")["visible"]
+    user.type("law", "friction")
+    assert user.entry("mu")["visible"] and not user.entry("sigma_max")["visible"]
+    user.type("E", 2e10)
+    entry = user.entry("E_dam")
     assert entry["values"] == [-1] and entry["label"].startswith("E_dam = 2e+10 (-1: E): ")
-    assert hand.session.tree.sheet.case["E_dam"] == 2e10
-    hand.type("E_dam", 3e10)
-    assert hand.session.tree.sheet.case["E_dam"] == 3e10
-    assert hand.entry("E_dam")["label"] == "Young's modulus of the dam [Pa]"
-    hand.type("E_dam", -1.0)
-    assert hand.session.tree.sheet.case["E_dam"] == 2e10
+    assert user.session.tree.sheet.case["E_dam"] == 2e10
+    user.type("E_dam", 3e10)
+    assert user.session.tree.sheet.case["E_dam"] == 3e10
+    assert user.entry("E_dam")["label"] == "Young's modulus of the dam [Pa]"
+    user.type("E_dam", -1.0)
+    assert user.session.tree.sheet.case["E_dam"] == 2e10
 
 
-def test_changed_run_and_saved_as_in_batch(open_window, command, tmp_path):
-    """The same bytes, from the command line and from the case file that was saved."""
-    hand = open_window("a", **SMALL)
-    hand.type("law", "friction")
-    hand.type("uplift", "flow")
-    hand.type(tree.LEVELS, "3, 5,6")
-    hand.type(tree.TAIL_LEVELS, "0,1,1")
-    hand.type(tree.STEPS, "2")
+def test_results_and_saved_case_are_those_of_the_command(open_window, command, tmp_path):
+    """The same bytes, from the command line and from the saved case file."""
+    user = open_window("a", **SMALL)
+    user.type("law", "friction")
+    user.type("uplift", "flow")
+    user.type(tree.LEVELS, "3, 5,6")
+    user.type(tree.TAIL_LEVELS, "0,1,1")
+    user.type(tree.STEPS, "2")
     assert tree.get_text(tree.TIMES) == "0.5, 1, 1.5, 2, 2.5, 3"
-    assert hand.run().startswith(("done in", "sliding"))
-    hand.save(tmp_path / "window")
-    hand.session.close()
+    assert user.run().startswith(("done in", "sliding"))
+    user.save(tmp_path / "window")
+    user.session.close()
     words = "--set", "law=friction", "--set", "uplift=flow", "--steps", "2"
     levels = "--levels", "3,5,6", "--tail-levels", "0,1,1"
     command("run", "a", *WORDS, *words, *levels, "--out", "batch")
     command("run", tmp_path / "window" / "a.case", "--out", "again")
-    hand.session = Session(Request("a"))  # for the fixture to close
+    user.session = Session(Request("a"))  # closed by the fixture
     saved = sorted(p.relative_to(tmp_path / "window") for p in (tmp_path / "window").rglob("*.*"))
     for folder in ("batch", "again"):
         found = sorted(p.relative_to(tmp_path / folder) for p in (tmp_path / folder).rglob("*.*"))
@@ -142,10 +144,10 @@ def test_changed_run_and_saved_as_in_batch(open_window, command, tmp_path):
             assert one == other
 
 
-def test_results_stand_in_the_tree(open_window):
-    hand = open_window("c", **SMALL)
-    hand.run()
-    result = hand.session.scenes[0].result
+def test_results_are_in_the_tree(open_window):
+    user = open_window("c", **SMALL)
+    user.run()
+    result = user.session.scenes[0].result
     names = {n.rpartition("/")[2].lstrip("0123456789"): n for n in gmsh.onelab.getNames("01Res.*")}
     for column, name in tree.RESULTS.items():
         entry = json.loads(gmsh.onelab.get(names[name]))
@@ -157,25 +159,25 @@ def test_results_stand_in_the_tree(open_window):
     assert not json.loads(gmsh.onelab.get(names["Leakage [kg per m s]"]))["visible"]
 
 
-def test_a_softening_joint_is_a_number_and_a_color(open_window):
+def test_a_softening_joint_has_a_length_and_a_colour(open_window):
     coarse = {"n_joint": 20.0, "h_dam": 8.0, "h_found": 30.0}
-    hand = open_window("dam", law="bond", sigma_max=3e5, G_f=300.0, **coarse)
-    hand.type(tree.LEVELS, "40, 48")
-    hand.run()
-    (entry,) = (hand.entry(n) for n in gmsh.onelab.getNames("01Res.*") if "process zone" in n)
-    zone = hand.session.scenes[0].result.last["process_zone"]
+    user = open_window("dam", law="bond", sigma_max=3e5, G_f=300.0, **coarse)
+    user.type(tree.LEVELS, "40, 48")
+    user.run()
+    (entry,) = (user.entry(n) for n in gmsh.onelab.getNames("01Res.*") if "process zone" in n)
+    zone = user.session.scenes[0].result.last["process_zone"]
     assert entry["visible"] and entry["values"][0] == pytest.approx(zone) and zone > 5
-    assert "softening joint" in hand.views
-    tag = gmsh.view.getTags()[hand.views.index("softening joint")]
+    assert "softening joint" in user.views
+    tag = gmsh.view.getTags()[user.views.index("softening joint")]
     assert "violet: joint softening" in str(gmsh.view.getListDataStrings(tag, 2))
-    before, now = captions(Deformed(hand.session.scenes[0]))
+    before, now = captions(Deformed(user.session.scenes[0]))
     assert "softening" not in before and now.endswith(f"crack 0 m, softening {zone:.3g} m")
 
 
-def test_views_have_a_step_per_level_and_replace_those_before(open_window):
-    hand = open_window("c", **SMALL)
-    hand.run()
-    views = hand.views
+def test_views_have_a_step_per_level_and_replace_the_earlier_ones(open_window):
+    user = open_window("c", **SMALL)
+    user.run()
+    views = user.views
     for name in ("displacement [m]", "water", "open or broken joint", "slipped joint"):
         assert name in views
     for start in ("opening", "slip", "normal stress", "shear stress", "water pressure", "level"):
@@ -186,29 +188,29 @@ def test_views_have_a_step_per_level_and_replace_those_before(open_window):
             corners = {"VQ": 4, "VT": 3}
             for kind, count, values in zip(*data, strict=True):
                 steps = (len(values) / count / corners[kind] - 3) / 3
-                assert steps == len(hand.session.scenes[0].times) == 4
-    hand.run()
-    assert hand.views == views
-    hand.type(tree.KEEP, 1.0)
-    hand.type("mu", 0.7)
-    hand.run()
-    assert "run 1: displacement [m]" in hand.views and "displacement [m]" in hand.views
-    assert "opening, before [nm]" in hand.views
-    hand.type(tree.KEEP, 0.0)
-    hand.run()
-    assert not any("run 1" in view for view in hand.views)
+                assert steps == len(user.session.scenes[0].times) == 4
+    user.run()
+    assert user.views == views
+    user.type(tree.KEEP, 1.0)
+    user.type("mu", 0.7)
+    user.run()
+    assert "run 1: displacement [m]" in user.views and "displacement [m]" in user.views
+    assert "opening, before [nm]" in user.views
+    user.type(tree.KEEP, 0.0)
+    user.run()
+    assert not any("run 1" in view for view in user.views)
 
 
-def test_the_status_says_whether_the_results_are_those_of_the_parameters(open_window):
-    hand = open_window("c", **SMALL)
-    done = hand.run()
-    assert hand.type(tree.KEEP, 1.0) == done
-    assert hand.type("dam_crest", 2.0) == "changed since the run: press Run"
+def test_the_status_shows_whether_the_results_belong_to_the_parameters(open_window):
+    user = open_window("c", **SMALL)
+    done = user.run()
+    assert user.type(tree.KEEP, 1.0) == done
+    assert user.type("dam_crest", 2.0) == "changed since the run: press Run"
     visible = [gmsh.view.option.getNumber(tag, "Visible") for tag in gmsh.view.getTags()]
-    assert sum(visible) == 2  # the water beside the new outline, and the heading
-    assert hand.type("dam_crest", 1.5) == done
+    assert sum(visible) == 2  # water beside the new outline, and the heading
+    assert user.type("dam_crest", 1.5) == done
     visible = [gmsh.view.option.getNumber(tag, "Visible") for tag in gmsh.view.getTags()]
-    assert sum(visible) == len(visible) - 2  # all but that water, and the stress
+    assert sum(visible) == len(visible) - 2  # all but the water and the stress
 
 
 def shown_results():
@@ -221,35 +223,36 @@ def shown_results():
     return tree.get_text(tree.VERDICT), numbers, lines
 
 
-def test_results_of_anything_else_are_gone_at_once(open_window):
-    """Before the engine has answered: another parameter, another case, a bad choice, Run pressed
-    right after it; and back again with the parameter."""
-    hand = open_window("c", **SMALL)
+def test_results_of_other_parameters_are_removed_at_once(open_window):
+    """Before the engine has answered: after a change of a parameter, of the case, a bad value, and
+    Run pressed right after it; they return with the parameter.
+    """
+    user = open_window("c", **SMALL)
     assert shown_results() == (
         "not run yet",
         [],
         ["C: friction, 2D, order 1, quadrangles", C_SCENE],
     )
-    hand.run()
-    assert hand.views.count("displacement [m]") == 1
+    user.run()
+    assert user.views.count("displacement [m]") == 1
     before = verdict, numbers, lines = shown_results()
     assert verdict == "sliding" and len(numbers) > 10 and C_SCENE in lines
-    mu, own = hand.session.tree.known["mu"].label, hand.session.tree.sheet.case["mu"]
+    mu, own = user.session.tree.known["mu"].label, user.session.tree.sheet.case["mu"]
     for value, found in ((0.7, ("not run yet", [])), (own, before[:2])):
         gmsh.onelab.setNumber(mu, [value])
-        hand.press("check")
+        user.press("check")
         assert shown_results()[:2] == ("not run yet", [])
         assert not any("level" in line for line in shown_results()[2])
-        hand.wait()
+        user.wait()
         assert shown_results()[:2] == found
     assert shown_results() == before
     for case in (float(len(titles())), 0.0):  # "open a case file ...", and modeling A
         gmsh.onelab.setNumber(tree.CASE, [case])
-        hand.press("check")
+        user.press("check")
         assert shown_results()[:2] == ("not run yet", [])
-    hand.press("run")
-    assert hand.session.busy == "running" and shown_results()[:2] == ("not run yet", [])
-    hand.wait()
+    user.press("run")
+    assert user.session.busy == "running" and shown_results()[:2] == ("not run yet", [])
+    user.wait()
     assert shown_results()[0] == "stands"
     assert "A: rupture, 2D, order 1" in shown_results()[2]
 
@@ -258,27 +261,27 @@ def test_results_of_anything_else_are_gone_at_once(open_window):
 C_SCENE = "law friction, uplift imposed"
 
 
-def test_the_title_follows_law_and_water(open_window):
-    hand = open_window("c", **SMALL)
-    hand.run()
-    hand.type("law", "rupture")
-    hand.type("uplift", "none")
+def test_the_heading_follows_law_and_water(open_window):
+    user = open_window("c", **SMALL)
+    user.run()
+    user.type("law", "rupture")
+    user.type("uplift", "none")
     changed = ["case c, changed", "law rupture, uplift none"]
     assert shown_results()[2] == changed
-    hand.run()
+    user.run()
     assert [line for line in shown_results()[2] if line in changed] == changed
     assert not any("friction" in line for line in shown_results()[2])
-    hand.type("law", "friction")
-    hand.type("uplift", "imposed")
+    user.type("law", "friction")
+    user.type("uplift", "imposed")
     assert shown_results()[2] == ["C: friction, 2D, order 1, quadrangles", C_SCENE]
 
 
-def test_drawing_follows_geometry_and_can_be_meshed(open_window):
-    hand = open_window("e")
+def test_the_drawing_follows_the_geometry_and_can_be_meshed(open_window):
+    user = open_window("e")
     assert gmsh.model.getBoundingBox(-1, -1)[4] == pytest.approx(10, abs=1e-6)
-    hand.type("dam_height", 12.0)
+    user.type("dam_height", 12.0)
     assert gmsh.model.getBoundingBox(-1, -1)[4] == pytest.approx(12, abs=1e-6)
-    assert hand.views == ["water", "heading"]
+    assert user.views == ["water", "heading"]
     gmsh.model.mesh.generate(2)
     assert len(gmsh.model.mesh.getNodes()[0]) > 100
 
@@ -299,77 +302,77 @@ def test_drawing_follows_geometry_and_can_be_meshed(open_window):
         ("law", "glue", "law = glue: must be one of rupture, friction"),
     ],
 )
-def test_a_bad_value_is_one_line_and_nothing_runs(open_window, name, value, why):
-    hand = open_window("e", **SMALL)
+def test_a_bad_value_is_reported_in_one_line_and_not_run(open_window, name, value, why):
+    user = open_window("e", **SMALL)
     before = gmsh.onelab.getNumber(name) if isinstance(value, float) and "/" in name else None
-    was = tree.value_of(name) if "/" in name else hand.session.tree.sheet.case[name]
-    assert hand.type(name, value).startswith(why)
-    assert "\n" not in hand.session.status
-    assert hand.run().startswith(why) and not hand.session.scenes
-    assert hand.entry(tree.STATUS)["attributes"]["Highlight"] == tree.BAD
-    hand.type(name, before[0] if before is not None else was)
-    assert hand.run().startswith("done in")
+    was = tree.value_of(name) if "/" in name else user.session.tree.sheet.case[name]
+    assert user.type(name, value).startswith(why)
+    assert "\n" not in user.session.status
+    assert user.run().startswith(why) and not user.session.scenes
+    assert user.entry(tree.STATUS)["attributes"]["Highlight"] == tree.BAD
+    user.type(name, before[0] if before is not None else was)
+    assert user.run().startswith("done in")
 
 
-def test_what_is_pressed_meanwhile_is_done_afterwards(open_window, tmp_path):
-    hand = open_window("c", **SMALL)
-    done = hand.run()
+def test_buttons_pressed_during_a_run_act_after_it(open_window, tmp_path):
+    user = open_window("c", **SMALL)
+    done = user.run()
     gmsh.onelab.setString(tree.FOLDER, [str(tmp_path / "c")])
-    hand.press(tree.SAVE_ACTION)
-    hand.press("run")
-    hand.press("check")
-    hand.wait()
-    assert hand.session.status.startswith(done.partition("(")[0])
+    user.press(tree.SAVE_ACTION)
+    user.press("run")
+    user.press("check")
+    user.wait()
+    assert user.session.status.startswith(done.partition("(")[0])
     assert (tmp_path / "c" / "joint.csv").exists()
 
 
-def test_stop_keeps_what_has_converged(open_window, tmp_path):
-    hand = open_window("e", **SMALL)
-    hand.type(tree.STEPS, "2000")
-    hand.press("run")
-    hand.wait(lambda session: "level 3." in session.status)
+def test_stop_keeps_the_converged_steps(open_window, tmp_path):
+    user = open_window("e", **SMALL)
+    user.type(tree.STEPS, "2000")
+    user.press("run")
+    user.wait(lambda session: "level 3." in session.status)
     assert gmsh.onelab.getString("ONELAB/Button") == ["Stop", "stop"]
-    hand.press("stop")
-    hand.wait()
-    assert hand.session.status.startswith("interrupted at level")
+    user.press("stop")
+    user.wait()
+    assert user.session.status.startswith("interrupted at level")
     assert gmsh.onelab.getString("ONELAB/Button") == ["Run", "run"]
-    scene = hand.session.scenes[0]
+    scene = user.session.scenes[0]
     history = scene.result.history
     assert len(history["time"]) > 2000 and list(scene.times) == [1.0, history["time"][-1]]
-    assert "displacement [m]" in hand.views
-    hand.save(tmp_path / "stopped")
+    assert "displacement [m]" in user.views
+    user.save(tmp_path / "stopped")
     assert json.loads((tmp_path / "stopped/run.json").read_text())["state"] == "interrupted"
-    hand.press("run")
-    hand.press("stop")
-    hand.press("stop")
-    hand.wait()
-    assert hand.session.status in ("stopped at once, no results", "stopped before the first step")
-    hand.type(tree.STEPS, "1")
-    assert hand.run().startswith("done in")
+    user.press("run")
+    user.press("stop")
+    user.press("stop")
+    user.wait()
+    assert user.session.status in ("stopped at once, no results", "stopped before the first step")
+    user.type(tree.STEPS, "1")
+    assert user.run().startswith("done in")
 
 
-def test_an_emptied_database_is_filled_again(open_window):
-    """Reset, in Gmsh's menu beside Run."""
-    hand = open_window("a")
-    hand.type("E", 1e10)
+def test_after_reset_the_parameters_are_restored(open_window):
+    """Reset in the menu of Gmsh beside Run."""
+    user = open_window("a")
+    user.type("E", 1e10)
     gmsh.onelab.clear()
-    hand.press("reset")
-    hand.wait()
-    assert hand.entry("E")["values"] == [3e12] and tree.get_text(tree.SAVE)
+    user.press("reset")
+    user.wait()
+    assert user.entry("E")["values"] == [3e12] and tree.get_text(tree.SAVE)
     assert gmsh.onelab.getString("ONELAB/Button") == ["Run", "run"]
 
 
 def test_nothing_to_save_before_a_run(open_window, tmp_path):
-    hand = open_window("e")
-    hand.press(tree.SAVE_ACTION)
-    hand.wait()
-    assert hand.session.status == "nothing to save: press Run first"
+    user = open_window("e")
+    user.press(tree.SAVE_ACTION)
+    user.wait()
+    assert user.session.status == "nothing to save: press Run first"
 
 
-def test_a_case_of_ones_own_is_not_overwritten(open_window, tmp_path):
-    """Nor is a file that a link leads to; what the window itself has saved is."""
-    hand = open_window("c", **SMALL)
-    hand.run()
+def test_a_case_file_of_the_user_is_not_overwritten(open_window, tmp_path):
+    """Nor the target of a link; a file saved by the window itself is overwritten."""
+    user = open_window("c", **SMALL)
+    user.run()
     own, behind = tmp_path / "own" / "c.case", tmp_path / "behind.txt"
     for folder in ("own", "linked", "new"):
         (tmp_path / folder).mkdir()
@@ -378,85 +381,85 @@ def test_a_case_of_ones_own_is_not_overwritten(open_window, tmp_path):
     (tmp_path / "linked" / "c.case").symlink_to(behind)
     for folder in ("own", "linked"):
         gmsh.onelab.setString(tree.FOLDER, [str(tmp_path / folder)])
-        hand.press(tree.SAVE_ACTION)
-        hand.wait()
-        assert hand.session.status.endswith(
+        user.press(tree.SAVE_ACTION)
+        user.wait()
+        assert user.session.status.endswith(
             "must not have a c.case of your own; choose another folder"
         )
         assert [p.name for p in (tmp_path / folder).iterdir()] == ["c.case"]
     assert own.read_text() == "// mine\n" and behind.read_text() == "mine, too\n"
-    hand.save(tmp_path / "new")
-    hand.save(tmp_path / "new")
+    user.save(tmp_path / "new")
+    user.save(tmp_path / "new")
     gmsh.onelab.setString(tree.FOLDER, [""])
-    hand.press(tree.SAVE_ACTION)
-    hand.wait()
-    assert hand.session.status == "out: name a folder"
+    user.press(tree.SAVE_ACTION)
+    user.wait()
+    assert user.session.status == "out: name a folder"
 
 
-def test_an_engine_that_dies_is_started_again(open_window):
-    """Killed while it works, as by a machine without memory."""
-    hand = open_window("e", **SMALL)
-    hand.type(tree.STEPS, "2000")
-    hand.press("run")
-    hand.wait(lambda session: "level 3." in session.status)
-    hand.session.engine.process.kill()
-    hand.wait()
-    assert hand.session.status == "the engine's process ended (exit code -9): press Run"
-    hand.type(tree.STEPS, "1")
-    assert hand.run().startswith("done in")
+def test_an_engine_that_was_killed_is_started_again(open_window):
+    """Killed during a run, as if memory were exhausted."""
+    user = open_window("e", **SMALL)
+    user.type(tree.STEPS, "2000")
+    user.press("run")
+    user.wait(lambda session: "level 3." in session.status)
+    user.session.engine.process.kill()
+    user.wait()
+    assert user.session.status == "the engine's process ended (exit code -9): press Run"
+    user.type(tree.STEPS, "1")
+    assert user.run().startswith("done in")
 
 
-def test_a_run_that_stops_says_why(open_window):
-    hand = open_window("c", **SMALL, pena_tang=0.0)
-    status = hand.run()
+def test_the_reason_of_a_stop_is_shown(open_window):
+    user = open_window("c", **SMALL, pena_tang=0.0)
+    status = user.run()
     assert status.startswith("sliding: no equilibrium beyond level")
-    assert hand.entry(tree.STATUS)["attributes"]["Highlight"] == tree.WARN
+    assert user.entry(tree.STATUS)["attributes"]["Highlight"] == tree.WARN
 
 
-def test_other_cases_and_files(open_window, tmp_path):
-    hand = open_window("a", **SMALL)
-    hand.run()
-    hand.type(tree.CASE, float(list(hand.session.tree.titles).index("dam")))
-    assert hand.session.tree.sheet.case.name == "dam" and hand.views == ["water", "heading"]
+def test_other_cases_and_files_can_be_opened(open_window, tmp_path):
+    user = open_window("a", **SMALL)
+    user.run()
+    user.type(tree.CASE, float(list(user.session.tree.titles).index("dam")))
+    assert user.session.tree.sheet.case.name == "dam" and user.views == ["water", "heading"]
     assert tree.get_text(tree.LEVELS) == "30, 40, 45"
-    assert hand.session.tree.sheet.request.overrides == {}
+    assert user.session.tree.sheet.request.overrides == {}
     mine = tmp_path / "mine.case"
     mine.write_text("default_dam_height = 20; default_dam_base = 16; levels() = {15, 18};")
-    hand.type(tree.FILE, str(mine))
-    assert tree.get_text(tree.LEVELS) == "15, 18" and "mine" in hand.entry(tree.CASE)["valueLabels"]
-    hand.type("dam_height", 21.0)
-    assert hand.session.tree.sheet.case.name == "mine"
-    assert "unknown; allowed" in hand.type(tree.FILE, 5000 * "x")
-    hand.type(tree.FILE, "")  # nothing is chosen: the case stays
-    assert hand.run().startswith("done in")
+    user.type(tree.FILE, str(mine))
+    assert tree.get_text(tree.LEVELS) == "15, 18" and "mine" in user.entry(tree.CASE)["valueLabels"]
+    user.type("dam_height", 21.0)
+    assert user.session.tree.sheet.case.name == "mine"
+    assert "unknown; allowed" in user.type(tree.FILE, 5000 * "x")
+    user.type(tree.FILE, "")  # no file chosen: the case stays
+    assert user.run().startswith("done in")
 
 
-def test_both_uplifts_of_a_published_case(open_window):
-    hand = open_window("a", **SMALL)
-    hand.run()
-    assert hand.entry(tree.SCENE)["choices"] == ["imposed", "none"]
-    assert any(view.startswith("water pressure") for view in hand.views)
-    hand.type(tree.SCENE, "none")
-    assert not any(view.startswith("water pressure") for view in hand.views)
-    hand.type("uplift", "imposed")  # its own value: both again
-    hand.run()
-    assert len(hand.session.scenes) == 2
+def test_both_uplifts_of_a_published_case_are_run(open_window):
+    user = open_window("a", **SMALL)
+    user.run()
+    assert user.entry(tree.SCENE)["choices"] == ["imposed", "none"]
+    assert any(view.startswith("water pressure") for view in user.views)
+    user.type(tree.SCENE, "none")
+    assert not any(view.startswith("water pressure") for view in user.views)
+    user.type("uplift", "imposed")  # the value of the case: both again
+    user.run()
+    assert len(user.session.scenes) == 2
 
 
-def test_accuracy_chooses_the_mesh(open_window):
-    hand = open_window("a")
-    hand.type(tree.ACCURACY, "coarse")
-    assert (hand.entry("n_joint")["values"], hand.entry("order")["values"]) == ([32], [2])
-    hand.type(tree.ACCURACY, tree.OWN)
-    assert (hand.entry("n_joint")["values"], hand.entry("order")["values"]) == ([50], [1])
+def test_accuracy_refines_the_mesh(open_window):
+    user = open_window("a")
+    user.type(tree.ACCURACY, "coarse")
+    assert (user.entry("n_joint")["values"], user.entry("order")["values"]) == ([32], [2])
+    user.type(tree.ACCURACY, tree.OWN)
+    assert (user.entry("n_joint")["values"], user.entry("order")["values"]) == ([50], [1])
 
 
-def test_3d_shows_the_joint_as_a_surface(open_window):
-    hand = open_window("f", n_joint=8.0, h_dam=3.0, h_found=4.0)
-    assert hand.run().startswith("done in")
+def test_the_joint_in_3d_is_shown_as_a_surface(open_window):
+    user = open_window("f", n_joint=8.0, h_dam=3.0, h_found=4.0)
+    assert user.run().startswith("done in")
     state = "joint: closed, slipped, softening, open"
     for start in ("opening of the joint", state, "water pressure"):
-        assert any(view.startswith(start) for view in hand.views), start
+        assert any(view.startswith(start) for view in user.views), start
 
 
 #: A batter, a neck, an inclined joint or a lift joint; water over the crest and below the dam.
@@ -465,14 +468,15 @@ LOADS = {"silt_height": 2.0, "ice_force": 1e3, "ice_level": 7.0, "anchor_force":
 
 
 @pytest.mark.parametrize("joint", [{"joint_slope": 5.0}, {"joint_height": 4.0}])
-def test_water_and_loads_of_any_section(open_window, joint):
-    """Before the run the water's area is that of the section's own outline; after it a bit more or
-    less, as the faces are drawn displaced."""
-    hand = open_window("e", **SMALL, **SECTION, **joint, **LOADS, uplift="imposed")
-    hand.type(tree.LEVELS, "6, 10.5")
-    hand.type(tree.TAIL_LEVELS, "0, 3")
-    assert hand.views == ["water", "silt", "forces", "heading"]
-    case = hand.session.tree.sheet.case
+def test_water_and_loads_are_drawn_for_any_section(open_window, joint):
+    """Before the run the water's area is that of the outline; after it slightly more or less, as
+    the displaced faces are drawn.
+    """
+    user = open_window("e", **SMALL, **SECTION, **joint, **LOADS, uplift="imposed")
+    user.type(tree.LEVELS, "6, 10.5")
+    user.type(tree.TAIL_LEVELS, "0, 3")
+    assert user.views == ["water", "silt", "forces", "heading"]
+    case = user.session.tree.sheet.case
     base, side, bed = 5.0, case["found_side"], joint.get("joint_slope", 0.0)
     bed = base * np.tan(np.radians(bed))
     slope = (base - 2.5) / (8 - bed)  # downstream, from the bed to the neck
@@ -485,16 +489,16 @@ def test_water_and_loads_of_any_section(open_window, joint):
         + slope * (3 - bed) ** 2 / 2,
         "silt": 2 * side + 2 * 0.4 / 2,
     }
-    tags = dict(zip(hand.views, gmsh.view.getTags(), strict=True))
+    tags = dict(zip(user.views, gmsh.view.getTags(), strict=True))
     for name, size in expected.items():
         _, (count,), (values,) = gmsh.view.getListData(tags[name])
         x, y, _ = values.reshape(count, -1)[:, :12].reshape(count, 3, 4).transpose(1, 0, 2)
         doubled = np.sum(x * np.roll(y, -1, 1) - np.roll(x, -1, 1) * y, axis=1)
         assert np.abs(doubled).sum() / 2 == pytest.approx(size, rel=1e-9), name
-    assert not hand.run().startswith("failed")
+    assert not user.run().startswith("failed")
     for name in ("water", "silt", "forces"):
-        assert name in hand.views
-    rows = hand.session.scenes[0].result.at()
+        assert name in user.views
+    rows = user.session.scenes[0].result.at()
     graph = next(
         t for t in gmsh.view.getTags() if "shear stress" in gmsh.view.option.getString(t, "Name")
     )
@@ -502,7 +506,7 @@ def test_water_and_loads_of_any_section(open_window, joint):
     assert values.reshape(count, -1)[:, 1].max() == pytest.approx(rows["s"].max(), rel=1e-6)
 
 
-def test_no_display_and_bad_input_are_one_line(command, monkeypatch):
+def test_a_missing_display_and_bad_input_are_reported_in_one_line(command, monkeypatch):
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
     assert command("gui", "q")[::2][0] == 2
@@ -518,8 +522,8 @@ RUN_BUTTON = 476, -42
 
 
 @pytest.mark.heavy
-def test_run_is_pressed_in_the_real_window(tmp_path):
-    """Under Xvfb: opens, is clicked, says that it is done; the screenshot stays in tmp_path."""
+def test_run_in_the_window_on_a_virtual_screen(tmp_path):
+    """Opened, clicked and finished under Xvfb; the screenshot stays in tmp_path."""
     missing = [n for n in ("Xvfb", "xvfb-run", "xdotool", "import") if not shutil.which(n)]
     if missing:
         pytest.skip(f"needs {', '.join(missing)} (apt: xvfb xdotool imagemagick)")
@@ -531,27 +535,29 @@ def test_run_is_pressed_in_the_real_window(tmp_path):
     assert (tmp_path / "window.png").stat().st_size > 20_000
 
 
-#: The session's status goes to standard output; a click on Run, and the picture after it.
+#: Prints the status of the session; Run is clicked, then a screenshot taken.
 PRESS = """
 {python} -u -c '
-from damjoint.window import window
-from damjoint.window.sheet import Request
+from damjoint.gui import window
+from damjoint.gui.sheet import Request
 say = window.Session.say
-def told(self, status, color):
+def print_status(self, status, color):
     say(self, status, color)
     print(status)
-window.Session.say = told
+window.Session.say = print_status
 if __name__ == "__main__":
     window.gui(Request("e"))
-' > said.txt 2>&1 &
-for i in $(seq 100); do grep -q ready said.txt && break; sleep 0.2; done
-sleep 1
-window=$(xdotool search --name Gmsh | tail -1)
+' > status.txt 2>&1 &
+for i in $(seq 100); do grep -q ready status.txt && break; sleep 0.2; done
+window=$(xdotool search --sync --onlyvisible --name Gmsh | tail -1)
 eval $(xdotool getwindowgeometry --shell $window)
-xdotool mousemove $((X + {x})) $((Y + HEIGHT + {y})) click 1
-for i in $(seq 100); do grep -q "done in" said.txt && break; sleep 0.2; done
-sleep 1
+xdotool mousemove $((X + {x})) $((Y + HEIGHT + {y}))
+for i in $(seq 10); do  # a click is lost if the window is not drawn yet
+  xdotool click 1
+  for j in $(seq 10); do grep -q running status.txt && break 2; sleep 0.2; done
+done
+for i in $(seq 100); do grep -q "done in" status.txt && break; sleep 0.2; done
 import -window root window.png
 kill $!
-cat said.txt
+cat status.txt
 """

@@ -1,4 +1,4 @@
-"""The eleven modelings of SSNP142 against the published numbers, and how hard they are to solve."""
+"""The eleven modelings of SSNP142 against the published numbers; numbers of iterations."""
 
 import pytest
 from damjoint.post import validation
@@ -24,7 +24,7 @@ MODELINGS = [
 
 
 @pytest.mark.parametrize("name", MODELINGS)
-def test_reference_values(solve, name):
+def test_published_values(solve, name):
     comparisons = [c for result in solve(name) for c in validation.compare(result)]
     missed = [c for c in comparisons if c.verdict == "fail"]
     assert not missed, "\n" + validation.report(missed)
@@ -50,8 +50,8 @@ def test_validate_prints_the_table(command, tmp_path):
     assert (tmp_path / "out" / "c" / "joint.csv").exists()
 
 
-def test_validate_fails_with_1(command, monkeypatch):
-    """With the first case's references moved by 10 %."""
+def test_validate_exits_with_1_if_a_row_fails(command, monkeypatch):
+    """With the references of the first case changed by 10 %."""
     from dataclasses import replace
 
     rows = [replace(r, value=1.1 * r.value) for r in validation.table() if r.tolerance]

@@ -1,5 +1,4 @@
-"""Bad input: exit code 2, one line that names parameter, value and what is allowed, and nothing
-left behind."""
+"""Bad input: exit code 2, one line with parameter, value and allowed range, no file written."""
 
 import subprocess
 import sys
@@ -58,7 +57,7 @@ def refuse(command, tmp_path, words, parts):
         ("thickness=-1", "> 0"),
     ],
 )
-def test_parameter_out_of_range(command, tmp_path, setting, allowed):
+def test_a_parameter_out_of_range_is_refused(command, tmp_path, setting, allowed):
     name, value = setting.split("=")
     refuse(command, tmp_path, (*RUN, "--set", setting), (f"{name} = {value}", allowed))
 
@@ -122,11 +121,11 @@ def test_parameter_out_of_range(command, tmp_path, setting, allowed):
         pytest.param((*RUN, "--levels", "-1,3"), ("levels = -1", TO_TWICE)),
     ],
 )
-def test_bad_words(command, tmp_path, words, parts):
+def test_bad_arguments_are_refused(command, tmp_path, words, parts):
     refuse(command, tmp_path, words, parts)
 
 
-def test_unwritable_output_folder(command, tmp_path):
+def test_an_output_folder_that_can_not_be_written_is_refused(command, tmp_path):
     (tmp_path / "file").write_text("in the way")
     refuse(
         command,
@@ -144,7 +143,7 @@ def test_unwritable_output_folder(command, tmp_path):
         ("law", "rupture", "--path", "path.csv"),
     ],
 )
-def test_missing_getdp(command, tmp_path, monkeypatch, words):
+def test_a_missing_getdp_is_reported(command, tmp_path, monkeypatch, words):
     monkeypatch.setenv("GETDP", "/no/such/getdp")
     (tmp_path / "path.csv").write_text("delta_n,delta_t1,delta_t2\n0,0,0\n")
     refuse(command, tmp_path, words, ("GETDP = /no/such/getdp", "GetDP >= 3.2"))
@@ -183,13 +182,13 @@ GOOD = "delta_n,delta_t1,delta_t2\n0,0,0\n"
         ),
     ],
 )
-def test_bad_path_file(command, tmp_path, law, text, parts):
+def test_a_bad_path_file_is_refused(command, tmp_path, law, text, parts):
     if text is not None:
         (tmp_path / "path.csv").write_text(text)
     refuse(command, tmp_path, ("law", law, "--path", "path.csv"), parts)
 
 
-def test_law_into_a_missing_folder(command, tmp_path):
+def test_a_missing_folder_for_the_results_of_a_law_is_refused(command, tmp_path):
     (tmp_path / "path.csv").write_text(GOOD)
     refuse(
         command,
@@ -199,7 +198,7 @@ def test_law_into_a_missing_folder(command, tmp_path):
     )
 
 
-def test_bad_setting_of_a_law(command, tmp_path):
+def test_a_bad_setting_of_a_law_is_refused(command, tmp_path):
     (tmp_path / "path.csv").write_text(GOOD)
     refuse(
         command,
@@ -209,8 +208,8 @@ def test_bad_setting_of_a_law(command, tmp_path):
     )
 
 
-def test_level_that_is_no_number(tmp_path):
-    """In a process of its own: Gmsh's parser stumbles."""
+def test_a_level_that_is_not_a_number_is_refused(tmp_path):
+    """In a process of its own, as Gmsh's parser prints an error."""
     done = subprocess.run(
         [sys.executable, "-m", "damjoint.cli", *RUN, "--levels", "3,nan"],
         cwd=tmp_path,
@@ -231,8 +230,8 @@ def test_level_that_is_no_number(tmp_path):
         (("--vary", "mu=0.5", "--tie", "adhesion=1+\n2"), (r"--tie adhesion=1+\n2",)),
     ],
 )
-def test_a_sweep_in_one_line(tmp_path, words, parts):
-    """In a process of its own, whose warnings are seen."""
+def test_a_bad_sweep_is_refused_in_one_line(tmp_path, words, parts):
+    """In a process of its own, so that warnings are included."""
     done = subprocess.run(
         [sys.executable, "-m", "damjoint", "sweep", "c", *words],
         cwd=tmp_path,
@@ -245,7 +244,7 @@ def test_a_sweep_in_one_line(tmp_path, words, parts):
 
 
 @pytest.mark.parametrize("law, name", [("rupture", "sigma_max"), ("bond", "adhesion")])
-def test_a_strength_whose_square_overflows(command, law, name):
+def test_a_strength_whose_square_overflows_is_refused(command, law, name):
     code, _, err = command(*RUN, "--set", f"{name}=1e308", "--set", f"law={law}")
     assert code == 2 and len(err.splitlines()) == 1
 
@@ -258,7 +257,7 @@ def test_escape_sequences_do_not_reach_the_terminal(command, tmp_path):
 
 
 @pytest.mark.parametrize("name", ["...case", "..case", "my\x1b[31m.case", "a" * 230 + ".case"])
-def test_a_case_that_can_not_have_a_folder(command, tmp_path, name):
+def test_a_case_file_name_that_is_no_folder_name_is_refused(command, tmp_path, name):
     (tmp_path / "in").mkdir()
     (tmp_path / "in" / name).write_text("default_n_joint = 8;")
     code, _, err = command("run", f"in/{name}")
@@ -266,7 +265,7 @@ def test_a_case_that_can_not_have_a_folder(command, tmp_path, name):
     assert [path.name for path in tmp_path.iterdir()] == ["in"]
 
 
-def test_a_bad_case_does_not_spoil_the_next_one(tmp_path):
+def test_a_bad_case_has_no_effect_on_the_next_one(tmp_path):
     (tmp_path / "bad.case").write_text(
         "default_nu = unheard_of; default_E = 1e9;\ntimes() = {1};\n"
     )
@@ -285,20 +284,20 @@ except InputError:
 
 
 @pytest.mark.parametrize("setting", ["h_dam=1e-5", "h_found=1e-5", "n_joint=100000"])
-def test_more_than_the_memory_is_refused_before_meshing(command, setting):
+def test_a_mesh_that_exceeds_the_memory_is_refused_before_meshing(command, setting):
     code, _, err = command("run", "dam", "--set", setting, "--no-fields", "--no-picture")
     assert code == 1 and "need about" in err and len(err.splitlines()) == 1
 
 
 @pytest.mark.parametrize("setting", ["E=1e308", "dam_height=1e-12"])
-def test_numbers_that_can_not_be_computed_with(command, setting):
+def test_values_whose_system_is_singular_are_reported(command, setting):
     code, out, err = command("run", "a", "--set", setting, "--set", "h_found=4", "--levels", "0")
     assert (code, out) == (1, "") and len(err.splitlines()) == 1 and "eliminated" in err
 
 
-def test_arguments_are_refused_by_name(command):
-    """Too many steps and rows, a parameter given twice, no folder: it would be the present one."""
-    for words, said in (
+def test_the_message_names_the_argument(command):
+    """Too many steps or rows, a parameter set twice, an empty path (the current folder)."""
+    for words, message in (
         (("run", "a", "--out", ""), "out = '': must be a path"),
         (("run", "a", "--steps", "99999999999"), "steps = 99999999999"),
         (("sweep", "a", "--vary", "mu=0:1:1e-12"), "at most"),
@@ -306,4 +305,13 @@ def test_arguments_are_refused_by_name(command):
         (("sweep", "a", "--vary", "mu=0.5", "--set", "mu=0.6"), "--vary mu"),
     ):
         code, _, err = command(*words)
-        assert code == 2 and said in err and len(err.splitlines()) == 1
+        assert code == 2 and message in err and len(err.splitlines()) == 1
+
+
+@pytest.mark.parametrize("words", [("stress", 1), ("bench", "--short")])
+def test_a_command_whose_tools_are_not_installed_is_one_line(command, tmp_path, monkeypatch, words):
+    for name in ("damjoint_tools", "damjoint_tools.stress", "damjoint_tools.bench_page"):
+        monkeypatch.setitem(sys.modules, name, None)  # makes the import fail
+    code, out, err = command(*words)
+    assert (code, out) == (1, "") and "damjoint_tools is not installed" in err
+    assert len(err.splitlines()) == 1 and not list(tmp_path.iterdir())

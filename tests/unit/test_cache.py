@@ -1,12 +1,13 @@
-"""Condensed bodies on disk: complete, of this scene and version, or computed again; no file is
-executed."""
+"""Condensed bodies in the cache: complete, of this scene and version, or computed again; nothing in
+a file is executed.
+"""
 
 import os
 import pickle
 
 import numpy as np
 import pytest
-from damjoint.engines.condensed import cache
+from damjoint.fem import cache
 from damjoint.model.case import load
 
 SMALL = {"n_joint": 6.0, "h_dam": 4.0, "h_found": 4.0}
@@ -26,8 +27,8 @@ def same(first, second):
     return np.array_equal(first.stiffness, second.stiffness) and first.counts == second.counts
 
 
-def test_an_entry_is_read(entry):
-    """All of it: types, names, numbers, arrays."""
+def test_all_of_an_entry_is_read_again(entry):
+    """Types, names, numbers, arrays."""
     _, written = entry
     result, bodies = cache.cached(load("a", SMALL))
     assert bodies is None and list(result.faces) == ["face2"]
@@ -39,7 +40,7 @@ def test_an_entry_is_read(entry):
 
 
 class Trap:
-    """What a pickle would run on loading."""
+    """Object whose pickle creates a file when it is loaded."""
 
     def __init__(self, path):
         self.path = path
@@ -49,7 +50,7 @@ class Trap:
 
 
 @pytest.mark.parametrize("damage", ["truncated", "foreign", "pickle", "empty", "other header"])
-def test_a_bad_entry_is_computed_again(entry, tmp_path, damage):
+def test_a_damaged_entry_is_computed_again(entry, tmp_path, damage):
     file, written = entry
     whole = file.read_bytes()
     if damage == "truncated":
@@ -66,7 +67,7 @@ def test_a_bad_entry_is_computed_again(entry, tmp_path, damage):
     result, bodies = cache.cached(load("a", SMALL))
     assert bodies is not None and same(result, written)
     assert not (tmp_path / "trap").exists()
-    assert cache.cached(load("a", SMALL))[1] is None  # and stored again
+    assert cache.cached(load("a", SMALL))[1] is None  # stored again
 
 
 @pytest.mark.parametrize(
@@ -78,19 +79,19 @@ def test_a_bad_entry_is_computed_again(entry, tmp_path, damage):
         pytest.param(46, 0, id="name"),
     ],
 )
-def test_a_flipped_byte_is_a_miss_once(entry, place, value):
-    """In an entry of the zip file's directory."""
+def test_an_entry_with_a_changed_byte_is_replaced(entry, place, value):
+    """In the directory of the zip file."""
     file, written = entry
     data = bytearray(file.read_bytes())
     data[data.index(b"PK\x01\x02") + place] = value
     file.write_bytes(data)
     result, bodies = cache.cached(load("a", SMALL))
     assert bodies is not None and same(result, written)
-    assert cache.cached(load("a", SMALL))[1] is None  # and replaced
+    assert cache.cached(load("a", SMALL))[1] is None  # replaced
 
 
-def test_an_array_that_is_missing_is_a_miss(entry):
-    """As one of the loads is if the length of the entry before it in the directory is damaged."""
+def test_an_entry_without_an_array_is_computed_again(entry):
+    """E.g. if the length of the array before it in the directory is damaged."""
     file, written = entry
     with np.load(file) as result:
         np.savez(
@@ -100,7 +101,7 @@ def test_an_array_that_is_missing_is_a_miss(entry):
     assert bodies is not None and result.units.keys() == written.units.keys()
 
 
-def test_a_pipe_in_place_of_an_entry(entry):
+def test_a_pipe_in_place_of_an_entry_is_not_read(entry):
     file, written = entry
     file.unlink()
     os.mkfifo(file)
@@ -129,20 +130,20 @@ def test_an_array_of_objects_is_not_loaded(entry, tmp_path):
     assert bodies is not None and same(result, written) and not (tmp_path / "trap").exists()
 
 
-def test_a_folder_that_can_not_be_written_costs_time_only(tmp_path, monkeypatch):
+def test_a_cache_that_can_not_be_written_is_ignored(tmp_path, monkeypatch):
     (tmp_path / "file").write_text("in the way")
     monkeypatch.setenv("DAMJOINT_CACHE", str(tmp_path / "file" / "below"))
     assert cache.cached(load("a", SMALL))[1] is not None
 
 
-def test_another_mesh_makes_other_bodies(entry, monkeypatch):
-    """After a change of geo/ or of the elements nothing old is read."""
+def test_an_entry_of_other_meshing_code_is_not_read(entry, monkeypatch):
+    """After a change of geo/ or of the elements."""
     monkeypatch.setattr(cache, "sources", lambda: "changed")
     assert cache.cached(load("a", SMALL))[1] is not None
 
 
-def test_the_files_longest_unused_go_first(tmp_path, monkeypatch):
-    """Whatever their names, and no more of them than have to."""
+def test_the_least_recently_used_files_are_removed(tmp_path, monkeypatch):
+    """Whatever their names, and no more than necessary."""
     for age, name in enumerate("bdac"):
         (tmp_path / f"{name}.npz").write_bytes(bytes(10))
         os.utime(tmp_path / f"{name}.npz", (0, 1e9 - 100 * age))

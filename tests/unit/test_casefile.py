@@ -1,4 +1,4 @@
-"""Case files are data: what they may say, and that nothing in them is ever executed."""
+"""Case files are data: their statements; nothing in them is executed."""
 
 import os
 
@@ -11,8 +11,8 @@ from damjoint.post import validation
 
 
 @pytest.mark.parametrize("path", sorted(CASES.glob("*.case")), ids=lambda path: path.stem)
-def test_read_as_gmsh_reads_it(path):
-    """The cases open in Gmsh and GetDP as they are: both have to see the same in them."""
+def test_damjoint_and_gmsh_read_a_case_alike(path):
+    """The cases can be opened in Gmsh and GetDP."""
     ours = casefile.read(path)
     parameters.start_gmsh()
     gmsh.parser.clear()
@@ -23,7 +23,7 @@ def test_read_as_gmsh_reads_it(path):
     expected = {f"default_{n}": [v] for n, v in ours.defaults.items() if isinstance(v, float)}
     assert {n: v for n, v in numbers.items() if v} == expected | ours.lists
     expected = {f"default_{n}": [v] for n, v in ours.defaults.items() if isinstance(v, str)}
-    if "geometry" in texts:  # ours: from the file that names it
+    if "geometry" in texts:  # damjoint: relative to the case file
         texts["geometry"] = [str(path.parent / texts["geometry"][0])]
     assert texts == expected | {n: [v] for n, v in ours.texts.items()}
 
@@ -34,7 +34,7 @@ def write(tmp_path, text, name="mine.case"):
     return path
 
 
-def test_arithmetic_comments_and_defaults_set_before(tmp_path):
+def test_arithmetic_comments_and_earlier_defaults_are_read(tmp_path):
     path = write(
         tmp_path,
         "/* two\nlines */ default_K_N = 2 * 1e11; // half of it\ndefault_K_T = default_K_N / 2 ^ 2;"
@@ -45,14 +45,14 @@ def test_arithmetic_comments_and_defaults_set_before(tmp_path):
     assert found.lists == {"levels": [1, 5.5, 10]}
 
 
-def test_included_files_come_first_and_can_be_overruled(tmp_path):
+def test_values_of_included_files_can_be_changed(tmp_path):
     write(tmp_path, "default_mu = 0.5; default_E = 1e9;", "common.case")
     found = casefile.read(write(tmp_path, 'Include "common.case"; default_mu = 0.7;'))
     assert found.defaults == {"mu": 0.7, "E": 1e9}
 
 
 @pytest.mark.parametrize(
-    "text, said",
+    "text, message",
     [
         ('SystemCall "touch x";', "SystemCall"),
         ('title = "t"; SystemCall "touch x";', "line 1"),
@@ -90,26 +90,30 @@ def test_included_files_come_first_and_can_be_overruled(tmp_path):
         ("levels() = {1, 2, 3}; tail_levels() = {1, 2};", "tail_levels = 1,2"),
     ],
 )
-def test_anything_else_is_refused_before_gmsh_sees_it(command, tmp_path, text, said):
+def test_other_statements_are_refused_before_gmsh_reads_them(command, tmp_path, text, message):
     write(tmp_path, text)
     before = sorted(tmp_path.rglob("*"))
     code, out, err = command("run", "mine.case", "--no-fields", "--no-picture")
     assert (code, out) == (2, "") and len(err.splitlines()) == 1
-    assert said in err and sorted(tmp_path.rglob("*")) == before
+    assert message in err and sorted(tmp_path.rglob("*")) == before
 
 
-def test_files_that_are_no_cases(command, tmp_path):
+def test_files_that_are_no_cases_are_refused(command, tmp_path):
     (tmp_path / "binary.case").write_bytes(bytes(range(256)))
     write(tmp_path, 'Include "itself.case";', "itself.case")
     write(tmp_path, "// nothing\n" * 200_000, "enormous.case")
-    for name, said in (("binary", "decode"), ("itself", "includes itself"), ("enormous", "bytes")):
+    for name, message in (
+        ("binary", "decode"),
+        ("itself", "includes itself"),
+        ("enormous", "bytes"),
+    ):
         code, _, err = command("run", f"{name}.case")
-        assert code == 2 and said in err and len(err.splitlines()) == 1
+        assert code == 2 and message in err and len(err.splitlines()) == 1
 
 
 @pytest.mark.parametrize("text", ['Include "other.case";' * 51, 'Include "pipe.case";'])
-def test_inclusion_that_would_not_end(command, tmp_path, text):
-    """Of many files in few lines; of what can be read for ever."""
+def test_endless_inclusion_is_refused(command, tmp_path, text):
+    """Of many files in few lines; of a pipe."""
     write(tmp_path, "", "other.case")
     os.mkfifo(tmp_path / "pipe.case")
     code, _, err = command("run", write(tmp_path, text))
@@ -117,14 +121,14 @@ def test_inclusion_that_would_not_end(command, tmp_path, text):
     assert "must be a file" in err or "more than 50 files" in err
 
 
-def test_levels_without_times_are_all_reached(tmp_path):
+def test_without_times_each_level_is_a_step(tmp_path):
     case = load(str(write(tmp_path, "default_dam_height = 12; levels() = {6, 9, 11, 11.5, 12};")))
     assert case.times == (1, 2, 3, 4, 5)
     assert [case.level_at(t) for t in case.times] == [6, 9, 11, 11.5, 12]
 
 
-def test_the_case_keeps_its_tailwater(tmp_path):
-    """One value, or one per level, also under other levels; else it has to be said anew."""
+def test_other_levels_have_the_tailwater_of_the_case(tmp_path):
+    """One value, or one per level if there are as many levels; otherwise it must be given."""
     text = "default_dam_height = 12; levels() = {6, 9, 11}; tail_levels() = {%s};"
     constant = str(write(tmp_path, text % "2", "constant.case"))
     rising = str(write(tmp_path, text % "1, 2, 3", "rising.case"))
@@ -135,8 +139,8 @@ def test_the_case_keeps_its_tailwater(tmp_path):
     assert load(rising, levels="5,10", tail_levels="0").tail_levels == (0, 0)
 
 
-def test_defaults_are_a_real_dam():
-    """Concrete on rock, and what follows from the geometry."""
+def test_defaults_are_a_realistic_dam():
+    """Concrete on rock; dependent defaults follow the geometry."""
     case = load("dam")
     assert 1e10 <= case["E"] <= 5e10 and case["dam_height"] == 45
     energy = case["sigma_max"] ** 2 * (1 + case["pena_rupture"]) / (2 * case["K_N"])
@@ -147,21 +151,21 @@ def test_defaults_are_a_real_dam():
     assert taller["found_depth"] == 120 and taller["E_found"] == 3e10 and taller.levels[-1] == 60
 
 
-def test_what_is_written_is_read_again(tmp_path):
-    said = casefile.read(CASES / "k.case")
-    said.defaults |= {"law": "friction", "drive_by": 1 / 3}
-    (tmp_path / "again.case").write_text(casefile.written(said))
-    assert casefile.read(tmp_path / "again.case") == said
+def test_a_written_case_is_read_again(tmp_path):
+    case = casefile.read(CASES / "k.case")
+    case.defaults |= {"law": "friction", "drive_by": 1 / 3}
+    (tmp_path / "again.case").write_text(casefile.written(case))
+    assert casefile.read(tmp_path / "again.case") == case
 
 
-def test_a_file_from_windows(tmp_path):
-    """A byte order mark and CRLF line ends."""
+def test_a_case_file_from_windows_is_read(tmp_path):
+    """Byte order mark and CRLF line ends."""
     (tmp_path / "mine.case").write_bytes(b"\xef\xbb\xbfdefault_mu = 0.7;\r\n// words\r\n")
     assert casefile.read(tmp_path / "mine.case").defaults == {"mu": 0.7}
 
 
-def test_published_is_what_has_been_published(tmp_path):
-    """Another loading, another parameter or another file of the same name has no references."""
+def test_only_published_cases_have_references(tmp_path):
+    """Not a case with another loading, another parameter, or another file of that name."""
     copy = tmp_path / "a.case"
     copy.write_text("levels() = {45};")
     assert load("a").published and load("a", {"n_joint": 20.0, "order": 2.0}).published

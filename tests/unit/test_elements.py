@@ -1,5 +1,4 @@
-"""The functions of order 2: how many they are, that they fit together, that a quadratic field is
-theirs."""
+"""Shape functions of order 2: number, continuity, exact quadratic fields."""
 
 import numpy as np
 import pytest
@@ -8,11 +7,11 @@ from damjoint.fem.elements import CORNERS, Space, basis, corners_of
 from damjoint.model.mesh import Body
 from scipy.sparse.linalg import spsolve
 
-#: Numbers of functions: simplices have the quadratic ones, the others products of such.
+#: Numbers of functions: quadratic on simplices, products of quadratic ones on other shapes.
 FUNCTIONS = {"vertex": 1, "line": 3, "triangle": 6, "quad": 9, "tetra": 10, "wedge": 18}
 FUNCTIONS["hexahedron"] = 27
 YOUNG, POISSON = 3e10, 0.2
-#: What a unit cell of a grid is divided into, by its corners.
+#: Elements of a unit cell of a grid, by their corners.
 CELLS = {
     "quad": [[0, 1, 2, 3]],
     "triangle": [[0, 1, 2], [0, 2, 3]],
@@ -20,13 +19,12 @@ CELLS = {
     "wedge": [[0, 1, 2, 4, 5, 6], [0, 2, 3, 4, 6, 7]],
     "tetra": [[0, 1, 2, 6], [0, 2, 3, 6], [0, 3, 7, 6], [0, 7, 4, 6], [0, 4, 5, 6], [0, 5, 1, 6]],
 }
-#: The same element, its nodes counted from another corner.
+#: The same element with its nodes numbered from another corner.
 TURNED = {"quad": [1, 2, 3, 0], "hexahedron": [1, 2, 3, 0, 5, 6, 7, 4], "wedge": [1, 2, 0, 4, 5, 3]}
 
 
 def grid(shape, shake=0.2, size=2):
-    """A body of cells, distorted by as much, some of them numbered from another corner; tags in
-    disorder."""
+    """A body of distorted cells, some of them numbered from another corner, with unordered tags."""
     rng = np.random.default_rng(142)
     corners = corners_of("quad" if shape in ("quad", "triangle") else "hexahedron")
     dim = corners.shape[1]
@@ -46,7 +44,8 @@ def grid(shape, shake=0.2, size=2):
 
 def quadratic(dim):
     """A full quadratic displacement (points) -> (n, dim) and its second derivatives (component,
-    dim, dim)."""
+    dim, dim).
+    """
     rng = np.random.default_rng(7)
     second = rng.normal(size=(dim, dim, dim))
     second += second.swapaxes(1, 2)
@@ -61,7 +60,7 @@ def quadratic(dim):
 
 @pytest.mark.parametrize("shape", CORNERS)
 def test_dimension_of_the_space(shape):
-    """The functions are independent; at the nodes only the nodal ones count."""
+    """The functions are independent; at the nodes only the nodal ones are not 0."""
     rng = np.random.default_rng(1)
     dim = corners_of(shape).shape[1]
     values = np.array([basis(shape, 2, u)[0] for u in rng.uniform(-1, 1, (60, dim))])
@@ -73,8 +72,9 @@ def test_dimension_of_the_space(shape):
 @pytest.mark.parametrize("shake", [0, 0.2])
 @pytest.mark.parametrize("shape", CELLS)
 def test_patch_test_of_order_2(shape, shake):
-    """A quadratic displacement given on the boundary, with the body force that it needs, is found
-    inside a mesh to round-off, also of distorted elements; so is its stress."""
+    """A quadratic displacement on the boundary, with its body force, is reproduced inside a mesh of
+    distorted elements to rounding; so is its stress.
+    """
     body, dim = grid(shape, shake)
     space = Space(body, 2)
     field, second = quadratic(dim)
@@ -100,13 +100,13 @@ def test_patch_test_of_order_2(shape, shake):
     step = np.eye(3)[:dim] * 1e-3  # central differences of a quadratic field are exact
     slope = np.stack([(field(middles + h) - field(middles - h)) / 2e-3 for h in step], axis=2)
     shear = mu * (slope[:, 0, 1] + slope[:, 1, 0])
-    given = stress(space, found.reshape(1, -1, dim), {"dam": (YOUNG, POISSON)})[0, :, 3]
-    assert given == pytest.approx(shear, abs=1e-9 * np.abs(shear).max())
+    computed = stress(space, found.reshape(1, -1, dim), {"dam": (YOUNG, POISSON)})[0, :, 3]
+    assert computed == pytest.approx(shear, abs=1e-9 * np.abs(shear).max())
 
 
 @pytest.mark.parametrize("shape, corners", [("hexahedron", [0, 1, 5, 4]), ("wedge", [0, 1, 4, 3])])
-def test_a_face_finds_its_functions(shape, corners):
-    """Counted from any corner: they are where the body's are, and have the same values."""
+def test_the_functions_of_a_face_are_those_of_the_body(shape, corners):
+    """Positions and values are the same, numbered from any corner."""
     body, _ = grid(shape)
     cells = np.roll(body.cells[0][1][3:4, corners], 1, axis=1)
     used = np.unique(cells)

@@ -1,4 +1,4 @@
-"""The gravity method beside closed forms: published tables, and each load by quadrature."""
+"""The gravity method against closed forms, published tables, and quadrature of each load."""
 
 import itertools
 import math
@@ -14,7 +14,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 WATER = 1000 * 9.81
-#: A dam with everything: batter, neck, a lift joint that falls towards the toe.
+#: A dam with batter, neck and a lift joint that falls towards the toe.
 WHOLE = {
     "batter": 4.0,
     "batter_height": 20.0,
@@ -33,7 +33,7 @@ SECTIONS = {
 
 
 def large(settings, tail="3"):
-    """The 45 m dam at its crest."""
+    """The 45 m dam with water to its crest."""
     return load("dam", settings, "45", tail)
 
 
@@ -52,13 +52,14 @@ def test_table_of_the_45_m_dam(level, normal, shear, moment):
 
 
 def test_crack_of_the_45_m_dam():
-    """Without tension: by three times the resultant's distance from the toe under linear uplift; by
-    a cubic equation where the crack takes the full head (12185 kN, 128.3 MN m, 2.42 m)."""
+    """Without tension: from three times the distance of the resultant to the toe under linear
+    uplift; from a cubic equation with full head in the crack (12185 kN, 128.3 MN m, 2.42 m).
+    """
     found = gravity.at(large({"sigma_max": 0.0}), 1)
     assert found.crack_length == pytest.approx(1.08, abs=0.005)
     assert found.crack_length == pytest.approx(34 - 3 * found.M / found.N, rel=1e-9)
     dry = gravity.at(large({"sigma_max": 0.0, "uplift": "none"}), 1)
-    # N B = 3 M with B left: the water beyond full head, 42 w B/2, acts at B/3 like the stress
+    # N B = 3 M with B uncracked: the uplift there, 42 w B/2 below full head, acts at B/3, too
     left = 3 * (dry.M - WATER * 45 * 34**2 / 2) / (dry.N - WATER * 45 * 34)
     for uplift in ("cracked", "flow"):
         wet = gravity.at(large({"sigma_max": 0.0, "uplift": uplift}), 1)
@@ -106,7 +107,7 @@ def test_sliding_levels_of_ssnp142():
         assert found == pytest.approx(slide_level(0.35, 1000, uplift == "imposed"), rel=1e-9)
 
 
-def test_plain_resultants():
+def test_resultants_of_ssnp142():
     case = load("c", {}, "9", "4")
     for uplift in ("none", "imposed"):
         case.values["uplift"] = uplift
@@ -121,7 +122,9 @@ def test_plain_resultants():
 
 
 def side_of(case, side):
-    """Straight parts of the upper body's faces as pairs of points, from pro/section.pro's order."""
+    """Straight parts of the faces of the upper body, as pairs of points in the order of
+    pro/section.pro.
+    """
     found = case.section
     code = {"UP": 0, "DOWN": 1, "TOP": 2}[side]
     columns = zip(
@@ -131,7 +134,7 @@ def side_of(case, side):
 
 
 def by_quadrature(case, side, pressure, horizontal_only=False):
-    """Fx, Fy and moment about the toe of pressure(y, share of the normal along x) on a side."""
+    """Fx, Fy and moment about the toe of pressure(y, x component of the normal) on a side."""
     toe = np.array([case.section["toe_x"][0], case.section["toe_y"][0]])
     total = np.zeros(3)
     for a, b in side_of(case, side):
@@ -191,13 +194,13 @@ def test_silt_and_westergaard(section):
 
 @pytest.mark.parametrize("section", SECTIONS)
 def test_weight_by_slices(section):
-    """Area and first moments of the upper body from its width at each height."""
+    """Area and first moments of the upper body by integration of its width."""
     case = load("dam", SECTIONS[section])
     body = gravity.RigidBlock(case)
     (x0, y0), bottom = body.toe, min(body.toe[1], body.heel[1])
 
     def ends(y):
-        """Where the horizontal at y cuts the outline."""
+        """Intersections of the outline with the horizontal at y."""
         corners = body.outline + body.toe
         cuts = [
             a[0] + (y - a[1]) / (b[1] - a[1]) * (b[0] - a[0])
@@ -223,7 +226,7 @@ def test_weight_by_slices(section):
 
 
 def test_line_forces():
-    """Ice and a force on the faces, an anchor that leans upstream: by hand on the plain dam."""
+    """Ice and a force on the faces, an inclined anchor: by hand for the dam without batter."""
     leaning = {"anchor_force": 2e6, "anchor_angle": 30.0}
     other = {"force_x": -3e4, "force_y": 5e4, "force_face": "downstream", "force_at": 9.0}
     settings = {"ice_force": 1e5, "ice_level": 30.0} | leaning | other
@@ -237,7 +240,7 @@ def test_line_forces():
     assert {row.name for row in gravity.at(lifted, 1).loads}.isdisjoint({"ice", "force"})
 
 
-def test_loads_grow_over_the_unit_before_their_time():
+def test_loads_increase_linearly_up_to_their_time():
     settings = {"silt_height": 10.0, "silt_t": 2.0, "ice_force": 1e5, "k_h": 0.1}
     case = load("dam", settings, "45,45,45")
     moments = lambda time: {row.name: row.moment for row in gravity.at(case, time).loads}
@@ -249,14 +252,14 @@ def test_loads_grow_over_the_unit_before_their_time():
 
 
 def test_uniform_pressure():
-    """Modeling K: on the whole face; the level at which it turns the dry dam over."""
+    """Modeling K: on the whole face; the level at which the dry dam overturns."""
     case = load("k")
     assert_allclose(load_of(case, "reservoir", 5.02), (WATER * 50.2, 0, -WATER * 251))
     assert gravity.at(case, 1, 49_247 / WATER).M == pytest.approx(0, abs=1e-4 * WEIGHT)
 
 
 def test_inclined_joint():
-    """A block's weight on a joint that rises towards the toe: W cos, -W sin, and its moment."""
+    """Weight of a block on a joint that rises towards the toe: W cos, -W sin, and its moment."""
     case = load("dam", {"joint_slope": 10.0, "uplift": "none"}, "45", "0")
     found, lean = gravity.at(case, 1, 0.0), math.radians(10)
     weight = -found.loads[0].fy
@@ -272,8 +275,8 @@ def test_inclined_joint():
 # -- uplift
 
 
-def test_heads_stand_above_the_joint():
-    """On a lift joint at 8 m: nothing from a tailwater at 3 m; heads over the ends of a slope."""
+def test_heads_are_measured_from_the_joint():
+    """On a lift joint at 8 m: none from a tailwater at 3 m; on a slope from each end."""
     found = gravity.at(large({"joint_height": 8.0}), 1).uplift
     assert_allclose(found.p, np.array([37, 37, 0]) * WATER)
     length = gravity.RigidBlock(large({"joint_height": 8.0})).length
@@ -311,9 +314,10 @@ def test_uplift_rules(mode, crack, places, heads):
     assert found.moment == pytest.approx(moment)
 
 
-def test_drains_lose_their_effect_where_the_crack_passes_them():
-    """Drains that stop it leave a shorter crack; weak ones near the heel are passed, and do
-    nothing."""
+def test_drains_have_no_effect_if_the_crack_passes_them():
+    """Drains that stop the crack leave it shorter; weak ones near the heel are passed and have no
+    effect.
+    """
     settings = DRAINS | {"uplift": "cracked", "sigma_max": 0.0, "rho_dam": 2150.0}
     without = gravity.at(large(settings), 1)
     stopped = gravity.at(large(settings | {"drains": 1.0, "drain_x": 10.0}), 1)
@@ -325,7 +329,7 @@ def test_drains_lose_their_effect_where_the_crack_passes_them():
 
 
 def test_two_cracks_in_equilibrium():
-    """Drains stop a crack of 2.09 m; one of 12.4 m has passed them and is in equilibrium, too."""
+    """Drains stop a crack of 2.09 m; a crack of 12.4 m past them is in equilibrium, too."""
     drains = {"uplift": "cracked", "drains": 1.0, "drain_x": 6.0}
     settings = drains | {"dam_base": 30.0, "law": "bond", "sigma_max": 0.0, "adhesion": 0.0}
     found = gravity.at(load("dam", settings | {"mu": 1.2}, "44", "3"), 1)
@@ -345,8 +349,8 @@ def test_two_cracks_in_equilibrium():
 
 
 @pytest.mark.parametrize("seed", range(40))
-def test_every_crack_at_which_growth_ends(seed):
-    """Beside a scan of the tension at the tip."""
+def test_all_crack_lengths_in_equilibrium_are_found(seed):
+    """Against a scan of the tension at the tip."""
     dice = np.random.default_rng(seed)
     settings = {
         "dam_base": dice.uniform(26, 36),
@@ -384,7 +388,7 @@ def test_every_crack_at_which_growth_ends(seed):
 
 
 def test_tensile_strength():
-    """Below it no crack; beyond it rupture has none left at the tip, friction keeps c/mu."""
+    """No crack below it; beyond it none is left at the tip with law = rupture, else c/mu."""
     settings = {"uplift": "none", "rho_water": 1600.0}
     free = gravity.at(large(settings | {"sigma_max": 0.0}), 1)
     tension = gravity.at(large(settings | {"sigma_max": 1e9, "G_f": 1e9}), 1)
@@ -393,16 +397,18 @@ def test_tensile_strength():
     weaker = {"sigma_max": 0.99 * strength}
     assert gravity.at(large(settings | {"sigma_max": 1.01 * strength}), 1).crack_length == 0
     assert gravity.at(large(settings | weaker), 1).crack_length == pytest.approx(free.crack_length)
-    kept = gravity.at(large(settings | {"law": "friction", "mu": 1.0, "adhesion": strength / 2}), 1)
-    assert kept.tip_stress == pytest.approx(strength / 2, rel=1e-6)
-    assert 0 < kept.crack_length < free.crack_length
+    friction = gravity.at(
+        large(settings | {"law": "friction", "mu": 1.0, "adhesion": strength / 2}), 1
+    )
+    assert friction.tip_stress == pytest.approx(strength / 2, rel=1e-6)
+    assert 0 < friction.crack_length < free.crack_length
 
 
 def test_factors_and_position():
     found = gravity.at(large({"mu": 0.8, "adhesion": 1e5, "sigma_max": 0.0}), 1)
     holds = 0.8 * found.N + 1e5 * (34 - found.crack_length)
     assert found.SSF == pytest.approx(holds / found.T)
-    # weight and tailwater (pushing back, and down) against reservoir and uplift
+    # weight and tailwater (its thrust upstream and downwards) against reservoir and uplift
     rows = {row.name: row for row in found.loads}
     holding = rows["weight"].moment + rows["tailwater"].moment
     assert found.OSF == pytest.approx(holding / (found.uplift.moment - rows["reservoir"].moment))

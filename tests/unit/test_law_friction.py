@@ -1,5 +1,6 @@
 """The friction law of pro/law_friction.pro against closed forms (code_aster R7.01.25,
-JOINT_MECA_FROT)."""
+JOINT_MECA_FROT).
+"""
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ from numpy.testing import assert_allclose
 
 K_N, K_T, MU, C = 1e12, 2e12, 0.35, 1000.0
 PRESSED = -1e-8  # sigma = -1e4 Pa
-YIELD = C + MU * 1e4  # shear at which the pressed joint slips: 4500 Pa
+YIELD = C + MU * 1e4  # shear strength of the closed joint: 4500 Pa
 BASE = {"K_N": K_N, "K_T": K_T, "mu": MU, "adhesion": C, "pena_tang": 0}
 
 
@@ -17,13 +18,14 @@ def along(jumps, pressure=None, **settings):
 
 
 def shear(d_t, d_n=PRESSED, **settings):
-    """Along tangent 1 at constant normal jump."""
+    """Response along tangent 1 at constant normal jump."""
     return along(np.column_stack([np.full(len(d_t), d_n), d_t, np.zeros(len(d_t))]), **settings)
 
 
 def closed_form(jumps, hardening):
     """sigma_n, tau_1, tau_2, lambda along a path: implicit return to |tau| = c - mu sigma + H
-    lambda."""
+    lambda.
+    """
     slip, total, rows = np.zeros(2), 0.0, []
     for d_n, *d_t in jumps:
         sigma = min(K_N * d_n, C / MU)
@@ -38,8 +40,8 @@ def closed_form(jumps, hardening):
     return np.array(rows)
 
 
-def test_stick_then_slip_by_hand():
-    """Elastic up to 4500 Pa, reached at 2.25e-9 m; constant beyond; unloads elastically."""
+def test_stress_of_sticking_and_slipping():
+    """Elastic up to 4500 Pa at 2.25e-9 m; constant beyond; elastic unloading."""
     answer = shear([1e-9, 2e-9, 3e-9, 5e-9, 4e-9])
     assert_allclose(answer["tau_1"], [2000, 4000, 4500, 4500, 2500], rtol=1e-9)
     assert_allclose(answer["slip_1"], [0, 0, 0.75e-9, 2.75e-9, 2.75e-9], rtol=1e-9, atol=1e-20)
@@ -48,7 +50,7 @@ def test_stick_then_slip_by_hand():
 
 @pytest.mark.parametrize("hardening", [0, 2e11, 2e12])
 def test_hardening_slope(hardening):
-    """While slipping d tau/d delta_t = K_T H/(K_T + H)."""
+    """During slip d tau/d delta_t = K_T H/(K_T + H)."""
     d_t = np.array([4e-9, 9e-9])
     tau = shear(d_t, pena_tang=hardening)["tau_1"]
     assert_allclose(
@@ -56,9 +58,10 @@ def test_hardening_slope(hardening):
     )
 
 
-def test_a_cycle_dissipates():
+def test_dissipation_of_a_cycle():
     """Between +-a without hardening the loop encloses 4 tau_y (a - tau_y/K_T); the cumulated slip
-    only grows."""
+    increases only.
+    """
     a = 6e-9
     d_t = a * np.interp(np.arange(101), [0, 20, 60, 100], [0, 1, -1, 1])
     answer = shear(d_t)
@@ -69,7 +72,7 @@ def test_a_cycle_dissipates():
     assert answer["slip_1"][-1] == pytest.approx(a - YIELD / K_T)
 
 
-def test_slip_follows_the_shear_in_3d():
+def test_slip_is_parallel_to_the_shear_in_3d():
     """Along (3, -4)/5: the return is radial."""
     way = np.array([0.6, -0.8])
     jumps = [(PRESSED, *(d * way)) for d in (1e-9, 5e-9)]
@@ -81,8 +84,8 @@ def test_slip_follows_the_shear_in_3d():
     assert_allclose(answer["lambda"], [0, 5e-9 - YIELD / K_T], rtol=1e-9, atol=1e-20)
 
 
-def test_open_at_the_tip_of_the_cone():
-    """sigma never passes c/mu; there the shear has gone, and closing brings the contact back."""
+def test_an_open_joint_is_at_the_apex_of_the_cone():
+    """sigma never exceeds c/mu; there the shear is 0, and closing restores the contact."""
     tip = C / MU / K_N
     answer = along([(0.5 * tip, 0, 0), (2 * tip, 3e-9, 0), (PRESSED, 3e-9, 0)])
     assert_allclose(answer["sigma_n"], [0.5 * C / MU, C / MU, -1e4], rtol=1e-9)
@@ -90,15 +93,15 @@ def test_open_at_the_tip_of_the_cone():
     assert_allclose(answer["open"], [0, 1, 0])
 
 
-def test_more_pressure_on_the_joint_lets_more_shear_through():
-    """The slip limit c - mu sigma goes with the current normal stress."""
+def test_the_shear_strength_increases_with_compression():
+    """c - mu sigma of the current normal stress."""
     d_n = np.array([-1e-8, -2e-8, -5e-9, 0])
     answer = along([(d, 1e-6 * (i + 1), 0) for i, d in enumerate(d_n)])
     assert_allclose(answer["tau_1"], C - MU * K_N * d_n, rtol=1e-9)
 
 
 def test_pressure_changes_the_total_stress_but_not_the_friction():
-    """Slip is governed by the effective stress."""
+    """The shear strength depends on the effective stress."""
     d_t = np.column_stack([np.full(3, PRESSED), [1e-9, 3e-9, 5e-9], np.zeros(3)])
     dry, wet = along(d_t), along(d_t, pressure=[5e3] * 3)
     assert_allclose(wet["sigma_n"], dry["sigma_n"] - 5e3, rtol=1e-9)
@@ -110,14 +113,14 @@ def test_default_hardening():
     settings = {k: v for k, v in BASE.items() if k != "pena_tang"}
     jumps = np.array([(PRESSED, 1e-6, 0)])
     answer = law.evaluate("friction", jumps, settings=settings)
-    given = along(jumps, pena_tang=(K_N + K_T) * 1e-6)
-    assert_allclose(answer["tau_1"], given["tau_1"], rtol=1e-12)
+    explicit = along(jumps, pena_tang=(K_N + K_T) * 1e-6)
+    assert_allclose(answer["tau_1"], explicit["tau_1"], rtol=1e-12)
     assert answer["tau_1"][0] > YIELD
 
 
 @pytest.mark.parametrize("hardening", [0, 3e6, 2e11])
-def test_random_walk(hardening):
-    """120 steps that slide to and fro, open and close, row by row the closed form."""
+def test_random_path_against_the_closed_form(hardening):
+    """120 steps with slip in both directions, opening and closing."""
     walk = np.cumsum(np.random.default_rng(142).normal(0, 2e-9, (120, 3)), axis=0)
     walk[:, 0] = 1e-8 * np.sin(np.arange(120) / 9)
     answer = along(walk, pena_tang=hardening)

@@ -1,4 +1,4 @@
-"""damjoint law: a path file in, the same path with stresses and state out."""
+"""damjoint law: a path file in, the path with stresses and internal variables out."""
 
 import csv
 import io
@@ -14,8 +14,9 @@ def columns(text):
 
 
 def test_path_file_to_standard_output_and_to_a_file(command, tmp_path):
-    """Rupture by hand: 1e-10 m is the peak, 1.1e-10 m half way down, -1e-9 m in contact; p comes
-    off sigma_n."""
+    """Rupture by hand: peak at 1e-10 m, half of it at 1.1e-10 m, contact at -1e-9 m; p is
+    subtracted from sigma_n.
+    """
     (tmp_path / "path.csv").write_text(
         "delta_n,delta_t1,delta_t2,p\n1e-10,0,0,0\n1.1e-10,0,0,1000\n-1e-9,2e-9,-1e-9,0\n"
     )
@@ -41,7 +42,7 @@ def test_path_file_to_standard_output_and_to_a_file(command, tmp_path):
 
 
 def test_path_of_a_grouted_joint(command, tmp_path):
-    """Open by 1 mm at t = 1, grouted at t = 2, pressed against the grout at t = 3."""
+    """Opened by 1 mm at t = 1, grouted at t = 2, pressed against the grout at t = 3."""
     (tmp_path / "path.csv").write_text(
         "delta_n,delta_t1,delta_t2\n1e-3,0,0\n1e-3,0,0\n9.9995e-4,0,0\n"
     )
@@ -69,8 +70,8 @@ def test_friction_without_a_pressure_column(command, tmp_path):
     )
 
 
-def test_long_path():
-    """A thousand rows: more than GetDP reads in one line."""
+def test_a_path_of_a_thousand_rows():
+    """More than GetDP reads in one line."""
     closing = -np.linspace(1e-10, 1e-9, 1000)
     jumps = np.column_stack([closing, closing, 0 * closing])
     answer = law.evaluate("rupture", jumps, settings={"K_N": 1e12})

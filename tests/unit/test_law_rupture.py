@@ -1,5 +1,6 @@
 """The rupture law of pro/law_rupture.pro against its closed form (code_aster R7.01.25,
-JOINT_MECA_RUPT)."""
+JOINT_MECA_RUPT).
+"""
 
 import numpy as np
 import pytest
@@ -26,7 +27,7 @@ def closed_form(jumps, sigma_max=S, alpha=1.0, pena_contact=1.0):
     l_c = (1 + P) * d_e
     l_ct = max(
         {0: 0.0, 2: np.inf}.get(alpha, l_c * np.tan(alpha * np.pi / 4)), 1e-12
-    )  # "at once" is 1e-12 m
+    )  # regularisation length 1e-12 m
     kappa, free, rows = d_e, np.zeros(2), []
     for d_n, *d_t in jumps:
         peak = sigma_max * (1 + P) / P
@@ -44,15 +45,16 @@ def closed_form(jumps, sigma_max=S, alpha=1.0, pena_contact=1.0):
     return np.array(rows)
 
 
-def test_monotone_opening_by_hand():
-    """100 Pa at 1e-10 m, then down the line to zero at 1.2e-10 m."""
+def test_stress_of_a_monotone_opening():
+    """100 Pa at 1e-10 m, then linear to zero at 1.2e-10 m."""
     openings = np.array([0.5, 1.0, 1.05, 1.1, 1.15, 1.2, 2.0]) * 1e-10
     assert_allclose(normal(openings), [50, 100, 75, 50, 25, 0, 0], rtol=1e-9, atol=1e-9)
 
 
-def test_unloading_to_the_origin_and_reloading_by_hand():
-    """From 50 Pa at 1.1e-10 m along the secant; back to the same point; on along the softening
-    line."""
+def test_unloading_to_the_origin_and_reloading():
+    """From 50 Pa at 1.1e-10 m along the secant, back to the same point, then along the softening
+    line.
+    """
     openings = np.array([1.1, 0.55, 0.11, 0.55, 1.1, 1.15]) * 1e-10
     assert_allclose(normal(openings), [50, 25, 5, 25, 50, 25], rtol=1e-9)
 
@@ -64,13 +66,13 @@ def test_elastic_branch_is_reversible():
     assert_allclose(answer["damage"], 0)
 
 
-def test_damage_is_the_used_part_of_the_softening_branch():
+def test_damage_is_the_share_of_the_softening_branch():
     answer = along([(d * 1e-10, 0, 0) for d in (0.9, 1.05, 1.0, 1.1, 1.3, 0.1)])
     assert_allclose(answer["damage"], [0, 0.25, 0.25, 0.5, 1, 1], rtol=1e-9)
     assert_allclose(answer["kappa"], np.array([1, 1.05, 1.05, 1.1, 1.3, 1.3]) * 1e-10, rtol=1e-12)
 
 
-def test_broken_stays_broken_but_still_bears_compression():
+def test_a_broken_joint_has_no_tension_but_compression():
     openings = np.array([1.3, 0.5, -2.0, 0.5, 0.0]) * 1e-10
     assert_allclose(normal(openings), [0, 0, -200, 0, 0], atol=1e-9)
 
@@ -93,16 +95,18 @@ def test_without_strength_there_is_no_tension():
     "alpha, left", [(0, 0), (1, 0.5), (1.5, 1 - 0.5 / np.tan(1.5 * np.pi / 4)), (2, 1)]
 )
 def test_tangential_stiffness_half_way_to_rupture(alpha, left):
-    """K_t = K_T (1 - delta_n/L_CT), L_CT = L_C tan(alpha pi/4): none left at once (0), never
-    released (2)."""
+    """K_t = K_T (1 - delta_n/L_CT), L_CT = L_C tan(alpha pi/4): alpha = 0 loses it at once, alpha =
+    2 never.
+    """
     answer = along([(0, 2e-9, -1e-9), (0.5 * L_C, 2e-9, -1e-9)], alpha=alpha)
     assert_allclose(answer["tau_1"], K_T * 2e-9 * np.array([1, left]), rtol=1e-9, atol=1e-6)
     assert_allclose(answer["tau_2"], K_T * -1e-9 * np.array([1, left]), rtol=1e-9, atol=1e-6)
 
 
-def test_released_slip_is_remembered():
-    """Sheared elastically, opened (slides freely to 7e-9 m), closed there: the shear starts anew
-    from 7e-9 m."""
+def test_slip_of_the_open_joint_is_kept_on_closing():
+    """Sheared elastically, opened (free slip to 7e-9 m), closed there: shear starts again from 7e-9
+    m.
+    """
     jumps = [
         (-D_E, 1e-9, 0),
         (2 * L_C, 4e-9, 1e-9),
@@ -116,8 +120,8 @@ def test_released_slip_is_remembered():
     assert_allclose(answer["released_1"][-1], 7e-9)
 
 
-def test_partial_release_is_recovered_on_closing():
-    """The law is total: short of L_CT, the shear comes back with the contact."""
+def test_a_partial_shear_release_is_recovered_on_closing():
+    """The law is total: below L_CT the shear returns with the contact."""
     answer = along([(0.5 * L_C, 1e-9, 0), (-D_E, 1e-9, 0)])
     assert_allclose(answer["tau_1"], [0.5 * K_T * 1e-9, K_T * 1e-9], rtol=1e-9)
 
@@ -137,9 +141,8 @@ def test_pressure_lowers_the_total_normal_stress_only():
         {"sigma_max": 1e4, "pena_contact": 2.5},
     ],
 )
-def test_random_walk(settings):
-    """120 steps that open, break, close and slide in both directions, row by row the closed
-    form."""
+def test_random_path_against_the_closed_form(settings):
+    """120 steps that open, break, close and slide in both directions."""
     scale = max(settings.get("sigma_max", S), 1) / K_N
     walk = np.cumsum(np.random.default_rng(142).normal(0, 0.3, (120, 3)), axis=0) * scale
     walk[:, 0] = 0.7 * scale * np.sin(np.arange(120) / 4) * np.linspace(0.5, 3, 120)
@@ -152,8 +155,8 @@ def test_random_walk(settings):
     )
 
 
-def test_grouted_joint_closes_on_the_grout():
-    """1 mm open, grouted at 5e4 Pa: contact at the thickness 1 mm + p/K_N, no tension beyond it."""
+def test_a_grouted_joint_closes_on_the_grout():
+    """Open by 1 mm, grouted at 5e4 Pa: contact at the thickness 1 mm + p/K_N, no tension beyond."""
     gap, p = 1e-3, 5e4
     filled = gap + p / K_N
     openings = np.array([gap, gap, filled - 2 * p / K_N, filled + 1e-6, -p / K_N])
@@ -164,9 +167,10 @@ def test_grouted_joint_closes_on_the_grout():
 
 
 @pytest.mark.parametrize("beta", [0.5, 1])
-def test_grout_is_liquid_until_it_sets(beta):
-    """Half the pressure half a unit before, whatever the opening; a point pressed harder than the
-    grout takes none."""
+def test_grout_is_a_pressure_until_it_sets(beta):
+    """Half the pressure at half the time, at any opening; a point under a higher contact stress
+    takes no grout.
+    """
     p, stiffness = 5e4, beta * K_N
     settings = {"grout_pressure": p, "grout_t": 2.5, "pena_contact": beta}
     answer = along([(d, 0, 0) for d in (1e-3, 2e-3, 3e-3, 3e-3)], **settings)
@@ -177,15 +181,15 @@ def test_grout_is_liquid_until_it_sets(beta):
     assert_allclose(pressed["thickness"], 0)
 
 
-def test_grout_holds_along_the_joint_from_where_it_was_put():
+def test_shear_of_a_grouted_joint_counts_from_its_slip_at_grouting():
     jumps = [(1e-3, 1e-6, 0), (1e-3, 1e-6, 0), (1e-3, 3e-6, -1e-6), (2e-3, 3e-6, 0)]
     answer = along(jumps, grout_pressure=5e4, grout_t=2)
     assert_allclose(answer["tau_1"], K_T * np.array([0, 0, 2e-6, 0]), rtol=1e-9, atol=1e-3)
     assert_allclose(answer["tau_2"], K_T * np.array([0, 0, -1e-6, 0]), rtol=1e-9, atol=1e-3)
 
 
-def test_sawn_joint_has_no_bond_and_closes_later():
-    """2e-10 m sawn at t = 2, half of them at 1.5: contact from there on, no tension anywhere."""
+def test_a_sawn_joint_has_no_bond_and_closes_later():
+    """2e-10 m sawn at t = 2, half of it at 1.5: contact from there on, no tension."""
     saw = 2e-10
     openings = np.array([0.5 * D_E, 0.5 * D_E, -0.5 * saw, -1.5 * saw])
     answer = along([(d, 0, 0) for d in openings], saw_thickness=saw, saw_t=2)
@@ -195,9 +199,10 @@ def test_sawn_joint_has_no_bond_and_closes_later():
     assert_allclose(halfway["sigma_n"], -K_N * saw * np.array([1.5, 1, 0.5]), rtol=1e-9)
 
 
-def test_sawn_between_elastic_blocks():
-    """Blocks of 10 m in all, pushed together by 3e-6 m; 1e-6 m sawn between them takes a third of
-    the stress away (code_aster, SSNP143 C)."""
+def test_stress_of_a_sawn_joint_between_elastic_blocks():
+    """Blocks of 10 m in all, compressed by 3e-6 m; sawing 1e-6 m reduces the stress by a third
+    (code_aster, SSNP143 C).
+    """
     push, saw, beta, young, length = 3e-6, 1e-6, 0.8, 3e12, 10.0
     soft = 1 / (beta * K_N) + length / young
     sigma = -np.array([push, push - saw]) / soft

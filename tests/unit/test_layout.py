@@ -1,4 +1,4 @@
-"""The arrows between the parts of the package point one way; the pages made from it are current."""
+"""Imports between the parts of the package go one way; pages made from the code are current."""
 
 import ast
 from pathlib import Path
@@ -29,20 +29,20 @@ def imported(path):
 
 
 @pytest.mark.parametrize("path", sorted(PACKAGE.rglob("*.py")), ids=lambda p: str(p.name))
-def test_a_module_uses_only_what_stands_above_it(path):
+def test_a_module_imports_only_modules_above_it(path):
     for names in imported(path):
         used = names[0] if names[0] in PARTS else ""
         assert PARTS.index(used) <= PARTS.index(part_of(path)), f"{path} imports {names}"
 
 
-def test_the_engines_do_not_know_one_another():
+def test_the_engines_do_not_import_each_other():
     for engine, other in (("getdp", "condensed"), ("condensed", "getdp")):
         for path in (PACKAGE / "engines" / engine).rglob("*.py"):
             assert not any(other in names for names in imported(path)), path
 
 
-def test_no_circles():
-    """Among the modules, by following every import."""
+def test_no_circular_imports():
+    """Over all imports of all modules."""
     graph = {}
     for path in PACKAGE.rglob("*.py"):
         name = path.relative_to(PACKAGE).with_suffix("").parts
@@ -77,14 +77,14 @@ def is_module(names):
 
 @pytest.mark.parametrize("name", ["parameters", "results"])
 def test_pages_are_current(name):
-    """`make pages` after a change of a parameter or a column."""
+    """After a change of a parameter or a column: `make pages`."""
     path = Path(__file__).parents[2] / "reference" / f"{name}.md"
     assert path.read_text() == getattr(pages, f"{name}_page")()
 
 
 @pytest.mark.parametrize("folder", ["pro", "geo", "cases"])
-def test_lines_are_not_too_long(folder):
-    """As ruff sees to it in Python."""
+def test_lines_of_gmsh_and_getdp_files_are_not_too_long(folder):
+    """In Python ruff checks it."""
     for path in damjoint.data(folder).iterdir():
         if path.suffix in (".pro", ".geo", ".case"):
             long = [line for line in path.read_text().splitlines() if len(line) > 100]

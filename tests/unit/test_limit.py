@@ -1,10 +1,10 @@
-"""Loads that no joint can hold: told from the resultants, in agreement with the closed forms."""
+"""Limit analysis: loads that no joint can resist, by their resultants, against closed forms."""
 
 from dataclasses import replace
 
 import pytest
 from closed_forms import BASE, resultants
-from damjoint.engines.condensed.cache import interface_of
+from damjoint.joint.interface import interface_of
 from damjoint.model.case import load
 from damjoint.statics.limit import mechanism
 
@@ -18,8 +18,8 @@ def verdict_of(values, level):
 
 
 @pytest.mark.parametrize("law", ["friction", "bond"])
-def test_sliding(law):
-    """T > mu N + c L, a per mille to both sides."""
+def test_sliding_limit(law):
+    """T > mu N + c L, a per mille on both sides."""
     n, t, _ = resultants(9.0, 0.0, True)
     for factor, expected in ((1.001, ""), (0.999, "sliding")):
         cohesion = (t - 0.35 * n) / BASE * factor
@@ -27,8 +27,8 @@ def test_sliding(law):
         assert verdict_of(values, 9)[0] == expected
 
 
-def test_overturning():
-    """Without tension no M < 0; with tension f no M < - f L^2/2."""
+def test_overturning_limit():
+    """Without tension no M < 0; with tensile strength f no M < - f L^2/2."""
     n, _, m = resultants(10.0, 0.0, True)
     assert m > 0 and n > 0
     heavy = {"law": "rupture", "rho_water": 1200.0}
@@ -39,7 +39,7 @@ def test_overturning():
         assert verdict_of(heavy | {"sigma_max": strength}, 10)[0] == expected
 
 
-def test_nothing_is_said_of_hardening_and_of_water_that_follows_the_opening():
+def test_hardening_and_computed_uplift_have_no_limit():
     weak = {"mu": 0.01, "adhesion": 0.0}
     assert verdict_of(weak, 9)[0] == "sliding"
     assert verdict_of(weak | {"pena_tang": 1.0}, 9) == ("", "")

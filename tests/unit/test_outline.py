@@ -1,4 +1,4 @@
-"""What a picture takes from the mesh: outlines, faces that water stands against; units by size."""
+"""Outlines of the mesh for pictures, faces under water; units by magnitude."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ from numpy.testing import assert_allclose
 
 
 def body(points, **quads):
-    """Of some regions."""
+    """A body with these regions."""
     points = np.array([(*p, 0.0) for p in points])
     cells = [("quad", np.array(some)) for some in quads.values()]
     return Body(points, np.arange(len(points)), cells, np.arange(len(quads)), list(quads))
@@ -27,8 +27,9 @@ def body(points, **quads):
 
 @pytest.fixture
 def lift():
-    """A dam with a batter 1:4 and a slope 1:1 upon a block of itself on rock; the joint at y = 4
-    from x = 1 to x = 8, the crest at y = 8 from 2 to 4."""
+    """A dam with a batter 1:4 and a slope 1:1 on a block of concrete on rock; the joint at y = 4
+    from x = 1 to x = 8, the crest at y = 8 from 2 to 4.
+    """
     bodies = {
         "dam": body([(1, 4), (8, 4), (4, 8), (2, 8)], dam=[(0, 1, 2, 3)]),
         "foundation": body(
@@ -69,14 +70,14 @@ def test_outlines_of_a_lift_joint(lift):
     "level, held",
     [(0, 0), (2, 2 * (5 + 2 / 8)), (6, 6 * (5 + 6 / 8)), (9, 8 * (5 + 1) + 5 + 2 + 2)],
 )
-def test_water_up_to_a_level(lift, level, held):
-    """Beside a batter 1:4 from the rock's end on; over the crest as far as it goes."""
+def test_area_of_water_up_to_a_level(lift, level, held):
+    """Beside a batter 1:4 from the end of the rock; over the crest over its whole length."""
     polygon = section_of(*lift[:2], 1.0, lift[2]).reservoir(level)
     assert (area(polygon) if len(polygon) else 0) == pytest.approx(held)
 
 
-def test_water_follows_the_dam(lift):
-    """Tailwater beside a slope 1:1 of a dam that has moved by 0.5 m, ten times exaggerated."""
+def test_water_follows_the_displaced_dam(lift):
+    """Tailwater beside a slope 1:1, displaced by 0.5 m, ten times exaggerated."""
     bodies, still, ends = lift
     section = section_of(bodies, still | {"dam": still["dam"] + (0.05, 0, 0)}, 10.0, ends)
     below, above = 4 * (8 + 2), 2 * (20 - 8 - 0.5 + 1)
@@ -84,19 +85,18 @@ def test_water_follows_the_dam(lift):
     assert_allclose(section.crest[:, 0], (4.5, 2.5))
 
 
-def test_no_section_where_none_is_seen(lift):
-    """A dam that touches the lowest z nowhere with a face."""
+def test_a_body_without_a_face_at_the_lowest_z_has_no_section(lift):
     bodies, still, ends = lift
     bodies["dam"].points[:2, 2] = 1.0
     assert section_of(bodies, still, 1.0, ends) is None
 
 
-def test_a_shore_with_an_overhang():
+def test_water_below_an_overhang():
     shore = np.array([(0.0, 3.0), (1.0, 2.0), (0.0, 1.0), (0.0, 0.0), (-2.0, 0.0)])
     assert area(fill_to_level(shore, 2.0)) == pytest.approx(2 * 2 + 0.5)
 
 
-def test_skin_of_a_solid():
+def test_surface_of_a_solid():
     """Two tetrahedra that share a face."""
     points = np.vstack([np.zeros(3), np.eye(3), np.ones(3)])
     tets = [("tetra", np.array([(0, 1, 2, 3), (4, 1, 2, 3)]))]
@@ -106,16 +106,17 @@ def test_skin_of_a_solid():
 
 
 def test_states_of_the_joint():
-    """Closed, slipped, softening (slipped or not), open; friction does not soften: what is between
-    0 and 1 is a mean over z."""
+    """Closed, slipped, softening (slipped or not), open; law = friction has no softening: values
+    between 0 and 1 are means over z.
+    """
     rows = {"damage": np.array([0, 0, 0.2, 0.2, 1]), "slip": np.array([0, 1e-3, 0, 1e-3, 1e-3])}
     assert state_of(rows).tolist() == [CLOSED, SLIPPED, SOFTENING, SOFTENING, OPEN]
     friction = rows | {"lambda": rows["slip"]}
     assert state_of(friction).tolist() == [CLOSED, SLIPPED, CLOSED, SLIPPED, OPEN]
 
 
-def test_rows_of_a_broken_joint():
-    """A step in the joint: two nodes at the same x and z; curves go by the distance."""
+def test_rows_of_a_stepped_joint():
+    """Two nodes at the same x and z; curves are drawn over the distance."""
     rows = {
         "x": np.array([0, 1, 1, 2.0]),
         "y": np.array([0, 0, 1, 1.0]),
@@ -127,11 +128,11 @@ def test_rows_of_a_broken_joint():
     joint = Body(points, np.arange(4), [], np.arange(0))
     assert row_of_nodes(joint, rows).tolist() == [3, 2, 1, 0]
     assert_allclose(along(rows)["p"], [3, 2, 1, 0])
-    assert_allclose(distance({"x": rows["x"]}), rows["x"])  # flat: no column of its own
+    assert_allclose(distance({"x": rows["x"]}), rows["x"])  # flat: no separate column
 
 
-def test_curves_of_a_joint_whose_nodes_stand_in_no_rows():
-    """A pressure linear in the distance stays so; the parts are as many as nodes go across."""
+def test_curves_of_a_joint_with_unordered_nodes():
+    """A pressure linear in the distance stays linear; there are as many parts as nodes across."""
     s, z = np.random.default_rng(1).uniform(size=(2, 400))
     curves = along({"x": s, "z": z, "s": s, "p": 3 - s})
     assert len(curves["s"]) == 20
@@ -139,7 +140,7 @@ def test_curves_of_a_joint_whose_nodes_stand_in_no_rows():
 
 
 @pytest.mark.parametrize(
-    "value, units, said",
+    "value, units, text",
     [
         (1.2683e7, FORCES, "12.68 MN/m"),
         (150e3, FORCES, "150 kN/m"),
@@ -147,6 +148,6 @@ def test_curves_of_a_joint_whose_nodes_stand_in_no_rows():
         (0.0, LENGTHS, "0 nm"),
     ],
 )
-def test_units_by_size(value, units, said):
-    assert with_unit(value, units) == said
-    assert unit([np.array([0, -value])], units)[0] == said.split()[1]
+def test_units_by_magnitude(value, units, text):
+    assert with_unit(value, units) == text
+    assert unit([np.array([0, -value])], units)[0] == text.split()[1]

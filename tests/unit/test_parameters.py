@@ -1,4 +1,6 @@
-"""Parameters, case files, levels: what a scene is made of."""
+"""Parameters, case files, levels."""
+
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -6,9 +8,10 @@ from damjoint import InputError
 from damjoint.model import parameters
 from damjoint.model.case import CASES, as_published, load
 from damjoint.model.parameters import independent
+from damjoint.model.values import TextName
 from numpy.testing import assert_allclose
 
-# What the verification document and the published test files say of each modeling.
+# Values of each modeling in the verification document and the published test files.
 PUBLISHED = {
     "a": {
         "dim": 2,
@@ -144,9 +147,17 @@ def test_dependent_defaults():
     assert [changed[n] for n in ("E_dam", "E_found", "nu_dam", "nu_found")] == [3e10, 2e10, 0, 0.3]
 
 
-def test_settings_are_checked_numbers_and_choices():
+def test_settings_become_checked_numbers_and_choices():
     found = parameters.settings(["E=3e9", " K_N = 1e11 ", "law=friction"])
     assert found == {"E": 3e9, "K_N": 1e11, "law": "friction"}
+
+
+def test_levels_as_numbers_and_as_text():
+    text = load("a", {"mu": 0.5}, "6,9", "1,2")
+    numbers = load("a", {"mu": 0.5}, [6, 9.0], (1, 2))
+    assert text == numbers and numbers.levels == (6, 9)
+    with pytest.raises(InputError, match="levels = 3,nan: must be"):
+        load("a", levels=[3, float("nan")])
 
 
 def test_levels_and_steps():
@@ -158,20 +169,19 @@ def test_levels_and_steps():
     assert_allclose([case.level_at(t) for t in (0, 0.5, 1, 1.5, 2.25, 4)], [0, 3, 6, 7.5, 7.25, 8])
 
 
-def test_one_tail_level_holds_for_all():
+def test_one_tail_level_is_used_for_all_levels():
     assert load("a", levels="6,9", tail_levels="2").tail_levels == (2, 2)
     assert load("a", levels="6,9", tail_levels="1,2").tail_levels == (1, 2)
 
 
-def test_steps_alone_keep_the_levels_of_the_case():
+def test_steps_without_levels_use_the_levels_of_the_case():
     case = load("a", steps=2)
     assert case.levels == (3, 6, 8, 9)
     assert_allclose(case.times, np.arange(1, 9) / 2)
 
 
-def test_own_case_file(tmp_path):
-    """A file of one's own: the name is the file's, comments and arithmetic as in Gmsh, overrides
-    win."""
+def test_a_case_file_of_the_user(tmp_path):
+    """The name is that of the file; comments and arithmetic as in Gmsh; overrides win."""
     path = tmp_path / "mine.case"
     path.write_text(
         '// mine\ntitle = "mine";\ndefault_K_N = 2 * 1e11; default_dam_height = 12;\n'
@@ -183,7 +193,7 @@ def test_own_case_file(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "text, said",
+    "text, message",
     [
         ("default_KN = 1e12;", "KN"),
         ("default_nu = 0.5;", "nu = 0.5"),
@@ -192,10 +202,10 @@ def test_own_case_file(tmp_path):
         ("default_nu = ;", "must be a number"),
     ],
 )
-def test_bad_case_file(tmp_path, text, said):
+def test_a_bad_case_file_is_refused(tmp_path, text, message):
     path = tmp_path / "bad.case"
     path.write_text(text + "\n")
-    with pytest.raises(InputError, match=said) as caught:
+    with pytest.raises(InputError, match=message) as caught:
         load(str(path))
     assert "\n" not in str(caught.value)
 
@@ -212,14 +222,14 @@ def test_every_parameter_has_a_label_with_its_unit():
 
 
 def test_an_independent_parameter_changes_nothing_else():
-    """A case that is changed is the case that is loaded, for every one of them."""
+    """For each of them, a changed case equals a case loaded with the change."""
     common = {"law": "bond", "uplift": "drained"}
     base = load("dam", common)
     for name in independent():
         known, own = parameters.parameter(name), base[name]
         values = known.choices or ([own + 1] if known.integer else [own / 2, (own + 1) / 2])
         value = next(v for v in values if v != own)
-        if name in ("grout_pressure", "saw_thickness"):  # not with a bond: refused in both ways
+        if name in ("grout_pressure", "saw_thickness"):  # not with law = bond: refused in both ways
             for way in (lambda v: load("dam", common | v), base.changed):
                 with pytest.raises(InputError, match=name):
                     way({name: value})
@@ -239,11 +249,30 @@ def test_a_changed_case_is_checked():
         base.changed({"K_N": 1e12})
 
 
-def test_a_case_is_as_published_with_another_mesh_only():
-    """Solver and uplift, too; any other parameter makes it the user's."""
+def test_a_case_counts_as_published_with_another_mesh_only():
+    """Or solver or uplift; any other parameter makes it a case of the user."""
     groups = {name: known.group for name, known in parameters.declared().items()}
-    kept = {n for n in groups if as_published(CASES / "a.case", {n: 0}, None, None)}
-    assert kept == {n for n in groups if groups[n] in ("Mesh", "Solver")} | {"order", "uplift"}
-    assert {"n_joint", "tolerance"} <= kept and not {"mu", "sigma_max", "K_N", "law"} & kept
+    published = {n for n in groups if as_published(CASES / "a.case", {n: 0}, None, None)}
+    assert published == {n for n in groups if groups[n] in ("Mesh", "Solver")} | {"order", "uplift"}
+    assert {"n_joint", "tolerance"} <= published and not {
+        "mu",
+        "sigma_max",
+        "K_N",
+        "law",
+    } & published
     assert load("a", {"n_joint": 10}).published and not load("a", {"sigma_max": 2e4}).published
     assert not load("a", levels="3").published
+
+
+def test_groups_have_all_values_of_a_case():
+    """Each parameter is an attribute of one group; those declared as texts are the texts."""
+    case, known = load("dam"), parameters.declared()
+    names = ("scene", "dimensions", "mesh", "material", "joint", "water", "loads", "solver")
+    groups = [getattr(case, name) for name in (*names, "checks")]
+    assert sorted(n for group in groups for n in vars(group)) == sorted(known)
+    assert all(vars(group)[n] == case[n] for group in groups for n in vars(group))
+    texts = {n for n, parameter in known.items() if parameter.text}
+    assert {n for group in groups for n in getattr(group, "__annotations__", ())} == texts
+    assert set(get_args(TextName)) == texts
+    with pytest.raises(AttributeError):
+        case.joint.mu = 1.0

@@ -1,4 +1,4 @@
-"""What a sweep goes over: ties are arithmetic and nothing else, samples are those of scipy."""
+"""Plan of a sweep: ties are arithmetic only; samples are those of scipy."""
 
 import itertools
 import math
@@ -13,14 +13,14 @@ from scipy import stats
 MU = ["mu=0.6:1.0:0.2"]
 
 
-def test_ties_follow_what_stands_before():
+def test_ties_are_computed_from_earlier_names():
     plan = plan_of(MU, ["adhesion=2e5*mu", "sigma_max=(adhesion/2)^1"], None, {})
     rows = [[float(row[n]) for n in plan.names] for row in plan.rows()]
     assert np.allclose(rows, [[m, 2e5 * m, 1e5 * m] for m in (0.6, 0.8, 1.0)])
 
 
 @pytest.mark.parametrize(
-    "tie, said",
+    "tie, message",
     [
         ("adhesion=__import__('os').getpid()", "arithmetic"),
         ("adhesion=().__class__", "arithmetic"),
@@ -35,13 +35,13 @@ def test_ties_follow_what_stands_before():
         ("K_N=1e11", "given once"),
     ],
 )
-def test_anything_else_is_refused(tie, said):
+def test_an_expression_that_is_not_arithmetic_is_refused(tie, message):
     with pytest.raises(InputError) as refused:
         list(plan_of(MU, [tie], None, {"K_N": 1e12}).rows())
-    assert said in str(refused.value)
+    assert message in str(refused.value)
 
 
-def test_every_combination_has_the_whole_sample():
+def test_each_combination_has_all_rows_of_the_sample():
     sample = sample_of(["5", "adhesion = uniform(1e5, scale=1e5)"], seed=3)
     rows = list(plan_of(MU, ["sigma_max=adhesion"], sample, {}).rows())
     assert len(rows) == 15 and rows[0]["adhesion"] == rows[5]["adhesion"] == rows[5]["sigma_max"]
@@ -51,7 +51,7 @@ def test_every_combination_has_the_whole_sample():
 
 
 @pytest.mark.parametrize(
-    "words, said",
+    "words, message",
     [
         (["mu=normal(1,0.1)", "3"], "N NAME=DISTRIBUTION"),
         (["3"], "N NAME=DISTRIBUTION"),
@@ -68,14 +68,14 @@ def test_every_combination_has_the_whole_sample():
         (["3", "mu=normal(1,0.1)", "mu=normal(1,0.1)"], "given once"),
     ],
 )
-def test_a_bad_sample_is_refused(words, said):
+def test_a_bad_sample_is_refused(words, message):
     with pytest.raises(InputError) as refused:
         plan_of([], [], sample_of(words), {})
-    assert said in str(refused.value)
+    assert message in str(refused.value)
 
 
 def test_a_latin_hypercube_has_one_value_in_each_part():
-    """Of equal probability; also where the inputs are correlated."""
+    """Parts of equal probability; also with correlated inputs."""
     laws = {"mu": "normal(1.0, 0.15)", "adhesion": "lognorm(0.3, scale=2e5)"}
     drawn = sampling.draw(400, laws, "latin", 0, ["adhesion,mu=-0.5"])
     for name, law in (("mu", stats.norm(1.0, 0.15)), ("adhesion", stats.lognorm(0.3, scale=2e5))):
@@ -88,8 +88,8 @@ def test_a_latin_hypercube_has_one_value_in_each_part():
 @pytest.mark.parametrize(
     "wanted", [{"ab": -0.5}, {"ab": 0.95}, {"ab": 0.6, "bc": -0.3, "cd": 0.5}, {"ad": -0.8}]
 )
-def test_the_sample_has_the_correlations_asked_for(design, number, error, wanted):
-    """Those of the sample itself, 0 where none is asked for; each input keeps its values."""
+def test_the_sample_has_the_required_correlations(design, number, error, wanted):
+    """Of the sample itself, 0 where none is set; the values of each input stay the same."""
     laws = {"a": "normal(1,0.1)", "b": "lognorm(0.3)", "c": "uniform(0,1)", "d": "gumbel_r(2,3)"}
     texts = [f"{a},{b}={rank}" for (a, b), rank in wanted.items()]
     for seed in range(5):
@@ -116,15 +116,16 @@ def test_a_bad_correlation_is_refused(text):
         sampling.draw(3, laws, "monte-carlo", 0, [text])
 
 
-def test_correlations_have_to_hold_together():
+def test_contradictory_correlations_are_refused():
     laws = dict.fromkeys("abc", "normal(1,0.1)")
     with pytest.raises(InputError, match="hold together"):
         sampling.draw(3, laws, "latin", 0, ["a,b=0.9", "b,c=0.9", "a,c=-0.9"])
 
 
-def test_the_interval_of_a_probability():
-    """Clopper and Pearson's closed form without failures; what has not ended counts as a failure,
-    but not for the lower limit."""
+def test_confidence_interval_of_a_probability():
+    """Clopper and Pearson's closed form without failures; undecided rows count as failures, but not
+    for the lower limit.
+    """
     share, low, high = sampling.probability(0, 0, 50)
     assert (share, low) == (0, 0) and high == pytest.approx(1 - 0.025 ** (1 / 50))
     share, low, high = sampling.probability(0, 50, 50)

@@ -1,4 +1,4 @@
-"""Where measured figures come from, and that two versions are never mixed."""
+"""The line of a page on the origin of its figures, which are of one version."""
 
 import shutil
 import subprocess
@@ -11,35 +11,37 @@ from damjoint import __version__
 from damjoint_tools import pages, provenance
 
 ROOT = Path(__file__).parents[2]
-ONE = {"version": "1.2", "commit": "abc1234", "code": "f00", "machine": "PC", "date": "2030-01-02"}
+VALUES = "1.2", "abc1234", "f00", "PC", "2030-01-02"
+RECORD = dict(zip(provenance.RECORDED, VALUES, strict=True))
 
 
-def test_the_line_names_version_commit_day_and_machine():
-    said = provenance.said
-    assert said([ONE]) == "Measured with damjoint 1.2 (commit abc1234, 2030-01-02) on PC."
-    installed = ONE | {"commit": ""}
-    assert said([installed], "Computed") == "Computed with damjoint 1.2 (2030-01-02) on PC."
-    later = ONE | {"date": "2030-01-05", "machine": "laptop"}
-    assert "2030-01-02 to 2030-01-05) on PC and laptop." in said([later, ONE, ONE][::-1])
+def test_the_line_has_version_commit_date_and_machine():
+    line = provenance.source_line
+    assert line([RECORD]) == "Measured with damjoint 1.2 (commit abc1234, 2030-01-02) on PC."
+    installed = RECORD | {"commit": ""}
+    assert line([installed], "Computed") == "Computed with damjoint 1.2 (2030-01-02) on PC."
+    later = RECORD | {"date": "2030-01-05", "machine": "laptop"}
+    assert "2030-01-02 to 2030-01-05) on PC and laptop." in line([later, RECORD, RECORD][::-1])
 
 
-def test_figures_of_two_versions_or_of_none_have_no_line():
+def test_figures_of_two_versions_or_of_an_unknown_one_are_refused():
     with pytest.raises(ValueError, match=r"different versions: damjoint 1.2 \(abc1234\), 1.3 "):
-        provenance.said([ONE, ONE | {"version": "1.3", "code": "f01"}])
-    with pytest.raises(ValueError, match="do not say"):
-        provenance.said([ONE, {"scene": "7-1"}])
+        provenance.source_line([RECORD, RECORD | {"version": "1.3", "code": "f01"}])
+    with pytest.raises(ValueError, match="unknown version"):
+        provenance.source_line([RECORD, {"scene": "7-1"}])
 
 
-def test_what_is_recorded_now():
+def test_provenance_of_figures_measured_now():
     now = provenance.provenance()
     assert (now["version"], now["date"]) == (__version__, f"{date.today()}")
     assert len(now["code"]) == 64 and "cores" in now["machine"]
 
 
-def test_the_commit_is_that_of_the_code(tmp_path):
-    """Of a checkout, with its changes; none for a copy that lies in another project's checkout."""
+def test_the_commit_is_that_of_the_checkout_with_its_changes(tmp_path):
+    """A copy within another project's checkout has no commit."""
     copy = tmp_path / "project" / "scripts" / "damjoint"
-    shutil.copytree(ROOT / "scripts" / "damjoint", copy)
+    for package in ("damjoint", "damjoint_tools"):
+        shutil.copytree(ROOT / "scripts" / package, copy.with_name(package))
     (copy.parents[1] / "pro").mkdir()
 
     def git(*words):
@@ -47,21 +49,21 @@ def test_the_commit_is_that_of_the_code(tmp_path):
         done = subprocess.run(["git", *words], cwd=copy.parents[1], capture_output=True, text=True)
         return done.stdout.strip()
 
-    def told():
-        tell = "from damjoint.studies.provenance import commit; print(commit())"
-        words = [sys.executable, "-c", f"import sys; sys.path.insert(0, '{copy.parent}'); {tell}"]
+    def commit():
+        script = "from damjoint_tools.provenance import commit; print(commit())"
+        words = [sys.executable, "-c", f"import sys; sys.path.insert(0, '{copy.parent}'); {script}"]
         return subprocess.run(words, capture_output=True, text=True, check=True).stdout.strip()
 
     git("init")
-    assert told() == ""
+    assert commit() == ""
     git("add", "-A")
-    git("commit", "-m", "one")
+    git("commit", "-m", "first")
     head = git("rev-parse", "--short=7", "HEAD")
-    assert len(head) == 7 and told() == head
+    assert len(head) == 7 and commit() == head
     (copy / "run.py").write_text("# changed")
-    assert told() == f"{head} with changes"
+    assert commit() == f"{head} with changes"
 
 
-def test_the_pages_have_a_place_for_the_line():
+def test_readme_and_tour_have_a_place_for_the_line():
     for page, mark in (("README.md", "modelings"), ("reference/tour.md", "figures")):
         assert "\nnew\n<!-- /" in pages.between(mark, (ROOT / page).read_text(), "new")

@@ -1,4 +1,4 @@
-"""The reference table and the verdicts of the comparison."""
+"""The reference table and the verdicts of the comparison with it."""
 
 from dataclasses import replace
 
@@ -15,7 +15,7 @@ REFERENCE = validation.Reference(
 )
 
 
-def test_reference_table():
+def test_units_quantities_and_tolerances_of_the_reference_table():
     rows = validation.table()
     assert {r.modeling for r in rows} == set("ABCDEFGHIJK")
     assert {r.quantity for r in rows} <= {*JOINT, "flux"}
@@ -42,7 +42,7 @@ def test_every_scene_of_every_modeling_has_references(name):
         (3e-7, None, "info"),
     ],
 )
-def test_verdict(computed, tolerance, verdict):
+def test_verdict_of_a_comparison(computed, tolerance, verdict):
     comparison = validation.Comparison(replace(REFERENCE, tolerance=tolerance), computed)
     assert comparison.verdict == verdict
 
@@ -52,7 +52,7 @@ def test_difference_is_relative_to_the_reference():
     assert negative.difference == pytest.approx(0.05)
 
 
-def test_report_counts():
+def test_the_report_counts_the_verdicts():
     rows = [
         validation.Comparison(REFERENCE, 2e-7),
         validation.Comparison(REFERENCE, 3e-7),
@@ -64,13 +64,13 @@ def test_report_counts():
 
 
 def joint_table(rows):
-    """Joint rows from (time, x, z, delta_n)."""
+    """Rows of a joint table from (time, x, z, delta_n)."""
     table = {name: np.zeros(len(rows)) for name in JOINT}
     table["time"], table["x"], table["z"], table["delta_n"] = np.array(rows, float).T
     return table
 
 
-def test_compare_reads_the_nearest_nodes_at_the_last_level_and_averages_over_z():
+def test_computed_values_are_means_over_z_at_the_nearest_nodes_of_the_last_level():
     case = load("a")
     table = joint_table(
         [(3, 1.3, 0, 9), (4, 1.2, 0, 9), (4, 1.3, 0, 1e-7), (4, 1.3, 1, 3e-7), (4, 1.4, 0, 9)]
@@ -80,7 +80,7 @@ def test_compare_reads_the_nearest_nodes_at_the_last_level_and_averages_over_z()
     assert at and at == pytest.approx([2e-7] * len(at))
 
 
-def test_nodes_shared_by_elements_are_found_once():
+def test_nodes_shared_by_elements_are_counted_once():
     points = np.array([(0.1, 0, 0), (0.2, 0, 0), (0.2 + 1e-14, 0, 0), (0.3, 0, 0), (0.1, 0, 0.5)])
     nodes, rows = nodes_of(points)
     assert len(nodes) == 4
@@ -88,7 +88,7 @@ def test_nodes_shared_by_elements_are_found_once():
 
 
 def results(name, stopped=True, slip=0.0, **last):
-    """A run whose only step has these resultants; slip: of all nodes."""
+    """A run whose only step has these resultants; slip: at all nodes."""
     case = load(name)
     row = {**dict.fromkeys(HISTORY, 0.0), "time": 1.0, "level": 7.5, **last}
     joint = {column: np.zeros(3) for column in JOINT}
@@ -104,12 +104,16 @@ def results(name, stopped=True, slip=0.0, **last):
 @pytest.mark.parametrize(
     "name, last, reason",
     [
-        ("c", {"N": 1e5, "T": 39_900, "M": 2e5}, "sliding"),  # holds 0.35 * 1e5 + 1000 * 5 = 40000
-        # the hardening holds as well: 2e11 * 1e-7 * 5 = 1e5
+        (
+            "c",
+            {"N": 1e5, "T": 39_900, "M": 2e5},
+            "sliding",
+        ),  # strength 0.35 * 1e5 + 1000 * 5 = 40000
+        # with hardening: 2e11 * 1e-7 * 5 = 1e5 more
         ("c", {"N": 1e5, "T": 39_900, "M": 2e5, "slip": 1e-7}, "not converged"),
         ("c", {"N": 1e5, "T": 139_500, "M": 2e5, "slip": 1e-7}, "sliding"),
         ("c", {"N": 1e5, "T": 139_000, "M": 2e5, "slip": 1e-7}, "not converged"),
-        # N holds the tension of the open part: adhesion counts on all of the base
+        # N includes the tension of the open part: adhesion counts on all of the base
         ("c", {"N": 1e5, "T": 38_000, "M": 2e5, "crack_length": 3.0}, "not converged"),
         ("c", {"N": 1e5, "T": 39_900, "M": 1e3}, "overturning"),
         # statics: within half an element, or a hundredth of the base, of the toe
@@ -121,7 +125,7 @@ def results(name, stopped=True, slip=0.0, **last):
         ("c", {"N": 1e5, "T": 20_000, "M": 2e5}, "not converged"),
     ],
 )
-def test_why_a_run_stopped(name, last, reason):
+def test_reason_of_a_stop(name, last, reason):
     result = results(name, **last)
     assert verdict(result) == reason and failed(result)
     assert statement(result).startswith(reason) and "7.5 m" in statement(result)
@@ -131,12 +135,12 @@ def test_why_a_run_stopped(name, last, reason):
     "name, last, found, failure",
     [
         ("c", {"slip_length": 4.9}, "stands", False),
-        ("c", {"slip_length": 5.0}, "sliding", False),  # its hardening is asked for
+        ("c", {"slip_length": 5.0}, "sliding", False),  # its hardening is set
         ("a", {"crack_length": 5.0}, "sliding", True),
-        ("a", {"slip": 1e-6}, "sliding", True),  # all nodes have let go
+        ("a", {"slip": 1e-6}, "sliding", True),  # all nodes have slipped
     ],
 )
-def test_a_dam_whose_whole_joint_has_let_go_slides(name, last, found, failure):
+def test_a_dam_on_a_fully_slipped_joint_slides(name, last, found, failure):
     result = results(name, stopped=False, N=1e5, T=1e4, M=2e5, **last)
     assert (verdict(result), failed(result)) == (found, failure)
     assert statement(result).startswith("sliding: the whole joint") == (found == "sliding")

@@ -1,4 +1,4 @@
-"""How a failure is told from resultants: on both sides of each limit."""
+"""Verdicts from resultants, on both sides of each limit."""
 
 import numpy as np
 import pytest
@@ -6,12 +6,12 @@ from damjoint.model.case import load
 from damjoint.model.results import HISTORY, Results
 from damjoint.statics import verdict
 
-#: Effective normal force [N/m] of all these states.
+#: Effective normal force of all states [N/m].
 N = 1e6
 
 
 def stopped(law, crack=0.0, n_joint=50.0, **last):
-    """A dam on a base of 5 m whose run has stopped in a state; crack: share of the base."""
+    """A run that has stopped in this state, on a base of 5 m; crack: share of the base."""
     case = load("c", {"law": law, "pena_tang": 0, "uplift": "none", "n_joint": n_joint}, levels="3")
     length = case.joint_length
     state = {"N": N, "T": 0.0, "M": N * length / 2, "level": 2.0, "time": 0.5}
@@ -30,7 +30,7 @@ def stopped(law, crack=0.0, n_joint=50.0, **last):
         *((10.0, 0.9, 0.049, True), (10.0, 0.9, 0.051, False)),
     ],
 )
-def test_overturning_by_where_the_resultant_is(n_joint, crack, arm, overturns):
+def test_overturning_by_the_position_of_the_resultant(n_joint, crack, arm, overturns):
     """In the last hundredth of the base, or in the last half of an element, whatever the crack."""
     result = stopped("rupture", crack, n_joint)
     assert verdict.verdict(result) == "not converged"
@@ -41,8 +41,8 @@ def test_overturning_by_where_the_resultant_is(n_joint, crack, arm, overturns):
 
 @pytest.mark.parametrize("law", ["friction", "bond"])
 @pytest.mark.parametrize("share, slides", [(0.994, False), (0.996, True)])
-def test_sliding_by_the_share_of_the_capacity(law, share, slides):
-    """mu N + c L, within the half of a percent that a run's last step may miss."""
+def test_sliding_by_the_share_of_the_shear_strength(law, share, slides):
+    """mu N + c L, to half a percent, by which the last step of a run may be below it."""
     result = stopped(law)
     holds = result.case["mu"] * N + result.case["adhesion"] * result.case.joint_along
     result.history["T"] += share * holds
@@ -50,8 +50,8 @@ def test_sliding_by_the_share_of_the_capacity(law, share, slides):
     assert ("that the joint holds" in verdict.statement(result)) == slides
 
 
-def test_a_bond_holds_by_the_cohesion_that_damage_has_left():
-    """Half of c L where half of it is gone; all of friction's."""
+def test_sliding_of_a_bond_by_its_undamaged_cohesion():
+    """Half of c L at damage 1/2; all of friction."""
     for law, left in (("bond", 0.5), ("friction", 1.0)):
         result = stopped(law)
         length = result.case.joint_along
@@ -64,25 +64,27 @@ def test_a_bond_holds_by_the_cohesion_that_damage_has_left():
         )
 
 
-@pytest.mark.parametrize("engine, said", [("getdp", True), ("condensed", False)])
-def test_the_plain_engine_says_what_it_does_not_do(engine, said):
+@pytest.mark.parametrize("engine, expected", [("getdp", True), ("condensed", False)])
+def test_the_getdp_engine_has_a_hint_that_it_does_not_follow_the_path(engine, expected):
     result = stopped("bond")
     result.info["engine"] = engine
-    assert any("does not follow the equilibrium path" in h for h in verdict.hints(result)) == said
+    assert (
+        any("does not follow the equilibrium path" in h for h in verdict.hints(result)) == expected
+    )
 
 
-def test_what_a_path_has_shown_is_said():
-    """Far from any bound, the mechanism counts; else the run has not converged."""
+def test_the_statement_gives_the_mechanism_found_on_the_path():
+    """Far from any bound the mechanism is the reason; without one the run has not converged."""
     result = stopped("bond")
-    said = verdict.statement(result)
-    assert said.startswith("not converged: no equilibrium is found beyond level 2 m")
-    assert "the resultant is 2.5 m from the toe" in said
+    statement = verdict.statement(result)
+    assert statement.startswith("not converged: no equilibrium is found beyond level 2 m")
+    assert "the resultant is 2.5 m from the toe" in statement
     result.info["mechanism"] = {
         "mode": "sliding",
         "level": 2.5,
         "displacement_ratio": 4.2,
         "time": 1.0,
     }
-    said = verdict.statement(result)
-    assert said.startswith("sliding: no equilibrium beyond level 2 m")
-    assert "under 4.2 times that displacement, holds 2.5 m at most" in said
+    statement = verdict.statement(result)
+    assert statement.startswith("sliding: no equilibrium beyond level 2 m")
+    assert "under 4.2 times that displacement, holds 2.5 m at most" in statement

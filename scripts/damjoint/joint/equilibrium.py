@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays import Array
 from ..laws import TANGENT, Law, Mode
-from ..laws.base import Array
 from ..model.case import Case, flows, has_drains
 from ..model.loads import Loading, line_forces, quake_column, water_column
 from .flow import FlowSolution

@@ -12,7 +12,9 @@ from scipy import sparse
 
 from ..arrays import Array, IntArray, Sparse
 from ..fem import elements
+from ..fem.cache import cached, key_of
 from ..fem.condensation import Condensed
+from ..model.case import Case
 from ..model.mesh import JointMesh, ends_of, heel_normal
 from ..model.scene import UP
 from .flow import Flow, JointFields
@@ -255,3 +257,25 @@ class Interface:
         """
         lift = self.flow.lift if change.flow else None
         return self.undamaged(undamaged).solve(change, right, border, lift)
+
+
+@dataclass
+class LastInterface:
+    """A cache of one entry: a study computes its scenes mesh by mesh, and an interface with its
+    dense matrices may take gigabytes.
+    """
+
+    key: tuple[object, ...] = ()
+    interface: Interface | None = None
+
+    def of(self, case: Case) -> Interface:
+        """The joint of a case with its condensed bodies."""
+        key = *key_of(case), case["quadrature"]
+        if self.interface is None or key != self.key:
+            self.interface = None  # free its memory first
+            self.interface, self.key = Interface(cached(case)[0], case["quadrature"]), key
+        return self.interface
+
+
+#: The interface of this process: studies and tools share it.
+interface_of = LastInterface().of

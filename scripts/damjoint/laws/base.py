@@ -14,8 +14,7 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from ..arrays import Array, BoolArray
 
 V = TypeVar("V")
 
@@ -29,7 +28,7 @@ class Mode:
     #: the law with frozen damage, see `Law.freeze`
     frozen: Law[Any] | None = None
     #: points (q,) that are placed inside the release of their shear, see `Law.shear_release`
-    releasing: Mask | None = None
+    releasing: BoolArray | None = None
 
 
 TANGENT = Mode()
@@ -143,7 +142,7 @@ class Law(Generic[V]):
         """Used part of the strength: 0 undamaged to 1 broken; here 1 where the point is open."""
         return self.is_open(jump, variables).astype(float)
 
-    def is_open(self, jump: Array, variables: V) -> Mask:
+    def is_open(self, jump: Array, variables: V) -> BoolArray:
         """Whether a point belongs to the crack."""
         return jump[:, 0] > 0
 
@@ -155,11 +154,11 @@ class Law(Generic[V]):
         """Size of the plastic or released slip (q,) [m]."""
         return np.zeros(points)
 
-    def has_slipped(self, variables: V, points: int) -> Mask:
+    def has_slipped(self, variables: V, points: int) -> BoolArray:
         """Whether a point has slipped, or its shear has been released."""
         return self.slip(variables, points) > 0
 
-    def in_process_zone(self, jump: Array, variables: V) -> Mask:
+    def in_process_zone(self, jump: Array, variables: V) -> BoolArray:
         """Whether a point softens: it is damaged, and neither broken nor open."""
         damage = self.damage(jump, variables)
         return (damage > 0) & (damage < 1) & ~self.is_open(jump, variables)

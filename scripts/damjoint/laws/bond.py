@@ -13,7 +13,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .base import Array, Law, Mask
+from ..arrays import Array, BoolArray
+from .base import Law
 
 
 @dataclass(frozen=True)
@@ -35,8 +36,8 @@ class Trial(NamedTuple):
     slip: Array
     damage: Array
     #: whether the damage is the opening's, and whether the slip has used up the cohesion
-    by_opening: Mask
-    broken: Mask
+    by_opening: BoolArray
+    broken: BoolArray
 
 
 class Bond(Law[BondVariables]):
@@ -167,7 +168,7 @@ class Bond(Law[BondVariables]):
         """See `Law`."""
         return variables.damage
 
-    def is_open(self, jump: Array, variables: BondVariables) -> Mask:
+    def is_open(self, jump: Array, variables: BondVariables) -> BoolArray:
         """See `Law`: open, and broken."""
         return (jump[:, 0] > 0) & ((variables.damage >= 1) | (self.tensile_strength == 0))
 

@@ -11,7 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .base import Array, Evidence, Law, Mask
+from ..arrays import Array, BoolArray
+from .base import Evidence, Law
 
 #: Parameters of a joint that stays elastic under any load.
 UNBREAKABLE: dict[str, float | str] = {
@@ -123,7 +124,7 @@ class Friction(Law[FrictionVariables]):
 
     # -- meaning
 
-    def is_open(self, jump: Array, variables: FrictionVariables) -> Mask:
+    def is_open(self, jump: Array, variables: FrictionVariables) -> BoolArray:
         """See `Law`: beyond the opening at which the tension reaches c/mu."""
         return jump[:, 0] > self.cap_opening
 
@@ -135,7 +136,7 @@ class Friction(Law[FrictionVariables]):
         """See `Law`: the plastic slip."""
         return np.linalg.norm(variables.plastic, axis=1)
 
-    def has_slipped(self, variables: FrictionVariables, points: int) -> Mask:
+    def has_slipped(self, variables: FrictionVariables, points: int) -> BoolArray:
         """See `Law`."""
         return variables.accumulated > 0
 

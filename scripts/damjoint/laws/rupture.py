@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .base import Array, Evidence, Law, Mask
+from ..arrays import Array, BoolArray
+from .base import Evidence, Law
 
 
 @dataclass(frozen=True)
@@ -99,15 +100,15 @@ class Rupture(Law[RuptureVariables]):
         v = variables
         return np.minimum(jump[:, 0] - v.thickness + v.sawn, v.largest)
 
-    def is_broken(self, opening: Array, variables: RuptureVariables) -> Mask:
+    def is_broken(self, opening: Array, variables: RuptureVariables) -> BoolArray:
         """Whether a point has lost its tensile strength."""
         return self.was_broken(variables) | (opening >= self.L_C)
 
-    def was_broken(self, variables: RuptureVariables) -> Mask:
+    def was_broken(self, variables: RuptureVariables) -> BoolArray:
         """Whether it had at the beginning of the step."""
         return (variables.kappa >= self.L_C) | (variables.sawn > 0)
 
-    def unloads(self, opening: Array, variables: RuptureVariables) -> Mask:
+    def unloads(self, opening: Array, variables: RuptureVariables) -> BoolArray:
         """Whether a point is on the line between the origin and its largest opening."""
         return opening <= variables.kappa
 
@@ -189,7 +190,7 @@ class Rupture(Law[RuptureVariables]):
             used = (kappa - self.delta_e) / (self.L_C - self.delta_e)
         return np.where(self.is_open(jump, variables), 1.0, used)
 
-    def is_open(self, jump: Array, variables: RuptureVariables) -> Mask:
+    def is_open(self, jump: Array, variables: RuptureVariables) -> BoolArray:
         """See `Law`: whether it is broken."""
         return self.is_broken(self.opening(jump, variables), variables) & (variables.kappa > 0)
 
@@ -218,11 +219,11 @@ class FrozenRupture(Rupture):
         vars(self).update(vars(law))
         self.share = share
 
-    def is_broken(self, opening: Array, variables: RuptureVariables) -> Mask:
+    def is_broken(self, opening: Array, variables: RuptureVariables) -> BoolArray:
         """See `Rupture`."""
         return self.was_broken(variables)
 
-    def unloads(self, opening: Array, variables: RuptureVariables) -> Mask:
+    def unloads(self, opening: Array, variables: RuptureVariables) -> BoolArray:
         """See `Rupture`."""
         return np.ones(len(opening), bool)
 

@@ -1,1 +1,1 @@
-"""What is asked: parameters, case files, meshes."""
+"""The data model: parameters, cases, meshes, results."""

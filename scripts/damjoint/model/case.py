@@ -1,4 +1,4 @@
-"""Cases: a scene and its loading, read from a case file, with overrides, checked."""
+"""Case: a scene and its loading, from a case file and overrides, checked."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import RUN_GEO, InputError, data
-from ..arrays import Values
+from ..arrays import Value, Values
 from ..laws import LAWS, Law
 from . import casefile
 from .constraints import (
@@ -41,23 +41,14 @@ from .values import has_drains as has_drains
 
 CASES = data("cases")
 
-#: Values of pro/parameters.pro that the engines share and nobody sets.
+#: Constants of pro/parameters.pro that both engines use.
 SHARED = (
-    "strategy_growth",
-    "strategy_secant",
-    "strategy_release",
-    "strategy_iterations",
-    "cut",
-    "round_off",
-    "coarsest",
-    "artificial",
-    "release_length",
-    "crack_aperture",
-    "crack_most",
+    *("strategy_growth", "strategy_secant", "strategy_release", "strategy_iterations", "cut"),
+    *("round_off", "coarsest", "artificial", "release_length", "crack_aperture", "crack_most"),
 )
 
-#: What pro/section.pro finds of the section: the joint's ends, the faces' segments, the marks where
-#: line forces act.
+#: Variables of pro/section.pro: the joint's ends, the segments of the faces, the marks of line
+#: forces.
 SECTION = (
     *("heel_x", "heel_y", "toe_x", "toe_y", "joint_length", "joint_along", "crest_x", "neck_y"),
     *("seg_side", "seg_body", "seg_x0", "seg_y0", "seg_x1", "seg_y1"),
@@ -67,29 +58,29 @@ SECTION = (
 
 @dataclass(frozen=True, kw_only=True)
 class Case(ParameterValues):
-    """A scene and its loading, fully resolved: everything a run depends on."""
+    """A scene and its loading: all that a run depends on."""
 
     name: str
     title: str
-    values: dict[str, float | str]
+    values: dict[str, Value]
     #: reservoir and tailwater [m] at t = 1, 2, ...
     levels: tuple[float, ...]
     tail_levels: tuple[float, ...]
-    #: converged steps asked for; those in `requested` have a joint table
+    #: t of the converged steps; joint tables are written at those in `requested`
     times: tuple[float, ...]
-    #: further uplift modes that the published case runs
+    #: further uplift modes of a published case
     also_uplift: tuple[str, ...] = ()
-    #: whether it is a case of the package as it was published, but for mesh and solver
+    #: whether it is a published case of the package, but for mesh, solver and uplift
     published: bool = False
     #: whether pena_tang has been set: a dam whose whole joint slips is meant to stand on it
     hardening_asked: bool = False
-    #: the relative error asked for; None: the mesh is as it is
+    #: the required relative error; None: the mesh is not refined
     accuracy: float | None = None
     #: the user's own geometry instead of the section by parameters
     geometry: Path | None = None
-    #: what the solvers share besides the parameters: {name: values}, from pro/parameters.pro
+    #: SHARED of pro/parameters.pro
     shared: dict[str, list[float]] = field(default_factory=dict, compare=False, repr=False)
-    #: the section, by the names of pro/section.pro
+    #: SECTION of pro/section.pro
     section: dict[str, list[float]] = field(default_factory=dict, compare=False, repr=False)
 
     @cached_property
@@ -100,35 +91,33 @@ class Case(ParameterValues):
 
     @property
     def joint_length(self) -> float:
-        """From heel to toe, straight [m]."""
+        """Distance from heel to toe [m]."""
         return self.section["joint_length"][0]
 
     @property
     def size(self) -> float:
-        """A length of the dam [m]: what is small beside it is small."""
+        """Characteristic length of the dam [m]."""
         return self.joint_length if self.geometry else self["dam_height"]
 
     @property
     def joint_along(self) -> float:
-        """From heel to toe along the joint [m]; a mean in 3D."""
+        """Length from heel to toe along the joint [m]; its mean in 3D."""
         return self.section["joint_along"][0]
 
     @property
     def requested(self) -> tuple[float, ...]:
-        """The times at which a level of the list or the end of a prescribed displacement is
-        reached; the last.
-        """
+        """The times of the levels and of the end of a prescribed displacement; the last time."""
         ends = {self["drive_end"]} if self["drive"] != "level" else set()
         return tuple(t for t in self.times if t == round(t) or t in ends or t == self.times[-1])
 
     @property
     def highest_level(self) -> float:
-        """The highest water level that is allowed [m]."""
+        """The highest allowed water level [m]."""
         return math.inf if self.geometry else highest_level(self)
 
     @property
     def reached(self) -> float:
-        """The highest level of the reservoir [m]; if it is driven, the highest it may have."""
+        """The highest level of the reservoir [m]; the highest allowed if it is not prescribed."""
         return max(self.levels) if self["drive"] == "level" else self.highest_level
 
     def level_at(self, time: float) -> float:
@@ -140,8 +129,8 @@ class Case(ParameterValues):
         return between(self.tail_levels, time)
 
     def before_last_level(self) -> Case | None:
-        """The case without its last level; None if there is only one, or the level is not what is
-        prescribed.
+        """The case without its last level; None if it has only one level or a prescribed
+        displacement.
         """
         before = len(self.levels) - 1
         if not before or self["drive"] != "level":
@@ -154,10 +143,9 @@ class Case(ParameterValues):
         )
 
     def changed(self, values: Values) -> Case:
-        """The case with other values of independent parameters, as `load` makes it, without
-        Gmsh's parser.
+        """The case with other values of independent parameters, without Gmsh's parser.
 
-        Raises InputError.
+        Raises InputError, and KeyError if other parameters depend on one of them.
         """
         checked = {name: declared()[name].check(value) for name, value in values.items()}
         if not checked.keys() <= independent():
@@ -167,7 +155,7 @@ class Case(ParameterValues):
         return result
 
     def scenes(self) -> list[Case]:
-        """The case itself, then the other uplift modes it is published with."""
+        """The case itself, then with its further uplift modes."""
         others = (
             replace(self, values={**self.values, "uplift": mode}, also_uplift=())
             for mode in self.also_uplift
@@ -176,23 +164,21 @@ class Case(ParameterValues):
 
 
 def between(levels: tuple[float, ...], time: float) -> float:
-    """Level at a time, linear between the levels at t = 1, 2, ..., from 0 at t = 0; later the last
-    one.
-    """
+    """Level at a time: linear between 0 at t = 0 and the levels at t = 1, 2, ..., then constant."""
     points, time = (0.0, *levels), min(time, len(levels))
     i = min(int(time), len(points) - 2)
     return points[i] + (time - i) * (points[i + 1] - points[i])
 
 
 def is_name(text: str) -> bool:
-    """Whether a text can be a case's name, which its files and its folder carry: one part of a path
-    that leads nowhere else, with nothing that a terminal would obey.
+    """Whether a text can be the name of a case, of its files and of its folder: one part of a path,
+    printable, neither . nor ..
     """
     single = Path(text).name == text and text.strip(".")
     return bool(single) and text.isprintable() and len(text.encode()) <= LONGEST_NAME
 
 
-#: Bytes of a case's name, for a file's has 255.
+#: Limit of a case's name [bytes]; that of a file's name is 255.
 LONGEST_NAME = 200
 
 
@@ -202,7 +188,7 @@ def case_file(case: str) -> Path:
     Raises InputError if there is none, or its name can not be that of a folder.
     """
     for path in (CASES / f"{case.lower()}.case", Path(case)):
-        if path.suffix == ".case" and os.path.isfile(path):  # False for any name, however odd
+        if path.suffix == ".case" and os.path.isfile(path):  # does not raise, whatever the name
             if not is_name(path.stem):
                 raise InputError(
                     f"case {case!r}: must be called by printable letters, at most {LONGEST_NAME} "
@@ -242,10 +228,10 @@ def has_plane_fields(case: Case) -> bool:
 
 
 def first_mesh(case: Case) -> dict[str, float | str]:
-    """Mesh and order from which an accuracy is looked for.
+    """Mesh and order with which a refinement for an accuracy begins.
 
-    Order 2, triangles, in 3D extruded and cut into tetrahedra: these contain the plane fields
-    exactly, however thick they are.
+    Order 2, triangles, in 3D extruded and cut into tetrahedra: these represent plane fields exactly
+    for any thickness.
     """
     solid = case["dim"] == 3
     n = 32 if not solid else 16 if has_plane_fields(case) else 8
@@ -298,8 +284,8 @@ def load(
     geometry = own_geometry(file.texts["geometry"]) if "geometry" in file.texts else None
     if accuracy is not None and geometry and geometry.suffix != ".geo":
         raise InputError(
-            f"accuracy = {accuracy}: must not be asked of a mesh of one's own ({geometry.name}), "
-            "which is as fine as it is"
+            f"accuracy = {accuracy}: must not be given with a mesh of one's own "
+            f"({geometry.name}), which can not be refined"
         )
     heights = tuple(variables["levels"])
     also = () if "uplift" in overrides else tuple(file.texts.get("also_uplift", "").split())
@@ -340,7 +326,7 @@ def equal_steps(levels: int, steps: int) -> tuple[float, ...]:
 def own_geometry(name: str) -> Path:
     """The file of a user's own geometry.
 
-    Raises InputError if it is not there, or may be a program and nobody has allowed it to run.
+    Raises InputError if it does not exist, or may be a program that is not allowed to run.
     """
     path = Path(name)
     if not path.is_file():
@@ -354,13 +340,13 @@ def own_geometry(name: str) -> Path:
     return path
 
 
-#: What a mesh in Gmsh's format begins with.
+#: First bytes of a mesh in Gmsh's format.
 MESH = b"$MeshFormat"
 
 
 def is_mesh(path: Path) -> bool:
-    """Whether a file can be nothing but data to Gmsh, which runs what it does not know as a .geo,
-    whatever its name, and unpacks it before.
+    """Whether Gmsh reads a file as data: it unpacks and runs a file of unknown format as a .geo,
+    whatever its name.
     """
     try:
         with path.open("rb") as file:
@@ -370,7 +356,7 @@ def is_mesh(path: Path) -> bool:
 
 
 def as_published(path: Path, overrides: Values, *loading: str | Sequence[float] | None) -> bool:
-    """Whether a case of the package is run with nothing changed but mesh, solver and uplift."""
+    """Whether a case of the package is unchanged but for mesh, solver and uplift."""
     harmless = {n for n, p in declared().items() if p.group in ("Mesh", "Solver")}
     own = path.resolve().parent == CASES.resolve()
     return (

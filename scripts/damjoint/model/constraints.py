@@ -1,5 +1,4 @@
-"""Constraints between the values of a case, one function each; that on a single value is
-`Parameter.check`.
+"""Constraints between the values of a case, a function each; single values: `Parameter.check`.
 
 All raise InputError, "name = value: must be ...".
 """
@@ -13,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from .. import InputError
 from ..laws import LAWS
 from .parameters import constants, declared
-from .values import ParameterValues, Section, flows, has_drains
+from .values import Group, ParameterValues, flows, has_drains
 
 #: Limits of the numbers of steps between two levels, and of levels, each of which has its table.
 MOST_STEPS, MOST_LEVELS = 100_000, 10_000
@@ -44,7 +43,7 @@ def check_energies(case: ParameterValues) -> None:
             )
 
 
-def check_softening(joint: Section, twice: bool) -> None:
+def check_softening(joint: Group, twice: bool) -> None:
     """The softening of law = rupture: not given twice."""
     if twice:
         raise InputError(
@@ -89,8 +88,8 @@ def check_section(case: ParameterValues, section: Mapping[str, Sequence[float]])
 
 
 def check_drains(case: ParameterValues, length: float) -> None:
-    """Drains: on the joint, whose length is given [m]; pressure linear in the level where a
-    displacement is prescribed.
+    """Drains: within the length of the joint [m]; with a prescribed displacement their pressure has
+    to be linear in the level.
     """
     if not has_drains(case):
         return

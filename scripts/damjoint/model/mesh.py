@@ -175,7 +175,7 @@ def shares(case: Case) -> dict[str, Value]:
     """The parameters that the mesh of a case depends on."""
     names = [*GEOMETRY, *(n for force, needs in MARKS.items() if case[force] for n in needs)]
     values: dict[str, Value] = {name: case[name] for name in names}
-    # whether there is a force, not how large
+    # of a force only whether it acts
     values |= {name: float(bool(case[name])) for name in MARKS}
     if has_drains(case):  # they need a node in all modes of uplift
         values |= {"uplift": "drained", "drain_x": case["drain_x"]}
@@ -224,7 +224,7 @@ def mesh_of(case: Case) -> Mesh:
 
 
 def generate(case: Case) -> None:
-    """Make the mesh of a case Gmsh's current one.
+    """Make the mesh of a case, as Gmsh's current mesh.
 
     Raises RunError, and InputError if a user's own geometry can not be read.
     """
@@ -384,7 +384,7 @@ class Mesh:
         self._coordinates = coordinates.reshape(-1, 3)
 
     def _body(self, dimension: int, parts: list[tuple[str, int]]) -> Body:
-        """Some regions (name, number of the physical group) as one body."""
+        """The body of some regions (name, number of the physical group)."""
         blocks: dict[tuple[str, int], list[IntArray]] = {}
         numbers: dict[tuple[str, int], list[IntArray]] = {}
         for name, group in parts:
@@ -455,8 +455,8 @@ class Mesh:
     def bearer(self, line: str) -> str:
         """The body that bears the force on one of LINES: the first that has all nodes of it."""
         nodes = self.bodies[line].node_tags
-        whole = (n for n, s in self.solids.items() if np.isin(nodes, s.node_tags).all())
-        return next(whole, JOINTS[JOINT].lower)
+        bearers = (n for n, s in self.solids.items() if np.isin(nodes, s.node_tags).all())
+        return next(bearers, JOINTS[JOINT].lower)
 
     @property
     def counts(self) -> dict[str, int]:
@@ -520,9 +520,9 @@ def outward(surface: Body, body: Body) -> tuple[Array, BoolArray] | None:
     rows = [incidence(b, size) for b in (surface, body)]
     shared = (rows[0] @ rows[1].T).tocoo()
     corners = np.concatenate([np.full(len(t), t.shape[1]) for _, t in surface.cells])
-    whole = shared.data == corners[shared.row]
+    is_side = shared.data == corners[shared.row]
     inside = np.full(len(corners), -1)
-    inside[shared.row[whole]] = shared.col[whole]
+    inside[shared.row[is_side]] = shared.col[is_side]
     if (inside < 0).any():
         return None
     directions = []

@@ -168,7 +168,7 @@ def declaration(name: str, rest: str, text: str) -> Parameter:
     label = matched(r'Name\s+"([^"]+)"', rest)
     group, description, unit = re.findall(LABEL, label)[0]
     entry = json.loads(gmsh.onelab.get(label))
-    # Min of one that may be -1 is -1
+    # Min is -1 for a parameter that may be -1
     otherwise = entry.get("attributes", {}).get("Otherwise")
     low = {None: entry.get("min", -ANY), "> 0": TINY, ">= 0": 0.0}[otherwise]
     high = entry.get("max", ANY)
@@ -246,16 +246,16 @@ def settings(pairs: Iterable[str]) -> dict[str, Value]:
 def levels_of(name: str, levels: str | Sequence[float]) -> tuple[float, ...]:
     """Water levels [m] from numbers, or a text 'a,b,c'.
 
-    Raises InputError if it is none.
+    Raises InputError if there is none, or one is not finite.
     """
-    if not isinstance(levels, str):
-        return tuple(map(float, levels))
+    values = levels.split(",") if isinstance(levels, str) else levels
     try:
-        result = tuple(number(v) for v in levels.split(","))
+        result = tuple(number(v) if isinstance(v, str) else float(v) for v in values)
     except ValueError:
         result = ()
     if not result or not all(map(math.isfinite, result)):
-        raise InputError(f"{name} = {levels}: must be a list of levels in metres, such as 3,6,8,9")
+        listed = levels if isinstance(levels, str) else ",".join(map(str, levels))
+        raise InputError(f"{name} = {listed}: must be a list of levels in metres, such as 3,6,8,9")
     return result
 
 

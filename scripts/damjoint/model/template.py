@@ -1,4 +1,4 @@
-"""A case file to begin with: the 45 m dam of the defaults, every parameter with its meaning."""
+"""Template of a case file: the 45 m dam of the defaults, every parameter with its meaning."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ EXAMPLE = {"E_dam": "2.5e10", "E_found": "2.5e10", "G_f": "100"}
 
 
 def text(name: str, title: str) -> str:
-    """The whole file."""
+    """The text of the file."""
     lines, group = [HEAD.format(name=name, title=title)], ""
     for parameter in declared().values():
         if parameter.group != group:
@@ -57,7 +57,7 @@ def text(name: str, title: str) -> str:
 def write(path: Path) -> None:
     """Write the file.
 
-    Raises InputError if the path is taken, does not end in .case, or can not be written.
+    Raises InputError if the path exists, does not end in .case, or can not be written.
     """
     if path.suffix != ".case":
         raise InputError(f"new = {path}: must end in .case")

@@ -1,4 +1,4 @@
-"""Values of all parameters, by name and by section: case["mu"], case.joint.mu."""
+"""Values of all parameters, by name and by group: case["mu"], case.joint.mu."""
 
 from __future__ import annotations
 
@@ -14,10 +14,9 @@ TextName: TypeAlias = Literal[
 ]
 
 
-class Section:
-    """The values of one group of pro/parameters.pro: numbers, but for those that a subclass names.
-
-    Not to be changed: a case is.
+class Group:
+    """The values of one group of pro/parameters.pro as attributes that can not be set: numbers, but
+    for those that a subclass declares.
     """
 
     def __init__(self, values: Values) -> None:
@@ -31,7 +30,7 @@ class Section:
         def __getattr__(self, name: str) -> float: ...
 
 
-class Scene(Section):
+class SceneGroup(Group):
     """Dimension and order, joint law, water, and what is prescribed."""
 
     law: str
@@ -40,14 +39,14 @@ class Scene(Section):
     drive: str
 
 
-class MeshSize(Section):
+class MeshGroup(Group):
     """Pattern and sizes of the mesh."""
 
     mesh_pattern: str
     quadrature: str
 
 
-class Loads(Section):
+class LoadGroup(Group):
     """Loads besides the water."""
 
     force_face: str
@@ -72,49 +71,49 @@ class ParameterValues:
         return {n: self.values[n] for n, known in declared().items() if known.group == name}
 
     @cached_property
-    def scene(self) -> Scene:
+    def scene(self) -> SceneGroup:
         """Dimension and order, joint law, water, and what is prescribed."""
-        return Scene(self._group("Scene"))
+        return SceneGroup(self._group("Scene"))
 
     @cached_property
-    def dimensions(self) -> Section:
+    def dimensions(self) -> Group:
         """Lengths of the dam's section and of its foundation."""
-        return Section(self._group("Geometry"))
+        return Group(self._group("Geometry"))
 
     @cached_property
-    def mesh(self) -> MeshSize:
+    def mesh(self) -> MeshGroup:
         """Pattern and sizes of the mesh."""
-        return MeshSize(self._group("Mesh"))
+        return MeshGroup(self._group("Mesh"))
 
     @cached_property
-    def material(self) -> Section:
+    def material(self) -> Group:
         """Elasticity and density of dam and foundation."""
-        return Section(self._group("Bulk"))
+        return Group(self._group("Bulk"))
 
     @cached_property
-    def joint(self) -> Section:
+    def joint(self) -> Group:
         """Stiffness, strength and fracture energy of the joint."""
-        return Section(self._group("Joint"))
+        return Group(self._group("Joint"))
 
     @cached_property
-    def water(self) -> Section:
+    def water(self) -> Group:
         """Density and viscosity of the water, aperture of the closed joint, drains."""
-        return Section(self._group("Water"))
+        return Group(self._group("Water"))
 
     @cached_property
-    def loads(self) -> Loads:
+    def loads(self) -> LoadGroup:
         """Loads besides the water, works on the joint."""
-        return Loads(self._group("Loads"))
+        return LoadGroup(self._group("Loads"))
 
     @cached_property
-    def solver(self) -> Section:
+    def solver(self) -> Group:
         """Tolerance and limits of the solver."""
-        return Section(self._group("Solver"))
+        return Group(self._group("Solver"))
 
     @cached_property
-    def checks(self) -> Section:
+    def checks(self) -> Group:
         """Safety factors and strength that are required."""
-        return Section(self._group("Checks"))
+        return Group(self._group("Checks"))
 
 
 def flows(values: Values | ParameterValues) -> bool:

@@ -49,7 +49,7 @@ def read(folder: Path) -> Solution:
         result = read_results(info, folder)
         bodies, fields = read_fields(folder / "fields", np.unique(result.joint["time"]))
     except DAMAGED as error:
-        why = error if isinstance(error, InputError) else f"damaged: {error!r}"
+        why = error if isinstance(error, InputError) else f"damaged ({error!r}); run the case again"
         raise InputError(f"out = {folder}: {why}") from None
     return Solution(result, bodies, fields)
 

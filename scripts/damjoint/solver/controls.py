@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..arrays import Array
 from ..joint.equilibrium import Equilibrium
-from ..laws.base import Array
 from ..model.loads import Loading
 from .state import State
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ..arrays import Array
 from ..joint.equilibrium import Equilibrium
-from ..laws.base import Array
 from ..model.case import Case
 from ..model.results import HISTORY, Results, history_table, joint_table
 from .model import StepResult

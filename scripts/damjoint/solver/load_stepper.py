@@ -120,10 +120,10 @@ class LoadStepper:
         if self.case["weight_first"]:
             self.history.at_rest = self.state
         if self.drives:
-            self.displacement_at_begin = self.driven_displacement()
+            self.displacement_at_begin = self.controlled_displacement()
         return True
 
-    def driven_displacement(self) -> float:
+    def controlled_displacement(self) -> float:
         """The displacement that the case prescribes, in the last state [m]."""
         return self.model.measure(DRIVES[self.case["drive"]](0.0), self.state)
 
@@ -133,7 +133,7 @@ class LoadStepper:
         self.history.add(step, cuts)
         if self.drives:
             if self.state.time < self.case["drive_begin"] + 1e-9:
-                self.displacement_at_begin = self.driven_displacement()
+                self.displacement_at_begin = self.controlled_displacement()
             if self.state.time < self.case["drive_end"] + 1e-9:
                 self.level_at_drive_end = self.state.loading.level
         self.on_step(self.state.time)

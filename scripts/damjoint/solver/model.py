@@ -1,4 +1,4 @@
-"""The stepping interface: `Model(case, interface).start()`, then `advance` from state to state.
+"""The stepping interface: `Model(case).start()`, then `advance` from state to state.
 
 A state is immutable; any number of steps can start from it.
 """
@@ -12,11 +12,11 @@ from functools import cached_property
 import numpy as np
 
 from .. import RunError
+from ..arrays import Array
 from ..joint.equilibrium import Equilibrium
-from ..joint.interface import Interface
+from ..joint.interface import Interface, interface_of
 from ..joint.linear_system import Border
 from ..laws import TANGENT, Mode
-from ..laws.base import Array
 from ..model.case import Case
 from ..model.loads import STAGED, Loading
 from .controls import Control, DisplacementControl, LevelControl
@@ -44,7 +44,9 @@ class StepResult:
 class Model:
     """The equilibrium of a case, and how a step of it is solved."""
 
-    def __init__(self, case: Case, interface: Interface) -> None:
+    def __init__(self, case: Case, interface: Interface | None = None) -> None:
+        """interface: the joint of the condensed bodies; by default from the cache, or made."""
+        interface = interface or interface_of(case)
         if case.geometry:  # the ends of its joint follow from the mesh
             case = replace(case, section=case.section | interface.section)
         self.case, self.equilibrium = case, Equilibrium(case, interface)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from ..laws.base import Array
+from ..arrays import Array
 
 
 class Diverged(Exception):

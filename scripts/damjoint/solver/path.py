@@ -14,7 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..laws.base import Array
+from ..arrays import Array
 from ..model.case import Case
 from .controls import (
     DRIVES,

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays import Array
 from ..joint.equilibrium import Equilibrium, Pressure
 from ..laws import Law
-from ..laws.base import Array
 from ..model.loads import Loading
 
 

@@ -21,8 +21,8 @@ from tqdm import tqdm
 
 from .. import InputError
 from ..engines import Outcome
-from ..engines.condensed.cache import interface_of
 from ..engines.condensed.solve import about
+from ..joint.interface import interface_of
 from ..laws import Evidence
 from ..model.case import Case, load
 from ..model.parameters import parameter
@@ -504,12 +504,12 @@ def write(search: Search, answer: Answer, out: Path, seconds: float) -> None:
     """Write the last equilibrium as `damjoint run` does, critical.csv and its picture below out, in
     place of an earlier run's files.
     """
-    from .critical_picture import Found, draw
+    from . import critical_picture as picture
 
     case = search.own
-    trials = [(t.value, t.stands, t.path) for t in search.trials]
+    trials = [picture.Trial(t.value, t.stands, t.path) for t in search.trials]
     what = case.title, search.of, search.unit, trials
-    shown = Found(*what, answer.value, answer.gravity, answer.mode)
+    shown = picture.Content(*what, answer.value, answer.gravity, answer.mode)
     with folders.claim_output_folder(case, out):
         folders.write_state(case, out, "interrupted" if answer.error else "complete", answer.doubt)
         if answer.point:
@@ -518,7 +518,7 @@ def write(search: Search, answer: Answer, out: Path, seconds: float) -> None:
             result.info = about(answer.point.model.equilibrium.bulk) | found
             save(Outcome(result, lambda: None, dict, answer.error), case, out)
         write_csv(out / "critical.csv", table(search))
-        draw(shown, out / f"{case.name}_critical.png")
+        picture.draw(shown, out / f"{case.name}_critical.png")
 
 
 def as_json(search: Search, answer: Answer) -> dict:

@@ -72,7 +72,7 @@ def draw_trials(axes: Axes, content: Content) -> None:
         (False, RED, "v", "fails: its highest level"),
     ):
         paths = {trial.value: trial.path for trial in content.trials if trial.stands == stands}
-        levels = [b.target if stands else b.highest for b in paths.values()]
+        levels = [p.target if stands else p.highest for p in paths.values()]
         axes.plot(list(paths), levels, mark, color=color, label=label)
     for value, style, label in critical_lines(content):
         axes.axvline(value, color="black", linestyle=style, linewidth=0.9, label=label)

@@ -26,7 +26,8 @@ def read_path(path: Path) -> dict[str, np.ndarray]:
         with path.open(newline="") as file:
             rows = list(csv.DictReader(file, skipinitialspace=True))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"path = {path}: {error}") from None
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise InputError(f"path = {path}: must be a readable CSV file ({reason})") from None
     names = [name for name in (*JUMPS, "p") if rows and name in rows[0]]
     if not rows or not set(JUMPS) <= set(names):
         raise InputError(

@@ -96,7 +96,7 @@ def write(folders: list[Path], to: Path) -> None:
         with atomic_write(to) as path:
             path.write_text(page, encoding="utf-8")
     except OSError as error:
-        raise InputError(f"to = {to}: {error}") from None
+        raise InputError(f"to = {to}: must be a writable file ({error.strerror})") from None
 
 
 def read_section(folder: Path) -> Section:
@@ -108,7 +108,7 @@ def read_section(folder: Path) -> Section:
     try:
         return section_of(folder, solution)
     except stored.DAMAGED as error:
-        raise InputError(f"out = {folder}: damaged: {error!r}") from None
+        raise InputError(f"out = {folder}: damaged ({error!r}); run the case again") from None
 
 
 def section_of(folder: Path, solution: Solution) -> Section:

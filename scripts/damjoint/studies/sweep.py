@@ -23,8 +23,7 @@ from tqdm import tqdm
 from .. import InputError, RunError, __version__, accuracy
 from ..arrays import Value, Values
 from ..engines import engine_of
-from ..engines.condensed.cache import interface_of
-from ..joint.interface import Interface
+from ..joint.interface import Interface, interface_of
 from ..model.case import Case, first_mesh
 from ..model.results import HISTORY
 from ..post.tables import as_text
@@ -160,14 +159,14 @@ def read_done(path: Path, columns: list[str], numeric: Sequence[str]) -> dict[st
     """
     if not path.exists() or not path.stat().st_size:
         return {}
-    damaged = f"out = {path}: line {{}} is damaged; take it away, and its row is computed again"
+    damaged = f"out = {path}: line {{}} is damaged; delete it, and its row is computed again"
     try:
         text = path.read_text()
     except UnicodeDecodeError as error:
         lines = path.read_bytes()[: error.start].count(b"\n")
         raise InputError(damaged.format(lines + 1)) from None
-    whole = text[: text.rfind("\n") + 1]
-    rows = csv.DictReader(whole.splitlines(), restval=None, strict=True)
+    complete = text[: text.rfind("\n") + 1]
+    rows = csv.DictReader(complete.splitlines(), restval=None, strict=True)
     if rows.fieldnames != columns:
         raise InputError(
             f"out = {path}: must be a new file or one of the same sweep "
@@ -185,8 +184,8 @@ def read_done(path: Path, columns: list[str], numeric: Sequence[str]) -> dict[st
         raise InputError(damaged.format(rows.line_num)) from None
     except csv.Error:  # of the row after the last one that was read
         raise InputError(damaged.format(rows.line_num + 1)) from None
-    if whole != text:
-        path.write_text(whole)
+    if complete != text:
+        path.write_text(complete)
     return done
 
 
@@ -232,7 +231,7 @@ def spread(
             client = Client(scheduler, timeout=10)
         except (OSError, ValueError) as error:
             raise InputError(
-                f"--scheduler {scheduler}: no scheduler answers there ({error})"
+                f"--scheduler {scheduler}: no scheduler answers at this address ({error})"
             ) from None
         with client:
             futures = {
@@ -254,8 +253,8 @@ def spread(
                     yield from zip(waiting[future], future.result(), strict=True)
             except BrokenProcessPool:
                 raise RunError(
-                    "sweep: a process was killed (out of memory?); what has been finished is "
-                    "saved, the same command goes on; --jobs 1 takes least memory"
+                    "sweep: a process was killed (out of memory?); finished rows are saved, the "
+                    "same command continues; --jobs 1 needs least memory"
                 ) from None
 
 

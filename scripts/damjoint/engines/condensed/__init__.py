@@ -1,6 +1,5 @@
 """The condensed engine: bodies condensed onto the joint once, then load steps on the joint only.
 
-cache.py    condensed bodies on disk, the last joint in memory
 recover.py  displacement and stress of the bodies, from the displacement jump
 solve.py    the interface to the rest
 """

@@ -10,6 +10,7 @@ from threadpoolctl import threadpool_limits
 
 from ...fem import factor
 from ...fem.bodies import Bodies
+from ...fem.cache import cached
 from ...fem.condensation import Condensed
 from ...fem.memory import joint_size
 from ...joint.interface import Interface
@@ -18,7 +19,6 @@ from ...model.fields import Field
 from ...model.mesh import mesh_of
 from ...solver.load_stepper import LoadStepper
 from .. import OnStep, Outcome
-from .cache import cached
 
 #: Jump unknowns from which on a second thread of the linear algebra pays; below it waits and
 #: disturbs.

@@ -41,10 +41,11 @@ def check(case: Case) -> None:
 
 def check_own(mesh: Mesh, case: Case) -> None:
     """Raise InputError if this engine cannot run a user's own geometry."""
-    shapes = {shape for name in ("dam", "foundation") for shape, _ in mesh.bodies[name].cells}
+    shapes = {shape for solid in mesh.solids.values() for shape, _ in solid.cells}
     if mesh.dim == 3 and shapes != {"tetra"}:
         raise InputError(f"geometry = {case.geometry}: must have tetrahedra with engine = getdp")
-    level = all(np.ptp(mesh.bodies[n].points[:, 1]) < 1e-9 * case.size for n in ("heel", "toe"))
+    ends = [end for joint in mesh.joints.values() for end in (joint.heel, joint.toe)]
+    level = all(np.ptp(end.points[:, 1]) < 1e-9 * case.size for end in ends)
     if not level and case["uplift"] != "none":
         raise InputError(
             f"uplift = {case['uplift']}: must be none with engine = getdp where heel or toe are "

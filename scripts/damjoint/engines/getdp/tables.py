@@ -13,8 +13,6 @@ from ...model.mesh import Mesh
 from ...model.results import JOINT, Results, history_table, joint_columns, joint_table
 from ...storage import check_end
 
-BODIES = ("dam", "foundation")
-
 #: Columns of history.txt (pro/step_control.pro), after the word "step".
 PRINTED = [
     "time",
@@ -171,14 +169,14 @@ def read_rest(path: Path, wanted: np.ndarray) -> np.ndarray | float:
 
 def read_fields(folder: Path, saved: dict[int, float], mesh: Mesh) -> dict[float, Field]:
     """Fields of the bodies by time; saved: see `read`."""
-    result = {}
-    at_rest = {n: read_rest(folder / f"u_{n}_0.txt", mesh.bodies[n].node_tags) for n in BODIES}
+    result, solids = {}, mesh.solids.items()
+    at_rest = {n: read_rest(folder / f"u_{n}_0.txt", solid.node_tags) for n, solid in solids}
     for number, time in saved.items():
         elements, stress = read_values(folder / f"stress_{number}.txt")
         stress = stress[:, [0, 3, 5, 1, 4, 2]]
-        displacement = {n: read_values(folder / f"u_{n}_{number}.txt") for n in BODIES}
+        displacement = {n: read_values(folder / f"u_{n}_{number}.txt") for n, _ in solids}
         result[time] = Field(
-            {n: pick(*displacement[n], mesh.bodies[n].node_tags) - at_rest[n] for n in BODIES},
-            {n: pick(elements, stress, mesh.bodies[n].element_tags) for n in BODIES},
+            {n: pick(*displacement[n], solid.node_tags) - at_rest[n] for n, solid in solids},
+            {n: pick(elements, stress, solid.element_tags) for n, solid in solids},
         )
     return result

@@ -1,4 +1,4 @@
-"""Condensed bodies on disk, by mesh and elasticity; the joint interface last used in memory.
+"""Condensed bodies on disk, by mesh and elasticity.
 
 A file is numpy's npz (arrays only, nothing that could be executed) with a header, the version and
 the scene it belongs to, and the tree of the values as JSON. A foreign or damaged file or one of
@@ -13,7 +13,7 @@ import json
 import os
 import zipfile
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -21,15 +21,14 @@ from typing import Any
 import numpy as np
 from scipy import linalg
 
-from ... import RunError, __version__, data
-from ...arrays import Array
-from ...fem.bodies import PARAMETERS, Bodies
-from ...fem.condensation import Condensed, CondensedJoint, condense
-from ...fem.memory import check_size
-from ...joint.interface import Interface
-from ...model.case import Case
-from ...model.loads import overtopped
-from ...model.mesh import Body, Face, JointMesh, Mesh, mesh_of, shares
+from .. import RunError, __version__, data
+from ..arrays import Array
+from ..model.case import Case
+from ..model.loads import overtopped
+from ..model.mesh import Body, Face, JointMesh, Mesh, mesh_of, shares
+from .bodies import PARAMETERS, Bodies
+from .condensation import Condensed, CondensedJoint, condense
+from .memory import check_size
 
 #: Size up to which the cache may grow [bytes]; the files longest unused are deleted first.
 LIMIT = 2_000_000_000
@@ -68,7 +67,7 @@ def fingerprint(mesh: Mesh) -> str:
 @lru_cache(maxsize=1)
 def sources() -> str:
     """Hash of the files that condensed bodies of a case are computed by: meshes and elements."""
-    code = sorted((Path(__file__).parents[2] / "fem").glob("*.py"))
+    code = sorted(Path(__file__).parent.glob("*.py"))
     texts = [path.read_bytes() for path in (*sorted(data("geo").glob("*.geo")), *code)]
     return hashlib.sha256(b"".join(texts)).hexdigest()
 
@@ -98,28 +97,6 @@ def cached(case: Case) -> tuple[Condensed, Bodies | None]:
     if path:
         write(condensed, header, path)
     return condensed, bodies
-
-
-@dataclass
-class LastInterface:
-    """A cache of one entry: a study computes its scenes mesh by mesh, and an interface with its
-    dense matrices may take gigabytes.
-    """
-
-    key: tuple[object, ...] = ()
-    interface: Interface | None = None
-
-    def of(self, case: Case) -> Interface:
-        """The joint of a case with its condensed bodies."""
-        key = *key_of(case), case["quadrature"]
-        if self.interface is None or key != self.key:
-            self.interface = None  # free its memory first
-            self.interface, self.key = Interface(cached(case)[0], case["quadrature"]), key
-        return self.interface
-
-
-#: The interface of this process: studies and tools share it.
-interface_of = LastInterface().of
 
 
 def read(path: Path, header: str) -> Condensed | None:

@@ -1,4 +1,4 @@
-"""The plain problem definition in Gmsh's window: cases/*.pro with GetDP, nothing of Python."""
+"""The GetDP model in the window of Gmsh: cases/*.pro, without Python."""
 
 import os
 import shutil
@@ -15,21 +15,22 @@ from damjoint.model.case import load
 from damjoint.model.parameters import parameter, start_gmsh
 from matplotlib.image import imread
 
-#: Of an order 1 mesh that is solved in a second
+#: An order 1 mesh that is solved in a second
 COARSE = {"n_joint": 20.0, "h_dam": 2.0, "h_found": 4.0}
 
 
 @pytest.fixture
-def plain(tmp_path):
-    """A copy of geo, pro and cases: a run leaves mesh and results beside the case."""
+def project(tmp_path):
+    """A copy of geo, pro and cases: a run writes mesh and results beside the case."""
     for name in ("geo", "pro", "cases"):
         shutil.copytree(data(name), tmp_path / name, ignore=shutil.ignore_patterns("res"))
     return tmp_path / "cases"
 
 
 def press_run(folder, changed):
-    """What the window does at Run, in Gmsh without a window: parameters changed in the tree, the
-    drawing made anew, meshed, GetDP as ONELAB's client. The last row of history.txt."""
+    """Do what Run does, in Gmsh without a window: change parameters in the tree, redraw, mesh, run
+    GetDP as a client of ONELAB. Returns the last row of history.txt.
+    """
     for label, value in changed.items():
         if isinstance(value, str):
             gmsh.onelab.setString(label, [value])
@@ -47,7 +48,7 @@ def press_run(folder, changed):
 
 
 @pytest.mark.parametrize(
-    "words, said",
+    "words, message",
     [
         ("level_2 20.5", "Level 2 = 20.5 m: must be between 0 and 20 m"),
         ("tail_level_1 -3", "Tailwater at level 1 = -3 m: must be between 0 and 20 m"),
@@ -62,16 +63,16 @@ def press_run(folder, changed):
         ("force_x 1 -setnumber force_at 3", "force_at, anchor_at: must lie on the dam's faces"),
     ],
 )
-def test_impossible_sections_are_told_before_anything_runs(plain, words, said):
-    """In Gmsh and in GetDP: one line with the level, its value and what is allowed."""
-    gmsh_command = [sys.executable, "-c", GMSH, str(plain / "a.geo"), "-", "-v", "2"]
-    for command in (gmsh_command, [find_getdp(), str(plain / "a.pro"), "-v", "2"]):
+def test_impossible_sections_are_refused_before_the_run(project, words, message):
+    """In Gmsh and in GetDP: one line with the level, its value and the allowed range."""
+    gmsh_command = [sys.executable, "-c", GMSH, str(project / "a.geo"), "-", "-v", "2"]
+    for command in (gmsh_command, [find_getdp(), str(project / "a.pro"), "-v", "2"]):
         done = subprocess.run(
             [*command, "-setnumber", *words.split()], capture_output=True, text=True, check=False
         )
         lines = [line for line in (done.stdout + done.stderr).splitlines() if line.strip()]
-        assert len(lines) == 1 and said in lines[0]
-    assert done.returncode and not (plain / "res").exists()
+        assert len(lines) == 1 and message in lines[0]
+    assert done.returncode and not (project / "res").exists()
 
 
 CHANGES = (
@@ -86,30 +87,30 @@ CHANGES = (
 
 
 @pytest.mark.heavy
-def test_every_change_in_the_tree_acts(plain):
-    """Changes in the tree, one run after the other, against the other engine."""
+def test_a_changed_parameter_changes_the_next_run(project):
+    """Changes one after the other, compared with the other engine."""
     labels = {n: parameter(n).label for change in CHANGES for n in change}
     start_gmsh()
     gmsh.onelab.clear()
-    rows = [press_run(plain, {labels[n]: v for n, v in change.items()}) for change in CHANGES]
+    rows = [press_run(project, {labels[n]: v for n, v in change.items()}) for change in CHANGES]
     level = {"Parameters/1Water levels/20004Level 4 [m]": 8.5}
-    rows.append(press_run(plain, level))
+    rows.append(press_run(project, level))
     gmsh.onelab.clear()
     changed, levels = {}, "3,6,8,9"
     for change, row in zip((*CHANGES, {}), rows, strict=True):
         changed |= change
         levels = levels if change else "3,6,8,8.5"
         case = load("a", changed, levels)
-        expected = solved(case, plain)
+        expected = solved(case, project)
         assert row[[1, 5, 6, 8, 9]] == pytest.approx(expected, rel=1e-6), (change, levels)
 
 
-#: What is compared: columns of the history.
+#: Columns of the history that are compared.
 SEEN = "level", "crack_length", "process_zone", "max_opening", "crest_ux"
 
 
 def solved(case, folder):
-    """SEEN at the end, by the default engine."""
+    """SEEN at the last step, by the default engine."""
     result = run.run(case, folder / "other", fields=False, picture=False, progress=False)[0]
     return [result.history[name][-1] for name in SEEN]
 
@@ -119,9 +120,10 @@ GREEN, RED = (127, 218, 127), (255, 72, 63)
 
 
 @pytest.fixture
-def window(plain, tmp_path):
-    """window(*arguments): Gmsh's own window on cases/a.pro, of fixed size, on a screen of its own.
-    It gives press(): Run, until the status is there and shows; a picture."""
+def window(project, tmp_path):
+    """window(*arguments): the window of Gmsh with cases/a.pro, of fixed size, on its own virtual
+    screen. Has press(): Run, until the status is displayed; and a picture.
+    """
     for tool in ("Xvfb", "xdotool", "import"):
         if not shutil.which(tool):
             pytest.skip(f"{tool} is missing (apt-get install xvfb xdotool imagemagick)")
@@ -136,10 +138,10 @@ def window(plain, tmp_path):
         display = ":" + number.readline().strip()
     environment = os.environ | {
         "DISPLAY": display,
-        "HOME": str(tmp_path),  # no settings of the user's, none left to him
+        "HOME": str(tmp_path),  # settings of the user are neither read nor written
         "LIBGL_ALWAYS_SOFTWARE": "1",
     }
-    # xdotool and import wait for ever for a window that does not come
+    # xdotool and import would wait for ever for a missing window
     call = lambda *words: subprocess.run(words, env=environment, check=True, timeout=60)
     opened = [screen]
     sizes = {"GraphicsWidth": 1200, "GraphicsHeight": 800, "MenuWidth": 330}
@@ -150,12 +152,12 @@ def window(plain, tmp_path):
 
     def open_window(*arguments):
         opened.append(
-            subprocess.Popen([*command, *arguments, str(plain / "a.pro")], env=environment)
+            subprocess.Popen([*command, *arguments, str(project / "a.pro")], env=environment)
         )
-        time.sleep(3)
+        call("xdotool", "search", "--sync", "--onlyvisible", "--name", "Gmsh")
 
         def press(name):
-            results = plain / "res/a"
+            results = project / "res/a"
             began, ended = results / "clear.geo", results / "status.geo"
             before = [stamp(began), stamp(ended)]
             pressed, end = 0.0, time.monotonic() + 120
@@ -165,10 +167,13 @@ def window(plain, tmp_path):
                     call("xdotool", "mousemove", "250", "818", "click", "1")
                     pressed = time.monotonic()
                 time.sleep(0.2)
-            time.sleep(3)
             picture = tmp_path / f"{name}.png"
-            call("import", "-window", "root", str(picture))
-            return imread(picture)
+            while True:
+                call("import", "-window", "root", str(picture))
+                pixels_of_status = [pixels(imread(picture), colour) for colour in (GREEN, RED)]
+                if max(pixels_of_status) > 500:
+                    return imread(picture)
+                assert time.monotonic() < end
 
         return press
 
@@ -178,7 +183,7 @@ def window(plain, tmp_path):
         process.wait()
 
 
-#: The gmsh command, of the package that is installed
+#: The gmsh command of the installed package
 GMSH = "import sys, gmsh; gmsh.initialize(['gmsh', *sys.argv[1:]], run=True); gmsh.finalize()"
 
 
@@ -187,26 +192,26 @@ def stamp(file):
 
 
 def pixels(picture, colour):
-    """How many pixels have a colour."""
+    """Count the pixels of a colour."""
     return (np.abs(picture[..., :3] * 255 - colour).max(axis=2) < 3).sum()
 
 
 @pytest.mark.heavy
-def test_window_shows_a_complete_run(window, plain):
-    """Run twice: the status is green both times, the views of the first run are gone."""
+def test_window_shows_a_complete_run(window, project):
+    """Run twice: the status is green both times, the views of the first run are removed."""
     press = window()
     for name in ("first", "second"):
         picture = press(name)
         assert pixels(picture, GREEN) > 500 and not pixels(picture, RED) > 500
-    assert "complete" in (plain / "res/a/status.geo").read_text()
-    assert len(list((plain / "res/a").glob("opening_*.pos"))) == 8
+    assert "complete" in (project / "res/a/status.geo").read_text()
+    assert len(list((project / "res/a").glob("opening_*.pos"))) == 8
 
 
 @pytest.mark.heavy
-def test_window_shows_where_a_run_stops(window, plain):
+def test_window_shows_the_level_of_a_run_that_stops(window, project):
     """A dam that slides without hardening: red, with the level."""
     words = "-setstring law friction -setstring uplift none -setnumber pena_tang 0"
-    words += " -setnumber n_joint 10"  # where it slides does not depend on the mesh
+    words += " -setnumber n_joint 10"  # the sliding level does not depend on the mesh
     picture = window(*words.split())("stopped")
     assert pixels(picture, RED) > 500 and not pixels(picture, GREEN) > 500
-    assert "stopped_at = 7.4" in (plain / "res/a/stopped.geo").read_text()
+    assert "stopped_at = 7.4" in (project / "res/a/stopped.geo").read_text()
