@@ -1,8 +1,8 @@
 """The gravity method: the body above the joint as a rigid block, stresses linear along the joint.
 
-The hand calculation that every answer of the finite elements is laid beside [USACE EM 1110-2-2200;
-FERC Engineering Guidelines, chapter 3; Leclerc, Leger and Tinawi 2003]. It knows the state at one
-time, not how that was reached, and cracks from the heel only.
+The hand calculation with which the results of the finite elements are compared [USACE EM
+1110-2-2200; FERC Engineering Guidelines, chapter 3; Leclerc, Leger and Tinawi 2003]. The state at a
+time does not depend on the load history; the joint cracks from the heel only.
 
 Forces are per metre of thickness: x downstream, y upwards, moments about the joint's toe, holding
 the dam down > 0. Along the joint, s is the distance from the heel.
@@ -51,14 +51,14 @@ class Load(NamedTuple):
         return Load(self.name, *(factor * value for value in self[1:]))
 
 
-def together(name: str, loads: list[Load]) -> Load:
-    """The resultant of loads, by the name given."""
+def resultant_of(name: str, loads: list[Load]) -> Load:
+    """The resultant of loads, with its name."""
     _, *components = zip(Load("nothing", 0.0, 0.0, 0.0, 0.0), *loads, strict=True)
     return Load(name, *map(math.fsum, components))
 
 
 def force(name: str, fx: float, fy: float, place: tuple[float, float]) -> Load:
-    """A force at a place counted from the joint's toe [m]."""
+    """The load of a force at a place [m from the joint's toe]."""
     return Load(name, fx, fy, -place[1] * fx, place[0] * fy)
 
 
@@ -73,7 +73,7 @@ class Segment(NamedTuple):
     y1: float
 
     def below(self, height: float) -> Segment | None:
-        """The part of it that lies below a height above the toe; None if there is none."""
+        """The part below a height above the toe; None if there is none."""
         if min(self.y0, self.y1) >= height:
             return None
         if max(self.y0, self.y1) <= height:
@@ -82,7 +82,7 @@ class Segment(NamedTuple):
         middle = self.x0 + part * (self.x1 - self.x0), height
         return Segment(*self[:2], *middle) if self.y0 < height else Segment(*middle, *self[2:])
 
-    def pressed(self, p0: float, p1: float) -> Load:
+    def pressure_load(self, p0: float, p1: float) -> Load:
         """The resultant of a pressure [Pa] that is linear from one end to the other."""
         width, rise, mean = self.x1 - self.x0, self.y1 - self.y0, (p0 + p1) / 2
         first_moment = lambda v0, v1: (p0 * (2 * v0 + v1) + p1 * (v0 + 2 * v1)) / 6
@@ -94,7 +94,7 @@ class Segment(NamedTuple):
             first_moment(self.x0, self.x1) * width,
         )
 
-    def pressed_by_westergaard(self, surface: float) -> Load:
+    def westergaard_load(self, surface: float) -> Load:
         """The resultant of a pressure Sqrt[surface - y] (surface: height above the toe [m]), times
         the normal's horizontal part, by the integrals of u^1/2 and u^3/2 over u = surface - y.
         """
@@ -102,15 +102,15 @@ class Segment(NamedTuple):
         if rise == 0:
             return Load("pressure", 0, 0, 0, 0)
         u0, u1 = surface - self.y0, surface - self.y1
-        whole, first = (2 / k * (u0 ** (k / 2) - u1 ** (k / 2)) for k in (3, 5))
+        half, three_halves = (2 / k * (u0 ** (k / 2) - u1 ** (k / 2)) for k in (3, 5))
         lean = width / rise
         part = abs(rise) / math.hypot(width, rise)
         return Load(
             "pressure",
-            -whole,
-            lean * whole,
-            surface * whole - first,
-            lean * ((self.x0 + lean * u0) * whole - lean * first),
+            -half,
+            lean * half,
+            surface * half - three_halves,
+            lean * ((self.x0 + lean * u0) * half - lean * three_halves),
         ).times(part)
 
 
@@ -118,20 +118,20 @@ class RigidBlock:
     """The part of the section above the joint: outline, faces, marks, from the joint's toe [m]."""
 
     def __init__(self, case: Case) -> None:
-        found = case.section
-        self.toe = found["toe_x"][0], found["toe_y"][0]
-        self.heel = found["heel_x"][0], found["heel_y"][0]
-        self.length = found["joint_length"][0]
+        section = case.section
+        self.toe = section["toe_x"][0], section["toe_y"][0]
+        self.heel = section["heel_x"][0], section["heel_y"][0]
+        self.length = section["joint_length"][0]
         #: the joint's direction, from heel to toe
         self.along = tuple((t - h) / self.length for t, h in zip(self.toe, self.heel, strict=True))
         x, y = self.toe
-        ends = zip(*(found[f"seg_{n}"] for n in ("x0", "y0", "x1", "y1")), strict=True)
+        ends = zip(*(section[f"seg_{n}"] for n in ("x0", "y0", "x1", "y1")), strict=True)
         self.all_segments = [Segment(x0 - x, y0 - y, x1 - x, y1 - y) for x0, y0, x1, y1 in ends]
-        self.sides, self.bodies = found["seg_side"], found["seg_body"]
+        self.sides, self.bodies = section["seg_side"], section["seg_body"]
         self.marks = {
             int(region): (mx - x, my - y)
             for region, mx, my, k in zip(
-                *(found[f"mark_{n}"] for n in ("region", "x", "y", "segment")), strict=True
+                *(section[f"mark_{n}"] for n in ("region", "x", "y", "segment")), strict=True
             )
             if self.bodies[int(k)] == constants()["UPPER"][0]
         }
@@ -167,7 +167,7 @@ class RigidBlock:
 def fluid_on(segments: list[Segment], weight: float, surface: float) -> list[Load]:
     """A fluid of a weight [N/m3] up to a surface [m above the toe] on segments."""
     wet = [part for s in segments if (part := s.below(surface))]
-    return [s.pressed(weight * (surface - s.y0), weight * (surface - s.y1)) for s in wet]
+    return [s.pressure_load(weight * (surface - s.y0), weight * (surface - s.y1)) for s in wet]
 
 
 def water_on(
@@ -176,15 +176,17 @@ def water_on(
     """Water up to a level, or of a uniform pressure, on the segments of a face."""
     weight = case["rho_water"] * case["g"]
     if case["face_load"] == "uniform":
-        return together(name, [s.pressed(weight * level, weight * level) for s in segments])
-    return together(name, fluid_on(segments, weight, level - body.toe[1]))
+        return resultant_of(
+            name, [s.pressure_load(weight * level, weight * level) for s in segments]
+        )
+    return resultant_of(name, fluid_on(segments, weight, level - body.toe[1]))
 
 
 def silt_on(case: Case, body: RigidBlock) -> Load:
     """Silt on the upstream face: horizontal pressure of an equivalent fluid."""
     weight = case["rho_silt"] * case["g"] * case["silt_K0"]
     loads = fluid_on(body.segments("UP"), weight, case["silt_height"] - body.toe[1])
-    return together("silt", loads)._replace(fy=0.0, moment_of_fy=0.0)
+    return resultant_of("silt", loads)._replace(fy=0.0, moment_of_fy=0.0)
 
 
 def added_pressure(case: Case, body: RigidBlock, level: float) -> Load:
@@ -194,15 +196,15 @@ def added_pressure(case: Case, body: RigidBlock, level: float) -> Load:
     surface = level - body.toe[1]
     wet = [part for s in body.segments("UP") if (part := s.below(surface))]
     size = 7 / 8 * case["k_h"] * case["rho_water"] * case["g"] * math.sqrt(level)
-    loads = [s.pressed_by_westergaard(surface) for s in wet]
-    return together("added water pressure", loads).times(size * case["added_mass"])
+    loads = [s.westergaard_load(surface) for s in wet]
+    return resultant_of("added water pressure", loads).times(size * case["added_mass"])
 
 
 def loads_on(
     case: Case, body: RigidBlock, time: float, level: float, tail: float
 ) -> tuple[Load, ...]:
-    """All loads on the body above the joint but the water in the joint; the weight comes first,
-    others only where there are any.
+    """All loads on the body above the joint but the water in the joint; the weight first, others
+    only if they act.
     """
     area, *centroid = body.area_and_centroid
     weight = case["rho_dam"] * case["g"] * area
@@ -228,9 +230,9 @@ class Uplift:
     places s [m].
 
     Heads are pressure heads above the joint's ends, never negative. By `uplift`: none; imposed: H1
-    to H2; drained: over the head left at the drains; cracked: H1 in the crack, beyond it as imposed
-    or, with drains not yet passed by the crack, as drained [USACE EM 1110-2-2200]; flow: as cracked
-    without drains, the limit of the cubic law for a narrow closed joint.
+    to H2; drained: reduced at the drains; cracked: H1 in the crack, beyond it as imposed or,
+    with drains beyond the crack, as drained [USACE EM 1110-2-2200]; flow: as cracked without
+    drains, the limit of the cubic law for a narrow closed joint.
     """
 
     def __init__(
@@ -267,16 +269,16 @@ class Uplift:
 
 
 def drained_head(case: Case, undrained: float, outlet: float) -> float:
-    """Head left at the drains [m]: they take their part of what stands above their outlet, the
-    gallery or, if higher, the tailwater; all heads above the joint at the drains.
+    """Head at the drains [m]: they reduce the head above their outlet (the gallery or, if higher,
+    the tailwater) by their effectiveness; all heads above the joint at the drains.
     """
     return undrained - case["drain_effectiveness"] * max(undrained - outlet, 0.0)
 
 
 def sliding_factor(case: Case, normal: float, shear: float, uncracked: float) -> float:
     """SSF = (mu N' + c (L - a)) / |T|: shear friction factor, cohesion on the uncracked joint."""
-    holds = case["mu"] * normal + case["adhesion"] * uncracked
-    return holds / abs(shear) if shear else math.inf
+    resistance = case["mu"] * normal + case["adhesion"] * uncracked
+    return resistance / abs(shear) if shear else math.inf
 
 
 def overturning_factor(loads: tuple[Load, ...], uplift_moment: float) -> float:
@@ -306,22 +308,22 @@ class GravityMethod:
     tail_level: float
     #: all but the water in the joint
     loads: tuple[Load, ...]
-    #: from the heel [m]; the joint's length if no shorter one leaves an equilibrium
+    #: from the heel [m]; the joint's length if no shorter crack is in equilibrium
     crack_length: float
     uplift: Uplift
-    #: where a crack that has passed this one's end, or the drains, comes to rest: equilibria with a
-    #: longer one, or the whole joint
+    #: states that follow if the crack grows beyond this length or the drains: equilibria with a
+    #: longer crack, or the joint cracked through
     further: tuple[GravityMethod, ...] = ()
 
     @property
     def uncracked(self) -> float:
-        """Length of the joint that holds [m]."""
+        """Uncracked length of the joint [m]."""
         return self.body.length - self.crack_length
 
     @cached_property
     def resultant(self) -> Load:
         """Of all loads but the water in the joint."""
-        return together("sum", list(self.loads))
+        return resultant_of("sum", list(self.loads))
 
     @property
     def U(self) -> float:
@@ -347,7 +349,7 @@ class GravityMethod:
 
     @property
     def stands(self) -> bool:
-        """Whether there is an equilibrium, sliding apart: some joint is left, and pressed."""
+        """Whether an uncracked joint is under compression; sliding is not considered."""
         return self.uncracked > 0 and self.N > 0
 
     @property
@@ -357,7 +359,7 @@ class GravityMethod:
 
     @property
     def eccentricity(self) -> float:
-        """Of N, from the middle of the whole joint towards the toe > 0 [m]."""
+        """Of N, from the middle of the joint (crack included), towards the toe > 0 [m]."""
         return self.x_resultant - self.body.length / 2
 
     @property
@@ -398,56 +400,56 @@ class GravityMethod:
         return overturning_factor(self.loads, self.uplift.moment)
 
     @property
-    def in_words(self) -> str:
-        """Its crack and safety factors."""
+    def description(self) -> str:
+        """Crack and safety factors."""
         if not self.stands:
             return "overturning"
         return f"crack {self.crack_length:.4g} m, SSF {self.SSF:.4g}, OSF {self.OSF:.4g}"
 
     @property
     def notes(self) -> list[str]:
-        """What its figures do not show: longer cracks in equilibrium, and what hangs on tension."""
-        case, found = self.case, []
-        for one in self.further:
-            passed = self.crack_length <= case["drain_x"] < one.crack_length
+        """Longer cracks in equilibrium; the result without tension, if it matters."""
+        case, notes = self.case, []
+        for state in self.further:
+            passed = self.crack_length <= case["drain_x"] < state.crack_length
             which = f"past the drains ({case['drain_x']:g} m)" if passed else "beyond it"
-            found.append(
+            notes.append(
                 "gravity method: the shortest crack in equilibrium is "
-                f"{self.crack_length:.4g} m; once {which}: {one.in_words}"
+                f"{self.crack_length:.4g} m; once {which}: {state.description}"
             )
         if not self.crack_length and self.tip_stress > 0:
             free = at(case, self.time, self.level, tension=False)
             strength = case.law.tensile_strength
-            found.append(
+            notes.append(
                 f"gravity method: uncracked, as its {self.tip_stress / 1e3:.4g} kPa at the heel "
                 f"are below the strength of {strength / 1e3:.4g} kPa; without tension: "
-                f"{(free, *free.further)[-1].in_words}"
+                f"{(free, *free.further)[-1].description}"
             )
-        return found
+        return notes
 
     def table(self) -> dict[str, list]:
-        """Its resultants by the columns LOADS: the loads, the uplift, the sum."""
+        """Resultants by the columns LOADS: the loads, the uplift, the sum."""
         tx, ty = self.body.along
         joint = Load("uplift", 0.0 - ty * self.U, tx * self.U, 0.0, 0.0 - self.uplift.moment)
         rows = [*self.loads, joint]
-        rows.append(together("sum", rows))
+        rows.append(resultant_of("sum", rows))
         cells = [(row.name, row.fx, row.fy, row.moment) for row in rows]
         return dict(zip(LOADS, map(list, zip(*cells, strict=True)), strict=True))
 
 
 def with_crack(case: Case, time: float, level: float, crack: float) -> GravityMethod:
-    """The rigid block at a time of a case, at a level [m] and with a crack [m] that are given."""
+    """The rigid block at a time of a case, with a reservoir level [m] and a crack length [m]."""
     body, tail = RigidBlock(case), case.tail_at(time)
     loads, uplift = loads_on(case, body, time, level, tail), Uplift(case, body, level, tail, crack)
     return GravityMethod(case, body, time, level, tail, loads, crack, uplift)
 
 
 def at(case: Case, time: float, level: float | None = None, tension: bool = True) -> GravityMethod:
-    """The gravity method at a time of a case: uncracked, or with the shortest crack in equilibrium,
-    what a longer one leads to in `further`.
+    """The gravity method at a time of a case: uncracked, or with the shortest crack in equilibrium;
+    the states with longer cracks in `further`.
 
-    level: of the reservoir [m] where it is not the one prescribed for that time; tension: whether
-    the joint has its tensile strength.
+    level: of the reservoir [m], by default the prescribed one; tension: whether the joint has its
+    tensile strength.
     """
     body, tail = RigidBlock(case), case.tail_at(time)
     level = case.level_at(time) if level is None else level
@@ -463,15 +465,15 @@ def at(case: Case, time: float, level: float | None = None, tension: bool = True
         return state(0.0)
 
     def excess(crack: float) -> float:
-        found, left = state(crack), body.length - crack
-        return 2 * found.N * left - 6 * found.M - at_tip * left**2
+        block, uncracked = state(crack), body.length - crack
+        return 2 * block.N * uncracked - 6 * block.M - at_tip * uncracked**2
 
-    found = [state(crack) for crack in ends_of_growth(excess, pieces(case, body, level, tail))]
-    standing = [one for one in found if one.stands]
-    first, *further = standing or found[:1] or [state(body.length)]
+    arrested = [state(crack) for crack in arrest_lengths(excess, pieces(case, body, level, tail))]
+    standing = [block for block in arrested if block.stands]
+    first, *further = standing or arrested[:1] or [state(body.length)]
     behind = float(np.nextafter(case["drain_x"], body.length))
     if first.stands and first.uplift.drains and not further and excess(behind) > 0:
-        further = [state(body.length)]  # past the drains nothing stops it
+        further = [state(body.length)]  # the crack grows through the joint
     return replace(first, further=tuple(further))
 
 
@@ -491,27 +493,34 @@ def pieces(case: Case, body: RigidBlock, level: float, tail: float) -> list[tupl
     return [(np.nextafter(a, b), b) for a, b in itertools.pairwise(ends) if b > a]
 
 
-def ends_of_growth(
+#: Relative tolerances: imaginary part of a real root of the cubic, over the length of its span;
+#: crack length, over that of the joint.
+REAL_ROOT, CRACK_TOLERANCE = 1e-6, 1e-12
+
+
+def arrest_lengths(
     excess: Callable[[float], float], spans: list[tuple[float, float]]
 ) -> list[float]:
-    """The crack lengths [m] at which the tension at the tip falls to what it may be.
+    """The crack lengths [m] at which growth stops: the tension at the tip falls to its limit.
 
-    excess: of the tension [N/m]; times the length left it is a polynomial of degree 3 within each
-    of the spans, whose roots are all found.
+    excess: of the tension over its limit [N]; times the uncracked length it is a polynomial of
+    degree 3 in the crack length within each of the spans.
     """
-    length, found = spans[-1][1], []
+    length, lengths = spans[-1][1], []
     for start, end in spans:
         x = (start + end) / 2 + (end - start) / 2 * np.cos(np.pi * (np.arange(4) + 0.5) / 4)
         values = [excess(a) * (length - a) for a in x]
         rough = np.polynomial.Polynomial.fit(x, values, 3, domain=[start, end]).roots()
-        rough = np.sort(rough.real[np.abs(rough.imag) < 1e-6 * (end - start)])
+        rough = np.sort(rough.real[np.abs(rough.imag) < REAL_ROOT * (end - start)])
         turns = [a for a in rough if start < a < end]
         # between two roots, and beside the first and the last, the sign is known
         limits = [start, *((a + b) / 2 for a, b in itertools.pairwise(turns)), end]
         for before, after in itertools.pairwise(limits):
             if excess(before) > 0 >= excess(after):
-                while after - before > 1e-12 * length:  # scipy's roots are half of a run's start
+                while (
+                    after - before > CRACK_TOLERANCE * length
+                ):  # scipy's roots are half of a run's start
                     middle = (before + after) / 2
                     before, after = (middle, after) if excess(middle) > 0 else (before, middle)
-                found.append(float(after))
-    return found
+                lengths.append(float(after))
+    return lengths

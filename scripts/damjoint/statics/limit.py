@@ -1,9 +1,8 @@
 """Limit analysis: loads that exceed the strength of the joint, whatever the distribution of stress.
 
 The joint's resultants N, T, M follow from the loads alone, unless the water in it depends on its
-opening. Where they exceed what the strength allows there is no equilibrium (static theorem of limit
-analysis, its necessary side), and a sample need not search for one. Where they do not, nothing
-follows.
+opening. Where they exceed the strength there is no equilibrium (static theorem of limit analysis),
+and a sample needs no load steps. The converse does not hold.
 """
 
 from __future__ import annotations
@@ -18,10 +17,10 @@ from ..laws import UNBREAKABLE
 from ..model.case import Case, flows
 from ..solver.load_stepper import LoadStepper
 
-#: Parameters of which N, T, M do not depend.
+#: Parameters on which N, T, M do not depend.
 STRENGTHS = (*UNBREAKABLE, "sigma_max", "G_f", "G_t", "alpha", "pena_rupture", "pena_contact")
 
-#: Part of a bound by which it must be passed: far more than rounding makes.
+#: Relative excess over a bound that counts as failure, far above round-off.
 MARGIN = 1e-6
 
 
@@ -49,29 +48,29 @@ def resultants(elastic: Elastic) -> dict[str, np.ndarray]:
 
 def elastic_heel_stress(case: Case, interface: Interface) -> float:
     """Largest effective normal stress [Pa] at the heel at the last level of a case whose joint does
-    not fail: the heel is a corner, it depends on the mesh.
+    not fail. It depends on the mesh, as the heel is a corner.
     """
     rows = LoadStepper(Elastic.of(case, interface).case, interface).run().at()
     return float(rows["sigma_n_eff"][rows["s"] <= rows["s"].min()].max())
 
 
 def mechanism(case: Case, interface: Interface) -> tuple[str, str]:
-    """How a case fails for certain, and why, in words; both empty where nothing follows.
+    """How a case certainly fails, and why; both empty if its failure is not certain.
 
     Sliding: the shear exceeds the law's `shear_bound`. Overturning: with the tensile strength f
-    and the joint's length L, the tension holds the dam down by f L^2/2 about the toe at most.
+    and the joint's length L, the moment of the tension about the toe is at most f L^2/2.
     """
     if flows(case) or case["drive"] != "level":
         return "", ""
     history, length = resultants(Elastic.of(case, interface)), case.section["joint_length"][0]
     shear = case.law.shear_bound(history["N"], length)
     for name, demand, bound, words in (
-        ("sliding", np.abs(history["T"]), shear, "the shear T = {:.6g} N/m, what holds {:.6g} N/m"),
+        ("sliding", np.abs(history["T"]), shear, "T = {:.6g} N/m exceeds the strength, {:.6g} N/m"),
         (
             "overturning",
             -history["M"],
             np.full_like(shear, case.law.tensile_strength * length**2 / 2),
-            "the moment -M = {:.6g} N, what holds {:.6g} N",
+            "-M = {:.6g} N m/m exceeds the resistance, {:.6g} N m/m",
         ),
     ):
         beyond = np.flatnonzero(demand > bound + MARGIN * np.abs(demand))

@@ -1,6 +1,6 @@
-"""The verdict of a run: whether the dam stands, how it fails, and what to know of the result.
+"""The verdict of a run: whether the dam stands, how it fails, and hints on the result.
 
-The one place where a failure is derived from resultants.
+Only this module derives a failure from resultants.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ def verdict(results: Results) -> str:
     equilibrium, interrupted.
 
     "no equilibrium": not even at the first step. "sliding" also where the whole joint has slipped
-    or opened and the dam stands on nothing but the joint's hardening.
+    or opened and only the hardening of the joint resists.
     """
     if not results.last:
         return "no equilibrium"
@@ -39,9 +39,9 @@ def failed(results: Results) -> bool:
 
 def slipped_from(results: Results) -> float | None:
     """The level [m] from which on the whole joint has slipped or is open; None if a part of it
-    still sticks, or if the law lets a slipped dam stand.
+    sticks, or if a dam that has slipped stands by the joint law.
 
-    A point that has slipped counts as slipped from then on. By the integration points of every
+    A point that has slipped once counts as slipped. By the integration points of every
     step, or by the nodes at the last requested level.
     """
     if results.case.law.stands_slipped:
@@ -80,13 +80,16 @@ def shear_resistance(results: Results, normal: float) -> float:
     return case.law.shear_resistance(normal, case.joint_along, damage, slip)
 
 
-#: How near to a bound of statics a state counts as there, relatively: a run's last step is found
-#: to 1/1024 of the way between two levels.
+#: Relative distance to a bound of statics within which a state has reached it: the last step of a
+#: run is known to 1/1024 of the step between two levels.
 AT_BOUND = 5e-3
+#: Distance of the resultant from the toe, over the joint's length, within which the dam overturns:
+#: at least, and in elements.
+ARM_AT_TOE, ELEMENTS_AT_TOE = 0.01, 0.5
 
 
 def bound(results: Results) -> tuple[str, str]:
-    """Which bound of statics the last state has reached, sliding or overturning, and in words; both
+    """The bound of statics that the last state has reached, sliding or overturning, and why; both
     empty if none.
 
     A rigid block on a joint without tension has M >= 0; on elements the compression ends within the
@@ -98,20 +101,24 @@ def bound(results: Results) -> tuple[str, str]:
     pull = case.law.open_tension * crack
     normal, moment = last["N"] + pull, last["M"] + pull * (length - crack / 2)
     arm = moment / normal if normal > 0 else 0.0
-    if arm < max(0.01, 0.5 / case["n_joint"]) * length:
+    if arm < max(ARM_AT_TOE, ELEMENTS_AT_TOE / case["n_joint"]) * length:
         side = "from" if arm >= 0 else "beyond"
         return "overturning", f"the resultant is {abs(arm):.3g} m {side} the toe"
     if last["T"] >= (1 - AT_BOUND) * resistance:
         return (
             "sliding",
-            f"T = {last['T']:.5g} N/m of the {resistance:.5g} N/m that the joint holds",
+            f"T = {last['T']:.5g} N/m reaches the shear strength, {resistance:.5g} N/m",
         )
     return "", ""
 
 
+#: Moments that differ by more, over N times the base, belong to different cracks.
+SAME_CRACK = 0.01
+
+
 def highest_by_statics(case: Case, last: dict[str, float]) -> tuple[float, str, str]:
-    """The level [m] above which a state has no equilibrium any more, how it fails and why, in
-    words; infinite and empty where statics gives no bound.
+    """The level [m] above which no equilibrium exists, how the dam fails and why; infinite and
+    empty where statics gives no bound.
 
     Whatever the distribution of stress: with the tensile strength f over the length l that is not
     cracked, M >= -f l^2/2, and the shear is at most the law's `shear_bound`; the crack does not
@@ -124,28 +131,27 @@ def highest_by_statics(case: Case, last: dict[str, float]) -> tuple[float, str, 
         return np.inf, "", ""
     crack = 0.0 if law.open_tension else last["crack_length"]
     block = lambda level: gravity.with_crack(case, time, level, crack)
-    here = block(last["level"])
-    length = here.uncracked
+    at_last = block(last["level"])
+    length = at_last.uncracked
 
     def moment(level: float) -> float:
         return block(level).M + law.tensile_strength * length**2 / 2
 
     def shear(level: float) -> float:
-        found = block(level)
-        return float(law.shear_bound(np.array(found.N), length)) - found.T
+        state = block(level)
+        return float(law.shear_bound(np.array(state.N), length)) - state.T
 
     reasons = (
         (moment, "overturning", "the resultant leaves the joint"),
-        (shear, "sliding", "the shear passes what the joint holds"),
+        (shear, "sliding", "the shear exceeds the strength of the joint"),
     )
-    found = [(np.inf, "", "")]
-    # where the resultants are a hundredth of the base apart, the crack is another one
-    if abs(here.M - last["M"]) < 0.01 * abs(here.N) * case.joint_along:
+    bounds = [(np.inf, "", "")]
+    if abs(at_last.M - last["M"]) < SAME_CRACK * abs(at_last.N) * case.joint_along:
         for reserve, mode, words in reasons:
             if reserve(last["level"]) > 0 > reserve(case.highest_level):
                 root = brentq(reserve, last["level"], case.highest_level)
-                found.append((root, mode, words))
-    return min(found)
+                bounds.append((root, mode, words))
+    return min(bounds)
 
 
 def mean(results: Results, column: str) -> float:
@@ -159,33 +165,33 @@ def mean(results: Results, column: str) -> float:
 
 
 def statement(results: Results) -> str:
-    """In words: why and where a run has stopped, or that the dam slides; empty if it stands."""
-    case, last, found = results.case, results.last, verdict(results)
-    if found == "no equilibrium":
+    """Why and where a run has stopped, or that the dam slides; empty if it stands."""
+    case, last, outcome = results.case, results.last, verdict(results)
+    if outcome == "no equilibrium":
         return "no equilibrium even at the first step"
     if results.stopped:
         where = f"level {last['level']:.6g} m (t = {last['time']:.6g})"
-        if found == "out of range":
+        if outcome == "out of range":
             return (
-                f"out of range: the displacement asks for a level below 0 or above "
+                f"out of range: the displacement needs a level below 0 or above "
                 f"{case.highest_level:g} m beyond {where}; the last converged state is saved"
             )
-        return f"{found}: {why_there(results)}; the last converged state is saved"
-    if found == "stands":
+        return f"{outcome}: {reason_of_stop(results)}; the last converged state is saved"
+    if outcome == "stands":
         return ""
     level, hardening = slipped_from(results), case.law.hardening_parameter
     slides = f"sliding: the whole joint has slipped or is open from level {level:.6g} m on"
     if not hardening:
-        return f"{slides}; nothing holds it along the joint"
-    default = ", a default that no joint has; set it if yours hardens"
+        return f"{slides}; the joint has no further shear strength"
+    default = ", a numerical default; set it if your joint hardens"
     return (
         f"{slides}; the dam stands on the hardening {hardening} = {case[hardening]:.4g} Pa/m"
         f"{'' if case.hardening_asked else default}"
     )
 
 
-def why_there(results: Results) -> str:
-    """In words, what shows why a run has stopped, or that nothing does."""
+def reason_of_stop(results: Results) -> str:
+    """The mechanism or bound of statics at which a run has stopped, or that there is none."""
     case, last, shown = results.case, results.last, results.info.get("mechanism")
     where = f"level {last['level']:.6g} m (t = {last['time']:.6g})"
     if shown:
@@ -205,7 +211,7 @@ def why_there(results: Results) -> str:
 
 #: K_N h/E beyond which a joint is stiff for its mesh: the published points make its node stresses
 #: oscillate, and convergence is hard.
-STIFF = 100
+STIFF_JOINT = 100
 
 
 def stiffness_ratio(results: Results) -> float:
@@ -218,63 +224,63 @@ def stiffness_ratio(results: Results) -> float:
 def stiff_joint(results: Results) -> str:
     """A hint to a run that has not converged, if the joint is too stiff for its elements."""
     ratio = stiffness_ratio(results)
-    if ratio < STIFF:
+    if ratio < STIFF_JOINT:
         return ""
     why = f"the joint is too stiff for this mesh: K_N h/E = {ratio:.3g}"
     return f" ({why}; refine n_joint or lower K_N)"
 
 
-#: A foundation that reaches less far than this many heights of the dam makes the crack too long: a
-#: 45 m dam at 45 m has 10.7, 5.3, 4.2, 3.2 m of it with 5, 34, 60, 120 m.
-FOUNDATION = 1.5
+#: Depth and width of the foundation over the dam's height below which the crack is too long: a 45 m
+#: dam at 45 m has a crack of 10.7, 5.3, 4.2, 3.2 m with a foundation of 5, 34, 60, 120 m.
+LEAST_FOUNDATION = 1.5
 #: K_N L/E below which the joint is softer than the dam: the stress is that of a rigid block.
-SOFT = 1
+SOFT_JOINT = 1
 
 
 def hints(results: Results) -> list[str]:
-    """What an engineer should know of a result besides its verdict."""
-    case, last, found = results.case, results.last, []
+    """Hints on a result besides its verdict: limits of the model, what to change."""
+    case, last, messages = results.case, results.last, []
     ratio = stiffness_ratio(results)
-    if ratio >= STIFF and case["quadrature"] == "published":
-        found.append(
+    if ratio >= STIFF_JOINT and case["quadrature"] == "published":
+        messages.append(
             f"K_N h/E = {ratio:.3g}: the joint is stiff for this mesh, its node stresses oscillate "
-            "(N, T, M do not): take quadrature = full"
+            "(N, T, M do not): set quadrature = full"
         )
     soft = case["K_N"] * case.joint_length / min(case["E_dam"], case["E_found"])
-    if soft < SOFT:
-        found.append(
+    if soft < SOFT_JOINT:
+        messages.append(
             f"K_N L/E = {soft:.3g}: the joint is softer than the dam; a closed joint of "
             "concrete on rock has 10 to 1000"
         )
     reach = min(case["found_side"], case["found_depth"])
     if case.published:
-        return found
-    if not case.geometry and reach < FOUNDATION * case["dam_height"]:
-        found.append(
-            f"the foundation reaches {reach:g} m: less than {FOUNDATION:g} heights of the dam make "
-            "the crack too long"
+        return messages
+    if not case.geometry and reach < LEAST_FOUNDATION * case["dam_height"]:
+        messages.append(
+            f"the foundation reaches {reach:g} m: less than {LEAST_FOUNDATION:g} heights of the "
+            "dam make the crack too long"
         )
     if levels := results.info.get("unstable_growth"):
-        found.append(
+        messages.append(
             f"unstable crack growth at level {min(levels):.4g} m: the state after it depends on "
             "steps and mesh"
         )
     for limit, lowest in results.info.get("limit_points", ()):
-        found.append(
+        messages.append(
             f"unstable crack growth at level {limit:.4g} m: along the equilibrium path the level "
             f"falls to {lowest:.4g} m before it rises again"
         )
     if results.info.get("engine") == "getdp" and verdict(results) == "not converged":
-        found.append(
+        messages.append(
             "the engine getdp does not follow the equilibrium path beyond a limit point: "
             "--engine condensed does"
         )
     if last:
         unstable = bool(levels) or verdict(results) == "not converged"
         share = tension_share(case, last)
-        found += case.law.hints(Evidence(last["crack_length"], unstable, share))
-        found += seen_in(results, last)
-    return found
+        messages += case.law.hints(Evidence(last["crack_length"], unstable, share))
+        messages += hints_on_state(results, last)
+    return messages
 
 
 def tension_share(case: Case, last: dict[str, float]) -> float:
@@ -294,27 +300,29 @@ def tension_share(case: Case, last: dict[str, float]) -> float:
 
 #: Part of the tensile strength from which on the heel counts as in tension.
 IN_TENSION = 1e-3
+#: Distance of a node from the drains, over the joint's length, within which it is at the drains.
+AT_DRAINS = 1e-5
 
 
-def seen_in(results: Results, last: dict[str, float]) -> list[str]:
-    """What the last state shows: a crack counted in elements, drains in it, tension at the heel."""
-    case, found, crack = results.case, [], last["crack_length"]
+def hints_on_state(results: Results, last: dict[str, float]) -> list[str]:
+    """Hints on the last state: resolution of the crack, drains, tension at the heel."""
+    case, messages, crack = results.case, [], last["crack_length"]
     element = case.joint_length / case["n_joint"]
     if crack > 0 and not (case.accuracy or case.geometry):
-        found.append(
+        messages.append(
             f"the crack ({crack:.3g} m) ends somewhere in an element of {element:.2g} m; "
             "--accuracy 3% chooses the mesh and estimates the error"
         )
     if has_drains(case) and len(results.joint["time"]):  # a section's mesh has a node there
         away = np.abs(results.at()["s"] - case["drain_x"]).min()
-        if away > 1e-5 * case.joint_along:
-            found.append(
+        if away > AT_DRAINS * case.joint_along:
+            messages.append(
                 f"the mesh has no node at the drains (drain_x = {case['drain_x']:g} m): the "
                 f"nearest is {away:.2g} m away"
             )
     if has_drains(case) and crack > case["drain_x"]:
         unchanged = "" if case["uplift"] == "cracked" else "; the model keeps their effect"
-        found.append(
+        messages.append(
             f"the crack ({crack:.3g} m) has passed the drains ({case['drain_x']:g} m){unchanged}"
         )
     if len(results.joint["time"]) and not case.law.open_tension * crack:
@@ -322,36 +330,34 @@ def seen_in(results: Results, last: dict[str, float]) -> list[str]:
         heel = rows["sigma_n_eff"][rows["s"] <= rows["s"].min()].mean()
         strength = case.law.tensile_strength
         if heel > IN_TENSION * strength > 0:
-            found.append(
+            messages.append(
                 f"the heel is in tension, {heel / 1e3:.4g} kPa of the tensile strength of "
                 f"{strength / 1e3:.4g} kPa"
             )
-    return found
+    return messages
 
 
 def path_statement(results: Results) -> str:
-    """In words, what a prescribed displacement has found: the largest level, and whether the path
-    turns back.
-    """
+    """The largest level of a run under displacement control, and whether its path snaps back."""
     history, case = results.history, results.case
     level, time = history["level"], history["time"]
     if not len(level):
         return "no step has converged"
     driven = (time > case["drive_begin"] - 1e-9) & (time < case["drive_end"] + 1e-9)
     load = case["rho_water"] * case["g"] * level.max()
-    said = f"largest load: level {level.max():.5g} m ({load / 1e3:.5g} kPa)"
+    text = f"largest load: level {level.max():.5g} m ({load / 1e3:.5g} kPa)"
     if case["drive_by"] < 0:
-        return said + "; the displacement was taken back"
+        return text + "; the displacement was reversed"
     falls = bool((np.diff(level[driven]) < 0).any())
     moved = history["crest_ux"][driven], results.heel[driven]
     back = any(bool((np.diff(m) < 0).any()) for m in moved)
-    said += "; the level " + ("falls while the displacement grows" if falls else "rises all along")
-    return said + ("; snap-back met" if back else "; no snap-back")
+    text += "; the level " + ("falls while the displacement grows" if falls else "always rises")
+    return text + ("; snap-back occurs" if back else "; no snap-back")
 
 
 def overturning_level(case: Case) -> float:
     """Level [m] of a uniform pressure at which the rigid dam without tension turns over about its
     toe: the moment is linear in it.
     """
-    empty, one = (gravity.at(case, case.times[-1], level).M for level in (0.0, 1.0))
-    return empty / (empty - one)
+    at_0, at_1 = (gravity.at(case, case.times[-1], level).M for level in (0.0, 1.0))
+    return at_0 / (at_0 - at_1)

@@ -1,8 +1,8 @@
-"""The level, the strength or any parameter at which a dam has no equilibrium left.
+"""The critical level, strength or parameter, beyond which a dam has no equilibrium.
 
 A value stands if there is an equilibrium at the case's last level, and fails if its equilibrium
-path (see failure_path.py) ends below. Between the two the interval is bisected to the precision; a
-level needs no bisection, it is the highest one of the path.
+path (see failure_path.py) ends below. Between such values the interval is bisected to the
+precision. A critical level needs no bisection: it is the highest level of the path.
 """
 
 from __future__ import annotations
@@ -36,29 +36,32 @@ from ..statics.limit import elastic_heel_stress
 from ..statics.verdict import bound, highest_by_statics, statement, tension_share
 from .failure_path import CRITICAL, FailurePath, row
 
-#: Parameters that are divided by the strength reduction factor. With the fracture energies among
-#: them the softening curve is scaled in stress, at the same jumps.
+#: Parameters that are divided by the strength reduction factor. The fracture energies are included:
+#: the stresses of the softening curve are scaled, its jumps are not.
 STRENGTH = ("sigma_max", "adhesion", "mu", "G_f", "G_t")
 
-#: Few strategies for a step of the level: where it fails a displacement is prescribed.
+#: Few iterations for a step of the level: if it fails a displacement is prescribed.
 QUICK = {"smallest_step": 1.0, "max_iterations": 15.0, "burst_iterations": 15.0}
 
 #: Parameters of a prescribed displacement.
 DRIVE = ("drive", "drive_begin", "drive_end", "drive_by")
 
 #: Further assumptions of the gravity method: tension, longest crack.
-ASSUMED = {"with the crack past the drains": (True, True), "without tension": (False, True)}
+ASSUMPTIONS = {"with the crack past the drains": (True, True), "without tension": (False, True)}
 
-#: How much higher, relatively, statics may allow a level that it confirms.
-NEAR = 0.02
+#: Relative distance within which the bound of statics confirms a critical level below it.
+NEAR_BOUND = 0.02
 
 #: The smallest value of a parameter that has to be positive.
 TINY = 1e-30
 
+#: Relative distances from a value at which the gravity method's critical value is sought.
+DISTANCES = (0.02, 0.05, 0.1, 0.2, 0.5, 0.9)
+
 
 @dataclass(frozen=True)
 class Trial:
-    """A value, and the equilibrium path of the dam that has it."""
+    """A value of the varied quantity, and the equilibrium path of the dam with it."""
 
     value: float
     path: FailurePath
@@ -70,33 +73,33 @@ class Trial:
 
 
 @dataclass(frozen=True)
-class Answer:
-    """The result of a search."""
+class CriticalValue:
+    """The result of a search for a critical value."""
 
     #: the largest load (or smallest strength) with an equilibrium; None if there is no limit
     value: float | None
     mode: str
-    #: what confirms it, and why it is not confirmed; one of them is empty
+    #: why it is confirmed, or why not; one of them is empty
     why: str
     doubt: str
     #: the last equilibrium
     point: Point | None
-    #: the same by the gravity method; None if it gives none
+    #: critical value of the gravity method; None if it has none
     gravity: float | None = None
-    #: and with other assumptions where they change it, {assumption: value}
+    #: the same with other assumptions, if they change it, {assumption: value}
     gravity_with: Mapping[str, float] = field(default_factory=dict)
     #: a note on the gravity method's values
     note: str = ""
-    #: what has interrupted the search
+    #: error or interrupt that ended the search
     error: BaseException | None = None
 
     @property
     def confirmed(self) -> bool:
-        """Whether there is a critical value, with an equilibrium below and a mechanism above it."""
+        """Whether there is a critical value, and a mechanism or bound of statics beyond it."""
         return self.value is not None and bool(self.why)
 
     def lines(self, search: Search) -> list[str]:
-        """The answer in words."""
+        """The printed lines."""
         of, name, unit = search.of, search.own.name, search.unit
         if self.value is None:
             lines = [f"{name}: no critical {of} found: {self.doubt}"]
@@ -163,7 +166,7 @@ class Search:
 
     @property
     def unit(self) -> str:
-        """The unit of what is varied, with a blank before it."""
+        """Unit of the varied quantity, after a blank."""
         if self.of in ("level", "strength"):
             return " m" if self.of == "level" else ""
         unit = parameter(self.name).unit
@@ -185,7 +188,7 @@ class Search:
         return load(name, self.settings | changed, levels, tails)
 
     def path(self, value: float, case: Case, target: float | None = None) -> FailurePath:
-        """The equilibrium path of a case, followed to a first estimate; one more trial."""
+        """The equilibrium path of a case, followed to a first estimate; adds a trial."""
         report = lambda level: self.on_progress(
             f"{self.of} {value:.6g}{self.unit}: level {level:.6g} m"
         )
@@ -204,12 +207,12 @@ class Search:
     # -- the search
     # ----------------------------------------------------------------------------------------------
 
-    def run(self) -> Answer:
+    def run(self) -> CriticalValue:
         """Search."""
         with threadpool_limits(1):
             return self.level() if self.of == "level" else self.value()
 
-    def level(self) -> Answer:
+    def level(self) -> CriticalValue:
         """The highest level of the path, beyond the case's highest level."""
         name, *_ = self.source
         last = int(np.argmax(self.own.levels)) + 1
@@ -219,51 +222,53 @@ class Search:
         path.refine()
         if path.reached:
             beyond = f"{path.target:g} m, twice the dam's height"
-            return Answer(None, "", "", f"there is an equilibrium at {beyond}", path.points[-1])
+            return CriticalValue(
+                None, "", "", f"there is an equilibrium at {beyond}", path.points[-1]
+            )
         point = path.points[path.top] if path.points else None
-        return self.answer(point and point.level, path, point)
+        return self.result(point and point.level, path, point)
 
-    def value(self) -> Answer:
-        """Outwards from the case's own value until the answer changes, then bisected."""
-        found = self.trial(1.0 if self.of == "strength" else self.own[self.name])
-        other = self.change(found)
+    def value(self) -> CriticalValue:
+        """Search outwards from the case's own value for a stand and a failure, then bisect."""
+        first = self.trial(1.0 if self.of == "strength" else self.own[self.name])
+        other = self.change(first)
         if other is None:
-            return self.no_change(found)
-        stands, fails = (found, other) if found.stands else (other, found)
+            return self.no_change(first)
+        stands, fails = (first, other) if first.stands else (other, first)
         while True:
             stands, fails = self.bisect(stands, fails)
             fails.path.follow(SURE)
             fails.path.refine()
             if not fails.stands:
-                return self.answer(stands.value, fails.path, arrived(stands))
-            step = fails.value - stands.value  # it does stand after all: continue from there
+                return self.result(stands.value, fails.path, point_at_target(stands))
+            step = fails.value - stands.value  # the refined path stands: continue from it
             stands = fails
             while fails.stands:
                 step *= 2
                 fails = self.trial(stands.value + step)
 
-    def no_change(self, found: Trial) -> Answer:
-        """The answer where all trials stand, or all fail."""
+    def no_change(self, first: Trial) -> CriticalValue:
+        """The result if all trials stand, or all fail."""
         tried = [t.value for t in self.trials]
-        ends = "stands" if found.stands else "fails"
+        ends = "stands" if first.stands else "fails"
         doubt = f"{ends} with all values tried, {min(tried):.6g} to {max(tried):.6g}{self.unit}"
-        point = arrived(found) if found.stands else None
-        return Answer(None, found.path.mode, "", doubt, point)
+        point = point_at_target(first) if first.stands else None
+        return CriticalValue(None, first.path.mode, "", doubt, point)
 
     def change(self, first: Trial) -> Trial | None:
-        """The first trial outwards from one that ends otherwise."""
+        """The nearest tried value with the other result than the first; None if there is none."""
         for value in self.outwards(first):
             try:
-                found = self.trial(value)
+                trial = self.trial(value)
             except InputError:  # the case allows no such value
                 continue
-            if found.stands != first.stands:
-                return found
+            if trial.stands != first.stands:
+                return trial
         return None
 
     def outwards(self, first: Trial) -> Iterator[float]:
-        """Values ever further from the first: towards failure if it stands and else from it; in
-        both directions by turns where that is not known.
+        """Values at increasing distance from the first: towards failure if it stands, else away
+        from it; alternately in both directions where failure may be in either.
         """
         low, high = TINY, np.inf
         if self.of != "strength":
@@ -276,18 +281,18 @@ class Search:
         return worse if first.stands else (down if worse is up else up)
 
     def bisect(self, stands: Trial, fails: Trial) -> tuple[Trial, Trial]:
-        """The two, as close to each other as the precision; halved every third time at least."""
+        """Narrow an interval to the precision, by secants and at least every third time by half."""
         ends, turn = (stands.value, fails.value), 0
         while abs(ends[0] - ends[1]) > PRECISION * max(map(abs, ends)):
             value = self.extrapolate(*ends) if turn % 3 else None
-            found = self.trial(middle(*ends) if value is None else value)
-            stands, fails = (found, fails) if found.stands else (stands, found)
+            trial = self.trial(middle(*ends) if value is None else value)
+            stands, fails = (trial, fails) if trial.stands else (stands, trial)
             ends, turn = (stands.value, fails.value), turn + 1
         return stands, fails
 
     def extrapolate(self, stands: float, fails: float) -> float | None:
-        """A value just before or beyond the one at which the dam just fails, by the highest levels
-        of the last two trials that failed; None if these give none.
+        """The value at which the highest level reaches the target, by the secant of the last two
+        trials that failed; shifted by less than the precision, to bracket it. None if outside.
         """
         known = [t for t in self.trials if not t.stands and t.path.points][-2:]
         values = [t.value for t in known]
@@ -295,20 +300,22 @@ class Search:
         if len(set(missing)) < 2:
             return None
         root = values[1] - missing[1] * np.diff(values)[0] / np.diff(missing)[0]
-        aside = np.sign(fails - stands) * 0.4 * PRECISION * abs(root)
+        shift = np.sign(fails - stands) * 0.4 * PRECISION * abs(root)
         low, high = sorted((stands, fails))
-        return next((v for v in (root - aside, root + aside) if low < v < high), None)
+        return next((v for v in (root - shift, root + shift) if low < v < high), None)
 
-    def so_far(self, error: BaseException) -> Answer:
-        """The answer of an interrupted search."""
+    def interrupted(self, error: BaseException) -> CriticalValue:
+        """The result of an interrupted search: its last trials."""
         standing = [t for t in self.trials if t.stands]
         ends = [f"{t.value:.6g} {'stands' if t.stands else 'fails'}" for t in self.trials[-2:]]
         doubt = f"interrupted: {', '.join(ends)}" if ends else "interrupted"
-        point = arrived(standing[-1]) if standing else None
-        return Answer(None, "", "", doubt, point, error=error)
+        point = point_at_target(standing[-1]) if standing else None
+        return CriticalValue(None, "", "", doubt, point, error=error)
 
-    def answer(self, value: float | None, failing: FailurePath, point: Point | None) -> Answer:
-        """The answer, with what the failing path shows."""
+    def result(
+        self, value: float | None, failing: FailurePath, point: Point | None
+    ) -> CriticalValue:
+        """The result for a value and the path that fails beyond it."""
         mode, why = failing.mode, ""
         doubt = "no further equilibrium is found, but no mechanism either"
         if not failing.points:
@@ -317,7 +324,7 @@ class Search:
             why = f"beyond it the toe's compression passes f_c = {failing.case['f_c']:g} Pa"
         elif failing.slides:
             last = failing.points[failing.top].last
-            why = f"there the whole joint slips: T = {last['T']:.5g} N/m is its whole strength"
+            why = f"there the whole joint slips: T = {last['T']:.5g} N/m is its shear strength"
         elif failing.settled(SURE):
             top, limit = failing.points[failing.top], failing.points[failing.limit_point]
             ratio = failing.points[-1].imposed / failing.imposed(limit)
@@ -329,29 +336,29 @@ class Search:
                 why += f"; there {reached}"
         else:
             mode, why = self.by_statics(failing)
-        found = Answer(value, mode, why, "" if why else doubt, point)
-        if value is None or (beside := self.by_gravity(value)) is None:
-            return found
+        result = CriticalValue(value, mode, why, "" if why else doubt, point)
+        if value is None or (by_hand := self.by_gravity(value)) is None:
+            return result
         others: dict[str, float] = {}
-        for name, how in ASSUMED.items():
-            other = self.by_gravity(value, *how)
-            known = beside, *others.values()
+        for name, assumptions in ASSUMPTIONS.items():
+            other = self.by_gravity(value, *assumptions)
+            known = by_hand, *others.values()
             if other is not None and not np.isclose(other, known, PRECISION, 0).any():
                 others[name] = other
-        return replace(found, gravity=beside, gravity_with=others, note=self.tension(value))
+        return replace(result, gravity=by_hand, gravity_with=others, note=self.tension(value))
 
     def by_statics(self, failing: FailurePath) -> tuple[str, str]:
-        """How a path fails whose end is not confirmed, and why: its resultants allow no equilibrium
-        above a level that is near (or below the target, where no level is sought). Why is empty if
-        they do.
+        """How an unconfirmed path fails, and why: its resultants have no equilibrium above a level
+        near its highest (below the target, for another quantity than the level). Why is empty if
+        they have.
         """
         top = failing.points[failing.top]
         level, mode, words = highest_by_statics(failing.case, top.last)
-        if not level < (top.level * (1 + NEAR) if self.of == "level" else failing.target):
+        if not level < (top.level * (1 + NEAR_BOUND) if self.of == "level" else failing.target):
             return failing.mode, ""
         return mode, (
             f"by statics there is no equilibrium above {level:.6g} m, where {words}; the highest "
-            f"one found is at {top.level:.6g} m"
+            f"computed one is at {top.level:.6g} m"
         )
 
     # -- the gravity method
@@ -380,19 +387,19 @@ class Search:
         )
 
     def by_gravity(self, value: float, tension: bool = True, longest: bool = False) -> float | None:
-        """The critical value of the gravity method that is nearest to one of the finite elements;
-        None if there is none near.
+        """The critical value of the gravity method nearest to that of the finite elements; None if
+        there is none within DISTANCES.
 
-        tension: whether the joint has its tensile strength; longest: whether the longest crack
-        counts where several are in equilibrium.
+        tension: whether the joint has its tensile strength; longest: whether the longest of several
+        cracks in equilibrium decides.
         """
         stands = lambda value: self.rigid_block_stands(value, tension, longest)
-        here = stands(value)
-        for share in (0.02, 0.05, 0.1, 0.2, 0.5, 0.9):
+        at_value = stands(value)
+        for share in DISTANCES:
             for other in (value * (1 + share), value * (1 - share)):
-                there = stands(other)
-                if there is not None and there != here:
-                    sign = lambda v: 1.0 if stands(v) == here else -1.0
+                at_other = stands(other)
+                if at_other is not None and at_other != at_value:
+                    sign = lambda v: 1.0 if stands(v) == at_value else -1.0
                     return float(bisect(sign, value, other, rtol=PRECISION / 1000))
         return None
 
@@ -421,8 +428,8 @@ class Search:
         return method.stands and not slides and not crushed
 
 
-def arrived(trial: Trial) -> Point:
-    """The equilibrium of a trial that stands."""
+def point_at_target(trial: Trial) -> Point:
+    """The equilibrium at the target level of a trial that stands."""
     path = trial.path
     if path.points[path.arrival].control != "level":
         path.refine()
@@ -430,13 +437,15 @@ def arrived(trial: Trial) -> Point:
 
 
 def middle(a: float, b: float) -> float:
-    """Between two values: where they differ by more than a factor 2, of their orders."""
+    """Mean of two values: geometric if they differ by more than a factor 2."""
     far = a * b > 0 and not 0.5 <= a / b <= 2
     return float(np.sign(a) * np.sqrt(a * b)) if far else (a + b) / 2
 
 
 def outwards(value: float, end: float) -> Iterator[float]:
-    """Values ever further from one: nearer to an end by shares, to 0 or away from it by factors."""
+    """Values at increasing distance from a value, halving the distance to a finite end, by factors
+    of 2 towards or away from 0, by powers of 10 from 0.
+    """
     if np.isfinite(end) and abs(end) > TINY:
         yield from (value + (end - value) * 2.0**-k for k in range(7, -1, -1) if value != end)
     elif value == 0:
@@ -459,10 +468,10 @@ def critical(
     levels: str | None = None,
     tail_levels: str | None = None,
     out: Path | None = None,
-) -> tuple[Answer, list[str]]:
+) -> tuple[CriticalValue, list[str]]:
     """Find a critical value and write its files below out (default out/CASE_critical).
 
-    Returns the answer, and its lines of text. An interrupted search leaves what it has found.
+    Returns the result, and its lines of text. An interrupted search writes its trials.
     Raises InputError, RunError.
     """
     shown = tqdm(bar_format="{desc} {elapsed}", disable=not sys.stderr.isatty(), leave=False)
@@ -473,7 +482,7 @@ def critical(
     try:
         answer = search.run()
     except KeyboardInterrupt as caught:
-        write(search, search.so_far(caught), out, time.perf_counter() - start)
+        write(search, search.interrupted(caught), out, time.perf_counter() - start)
         raise
     finally:
         shown.close()
@@ -488,7 +497,7 @@ def table(search: Search) -> dict[str, np.ndarray]:
         for number, trial in enumerate(search.trials, 1)
         for point in trial.path.points
     ]
-    return {name: np.array([one[name] for one in rows]) for name in CRITICAL}
+    return {name: np.array([cells[name] for cells in rows]) for name in CRITICAL}
 
 
 def last_state(search: Search, point: Point) -> Results:
@@ -500,29 +509,28 @@ def last_state(search: Search, point: Point) -> Results:
     return history.results(replace(case, values=case.values | required), stopped=False)
 
 
-def write(search: Search, answer: Answer, out: Path, seconds: float) -> None:
+def write(search: Search, answer: CriticalValue, out: Path, seconds: float) -> None:
     """Write the last equilibrium as `damjoint run` does, critical.csv and its picture below out, in
     place of an earlier run's files.
     """
     from . import critical_picture as picture
 
     case = search.own
-    trials = [picture.Trial(t.value, t.stands, t.path) for t in search.trials]
-    what = case.title, search.of, search.unit, trials
+    what = case.title, search.of, search.unit, search.trials
     shown = picture.Content(*what, answer.value, answer.gravity, answer.mode)
     with folders.claim_output_folder(case, out):
         folders.write_state(case, out, "interrupted" if answer.error else "complete", answer.doubt)
         if answer.point:
             result = last_state(search, answer.point)
-            found = {"critical": as_json(search, answer), "wall_seconds": {"search": seconds}}
-            result.info = about(answer.point.model.equilibrium.bulk) | found
+            entries = {"critical": as_json(search, answer), "wall_seconds": {"search": seconds}}
+            result.info = about(answer.point.model.equilibrium.bulk) | entries
             save(Outcome(result, lambda: None, dict, answer.error), case, out)
         write_csv(out / "critical.csv", table(search))
         picture.draw(shown, out / f"{case.name}_critical.png")
 
 
-def as_json(search: Search, answer: Answer) -> dict:
-    """The answer in run.json."""
+def as_json(search: Search, answer: CriticalValue) -> dict:
+    """The entry `critical` of run.json."""
     return {
         "of": search.of,
         "value": answer.value,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -15,13 +15,8 @@ from ..post.units import LENGTHS, unit
 from ..solver.path import Point
 from .failure_path import FailurePath
 
-
-class Trial(NamedTuple):
-    """A tried value: whether the dam stands, its equilibrium path."""
-
-    value: float
-    stands: bool
-    path: FailurePath
+if TYPE_CHECKING:
+    from .critical import Trial
 
 
 class Content(NamedTuple):
@@ -45,13 +40,13 @@ def draw(content: Content, path: Path) -> None:
     single = content.of == "level"
     figure = Figure(figsize=(7.5 if single else 12, 4.8), layout="constrained")
     FigureCanvasAgg(figure)
-    *left, right = figure.subplots(1, 1 if single else 2, squeeze=False)[0]
+    *of_trials, of_paths = figure.subplots(1, 1 if single else 2, squeeze=False)[0]
     title = textwrap.fill(heading(content), 75 if single else 120)
     figure.suptitle(title, fontsize=11, parse_math=False)
-    for axes in left:
+    for axes in of_trials:
         draw_trials(axes, content)
-    draw_paths(right, content)
-    for axes in (*left, right):
+    draw_paths(of_paths, content)
+    for axes in (*of_trials, of_paths):
         axes.grid(alpha=0.3)
         axes.legend(fontsize=8)
     write_picture(figure, path, 110)

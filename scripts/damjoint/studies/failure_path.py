@@ -19,20 +19,19 @@ from ..solver.path import EquilibriumPath, Point
 #: Columns of critical.csv: a row per equilibrium of each dam that was tried.
 CRITICAL = {
     "trial": ("-", "number of the trial"),
-    "value": ("", "what was varied: level [m], strength, or the parameter"),
-    "stands": ("-", "1: there is an equilibrium with this value, 0: none was found"),
+    "value": ("", "of the varied quantity: level [m], strength or parameter"),
+    "stands": ("-", "1: the dam has an equilibrium with this value, 0: it has none"),
     "displacement_control": ("-", "0: the level was prescribed; 1: a displacement"),
     **{n: HISTORY[n] for n in ("level", "crest_ux", "crack_length", "slip_length", "N", "T", "M")},
     "imposed_displacement": ("m", "since the first equilibrium under displacement control"),
     "compression": ("Pa", "total compression at the toe"),
 }
 
-#: How many steps of the level may fail, each half of the one before, until a displacement is
-#: prescribed.
+#: Number of failed steps of the level, each half as long as the one before, after which a
+#: displacement is prescribed.
 FAILURES = 2
 
-#: Time of an increment, after the last level: only the order matters, and that all loads that grow
-#: in time act fully.
+#: Time of an increment of displacement, after the last level, where all loads act in full.
 TICK = 1e-3
 
 
@@ -61,7 +60,7 @@ class FailurePath(EquilibriumPath):
         self.case, self.on_step = case, on_step
         self.points: list[Point] = []
         stepper = LoadStepper(case, interface, lambda _: self.add(point_of(stepper)))
-        # from the weight alone on steps can be halved; else the first one includes it at any length
+        # after a step of the weight alone steps can be halved; else the first includes the weight
         if not (case["weight_first"] and stepper.weigh()):
             stepper.advance_to(case.times[0])
         if not stepper.stopped:
