@@ -1,27 +1,27 @@
 """Concrete gravity dams on a thin joint that opens, breaks, slides and lets water in.
 
 storage.py  atomic writes, locks on files and folders
-model/      what is asked and what comes out, as data: parameters, case, mesh, loads, results
+model/      data: parameters, case, mesh, loads, results
 laws/       the joint laws, one file each
 fem/        finite elements of the bodies, condensed onto the joint
 joint/      the joint between them: interpolation, water, residual and tangent
 solver/     load stepping, Newton's method, equilibrium path
-engines/    a case solved: condensed/ with the parts above, getdp/ by the problem definition
+engines/    the engines: condensed/ from the parts above, getdp/ by the problem definition
 statics/    gravity method, limit analysis, verdict
 post/       tables, pictures, fields and folders of results
-accuracy.py the mesh that an accuracy requires, and the error that is left
-run.py      one case, solved and written
+accuracy.py mesh refinement to a required accuracy, error estimate
+run.py      solves a case and writes its results
 studies/    checks, sweeps, critical values, a law along a path, reports
 gui/        the Gmsh window
-cli.py      the command line; __main__.py what has to be done before it
+cli.py      the command line; __main__.py prepares its process
 
-Each of them uses only those above it. Beside the package stand damjoint_tools: benchmarks, random
-verification and the pages made from the code.
+Each uses only those above it. damjoint_tools, beside the package: benchmarks, random verification
+and the pages made from the code.
 """
 
 from __future__ import annotations
 
-TYPE_CHECKING = False  # typing's own takes time in which an interrupt is not yet heeded
+TYPE_CHECKING = False  # importing typing takes time in which an interrupt is not yet handled
 if TYPE_CHECKING:
     from pathlib import Path
 
@@ -44,7 +44,7 @@ class InputError(ValueError):
 
 
 class RunError(RuntimeError):
-    """A computation that failed for another reason than the input.
+    """A computation failed, though not because of bad input.
 
     The command exits with 1.
     """

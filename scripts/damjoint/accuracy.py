@@ -50,7 +50,7 @@ QUANTITIES = {
 COUNTED_IN_ELEMENTS = ("crack_length", "slip_length")
 
 #: Largest K_N h/E of a joint so soft that the stress at its ends is not singular.
-SOFT = 1.0
+REGULAR_CORNER = 1.0
 
 #: Bounds of the ratio of a change to the one before: 0.25 is second order; above 0.75 there is
 #: hardly any convergence, and the error is three times the change.
@@ -254,7 +254,7 @@ def estimate_errors(
         if counted and scale:
             error = max(error, element)
             slack = ONE_ELEMENT * element if accuracy * case["n_joint"] >= 1 else 0.0
-        used = name != "toe_stress" or stiffness_ratio(results[0]) <= SOFT
+        used = name != "toe_stress" or stiffness_ratio(results[0]) <= REGULAR_CORNER
         value = float(table[-1, -1])
         estimates.append(Estimate(name, value, error, scale, slack, used, step_error))
     return estimates
@@ -310,7 +310,7 @@ def discretisation_error(values: np.ndarray, counted: bool) -> np.ndarray:
 
     values: (meshes, n); counted: in elements. Of three values, Richardson's extrapolation with a
     factor of safety and the observed ratio of changes, within MIN_RATIO and MAX_RATIO; at least
-    what second order leaves of the change before, as two values may agree by accident. Values that
+    the error of second order by the change before, as two values may agree by chance. Values that
     oscillate show no order: half of their range (Stern et al., J. Fluids Eng. 123, 2001). Of two
     values, the change at first order with a larger factor; of those counted in elements the last
     change.

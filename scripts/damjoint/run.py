@@ -117,7 +117,7 @@ def early_end(outcome: Outcome) -> tuple[str, str]:
 def write_fields_and_picture(
     outcome: Outcome, case: Case, out: Path, fields: bool, picture: bool
 ) -> None:
-    """Write fields and picture of a scene, and into run.json the time of all writing."""
+    """Write fields and picture of a scene; add the time of writing to run.json."""
     start, result = time.perf_counter(), outcome.result
     folder = folders.scene_folder(case, result.case, out)
     solution = Solution(result, outcome.mesh().bodies, outcome.fields())

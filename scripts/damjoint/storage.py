@@ -63,7 +63,7 @@ def lock(file: int, path: Path) -> None:
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
-        raise InputError(f"out = {path}: another damjoint is writing there") from None
+        raise InputError(f"out = {path}: another damjoint is writing to it") from None
     except OSError:  # a file system without locks
         return
 

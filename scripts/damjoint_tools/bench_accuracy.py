@@ -129,9 +129,9 @@ def meshes(short: bool) -> list[tuple]:
     gradings = (1.0,) if short else (2.0, 1.0, 0.5)
     most_3d = {"layers": 80, "split": 160, "free": 40}
     orders = (1, 2)
-    found = [(2, "free", o, n, g) for o in orders for n in numbers for g in gradings]
-    found += [(2, "regular", o, n, 1.0) for o in orders for n in numbers]
-    found += [
+    published = [(2, "free", o, n, g) for o in orders for n in numbers for g in gradings]
+    published += [(2, "regular", o, n, 1.0) for o in orders for n in numbers]
+    published += [
         (3, pattern, o, n, 1.0)
         for pattern, most in most_3d.items()
         for o in orders
@@ -139,7 +139,7 @@ def meshes(short: bool) -> list[tuple]:
         if n <= most
     ]
     other_steps = [(2, "free", 2, numbers[-2], 1.0, steps) for steps in (1, 2, 4)]
-    return [*((*mesh, PUBLISHED_STEPS) for mesh in found), *other_steps]
+    return [*((*mesh, PUBLISHED_STEPS) for mesh in published), *other_steps]
 
 
 def recommended(measurements: Measurements, exact: dict[str, np.ndarray]) -> Table:

@@ -288,7 +288,7 @@ def bench(out: Path, short: bool) -> None:
 
 
 def measure(measurements: Measurements) -> tuple[dict[str, Table], list[str]]:
-    """Measure all tables, {name: table}, and what holds to machine precision."""
+    """Measure all tables, {name: table}, and the errors of balances."""
     tables = [cases := bench_cost.cases(measurements)]
     studies = bench_cost.switches, bench_cost.sweeps, bench_cost.growth, bench_cost.stress
     tables += [study(measurements) for study in studies]

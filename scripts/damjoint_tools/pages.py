@@ -171,12 +171,12 @@ def tour_page() -> str:
 def between(mark: str, text: str, new: str) -> str:
     """A text with `new` between the comments <!-- mark --> and <!-- /mark -->."""
     marks = rf"(<!-- {mark} -->\n).*?(<!-- /{mark} -->)"
-    return re.sub(marks, lambda found: f"{found[1]}{new}\n{found[2]}", text, flags=re.S)
+    return re.sub(marks, lambda match: f"{match[1]}{new}\n{match[2]}", text, flags=re.S)
 
 
 def played(block: str, folder: Path) -> str:
-    """A block of code of the tour: below each line `$ damjoint ...` what it prints; one that begins
-    with `// NAME.case` becomes that file.
+    """A block of code of the tour with the output of each line `$ damjoint ...` below it; a block
+    that begins with `// NAME.case` is written to that file.
 
     Raises ValueError if a command ends with an error of the input.
     """

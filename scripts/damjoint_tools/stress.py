@@ -46,7 +46,7 @@ ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL")}
 
 
 @dataclass(frozen=True)
-class Scene:
+class RandomScene:
     """Random dam: parameters that differ from the default dam's, and levels as in the command."""
 
     settings: dict[str, float | str]
@@ -92,7 +92,7 @@ class RandomNumbers:
         return bool(self.generator.random() < probability)
 
 
-def random_scene(seed: int, number: int) -> Scene:
+def random_scene(seed: int, number: int) -> RandomScene:
     """Draw scene `number` of a seed: any law, uplift, section and loads, stiffnesses over orders of
     magnitude, rising and falling levels. New draws are appended, so that old seeds stay
     reproducible.
@@ -129,7 +129,7 @@ def random_scene(seed: int, number: int) -> Scene:
         settings, tails = slender_dam(rng, height), [0.0]
         levels = sorted(rng.uniform(0.6 * height, height) for _ in levels)
     water = (",".join(f"{level:g}" for level in heights) for heights in (levels, tails))
-    return Scene(settings, *water, steps)
+    return RandomScene(settings, *water, steps)
 
 
 def slender_dam(rng: RandomNumbers, height: float) -> dict[str, float | str]:
@@ -255,7 +255,7 @@ def loads(rng: RandomNumbers, height: float) -> dict[str, float | str]:
     return drawn
 
 
-def run_and_verify(scene: Scene, folder: Path) -> dict[str, object]:
+def run_and_verify(scene: RandomScene, folder: Path) -> dict[str, object]:
     """Run a scene by the command and verify its files; returns its row without the number."""
     case, start = scene.case, time.perf_counter()
     words = [*scene.words, "--no-fields", "--no-picture", "--out", str(folder / "out")]
@@ -333,7 +333,7 @@ def stress(
         if row["code"] != now["code"]:
             other = f"damjoint {row['version']} ({row['commit'] or row['date']})"
             raise InputError(
-                f"out = {out}: must be a new file; this one was begun with {other}, other code"
+                f"out = {out}: must be a new file; this file has rows of {other}, other code"
             )
     names = [f"{seed}-{number}" for number in range(count)]
     missing = [number for number, name in enumerate(names) if name not in done]

@@ -264,12 +264,12 @@ def strength(run: RunFiles) -> Iterator[str]:
     """Check that tension and shear are within the strengths of the law."""
     for rows in run.joint:
         tension, shear = strengths(run, rows)
-        found = np.hypot(rows["tau_1"], rows["tau_2"])
+        size = np.hypot(rows["tau_1"], rows["tau_2"])
         room = stress_tolerance(rows)
-        room_shear = room + DIGITS_TOLERANCE * found.max()
+        room_shear = room + DIGITS_TOLERANCE * size.max()
         for name, excess, allowed in (
             ("tension", rows["sigma_n_eff"] - tension, room),
-            ("shear", found - shear, room_shear),
+            ("shear", size - shear, room_shear),
         ):
             if (excess > allowed).any():
                 worst = f"{excess.max():.3g} Pa at t = {rows['time'][0]:g}"

@@ -87,4 +87,4 @@ def test_the_statement_gives_the_mechanism_found_on_the_path():
     }
     statement = verdict.statement(result)
     assert statement.startswith("sliding: no equilibrium beyond level 2 m")
-    assert "under 4.2 times that displacement, holds 2.5 m at most" in statement
+    assert "followed to 4.2 times that displacement, reaches 2.5 m at most" in statement

@@ -1,9 +1,8 @@
-"""How a scene is solved: two engines behind one small interface.
+"""The two engines that solve a case, with the same interface.
 
-`check(case)` of engines/condensed/solve.py and of engines/getdp/solve.py raises InputError, and
-`solve(case, on_step, fields)` gives, scene by scene, an Outcome (fields: whether the bodies' fields
-will be asked for; raises RunError). They know nothing of output folders, and what uses them nothing
-of their insides. memory.py tells both what a case needs.
+`check(case)` of engines/condensed/solve.py and of engines/getdp/solve.py raises InputError;
+`solve(case, on_step, fields)` yields an Outcome for each scene (fields: whether the fields of the
+bodies are needed) and raises RunError. Engines write no output folders.
 """
 
 from __future__ import annotations
@@ -27,24 +26,24 @@ OnStep = Callable[[int, float], None]
 
 @dataclass
 class Outcome:
-    """A scene, solved as far as it went."""
+    """The results of a scene, up to its end or to an error."""
 
     result: Results
-    #: the mesh, made when it is asked for if the engine had no need of it
+    #: the mesh; made at the first call if the engine did not need it
     mesh: Callable[[], Mesh]
     #: displacement and stress of the bodies by requested time
     fields: Callable[[], dict[float, Field]]
-    #: what ended it before its time, to be raised once the result is saved
+    #: the error that ended it early, to be raised when the result is saved
     error: BaseException | None = None
 
 
 def engine_of(case: Case, name: str) -> ModuleType:
-    """The engine of a name: condensed (auto), or getdp, the plain problem definition.
+    """The engine of a name: condensed (auto), or getdp, the reference GetDP model.
 
     Raises InputError if there is none, or if it can not run the case.
     """
     if name not in ENGINES:
         raise InputError(f"engine = {name}: must be one of {', '.join(ENGINES)}")
-    found = import_module(f".{'condensed' if name == 'auto' else name}.solve", __name__)
-    found.check(case)
-    return found
+    engine = import_module(f".{'condensed' if name == 'auto' else name}.solve", __name__)
+    engine.check(case)
+    return engine

@@ -20,15 +20,15 @@ CLIP_MARGIN = 0.05
 CLIPPED = 0b111
 
 
-def frame(case: Case, whole: bool = False) -> np.ndarray:
-    """Corners (2, 3) of the box shown of a scene [m]: up to the crest or the water, with a part of
-    a large foundation, or the whole of it; of a user's own geometry all.
+def frame(case: Case, all_of_foundation: bool = False) -> np.ndarray:
+    """Corners (2, 3) of the box that is shown [m]: up to the crest or the water, with a part of the
+    foundation or all of it; of a user's own geometry all.
     """
     if case.geometry:
         return np.array(gmsh.model.getBoundingBox(-1, -1)).reshape(2, 3)
     height, section = case["dam_height"], case.section
     beside, below = case["found_side"], case["found_depth"]
-    if not whole:
+    if not all_of_foundation:
         lowest = min(0.0, *section["seg_y0"], *section["seg_y1"])
         beside, below = min(beside, BESIDE * height), min(below, BELOW * height - lowest)
     top = max(height, *case.levels, *case.tail_levels)

@@ -18,7 +18,7 @@ from ..model.loads import Loading, line_forces
 from ..model.mesh import Body
 from ..model.scene import BED, DOWN, FLOOR, SIDES, TOP, UP
 from ..post.outline import section_of, skin
-from .worker import Scene
+from .worker import SolvedScene
 
 #: Length of a force's arrow, and largest displacement drawn, over the dam's height.
 ARROW, DISPLACEMENT = 0.12, 0.06
@@ -141,7 +141,7 @@ def undeformed_loads(case: Case) -> dict[str, Pieces]:
 class Deformed:
     """A scene with its displacement times `scale`; it has reached a requested time."""
 
-    scene: Scene
+    scene: SolvedScene
 
     def __post_init__(self) -> None:
         case, fields = self.scene.result.case, self.scene.fields

@@ -20,7 +20,7 @@ from ..model.case import ACCURACIES, Case
 from ..model.parameters import AUTOMATIC, Parameter, levels_of
 from ..statics.verdict import verdict
 from .sheet import Request, Sheet
-from .worker import Scene
+from .worker import SolvedScene
 
 # Names in the tree. Digits order it and are not shown; Gmsh's own "0Modules" follows the results.
 CASE = "00Case/0Case"
@@ -278,7 +278,7 @@ def show_verdict(name: str, color: str, why: str) -> None:
     put(text(VERDICT, name, readOnly=True, help=why, attributes={"Highlight": color}))
 
 
-def show_results(scenes: list[Scene], shown: int) -> None:
+def show_results(scenes: list[SolvedScene], shown: int) -> None:
     """Show the results of a scene: values of the last step, those of all steps as choices."""
     scene = scenes[shown]
     result, history = scene.result, scene.result.history
@@ -319,7 +319,7 @@ def hide_results() -> None:
     show_verdict(NOT_RUN, CALM, "press Run")
 
 
-def chosen_scene(scenes: list[Scene]) -> int:
+def chosen_scene(scenes: list[SolvedScene]) -> int:
     """Index of the scene that the user has chosen."""
     modes = [scene.result.case["uplift"] for scene in scenes]
     mode = get_text(SCENE)

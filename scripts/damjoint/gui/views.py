@@ -19,7 +19,7 @@ from ..model.fields import CLOSED, OPEN, SOFTENING, along, distance, row_of_node
 from ..post.units import LENGTHS, STRESSES, Units, unit, with_unit
 from .camera import CLIPPED, MAPS, clip, frame
 from .shapes import Deformed, Pieces, is_extruded, undeformed_loads
-from .worker import Scene
+from .worker import SolvedScene
 
 Color = tuple[int, int, int, int]
 
@@ -126,7 +126,7 @@ def paint(tag: int, colors: Sequence[tuple[int, ...]]) -> None:
 
 
 #: Color and layer of the loads. Water is behind the bodies: it reaches under an overhang.
-LOADS = {"water": (WATER, -2), "silt": (SILT, -1), "forces": (DARK, 3)}
+LOAD_STYLES = {"water": (WATER, -2), "silt": (SILT, -1), "forces": (DARK, 3)}
 
 
 def show_undeformed_loads(case: Case) -> Gallery:
@@ -141,7 +141,7 @@ def show_loads(
 ) -> None:
     """Show water, silt and forces, each in its layer."""
     for name, pieces in loads.items():
-        color, number = LOADS[name]
+        color, number = LOAD_STYLES[name]
         gallery.add(name, [pieces], [color], **options, **layer(case, number), LineWidth=3)
 
 
@@ -158,7 +158,7 @@ def show_heading(gallery: Gallery, heading: tuple[str, str]) -> None:
     gmsh.view.option.setString(tag, "Name", "heading")
 
 
-def show(scene: Scene, title: str, before: Sequence[Scene] = ()) -> Gallery:
+def show(scene: SolvedScene, title: str, before: Sequence[SolvedScene] = ()) -> Gallery:
     """Show all views of a scene; heading and history alone if no requested level was reached.
 
     title: of the case; before: earlier runs, whose last curves are drawn in grey for comparison.
@@ -273,10 +273,10 @@ class Curve:
     color: Color
 
 
-def show_curves(graphs: Graphs, scene: Scene, before: Sequence[Scene]) -> None:
+def show_curves(graphs: Graphs, scene: SolvedScene, before: Sequence[SolvedScene]) -> None:
     """Show opening, slip, stresses and pressure along the joint (means over z in 3D)."""
     rows = [along(scene.result.at(time)) for time in scene.times]
-    olds = [along(other.result.at()) for other in before]
+    earlier = [along(other.result.at()) for other in before]
     wet = scene.result.case["uplift"] != "none"
     shown: list[tuple[str, Units, list[tuple[str, str, Color]]]] = [
         ("opening", LENGTHS, [("", "delta_n", BLUE)]),
@@ -293,11 +293,11 @@ def show_curves(graphs: Graphs, scene: Scene, before: Sequence[Scene]) -> None:
             Curve(name, rows[0]["s"], np.array([r[column] for r in rows]), color)
             for name, column, color in parts
         ]
-        curves += [Curve(BEFORE, old["s"], old[first][None], GREY) for old in olds]
+        curves += [Curve(BEFORE, other["s"], other[first][None], GREY) for other in earlier]
         graphs.add(title, units, "s [m], heel to toe", curves)
 
 
-def show_history(graphs: Graphs, scene: Scene, before: Sequence[Scene]) -> None:
+def show_history(graphs: Graphs, scene: SolvedScene, before: Sequence[SolvedScene]) -> None:
     """Show the level over opening, crest displacement and crack length, all converged steps."""
     driven = scene.result.case["drive"] != "level"
     shown = (

@@ -21,7 +21,7 @@ from ..model.mesh import shares
 from ..model.parameters import assignments, listing, start_gmsh
 from . import camera, tree, views
 from .sheet import Request, Sheet
-from .worker import EngineProcess, Scene
+from .worker import EngineProcess, SolvedScene
 
 #: Actions after changes of parameters; load, reset: of the database, from Gmsh's menu beside Run.
 CHANGES = "check", "load", "reset"
@@ -49,14 +49,14 @@ class Session:
         self.pending = ""
         self.status = ""
         #: the last run: scenes, request, status line with its color, title
-        self.scenes: list[Scene] = []
+        self.scenes: list[SolvedScene] = []
         self.last_request: Request | None = None
         self.last_status = "", tree.CALM
         self.title = ""
         #: views of the last run, runs for comparison, loads before a run
         self.gallery: views.Gallery | None = None
         self.scene_shown = 0
-        self.earlier: list[tuple[Scene, views.Gallery]] = []
+        self.earlier: list[tuple[SolvedScene, views.Gallery]] = []
         self.loads: views.Gallery | None = None
         #: views of the heading before a run and of an error message
         self.heading = views.Gallery()
@@ -211,7 +211,7 @@ class Session:
             tree.CALM,
         )
 
-    def on_done(self, scenes: list[Scene]) -> None:
+    def on_done(self, scenes: list[SolvedScene]) -> None:
         """A run has ended, at its last level or before: show its results."""
         self.keep_or_drop()
         self.scenes, self.title = scenes, self.tree.sheet.heading[0]
@@ -374,13 +374,13 @@ def button(action: tuple[str, str]) -> dict[str, Any]:
 
 
 #: Parameters of loads that the drawing shows, besides the levels.
-LOADS = "crest_water", "silt_height", "force_x", "force_y", "anchor_angle"
+DRAWN_LOADS = "crest_water", "silt_height", "force_x", "force_y", "anchor_angle"
 
 
 def drawing_key(sheet: Sheet) -> tuple[Any, ...]:
     """All that the drawing depends on."""
     case = sheet.case
-    loads = [case[name] for name in LOADS]
+    loads = [case[name] for name in DRAWN_LOADS]
     return sheet.path, shares(case), max(case.levels), max(case.tail_levels), loads
 
 

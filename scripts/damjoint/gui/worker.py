@@ -1,6 +1,6 @@
-"""The engine in a process of its own.
+"""The engine in its own process.
 
-Loading a case and meshing empty Gmsh's model and the ONELAB database, which the window needs; and
+Loading a case and meshing clear Gmsh's model and the ONELAB database, which the window uses; and
 the window must respond while the engine works. The process is started once, with all imports.
 """
 
@@ -36,8 +36,8 @@ SAVED = "// Saved by the window of damjoint, which writes it anew when a run is 
 
 
 @dataclass
-class Scene:
-    """A solved scene for the window."""
+class SolvedScene:
+    """The results of a scene, for the window."""
 
     result: Results
     bodies: dict[str, Body]
@@ -50,7 +50,7 @@ class Scene:
     failed: bool
 
     @staticmethod
-    def of(outcome: Outcome) -> Scene:
+    def of(outcome: Outcome) -> SolvedScene:
         """Convert an outcome; computes the bodies' fields."""
         result, (state, _) = outcome.result, early_end(outcome)
         message = statement(result)
@@ -58,7 +58,7 @@ class Scene:
             message = str(outcome.error)
         elif state:
             message = f"{state} at level {result.last['level']:.4g} m" if result.last else state
-        return Scene(
+        return SolvedScene(
             result,
             outcome.mesh().bodies,
             outcome.fields(),
@@ -98,11 +98,11 @@ class Stop:
 
 
 def serve(pipe: Connection) -> None:
-    """Answer the messages of the window until it closes.
+    """Process the messages of the window until it closes.
 
     In: ("check", Request), ("run", Request), ("save", folder). Out: ("ready", titles, parameters),
     ("checked", Sheet), ("rejected", message), ("step", (number of the scene, time)),
-    ("done", [Scene]), ("failed", message), ("saved", folder).
+    ("done", [SolvedScene]), ("failed", message), ("saved", folder).
     """
     stop = Stop()
     pipe.send(("ready", titles(), declared()))
@@ -121,13 +121,13 @@ def serve(pipe: Connection) -> None:
             pipe.send(("checked", sheet))
             if kind == "run":
                 outcomes = run_case(sheet, pipe, stop)
-                pipe.send(("done", [Scene.of(outcome) for outcome in outcomes]))
+                pipe.send(("done", [SolvedScene.of(outcome) for outcome in outcomes]))
                 last = sheet, outcomes
         except InputError as error:
             pipe.send(("rejected", str(error)))
         except KeyboardInterrupt:
             pipe.send(("failed", "stopped before the first step"))
-        except Exception as error:  # shown in the window, which goes on
+        except Exception as error:  # shown in the window, which stays open
             pipe.send(("failed", str(error) or type(error).__name__))
 
 

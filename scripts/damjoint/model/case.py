@@ -72,7 +72,7 @@ class Case(ParameterValues):
     also_uplift: tuple[str, ...] = ()
     #: whether it is a published case of the package, but for mesh, solver and uplift
     published: bool = False
-    #: whether pena_tang has been set: a dam whose whole joint slips is meant to stand on it
+    #: whether pena_tang has been set: then a dam stands though its whole joint slips
     hardening_asked: bool = False
     #: the required relative error; None: the mesh is not refined
     accuracy: float | None = None
@@ -183,7 +183,7 @@ LONGEST_NAME = 200
 
 
 def case_file(case: str) -> Path:
-    """The file of a case given by letter, name or path.
+    """The file of a case, by letter, name or path.
 
     Raises InputError if there is none, or its name can not be that of a folder.
     """
@@ -204,7 +204,7 @@ ACCURACIES = {"coarse": 0.03, "standard": 0.01, "fine": 0.002}
 
 
 def relative_error(accuracy: str) -> float:
-    """The relative error that an accuracy stands for: coarse, standard, fine or a percentage.
+    """The relative error of an accuracy: coarse, standard, fine or a percentage.
 
     Raises InputError.
     """
@@ -284,7 +284,7 @@ def load(
     geometry = own_geometry(file.texts["geometry"]) if "geometry" in file.texts else None
     if accuracy is not None and geometry and geometry.suffix != ".geo":
         raise InputError(
-            f"accuracy = {accuracy}: must not be given with a mesh of one's own "
+            f"accuracy = {accuracy}: must not be set with a mesh as geometry "
             f"({geometry.name}), which can not be refined"
         )
     heights = tuple(variables["levels"])
@@ -306,16 +306,32 @@ def load(
     )
     check_softening(result.joint, bool(variables["softening_twice"][0]))
     check_values(result, result.section, result.geometry is None)
-    check_levels("levels", heights, result.highest_level)
-    check_levels("tail_levels", tails, result.highest_level)
-    check_tail_levels(result.tail_levels, len(heights), tail_levels is None)
-    check_times(result.times, len(heights))
-    check_also_uplift(also, result["uplift"])
-    if result["drive"] == "level":
-        return result
-    begin, end = result["drive_begin"], result["drive_end"]
-    check_drive(begin, end, len(heights))
-    return replace(result, times=tuple(sorted({*result.times, end, *([begin] if begin else [])})))
+    check_loading(result, tails, of_case=tail_levels is None)
+    return with_drive_times(result)
+
+
+def check_loading(case: Case, tails: Sequence[float], of_case: bool) -> None:
+    """Check levels, times and further uplift modes of a case; tails: tailwater levels as listed;
+    of_case: whether they are those of the case file.
+
+    Raises InputError.
+    """
+    number = len(case.levels)
+    check_levels("levels", case.levels, case.highest_level)
+    check_levels("tail_levels", tails, case.highest_level)
+    check_tail_levels(case.tail_levels, number, of_case)
+    check_times(case.times, number)
+    check_also_uplift(case.also_uplift, case["uplift"])
+    if case["drive"] != "level":
+        check_drive(case["drive_begin"], case["drive_end"], number)
+
+
+def with_drive_times(case: Case) -> Case:
+    """The case with steps at begin and end of a prescribed displacement."""
+    if case["drive"] == "level":
+        return case
+    ends = {case["drive_begin"], case["drive_end"]} - {0.0}
+    return replace(case, times=tuple(sorted({*case.times, *ends})))
 
 
 def equal_steps(levels: int, steps: int) -> tuple[float, ...]:
@@ -335,7 +351,7 @@ def own_geometry(name: str) -> Path:
     if not (own or is_mesh(path)) and os.environ.get(RUN_GEO) != "1":
         raise InputError(
             f"geometry = {name}: is a program that Gmsh runs (a mesh ends in .msh and begins with "
-            f"{MESH.decode()}); if you trust it, say --run-geo"
+            f"{MESH.decode()}); if you trust it, add --run-geo"
         )
     return path
 

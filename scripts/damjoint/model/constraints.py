@@ -32,9 +32,7 @@ def check_values(
 
 
 def check_energies(case: ParameterValues) -> None:
-    """Fracture energies: larger than what the joint stores before it softens, else a point would
-    snap back.
-    """
+    """Fracture energies: larger than the elastic energy at the strength (no snap-back)."""
     for name, (least, formula) in LAWS[case["law"]].least_energies(case.values).items():
         if not case[name] > least:
             raise InputError(
@@ -44,7 +42,7 @@ def check_energies(case: ParameterValues) -> None:
 
 
 def check_softening(joint: Group, twice: bool) -> None:
-    """The softening of law = rupture: not given twice."""
+    """The softening of law = rupture: by G_f or pena_rupture, not both."""
     if twice:
         raise InputError(
             f"G_f, pena_rupture = {joint.G_f:g}, {joint.pena_rupture:g}: must be one of them, the "

@@ -70,7 +70,7 @@ CLOSED, SLIPPED, SOFTENING, OPEN = range(4)
 
 def state_of(rows: Table) -> IntArray:
     """The state at each row of the joint's table: OPEN (or broken), SOFTENING, SLIPPED, CLOSED."""
-    # friction, whose rows have lambda, does not soften: what is between is a mean over z
+    # friction (rows with lambda) does not soften: values between 0 and 1 are means over z
     softening = (rows["damage"] > 0) & ("lambda" not in rows)
     unbroken = np.where(rows["slip"] > 0, SLIPPED, CLOSED)
     return np.where(rows["damage"] >= 1, OPEN, np.where(softening, SOFTENING, unbroken))
@@ -79,7 +79,7 @@ def state_of(rows: Table) -> IntArray:
 def nearest_rows(points: Array, rows: Table) -> IntArray:
     """For each of some points (n, 3) the nearest row of the joint's table at one time (n,)."""
     places = np.column_stack([rows[axis] for axis in "xyz"])
-    # in turn: all distances at once need too much memory for a fine joint in 3D
+    # point by point: all distances at once need too much memory for a fine joint in 3D
     return np.array([np.argmin(((places - point) ** 2).sum(axis=1)) for point in points], int)
 
 

@@ -26,7 +26,7 @@ GEOMETRY = (
     *("dam_base", "dam_crest", "dam_height", "batter", "batter_height", "neck_height"),
     *("joint_slope", "joint_height", "found_side", "found_depth", "thickness"),
 )
-#: Those on which it depends only if a line force acts.
+#: Parameters on which it depends only if a line force acts.
 MARKS = {
     "ice_force": ("ice_level",),
     "anchor_force": ("anchor_at",),
@@ -34,7 +34,7 @@ MARKS = {
     "force_y": ("force_face", "force_at"),
 }
 
-#: Regions and the codimension of each; their numbers stand in pro/parameters.pro.
+#: Codimension of the regions; their numbers are in pro/parameters.pro.
 REGIONS = {
     "dam": 0,
     "foundation": 0,
@@ -49,9 +49,9 @@ REGIONS = {
     "force": 2,
     "anchor": 2,
 }
-#: Where line forces act, if they do.
+#: Regions of line forces.
 LINES = ("ice", "force", "anchor")
-#: Those that every geometry has.
+#: Regions that every geometry has.
 NEEDED = ("dam", "foundation", "joint", "fixed", "heel", "toe", "crest")
 
 #: Limit of the joint's element tags: six digits in the keys of GetDP's internal variables.
@@ -191,7 +191,7 @@ def heel_normal(joint: Body, heel: Body) -> Array:
 
 @dataclass(frozen=True)
 class OwnGeometry:
-    """A user's own geometry in its present state: what its mesh depends on."""
+    """The file of a user's own geometry in its present state, and all else its mesh depends on."""
 
     file: Path
     changed: int
@@ -203,13 +203,13 @@ class OwnGeometry:
 
 @lru_cache(maxsize=1)
 def mesh_of_own(geometry: OwnGeometry) -> Mesh:
-    """The mesh of a user's own geometry: its fingerprint is needed before the mesh itself."""
+    """The mesh of a user's own geometry, stored: its fingerprint is needed before the run."""
     return Mesh(geometry.case)
 
 
 def mesh_of(case: Case) -> Mesh:
-    """The mesh of a case; that of a user's own geometry is read again only if it is no longer
-    Gmsh's current one.
+    """The mesh of a case; that of a user's own geometry is read again only if it is not
+    Gmsh's current mesh.
     """
     if not case.geometry:
         return Mesh(case)
@@ -271,7 +271,7 @@ class Mesh:
     in `bodies` solids, joints and the other REGIONS.
 
     Raises RunError with Gmsh's message if there is no mesh for the parameters, InputError if a
-    user's own geometry lacks something.
+    user's own geometry is unsuitable.
     """
 
     def __init__(self, case: Case) -> None:
@@ -311,7 +311,7 @@ class Mesh:
             raise RunError(
                 f"mesh: joint element tag {last}: must be below {MOST_TAGS}; use a coarser mesh"
             )
-        #: wall seconds it took
+        #: wall seconds of meshing
         self.seconds = time.perf_counter() - start
 
     @property
@@ -340,8 +340,8 @@ class Mesh:
         return bodies, faces
 
     def _own_regions(self) -> tuple[dict[str, int], list[FaceRegion]]:
-        """The same by the names of the physical groups, which get the numbers of the package's own
-        geometries.
+        """As `_section_regions`, by the names of the physical groups, which get the numbers of the
+        package's own geometries.
         """
         numbers, named = constants(), {}
         for d, tag in gmsh.model.getPhysicalGroups():
@@ -376,7 +376,7 @@ class Mesh:
         return InputError(f"geometry = {self.own}: {why}")
 
     def _read(self) -> None:
-        """Take the nodes of Gmsh's current mesh."""
+        """Read the nodes of Gmsh's current mesh."""
         tags, coordinates, _ = gmsh.model.mesh.getNodes()
         self.nodes = len(tags)
         self._place = np.zeros(int(tags.max(initial=0)) + 1, int)
@@ -469,7 +469,7 @@ class Mesh:
         }
 
     def write(self, path: Path) -> None:
-        """Write the mesh for GetDP (MSH 2.2, binary); only while it is Gmsh's current one.
+        """Write the mesh, which must be Gmsh's current one, for GetDP (MSH 2.2, binary).
 
         Raises OSError if the disk is full, which Gmsh does not report.
         """

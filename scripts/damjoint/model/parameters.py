@@ -25,7 +25,7 @@ INCLUDE = f'Include "{DECLARATIONS}";\n'
 
 #: The value of a parameter that follows others.
 AUTOMATIC = -1.0
-#: Limits that stand for > 0 and < 0.5 in the declarations; ONELAB's limit of what has none.
+#: Limits that mean > 0 and < 0.5 in the declarations; limit of ONELAB that means none.
 TINY, BELOW_HALF, ANY = 1e-30, 0.5 - 1e-9, 1e200
 
 
@@ -78,7 +78,7 @@ class Parameter:
         return f"{self.description} [{self.unit}]" if self.unit else self.description
 
     def allowed(self) -> str:
-        """The allowed values in words."""
+        """The allowed values, as text."""
         if self.choices:
             return "one of " + ", ".join(
                 c if isinstance(c, str) else f"{c:g}" for c in self.choices
@@ -187,7 +187,7 @@ def declaration(name: str, rest: str, text: str) -> Parameter:
         integer=entry.get("step") == 1,
         automatic=otherwise is not None,
         default="-1" if default == "automatic" else default.strip('"'),
-        matters=in_words(matched(r"Visible\s+(.*?),\s*Name", rest)),
+        matters=condition_text(matched(r"Visible\s+(.*?),\s*Name", rest)),
     )
 
 
@@ -208,8 +208,8 @@ def independent() -> frozenset[str]:
     return frozenset(n for n, p in declared().items() if n not in used and not p.text)
 
 
-def in_words(condition: str) -> str:
-    """The condition of a Visible option in words."""
+def condition_text(condition: str) -> str:
+    """The condition of a Visible option, as text."""
     words = re.sub(r'!StrCmp\((\w+), "(\w+)"\)', r"\1 = \2", condition)
     words = re.sub(r'StrCmp\((\w+), "(\w+)"\)', r"\1 not \2", words)
     for mark, word in (("==", "="), ("!= 0", "not 0"), ("||", "or")):

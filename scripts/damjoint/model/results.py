@@ -32,7 +32,7 @@ JOINT = {
     "s": ("m", "distance from the heel along the joint"),
     "sigma_n_eff": ("Pa", "effective normal stress, sigma_n + p"),
 }
-#: One more where water flows.
+#: Additional column where water flows.
 FLUX = {"flux": ("kg/(m s)", "mass flux towards the toe, mean of the elements around the node")}
 
 #: Columns of history.csv: a row per converged step. Forces are per metre of thickness, in 3D too.
@@ -86,7 +86,7 @@ class Results:
         return rows_at(self.extrapolated, time)
 
     def state(self, time: float) -> dict[str, float]:
-        """The row of the history at a time, or next to it."""
+        """The row of the history nearest to a time."""
         row = np.argmin(np.abs(self.history["time"] - time))
         return {name: float(column[row]) for name, column in self.history.items()}
 

@@ -1,4 +1,4 @@
-"""The parts of a scene: named bodies and the joints between them; at present two and one."""
+"""The parts of a scene: two named bodies and the joint between them."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Solid:
-    """An elastic body: of each of its regions the material, the suffix of E_, nu_ and rho_."""
+    """An elastic body: material (suffix of E_, nu_ and rho_) by region."""
 
     materials: dict[str, str]
 
@@ -33,6 +33,6 @@ JOINTS = {"joint": Joint(upper="dam", lower="foundation", heel="heel", toe="toe"
 #: The name of the only joint.
 (JOINT,) = JOINTS
 
-#: What stands before a face, in the order of the numbers in pro/section.pro: reservoir, tailwater,
-#: water on the crest, on the reservoir's floor, on the tailwater's bed.
+#: Sides of a face, in the order of the numbers in pro/section.pro: reservoir, tailwater, water on
+#: the crest, on the reservoir's floor, on the tailwater's bed.
 SIDES = UP, DOWN, TOP, FLOOR, BED = "up", "down", "top", "floor", "bed"

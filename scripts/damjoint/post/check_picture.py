@@ -27,7 +27,7 @@ CRACK_AT, LONGER_AT, ARROW = -0.02, -0.04, 0.4
 #: Ground beside the dam over its base; below the dam over its height.
 BESIDE, BELOW = 0.45, 0.1
 #: Places along the joint between which a resultant is drawn; heel 0, toe 1.
-NEAR = (-0.3, 1.3)
+DRAWN_RESULTANT = (-0.3, 1.3)
 #: Of the figure: axes of section and table (left, bottom, width, height).
 SECTION, TABLE = (0.055, 0.075, 0.59, 0.81), (0.665, 0.075, 0.325, 0.81)
 #: Of the table's axes: height of a row and of the table at most.
@@ -263,7 +263,7 @@ def draw_resultant(
 ) -> None:
     """Draw the force on the joint as an arrow to where it meets the joint, if that is near it."""
     s, size = last["x_resultant"] / under.length, np.hypot(last["N"], last["T"])
-    if not (NEAR[0] < s < NEAR[1] and last["N"] > 0):
+    if not (DRAWN_RESULTANT[0] < s < DRAWN_RESULTANT[1] and last["N"] > 0):
         return
     back = ARROW / size
     start, end = under.place(s - back * last["T"], -back * last["N"]), under.place(s, 0)

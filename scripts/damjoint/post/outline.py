@@ -48,7 +48,7 @@ def skin(body: Body) -> list[tuple[np.ndarray, np.ndarray]]:
     parts = []
     for same_shape in tables.values():
         faces, owners = (np.concatenate(part) for part in zip(*same_shape, strict=True))
-        # three corners identify a face; one integer of them is faster to compare
+        # three corners identify a face; a single integer is faster to compare
         low, middle, high = np.sort(faces, axis=1).T[:3].astype(np.int64)
         key = (low * len(body.points) + middle) * len(body.points) + high
         _, index, count = np.unique(key, return_index=True, return_counts=True)
@@ -58,7 +58,7 @@ def skin(body: Body) -> list[tuple[np.ndarray, np.ndarray]]:
 
 
 def boundary(points: np.ndarray, faces: list[np.ndarray]) -> np.ndarray:
-    """Find the longest closed line around plane faces, counterclockwise; point numbers."""
+    """The longest closed line around plane faces, counterclockwise; point numbers."""
     edges = []
     for table in faces:
         (x, y), (x1, y1) = (

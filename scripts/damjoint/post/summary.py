@@ -39,7 +39,7 @@ class Table(NamedTuple):
 
     @property
     def heads(self) -> list[str]:
-        """Names with units, for one line."""
+        """Names with units."""
         return [
             f"{name} [{unit}]" if unit else name
             for name, unit in zip(self.names, self.units, strict=True)

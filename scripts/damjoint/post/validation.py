@@ -13,7 +13,7 @@ from ..model.case import CASES, Case
 from ..model.results import Results
 
 REFERENCE = data("reference") / "ssnp142.csv"
-#: Distance along x [m] within which nodes count as one: those across a joint in 3D.
+#: Distance along x [m] within which nodes are at the same place: those along z in 3D.
 SAME_NODE = 1e-6
 
 

@@ -196,10 +196,11 @@ def reason_of_stop(results: Results) -> str:
     where = f"level {last['level']:.6g} m (t = {last['time']:.6g})"
     if shown:
         ratio = shown["displacement_ratio"]
-        moved = f", under {ratio:.2g} times that displacement," if ratio > 1 else ""
+        along = f", followed to {ratio:.2g} times that displacement," if ratio > 1 else ""
         most = shown["level"]
         with_all = f" under the loads of t = {shown['time']:g}" if most < last["level"] else ""
-        return f"no equilibrium beyond {where}: the dam{moved} holds {most:.6g} m at most{with_all}"
+        path = f"the equilibrium path{along} reaches {most:.6g} m at most{with_all}"
+        return f"no equilibrium beyond {where}: {path}"
     if reached := bound(results)[1]:
         return f"no equilibrium beyond {where}: {reached}"
     arm = case.joint_along - last["x_resultant"]

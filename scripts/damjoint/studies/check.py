@@ -29,7 +29,7 @@ from ..statics.gravity import GravityMethod
 FINITE_ELEMENTS, GRAVITY = "finite elements", "gravity method"
 LONGER = "gravity method, longer crack"
 DIFFERENCE, REQUIRED = "difference", "required"
-#: Verdict if nothing fails and nothing is required; parameters by which a case requires something.
+#: Verdict if nothing fails and nothing is required; parameters that set requirements.
 UNCHECKED, REQUIREMENTS = "not checked", ("required_SSF", "required_OSF", "f_c")
 
 #: Columns of check.csv: a row per scene and method at the last level, and one of differences.
@@ -354,7 +354,7 @@ def check_cases(cases: list[Case], out: Path) -> list[SafetyCheck]:
     names = [case.name for case in cases]
     for case in cases:
         if names.count(case.name) > 1:
-            raise InputError(f"case {case.name}: must be given once, by a name of its own")
+            raise InputError(f"case {case.name}: must be given once, and have its own name")
         if case.geometry:
             raise InputError(
                 f"case {case.name}: must have a section by parameters, which the gravity method "

@@ -329,7 +329,7 @@ class Search:
             top, limit = failing.points[failing.top], failing.points[failing.limit_point]
             ratio = failing.points[-1].imposed / failing.imposed(limit)
             why = (
-                f"beyond it, under {ratio:.2g} times that displacement, the dam holds "
+                f"the equilibrium path, followed to {ratio:.2g} times that displacement, reaches "
                 f"{top.level:.6g} m at most"
             )
             if reached := bound(last_state(self, top))[1]:

@@ -136,7 +136,7 @@ def values_of(text: str) -> tuple[str, list[Value]]:
     return name, [checked(name, rounded(first + i * step)) for i in range(number)]
 
 
-#: Of a step: what the last value of FIRST:LAST:STEP may lie beyond LAST.
+#: Share of a step by which the last value of FIRST:LAST:STEP may lie beyond LAST.
 ROUNDING = 1e-9
 
 
@@ -205,7 +205,7 @@ class Plan:
 
 
 def column_of(name: str) -> str:
-    """The column of a plan's name; that of the level differs from the one of the history."""
+    """The column of a plan's name; that of the level is not the column `level` of the history."""
     return f"{name}_asked" if name == "level" else name
 
 

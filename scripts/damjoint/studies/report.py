@@ -115,7 +115,7 @@ def section_of(folder: Path, solution: Solution) -> Section:
     """Make the section of a run."""
     result = solution.result
     case, info = result.case, result.info
-    check = None if case.geometry else compare_methods(result)  # which needs a built-in section
+    check = None if case.geometry else compare_methods(result)  # of a section by parameters
     failures = failures_of(result, check)
     verdict = check.finite_elements.verdict if check else UNCHECKED
     made = datetime.fromtimestamp((folder / "run.json").stat().st_mtime)

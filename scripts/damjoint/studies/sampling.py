@@ -14,7 +14,7 @@ DISTRIBUTIONS = {
     name: kind for name, kind in vars(stats).items() if isinstance(kind, stats.rv_continuous)
 }
 DISTRIBUTIONS["normal"] = stats.norm
-#: Without those of test statistics that have no closed form: a value of theirs takes minutes.
+#: Without distributions that have no closed form: each value takes minutes.
 for slow in ("ksone", "kstwo", "levy_stable", "studentized_range"):
     del DISTRIBUTIONS[slow]
 
@@ -46,7 +46,7 @@ def distribution(name: str, text: str) -> stats.distributions.rv_frozen:
     except (TypeError, ValueError, ArithmeticError):
         spread = np.nan
     if np.isnan(spread) or spread == 0:
-        raise InputError(f"{message}; {kind}({shapes}), as scipy.stats has them")
+        raise InputError(f"{message}; {kind}({shapes}), as in scipy.stats")
     return frozen
 
 
@@ -72,7 +72,7 @@ def correlation(text: str, names: list[str]) -> tuple[int, int, float]:
 def draw(
     number: int, distributions: dict[str, str], design: str, seed: int, correlations: list[str]
 ) -> dict[str, Array]:
-    """Draw `number` values of each name from distributions given as texts.
+    """Draw `number` values of each name from distributions as texts.
 
     correlations: 'A,B=R' each; design: latin (hypercube: McKay, Beckman, Conover 1979) or
     monte-carlo. Raises InputError.
@@ -105,7 +105,9 @@ def correlated(shares: Array, pairs: list[tuple[int, int, float]]) -> Array:
     try:
         root = copula(wanted)
     except linalg.LinAlgError:
-        raise InputError("--correlate: must be correlations that can hold together") from None
+        raise InputError(
+            "--correlate: must be a positive definite matrix of correlations"
+        ) from None
     scores, corrected = stats.norm.ppf(shares), wanted
     orders: list[tuple[float, IntArray]] = []
     if number > inputs:

@@ -42,7 +42,7 @@ def key_of(case: Case) -> str:
 
 
 #: Columns of the outcome: whether the dam fails (1, the exit code of `damjoint run`) or stands (0),
-#: and how, in a word and in a sentence.
+#: its verdict and statement.
 OUTCOME = ("failed", "verdict", "statement")
 
 #: The verdict of a row whose computation has raised an error.
@@ -59,7 +59,7 @@ Solved: TypeAlias = dict[tuple[tuple[float, ...], ...], LoadStepper]
 
 
 def stepped(case: Case, solved: Solved, interface: Interface) -> LoadStepper:
-    """The loading of a case to its end, continued from its last level but one."""
+    """The load steps of a case to its end, continued from its last level but one."""
     key = case.levels, case.tail_levels, case.times
     if key not in solved:
         before = case.before_last_level()
@@ -78,7 +78,7 @@ class Task:
     """The computation of one row."""
 
     case: Case
-    #: whether a dam whose loads exceed the strength of its joint is not loaded up to its failure
+    #: whether load steps are omitted if the loads certainly exceed the strength of the joint
     quick: bool
     #: the search of its critical value, if there is one, and its columns
     search: Callable[[], Search] | None = None
@@ -95,7 +95,7 @@ def last_rows(tasks: list[Task]) -> list[dict[str, Value]]:
 
 
 def last_row(task: Task, solved: Solved) -> dict[str, Value]:
-    """The row of a case, whose outcome may be an error: the sweep continues."""
+    """The row of a case; an error is an outcome, and the sweep continues."""
     row: dict[str, Value] = dict.fromkeys(HISTORY, "")
     try:
         interface = interface_of(task.case)
@@ -104,12 +104,12 @@ def last_row(task: Task, solved: Solved) -> dict[str, Value]:
             return row | dict(zip(OUTCOME, (1.0, mode, why), strict=True))
         result = stepped(task.case, solved, interface).results()
     except Exception as error:
-        return row | dict(zip(OUTCOME, (1.0, ERROR, in_words(error)), strict=True))
+        return row | dict(zip(OUTCOME, (1.0, ERROR, message_of(error)), strict=True))
     outcome = float(failed(result)), verdict(result), statement(result)
     return row | result.last | dict(zip(OUTCOME, outcome, strict=True))
 
 
-def in_words(error: Exception) -> str:
+def message_of(error: Exception) -> str:
     """The message of an error in one line."""
     kind = "" if isinstance(error, RunError) else f"{type(error).__name__}: "
     return " ".join(f"{kind}{error}".split())
@@ -122,7 +122,7 @@ def critical_value(task: Task) -> dict[str, Value]:
     try:
         answer = task.search().run()
     except Exception as error:
-        return dict(zip(task.columns, ("", "", 0.0, in_words(error)), strict=True))
+        return dict(zip(task.columns, ("", "", 0.0, message_of(error)), strict=True))
     value = "" if answer.value is None else answer.value
     cells = value, answer.mode, float(answer.confirmed), answer.why or answer.doubt
     return dict(zip(task.columns, cells, strict=True))
@@ -198,7 +198,7 @@ def pool_of(jobs: int) -> Iterator[ProcessPoolExecutor]:
         try:
             yield pool
         except BaseException:
-            pool.shutdown(cancel_futures=True)  # waits: else nothing would be cancelled
+            pool.shutdown(cancel_futures=True)  # waits; without waiting nothing is cancelled
             raise
 
 

@@ -1,5 +1,5 @@
-"""The condensed engine: bodies condensed onto the joint once, then load steps on the joint only.
+"""The condensed engine: static condensation of the bodies, then load steps on the joint only.
 
 recover.py  displacement and stress of the bodies, from the displacement jump
-solve.py    the interface to the rest
+solve.py    the interface of engines/__init__.py
 """

@@ -20,12 +20,12 @@ from ...solver.state import State
 
 @dataclass(frozen=True, kw_only=True)
 class GluedBodies:
-    """Both bodies of a joint, glued there: one elastic body, the lower one's numbers first."""
+    """Both bodies, glued at the joint to a single elastic body; numbers of the lower body first."""
 
     stiffness: Sparse
     #: degrees of freedom that are not fixed
     free: IntArray
-    #: number of each degree of freedom of the upper body, and the boolean matrix to that from them
+    #: number of each degree of freedom of the upper body, and the Boolean matrix of these numbers
     number: IntArray
     from_upper: Sparse
 
@@ -75,8 +75,8 @@ def recover(bodies: Bodies, scenes: list[tuple[Equilibrium, History]]) -> list[d
     """Fields of the saved states of scenes on the same bodies, by scene and time. Displacements
     count from the state under the weight alone, if there is one.
 
-    The bodies glued at the joint are loaded also by the forces that the jump needs in the upper
-    one, -K_u jump; the water in the joint acts on both joint faces and cancels.
+    The glued bodies are also loaded by the forces -K_u jump of the jump in the upper body; the
+    water pressure in the joint acts on both joint faces and cancels.
     """
     states = [
         (equilibrium, state)

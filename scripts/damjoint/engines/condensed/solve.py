@@ -1,4 +1,4 @@
-"""The condensed engine's side of the interface of engines/__init__.py."""
+"""The interface of engines/__init__.py for the condensed engine."""
 
 from __future__ import annotations
 
@@ -20,19 +20,18 @@ from ...model.mesh import mesh_of
 from ...solver.load_stepper import LoadStepper
 from .. import OnStep, Outcome
 
-#: Jump unknowns from which on a second thread of the linear algebra pays; below it waits and
-#: disturbs.
-MANY = 3000
+#: Number of jump unknowns from which on several threads of the linear algebra are faster than one.
+THREADED_UNKNOWNS = 3000
 
 
 def check(case: Case) -> None:
-    """Raise InputError if a user's own geometry is not what is needed; any other case will do."""
+    """Raise InputError if a user's own geometry is unsuitable; all other cases are suitable."""
     if case.geometry:
         mesh_of(case)
 
 
 def about(bulk: Condensed) -> dict:
-    """What run.json says of the engine and its mesh."""
+    """Entries of run.json on the engine and its mesh."""
     return {
         "engine": "condensed",
         "factorisation": factor.name(),
@@ -43,7 +42,7 @@ def about(bulk: Condensed) -> dict:
 
 def solve(case: Case, on_step: OnStep, _fields: bool) -> Iterator[Outcome]:
     """The scenes of a case on one condensed mesh; see engines/__init__.py."""
-    with threadpool_limits(1 if case.geometry or joint_size(case) < MANY else None):
+    with threadpool_limits(1 if case.geometry or joint_size(case) < THREADED_UNKNOWNS else None):
         start = time.perf_counter()
         bulk, made = cached(case)
         before = bulk.seconds if made else {"cache": time.perf_counter() - start}
@@ -54,7 +53,7 @@ def solve(case: Case, on_step: OnStep, _fields: bool) -> Iterator[Outcome]:
             return made or Bodies.of(case)
 
         def fields(number: int) -> dict[float, Field]:
-            """All scenes at once: one factorisation."""
+            """Fields of a scene; recovers those of all scenes with a single factorisation."""
             if len(recovered) < len(steppers):
                 from .recover import recover
 
@@ -67,7 +66,7 @@ def solve(case: Case, on_step: OnStep, _fields: bool) -> Iterator[Outcome]:
             steppers.append(LoadStepper(scene, interface, partial(on_step, number)))
             try:
                 steppers[-1].run()
-            except BaseException as caught:  # an interruption, too: what has converged is a result
+            except BaseException as caught:  # also an interrupt: converged steps are saved
                 error = caught
                 if steppers[-1].history.complete(steppers[-1].state):
                     steppers[-1].save_last()

@@ -1,1 +1,1 @@
-"""The plain engine: GetDP runs the problem definition, pro/damjoint.pro."""
+"""The reference GetDP model: GetDP runs the problem definition, pro/damjoint.pro."""

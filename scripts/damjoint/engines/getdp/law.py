@@ -14,8 +14,8 @@ from ...model.parameters import assignments, listing, parameter
 from ...storage import check_end
 from . import process
 
-#: GetDP needs a mesh: one line, in the region JOINT (3).
-ONE_LINE = """$MeshFormat
+#: GetDP needs a mesh: a line in the region JOINT (3).
+LINE_MESH = """$MeshFormat
 2.2 0 8
 $EndMeshFormat
 $Nodes
@@ -46,7 +46,7 @@ def evaluate(
     values = load("dam", {**(settings or {}), "law": law}).values
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        (folder / "one.msh").write_text(ONE_LINE)
+        (folder / "line.msh").write_text(LINE_MESH)
         columns = {
             "path_n": jumps[:, 0],
             "path_t1": jumps[:, 1],
@@ -59,7 +59,7 @@ def evaluate(
             + "".join(listing(n, column) for n, column in columns.items())
             + f'out_dir = "./";\nInclude "{data("pro")}/law_path.pro";\n'
         )
-        process.Runner().execute(problem, ["-msh", str(folder / "one.msh"), "-solve", "Path"])
+        process.Runner().execute(problem, ["-msh", str(folder / "line.msh"), "-solve", "Path"])
         try:
             check_end(folder / "law.txt", "\n")
             heading, *rows = (folder / "law.txt").read_text().splitlines()

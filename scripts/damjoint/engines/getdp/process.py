@@ -1,4 +1,4 @@
-"""Processes of GetDP: each runs pro/damjoint.pro in a folder of its own, where its tables are."""
+"""Processes of GetDP: each runs pro/damjoint.pro in its own folder, into which it writes tables."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from ...model.parameters import assignments, constants, listing
 from ...model.scene import SIDES
 from ...storage import check_end
 
+#: Oldest suitable version of GetDP.
 OLDEST = (3, 2)
-#: Open MPI for a single process: without a search for networks it starts a quarter of a second
-#: sooner.
-ALONE = {
+#: Open MPI for a single process: without a search for networks it starts 0.25 s faster.
+SINGLE_PROCESS = {
     "OMPI_MCA_ess_singleton_isolated": "1",
     "OMPI_MCA_btl": "self",
     "OMPI_MCA_pml": "ob1",
 }
 #: Time limit for a program to print its version [s].
-PATIENCE = 60
+VERSION_TIMEOUT = 60
 
 #: A number as GetDP prints it.
 NUMBER = r"(\d+\.?\d*(?:e[+-]?\d+)?)"
@@ -65,7 +65,7 @@ def version_of(program: str) -> str:
                 stdout=subprocess.PIPE,
                 stderr=subprocess.STDOUT,
                 env=environment(Path(folder)),
-                timeout=PATIENCE,
+                timeout=VERSION_TIMEOUT,
             )
         except (OSError, subprocess.TimeoutExpired):
             return ""
@@ -74,10 +74,10 @@ def version_of(program: str) -> str:
 
 
 def environment(folder: Path, threads: int = 1) -> dict[str, str]:
-    """Environment of a GetDP in a folder, in which the temporary files of Open MPI are, too."""
+    """Environment of GetDP in a folder, which also has the temporary files of Open MPI."""
     number = str(threads)
     own = {"TMPDIR": str(folder), "OPENBLAS_NUM_THREADS": number, "OMP_NUM_THREADS": number}
-    return {**ALONE, **os.environ, **own}
+    return {**SINGLE_PROCESS, **os.environ, **own}
 
 
 def own_lists(mesh: Mesh) -> dict[str, list[float]]:
@@ -128,7 +128,7 @@ def write_problem(
 
 @dataclass
 class Usage:
-    """What a process of GetDP reports of itself; None: it failed."""
+    """Version, size and cost of a process of GetDP; None: it failed."""
 
     version: str | None = None
     unknowns: int | None = None
@@ -137,7 +137,7 @@ class Usage:
     memory: float | None = None
 
 
-#: The last block of GetDP's numbering of the unknowns (.pre) is one of these.
+#: Possible last blocks of GetDP's numbering of the unknowns (.pre).
 LAST_BLOCKS = "DofData", "ElementsXEdges", "ElementsXFacets", "ExtendedGroup"
 
 
@@ -200,7 +200,7 @@ class Runner:
             raise RunError(f"GetDP: {errors[0] if errors else ended}")
         return usage
 
-    def fill(
+    def solve(
         self,
         case: Case,
         mesh: Mesh,

@@ -86,7 +86,7 @@ def solve(case: Case, on_step: OnStep, fields: bool) -> Iterator[Outcome]:
             folder.mkdir()
             watch = lambda now, number=number: on_step(number, now)
             running.append(
-                (folder, pool.submit(runner.fill, scene, mesh, mesh_file, folder, fields, watch))
+                (folder, pool.submit(runner.solve, scene, mesh, mesh_file, folder, fields, watch))
             )
         for scene, (folder, future) in zip(scenes, running, strict=True):
             error: BaseException | None = None

@@ -102,8 +102,8 @@ def read_joint(
     ]
     when = np.tile([time, level], (len(nodes), 1))
     distance = case.joint_along * node_means(rows, table("path", 1)[1], len(nodes))
-    whole = np.hstack([when, nodes, jump[:, order], traction[:, order], state, distance, *more])
-    extra = whole.copy()
+    averaged = np.hstack([when, nodes, jump[:, order], traction[:, order], state, distance, *more])
+    extrapolated = averaged.copy()
     corners, mean_jump = table("mean_jump")
     _, corner_rows = nodes_of(np.vstack([nodes, corners]))
     corner_rows = corner_rows[len(nodes) :]
@@ -112,8 +112,8 @@ def read_joint(
     for columns, values in means:
         with np.errstate(invalid="ignore"):
             at_nodes = node_means(corner_rows, values[:, order], len(nodes))
-        extra[present, columns] = at_nodes[present]
-    return whole, extra
+        extrapolated[present, columns] = at_nodes[present]
+    return averaged, extrapolated
 
 
 def read(case: Case, folder: Path) -> tuple[Results, dict[int, float]]:
