@@ -118,7 +118,7 @@ def test_a_bad_correlation_is_refused(text):
 
 def test_contradictory_correlations_are_refused():
     laws = dict.fromkeys("abc", "normal(1,0.1)")
-    with pytest.raises(InputError, match="hold together"):
+    with pytest.raises(InputError, match="positive definite"):
         sampling.draw(3, laws, "latin", 0, ["a,b=0.9", "b,c=0.9", "a,c=-0.9"])
 
 

@@ -34,7 +34,7 @@ from ..solver.path import PRECISION, ROUGH, SURE, Point
 from ..statics import gravity
 from ..statics.limit import elastic_heel_stress
 from ..statics.verdict import bound, highest_by_statics, statement, tension_share
-from .failure_path import CRITICAL, FailurePath, row
+from .failure_path import CRITICAL, FailurePath, Trial, row
 
 #: Parameters that are divided by the strength reduction factor. The fracture energies are included:
 #: the stresses of the softening curve are scaled, its jumps are not.
@@ -57,19 +57,6 @@ TINY = 1e-30
 
 #: Relative distances from a value at which the gravity method's critical value is sought.
 DISTANCES = (0.02, 0.05, 0.1, 0.2, 0.5, 0.9)
-
-
-@dataclass(frozen=True)
-class Trial:
-    """A value of the varied quantity, and the equilibrium path of the dam with it."""
-
-    value: float
-    path: FailurePath
-
-    @property
-    def stands(self) -> bool:
-        """Whether there is an equilibrium at the target level."""
-        return self.path.reached
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -13,10 +13,7 @@ from matplotlib.figure import Figure
 from ..post.drawing import BLUE, GREEN, ORANGE, RED, write_picture
 from ..post.units import LENGTHS, unit
 from ..solver.path import Point
-from .failure_path import FailurePath
-
-if TYPE_CHECKING:
-    from .critical import Trial
+from .failure_path import FailurePath, Trial
 
 
 class Content(NamedTuple):

@@ -7,6 +7,7 @@ control (see solver/path.py), and its highest level is refined to the precision.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -149,6 +150,19 @@ class FailurePath(EquilibriumPath):
             ends = [p.level for p in self.points[max(right - 1, 0) : right + 1]]
             return right - 1, 0.5, self.highest + max(ends) - min(ends)
         return super().uncertain()
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A value of the varied quantity, and the equilibrium path of the dam with it."""
+
+    value: float
+    path: FailurePath
+
+    @property
+    def stands(self) -> bool:
+        """Whether there is an equilibrium at the target level."""
+        return self.path.reached
 
 
 def point_of(stepper: LoadStepper) -> Point:

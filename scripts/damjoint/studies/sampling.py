@@ -106,7 +106,7 @@ def correlated(shares: Array, pairs: list[tuple[int, int, float]]) -> Array:
         root = copula(wanted)
     except linalg.LinAlgError:
         raise InputError(
-            "--correlate: must be a positive definite matrix of correlations"
+            "--correlate: must form a positive definite matrix of correlations"
         ) from None
     scores, corrected = stats.norm.ppf(shares), wanted
     orders: list[tuple[float, IntArray]] = []
