@@ -19,6 +19,7 @@ run: setup
 check: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/mypy
 
 # Run the tests but those that take minutes (heavy); in CI all of them
 test: check
