@@ -41,5 +41,5 @@ pages: setup
 
 # Remove results and caches
 clean:
-	rm -rf out .pytest_cache .ruff_cache .hypothesis
+	rm -rf out .pytest_cache .ruff_cache .mypy_cache .hypothesis
 	find scripts tests -name __pycache__ -prune -exec rm -rf {} +
