@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain, zip_longest
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.optimize import bisect
@@ -20,6 +21,7 @@ from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from .. import InputError
+from ..arrays import Values
 from ..engines import Outcome
 from ..engines.condensed.solve import about
 from ..joint.interface import interface_of
@@ -115,7 +117,7 @@ class Search:
         self,
         case: str,
         of: str,
-        settings: dict | None = None,
+        settings: Values | None = None,
         levels: str | Sequence[float] | None = None,
         tail_levels: str | Sequence[float] | None = None,
         on_progress: Callable[[str], None] = lambda message: None,
@@ -451,7 +453,7 @@ def outwards(value: float, end: float) -> Iterator[float]:
 def critical(
     case: str,
     of: str,
-    settings: dict | None = None,
+    settings: Values | None = None,
     levels: str | None = None,
     tail_levels: str | None = None,
     out: Path | None = None,
@@ -516,7 +518,7 @@ def write(search: Search, answer: CriticalValue, out: Path, seconds: float) -> N
         picture.draw(shown, out / f"{case.name}_critical.png")
 
 
-def as_json(search: Search, answer: CriticalValue) -> dict:
+def as_json(search: Search, answer: CriticalValue) -> dict[str, Any]:
     """The entry `critical` of run.json."""
     return {
         "of": search.of,
