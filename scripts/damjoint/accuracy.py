@@ -2,7 +2,7 @@
 
 First the load steps are halved on the coarsest mesh until the results hardly change. Then the
 elements along the joint are halved from mesh to mesh; those of the bodies follow. Each mesh costs
-several times the one before, so that the last one takes most of the time. The discretisation error
+several times the one before: the last takes most of the time. The discretisation error
 of a quantity is estimated from its last changes, as by Roache's grid convergence index (J. Fluids
 Eng. 116, 1994), and includes the error of the load steps.
 """
@@ -57,7 +57,7 @@ REGULAR_CORNER = 1.0
 MIN_RATIO, MAX_RATIO = 0.25, 0.75
 #: Roache's factors of safety for three meshes and for two.
 SAFETY_OF_THREE, SAFETY_OF_TWO = 1.25, 3.0
-#: Most elements by which a length may differ: one, and round-off.
+#: Number of elements by which a length may differ, with a margin for round-off.
 ONE_ELEMENT = 1.001
 #: Relative error of the load steps below which the summary does not mention it.
 NEGLIGIBLE = 1e-4
@@ -130,8 +130,8 @@ def refine_until_accurate(
 ) -> Outcome:
     """Return the outcome of a scene on the first mesh with small enough errors.
 
-    solve_mesh: solves the scene on one mesh. If a mesh fails or is too large the outcome of the one
-    before is returned; after an interrupt too, with the interrupt as its error. Raises RunError if
+    solve_mesh: solves the scene on one mesh. If a mesh fails or is too large the outcome on the
+    mesh before is returned; after an interrupt, with the interrupt as its error. Raises RunError if
     the first mesh fails.
     """
     begin = time.perf_counter()

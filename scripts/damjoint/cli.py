@@ -31,8 +31,8 @@ RESUMED = "CSV of results; rows that are already in it are not computed again"
 
 
 class Checked(argparse.Action):
-    """Action that stores `convert(name, text)`, which raises InputError. As a `type` its message
-    would be replaced by one of argparse.
+    """Action that stores `convert(name, text)`, which raises InputError. As a `type`,
+    argparse would replace its message.
     """
 
     def __init__(self, *, convert: Callable[[str, str], object], **options: object) -> None:
@@ -138,7 +138,7 @@ def loading_options() -> Parser:
         "--steps",
         1,
         help="number of equal load steps between two levels (default: those of the case, or 1 if "
-        "--levels is given)",
+        "--levels is set)",
     )
     return options
 
@@ -399,8 +399,8 @@ def add_critical(commands: Commands) -> None:
     )
     command.add_levels(
         "--levels",
-        help="water levels [m above the heel] in this order; all but a critical level are "
-        "searched at the last one (default: those of the case)",
+        help="water levels [m above the heel] in this order; a critical value other than the level "
+        "is that at the last level (default: those of the case)",
     )
     command.add_levels("--tail-levels", help=TAIL_LEVELS)
     command.add_path("--out", "FOLDER", help="output folder (default: out/CASE_critical)")
@@ -500,7 +500,7 @@ def do_sweep(arguments: argparse.Namespace) -> int:
     )
     if schedule.accuracy:
         settings, schedule, estimate = meshed(arguments.case, settings, schedule)
-        print(f"one mesh for all rows, refined for the case as it is: {estimate}")
+        print(f"mesh of all rows, refined for the unchanged case: {estimate}")
     count, rows = sweep(
         arguments.case, plan, settings, out, schedule, arguments.jobs, arguments.scheduler
     )
@@ -525,7 +525,7 @@ def report_sweep(case: str, plan: Plan, rows: list[Row], out: Path) -> None:
 
 def add_stress(commands: Commands) -> None:
     """Add damjoint stress."""
-    summary = "run random dams and verify their result files; exit code 1 if one is a defect"
+    summary = "run random dams and verify their result files; exit code 1 if there is a defect"
     command = add_command(commands, do_stress, summary)
     command.add_integer(
         "count", 1, nargs="?", default=500, help="number of random dams (default: 500)"
@@ -538,7 +538,7 @@ def add_stress(commands: Commands) -> None:
 
 
 def do_stress(arguments: argparse.Namespace) -> int:
-    """Run damjoint stress; 1 if a dam is a defect."""
+    """Run damjoint stress; 1 if a run is a defect."""
     stress = tool("stress")
     rows = stress.stress(arguments.count, arguments.seed, arguments.out, arguments.jobs)
     for row in rows:

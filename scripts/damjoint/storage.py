@@ -12,7 +12,7 @@ from pathlib import Path
 
 from . import InputError
 
-#: Prefix of the temporary file beside the one that is being written.
+#: Prefix of the temporary file beside a file that is being written.
 PART = ".part."
 
 
@@ -20,8 +20,8 @@ PART = ".part."
 def atomic_write(path: Path) -> Iterator[Path]:
     """Yield a temporary path that replaces `path` at the end of the block.
 
-    An error or interrupt in the block leaves the old file. A link is replaced, not followed, also
-    one at the temporary path; a device is written directly. Raises OSError with the path.
+    After an error or interrupt in the block the old file remains. Links, also at the temporary
+    path, are replaced and not followed; a device is written directly. Raises OSError with the path.
     """
     if path.exists() and not (path.is_file() or path.is_dir()):  # /dev/stdout
         yield path
@@ -41,7 +41,7 @@ def atomic_write(path: Path) -> Iterator[Path]:
 
 
 def check_end(path: Path, *ends: str) -> None:
-    """Raise OSError (no space left) if a file is missing or ends in none of `ends`.
+    """Raise OSError (ENOSPC) if a file is missing or ends in none of `ends`.
 
     GetDP and Gmsh do not check their writes: on a full disk they leave a truncated file.
     """

@@ -1,7 +1,7 @@
 """Verification of a run from its result files, independent of the engines.
 
 The formulas are written again by hand: nothing of laws/, solver/ or engines/ is imported, so that
-an error there is not repeated here. Equilibrium is checked by the load resultants of the gravity
+their errors are not repeated. Equilibrium is checked by the load resultants of the gravity
 method, uplift by integration of the pressure along the joint, the inequalities of the joint law
 node by node, and the reason of a stop by limit analysis of the rigid block.
 """
@@ -244,7 +244,7 @@ def flux(run: RunFiles, rows: dict[str, np.ndarray], leakage: float) -> Iterator
 
 
 def contact(run: RunFiles) -> Iterator[str]:
-    """Check that a closed point has the contact stress K_N times its overlap, an open one none."""
+    """Check that the contact stress is K_N times the overlap, and zero at open points."""
     case = run.case
     stiffness = case["K_N"] * (case["pena_contact"] if case["law"] == "rupture" else 1.0)
     for rows in run.joint:
@@ -399,7 +399,7 @@ def judge_stop(run: RunFiles) -> tuple[bool, str]:
     Returns whether it is wrong that it stopped, or the reason it gives, and a remark. A remark
     without an error is a stop that is neither proved right nor wrong: not converged and the joint
     too stiff for its mesh; displacement control, whose level is not known beforehand; a rigid block
-    neither certain to stand nor near a limit. A crack that lets the reservoir in may grow through
+    neither certain to stand nor near a limit. A crack under the full head may grow through
     the joint far below any limit, so the block is judged under the most uplift, too.
     """
     verdict = run.record["verdict"]

@@ -219,7 +219,7 @@ def test_ties_loading_and_accuracy(command, solve, tmp_path):
     loading = "--levels", "6,8", "--tail-levels", "1", "--steps", "2"
     words = "--vary", "mu=0.35,0.5", "--tie", "adhesion=1e4*mu", "--jobs", "1", "--out", "s.csv"
     code, out, _ = command("sweep", "c", *loading, "--accuracy", "coarse", *words)
-    assert code == 0 and out.startswith("one mesh for all rows")
+    assert code == 0 and out.startswith("mesh of all rows")
     n = re.search(r"n_joint = (\d+)", out)[1]
     mesh = [part for name in (f"n_joint={n}", "order=2", *MESH) for part in ("--set", name)]
     for row in rows(tmp_path / "s.csv"):

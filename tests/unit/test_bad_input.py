@@ -89,7 +89,7 @@ def test_a_parameter_out_of_range_is_refused(command, tmp_path, setting, allowed
         ((*RUN, "--levels", "3,21"), ("levels = 21", TO_TWICE)),
         ((*RUN, "--levels", "3,-1"), ("levels = -1", TO_TWICE)),
         ((*RUN, "--levels", "3,\u0663"), ("levels = 3,\u0663", "list of levels in metres")),
-        ((*RUN, "--levels", "3," * 12000 + "3"), ("levels: are 12001", "at most 10000")),
+        ((*RUN, "--levels", "3," * 12000 + "3"), ("levels = 12001 values", "at most 10000")),
         ((*RUN, "--levels", ""), ("levels = ", "list of levels in metres")),
         ((*RUN, "--levels", "3,,6"), ("levels = 3,,6", "list of levels in metres")),
         ((*RUN, "--levels", "3;6"), ("levels = 3;6", "list of levels in metres")),

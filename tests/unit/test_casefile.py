@@ -134,7 +134,7 @@ def test_other_levels_have_the_tailwater_of_the_case(tmp_path):
     rising = str(write(tmp_path, text % "1, 2, 3", "rising.case"))
     assert load(constant, levels="5,10").tail_levels == (2, 2)
     assert load(rising, levels="5,8,10").tail_levels == (1, 2, 3)
-    with pytest.raises(InputError, match="the case's own; give --tail-levels"):
+    with pytest.raises(InputError, match="the case's own; set --tail-levels"):
         load(rising, levels="5,10")
     assert load(rising, levels="5,10", tail_levels="0").tail_levels == (0, 0)
 

@@ -1,7 +1,7 @@
 """The deformed scene as lines and faces, step by step.
 
-Gmsh displaces all of it by one factor: water and marks, which have no displacement of their own,
-get the one that brings them to their place.
+Gmsh scales all displacements by the same factor. Water and marks, which have no displacement, are
+assigned the displacement that brings them to their place.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from ..model.fields import BODIES, OPEN, SLIPPED, SOFTENING, distance, nearest_r
 from ..model.loads import Loading, line_forces
 from ..model.mesh import Body
 from ..model.scene import BED, DOWN, FLOOR, SIDES, TOP, UP
-from ..post.outline import section_of, skin
+from ..post.outline import exaggeration, section_of, skin
 from .worker import SolvedScene
 
-#: Length of a force's arrow, and largest displacement drawn, over the dam's height.
-ARROW, DISPLACEMENT = 0.12, 0.06
+#: Length of a force's arrow over the dam's size.
+ARROW = 0.12
 #: Cosine of the angle between faces above which a skin counts as smooth.
 SMOOTH = 0.9
 #: Lines of a section below water: of the reservoir, of water on the crest, of the tailwater.
@@ -151,9 +151,7 @@ class Deformed:
             name: np.array([fields[time].displacement[name] for time in self.times])
             for name in BODIES
         }
-        largest = max(np.abs(u).max() for u in self.moved.values())
-        exact = DISPLACEMENT * case.size / largest if largest > 0 else 1.0
-        self.scale = float(f"{exact:.1g}")
+        self.scale = exaggeration(self.moved, case.size)
         self.skins = {name: skin(self.scene.bodies[name]) for name in BODIES}
         self.depth = self.scene.bodies["dam"].points[:, 2].max()
         self.rows = [self.scene.result.at(time) for time in self.times]
@@ -282,7 +280,7 @@ class Deformed:
         return self.scene.bodies[owner].points[index] + self.scale * self.moved[owner][:, index]
 
     def placed(self, corners: np.ndarray) -> Pieces:
-        """Pieces whose displacement moves their corners to given places (steps, n, corners, 3)."""
+        """Pieces whose displacement moves their corners to places (steps, n, corners, 3)."""
         last = corners[-1]
         return Pieces(last, (corners - last) / self.scale)
 

@@ -327,7 +327,7 @@ def chosen_scene(scenes: list[SolvedScene]) -> int:
 
 
 def drop_level_entries() -> None:
-    """Remove the water levels that a .geo declares one by one; in this tree they are lists."""
+    """Remove the water levels that a .geo declares singly; in this tree they are lists."""
     for name in gmsh.onelab.getNames("Parameters/1Water levels/.*"):
         if name not in OF_LEVELS:
             gmsh.onelab.clear(name)

@@ -45,7 +45,7 @@ class Session:
         self.folder = tempfile.TemporaryDirectory(prefix="damjoint_")
         #: checking, running, saving, or empty
         self.busy = ""
-        #: check or run, to be done when no longer busy; or empty
+        #: check or run, postponed while busy; or empty
         self.pending = ""
         self.status = ""
         #: the last run: scenes, request, status line with its color, title
@@ -61,7 +61,7 @@ class Session:
         #: views of the heading before a run and of an error message
         self.heading = views.Gallery()
         self.message = views.Gallery()
-        #: what drawing and view were made for
+        #: keys of the current drawing and view, to detect changes
         self.drawn: tuple[Any, ...] = ()
         self.fitted: tuple[Any, ...] = ()
         self.started = self.next_progress = 0.0
@@ -116,7 +116,7 @@ class Session:
             self.check()
 
     def other_scene(self) -> bool:
-        """Show another scene of the last run if the user has chosen one; whether so."""
+        """Show the scene of the last run that the user has chosen; whether it is another."""
         if not tree.get_text(tree.SCENE) or tree.chosen_scene(self.scenes) == self.scene_shown:
             return False
         self.show(tree.chosen_scene(self.scenes))
@@ -156,7 +156,7 @@ class Session:
     # messages of the engine
 
     def on_ready(self, *_: Any) -> None:
-        """A new process has replaced a dead one; nothing to update."""
+        """A new process has started; nothing to update."""
 
     def on_checked(self, sheet: Sheet) -> None:
         """A request is good: update parameters, drawing and loads."""

@@ -32,7 +32,7 @@ from ..storage import atomic_write
 from .sheet import Request, Sheet, case_text, check_request, titles
 
 #: First line of case files that Save may replace.
-SAVED = "// Saved by the window of damjoint, which writes it anew when a run is saved here again.\n"
+SAVED = "// Saved by the window of damjoint; replaced when a run is saved to this folder again.\n"
 
 
 @dataclass
@@ -134,7 +134,7 @@ def serve(pipe: Connection) -> None:
 def run_case(sheet: Sheet, pipe: Connection, stop: Stop) -> list[Outcome]:
     """Solve the scenes of a case; sends a message after each converged step.
 
-    Raises the error that ends the run before its first step; a later one is in the outcome.
+    Raises an error before the first step; a later error is in the outcome.
     """
     outcomes = []
 

@@ -5,7 +5,7 @@ A case is a list of statements, in any layout, with // and /* */ comments:
     Include "other.case";            the statements of another case file, beside this one
     title = "words";
     also_uplift = "none";            further uplift modes the case is published with
-    geometry = "own.msh";            a mesh or .geo of one's own, beside this file
+    geometry = "own.msh";            your own mesh or .geo, beside this file
     default_<parameter> = value;     a text; arithmetic with + - * / ^ ( ), Pi, defaults set before
     levels() = {value, ...};         tail_levels() and times() likewise
 """

@@ -128,9 +128,9 @@ def highest_level(case: ParameterValues) -> float:
 
 
 def check_levels(name: str, levels: Sequence[float], highest: float) -> None:
-    """Water levels [m] from 0 to the highest one; above the crest the dam is overtopped."""
+    """Water levels [m] from 0 to `highest`; above the crest the dam is overtopped."""
     if len(levels) > MOST_LEVELS:
-        raise InputError(f"{name}: are {len(levels)}, must be at most {MOST_LEVELS}")
+        raise InputError(f"{name} = {len(levels)} values: must be at most {MOST_LEVELS}")
     for level in levels:
         if not 0 <= level <= highest:
             limit = f"between 0 and {highest:g} m, twice the dam's height"
@@ -143,7 +143,7 @@ def check_tail_levels(tails: Sequence[float], number: int, of_case: bool) -> Non
     """Tailwater levels: as many as levels; of_case: whether they are those of the case file."""
     if len(tails) != number:
         listed = ",".join(f"{v:g}" for v in tails)
-        whose = " (the case's own; give --tail-levels)" if of_case else ""
+        whose = " (the case's own; set --tail-levels)" if of_case else ""
         raise InputError(
             f"tail_levels = {listed}{whose}: must be one level or as many as levels ({number})"
         )

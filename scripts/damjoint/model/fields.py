@@ -34,7 +34,7 @@ class Solution:
     fields: dict[float, Field]
 
 
-#: Fields of the joint: name, unit, and the columns of joint.csv along x, y, z (or the one column).
+#: Fields of the joint: name, unit, and the columns of joint.csv along x, y, z (or a single column).
 OF_JOINT = {
     "jump": ("m", ("delta_t1", "delta_n", "delta_t2")),
     "traction": ("Pa", ("tau_1", "sigma_n", "tau_2")),

@@ -18,7 +18,7 @@ from ..arrays import Array, BoolArray, IntArray, Value
 from ..storage import check_end
 from .case import Case, has_drains
 from .parameters import assignments, constants, start_gmsh
-from .scene import BED, DOWN, FLOOR, JOINT, JOINTS, SIDES, SOLIDS, TOP, UP
+from .scene import BED, DOWN, FLOOR, JOINT_NAME, JOINTS, SIDES, SOLIDS, TOP, UP
 
 #: Parameters that the mesh always depends on.
 GEOMETRY = (
@@ -334,7 +334,7 @@ class Mesh:
         for i, side in enumerate(section["seg_side"]):
             ends = section["seg_y0"][i], section["seg_y1"][i]
             upper = section["seg_body"][i] == numbers["UPPER"][0]
-            body = JOINTS[JOINT].upper if upper else JOINTS[JOINT].lower
+            body = JOINTS[JOINT_NAME].upper if upper else JOINTS[JOINT_NAME].lower
             tag = int(numbers["SEGMENT"][0]) + i
             faces.append(FaceRegion(tag, body, SIDES[int(side)], min(ends), max(ends)))
         return bodies, faces
@@ -419,7 +419,7 @@ class Mesh:
         """Give joint and faces their normals: the joint's from foundation to dam, a face's out of
         its body.
         """
-        joint = self.joints[JOINT]
+        joint = self.joints[JOINT_NAME]
         upper, lower = self.solids[joint.upper], self.solids[joint.lower]
         if self.own:
             shared = np.intersect1d(upper.node_tags, lower.node_tags)
@@ -441,7 +441,7 @@ class Mesh:
                     "joint: its elements must be sides of the dam's (a conforming mesh)"
                 )
         kinds = {kind: name for name, kind in OWN_FACES.items()}
-        surfaces = [(JOINT, joint.surface, lower)]
+        surfaces = [(JOINT_NAME, joint.surface, lower)]
         for face in self.faces.values():
             surfaces.append((kinds[face.body, face.side], face.surface, self.solids[face.body]))
         for name, surface, body in surfaces:
@@ -453,10 +453,10 @@ class Mesh:
                 gmsh.model.mesh.reverseElements(surface.element_tags[turned])
 
     def bearer(self, line: str) -> str:
-        """The body that bears the force on one of LINES: the first that has all nodes of it."""
+        """The first body that has all nodes of a region of LINES: the line force acts on it."""
         nodes = self.bodies[line].node_tags
         bearers = (n for n, s in self.solids.items() if np.isin(nodes, s.node_tags).all())
-        return next(bearers, JOINTS[JOINT].lower)
+        return next(bearers, JOINTS[JOINT_NAME].lower)
 
     @property
     def counts(self) -> dict[str, int]:

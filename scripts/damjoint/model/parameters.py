@@ -246,7 +246,7 @@ def settings(pairs: Iterable[str]) -> dict[str, Value]:
 def levels_of(name: str, levels: str | Sequence[float]) -> tuple[float, ...]:
     """Water levels [m] from numbers, or a text 'a,b,c'.
 
-    Raises InputError if there is none, or one is not finite.
+    Raises InputError if there is none, or a level is not finite.
     """
     values = levels.split(",") if isinstance(levels, str) else levels
     try:

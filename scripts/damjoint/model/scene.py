@@ -31,7 +31,7 @@ SOLIDS = {
 #: Joints by the name of their region.
 JOINTS = {"joint": Joint(upper="dam", lower="foundation", heel="heel", toe="toe", law="law")}
 #: The name of the only joint.
-(JOINT,) = JOINTS
+(JOINT_NAME,) = JOINTS
 
 #: Sides of a face, in the order of the numbers in pro/section.pro: reservoir, tailwater, water on
 #: the crest, on the reservoir's floor, on the tailwater's bed.

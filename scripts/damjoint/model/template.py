@@ -28,7 +28,7 @@ COMMON = (
 
 
 def line(parameter: Parameter, value: str) -> str:
-    """A statement and the parameter's meaning; a comment unless the parameter is a common one."""
+    """A statement and the parameter's meaning; a comment unless the parameter is in COMMON."""
     value = f'"{value}"' if parameter.text else value
     about = parameter.meaning + (f"; {parameter.matters}" if parameter.matters else "")
     if parameter.automatic:

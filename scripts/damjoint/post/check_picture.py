@@ -15,11 +15,12 @@ from ..model.fields import SOFTENING, along, state_of
 from ..model.parameters import constants
 from ..model.results import Results
 from ..statics.gravity import GravityMethod
-from .drawing import BLUE, GREEN, ORANGE, RED, VIOLET, WATER, figure_of, write_picture
+from .drawing import BLUE, CONCRETE, GREEN, ORANGE, RED, VIOLET, WATER, figure_of, write_picture
 from .pictures import heading
 from .units import STRESSES, unit
 
-CONCRETE, ROCK, SILT, EDGE = "#c3ccd6", "#e6dcc8", "#a98d5d", "#5a5a5a"
+ROCK, SILT, EDGE = "#e6dcc8", "#a98d5d", "#5a5a5a"
+LOWER_BODY, LINES = "#dde2e8", "#b0b0b0"
 #: Over the joint's length: depth of the two diagrams below the joint, height of each, depth of the
 #: lines of cracks by the gravity method, length of a resultant's arrow.
 UPLIFT_AT, STRESS_AT, TALL = 0.14, 0.52, 0.24
@@ -79,7 +80,7 @@ def draw_cells(axes: Axes, cells: list[tuple[str, ...]]) -> None:
     table.auto_set_font_size(False)
     table.set_fontsize(9)
     for (row, column), cell in table.get_celld().items():
-        cell.set_edgecolor("#b0b0b0")
+        cell.set_edgecolor(LINES)
         cell.PAD = 0.03
         text = cell.get_text()
         text.set_parse_math(False)
@@ -121,7 +122,7 @@ def draw_scene(axes: Axes, method: GravityMethod) -> None:
     if method.level > height:
         crest = [up[-1, 0], down[-1, 0]]
         axes.fill_between(crest, height, method.level, color=WATER, alpha=0.4, linewidth=0)
-    axes.fill(*np.vstack([up, down[::-1]]).T, facecolor="#dde2e8", edgecolor=EDGE, lw=0.8)
+    axes.fill(*np.vstack([up, down[::-1]]).T, facecolor=LOWER_BODY, edgecolor=EDGE, lw=0.8)
     outline = method.body.outline + method.body.toe
     axes.fill(*outline.T, facecolor=CONCRETE, edgecolor=EDGE, linewidth=0.8)
     axes.set(

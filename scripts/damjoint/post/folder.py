@@ -143,7 +143,9 @@ def write_info(results: Results, folder: Path, state: str = "", why: str = "") -
             "tail_levels": case.tail_levels,
             "times": case.times,
             "geometry": str(case.geometry or ""),
-            "section": case.section if case.geometry else {},  # a built-in one: from parameters
+            "section": case.section
+            if case.geometry
+            else {},  # a section by parameters is computed again
             "published": case.published,
             "hardening_asked": case.hardening_asked,
             **results.info,

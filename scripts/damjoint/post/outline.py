@@ -15,6 +15,9 @@ from ..model.mesh import Body
 #: Relative distance of points that count as level: a user's crest may be slightly off.
 LEVEL = 1e-6
 
+#: Largest displacement drawn, over the dam's size.
+DISPLACEMENT = 0.06
+
 #: Corners of the faces of a cell, by its shape.
 FACES: dict[str, tuple[list[int], ...]] = {
     "triangle": ([0, 1, 2],),
@@ -30,6 +33,12 @@ FACES: dict[str, tuple[list[int], ...]] = {
         [3, 0, 4, 7],
     ),
 }
+
+
+def exaggeration(displacement: dict[str, np.ndarray], size: float) -> float:
+    """Factor, of one digit, by which displacements are drawn; size: of the dam [m]."""
+    largest = max((np.abs(u).max(initial=0) for u in displacement.values()), default=0)
+    return float(f"{DISPLACEMENT * size / largest:.1g}") if largest > 0 else 1.0
 
 
 def skin(body: Body) -> list[tuple[np.ndarray, np.ndarray]]:

@@ -46,8 +46,8 @@ from .drawing import (
     panels,
     write_picture,
 )
-from .outline import skin
-from .section_picture import draw_section, exaggeration
+from .outline import exaggeration, skin
+from .section_picture import draw_section
 from .units import FLUXES, LENGTHS, STRESSES, Units, unit
 
 DPI = 110

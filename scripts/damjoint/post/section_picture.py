@@ -27,11 +27,11 @@ from ..model.fields import (
 from ..model.loads import Loading, line_forces
 from ..model.parameters import constants
 from .drawing import CONCRETE, DARK, GREEN, GREY, ORANGE, RED, ROCK, SILT, VIOLET, WATER, panels
-from .outline import Section, section_of
+from .outline import Section, exaggeration, section_of
 from .units import FORCES, STRESSES, with_unit
 
-#: Over the dam's size: largest displacement drawn; length of an arrow.
-DISPLACEMENT, ARROW = 0.06, 0.16
+#: Length of an arrow over the dam's size.
+ARROW = 0.16
 #: Over the dam's height: ground shown beside and below; distance of a level's mark from the edge;
 #: depth of the drains; distance of the middle third below the joint.
 BESIDE, BELOW, MARK, DRAIN, THIRD = 0.6, 0.45, 0.12, 0.3, 0.025
@@ -48,12 +48,6 @@ STATES = {
     OPEN: (RED, 2.2, "joint open or broken"),
 }
 DRAINS = {"color": "#1565c0", "linestyle": "-.", "linewidth": 1.5}
-
-
-def exaggeration(displacement: dict[str, np.ndarray], size: float) -> float:
-    """Factor, of one digit, by which displacements are drawn."""
-    largest = max((np.abs(u).max(initial=0) for u in displacement.values()), default=0)
-    return float(f"{DISPLACEMENT * size / largest:.1g}") if largest > 0 else 1.0
 
 
 def draw_section(figure: FigureBase, solution: Solution, time: float) -> None:

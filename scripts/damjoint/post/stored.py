@@ -111,7 +111,7 @@ def case_of(info: dict[str, Any]) -> Case:
 def finite(name: str, values: list[float]) -> tuple[float, ...]:
     """Convert a list of run.json to floats.
 
-    Raises InputError if one is infinite or not a number.
+    Raises InputError if a number is not finite.
     """
     numbers = tuple(map(float, values))
     if not np.isfinite(numbers).all():

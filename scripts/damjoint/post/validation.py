@@ -81,7 +81,7 @@ def table() -> list[Reference]:
 
 
 def references(case: Case) -> list[Reference]:
-    """Published numbers of a scene; empty if the scene differs from the published one."""
+    """Published numbers of a scene; empty if it differs from the published scene."""
     if not case.published:
         return []
     return [r for r in table() if r.modeling == case.name.upper() and r.uplift == case["uplift"]]

@@ -1,1 +1,1 @@
-"""Methods beside the finite elements: gravity method, limit analysis, what a failure is called."""
+"""Methods beside the finite elements: gravity method, limit analysis, verdict of a run."""

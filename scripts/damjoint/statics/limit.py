@@ -26,7 +26,7 @@ MARGIN = 1e-6
 
 @dataclass(frozen=True)
 class Elastic:
-    """A case whose joint does not fail, compared by what its resultants depend on."""
+    """A case whose joint does not fail; equal if the resultants are equal."""
 
     key: tuple[object, ...]
     case: Case = field(compare=False)

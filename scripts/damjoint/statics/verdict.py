@@ -59,9 +59,9 @@ def slipped_from(results: Results) -> float | None:
 def why_stopped(results: Results) -> str:
     """Out of range, sliding, overturning, broken through or not converged.
 
-    Out of range: a driven run whose level would, in one more step like its last, be below 0 or
-    above the highest that is allowed. A failure is named where the equilibrium path has shown the
-    mechanism or where the last converged state has reached a bound of statics; else the run has not
+    Out of range: under displacement control the level of the next step, by extrapolation, would be
+    below 0 or above the highest allowed. A failure is named if the equilibrium path shows its
+    mechanism or the last converged state has reached a bound of statics; else the run has not
     converged.
     """
     case, last = results.case, results.last
@@ -223,7 +223,7 @@ def stiffness_ratio(results: Results) -> float:
 
 
 def stiff_joint(results: Results) -> str:
-    """A hint to a run that has not converged, if the joint is too stiff for its elements."""
+    """The hint, in brackets, that the joint is too stiff for its elements; empty if it is not."""
     ratio = stiffness_ratio(results)
     if ratio < STIFF_JOINT:
         return ""

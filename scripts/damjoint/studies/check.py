@@ -90,7 +90,7 @@ class MethodResult:
     time: float
     #: NUMBERS in SI units; nan if there is no state
     numbers: Mapping[str, float]
-    #: why there is no equilibrium; empty if there is one
+    #: why there is no equilibrium; empty if it exists
     statement: str = ""
     #: whether only a part of the case's loads acts
     partial: bool = False

@@ -347,7 +347,7 @@ class Search:
             return failing.mode, ""
         return mode, (
             f"by statics there is no equilibrium above {level:.6g} m, where {words}; the highest "
-            f"computed one is at {top.level:.6g} m"
+            f"computed level is {top.level:.6g} m"
         )
 
     # -- the gravity method

@@ -205,7 +205,7 @@ class Plan:
 
 
 def column_of(name: str) -> str:
-    """The column of a plan's name; that of the level is not the column `level` of the history."""
+    """The column of a plan's name; `level` is a column of the history."""
     return f"{name}_asked" if name == "level" else name
 
 

@@ -46,8 +46,8 @@ class Picture:
 
 
 @dataclass(frozen=True)
-class Section:
-    """Section of the page on a run."""
+class RunSection:
+    """RunSection of the page on a run."""
 
     folder: str
     title: str
@@ -99,19 +99,19 @@ def write(folders: list[Path], to: Path) -> None:
         raise InputError(f"to = {to}: must be a writable file ({error.strerror})") from None
 
 
-def read_section(folder: Path) -> Section:
+def read_section(folder: Path) -> RunSection:
     """Make the section of a run from its folder.
 
     Raises InputError if files are damaged.
     """
     solution = stored.read(folder)
     try:
-        return section_of(folder, solution)
+        return run_section(folder, solution)
     except stored.DAMAGED as error:
         raise InputError(f"out = {folder}: damaged ({error!r}); run the case again") from None
 
 
-def section_of(folder: Path, solution: Solution) -> Section:
+def run_section(folder: Path, solution: Solution) -> RunSection:
     """Make the section of a run."""
     result = solution.result
     case, info = result.case, result.info
@@ -119,7 +119,7 @@ def section_of(folder: Path, solution: Solution) -> Section:
     failures = failures_of(result, check)
     verdict = check.finite_elements.verdict if check else UNCHECKED
     made = datetime.fromtimestamp((folder / "run.json").stat().st_mtime)
-    return Section(
+    return RunSection(
         folder=str(folder),
         title=case.title,
         scene=describe_scene(case),
@@ -270,7 +270,7 @@ def facts(result: Results) -> list[tuple[str, str]]:
 
 
 def critical_fact(info: dict[str, Any] | None) -> list[tuple[str, str]]:
-    """Result of `damjoint critical`, if run.json has one."""
+    """Result of `damjoint critical`, if run.json has it."""
     if not info or info["value"] is None:
         return []
     unit = info["unit"]

@@ -9,7 +9,7 @@ from .. import InputError
 from ..arrays import Array, IntArray
 from ..model.arithmetic import call_of
 
-#: Distributions by scipy's names, and the usual name of the normal one.
+#: Distributions by scipy's names, and `normal`.
 DISTRIBUTIONS = {
     name: kind for name, kind in vars(stats).items() if isinstance(kind, stats.rv_continuous)
 }
@@ -152,8 +152,8 @@ def probability(failed: int, undecided: int, number: int) -> tuple[float, float,
 
 
 def sensitivity(values: Array, outcome: Array) -> float:
-    """Spearman's rank correlation of an input with an outcome; nan if one of them is constant or
-    less than three rows have both.
+    """Spearman's rank correlation of an input with an outcome; nan if either is constant or less
+    than three rows have both.
     """
     both = np.isfinite(values) & np.isfinite(outcome)
     if np.sum(both) < 3 or min(np.ptp(values[both]), np.ptp(outcome[both])) == 0:

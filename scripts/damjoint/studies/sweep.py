@@ -169,8 +169,7 @@ def read_done(path: Path, columns: list[str], numeric: Sequence[str]) -> dict[st
     rows = csv.DictReader(complete.splitlines(), restval=None, strict=True)
     if rows.fieldnames != columns:
         raise InputError(
-            f"out = {path}: must be a new file or one of the same sweep "
-            f"(columns {','.join(columns)})"
+            f"out = {path}: must be a new file or of the same sweep (columns {','.join(columns)})"
         )
     done = {}
     try:
@@ -191,7 +190,7 @@ def read_done(path: Path, columns: list[str], numeric: Sequence[str]) -> dict[st
 
 @contextlib.contextmanager
 def pool_of(jobs: int) -> Iterator[ProcessPoolExecutor]:
-    """Processes that end with this one, even if it is killed; after an error in one of them or in
+    """Processes that end with their parent, even if it is killed; after an error in a process or in
     the caller no further task starts.
     """
     with ProcessPoolExecutor(jobs, initializer=end_with_parent) as pool:
@@ -203,7 +202,7 @@ def pool_of(jobs: int) -> Iterator[ProcessPoolExecutor]:
 
 
 def end_with_parent() -> None:
-    """End this process when the one that started it ends."""
+    """End this process when its parent ends."""
 
     def wait() -> None:
         if parent := multiprocessing.parent_process():

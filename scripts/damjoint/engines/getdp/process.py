@@ -162,8 +162,8 @@ class Runner:
         """Run GetDP on a problem file, in its folder.
 
         arguments: after the problem file; threads: of the linear algebra; on_line: called with each
-        printed line. Raises RunError with GetDP's first error, or its last lines if it failed
-        without one.
+        printed line. Raises RunError with GetDP's first error, or else its last lines if it
+        failed.
         """
         program = find_getdp()
         usage = Usage(version_of(program), 0, 0.0, 0.0)
