@@ -47,7 +47,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class RunSection:
-    """RunSection of the page on a run."""
+    """Section of the page on a run."""
 
     folder: str
     title: str
