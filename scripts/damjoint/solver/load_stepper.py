@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from copy import copy
 from dataclasses import asdict, dataclass, replace
 
@@ -17,6 +17,7 @@ from .history import History
 from .model import Model, StepResult
 from .path import ROUGH, SURE, EquilibriumPath, Point
 from .relaxation import over_unstable_growth
+from .state import State
 
 #: Times and relative lengths of steps that differ by less are the same.
 SAME_TIME = 1e-9
@@ -42,8 +43,12 @@ class LoadStepper:
     """Load stepping: the converged steps are rows of the history, the requested levels tables."""
 
     def __init__(
-        self, case: Case, interface: Interface, on_step: Callable[[float], None] = lambda time: None
+        self,
+        case: Case,
+        interface: Interface | None = None,
+        on_step: Callable[[float], None] = lambda time: None,
     ) -> None:
+        """interface: see `Model`; on_step: called with the time of each converged step."""
         self.model, self.on_step = Model(case, interface), on_step
         self.history = History(self.model.equilibrium)
         self.state = self.model.start()
@@ -97,14 +102,19 @@ class LoadStepper:
 
     def run(self) -> Results:
         """Follow the times of the case from the last state on."""
+        for _ in self.steps():
+            pass
+        return self.results()
+
+    def steps(self) -> Iterator[State]:
+        """Follow the times of the case from the last state on, and yield each converged state."""
         for target in self.case.times:
             if target > self.state.time and not self.stopped:
-                self.advance_to(target)
+                yield from self.steps_to(target)
                 if target in self.case.requested and not self.stopped:
                     self.history.save(self.state)
         if self.stopped:
             self.save_last()
-        return self.results()
 
     def save_last(self) -> None:
         """Make a table of the last converged state, unless it has one."""
@@ -151,7 +161,12 @@ class LoadStepper:
         return step is not None
 
     def advance_to(self, target: float) -> None:
-        """Steps up to a time; a step that does not converge is cut, the next ones grow again.
+        """Take the steps up to a time, see `steps_to`."""
+        for _ in self.steps_to(target):
+            pass
+
+    def steps_to(self, target: float) -> Iterator[State]:
+        """The steps up to a time; one that does not converge is cut, the next ones grow again.
 
         The first step includes the weight at any length: it is cut to the weight alone first.
         """
@@ -162,6 +177,7 @@ class LoadStepper:
             self.weigh()
         cuts, dt, weighed = 0, np.inf, self.state.time > 0 or self.state.jump.any()
         while self.state.time < target and not self.stopped:
+            begin = self.state
             time = min(self.state.time + dt, target)
             time = target if target - time < SAME_TIME else time
             smallest = time - self.state.time < case["smallest_step"] * (1 + SAME_TIME)
@@ -182,6 +198,8 @@ class LoadStepper:
                 dt = 2 * (time - self.state.time)
                 self.accept(step, cuts)
                 cuts = 0
+            if self.state is not begin:  # by this step, or at the limit point of a path
+                yield self.state
 
     def direct_step(self, time: float, smallest: bool) -> StepResult | None:
         """A step to a time from the last state; smallest: whether it can be cut no more."""

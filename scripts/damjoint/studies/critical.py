@@ -31,7 +31,7 @@ from ..model.parameters import parameter
 from ..model.results import Results
 from ..post import folder as folders
 from ..post.tables import write_csv
-from ..run import save
+from ..runner import save
 from ..solver.path import PRECISION, ROUGH, SURE, Point
 from ..statics import gravity
 from ..statics.limit import elastic_heel_stress
