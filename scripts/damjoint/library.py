@@ -30,7 +30,7 @@ from .statics.verdict import hints, statement, verdict
 
 if TYPE_CHECKING:  # loaded when they are used, with what they draw with
     from .studies.check import SafetyCheck
-    from .studies.critical import Answer, Search
+    from .studies.critical import CriticalValue, Search
 
 __all__ = ["LAWS", "Critical", "Law", "Run", "Step", "case", "check", "critical", "fill", "run"]
 
@@ -225,7 +225,7 @@ def check(cases: Sequence[Case]) -> list[SafetyCheck]:
 class Critical:
     """A critical value."""
 
-    answer: Answer
+    answer: CriticalValue
     search: Search
 
     @property
