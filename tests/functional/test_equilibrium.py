@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from closed_forms import BASE, CENTROID, WATER, WEIGHT, integral, resultants, slide_level, thrust
-from damjoint import InputError, run
+from damjoint import InputError, runner
 from damjoint.model.case import load
 from damjoint.statics import gravity
 from numpy.testing import assert_allclose
@@ -111,7 +111,7 @@ def test_resultants_with_drains(tmp_path, engine, level, tail, effectiveness, ou
     drains = {"drain_x": 1.0, "drain_effectiveness": effectiveness, "drain_level": outlet}
     settings = {"uplift": "drained", "n_joint": 20.0, **{n: float(v) for n, v in drains.items()}}
     case = load("c", settings, str(level), str(tail))
-    (result,) = run.run(case, tmp_path, False, False, False, engine)
+    (result,) = runner.run(case, tmp_path, False, False, False, engine)
     heads = np.array([level, at_drains, tail]) * WATER
     uplift = (heads[0] + heads[1]) / 2 * 1 + (heads[1] + heads[2]) / 2 * 4
     x, p = result.at()["x"], result.at()["p"]
@@ -144,7 +144,7 @@ def test_uplift_is_exact_with_drains_between_regular_nodes(
     """The element lengths from heel to drains differ from the others."""
     drains = {"uplift": uplift, "drains": float(uplift != "drained"), "drain_x": 6.1}
     case = load("dam", {"n_joint": 9, "order": order} | drains | settings, "30", "3")
-    (result,) = run.run(case, tmp_path, False, False, False, engine)
+    (result,) = runner.run(case, tmp_path, False, False, False, engine)
     uplift = {"uplift": "drained" if uplift == "drained" else "cracked"}
     method = gravity.at(replace(case, values=case.values | uplift), 1.0)
     assert result.last["max_opening"] <= 0 == method.crack_length

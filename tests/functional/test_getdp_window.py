@@ -9,7 +9,7 @@ import time
 import gmsh
 import numpy as np
 import pytest
-from damjoint import data, run
+from damjoint import data, runner
 from damjoint.engines.getdp.process import find_getdp
 from damjoint.model.case import load
 from damjoint.model.parameters import parameter, start_gmsh
@@ -111,7 +111,7 @@ SEEN = "level", "crack_length", "process_zone", "max_opening", "crest_ux"
 
 def solved(case, folder):
     """SEEN at the last step, by the default engine."""
-    result = run.run(case, folder / "other", fields=False, picture=False, progress=False)[0]
+    result = runner.run(case, folder / "other", fields=False, picture=False, progress=False)[0]
     return [result.history[name][-1] for name in SEEN]
 
 

@@ -3,7 +3,7 @@
 import gmsh
 import numpy as np
 import pytest
-from damjoint import InputError, run
+from damjoint import InputError, runner
 from damjoint.fem.elements import tensor
 from damjoint.model.case import load
 from damjoint.model.mesh import Mesh
@@ -84,7 +84,7 @@ def test_both_engines_agree_on_a_bent_joint(tmp_path, uplift):
     settings = {"n_joint": 34, "uplift": uplift, "drain_x": 6, "tolerance": 1e-11}
     case = load("stepped", settings, "45", "4")
     one, other = (
-        run.run(case, tmp_path / engine, False, False, False, engine)[0].at()
+        runner.run(case, tmp_path / engine, False, False, False, engine)[0].at()
         for engine in ("condensed", "getdp")
     )
     for column in ("s", "delta_n", "delta_t1", "sigma_n", "tau_1", "p"):

@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from damjoint import InputError, run
+from damjoint import InputError, runner
 from damjoint.laws import COLUMNS
 from damjoint.model.case import load
 from damjoint.model.parameters import declared
@@ -63,7 +63,7 @@ def same(one, other, changed=None):
 def solve(tmp_path_factory):
     """solve(case): the result of its only scene."""
     folder = tmp_path_factory.mktemp("out")
-    return lambda case: run.run(case, folder, fields=False, picture=False, progress=False)[0]
+    return lambda case: runner.run(case, folder, fields=False, picture=False, progress=False)[0]
 
 
 @pytest.fixture(scope="module")

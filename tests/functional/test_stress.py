@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from damjoint import __version__, run
+from damjoint import __version__, runner
 from damjoint.model.case import load
 from damjoint.post.tables import write_csv
 from damjoint_tools import pages, stress, verification
@@ -32,7 +32,7 @@ def run_files(tmp_path_factory):
             settings = SCENES[law] | {"n_joint": 20.0} | (DRAINED if drained else {})
             case = load("dam", settings, "30,44,35", "3")
             folder = tmp_path_factory.mktemp(law)
-            run.run(case, folder, fields=False, picture=False, progress=False)
+            runner.run(case, folder, fields=False, picture=False, progress=False)
             done[law, drained] = RunFiles(case, folder, 0)
         return done[law, drained]
 
@@ -138,7 +138,7 @@ def test_the_reason_of_a_stop_is_judged_by_the_rigid_block(tmp_path, level, mu, 
     """With mu = 0.6 it slides at 40.6 m (T = mu N), with the resultant well within the base."""
     settings = {"law": "friction", "adhesion": 0.0, "mu": mu, "pena_tang": 0.0, "n_joint": 20.0}
     case = load("dam", settings, str(level), "3")
-    run.run(case, tmp_path, fields=False, picture=False, progress=False)
+    runner.run(case, tmp_path, fields=False, picture=False, progress=False)
     record = json.loads((tmp_path / "run.json").read_text())
     record |= {"state": "stopped", "verdict": verdict}
     (tmp_path / "run.json").write_text(json.dumps(record))
