@@ -19,6 +19,7 @@ run: setup
 check: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/mypy
 
 # Run the tests but those that take minutes (heavy); in CI all of them
 test: check
@@ -40,5 +41,5 @@ pages: setup
 
 # Remove results and caches
 clean:
-	rm -rf out .pytest_cache .ruff_cache .hypothesis
+	rm -rf out .pytest_cache .ruff_cache .mypy_cache .hypothesis
 	find scripts tests -name __pycache__ -prune -exec rm -rf {} +

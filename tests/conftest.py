@@ -1,7 +1,7 @@
 """Shared fixtures. A scene is computed once per session."""
 
 import pytest
-from damjoint import run
+from damjoint import runner
 from damjoint.model.case import load
 
 
@@ -24,7 +24,7 @@ def solve(tmp_path_factory):
         key = name, levels, tail_levels, steps, tuple(sorted(settings.items()))
         if key not in done:
             case = load(name, settings, levels, tail_levels, steps)
-            done[key] = run.run(
+            done[key] = runner.run(
                 case,
                 tmp_path_factory.mktemp(case.name),
                 fields=False,

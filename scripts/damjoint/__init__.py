@@ -10,8 +10,9 @@ engines/    a case solved: condensed/ with the parts above, getdp/ by the proble
 statics/    gravity method, limit analysis, verdict
 post/       tables, pictures, fields and folders of results
 accuracy.py the mesh that an accuracy requires, and the error that is left
-run.py      one case, solved and written
+runner.py   one case, solved and written
 studies/    checks, sweeps, critical values, a law along a path, reports
+library.py  the interface for Python: case, run, fill, a law of one's own
 gui/        the Gmsh window
 cli.py      the command line; __main__.py what has to be done before it
 
@@ -24,6 +25,7 @@ from __future__ import annotations
 TYPE_CHECKING = False  # typing's own takes time in which an interrupt is not yet heeded
 if TYPE_CHECKING:
     from pathlib import Path
+    from typing import Any
 
 __version__ = "0.2.0"
 
@@ -59,3 +61,19 @@ def data(folder: str) -> Path:
 
     packaged = Path(str(files(__name__))) / folder
     return packaged if packaged.is_dir() else Path(__file__).resolve().parents[2] / folder
+
+
+#: What `import damjoint` offers, see library.py; imported when it is used.
+LIBRARY = ("LAWS", "Law", "Run", "Step", "case", "fill", "run")
+
+
+def __getattr__(name: str) -> Any:
+    if name in LIBRARY:
+        from importlib import import_module
+
+        return getattr(import_module(".library", __name__), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return [*globals(), *LIBRARY]

@@ -200,7 +200,7 @@ def do_run(arguments: argparse.Namespace) -> int:
     from .model import parameters
     from .model.case import load
     from .post import summary
-    from .run import run
+    from .runner import run
     from .statics.verdict import failed, hints, path_statement, statement, verdict
 
     case = load(
@@ -363,7 +363,7 @@ def do_validate(arguments: argparse.Namespace) -> int:
     """Run damjoint validate; 1 if a row fails."""
     from .model.case import load
     from .post import validation
-    from .run import run
+    from .runner import run
     from .statics.verdict import statement
 
     cases = [load(name) for name in arguments.cases or validation.modelings()]

@@ -18,7 +18,7 @@ from damjoint.fem.bodies import Bodies
 from damjoint.fem.condensation import condense
 from damjoint.joint.interface import Interface, interface_of
 from damjoint.model.case import Case, load
-from damjoint.run import run
+from damjoint.runner import run
 from damjoint.solver.load_stepper import LoadStepper
 from damjoint.statics.verdict import verdict
 from damjoint.studies.sweep import pool_of, stepped

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from damjoint.model.case import Case, load
 from damjoint.post import validation
-from damjoint.run import run
+from damjoint.runner import run
 from damjoint.storage import locked_folder
 from tabulate import tabulate
 from threadpoolctl import threadpool_limits

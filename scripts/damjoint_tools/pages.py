@@ -130,7 +130,7 @@ def validation_page() -> str:
     """reference/ssnp142.md: the comparison with the published numbers, all cases computed again."""
     from damjoint.model.case import load
     from damjoint.post import validation
-    from damjoint.run import run
+    from damjoint.runner import run
 
     from .provenance import provenance, source_line
 

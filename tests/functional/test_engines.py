@@ -4,7 +4,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-from damjoint import run
+from damjoint import runner
 from damjoint.engines.getdp import law
 from damjoint.laws import LAWS
 from damjoint.model.case import Case, load
@@ -181,7 +181,7 @@ def test_runs_of_both_engines_agree_on_sections_and_loads(scene, tmp_path):
 def agree(case, tmp_path):
     """Assert equal joint.csv to 1e-6 of the largest jump, stress, ..."""
     reference, fast = (
-        run.run(case, tmp_path / name, fields=False, picture=False, progress=False, engine=name)
+        runner.run(case, tmp_path / name, fields=False, picture=False, progress=False, engine=name)
         for name in ("getdp", "condensed")
     )
     for a, b in zip(reference, fast, strict=True):

@@ -132,17 +132,17 @@ def test_tailwater_in_the_history(command, tmp_path):
 @pytest.mark.parametrize("engine", ["getdp", "condensed"])
 def test_an_interrupted_run_writes_its_converged_steps(tmp_path, monkeypatch, engine):
     """Ctrl-C after the second step."""
-    from damjoint import run
+    from damjoint import runner
     from damjoint.model.case import load
 
     def interrupt(self, scene, now):
         if now > 1:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(run.Progress, "step", interrupt)
+    monkeypatch.setattr(runner.Progress, "step", interrupt)
     case = load("c", {"n_joint": 10.0, "h_dam": 3.0, "h_found": 4.0})
     with pytest.raises(KeyboardInterrupt):
-        run.run(case, tmp_path / "out", False, False, False, engine)
+        runner.run(case, tmp_path / "out", False, False, False, engine)
     history = read(tmp_path / "out" / "history.csv")
     assert 1 <= len(history["time"]) < 5
     record = json.loads((tmp_path / "out" / "run.json").read_text())

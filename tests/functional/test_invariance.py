@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from closed_forms import JUMPS_AND_STRESSES, differences
-from damjoint import run
+from damjoint import runner
 from damjoint.engines.getdp import law
 from damjoint.model.case import load
 from numpy.testing import assert_allclose
@@ -158,13 +158,13 @@ def test_a_second_run_reads_the_condensed_bodies_from_the_cache(tmp_path, monkey
     """Also with another load or joint."""
     monkeypatch.setenv("DAMJOINT_CACHE", str(tmp_path / "cache"))
     one, again, other = (
-        run.run(load("c", settings), tmp_path / "out", False, False, False)[0]
+        runner.run(load("c", settings), tmp_path / "out", False, False, False)[0]
         for settings in ({}, {}, {"mu": 0.4, "rho_dam": 2300})
     )
     assert ["cache" in r.info["wall_seconds"] for r in (one, again, other)] == [False, True, True]
     assert max(differences(one, again)) == 0
     monkeypatch.setenv("DAMJOINT_CACHE", "")
-    (fresh,) = run.run(
+    (fresh,) = runner.run(
         load("c", {"mu": 0.4, "rho_dam": 2300}), tmp_path / "out", False, False, False
     )
     assert "cache" not in fresh.info["wall_seconds"]

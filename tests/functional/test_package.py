@@ -45,5 +45,7 @@ def test_the_wheel_runs_in_a_fresh_environment(tmp_path):
     assert ", 0 failed, " in out
     for tool in ("bench_page", "stress", "pages"):  # of the commands bench and stress, and make
         call(python, "-c", f"import damjoint_tools.{tool}", cwd=elsewhere, env=environment)
-    where = call(python, "-c", "import damjoint; print(damjoint.data('pro'))", cwd=elsewhere)
+    where = call(
+        python, "-c", "import damjoint; print(damjoint.data('pro'))", cwd=elsewhere, env=environment
+    )
     assert where.startswith(str(tmp_path / "env"))

@@ -63,7 +63,7 @@ def test_a_run_stops_at_the_critical_level(solve):
     assert verdict(result) == "overturning" == answer.mode
     assert result.last["level"] == pytest.approx(answer.value, rel=1e-4)
     assert result.last["level"] == pytest.approx(46.201, rel=1e-3)
-    assert "times as far, holds 46.16" in statement(result)
+    assert "times that displacement, holds 46.16" in statement(result)
 
 
 @pytest.mark.parametrize(

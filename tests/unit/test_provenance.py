@@ -60,7 +60,7 @@ def test_the_commit_is_that_of_the_checkout_with_its_changes(tmp_path):
     git("commit", "-m", "first")
     head = git("rev-parse", "--short=7", "HEAD")
     assert len(head) == 7 and commit() == head
-    (copy / "run.py").write_text("# changed")
+    (copy / "runner.py").write_text("# changed")
     assert commit() == f"{head} with changes"
 
 

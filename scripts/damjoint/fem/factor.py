@@ -20,7 +20,7 @@ from ..arrays import Array, IntArray, Sparse
 from .memory import check_memory, dense_memory
 
 try:
-    import mumps  # type: ignore[import-untyped]
+    import mumps
 except ImportError:  # not built for this Python, or the system's libmumps is gone
     mumps = None
 

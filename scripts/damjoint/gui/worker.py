@@ -26,7 +26,7 @@ from ..model.fields import Field
 from ..model.mesh import Body
 from ..model.parameters import declared
 from ..model.results import Results
-from ..run import early_end, write_outcomes
+from ..runner import early_end, write_outcomes
 from ..statics.verdict import failed, statement
 from ..storage import atomic_write
 from .sheet import Request, Sheet, case_text, check_request, titles

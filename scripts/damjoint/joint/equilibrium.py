@@ -1,8 +1,8 @@
 """The equilibrium of the joint with the condensed bodies around it (see fem/condensation.py).
 
 Unknown: the jump. Residual R = N^T W t(jump) - (water in the joint) + S jump - t_0(loading) = 0;
-the pressure of flowing water is solved for the jump at hand before every residual, and its
-derivative enters the tangent.
+the pressure of flowing water is solved at the same jump before every residual, and its derivative
+is part of the tangent.
 """
 
 from __future__ import annotations
@@ -14,27 +14,28 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, Sparse
 from ..laws import TANGENT, Law, Mode
 from ..model.case import Case, flows, has_drains
 from ..model.loads import Loading, line_forces, quake_column, water_column
 from .flow import FlowSolution
-from .interface import Change, Interface
+from .interface import Interface
+from .linear_system import Change
 from .wet_faces import WetFace
 
 
-@dataclass
+@dataclass(frozen=True, kw_only=True)
 class Pressure:
-    """Water pressure [Pa] at the law's points, at the water's points and at the nodes; and if it
-    flows, its mass flux:
-
-    mean of each joint element [kg/(m s)], and out of the toe per metre of thickness.
+    """Water pressure in the joint [Pa] at the law's points, at the integration points of the water
+    and at the nodes.
     """
 
-    points: np.ndarray
-    water_points: np.ndarray
-    nodes: np.ndarray
-    flux: np.ndarray | None = None
+    points: Array
+    water_points: Array
+    nodes: Array
+    #: of flowing water: mass flux, mean of each joint element [kg/(m s)], and out of the toe per
+    #: metre of thickness
+    flux: Array | None = None
     leakage: float = 0.0
 
 
@@ -49,15 +50,18 @@ class Residual:
     by_level: Callable[[], Array]
 
 
+#: Step of a difference with the level, over the size of the dam; level below which the reservoir
+#: counts as empty, and the level that replaces it, over the same.
+DIFFERENCE, EMPTY, SMALL_LEVEL = 1e-5, 1e-3, 0.1
+
+
 class Equilibrium:
-    """The joint of a case with the condensed bodies around it: residual, tangent and what is
-    evaluated from a jump.
-    """
+    """The joint with the condensed bodies: loads, water pressure, residual and tangent."""
 
     def __init__(self, case: Case, interface: Interface) -> None:
         self.case, self.bulk, self.interface = case, interface.bulk, interface
         self.wet, self.flowing = case["uplift"] != "none", flows(case)
-        #: where drains take from the water that flows
+        #: nodes and points of the drains of flowing water
         drained = self.flowing and has_drains(case)
         self.drains = interface.drains(case["drain_x"]) if drained else None
         self.unit_weight = case["rho_water"] * case["g"]
@@ -71,9 +75,9 @@ class Equilibrium:
     # -- loads
     # ---------------------------------------------------------------------------------------------
 
-    def face_forces(self, face: WetFace, loading: Loading) -> np.ndarray:
-        """Forces on the functions of a face [N], (functions * dim,): water, and upstream silt and
-        the water's added mass in an earthquake.
+    def face_forces(self, face: WetFace, loading: Loading) -> Array:
+        """Forces on the functions of a face [N], (functions * dim,): water; on the upstream face
+        also silt and the added mass of the water in an earthquake.
         """
         case = self.case
         level = loading.tail if face.side in ("down", "bed") else loading.level
@@ -86,14 +90,14 @@ class Equilibrium:
             shaking = 7 / 8 * case["k_h"] * loading.part("quake")
         floor = self.interface.floor
 
-        def height(level: float, y: np.ndarray, tilt: np.ndarray) -> np.ndarray:
+        def height(level: float, y: Array, tilt: Array) -> Array:
             still = np.maximum(level - y, 0)
             return still + shaking * tilt * np.sqrt(np.maximum(level - floor, 0) * still)
 
         def column(level: float, low: float, high: float) -> tuple[float, float]:
             still, quake = water_column(level, low, high), quake_column(level, low, high, floor)
             share = shaking * abs(face.normals[0, 0])
-            return tuple(a + share * b for a, b in zip(still, quake, strict=True))
+            return still[0] + share * quake[0], still[1] + share * quake[1]
 
         forces = self.unit_weight * face.press(level, height, column)
         grown = loading.part("silt") if face.side == "up" else 0.0
@@ -101,25 +105,25 @@ class Equilibrium:
             weight = grown * case["rho_silt"] * case["g"] * case["silt_K0"]
             depth = lambda level, y, _tilt: np.maximum(level - y, 0)
             silt = face.press(case["silt_height"], depth, water_column).reshape(-1, self.bulk.dim)
-            silt[:, 1:] = 0  # it presses horizontally, on the vertical projection
+            silt[:, 1:] = 0  # a horizontal pressure on the vertical projection
             forces += weight * silt.ravel()
         return forces
 
-    def units_of(self, loading: Loading) -> dict[str, float]:
-        """The unit loads of the bulk that act: weights [N/m3] and line forces [N/m]."""
+    def unit_loads(self, loading: Loading) -> dict[str, float]:
+        """Sizes of the unit loads that act: weights [N/m3] and line forces [N/m]."""
         case, quake = self.case, loading.part("quake")
         concrete = case["rho_dam"] * case["g"]
-        found = {
+        loads = {
             "dam_x": case["k_h"] * quake * concrete,
             "dam_y": (case["k_v"] * quake - 1) * concrete,
-            "foundation_y": 0.0 if case["in_situ"] else -case["rho_found"] * case["g"],
+            "loadsation_y": 0.0 if case["in_situ"] else -case["rho_loads"] * case["g"],
         }
-        found |= {"lower_x": found["dam_x"], "lower_y": found["dam_y"]}
+        loads |= {"lower_x": loads["dam_x"], "lower_y": loads["dam_y"]}
         for name, force in line_forces(case, loading).items():
-            found |= {f"{name}_{axis}": part for axis, part in zip("xy", force, strict=True)}
-        return {name: value for name, value in found.items() if value and name in self.bulk.units}
+            loads |= {f"{name}_{axis}": part for axis, part in zip("xy", force, strict=True)}
+        return {name: value for name, value in loads.items() if value and name in self.bulk.units}
 
-    def _external_forces(self, loading: Loading) -> tuple[np.ndarray, np.ndarray]:
+    def _external_forces(self, loading: Loading) -> tuple[Array, Array]:
         """Forces on the loaded unknowns (m,), and t_0 (j,) of them and of the unit loads."""
         bulk = self.bulk
         forces = np.zeros(bulk.pressure.shape[1])
@@ -127,83 +131,83 @@ class Equilibrium:
             dofs = bulk.dof_of_face[name]
             np.add.at(forces, dofs[dofs >= 0], self.face_forces(face, loading)[dofs >= 0])
         total = bulk.pressure @ forces
-        for name, size in self.units_of(loading).items():
+        for name, size in self.unit_loads(loading).items():
             total += size * bulk.units[name]
         return forces, total
 
-    def rate(self, of: Callable[[Loading], np.ndarray], loading: Loading) -> np.ndarray:
-        """The derivative with the reservoir level of what is nearly linear in it.
+    def rate(self, of: Callable[[Loading], Array], loading: Loading) -> Array:
+        """The derivative with the reservoir level of a function that is nearly linear in it.
 
-        An empty reservoir's thrust has none, which would leave a driven step without a direction:
-        it is that of a tenth of the dam's height.
+        It is zero for an empty reservoir, and displacement control could not start: there it is
+        taken at a small level.
         """
         height = self.case.size
-        step = 1e-5 * max(height, abs(loading.level))
-        level = loading.level if abs(loading.level) > 1e-3 * height else 0.1 * height
+        step = DIFFERENCE * max(height, abs(loading.level))
+        level = loading.level if abs(loading.level) > EMPTY * height else SMALL_LEVEL * height
         above, below = (replace(loading, level=level + s) for s in (step, -step))
         return (of(above) - of(below)) / (2 * step)
 
     # -- water in the joint
     # ---------------------------------------------------------------------------------------------
 
-    def head(self, loading: Loading, matrix: object = None) -> np.ndarray:
-        """Head [m] in a joint that conducts alike everywhere, at the joint's nodes or at places
-        that a matrix of `JointFields` leads to: linear on the way from the reservoir's level to the
-        tailwater's; a dry end has its own height, or the other end's head if that is lower.
+    def head(self, loading: Loading, matrix: Sparse | None = None) -> Array:
+        """Head [m] in a joint of uniform transmissivity, at the joint's nodes or at the places that
+        an interpolation matrix of `JointFields` leads to: linear along the joint between the levels
+        of reservoir and tailwater; a dry end has its own height, or the head of the other end if
+        that is lower.
 
-        Drains take away their part of the head above their outlet, the tailwater or their own
-        height (EM 1110-2-2200).
+        Drains reduce the head above their outlet, the tailwater or their own height, by their
+        effectiveness (EM 1110-2-2200).
         """
         case, along = self.case, self.interface.fields
         fields = along.heel_y, along.toe_y, along.xi
-        heel, toe, way = fields if matrix is None else (matrix @ field for field in fields)
+        heel, toe, xi = fields if matrix is None else (matrix @ field for field in fields)
         level, tail = loading.level, loading.tail
         first = np.maximum(level, np.minimum(heel, tail))
         last = np.maximum(tail, np.minimum(toe, level))
         if case["uplift"] != "drained":
-            return first + (last - first) * way
+            return first + (last - first) * xi
         at = case["drain_x"] / self.interface.length
-        there = first + (last - first) * at
+        drained = first + (last - first) * at
         outlet = np.maximum(heel + (toe - heel) * at, max(case["drain_level"], loading.tail))
-        there = there - case["drain_effectiveness"] * np.maximum(there - outlet, 0)
+        drained = drained - case["drain_effectiveness"] * np.maximum(drained - outlet, 0)
         return np.where(
-            way < at,
-            first + (there - first) * way / at,
-            there + (last - there) * (way - at) / (1 - at),
+            xi < at,
+            first + (drained - first) * xi / at,
+            drained + (last - drained) * (xi - at) / (1 - at),
         )
 
-    def uplift(
-        self, loading: Loading, matrix: object, y: np.ndarray, beyond: np.ndarray | float = 0.0
-    ) -> np.ndarray:
-        """Pressure [Pa], never below the air's, at places of height y that a matrix of
-        `JointFields` leads to; beyond: what flowing water adds there to the pressure imposed.
+    def uplift(self, loading: Loading, matrix: Sparse, y: Array, beyond: Array | float) -> Array:
+        """Pressure [Pa], not below zero, at places of height y that an interpolation matrix of
+        `JointFields` leads to; beyond: pressure of flowing water beyond the imposed one.
         """
         return np.maximum(self.unit_weight * (self.head(loading, matrix) - y) + beyond, 0)
 
-    def lift(self, loading: Loading, beyond: np.ndarray | float = 0.0) -> np.ndarray:
+    def lift(self, loading: Loading, beyond: Array | float = 0.0) -> Array:
         """Forces of the water in the joint on its two faces (j,)."""
         interface = self.interface
         weights, y = interface.water_points.weights, interface.water_points.positions[:, 1]
         pressure = self.uplift(loading, interface.fields.at_water, y, beyond)
-        return interface.opening_at_water.T @ (weights * pressure)
+        forces: Array = interface.opening_at_water.T @ (weights * pressure)
+        return forces
 
-    def _loads(self, loading: Loading) -> np.ndarray:
+    def _loads(self, loading: Loading) -> Array:
         """t_0 and, unless it flows, the water in the joint together (j,)."""
         total = self.external_forces(loading)[1]
         return total + self.lift(loading) if self.wet and not self.flowing else total
 
-    def expand_to_nodes(self, inner: np.ndarray) -> np.ndarray:
-        """The pressure at all of the joint's nodes from that at the inner ones."""
-        whole = np.zeros(self.interface.fields.nodes)
-        whole[self.interface.fields.inside] = inner
-        return whole
+    def expand_to_nodes(self, inner: Array) -> Array:
+        """A pressure at all nodes of the joint from that at the inner ones; zero at the ends."""
+        pressure = np.zeros(self.interface.fields.nodes)
+        pressure[self.interface.fields.inside] = inner
+        return pressure
 
-    def aperture(self, jump: np.ndarray, variables: Any) -> tuple[np.ndarray, np.ndarray, float]:
+    def aperture(self, jump: Array, variables: Any) -> tuple[Array, Array, float]:
         """Conductivity at the law's points over that of the closed joint, its derivative with the
-        opening, and the closed joint's aperture [m].
+        opening, and the aperture of the closed joint [m].
 
-        flow: cubic law. cracked: likewise, but from the opening on at which the bond is gone, and
-        up to where an open point conducts so well that it holds all of the head.
+        flow: cubic law. cracked: the same, but of the opening beyond that of a crack, and bounded
+        where an open point has practically the full head.
         """
         opening = self.interface.flow.opening @ jump
         if self.case["uplift"] == "flow":
@@ -217,13 +221,13 @@ class Equilibrium:
         growing = (wider > 0) & (wider < most)
         return factor**3, np.where(growing, 3 / narrowest * factor**2, 0), narrowest
 
-    def solve_flow(self, jump: np.ndarray, variables: Any, loading: Loading) -> FlowSolution:
+    def solve_flow(self, jump: Array, variables: Any, loading: Loading) -> FlowSolution:
         """Pressure beyond the imposed one at the inner nodes.
 
-        Drains: of the head that the joint would have there, they take away their part above their
-        outlet, the tailwater or their own height; the pressure is that part of one with the
-        outlet's head at the drains, and the rest of one without them. A crack that has reached them
-        takes their effect (EM 1110-2-2200).
+        Drains reduce the head above their outlet, the tailwater or their own height, by their
+        effectiveness e: the pressure is e times that with the outlet's head at the drains, plus
+        1 - e times that without drains. A crack that reaches the drains ends their effect
+        (EM 1110-2-2200).
         """
         case, flow = self.case, self.interface.flow
         factor = self.aperture(jump, variables)[0]
@@ -235,10 +239,10 @@ class Equilibrium:
         nodes, points = self.drains
         own = self.interface.surface.points[nodes, 1]
         outlet = np.maximum(own, max(case["drain_level"], loading.tail))
-        there = head[nodes] + self.expand_to_nodes(free.pressure)[nodes] / self.unit_weight
+        at_drains = head[nodes] + self.expand_to_nodes(free.pressure)[nodes] / self.unit_weight
         cracked = case["uplift"] == "cracked" and (factor[points] > 1).any()
         effect = case["drain_effectiveness"]
-        if cracked or not (there > outlet).all() or effect == 0:
+        if cracked or not (at_drains > outlet).all() or effect == 0:
             return free
         drained = flow.solve(
             conductivity, self.unit_weight * head, nodes, self.unit_weight * outlet
@@ -246,8 +250,8 @@ class Equilibrium:
         return free.mixed(effect, drained)
 
     def flowing_lift(
-        self, jump: np.ndarray, variables: Any, loading: Loading
-    ) -> tuple[np.ndarray, FlowSolution]:
+        self, jump: Array, variables: Any, loading: Loading
+    ) -> tuple[Array, FlowSolution]:
         """Forces of flowing water on the faces of the joint (j,), and its flow's solution."""
         solution = self.solve_flow(jump, variables, loading)
         beyond = self.interface.fields.at_water @ self.expand_to_nodes(solution.pressure)
@@ -296,33 +300,39 @@ class Equilibrium:
 
         return Residual(value, by_jump, by_level)
 
-    def pressure(self, jump: np.ndarray, variables: Any, loading: Loading) -> Pressure:
-        """The water's pressure in the joint for an opening."""
-        interface, bulk = self.interface, self.bulk
-        place = interface.space.locations
-        here = [interface.points.positions, interface.water_points.positions, place]
-        if not self.wet:
-            return Pressure(*(np.zeros(len(x)) for x in here))
-        along = interface.fields
-        matrices = along.at_points, along.at_water, along.at_locations
-        inner = self.solve_flow(jump, variables, loading).pressure if self.flowing else 0.0
-        whole = self.expand_to_nodes(inner)
-        found = [
-            self.uplift(loading, m, x[:, 1], m @ whole) for m, x in zip(matrices, here, strict=True)
-        ]
-        if self.case["uplift"] != "flow":
-            return Pressure(*found)
-        factor, _, narrowest = self.aperture(jump, variables)
-        conductivity = self.case["rho_water"] * narrowest**3 * factor / (12 * self.case["visc"])
-        total = self.unit_weight * self.head(loading) + whole
-        nodes = () if self.drains is None else (self.drains[0],)
-        return Pressure(*found, *interface.flow.flux(conductivity, total, bulk.width, *nodes))
+    def pressure(self, jump: Array, variables: Any, loading: Loading) -> Pressure:
+        """The water pressure in the joint at a jump."""
+        interface, fields = self.interface, self.interface.fields
+        inner: Array | float = 0.0
+        if self.flowing:
+            inner = self.solve_flow(jump, variables, loading).pressure
+        beyond = self.expand_to_nodes(np.asarray(inner))
 
-    def crest(self, jump: np.ndarray, loading: Loading) -> float:
+        def at(matrix: Sparse, positions: Array) -> Array:
+            if not self.wet:
+                return np.zeros(len(positions))
+            return self.uplift(loading, matrix, positions[:, 1], matrix @ beyond)
+
+        flux, leakage = None, 0.0
+        if self.case["uplift"] == "flow":
+            factor, _, narrowest = self.aperture(jump, variables)
+            conductivity = self.case["rho_water"] * narrowest**3 * factor / (12 * self.case["visc"])
+            total = self.unit_weight * self.head(loading) + beyond
+            drains = () if self.drains is None else (self.drains[0],)
+            flux, leakage = interface.flow.flux(conductivity, total, self.bulk.width, *drains)
+        return Pressure(
+            points=at(fields.at_points, interface.points.positions),
+            water_points=at(fields.at_water, interface.water_points.positions),
+            nodes=at(fields.at_locations, interface.space.locations),
+            flux=flux,
+            leakage=leakage,
+        )
+
+    def crest(self, jump: Array, loading: Loading) -> float:
         """The crest's displacement along x [m]."""
         bulk = self.bulk
         value = bulk.crest_pressure @ self.external_forces(loading)[0] + bulk.crest_jump @ jump
-        for name, size in self.units_of(loading).items():
+        for name, size in self.unit_loads(loading).items():
             value += size * bulk.crest_units[name]
         return float(value)
 

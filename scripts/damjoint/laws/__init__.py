@@ -1,21 +1,25 @@
-"""The joint laws: one file each, the same as in pro/law_*.pro, evaluated for many points at once.
+"""The joint laws, each a class after `Law` of base.py in the file of its name, as in pro/law_*.pro.
 
-A further law is a class after `Law` of base.py in a file of its own and a row of `LAWS` here.
+`rupture.py` has the class `Rupture`: the law of a case with law = rupture.
 """
 
 from __future__ import annotations
 
+from importlib import import_module
+from pkgutil import iter_modules
 from typing import Any
 
 from .base import TANGENT, Evidence, Law, Mode
-from .bond import Bond
-from .friction import UNBREAKABLE, Friction
-from .rupture import Rupture
+from .friction import UNBREAKABLE
 
 __all__ = ["COLUMNS", "LAWS", "TANGENT", "UNBREAKABLE", "Evidence", "Law", "Mode"]
 
 #: By the value of the parameter `law`.
-LAWS: dict[str, type[Law[Any]]] = {"rupture": Rupture, "friction": Friction, "bond": Bond}
+LAWS: dict[str, type[Law[Any]]] = {
+    file.name: getattr(import_module(f".{file.name}", __name__), file.name.capitalize())
+    for file in iter_modules(__path__)
+    if file.name != "base"
+}
 
 #: Columns of joint.csv that only some laws have: {name: (unit, meaning)}.
 COLUMNS = {name: column for law in LAWS.values() for name, column in law.columns.items()}

@@ -1,4 +1,4 @@
-"""What a joint law provides, for many points at once; what the rest of the package knows of it.
+"""The interface of a joint law: all that the package uses of it, for many points at once.
 
 Arrays: jump (q, 3) is the displacement jump delta_n, delta_t1, delta_t2 [m]; traction (q, 3) is
 sigma_n (effective), tau_1, tau_2 [Pa]; tangent (q, 3, 3) is its derivative with the jump [Pa/m].
@@ -36,7 +36,7 @@ TANGENT = Mode()
 
 @dataclass(frozen=True)
 class Evidence:
-    """What a run shows of a law's weak side, see `Law.hints`."""
+    """Results of a run that `Law.hints` depends on."""
 
     crack_length: float
     #: whether a crack has grown unstably, or the run has not converged

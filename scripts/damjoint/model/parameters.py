@@ -18,6 +18,7 @@ import gmsh
 
 from .. import InputError, data
 from ..arrays import Value
+from ..laws import LAWS
 
 DECLARATIONS = data("pro") / "parameters.pro"
 #: The line by which a text includes the declarations.
@@ -109,7 +110,7 @@ class Parameter:
     def allows(self, value: Value) -> bool:
         """Whether a value is one of the choices, or a number within the range."""
         if self.choices:
-            return value in self.choices
+            return value in self.choices or (self.name == "law" and value in LAWS)
         if isinstance(value, str):
             return False
         if self.automatic and value == AUTOMATIC:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
-from matplotlib.figure import FigureBase
+from matplotlib.figure import Figure, FigureBase
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from .. import ROUND_OFF
@@ -66,10 +66,17 @@ DISTANCE = "distance from the heel along the joint [m]"
 
 
 def draw(solution: Solution, folder: Path) -> Path:
-    """Draw all into folder/<case>.png and return its path; a load curve into <case>_curve.png.
+    """Draw all into folder/<case>.png and return its path; a load curve into <case>_curve.png."""
+    result = solution.result
+    if result.case["drive"] != "level":
+        write_picture(draw_curve(result), folder / f"{result.case.name}_curve.png", DPI)
+    path = folder / f"{result.case.name}.png"
+    write_picture(picture(solution), path, DPI, compress_level=2)
+    return path
 
-    The state drawn is the last one, or that of the published numbers.
-    """
+
+def picture(solution: Solution) -> Figure:
+    """Section and joint at the last state, or that of the published numbers; the history."""
     result = solution.result
     case = result.case
     has_states = bool(len(result.joint["time"]))
@@ -87,11 +94,7 @@ def draw(solution: Solution, folder: Path) -> Path:
         draw_history(parts[1], result)
         if case["dim"] == 3:
             draw_solid(parts[2], solution, time)
-    if case["drive"] != "level":
-        write_picture(draw_curve(result), folder / f"{case.name}_curve.png", DPI)
-    path = folder / f"{case.name}.png"
-    write_picture(figure, path, DPI, compress_level=2)
-    return path
+    return figure
 
 
 def shown_time(result: Results) -> float:

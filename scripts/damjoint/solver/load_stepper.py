@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from copy import copy
 from dataclasses import asdict, dataclass, replace
 
@@ -17,6 +17,10 @@ from .history import History
 from .model import Model, StepResult
 from .path import ROUGH, SURE, EquilibriumPath, Point
 from .relaxation import over_unstable_growth
+from .state import State
+
+#: Times and relative lengths of steps that differ by less are the same.
+SAME_TIME = 1e-9
 
 #: Number of strategies by which a step from the equilibrium path to the prescribed level is tried.
 FROM_PATH = 3
@@ -39,8 +43,12 @@ class LoadStepper:
     """Load stepping: the converged steps are rows of the history, the requested levels tables."""
 
     def __init__(
-        self, case: Case, interface: Interface, on_step: Callable[[float], None] = lambda time: None
+        self,
+        case: Case,
+        interface: Interface | None = None,
+        on_step: Callable[[float], None] = lambda time: None,
     ) -> None:
+        """interface: see `Model`; on_step: called with the time of each converged step."""
         self.model, self.on_step = Model(case, interface), on_step
         self.history = History(self.model.equilibrium)
         self.state = self.model.start()
@@ -49,7 +57,7 @@ class LoadStepper:
         self.path_ended = False
         #: how the dam fails, once its equilibrium path has shown that it does
         self.mechanism: Mechanism | None = None
-        #: the levels of limit points that have been passed, and the lowest ones behind them [m]
+        #: levels of the limit points that have been passed, and the lowest ones behind them [m]
         self.limit_points: tuple[tuple[float, float], ...] = ()
         #: the levels at which a crack grew unstably, to a state that depends on the steps
         self.relaxed_at: tuple[float, ...] = ()
@@ -83,40 +91,45 @@ class LoadStepper:
         if not self.drives:
             return LevelControl(level)
         begin, end, last = case["drive_begin"], case["drive_end"], case.times[-1]
-        if time > end + 1e-9:  # the level goes on from that at the end of the displacement
+        if time > end + SAME_TIME:  # the level continues from that at the end of the displacement
             start = self.level_at_drive_end
             share = (time - end) / (last - end)
             return LevelControl(start + (case.level_at(last) - start) * share)
-        if not begin + 1e-9 < time:
+        if not begin + SAME_TIME < time:
             return LevelControl(level)
         share = (time - begin) / (end - begin)
         return DRIVES[case["drive"]](self.displacement_at_begin + case["drive_by"] * share)
 
     def run(self) -> Results:
-        """Follow all the times of the case that are still to come."""
+        """Follow the times of the case from the last state on."""
+        for _ in self.steps():
+            pass
+        return self.results()
+
+    def steps(self) -> Iterator[State]:
+        """Follow the times of the case from the last state on, and yield each converged state."""
         for target in self.case.times:
             if target > self.state.time and not self.stopped:
-                self.advance_to(target)
+                yield from self.steps_to(target)
                 if target in self.case.requested and not self.stopped:
                     self.history.save(self.state)
         if self.stopped:
             self.save_last()
-        return self.results()
 
     def save_last(self) -> None:
-        """Make a table of the last converged state, if there is none yet."""
+        """Make a table of the last converged state, unless it has one."""
         if self.state.time > 0 and self.history.saved_until < self.state.time:
             self.history.save(self.state)
 
     def weigh(self) -> bool:
-        """The state under the weight alone, from where displacements count; whether there is one.
+        """Solve for the weight alone, from where displacements count; whether it converges.
 
-        It has no row in the history.
+        The state has no row in the history.
         """
-        found = self.model.advance(self.state, 0.0, self.control(0.0))
-        if found is None:
+        step = self.model.advance(self.state, 0.0, self.control(0.0))
+        if step is None:
             return False
-        self.state = found.state
+        self.state = step.state
         if self.case["weight_first"]:
             self.history.at_rest = self.state
         if self.drives:
@@ -132,9 +145,9 @@ class LoadStepper:
         self.state = step.state.after(self.state)
         self.history.add(step, cuts)
         if self.drives:
-            if self.state.time < self.case["drive_begin"] + 1e-9:
+            if self.state.time < self.case["drive_begin"] + SAME_TIME:
                 self.displacement_at_begin = self.controlled_displacement()
-            if self.state.time < self.case["drive_end"] + 1e-9:
+            if self.state.time < self.case["drive_end"] + SAME_TIME:
                 self.level_at_drive_end = self.state.loading.level
         self.on_step(self.state.time)
 
@@ -142,58 +155,79 @@ class LoadStepper:
         """One step to a time by the first strategy; whether it converges."""
         first = self.model.strategies[:1]
         control = self.control(time)
-        found = self.model.advance(self.state, time, control, strategies=first, extrapolate=True)
-        if found:
-            self.accept(found, cuts=0)
-        return found is not None
+        step = self.model.advance(self.state, time, control, strategies=first, extrapolate=True)
+        if step:
+            self.accept(step, cuts=0)
+        return step is not None
 
     def advance_to(self, target: float) -> None:
-        """Steps up to a time; a step that does not converge is cut, the next ones grow again.
+        """Take the steps up to a time, see `steps_to`."""
+        for _ in self.steps_to(target):
+            pass
+
+    def steps_to(self, target: float) -> Iterator[State]:
+        """The steps up to a time; one that does not converge is cut, the next ones grow again.
 
         The first step includes the weight at any length: it is cut to the weight alone first.
         """
-        case, model = self.case, self.model
+        case = self.case
         # a displacement prescribed from t = 0 on counts from the weight alone, too
         first = case["weight_first"] or (self.drives and case["drive_begin"] == 0)
         if first and self.state.time == 0 and not self.state.jump.any():
             self.weigh()
-        *strategies, fallback = model.strategies
         cuts, dt, weighed = 0, np.inf, self.state.time > 0 or self.state.jump.any()
         while self.state.time < target and not self.stopped:
+            begin = self.state
             time = min(self.state.time + dt, target)
-            time = target if target - time < 1e-9 else time
-            smallest = time - self.state.time < case["smallest_step"] * (1 + 1e-9)
-            ended = self.path_ended and (self.mechanism is not None or not smallest)
-            quick = ended or (self.relaxed_at and not smallest)
-            found = model.advance(
-                self.state,
-                time,
-                self.control(time),
-                strategies=strategies[:1] if quick else strategies,
-                extrapolate=True,
-                persist=smallest,
-            )
-            if found is None and not weighed:
+            time = target if target - time < SAME_TIME else time
+            smallest = time - self.state.time < case["smallest_step"] * (1 + SAME_TIME)
+            step = self.direct_step(time, smallest)
+            if step is None and not weighed:
                 weighed = True
                 if self.weigh():
                     cuts += 1
                     continue
-            if found is None and not ended:
-                found = self.over_limit_point(time, cuts, smallest)
-            if found is None:
-                length, cuts = time - self.state.time, cuts + 1
-                dt = max(case.shared["cut"][0] * length, case["smallest_step"])
-                if smallest and self.mechanism:
-                    self.stopped = True
-                elif smallest:
-                    time = target
-                    control = self.control(time)
-                    found = model.advance(self.state, time, control, strategies=[fallback])
-                    self.stopped = found is None
-            if found:
+            if step is None and not self.beyond_path(smallest):
+                step = self.over_limit_point(time, cuts, smallest)
+            if step is None:
+                cuts += 1
+                dt = max(case.shared["cut"][0] * (time - self.state.time), case["smallest_step"])
+                if smallest:
+                    time, step = target, self.fallback_step(target)
+            if step:
                 dt = 2 * (time - self.state.time)
-                self.accept(found, cuts)
+                self.accept(step, cuts)
                 cuts = 0
+            if self.state is not begin:  # by this step, or at the limit point of a path
+                yield self.state
+
+    def direct_step(self, time: float, smallest: bool) -> StepResult | None:
+        """A step to a time from the last state; smallest: whether it can be cut no more."""
+        *strategies, _ = self.model.strategies
+        quick = self.beyond_path(smallest) or (self.relaxed_at and not smallest)
+        return self.model.advance(
+            self.state,
+            time,
+            self.control(time),
+            strategies=strategies[:1] if quick else strategies,
+            extrapolate=True,
+            persist=smallest,
+        )
+
+    def beyond_path(self, smallest: bool) -> bool:
+        """Whether a step starts where the equilibrium path has ended: the dam has failed, or the
+        step can still be cut.
+        """
+        return self.path_ended and (self.mechanism is not None or not smallest)
+
+    def fallback_step(self, target: float) -> StepResult | None:
+        """The whole step to a time by the last strategy, unless the dam has failed; else stop."""
+        step = None
+        if self.mechanism is None:
+            control, fallback = self.control(target), self.model.strategies[-1:]
+            step = self.model.advance(self.state, target, control, strategies=fallback)
+        self.stopped = step is None
+        return step
 
     # -- beyond a limit point
 
@@ -203,22 +237,21 @@ class LoadStepper:
         Along the equilibrium path, unless opening releases the shear stiffness: such a path has a
         kink and a turn at every point. Else, and where the path is lost, by relaxation.
         """
-        equilibrium, found = self.model.equilibrium, None
+        equilibrium, step = self.model.equilibrium, None
         law = equilibrium.law
         follows = not (law.releases_shear or self.drives or self.path_ended)
         if follows and (smallest or not cuts):
-            found = self.along_path(time)
+            step = self.along_path(time)
             if self.path_ended and not smallest:  # shorter steps from where the path has ended
                 return None
-        if found is None and (law.softens or equilibrium.flowing):
-            known = bool(self.relaxed_at) or smallest or cuts > 0
-            control = self.control(time)
-            accept = law.softens and known
-            if step := over_unstable_growth(self.model, self.state, time, control, accept):
-                found, own = step
-                if not own:
-                    self.relaxed_at += (found.state.loading.level,)
-        return found
+        if step is None and (law.softens or equilibrium.flowing):
+            accept_relaxed = law.softens and (bool(self.relaxed_at) or smallest or cuts > 0)
+            step, relaxed = over_unstable_growth(
+                self.model, self.state, time, self.control(time), accept_relaxed
+            )
+            if step and relaxed:
+                self.relaxed_at += (step.state.loading.level,)
+        return step
 
     def along_path(self, time: float) -> StepResult | None:
         """A step along the equilibrium path, until it reaches the level of its time.
@@ -236,9 +269,9 @@ class LoadStepper:
         same = self.same_but_for_level(path.points[1].state.loading, begin.loading)
         start = path.points[0]
         if not same:
-            del path.points[0]  # no point of this path: other loads acted
+            del path.points[0]  # under other loads: not on this path
         while path.points[-1].level < level:
-            # an earlier path's mechanism, under other loads, does not end this one
+            # (a mechanism of an earlier path, under other loads, does not end this one)
             fails = path.slides or path.settled(ROUGH if path.ended else SURE)
             if fails or path.ended:
                 mechanism = self.mechanism_of(path)
@@ -259,14 +292,14 @@ class LoadStepper:
             jump = last.state.jump + share * (jump - last.state.jump)
         strategies = self.model.strategies[:FROM_PATH]
         control = LevelControl(level)
-        found = self.model.advance(
+        step = self.model.advance(
             last.state, time, control, strategies=strategies, guess=(jump, level)
         )
-        if found is None:
+        if step is None:
             return None
         self.record_limit_points(levels)
         spent = beyond.history.iterations_since(len(self.history))
-        return replace(found, iterations=spent + found.iterations)
+        return replace(step, iterations=spent + step.iterations)
 
     def record_limit_points(self, levels: list[float]) -> None:
         """Record the first limit point that a path has passed, and the lowest level behind it."""
@@ -302,8 +335,8 @@ class LoadStepper:
         """All tables so far, and what is known of failure and unstable crack growth."""
         results = self.history.results(self.case, self.stopped)
         if not self.stopped:
-            self.mechanism = None  # the dam has been found to stand
-        elif self.mechanism:  # the last steps of the level may have gone a little further
+            self.mechanism = None  # shorter steps have passed it
+        elif self.mechanism:  # the last steps of the level may have reached a little higher
             time, last = self.mechanism.time, self.state.loading
             if self.same_but_for_level(Loading.at(self.case, time, 0.0, last.tail), last):
                 highest = max(self.mechanism.level, float(last.level))

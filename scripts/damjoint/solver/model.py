@@ -146,7 +146,7 @@ class Model:
         self, state: State, time: float, control: Control, extrapolate: bool
     ) -> tuple[Array, float]:
         """Jump and level where Newton's method starts: the last state's, or extrapolated where the
-        loading goes on in the same direction.
+        loading continues in the same direction.
         """
         level, before = state.loading.level, state.previous
         prescribed = control.level if isinstance(control, LevelControl) else None

@@ -32,14 +32,12 @@ def relax(model: Model, begin: State, time: float, control: Control) -> StepResu
         start = state.begin_step(law, time)
         frozen = start.freeze(equilibrium)
         coupled = strategies[:1] if equilibrium.flowing else strategies
-        found = model.advance(
-            start, time, control, strategies=coupled, persist=False, frozen=frozen
-        )
-        if found is None and equilibrium.flowing:
+        step = model.advance(start, time, control, strategies=coupled, persist=False, frozen=frozen)
+        if step is None and equilibrium.flowing:
             level = control.level if isinstance(control, LevelControl) else start.loading.level
             loading = model.loading(time, level)
             lift, _ = equilibrium.flowing_lift(start.jump, start.variables, loading)
-            found = model.advance(
+            step = model.advance(
                 start,
                 time,
                 control,
@@ -48,16 +46,16 @@ def relax(model: Model, begin: State, time: float, control: Control) -> StepResu
                 frozen=frozen,
                 frozen_lift=lift,
             )
-        if found is None:
+        if step is None:
             return None
-        iterations += found.iterations
-        state = replace(found.state, time=begin.time)
+        iterations += step.iterations
+        state = replace(step.state, time=begin.time)
         jump, variables = state.jump, state.begin_step(law, time).variables
         residual = equilibrium.residual(jump, variables, state.loading).value
         size = float(np.linalg.norm(residual))
         if size <= model.convergence.tolerance:
             pressure = equilibrium.pressure(jump, variables, state.loading)
-            relaxed = replace(found.state, pressure=pressure).after(begin)
+            relaxed = replace(step.state, pressure=pressure).after(begin)
             return StepResult(relaxed, iterations, size / (model.reference or 1.0))
         if repeats(size, sizes, SAME):
             return None
@@ -67,19 +65,18 @@ def relax(model: Model, begin: State, time: float, control: Control) -> StepResu
 
 def over_unstable_growth(
     model: Model, begin: State, time: float, control: Control, accept_relaxed: bool
-) -> tuple[StepResult, bool] | None:
-    """A step over unstable crack growth: Newton's method from the relaxed state; where that does
-    not converge and `accept_relaxed`, the relaxed state itself.
-
-    The last: whether it is the step's own state, by the law from the last one.
+) -> tuple[StepResult | None, bool]:
+    """A step over unstable crack growth, and whether it is the relaxed state: by Newton's method
+    from that state, by the law from the last one; where it does not converge and `accept_relaxed`,
+    the relaxed state itself.
     """
     relaxed = relax(model, begin, time, control)
     if relaxed is None:
-        return None
+        return None, False
     first, *others = model.strategies
     strategies = [first, *(strategy for strategy in others if strategy.release)]
     guess = relaxed.state.jump, relaxed.state.loading.level
-    found = model.advance(begin, time, control, strategies=strategies, persist=False, guess=guess)
-    if found:
-        return replace(found, iterations=relaxed.iterations + found.iterations), True
-    return (relaxed, False) if accept_relaxed else None
+    step = model.advance(begin, time, control, strategies=strategies, persist=False, guess=guess)
+    if step:
+        return replace(step, iterations=relaxed.iterations + step.iterations), False
+    return (relaxed, True) if accept_relaxed else (None, False)

@@ -22,7 +22,7 @@ from ..post import folder as folders
 from ..post.check_picture import SIGN, draw_check
 from ..post.tables import write_csv
 from ..post.units import FORCES, MOMENTS, STRESSES, Units, unit
-from ..run import run
+from ..runner import run
 from ..statics import gravity, verdict
 from ..statics.gravity import GravityMethod
 

@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain, zip_longest
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.optimize import bisect
@@ -20,6 +21,7 @@ from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from .. import InputError
+from ..arrays import Values
 from ..engines import Outcome
 from ..engines.condensed.solve import about
 from ..joint.interface import interface_of
@@ -29,7 +31,7 @@ from ..model.parameters import parameter
 from ..model.results import Results
 from ..post import folder as folders
 from ..post.tables import write_csv
-from ..run import save
+from ..runner import save
 from ..solver.path import PRECISION, ROUGH, SURE, Point
 from ..statics import gravity
 from ..statics.limit import elastic_heel_stress
@@ -125,7 +127,7 @@ class Search:
         self,
         case: str,
         of: str,
-        settings: dict | None = None,
+        settings: Values | None = None,
         levels: str | Sequence[float] | None = None,
         tail_levels: str | Sequence[float] | None = None,
         on_progress: Callable[[str], None] = lambda message: None,
@@ -455,7 +457,7 @@ def outwards(value: float, end: float) -> Iterator[float]:
 def critical(
     case: str,
     of: str,
-    settings: dict | None = None,
+    settings: Values | None = None,
     levels: str | None = None,
     tail_levels: str | None = None,
     out: Path | None = None,
@@ -521,7 +523,7 @@ def write(search: Search, answer: Answer, out: Path, seconds: float) -> None:
         picture.draw(shown, out / f"{case.name}_critical.png")
 
 
-def as_json(search: Search, answer: Answer) -> dict:
+def as_json(search: Search, answer: Answer) -> dict[str, Any]:
     """The answer in run.json."""
     return {
         "of": search.of,

@@ -66,7 +66,7 @@ def add_external_forces(
     for name, dofs in body.face_dofs.items():
         face = equilibrium.interface.faces[name]
         np.add.at(load, dofs, equilibrium.face_forces(face, state.loading))
-    for name, size in equilibrium.units_of(state.loading).items():
+    for name, size in equilibrium.unit_loads(state.loading).items():
         if name in body.unit_loads:
             load += size * body.unit_loads[name]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from functools import lru_cache, partial
+from typing import Any
 
 from threadpoolctl import threadpool_limits
 
@@ -26,13 +27,13 @@ MANY = 3000
 
 
 def check(case: Case) -> None:
-    """Raise InputError if a user's own geometry is not what is needed; any other case will do."""
+    """Raise InputError if an own geometry lacks a region; this engine runs any other case."""
     if case.geometry:
         mesh_of(case)
 
 
-def about(bulk: Condensed) -> dict:
-    """What run.json says of the engine and its mesh."""
+def about(bulk: Condensed) -> dict[str, Any]:
+    """The engine and its mesh in run.json."""
     return {
         "engine": "condensed",
         "factorisation": factor.name(),
@@ -47,7 +48,9 @@ def solve(case: Case, on_step: OnStep, _fields: bool) -> Iterator[Outcome]:
         start = time.perf_counter()
         bulk, made = cached(case)
         before = bulk.seconds if made else {"cache": time.perf_counter() - start}
-        interface, steppers, recovered = Interface(bulk, case["quadrature"]), [], []
+        interface = Interface(bulk, case["quadrature"])
+        steppers: list[LoadStepper] = []
+        recovered: list[dict[float, Field]] = []
 
         @lru_cache
         def bodies() -> Bodies:
@@ -63,15 +66,17 @@ def solve(case: Case, on_step: OnStep, _fields: bool) -> Iterator[Outcome]:
             return recovered[number]
 
         for number, scene in enumerate(case.scenes()):
-            begin, error = time.perf_counter(), None
-            steppers.append(LoadStepper(scene, interface, partial(on_step, number)))
+            begin = time.perf_counter()
+            error: BaseException | None = None
+            stepper = LoadStepper(scene, interface, partial(on_step, number))
+            steppers.append(stepper)
             try:
-                steppers[-1].run()
-            except BaseException as caught:  # an interruption, too: what has converged is a result
+                stepper.run()
+            except BaseException as caught:  # an interruption, too: converged steps are a result
                 error = caught
-                if steppers[-1].history.complete(steppers[-1].state):
-                    steppers[-1].save_last()
-            result = steppers[-1].results()
+                if stepper.history.complete(stepper.state):
+                    stepper.save_last()
+            result = stepper.results()
             seconds = before | {"solve": time.perf_counter() - begin}
             result.info |= about(bulk) | {"wall_seconds": seconds}
             yield Outcome(result, lambda: bodies().mesh, partial(fields, number), error)

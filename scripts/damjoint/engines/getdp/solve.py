@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ... import InputError, RunError
+from ... import InputError, RunError, data
 from ...fem.memory import bulk_size, check_memory
 from ...model.case import Case, flows, has_drains
 from ...model.mesh import Mesh, mesh_of
@@ -32,6 +32,10 @@ def check(case: Case) -> None:
         raise InputError(
             f"mesh_pattern = {case['mesh_pattern']}: must be one of {', '.join(SOLID)} "
             "with engine = getdp in 3D"
+        )
+    if not (data("pro") / f"law_{case['law']}.pro").is_file():
+        raise InputError(
+            f"law = {case['law']}: must have a file pro/law_{case['law']}.pro with engine = getdp"
         )
     if flows(case) and has_drains(case):
         raise InputError(f"drains = 1: must be 0 with engine = getdp and uplift = {case['uplift']}")
