@@ -12,7 +12,7 @@ post/       tables, pictures, fields and folders of results
 accuracy.py the mesh that an accuracy requires, and the error that is left
 runner.py   one case, solved and written
 studies/    checks, sweeps, critical values, a law along a path, reports
-library.py  the interface for Python: case, run, fill, a law of one's own
+library.py  the interface for Python: case, run, check, critical, fill, own laws
 gui/        the Gmsh window
 cli.py      the command line; __main__.py what has to be done before it
 
@@ -64,7 +64,7 @@ def data(folder: str) -> Path:
 
 
 #: What `import damjoint` offers, see library.py; imported when it is used.
-LIBRARY = ("LAWS", "Law", "Run", "Step", "case", "fill", "run")
+LIBRARY = ("LAWS", "Law", "case", "check", "critical", "fill", "run")
 
 
 def __getattr__(name: str) -> Any:

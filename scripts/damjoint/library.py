@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -25,11 +25,14 @@ from .model.case import Case, load
 from .model.fields import Solution
 from .model.results import Results
 from .solver.load_stepper import LoadStepper
-from .solver.model import Model
 from .solver.state import State
 from .statics.verdict import hints, statement, verdict
 
-__all__ = ["LAWS", "Law", "Model", "Run", "Step", "case", "fill", "run"]
+if TYPE_CHECKING:  # loaded when they are used, with what they draw with
+    from .studies.check import SafetyCheck
+    from .studies.critical import Answer, Search
+
+__all__ = ["LAWS", "Critical", "Law", "Run", "Step", "case", "check", "critical", "fill", "run"]
 
 #: Relative difference up to which two levels are the same.
 SAME_LEVEL = 1e-9
@@ -203,3 +206,71 @@ def fill(source: Case | str | Path) -> Iterator[Step]:
     stepper = LoadStepper(chosen)
     for state in stepper.steps():
         yield Step(state, stepper.history.last)
+
+
+def check(cases: Sequence[Case]) -> list[SafetyCheck]:
+    """Safety factors of load combinations, by the finite elements and by the gravity method.
+
+    `rows` of a check are those of check.csv, `why` is empty if nothing fails, `notes` are what to
+    know. Raises InputError, RunError.
+    """
+    from .studies.check import check_has_section, compare_methods
+
+    for one in cases:
+        check_has_section(one)
+    return [compare_methods(run(one).results) for one in cases]
+
+
+@dataclass(frozen=True)
+class Critical:
+    """A critical value."""
+
+    answer: Answer
+    search: Search
+
+    @property
+    def value(self) -> float | None:
+        """The largest load or smallest strength with an equilibrium; None if there is no limit."""
+        return self.answer.value
+
+    @property
+    def mode(self) -> str:
+        """How the dam fails beyond it: sliding, overturning, ..."""
+        return self.answer.mode
+
+    @property
+    def confirmed(self) -> bool:
+        """Whether a mechanism or statics confirms it."""
+        return self.answer.confirmed
+
+    @property
+    def statement(self) -> list[str]:
+        """The lines that `damjoint critical` prints."""
+        return self.answer.lines(self.search)
+
+    @property
+    def equilibria(self) -> np.recarray:
+        """critical.csv: a row per equilibrium of each trial."""
+        from .studies.critical import table
+
+        return records(table(self.search))
+
+
+def critical(
+    source: str | Path = "dam",
+    of: str = "level",
+    *,
+    levels: Sequence[float] | float | None = None,
+    tail_levels: Sequence[float] | float | None = None,
+    **parameters: Value,
+) -> Critical:
+    """The level, strength, uplift or parameter at which no equilibrium is left.
+
+    source, levels, tail_levels, parameters: as of `case`; of: level, strength, uplift or the name
+    of a parameter. Raises InputError, RunError.
+    """
+    from .studies.critical import Search
+
+    heights = [None if v is None else np.atleast_1d(v).tolist() for v in (levels, tail_levels)]
+    search = Search(str(source), of, parameters, *heights)
+    return Critical(search.run(), search)

@@ -33,6 +33,7 @@ from .parameters import (
     levels_of,
     listing,
     number,
+    parameter,
     parse,
 )
 from .values import ParameterValues
@@ -278,7 +279,7 @@ def load(
     tails = lists.pop("tail_levels", (0.0,))
     if tail_levels is not None:
         tails = levels_of("tail_levels", tail_levels)
-    overrides = {name: declared()[name].check(value) for name, value in overrides.items()}
+    overrides = {name: parameter(name).check(value) for name, value in overrides.items()}
     text = assignments(file.defaults | overrides)
     variables = parse(text + "".join(listing(n, v) for n, v in lists.items()) + INCLUDE)
     geometry = own_geometry(file.texts["geometry"]) if "geometry" in file.texts else None

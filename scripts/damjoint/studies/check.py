@@ -345,6 +345,15 @@ def signed_cell(value: float) -> str:
     return f"{value:+.3g}" if value else "0"
 
 
+def check_has_section(case: Case) -> None:
+    """Raise InputError if the gravity method does not apply to a case."""
+    if case.geometry:
+        raise InputError(
+            f"case {case.name}: must have a section by parameters, which the gravity method needs; "
+            "damjoint critical finds the limits of any geometry"
+        )
+
+
 def check_cases(cases: list[Case], out: Path) -> list[SafetyCheck]:
     """Run cases, each into its folder below out, and check them.
 
@@ -355,11 +364,7 @@ def check_cases(cases: list[Case], out: Path) -> list[SafetyCheck]:
     for case in cases:
         if names.count(case.name) > 1:
             raise InputError(f"case {case.name}: must be given once, by a name of its own")
-        if case.geometry:
-            raise InputError(
-                f"case {case.name}: must have a section by parameters, which the gravity method "
-                "needs; damjoint critical finds the limits of any geometry"
-            )
+        check_has_section(case)
         engine_of(case, "auto")
     checks = []
     for case in cases:
