@@ -91,8 +91,8 @@ def results_page() -> str:
         "Written by a run under displacement control: `time`, `level` [m], `pressure` [Pa] at the "
         "foot of the face, `heel_opening` [m], `crest_ux` [m] of each converged step.",
         "## check.csv",
-        "Written by `damjoint check`: for each scene a row for the finite elements, one for the "
-        "gravity method, and, where both have the same load, one with their difference (first "
+        "Written by `damjoint check`: for each scene a row by the finite elements, a row by the "
+        "gravity method, and, where both have the same load, a row with their difference (first "
         "minus second).",
         check,
         "## gravity.csv",
