@@ -37,14 +37,15 @@ def parameters_page() -> str:
         "by `--set name=value`, by `default_name = value;` in a case file, or in the Gmsh window. "
         "The defaults are those of a 45 m dam of ordinary concrete on rock; "
         "[cases/ssnp142.case](../cases/ssnp142.case) contains those of the verification case. "
-        "A parameter with the default -1 follows others. Terms and symbols: "
+        'The default -1 means a value computed from others: see the column "allowed". A parameter '
+        'has no effect unless the condition "used if" holds. Terms and symbols: '
         "[glossary](glossary.md).",
         "The water levels are lists in the case file, or options: `levels() = {30, 40, 45};` "
         "(`--levels`) [m above the base's heel], from 0 at t = 0, level number i reached at t = i; "
-        "`tail_levels()` (`--tail-levels`) likewise, one value for all or as many as "
-        "levels; `times()` (`--steps` between two levels) the times of the load steps. Default: "
-        "two thirds and eight ninths of the height, and the crest. In the Gmsh window they are in "
-        "the group Water levels.",
+        "`tail_levels()` (`--tail-levels`) likewise, one value for all levels or one per level; "
+        "`times()` (`--steps` between two levels) are the times at the end of the load steps. "
+        "Default levels: two thirds and eight ninths of the height, and the crest. In the Gmsh "
+        "window they are in the group Water levels.",
     ]
     groups: dict[str, list[tuple]] = {}
     for parameter in declared().values():
@@ -60,7 +61,7 @@ def parameters_page() -> str:
                 notes,
             )
         )
-    heads = "name", "meaning", "unit", "default", "allowed", "matters if", "notes"
+    heads = "name", "meaning", "unit", "default", "allowed", "used if", "notes"
     for group, rows in groups.items():
         parts += [f"## {group}", markdown(rows, heads)]
     return "\n\n".join(parts) + "\n"
@@ -79,9 +80,9 @@ def results_page() -> str:
         "`make pages`.",
         "## joint.csv",
         "A row per joint node and requested level, sorted by level, x and z; with order 2 the "
-        "middles of edges and rectangles, too. Every row satisfies the joint law: nodes have "
-        "internal variables of their own. `lambda` only with law = friction, `flux` only with "
-        "uplift = flow.",
+        "midpoints of edges and rectangles, too. Stresses are those of the joint law at the node, "
+        "with internal variables of its own. `lambda` is written with law = friction only, `flux` "
+        "with uplift = flow only.",
         joint,
         "## history.csv",
         "A row per converged step. Forces are per metre of thickness, in 3D too.",
@@ -99,22 +100,23 @@ def results_page() -> str:
         "uplift and the sum.",
         loads,
         "## critical.csv",
-        "Written by `damjoint critical`: a row per equilibrium of each trial; where the dam fails, "
-        "also those beyond its highest level, under displacement control.",
+        "Written by `damjoint critical`: a row per equilibrium of each trial value; if the dam "
+        "fails, also those after the highest level, under displacement control.",
         critical,
         "## CASE_sweep.csv",
-        "Written by `damjoint sweep`, a row per combination, in the order of computation: `key`; "
-        "the varied, sampled and tied values (a level as `level_asked`); the last row of "
+        "Written by `damjoint sweep`, a row per combination, in the order of computation: `key`, "
+        "by which an interrupted sweep continues; the varied, sampled and tied values (a level as "
+        "`level_asked`); the last row of "
         "history.csv; `failed` (1 where `damjoint run` ends with exit code 1), `verdict`, "
         "`statement`; with `--critical` the critical value, its `mode`, whether it is `confirmed` "
         "and by what. In a sample, a row whose loads exceed the largest possible strength of the "
-        "joint has only this as its statement. Beside it:",
+        "joint is not computed; its `statement` gives this reason. Further files:",
         "- `_probability.csv`: probability of failure with the interval of Clopper and Pearson. "
         "Rows without a result are `undecided`; they count as failures, except for the lower "
         "limit.\n"
         "- `_sensitivity.csv`: Spearman's rank correlation of each sampled input with `failed` "
-        "and, over the rows that stand, with crack, opening and crest.\n"
-        "- a chart of one or two varied parameters, or of the sample.",
+        "and, over the rows that stand, with `crack_length`, `max_opening` and `crest_ux`.\n"
+        "- `.png`: a chart of one or two varied parameters, or of the sample.",
         "## fields/",
         "`bulk.msh` and `joint.msh` for Gmsh (a view per field with all levels as its steps); "
         "`fields.pvd` with `bulk_t*.vtu` and `joint_t*.vtu` for ParaView. Bulk: `displacement` "
@@ -145,9 +147,9 @@ def validation_page() -> str:
                 '"Extrapolated" rows were published as node values extrapolated from integration '
                 "points, and are compared with values computed in the same way. Rows marked info "
                 "are not judged: they belong to another geometry, to a variable with another "
-                "meaning, or to a value that the document prints differently. The opening of I at "
-                "the heel is close to the tolerance of the GEFDYN value, but agrees with "
-                "code_aster.",
+                "meaning, or to a value that the document prints differently. GEFDYN is the "
+                "finite element code that SSNP142 uses as reference. The opening of I at the heel "
+                "is close to the tolerance of its value, but agrees with code_aster.",
                 source_line([provenance()], "Computed"),
                 validation.report(comparisons, "github"),
                 "![Modeling K: past the critical load](pictures/k_curve.png)",
@@ -210,18 +212,19 @@ VERIFIED = """\
 - *Water*: $U$ is the integral of `p`, and the closed form where there is one; heads are between
   those of reservoir and tailwater; in 2D the flux is the same at every node, except for the flow
   into drains.
-- *Joint law*: at every node of `joint.csv` the stress of a closed point is $K_N$ times its overlap,
-  and an open point is not in compression. The tension is at most that of the damaged joint, the
-  shear at most the strength by friction, cohesion and hardening. Damage, cumulated slip (friction),
-  crack (rupture) and slipped length never decrease.
+- *Joint law*: at every node of `joint.csv` the normal stress of a closed point is $K_N$ times
+  $\\delta_n$, and an open point is not in compression. The tension is at most that of the damaged
+  joint, the shear at most the strength by friction, cohesion and hardening. Damage, cumulated slip
+  (friction), crack (rupture) and slipped length never decrease.
 - *Command*: parameters, times, levels, tailwater and exit code are those of the command line.
-- *A run that stops*: at no higher level is an equilibrium guaranteed (that of a rigid block with
-  friction as its only strength, under the largest uplift that a crack can cause, 5 % on the safe
-  side), and the block is within 10 % of the limit that the run names as reason.
+- *A run that stops* is justified if statics guarantees no equilibrium at a higher level (by the
+  safe bound of a rigid block with friction as its only strength, under the largest uplift that a
+  crack can cause, with a margin of 5 %), and if the block is within 10 % of the failure that the
+  run reports.
 
-*Undecided* is a stop that these bounds neither justify nor refute: a prescribed displacement with
-no further equilibrium, or a joint that is too stiff for its mesh ($K_N h/E \\ge 100$), which the
-run reports. A command that exceeds its time limit is a defect."""
+*Undecided* is a stop that these bounds neither justify nor refute: displacement control without a
+further equilibrium, or a joint that is too stiff for its mesh ($K_N h/E \\ge 100$, $h$ an element's
+length), which the run reports. A command that exceeds its time limit is a defect."""
 
 
 def trust_page(results: Path) -> str:
@@ -250,14 +253,14 @@ def trust_page(results: Path) -> str:
     return (
         "\n\n".join(
             [
-                "# What can be trusted",
-                f"{len(rows)} random scenes of `damjoint stress`. Each is computed by the command "
-                "and verified from its files, by code that is independent of the engines. The "
-                "scenes: dams from "
-                "5 to 150 m, $E$ from 1e9 to 1e13 Pa, $K_N$ from 1e8 to 1e15 Pa/m, all laws and "
-                "uplifts, sections with batter, neck, sloping and lift joint, silt, ice, anchor "
-                "and earthquake, rising and falling water; one 2D scene in ten is a slender dam "
-                "with the stiffness of concrete on a brittle joint. Written by "
+                "# Verification on random dams",
+                f"{len(rows)} random scenes of `damjoint stress`. Each is computed by `damjoint "
+                "run` and verified from its result files, by code that is independent of the "
+                "engines. The scenes: dams from 5 to 150 m, $E$ from 1e9 to 1e13 Pa, $K_N$ from "
+                "1e8 to 1e15 Pa/m, all laws and uplifts, sections with batter, neck, sloping and "
+                "lift joint, silt, ice, anchor and earthquake, rising and falling water; one 2D "
+                "scene in ten is a slender dam with the stiffness of concrete on a brittle joint. "
+                "The name of a scene is SEED-NUMBER. Written by "
                 "`python -m damjoint_tools.pages trust FILE` from the result file.",
                 provenance.source_line(rows),
                 "## What is verified",
@@ -267,7 +270,7 @@ def trust_page(results: Path) -> str:
                 "## Defects and undecided stops",
                 "\n".join(unsolved) or "None.",
                 "## The slowest scenes",
-                "Seconds of the complete command, in one of several processes.",
+                "Seconds of the complete command, while other scenes run in parallel.",
                 markdown(worst, ("scene", "seconds", "iterations", "cuts", "findings")),
             ]
         )

@@ -145,9 +145,9 @@ def report(comparisons: list[Comparison], style: str = "simple") -> str:
         "unit",
         "difference",
         "tolerance",
-        "",
+        "verdict",
         "source",
-        "read as",
+        "evaluation",
     )
     counts = {v: sum(c.verdict == v for c in comparisons) for v in ("pass", "fail", "info")}
     summary = "{pass} passed, {fail} failed, {info} for information only".format(**counts)

@@ -37,7 +37,7 @@ CHECK = {
     "case": ("", "name of the case"),
     "answer": (
         "",
-        "finite elements, gravity method (also with a longer crack), difference of the first two",
+        "method: finite elements, gravity method (also with a longer crack); or their difference",
     ),
     "uplift": ("", "water in the joint"),
     "load": ("", "full; partial: the run stopped before its last t, at which all loads act"),
@@ -50,12 +50,12 @@ CHECK = {
     "crack_length": HISTORY["crack_length"],
     "SSF": ("-", "sliding: (mu N + adhesion (length - crack_length)) / T"),
     "OSF": ("-", "overturning: stabilising over overturning moments about the toe"),
-    "position": ("", "where N meets the joint: middle third, middle half, within base, outside"),
-    "required_SSF": ("-", "what the case requires; 0: nothing"),
-    "required_OSF": ("-", "what the case requires; 0: nothing"),
+    "position": ("", "where N acts: middle third, middle half, within base, outside"),
+    "required_SSF": ("-", "required factor against sliding; 0: none"),
+    "required_OSF": ("-", "required factor against overturning; 0: none"),
     "f_c": ("Pa", "compressive strength at the toe; 0: not checked"),
     "verdict": ("", "pass or fail; not checked: nothing fails, and nothing is required"),
-    "why": ("", "why it fails"),
+    "why": ("", "failure, or each requirement that is not met"),
 }
 
 #: Columns of check.csv with the numbers of both methods.
@@ -256,7 +256,7 @@ class SafetyCheck:
         """Notes on the comparison of the two methods."""
         case, notes = self.gravity.case, []
         if not requires(case):
-            notes.append(f"nothing is required: the case sets none of {', '.join(REQUIREMENTS)}")
+            notes.append(f"not checked: the case sets none of {', '.join(REQUIREMENTS)}")
         if not case.law.limits_shear:
             strength = f"mu = {case['mu']:g}, adhesion = {case['adhesion']:g} Pa"
             notes.append(f"SSF with {strength}, which the law {case['law']} does not have")

@@ -20,11 +20,14 @@ from ..solver.path import EquilibriumPath, Point
 #: Columns of critical.csv: a row per equilibrium of each dam that was tried.
 CRITICAL = {
     "trial": ("-", "number of the trial"),
-    "value": ("", "of the varied quantity: level [m], strength or parameter"),
-    "stands": ("-", "1: the dam has an equilibrium with this value, 0: it has none"),
+    "value": ("", "varied quantity: level [m], strength factor or the parameter"),
+    "stands": ("-", "1: equilibrium reached with this value; 0: not reached"),
     "displacement_control": ("-", "0: the level was prescribed; 1: a displacement"),
     **{n: HISTORY[n] for n in ("level", "crest_ux", "crack_length", "slip_length", "N", "T", "M")},
-    "imposed_displacement": ("m", "since the first equilibrium under displacement control"),
+    "imposed_displacement": (
+        "m",
+        "displacement since the first equilibrium under displacement control",
+    ),
     "compression": ("Pa", "total compression at the toe"),
 }
 
