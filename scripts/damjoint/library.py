@@ -5,7 +5,7 @@
     run.verdict, run.joint.at(level=45).delta_n.max()
 
 Names and units are those of the parameters and of the tables (reference/parameters.md, results.md).
-Nothing is written unless `Run.save` is called.
+Only `Run.save` writes to disk.
 """
 
 from __future__ import annotations
