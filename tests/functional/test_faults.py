@@ -117,7 +117,7 @@ def test_a_second_run_in_a_locked_folder_is_refused(command, tmp_path):
     before = {p: p.read_bytes() for p in (tmp_path / "out" / "c").iterdir()}
     with locked_folder(tmp_path / "out" / "c"):
         code, _, err = command(*RUN)
-    assert code == 2 and "out/c: another damjoint is writing there" in err
+    assert code == 2 and "out/c: another damjoint is writing to it" in err
     assert {p: p.read_bytes() for p in (tmp_path / "out" / "c").iterdir()} == before
     assert command(*RUN)[0] == 0
 
@@ -127,7 +127,7 @@ def test_a_second_sweep_into_a_locked_file_is_refused(command, tmp_path):
     with (tmp_path / "mu.csv").open("a") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
         code, _, err = command(*words)
-        assert code == 2 and "mu.csv: another damjoint is writing there" in err
+        assert code == 2 and "mu.csv: another damjoint is writing to it" in err
     assert command(*words)[0] == 0
 
 

@@ -540,16 +540,16 @@ PRESS = """
 {python} -u -c '
 from damjoint.gui import window
 from damjoint.gui.sheet import Request
-say = window.Session.say
+show_status = window.Session.show_status
 def print_status(self, status, color):
-    say(self, status, color)
+    show_status(self, status, color)
     print(status)
-window.Session.say = print_status
+window.Session.show_status = print_status
 if __name__ == "__main__":
     window.gui(Request("e"))
 ' > status.txt 2>&1 &
 for i in $(seq 100); do grep -q ready status.txt && break; sleep 0.2; done
-window=$(xdotool search --sync --onlyvisible --name Gmsh | tail -1)
+window=$(timeout 60 xdotool search --sync --onlyvisible --name Gmsh | tail -1)
 eval $(xdotool getwindowgeometry --shell $window)
 xdotool mousemove $((X + {x})) $((Y + HEIGHT + {y}))
 for i in $(seq 10); do  # a click is lost if the window is not drawn yet

@@ -1,6 +1,7 @@
 """Imports between the parts of the package go one way; pages made from the code are current."""
 
 import ast
+import re
 from pathlib import Path
 
 import damjoint
@@ -89,3 +90,14 @@ def test_lines_of_gmsh_and_getdp_files_are_not_too_long(folder):
         if path.suffix in (".pro", ".geo", ".case"):
             long = [line for line in path.read_text().splitlines() if len(line) > 100]
             assert not long, f"{path}: {long[0]}"
+
+
+def test_functions_of_the_problem_definition_have_one_definition():
+    """GetDP refuses a second one; only one law is read at a time."""
+    places = {}
+    for path in damjoint.data("pro").glob("*.pro"):
+        place = "law" if path.name.startswith("law_") else path.name
+        for name in re.findall(r"^\s+([A-Za-z_]\w*)\[\]\s*=", path.read_text(), re.M):
+            places.setdefault(name, set()).add(place)
+    assert len(places) > 100
+    assert not {name: files for name, files in places.items() if len(files) > 1}
