@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import InputError, accuracy
+from . import ROUND_OFF, InputError, accuracy
 from .arrays import Table, Value
 from .engines import Outcome, engine_of
 from .laws import LAWS, Law
@@ -33,9 +33,6 @@ if TYPE_CHECKING:  # loaded when they are used, with what they draw with
     from .studies.critical import CriticalValue, Search
 
 __all__ = ["LAWS", "Critical", "Law", "Run", "Step", "case", "check", "critical", "fill", "run"]
-
-#: Relative difference up to which two levels are the same.
-SAME_LEVEL = 1e-9
 
 
 def case(
@@ -54,8 +51,13 @@ def case(
     accuracy: coarse, standard, fine or a percentage, see `damjoint run --help`; parameters: by
     name, in SI units. Raises InputError.
     """
-    heights = [None if v is None else np.atleast_1d(v).tolist() for v in (levels, tail_levels)]
+    heights = as_list(levels), as_list(tail_levels)
     return load(str(source), parameters, *heights, steps, accuracy)
+
+
+def as_list(levels: Sequence[float] | float | None) -> list[float] | None:
+    """Levels as a list, also of a single one."""
+    return None if levels is None else np.atleast_1d(levels).tolist()
 
 
 class JointTable(np.recarray):
@@ -68,7 +70,7 @@ class JointTable(np.recarray):
         column, value = ("level", level) if time is None else ("time", time)
         if value is None:
             raise InputError("at: must have a level or a time")
-        near = np.isclose(self[column], value, rtol=SAME_LEVEL, atol=SAME_LEVEL)
+        near = np.isclose(self[column], value, rtol=ROUND_OFF, atol=ROUND_OFF)
         if not near.any():
             known = ", ".join(f"{v:g}" for v in dict.fromkeys(self[column].tolist()))
             raise InputError(f"{column} = {value:g}: must be one of {known}")
@@ -271,6 +273,5 @@ def critical(
     """
     from .studies.critical import Search
 
-    heights = [None if v is None else np.atleast_1d(v).tolist() for v in (levels, tail_levels)]
-    search = Search(str(source), of, parameters, *heights)
+    search = Search(str(source), of, parameters, as_list(levels), as_list(tail_levels))
     return Critical(search.run(), search)

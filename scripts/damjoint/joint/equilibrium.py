@@ -284,7 +284,7 @@ class Equilibrium:
         def by_jump(secant: bool) -> Change:
             stiffness = tangent
             if secant:
-                stiffness = self.law.evaluate(at_points, variables, Mode(True, mode.frozen))[1]
+                stiffness = (mode.frozen or self.law).secant_stiffness(at_points, variables)
             change = interface.change(stiffness, self.undamaged)
             if solution is None:
                 return change

@@ -23,8 +23,6 @@ V = TypeVar("V")
 class Mode:
     """How the solver evaluates a law in an iteration."""
 
-    #: the secant stiffness in place of the tangent
-    secant: bool = False
     #: the law with frozen damage, see `Law.freeze`
     frozen: Law[Any] | None = None
     #: points (q,) that are placed inside the release of their shear, see `Law.shear_release`
@@ -125,11 +123,9 @@ class Law(Generic[V]):
         raise NotImplementedError
 
     def evaluate(self, jump: Array, variables: V, mode: Mode = TANGENT) -> tuple[Array, Array]:
-        """Traction and stiffness in a mode of the solver."""
+        """Traction and tangent in a mode of the solver."""
         law: Law[V] = mode.frozen or self
         traction, tangent = law.traction_and_tangent(jump, variables)
-        if mode.secant:
-            tangent = law.secant_stiffness(jump, variables)
         if mode.releasing is not None and mode.releasing.any():
             shear, slope = law.shear_release(jump, variables)
             traction[mode.releasing, 1:] = shear[mode.releasing]

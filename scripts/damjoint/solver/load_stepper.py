@@ -153,9 +153,7 @@ class LoadStepper:
 
     def step(self, time: float) -> bool:
         """One step to a time by the first strategy; whether it converges."""
-        first = self.model.strategies[:1]
-        control = self.control(time)
-        step = self.model.advance(self.state, time, control, strategies=first, extrapolate=True)
+        step = self.model.advance_by_first(self.state, time, self.control(time))
         if step:
             self.accept(step, cuts=0)
         return step is not None
@@ -274,9 +272,9 @@ class LoadStepper:
             # (a mechanism of an earlier path, under other loads, does not end this one)
             fails = path.slides or path.settled(ROUGH if path.ended else SURE)
             if fails or path.ended:
-                mechanism = self.mechanism_of(path)
+                mechanism = self.mechanism_of(path) if fails else None
                 path.refine()
-                if fails:
+                if mechanism:
                     self.mechanism = replace(mechanism, level=float(path.highest))
                 self.path_ended = same
                 if same:

@@ -142,6 +142,11 @@ class Model:
                 return found
         return None
 
+    def advance_by_first(self, state: State, time: float, control: Control) -> StepResult | None:
+        """A step by the first strategy only, from the extrapolation of the last two states."""
+        first = self.strategies[:1]
+        return self.advance(state, time, control, strategies=first, extrapolate=True)
+
     def predict(
         self, state: State, time: float, control: Control, extrapolate: bool
     ) -> tuple[Array, float]:

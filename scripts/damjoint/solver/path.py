@@ -14,6 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
+from .. import ROUND_OFF
 from ..arrays import Array
 from ..model.case import Case
 from .controls import (
@@ -102,7 +103,7 @@ class Point:
         assert state.pressure is not None  # of any converged state
         jump = interface.jumps(interface.at_nodes, state.jump)
         traction, _ = law.traction_and_tangent(jump, state.node_variables)
-        toe = interface.xi > 1 - 1e-9
+        toe = interface.xi > 1 - ROUND_OFF
         return float((state.pressure.nodes - interface.mean_at_nodes(traction[:, 0]))[toe].max())
 
     @property
@@ -138,8 +139,7 @@ class Point:
 
     def step(self, time: float, control: Control) -> tuple[State, History] | None:
         """The next equilibrium, by the first strategy; None if it does not converge."""
-        first = self.model.strategies[:1]
-        found = self.model.advance(self.state, time, control, strategies=first, extrapolate=True)
+        found = self.model.advance_by_first(self.state, time, control)
         if found is None:
             return None
         history = self.history.copy()
@@ -342,7 +342,7 @@ def movement(case: Case, crack_length: float, x: np.ndarray, moved: np.ndarray) 
 
     Sliding: the slip of the joint is larger than the opening at the heel by rotation.
     """
-    if crack_length > case.joint_along * (1 - 1e-9):
+    if crack_length > case.joint_along * (1 - ROUND_OFF):
         return "broken through"
     rotation = np.polyfit(x, moved[:, 0], 1)[0] * np.ptp(x)
     return "overturning" if -rotation > abs(moved[:, 1].mean()) else "sliding"
