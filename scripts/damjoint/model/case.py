@@ -11,13 +11,14 @@ from pathlib import Path
 from typing import Any
 
 from .. import RUN_GEO, InputError, data
-from ..arrays import Value, Values
+from ..arrays import Settings, Value, Values
 from ..laws import LAWS, Law
 from . import casefile
 from .constraints import (
     check_also_uplift,
     check_drive,
     check_levels,
+    check_lifts,
     check_softening,
     check_steps,
     check_tail_levels,
@@ -28,12 +29,12 @@ from .constraints import (
 from .parameters import (
     INCLUDE,
     assignments,
+    checked,
     declared,
     independent,
     levels_of,
     listing,
     number,
-    parameter,
     parse,
 )
 from .values import ParameterValues
@@ -58,8 +59,21 @@ SECTION = (
 
 
 @dataclass(frozen=True, kw_only=True)
+class OfJoint:
+    """What a joint of several has for itself: its name, the values that differ from the case's, and
+    SECTION with this joint alone.
+    """
+
+    name: str
+    values: dict[str, Value]
+    section: dict[str, list[float]] = field(compare=False, repr=False)
+
+
+@dataclass(frozen=True, kw_only=True)
 class Case(ParameterValues):
-    """A scene and its loading: all that a run depends on."""
+    """A scene and its loading: all that a run depends on. With several joints, its values are those
+    of the first one; each of `joints` is a case of a single joint.
+    """
 
     name: str
     title: str
@@ -83,6 +97,39 @@ class Case(ParameterValues):
     shared: dict[str, list[float]] = field(default_factory=dict, compare=False, repr=False)
     #: SECTION of pro/section.pro
     section: dict[str, list[float]] = field(default_factory=dict, compare=False, repr=False)
+    #: heights of the joints above the first one [m]
+    lift_heights: tuple[float, ...] = ()
+    #: an entry for each joint, from the lowest; empty if there is only one
+    of_joints: tuple[OfJoint, ...] = ()
+
+    @cached_property
+    def joints(self) -> tuple[Case, ...]:
+        """The case of each joint, from the lowest: its own values, and the section above it."""
+        if not self.of_joints:
+            return (self,)
+        return tuple(
+            replace(
+                self,
+                values=self.values | own.values,
+                section=own.section,
+                lift_heights=(),
+                of_joints=(),
+            )
+            for own in self.of_joints
+        )
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the joints, for messages."""
+        return tuple(own.name for own in self.of_joints) or (joint_name(self["joint_height"]),)
+
+    def with_values(self, values: Values) -> Case:
+        """The case with other values, the same for all joints; without the checks of `changed`."""
+        others = tuple(
+            replace(own, values={n: v for n, v in own.values.items() if n not in values})
+            for own in self.of_joints
+        )
+        return replace(self, values=self.values | values, of_joints=others)
 
     @cached_property
     def law(self) -> Law[Any]:
@@ -151,14 +198,14 @@ class Case(ParameterValues):
         checked = {name: declared()[name].check(value) for name, value in values.items()}
         if not checked.keys() <= independent():
             raise KeyError(*checked.keys() - independent())
-        result = replace(self, values=self.values | checked, published=False)
-        check_values(result, result.section, result.geometry is None)
+        result = replace(self.with_values(checked), published=False)
+        check_joints(result)
         return result
 
     def scenes(self) -> list[Case]:
         """The case itself, then with its further uplift modes."""
         others = (
-            replace(self, values={**self.values, "uplift": mode}, also_uplift=())
+            replace(self.with_values({"uplift": mode}), also_uplift=())
             for mode in self.also_uplift
         )
         return [self, *others]
@@ -169,6 +216,11 @@ def between(levels: tuple[float, ...], time: float) -> float:
     points, time = (0.0, *levels), min(time, len(levels))
     i = min(int(time), len(points) - 2)
     return points[i] + (time - i) * (points[i + 1] - points[i])
+
+
+def joint_name(height: float) -> str:
+    """The name of a joint whose heel is at a height [m]."""
+    return f"lift {height:g} m" if height else "base"
 
 
 def is_name(text: str) -> bool:
@@ -249,7 +301,7 @@ def first_mesh(case: Case) -> dict[str, float | str]:
 
 def load(
     case: str,
-    overrides: Values | None = None,
+    overrides: Settings | None = None,
     levels: str | Sequence[float] | None = None,
     tail_levels: str | Sequence[float] | None = None,
     steps: int | None = None,
@@ -257,7 +309,8 @@ def load(
 ) -> Case:
     """Read a case file, apply overrides, resolve the parameters that follow others, check all.
 
-    case: letter, name or path; overrides: {name: value}; levels, tail_levels: [m] at t = 1, 2, 3,
+    case: letter, name or path; overrides: {name: value, or a value for each joint}, also
+    lift_heights [m]; levels, tail_levels: [m] at t = 1, 2, 3,
     also as a text 'a,b,c'; steps: equal steps between two levels; accuracy: coarse, standard, fine
     or a percentage, chooses order, first mesh (overrides win) and one step per level. Raises
     InputError.
@@ -279,10 +332,13 @@ def load(
     tails = lists.pop("tail_levels", (0.0,))
     if tail_levels is not None:
         tails = levels_of("tail_levels", tail_levels)
-    overrides = {name: parameter(name).check(value) for name, value in overrides.items()}
-    text = assignments(file.defaults | overrides)
-    variables = parse(text + "".join(listing(n, v) for n, v in lists.items()) + INCLUDE)
+    overrides = {name: checked(name, value) for name, value in overrides.items()}
+    lifts = lists.pop("lift_heights", ())
+    lifts = tuple(map(float, overrides.pop("lift_heights", lifts)))
     geometry = own_geometry(file.texts["geometry"]) if "geometry" in file.texts else None
+    values = settings_of_joints({**file.defaults, **file.of_joints, **overrides}, lifts, geometry)
+    listed = "".join(listing(n, v) for n, v in lists.items())
+    variables, *of_joints = parsed_by_joint(values, listed, lifts)
     if accuracy is not None and geometry and geometry.suffix != ".geo":
         raise InputError(
             f"accuracy = {accuracy}: must not be set with a mesh as geometry "
@@ -304,11 +360,96 @@ def load(
         geometry=geometry,
         shared={n: variables[n] for n in SHARED},
         section={n: variables[n] for n in SECTION},
+        lift_heights=lifts,
+        of_joints=tuple(
+            OfJoint(
+                name=joint_name(parsed["joint_height"][0]),
+                values={n: parsed[n][0] for n in declared() if parsed[n] != variables[n]},
+                section={n: parsed[n] for n in SECTION},
+            )
+            for parsed in of_joints
+        ),
     )
-    check_softening(result.joint, bool(variables["softening_twice"][0]))
-    check_values(result, result.section, result.geometry is None)
+    for joint, parsed in zip(result.joints, of_joints or [variables], strict=True):
+        check_softening(joint.joint, bool(parsed["softening_twice"][0]))
+    check_joints(result)
     check_loading(result, tails, of_case=tail_levels is None)
     return with_drive_times(result)
+
+
+def settings_of_joints(
+    settings: Settings, lifts: tuple[float, ...], geometry: Path | None
+) -> list[dict[str, Value]]:
+    """The settings of each joint, from the lowest.
+
+    lifts: heights of the joints above the first [m]. Raises InputError if a list has another length
+    than there are joints.
+    """
+    single = {n: v for n, v in settings.items() if not isinstance(v, tuple)}
+    lists = {n: v for n, v in settings.items() if isinstance(v, tuple)}
+    if geometry and lifts:
+        raise InputError(
+            "lift_heights: must not be set for a geometry of one's own, whose mesh has the joints"
+        )
+    number = max([1, *map(len, lists.values())]) if geometry else 1 + len(lifts)
+    for name, values in lists.items():
+        if len(values) != number:
+            raise InputError(
+                f"{name} = {','.join(map(str, values))}: must be one value, or as many as there "
+                f"are joints ({number})"
+            )
+    heights = {} if geometry else {"joint_height": lifts}
+    return [
+        {
+            **single,
+            **{n: v[k] for n, v in lists.items()},
+            **({n: v[k - 1] for n, v in heights.items()} if k else {}),
+        }
+        for k in range(number)
+    ]
+
+
+def parsed_by_joint(
+    values: list[dict[str, Value]], listed: str, lifts: tuple[float, ...]
+) -> list[dict[str, list[Any]]]:
+    """Variables of Gmsh's parser for a case, and, if it has several joints, for each of them alone.
+
+    values: settings of each joint; listed: the lists of the case, as text.
+    """
+    several = ""
+    if lifts:
+        slopes = (number(str(v.get("joint_slope", default_of("joint_slope")))) for v in values[1:])
+        several = listing("lift_heights", lifts) + listing("lift_slopes", slopes)
+    text = lambda own, more: assignments(own) + listed + more + INCLUDE
+    whole = parse(text(values[0], several))
+    if len(values) == 1:
+        return [whole]
+    elements = whole["all_elements"] if lifts else [whole["n_joint"][0]] * len(values)
+    sizes = {n: whole[n][0] for n in ("h_dam", "h_found")}
+    return [
+        whole,
+        *(
+            parse(text({**own, **sizes, "n_joint": n}, ""))
+            for own, n in zip(values, elements, strict=True)
+        ),
+    ]
+
+
+def default_of(name: str) -> float:
+    """The default of a parameter that is a number."""
+    return float(declared()[name].default)
+
+
+def check_joints(case: Case) -> None:
+    """Check the values of a case, joint by joint, and the heights of its lifts.
+
+    Raises InputError.
+    """
+    for joint in case.joints:
+        check_values(joint, joint.section, joint.geometry is None)
+    if case.lift_heights:
+        sections = [joint.section for joint in case.joints]
+        check_lifts(case, case.lift_heights, sections)
 
 
 def check_loading(case: Case, tails: Sequence[float], of_case: bool) -> None:
