@@ -12,13 +12,15 @@ from ..arrays import Array, IntArray, Sparse
 from ..model.case import Case
 from ..model.loads import wet
 from ..model.mesh import LINES, Body, Mesh, mesh_of
-from ..model.scene import SOLIDS
+from ..model.scene import MATERIALS
 from .elasticity import Material, body_force, elasticity
 from .elements import WATER, Space, points_of
 
 #: Parameters that the bodies depend on besides those of the mesh.
-MATERIALS = dict.fromkeys(name for solid in SOLIDS.values() for name in solid.materials.values())
-PARAMETERS = ("order", "hold_z", *(f"{p}_{name}" for p in ("E", "nu") for name in MATERIALS))
+PARAMETERS = (
+    *("order", "hold_z"),
+    *(f"{p}_{name}" for p in ("E", "nu") for name in dict.fromkeys(MATERIALS.values())),
+)
 
 #: Weights that act, region and component: concrete also along x (earthquake).
 WEIGHTS = (("dam", 0), ("dam", 1), ("lower", 0), ("lower", 1), ("foundation", 1))
@@ -27,9 +29,7 @@ WEIGHTS = (("dam", 0), ("dam", 1), ("lower", 0), ("lower", 1), ("foundation", 1)
 def material_of(case: Case) -> Material:
     """Elastic constants by region."""
     return {
-        region: (case[f"E_{name}"], case[f"nu_{name}"])
-        for solid in SOLIDS.values()
-        for region, name in solid.materials.items()
+        region: (case[f"E_{name}"], case[f"nu_{name}"]) for region, name in MATERIALS.items()
     }
 
 
@@ -43,16 +43,16 @@ class ElasticBody:
     #: load vectors (n,) by name: weight densities dam_x, dam_y, lower_x, ... [N/m3], forces per
     #: metre of a line ice_x, ice_y, ... [N/m]
     unit_loads: dict[str, Array]
-    #: degrees of freedom: zero; on the joint, in its order; of each wet face, in its order
+    #: degrees of freedom: zero; on each of its joints, by number, in the joint's order; of each wet
+    #: face, in its order
     fixed_dofs: IntArray
-    joint_dofs: IntArray
+    joint_dofs: dict[int, IntArray]
     face_dofs: dict[str, IntArray]
 
     @staticmethod
     def of(case: Case, mesh: Mesh, name: str) -> ElasticBody:
         """Number the degrees of freedom of a body and assemble it."""
         dim, order = mesh.dim, int(case["order"])
-        (joint,) = mesh.joints.values()
         body = mesh.solids[name]
         space = Space(body, order)
 
@@ -68,7 +68,11 @@ class ElasticBody:
             stiffness=elasticity(space, dim, material_of(case)),
             unit_loads=dict(unit_loads(space, mesh, name)),
             fixed_dofs=np.unique(np.concatenate(fixed)),
-            joint_dofs=dofs(joint.surface),
+            joint_dofs={
+                number: dofs(joint.surface)
+                for number, joint in enumerate(mesh.joints)
+                if name in (joint.upper, joint.lower)
+            },
             face_dofs={
                 n: dofs(face.surface)
                 for n, face in mesh.faces.items()

@@ -1,6 +1,6 @@
-"""The equilibrium of the joint with the condensed bodies around it (see fem/condensation.py).
+"""The equilibrium of the joints with the condensed bodies around them (see fem/condensation.py).
 
-Unknown: the jump. Residual R = N^T W t(jump) - (water in the joint) + S jump - t_0(loading) = 0;
+Unknowns: the jumps. Residual R = N^T W t(jump) - (water in the joints) + S jump - t_0(loading) = 0;
 the pressure of flowing water is solved at the same jump before every residual, and its derivative
 is part of the tangent.
 """
@@ -10,33 +10,18 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
-from ..arrays import Array, Sparse
-from ..laws import TANGENT, Law, Mode
-from ..model.case import Case, flows, has_drains
+from ..arrays import Array
+from ..model.case import Case
 from ..model.loads import Loading, line_forces, quake_column, water_column
-from .flow import FlowSolution
+from .flow import FlowDerivative, FlowSolution
 from .interface import Interface
+from .joint_laws import TANGENT, JointLaws, JointVariables, Mode
 from .linear_system import Change
+from .water import JointWater, Pressure
 from .wet_faces import WetFace
-
-
-@dataclass(frozen=True, kw_only=True)
-class Pressure:
-    """Water pressure in the joint [Pa] at the law's points, at the integration points of the water
-    and at the nodes.
-    """
-
-    points: Array
-    water_points: Array
-    nodes: Array
-    #: of flowing water: mass flux, mean of each joint element [kg/(m s)], and out of the toe per
-    #: metre of thickness
-    flux: Array | None = None
-    leakage: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -56,19 +41,22 @@ DIFFERENCE, EMPTY, SMALL_LEVEL = 1e-5, 1e-3, 0.1
 
 
 class Equilibrium:
-    """The joint with the condensed bodies: loads, water pressure, residual and tangent."""
+    """The joints with the condensed bodies: loads, water pressure, residual and tangent."""
 
     def __init__(self, case: Case, interface: Interface) -> None:
         self.case, self.bulk, self.interface = case, interface.bulk, interface
-        self.wet, self.flowing = case["uplift"] != "none", flows(case)
-        #: nodes and points of the drains of flowing water
-        drained = self.flowing and has_drains(case)
-        self.drains = interface.drains(case["drain_x"]) if drained else None
+        self.water = [
+            JointWater(own, joint)
+            for own, joint in zip(case.joints, interface.joints, strict=True)
+        ]
+        #: numbers of the joints in which water flows
+        self.flowing = tuple(k for k, water in enumerate(self.water) if water.flowing)
         self.unit_weight = case["rho_water"] * case["g"]
-        self.law: Law[Any] = case.law
-        #: tangent (3, 3) of the undamaged joint
-        self.undamaged = self.law.traction_and_tangent(np.zeros((1, 3)), self.law.initial(1))[1][0]
-        #: forces on the loaded unknowns and t_0; with the water in the joint: of the last loadings
+        self.laws = JointLaws([own.law for own in case.joints])
+        #: tangent (q, 3, 3) of the undamaged joints
+        points = [len(joint.points.weights) for joint in interface.joints]
+        self.undamaged = self.laws.undamaged_tangent(points)
+        #: forces on the loaded unknowns and t_0; with the water in the joints: of the last loadings
         self.external_forces = lru_cache(maxsize=4)(self._external_forces)
         self.loads = lru_cache(maxsize=4)(self._loads)
 
@@ -147,136 +135,50 @@ class Equilibrium:
         above, below = (replace(loading, level=level + s) for s in (step, -step))
         return (of(above) - of(below)) / (2 * step)
 
-    # -- water in the joint
+    # -- water in the joints
     # ---------------------------------------------------------------------------------------------
 
-    def head(self, loading: Loading, matrix: Sparse | None = None) -> Array:
-        """Head [m] in a joint of uniform transmissivity, at the joint's nodes or at the places that
-        an interpolation matrix of `JointFields` leads to: linear along the joint between the levels
-        of reservoir and tailwater; a dry end has its own height, or the head of the other end if
-        that is lower.
-
-        Drains reduce the head above their outlet, the tailwater or their own height, by their
-        effectiveness (EM 1110-2-2200).
-        """
-        case, along = self.case, self.interface.fields
-        fields = along.heel_y, along.toe_y, along.xi
-        heel, toe, xi = fields if matrix is None else (matrix @ field for field in fields)
-        level, tail = loading.level, loading.tail
-        first = np.maximum(level, np.minimum(heel, tail))
-        last = np.maximum(tail, np.minimum(toe, level))
-        if case["uplift"] != "drained":
-            return first + (last - first) * xi
-        at = case["drain_x"] / self.interface.length
-        drained = first + (last - first) * at
-        outlet = np.maximum(heel + (toe - heel) * at, max(case["drain_level"], loading.tail))
-        drained = drained - case["drain_effectiveness"] * np.maximum(drained - outlet, 0)
-        return np.where(
-            xi < at,
-            first + (drained - first) * xi / at,
-            drained + (last - drained) * (xi - at) / (1 - at),
-        )
-
-    def uplift(self, loading: Loading, matrix: Sparse, y: Array, beyond: Array | float) -> Array:
-        """Pressure [Pa], not below zero, at places of height y that an interpolation matrix of
-        `JointFields` leads to; beyond: pressure of flowing water beyond the imposed one.
-        """
-        return np.maximum(self.unit_weight * (self.head(loading, matrix) - y) + beyond, 0)
-
-    def lift(self, loading: Loading, beyond: Array | float = 0.0) -> Array:
-        """Forces of the water in the joint on its two faces (j,)."""
-        interface = self.interface
-        weights, y = interface.water_points.weights, interface.water_points.positions[:, 1]
-        pressure = self.uplift(loading, interface.fields.at_water, y, beyond)
-        forces: Array = interface.opening_at_water.T @ (weights * pressure)
-        return forces
-
     def _loads(self, loading: Loading) -> Array:
-        """t_0 and, unless it flows, the water in the joint together (j,)."""
+        """t_0 and, unless it flows, the water in the joints together (j,)."""
         total = self.external_forces(loading)[1]
-        return total + self.lift(loading) if self.wet and not self.flowing else total
-
-    def expand_to_nodes(self, inner: Array) -> Array:
-        """A pressure at all nodes of the joint from that at the inner ones; zero at the ends."""
-        pressure = np.zeros(self.interface.fields.nodes)
-        pressure[self.interface.fields.inside] = inner
-        return pressure
-
-    def aperture(self, jump: Array, variables: Any) -> tuple[Array, Array, float]:
-        """Conductivity at the law's points over that of the closed joint, its derivative with the
-        opening, and the aperture of the closed joint [m].
-
-        flow: cubic law. cracked: the same, but of the opening beyond that of a crack, and bounded
-        where an open point has practically the full head.
-        """
-        opening = self.interface.flow.opening @ jump
-        if self.case["uplift"] == "flow":
-            narrowest, most = self.case["aperture_min"], np.inf
-        else:
-            shared = self.case.shared
-            narrowest, most = (shared[f"crack_{n}"][0] for n in ("aperture", "most"))
-            opening = opening - self.law.opening_of_crack(variables, len(opening))
-        wider = np.maximum(opening, 0) / narrowest
-        factor = 1 + np.minimum(wider, most)
-        growing = (wider > 0) & (wider < most)
-        return factor**3, np.where(growing, 3 / narrowest * factor**2, 0), narrowest
-
-    def solve_flow(self, jump: Array, variables: Any, loading: Loading) -> FlowSolution:
-        """Pressure beyond the imposed one at the inner nodes.
-
-        Drains reduce the head above their outlet, the tailwater or their own height, by their
-        effectiveness e: the pressure is e times that with the outlet's head at the drains, plus
-        1 - e times that without drains. A crack that reaches the drains ends their effect
-        (EM 1110-2-2200).
-        """
-        case, flow = self.case, self.interface.flow
-        factor = self.aperture(jump, variables)[0]
-        conductivity = factor * self.interface.points.weights
-        head = self.head(loading)
-        free = flow.solve(conductivity, self.unit_weight * head)
-        if self.drains is None:
-            return free
-        nodes, points = self.drains
-        own = self.interface.surface.points[nodes, 1]
-        outlet = np.maximum(own, max(case["drain_level"], loading.tail))
-        at_drains = head[nodes] + self.expand_to_nodes(free.pressure)[nodes] / self.unit_weight
-        cracked = case["uplift"] == "cracked" and (factor[points] > 1).any()
-        effect = case["drain_effectiveness"]
-        if cracked or not (at_drains > outlet).all() or effect == 0:
-            return free
-        drained = flow.solve(
-            conductivity, self.unit_weight * head, nodes, self.unit_weight * outlet
-        )
-        return free.mixed(effect, drained)
+        for water in self.water:
+            if water.wet and not water.flowing:
+                total = total + water.lift(loading)
+        return total
 
     def flowing_lift(
-        self, jump: Array, variables: Any, loading: Loading
-    ) -> tuple[Array, FlowSolution]:
-        """Forces of flowing water on the faces of the joint (j,), and its flow's solution."""
-        solution = self.solve_flow(jump, variables, loading)
-        beyond = self.interface.fields.at_water @ self.expand_to_nodes(solution.pressure)
-        return self.lift(loading, beyond), solution
+        self, jump: Array, variables: JointVariables, loading: Loading
+    ) -> tuple[Array, list[FlowSolution]]:
+        """Forces of flowing water on the faces of the joints (j,), and the solutions of its flow in
+        each joint where it flows.
+        """
+        total, solutions = np.zeros(len(jump)), []
+        for k in self.flowing:
+            lift, solution = self.water[k].flowing_lift(jump, variables.joints[k], loading)
+            total += lift
+            solutions.append(solution)
+        return total, solutions
 
     def residual(
         self,
         jump: Array,
-        variables: Any,
+        variables: JointVariables,
         loading: Loading,
         mode: Mode = TANGENT,
         frozen_lift: Array | None = None,
     ) -> Residual:
         """The residual and its derivatives.
 
-        mode: of the law; frozen_lift (j,): replaces the lift of the flowing water.
+        mode: of the laws; frozen_lift (j,): replaces the lift of the flowing water.
         """
         interface = self.interface
         at_points = interface.jumps(interface.at_points, jump)
-        traction, tangent = self.law.evaluate(at_points, variables, mode)
+        traction, tangent = self.laws.evaluate(at_points, variables, mode)
         value = self.bulk.stiffness @ jump - self.loads(loading) + interface.forces(traction)
 
-        flowing, solution = self.flowing and frozen_lift is None, None
+        flowing, solutions = bool(self.flowing) and frozen_lift is None, list[FlowSolution]()
         if flowing:
-            lift, solution = self.flowing_lift(jump, variables, loading)
+            lift, solutions = self.flowing_lift(jump, variables, loading)
             value = value - lift
         elif frozen_lift is not None:
             value = value - frozen_lift
@@ -284,12 +186,13 @@ class Equilibrium:
         def by_jump(secant: bool) -> Change:
             stiffness = tangent
             if secant:
-                stiffness = (mode.frozen or self.law).secant_stiffness(at_points, variables)
+                stiffness = (mode.frozen or self.laws).secant_stiffness(at_points, variables)
             change = interface.change(stiffness, self.undamaged)
-            if solution is None:
-                return change
-            growing = self.aperture(jump, variables)[1] * interface.points.weights
-            return replace(change, flow=interface.flow.derivative(solution, growing))
+            flow = [
+                self.water[k].derivative(jump, variables.joints[k], solution)
+                for k, solution in zip(self.flowing, solutions, strict=False)
+            ]
+            return replace(change, flow=FlowDerivative.joined(flow))
 
         def by_level() -> Array:
             slope = -self.rate(self._loads, loading)
@@ -300,33 +203,12 @@ class Equilibrium:
 
         return Residual(value, by_jump, by_level)
 
-    def pressure(self, jump: Array, variables: Any, loading: Loading) -> Pressure:
-        """The water pressure in the joint at a jump."""
-        interface, fields = self.interface, self.interface.fields
-        inner: Array | float = 0.0
-        if self.flowing:
-            inner = self.solve_flow(jump, variables, loading).pressure
-        beyond = self.expand_to_nodes(np.asarray(inner))
-
-        def at(matrix: Sparse, positions: Array) -> Array:
-            if not self.wet:
-                return np.zeros(len(positions))
-            return self.uplift(loading, matrix, positions[:, 1], matrix @ beyond)
-
-        flux, leakage = None, 0.0
-        if self.case["uplift"] == "flow":
-            factor, _, narrowest = self.aperture(jump, variables)
-            conductivity = self.case["rho_water"] * narrowest**3 * factor / (12 * self.case["visc"])
-            total = self.unit_weight * self.head(loading) + beyond
-            drains = () if self.drains is None else (self.drains[0],)
-            flux, leakage = interface.flow.flux(conductivity, total, self.bulk.width, *drains)
-        return Pressure(
-            points=at(fields.at_points, interface.points.positions),
-            water_points=at(fields.at_water, interface.water_points.positions),
-            nodes=at(fields.at_locations, interface.space.locations),
-            flux=flux,
-            leakage=leakage,
-        )
+    def pressures(
+        self, jump: Array, variables: JointVariables, loading: Loading
+    ) -> tuple[Pressure, ...]:
+        """The water pressure in each joint at a jump."""
+        pairs = zip(self.water, variables.joints, strict=True)
+        return tuple(water.pressure(jump, own, loading) for water, own in pairs)
 
     def crest(self, jump: Array, loading: Loading) -> float:
         """The crest's displacement along x [m]."""

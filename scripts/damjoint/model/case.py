@@ -131,6 +131,28 @@ class Case(ParameterValues):
         )
         return replace(self, values=self.values | values, of_joints=others)
 
+    def with_sections(self, sections: dict[str, dict[str, list[float]]]) -> Case:
+        """The case of a user's own geometry, with the ends of its joints, by their names.
+
+        Raises InputError if the case has lists of another length.
+        """
+        own = self.of_joints or (OfJoint(name="", values={}, section={}),) * len(sections)
+        if len(own) != len(sections):
+            raise InputError(
+                f"case {self.name}: lists have {len(own)} values: must be one, or as many as the "
+                f"geometry's joints ({len(sections)}: {', '.join(sections)})"
+            )
+        (first, *others) = sections.values()
+        of_joints = (
+            replace(joint, name=name, section=self.section | ends)
+            for joint, (name, ends) in zip(own, sections.items(), strict=True)
+        )
+        return replace(
+            self,
+            section=self.section | first,
+            of_joints=tuple(of_joints) if others else (),
+        )
+
     @cached_property
     def law(self) -> Law[Any]:
         """The joint's law with its parameters."""
@@ -426,10 +448,11 @@ def parsed_by_joint(
         return [whole]
     elements = whole["all_elements"] if lifts else [whole["n_joint"][0]] * len(values)
     sizes = {n: whole[n][0] for n in ("h_dam", "h_found")}
+    base = f"base_toe_y = {whole['base_toe_y'][0]!r};\n"
     return [
         whole,
         *(
-            parse(text({**own, **sizes, "n_joint": n}, ""))
+            parse(text({**own, **sizes, "n_joint": n}, base))
             for own, n in zip(values, elements, strict=True)
         ),
     ]

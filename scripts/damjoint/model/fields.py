@@ -10,9 +10,8 @@ from ..arrays import Array, IntArray, Table
 from ..laws import COLUMNS
 from .mesh import Body
 from .results import FLUX, Results
-from .scene import SOLIDS
 
-BODIES = tuple(SOLIDS)
+BODIES = ("dam", "foundation")
 
 
 @dataclass

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -14,11 +15,11 @@ import numpy as np
 from scipy import sparse
 
 from .. import InputError, RunError, data
-from ..arrays import Array, BoolArray, IntArray, Value
+from ..arrays import Array, BoolArray, IntArray, Setting
 from ..storage import check_end
 from .case import Case, has_drains
-from .parameters import assignments, constants, start_gmsh
-from .scene import BED, DOWN, FLOOR, JOINT_NAME, JOINTS, SIDES, SOLIDS, TOP, UP
+from .parameters import assignments, constants, listing, start_gmsh
+from .scene import BED, DOWN, FLOOR, SIDES, TOP, UP, Joint, numbered, stacked
 
 #: Parameters that the mesh always depends on.
 GEOMETRY = (
@@ -49,6 +50,8 @@ REGIONS = {
     "force": 2,
     "anchor": 2,
 }
+#: Regions of which each joint has its own.
+OF_JOINTS = ("dam", "joint", "heel", "toe")
 #: Regions of line forces.
 LINES = ("ice", "force", "anchor")
 #: Regions that every geometry has.
@@ -95,7 +98,7 @@ OWN_FACES = {
 
 def dimension(region: str, dim: int) -> int:
     """The dimension of a region's elements in 2D or 3D."""
-    return 0 if region == "crest" else dim - REGIONS[region]
+    return 0 if region == "crest" else dim - REGIONS[region.split(" ")[0]]
 
 
 @dataclass
@@ -148,6 +151,8 @@ class JointMesh:
     toe: Body
     upper: str
     lower: str
+    #: for messages
+    name: str
 
     @property
     def heel_nodes(self) -> IntArray:
@@ -171,15 +176,27 @@ class JointMesh:
         return ends_of(heel, toe, area(self.surface) / self.width)
 
 
-def shares(case: Case) -> dict[str, Value]:
-    """The parameters that the mesh of a case depends on."""
+def shares(case: Case) -> dict[str, Setting]:
+    """The parameters that the mesh of a case depends on, and the lists of its lifts."""
     names = [*GEOMETRY, *(n for force, needs in MARKS.items() if case[force] for n in needs)]
-    values: dict[str, Value] = {name: case[name] for name in names}
+    values: dict[str, Setting] = {name: case[name] for name in names}
     # of a force only whether it acts
     values |= {name: float(bool(case[name])) for name in MARKS}
     if has_drains(case):  # they need a node in all modes of uplift
         values |= {"uplift": "drained", "drain_x": case["drain_x"]}
+    if case.lift_heights:
+        _, *lifts = case.joints
+        values["lift_heights"] = case.lift_heights
+        values["lift_slopes"] = tuple(lift["joint_slope"] for lift in lifts)
+        values["lift_drain_x"] = tuple(has_drains(lift) * lift["drain_x"] for lift in lifts)
     return values
+
+
+def as_text(settings: Mapping[str, Setting]) -> str:
+    """Values and lists of numbers in Gmsh's language."""
+    lists = {name: value for name, value in settings.items() if isinstance(value, tuple)}
+    values = {name: value for name, value in settings.items() if name not in lists}
+    return assignments(values) + "".join(listing(*item) for item in lists.items())
 
 
 def heel_normal(joint: Body, heel: Body) -> Array:
@@ -196,7 +213,7 @@ class OwnGeometry:
     file: Path
     changed: int
     size: int
-    parameters: tuple[tuple[str, Value], ...]
+    parameters: tuple[tuple[str, Setting], ...]
     #: for making the mesh
     case: Case = field(compare=False)
 
@@ -237,7 +254,7 @@ def generate(case: Case) -> None:
     with tempfile.TemporaryDirectory(prefix="damjoint-") as folder:
         path = Path(folder) / f"scene{own.suffix if own else '.geo'}"
         if not own:
-            path.write_text(assignments(shares(case)) + f'Include "{data("geo")}/dam.geo";\n')
+            path.write_text(as_text(shares(case)) + f'Include "{data("geo")}/dam.geo";\n')
         elif own.suffix == ".geo":  # it may take sizes from the case
             path.write_text(assignments(case.values) + f'Include "{own}";\n')
         else:
@@ -267,8 +284,8 @@ class FaceRegion(NamedTuple):
 
 
 class Mesh:
-    """The mesh of a case: solids and joints by the names of model/scene.py, faces, number of nodes;
-    in `bodies` solids, joints and the other REGIONS.
+    """The mesh of a case: solids by name, joints from the lowest, faces, number of nodes; in
+    `bodies` solids, joints and the other REGIONS.
 
     Raises RunError with Gmsh's message if there is no mesh for the parameters, InputError if a
     user's own geometry is unsuitable.
@@ -281,32 +298,35 @@ class Mesh:
         #: Gmsh's name of it
         self.model = gmsh.model.getFileName()
         self._read()
-        bodies, faces = self._own_regions() if self.own else self._section_regions(case)
-        groups = {
-            n: [(r, bodies.pop(r)) for r in s.materials if r in bodies] for n, s in SOLIDS.items()
-        }
+        scene, bodies, faces = self._own_regions() if self.own else self._section_regions(case)
+        # from the highest: a line force at the end of a joint acts on the body above it
+        solids = dict.fromkeys(n for joint in reversed(scene) for n in (joint.upper, joint.lower))
+        groups = {name: [(name.split(" ")[0], bodies.pop(name))] for name in solids}
+        if "lower" in bodies:
+            groups["foundation"].append(("lower", bodies.pop("lower")))
         groups |= {name: [(name, tag)] for name, tag in bodies.items()}
         self.bodies = {
             name: self._body(dimension(name, self.dim), parts) for name, parts in groups.items()
         }
-        self.solids = {name: self.bodies[name] for name in SOLIDS}
-        self.joints = {
-            name: JointMesh(
+        self.solids = {name: self.bodies[name] for name in solids}
+        self.joints = [
+            JointMesh(
                 dim=self.dim,
-                surface=self.bodies[name],
+                surface=self.bodies[joint.region],
                 heel=self.bodies[joint.heel],
                 toe=self.bodies[joint.toe],
                 upper=joint.upper,
                 lower=joint.lower,
+                name=joint.name,
             )
-            for name, joint in JOINTS.items()
-        }
+            for joint in scene
+        ]
         self.faces = {}
         for i, face in enumerate(faces):
             surface = self._body(self.dim - 1, [(f"face{i}", face.tag)])
             self.faces[f"face{i}"] = Face(surface, *face[1:])
         self._turn_outwards()
-        last = max(joint.surface.element_tags.max() for joint in self.joints.values())
+        last = max(joint.surface.element_tags.max() for joint in self.joints)
         if last >= MOST_TAGS:
             raise RunError(
                 f"mesh: joint element tag {last}: must be below {MOST_TAGS}; use a coarser mesh"
@@ -320,26 +340,33 @@ class Mesh:
         start_gmsh()
         return bool(gmsh.model.getFileName() == self.model)
 
-    def _section_regions(self, case: Case) -> tuple[dict[str, int], list[FaceRegion]]:
-        """Physical groups by region, and those of the faces."""
-        numbers = constants()
+    def _section_regions(self, case: Case) -> tuple[list[Joint], dict[str, int], list[FaceRegion]]:
+        """The joints; physical groups by region, and those of the faces."""
+        numbers, scene = constants(), stacked(case.joint_names)
         present = {group for _, group in gmsh.model.getPhysicalGroups()}
         tag_of = {name: int(numbers[name.upper()][0]) for name in REGIONS}
+        layer = int(numbers["LAYER"][0])
+        tag_of |= {
+            numbered(name, k): tag_of[name] + k * layer
+            for name in OF_JOINTS
+            for k in range(1, len(scene))
+        }
         bodies = {
             n: t for n, t in tag_of.items() if t in present and (n != "sides" or self.dim == 3)
         }
-        if missing := [name for name in NEEDED if name not in bodies]:
+        needed = [*NEEDED, *(numbered(n, k) for k in range(1, len(scene)) for n in OF_JOINTS)]
+        if missing := [name for name in needed if name not in bodies]:
             raise RunError(f"mesh: no {missing[0]}; look at the geometry's proportions")
         faces, section = [], case.section
         for i, side in enumerate(section["seg_side"]):
             ends = section["seg_y0"][i], section["seg_y1"][i]
-            upper = section["seg_body"][i] == numbers["UPPER"][0]
-            body = JOINTS[JOINT_NAME].upper if upper else JOINTS[JOINT_NAME].lower
+            number = int(section["seg_body"][i] - numbers["UPPER"][0])
+            body = scene[number].upper if number >= 0 else scene[0].lower
             tag = int(numbers["SEGMENT"][0]) + i
             faces.append(FaceRegion(tag, body, SIDES[int(side)], min(ends), max(ends)))
-        return bodies, faces
+        return scene, bodies, faces
 
-    def _own_regions(self) -> tuple[dict[str, int], list[FaceRegion]]:
+    def _own_regions(self) -> tuple[list[Joint], dict[str, int], list[FaceRegion]]:
         """As `_section_regions`, by the names of the physical groups, which get the numbers of the
         package's own geometries.
         """
@@ -369,7 +396,7 @@ class Mesh:
                 tag = int(numbers["SEGMENT"][0]) + len(faces)
                 faces.append(FaceRegion(tag, *OWN_FACES[name]))
             gmsh.model.addPhysicalGroup(d, entities, tag)
-        return bodies, faces
+        return stacked(("joint",)), bodies, faces
 
     def _bad(self, why: str) -> InputError:
         """The error of a user's own geometry."""
@@ -419,7 +446,7 @@ class Mesh:
         """Give joint and faces their normals: the joint's from foundation to dam, a face's out of
         its body.
         """
-        joint = self.joints[JOINT_NAME]
+        (joint, *_) = self.joints
         upper, lower = self.solids[joint.upper], self.solids[joint.lower]
         if self.own:
             shared = np.intersect1d(upper.node_tags, lower.node_tags)
@@ -441,9 +468,10 @@ class Mesh:
                     "joint: its elements must be sides of the dam's (a conforming mesh)"
                 )
         kinds = {kind: name for name, kind in OWN_FACES.items()}
-        surfaces = [(JOINT_NAME, joint.surface, lower)]
+        surfaces = [("joint", joint.surface, self.solids[joint.lower]) for joint in self.joints]
         for face in self.faces.values():
-            surfaces.append((kinds[face.body, face.side], face.surface, self.solids[face.body]))
+            kind = "foundation" if face.body == "foundation" else "dam"
+            surfaces.append((kinds[kind, face.side], face.surface, self.solids[face.body]))
         for name, surface, body in surfaces:
             normals = outward(surface, body)
             if normals is None:
@@ -453,15 +481,17 @@ class Mesh:
                 gmsh.model.mesh.reverseElements(surface.element_tags[turned])
 
     def bearer(self, line: str) -> str:
-        """The first body that has all nodes of a region of LINES: the line force acts on it."""
+        """The first body, from the highest, that has all nodes of the crest or of a region of
+        LINES: the line force acts on it.
+        """
         nodes = self.bodies[line].node_tags
         bearers = (n for n, s in self.solids.items() if np.isin(nodes, s.node_tags).all())
-        return next(bearers, JOINTS[JOINT_NAME].lower)
+        return next(bearers, self.joints[0].lower)
 
     @property
     def counts(self) -> dict[str, int]:
         """Numbers of nodes, elements (of the solids) and joint_elements."""
-        joints = [joint.surface for joint in self.joints.values()]
+        joints = [joint.surface for joint in self.joints]
         return {
             "nodes": self.nodes,
             "elements": sum(len(solid.element_tags) for solid in self.solids.values()),

@@ -15,8 +15,8 @@ from .. import RunError
 from ..arrays import Array
 from ..joint.equilibrium import Equilibrium
 from ..joint.interface import Interface, interface_of
+from ..joint.joint_laws import TANGENT, Mode
 from ..joint.linear_system import Border
-from ..laws import TANGENT, Mode
 from ..model.case import Case
 from ..model.loads import STAGED, Loading
 from .controls import Control, DisplacementControl, LevelControl
@@ -45,10 +45,10 @@ class Model:
     """The equilibrium of a case, and how a step of it is solved."""
 
     def __init__(self, case: Case, interface: Interface | None = None) -> None:
-        """interface: the joint of the condensed bodies; by default from the cache, or made."""
+        """interface: the joints of the condensed bodies; by default from the cache, or made."""
         interface = interface or interface_of(case)
-        if case.geometry:  # the ends of its joint follow from the mesh
-            case = replace(case, section=case.section | interface.section)
+        if case.geometry:
+            case = case.with_sections({j.mesh.name: j.section for j in interface.joints})
         self.case, self.equilibrium = case, Equilibrium(case, interface)
         self.reference = self.unbalanced()
 
@@ -83,7 +83,7 @@ class Model:
         parts = ("growth", "secant", "release", "iterations")
         table = zip(*(self.case.shared[f"strategy_{n}"] for n in parts), strict=True)
         halvings = int(self.case["max_halvings"])
-        most = 2 if self.equilibrium.law.releases_shear else 1
+        most = 2 if self.equilibrium.laws.releases_shear else 1
         return tuple(
             Strategy(growth, int(secant), int(release), int(iterations), halvings)
             for growth, secant, release, iterations in table
@@ -184,16 +184,16 @@ class Model:
         frozen_lift: Array | None = None,
     ) -> StepResult | None:
         """A step by one strategy, from a jump and a level, see `advance`. Raises Diverged."""
-        equilibrium, start = self.equilibrium, state.begin_step(self.equilibrium.law, time)
-        interface, law, variables = equilibrium.interface, equilibrium.law, start.variables
-        law_points = frozen and frozen.points
+        equilibrium, start = self.equilibrium, state.begin_step(self.equilibrium.laws, time)
+        interface, laws, variables = equilibrium.interface, equilibrium.laws, start.variables
+        frozen_laws = frozen and frozen.points
         loads, convergence = self.loading(time, begin[1]), self.convergence
         stiffness = equilibrium.case["K_N"] * equilibrium.bulk.width
 
         def evaluate(jump: Array, level: float, last: Iterate | None) -> Iterate:
-            side, mode = None, Mode(frozen=law_points) if law_points else TANGENT
+            side, mode = None, Mode(frozen=frozen_laws) if frozen_laws else TANGENT
             if strategy.release:
-                side = law.release_side(interface.jumps(interface.at_points, jump), variables)
+                side = laws.release_side(interface.jumps(interface.at_points, jump), variables)
                 if last and last.side is not None:
                     crossing = side * last.side < 0
                     releasing = crossing & ((side < 0) | (strategy.release > 1))
@@ -209,7 +209,9 @@ class Model:
             def correction(secant: bool) -> tuple[Array, float]:
                 edge = border and Border(residual.by_level(), *border)
                 change = residual.by_jump(secant)
-                return interface.solve(equilibrium.undamaged, change, -residual.value, edge)
+                return interface.solve(
+                    equilibrium.undamaged, change, -residual.value, edge, equilibrium.flowing
+                )
 
             return Iterate(jump, level, residual.value, size, correction, side)
 
@@ -227,6 +229,6 @@ class Model:
             start.update(equilibrium, end.jump, frozen),
             time=time,
             loading=loading,
-            pressure=equilibrium.pressure(end.jump, variables, loading),
+            pressures=equilibrium.pressures(end.jump, variables, loading),
         )
         return StepResult(new.after(state), iterations, end.size / (self.reference or 1.0))

@@ -7,7 +7,7 @@ and a sample needs no load steps. The converse does not hold.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
@@ -36,7 +36,7 @@ class Elastic:
     def of(case: Case, interface: Interface) -> Elastic:
         """The case with a joint that does not fail."""
         values = tuple((n, v) for n, v in case.values.items() if n not in STRENGTHS)
-        strong = replace(case, values=case.values | UNBREAKABLE)
+        strong = case.with_values(UNBREAKABLE)
         return Elastic((values, case.levels, case.tail_levels, case.times), strong, interface)
 
 

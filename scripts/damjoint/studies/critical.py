@@ -364,7 +364,7 @@ class Search:
         case = method.case
         if self.of == "level":
             level = {"levels": (*case.levels[:-1], value)}
-            case = replace(case, values=case.values | {"drive": "level"}, **level)
+            case = replace(case.with_values({"drive": "level"}), **level)
         elastic = elastic_heel_stress(case, interface_of(case))
         if elastic <= strength:
             return ""
@@ -495,7 +495,7 @@ def last_state(search: Search, point: Point) -> Results:
     required = {n: search.own[n] for n in (*QUICK, *DRIVE)}
     if point.state.time > history.saved_until:
         history.save(point.state)
-    return history.results(replace(case, values=case.values | required), stopped=False)
+    return history.results(case.with_values(required), stopped=False)
 
 
 def write(search: Search, answer: CriticalValue, out: Path, seconds: float) -> None:
