@@ -216,11 +216,11 @@ def check(cases: Sequence[Case]) -> list[SafetyCheck]:
     `rows` of a check are those of check.csv, `why` is empty if nothing fails, `notes` are what to
     know. Raises InputError, RunError.
     """
-    from .studies.check import check_has_section, compare_methods
+    from .studies.check import check_has_section, compare_joints
 
     for one in cases:
         check_has_section(one)
-    return [compare_methods(run(one).results) for one in cases]
+    return [check for one in cases for check in compare_joints(run(one).results)]
 
 
 @dataclass(frozen=True)

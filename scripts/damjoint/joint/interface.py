@@ -4,7 +4,7 @@ operators, and the linear systems of Newton's method.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -14,7 +14,7 @@ from ..arrays import Array, IntArray, Sparse
 from ..fem import elements
 from ..fem.cache import cached, key_of
 from ..fem.condensation import Condensed, CondensedJoint
-from ..model.case import Case
+from ..model.case import Case, OfJoint
 from ..model.mesh import JointMesh, ends_of, heel_normal
 from ..model.scene import UP
 from .flow import Flow, JointFields
@@ -242,15 +242,10 @@ class Interface:
             self._lift = flowing, sparse.hstack(lifts, format="csr")
         return self._lift[1]
 
-    def separates(self, number: int) -> bool:
-        """Whether nothing but the joint of this number connects its two bodies."""
-        pairs = [(j.mesh.lower, j.mesh.upper) for j in self.joints]
-        lower, upper = pairs.pop(number)
-        reached, before = {lower}, set[str]()
-        while reached != before:
-            before = set(reached)
-            reached |= {name for pair in pairs if reached & set(pair) for name in pair}
-        return upper not in reached
+    @property
+    def of_joints(self) -> list[OfJoint]:
+        """Names, bodies and ends of the joints."""
+        return [replace(joint.mesh.of_case, section=joint.section) for joint in self.joints]
 
     # -- linear systems
 

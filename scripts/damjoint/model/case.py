@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -37,6 +37,7 @@ from .parameters import (
     number,
     parse,
 )
+from .scene import stacked
 from .values import ParameterValues
 from .values import flows as flows
 from .values import has_drains as has_drains
@@ -60,11 +61,13 @@ SECTION = (
 
 @dataclass(frozen=True, kw_only=True)
 class OfJoint:
-    """What a joint of several has for itself: its name, the values that differ from the case's, and
-    SECTION with this joint alone.
+    """What a joint of several has for itself: the values that differ from the case's, and SECTION
+    with this joint alone; its name and those of the bodies above and below it.
     """
 
     name: str
+    upper: str
+    lower: str
     values: dict[str, Value]
     section: dict[str, list[float]] = field(compare=False, repr=False)
 
@@ -123,6 +126,30 @@ class Case(ParameterValues):
         """Names of the joints, for messages."""
         return tuple(own.name for own in self.of_joints) or (joint_name(self["joint_height"]),)
 
+    def separates(self, numbers: Collection[int]) -> bool:
+        """Whether without the joints of these numbers a body has no connection to the rock."""
+        if not self.of_joints:
+            return bool(numbers)
+        pairs = [(own.lower, own.upper) for own in self.of_joints]
+        rest = [pair for k, pair in enumerate(pairs) if k not in numbers]
+        reached, before = {"foundation"}, set[str]()
+        while reached != before:
+            before = set(reached)
+            reached |= {name for pair in rest if reached & set(pair) for name in pair}
+        return any(not reached.issuperset(pair) for pair in pairs)
+
+    def separating(self, numbers: Sequence[int]) -> tuple[int, ...]:
+        """The first of some joints, by their numbers, that alone holds what is above it; all of
+        them if only together they do; none if other joints hold it, too.
+        """
+        alone = [(k,) for k in numbers if self.separates((k,))]
+        together = [tuple(numbers)] if self.separates(numbers) else []
+        return next(iter([*alone, *together]), ())
+
+    def named(self, numbers: Sequence[int]) -> str:
+        """The names of joints by their numbers; empty if there is only one joint."""
+        return " and ".join(self.joint_names[k] for k in numbers) if self.of_joints else ""
+
     def with_values(self, values: Values) -> Case:
         """The case with other values, the same for all joints; without the checks of `changed`."""
         others = tuple(
@@ -131,26 +158,24 @@ class Case(ParameterValues):
         )
         return replace(self, values=self.values | values, of_joints=others)
 
-    def with_sections(self, sections: dict[str, dict[str, list[float]]]) -> Case:
-        """The case of a user's own geometry, with the ends of its joints, by their names.
+    def with_joints(self, joints: Sequence[OfJoint]) -> Case:
+        """The case of a user's own geometry, with the names and ends of its joints.
 
         Raises InputError if the case has lists of another length.
         """
-        own = self.of_joints or (OfJoint(name="", values={}, section={}),) * len(sections)
-        if len(own) != len(sections):
+        known = self.of_joints or joints
+        if len(known) != len(joints):
             raise InputError(
-                f"case {self.name}: lists have {len(own)} values: must be one, or as many as the "
-                f"geometry's joints ({len(sections)}: {', '.join(sections)})"
+                f"case {self.name}: lists of {len(known)} values: must have one for each joint of "
+                f"the geometry ({len(joints)}: {', '.join(joint.name for joint in joints)})"
             )
-        (first, *others) = sections.values()
+        ends = [self.section | joint.section for joint in joints]
         of_joints = (
-            replace(joint, name=name, section=self.section | ends)
-            for joint, (name, ends) in zip(own, sections.items(), strict=True)
+            replace(joint, values=own.values, section=section)
+            for own, joint, section in zip(known, joints, ends, strict=True)
         )
         return replace(
-            self,
-            section=self.section | first,
-            of_joints=tuple(of_joints) if others else (),
+            self, section=ends[0], of_joints=tuple(of_joints) if len(joints) > 1 else ()
         )
 
     @cached_property
@@ -383,14 +408,7 @@ def load(
         shared={n: variables[n] for n in SHARED},
         section={n: variables[n] for n in SECTION},
         lift_heights=lifts,
-        of_joints=tuple(
-            OfJoint(
-                name=joint_name(parsed["joint_height"][0]),
-                values={n: parsed[n][0] for n in declared() if parsed[n] != variables[n]},
-                section={n: parsed[n] for n in SECTION},
-            )
-            for parsed in of_joints
-        ),
+        of_joints=stacked_joints(variables, of_joints),
     )
     for joint, parsed in zip(result.joints, of_joints or [variables], strict=True):
         check_softening(joint.joint, bool(parsed["softening_twice"][0]))
@@ -456,6 +474,23 @@ def parsed_by_joint(
             for own, n in zip(values, elements, strict=True)
         ),
     ]
+
+
+def stacked_joints(
+    variables: dict[str, list[Any]], of_joints: list[dict[str, list[Any]]]
+) -> tuple[OfJoint, ...]:
+    """The joints of a section, from the variables of `parsed_by_joint`."""
+    names = [joint_name(parsed["joint_height"][0]) for parsed in of_joints]
+    return tuple(
+        OfJoint(
+            name=joint.name,
+            upper=joint.upper,
+            lower=joint.lower,
+            values={n: parsed[n][0] for n in declared() if parsed[n] != variables[n]},
+            section={n: parsed[n] for n in SECTION},
+        )
+        for joint, parsed in zip(stacked(names), of_joints, strict=True)
+    )
 
 
 def default_of(name: str) -> float:

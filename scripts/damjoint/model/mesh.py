@@ -17,7 +17,7 @@ from scipy import sparse
 from .. import InputError, RunError, data
 from ..arrays import Array, BoolArray, IntArray, Setting
 from ..storage import check_end
-from .case import Case, has_drains
+from .case import Case, OfJoint, has_drains
 from .parameters import assignments, constants, listing, start_gmsh
 from .scene import BED, DOWN, FLOOR, SIDES, TOP, UP, Joint, numbered, stacked
 
@@ -174,6 +174,13 @@ class JointMesh:
         """Heel, toe and length, by the names of pro/section.pro."""
         heel, toe = (line.points[:, :2].mean(axis=0) for line in (self.heel, self.toe))
         return ends_of(heel, toe, area(self.surface) / self.width)
+
+    @property
+    def of_case(self) -> OfJoint:
+        """Name, bodies and ends, for its case."""
+        return OfJoint(
+            name=self.name, upper=self.upper, lower=self.lower, values={}, section=self.ends
+        )
 
 
 def shares(case: Case) -> dict[str, Setting]:

@@ -72,6 +72,12 @@ def column_of(name: str, joint: int) -> str:
     return f"{name}_{joint + 1}" if joint else name
 
 
+def row_of_joint(row: dict[str, float], joint: int) -> dict[str, float]:
+    """A row of history.csv with the columns of a joint, by its number from 0, without suffix."""
+    own = {n: row[column_of(n, joint)] for n in HISTORY_OF_JOINTS if column_of(n, joint) in row}
+    return row | own
+
+
 def history_columns(case: Case) -> dict[str, tuple[str, str]]:
     """The columns of a case's history.csv: unit and meaning."""
     others = {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 #: Material (suffix of E_, nu_ and rho_) of each region. The region lower: concrete bonded to rock.
@@ -25,7 +26,7 @@ def numbered(name: str, number: int) -> str:
     return f"{name} {number + 1}" if number else name
 
 
-def stacked(names: tuple[str, ...]) -> list[Joint]:
+def stacked(names: Sequence[str]) -> list[Joint]:
     """The joints of a section, from the lowest: each below a body of its own."""
     bodies = ["foundation", *(numbered("dam", k) for k in range(len(names)))]
     parts = ("joint", "heel", "toe")

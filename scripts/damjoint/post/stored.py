@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +13,17 @@ import numpy as np
 
 from .. import InputError
 from ..arrays import Value
-from ..model.case import SECTION, SHARED, Case, is_name
+from ..model.case import (
+    SECTION,
+    SHARED,
+    Case,
+    is_name,
+    parsed_by_joint,
+    stacked_joints,
+)
 from ..model.fields import Field, Solution
 from ..model.mesh import Body
-from ..model.parameters import INCLUDE, assignments, constants, declared, listing, parse
+from ..model.parameters import INCLUDE, assignments, constants, declared, listing
 from ..model.results import HISTORY, Results
 from .folder import read_info, scene_folders
 
@@ -60,11 +68,11 @@ def read_results(info: dict[str, Any], folder: Path) -> Results:
     Raises InputError if a column is missing, as in files of earlier versions.
     """
     history = read_csv(folder / "history.csv")
-    if missing := [name for name in HISTORY if name not in history]:
-        version = info["versions"]["damjoint"]
-        raise InputError(
-            f"history.csv of damjoint {version} lacks {', '.join(missing)}: run the case again"
-        )
+    joint = read_csv(folder / "joint.csv")
+    for name, table, columns in (("history", history, HISTORY), ("joint", joint, ("joint",))):
+        if missing := [column for column in columns if column not in table]:
+            version, lacks = info["versions"]["damjoint"], ", ".join(missing)
+            raise InputError(f"{name}.csv of damjoint {version} lacks {lacks}: run the case again")
     case = case_of(info)
     heel = np.zeros(0)
     if case["drive"] != "level":
@@ -72,7 +80,7 @@ def read_results(info: dict[str, Any], folder: Path) -> Results:
     return Results(
         case,
         history,
-        read_csv(folder / "joint.csv"),
+        joint,
         {},
         stopped=info["state"] == "stopped",
         heel=heel,
@@ -92,7 +100,19 @@ def case_of(info: dict[str, Any]) -> Case:
         raise InputError(f"run.json of damjoint {version} lacks parameters: {', '.join(missing)}")
     values = {n: p.check(info["parameters"][n]) for n, p in declared().items()}
     levels, tail_levels, times = (finite(n, info[n]) for n in ("levels", "tail_levels", "times"))
-    parsed = parse(parser_input(values, levels))
+    lifts = finite("lift_heights", info["lift_heights"])
+    own = [
+        values | {n: declared()[n].check(v) for n, v in joint["values"].items()}
+        for joint in info["joints"]
+    ]
+    parsed, *of_joints = parsed_by_joint(own or [values], listing("levels", levels), lifts)
+    joints = stacked_joints(parsed, of_joints)
+    if info["geometry"]:
+        ends = ("name", "upper", "lower", "section")
+        joints = tuple(
+            replace(joint, **{name: stored[name] for name in ends})
+            for joint, stored in zip(joints, info["joints"], strict=True)
+        )
     return Case(
         name=info["case"],
         title=str(info["title"]).encode(errors="replace").decode(),
@@ -105,6 +125,8 @@ def case_of(info: dict[str, Any]) -> Case:
         shared={n: parsed[n] for n in SHARED},
         geometry=Path(info["geometry"]) if info["geometry"] else None,
         section={n: parsed[n] for n in SECTION} | info["section"],
+        lift_heights=lifts,
+        of_joints=joints,
     )
 
 

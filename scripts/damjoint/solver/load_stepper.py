@@ -37,7 +37,7 @@ class Mechanism:
     time: float
     #: the highest level [m]
     level: float = np.nan
-    #: the joint that fails, if there are several
+    #: the joint that fails, or several; empty if the dam has only one
     joint: str = ""
 
 
@@ -317,8 +317,7 @@ class LoadStepper:
     def mechanism_of(self, path: EquilibriumPath) -> Mechanism:
         """The mechanism of a path that does not reach the prescribed level."""
         ratio = path.points[-1].imposed / path.imposed(path.points[path.limit_point])
-        name = self.case.joint_names[path.joint or 0] if len(self.case.joints) > 1 else ""
-        return Mechanism(path.mode, float(ratio), path.time, joint=name)
+        return Mechanism(path.mode, float(ratio), path.time, joint=path.joint)
 
     def end_at_limit_point(self, path: EquilibriumPath) -> None:
         """Take a path's limit point as a step, in which nothing but the level has changed."""

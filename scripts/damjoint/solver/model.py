@@ -48,7 +48,7 @@ class Model:
         """interface: the joints of the condensed bodies; by default from the cache, or made."""
         interface = interface or interface_of(case)
         if case.geometry:
-            case = case.with_sections({j.mesh.name: j.section for j in interface.joints})
+            case = case.with_joints(interface.of_joints)
         self.case, self.equilibrium = case, Equilibrium(case, interface)
         self.reference = self.unbalanced()
 

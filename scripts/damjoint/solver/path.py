@@ -80,15 +80,15 @@ class Point:
         return self.state.loading.level
 
     @cached_property
-    def sliding(self) -> int | None:
-        """The number of a joint that alone holds what is above it and, being plane, transmits the
-        shear by its whole strength, which slip cannot raise: a higher level has no equilibrium, it
-        pushes more and presses less. None if there is none.
+    def sliding(self) -> tuple[int, ...]:
+        """The numbers of joints that alone hold what is above them and, being plane, transmit the
+        shear by their whole strength, which slip cannot raise: a higher level has no equilibrium,
+        it pushes more and presses less. Empty if there are none.
         """
-        equilibrium, state = self.model.equilibrium, self.state
+        equilibrium, state, used = self.model.equilibrium, self.state, list[int]()
         for k, joint in enumerate(equilibrium.interface.joints):
             law, variables = equilibrium.laws.laws[k], state.variables.joints[k]
-            if law.hardens or not joint.flat or not equilibrium.interface.separates(k):
+            if law.hardens or not joint.flat:
                 continue
             jump = joint.jumps(joint.at_points, state.jump)
             traction, _ = law.traction_and_tangent(jump, variables)
@@ -96,13 +96,13 @@ class Point:
             strength = law.shear_strength(traction[:, 0], damage, slip)
             shear, weights = np.linalg.norm(traction[:, 1:], axis=1), joint.points.weights
             if weights @ shear >= (1 - PRECISION / 2) * (weights @ strength):
-                return k
-        return None
+                used.append(k)
+        return self.model.case.separating(used)
 
     @property
     def slides(self) -> bool:
-        """Whether there is such a joint."""
-        return self.sliding is not None
+        """Whether there are such joints."""
+        return bool(self.sliding)
 
     @cached_property
     def compressions(self) -> list[float]:
@@ -235,23 +235,28 @@ class EquilibriumPath:
         """How the dam fails; empty if the path does not show it."""
         if self.slides:
             return "sliding"
-        if self.joint is None:
+        if not self.failing:
             return ""
-        model, moved = self.points[-1].model, self.movements[self.joint]
-        interface, case = model.equilibrium.interface.joints[self.joint], model.case
-        crack = self.points[-1].last[column_of("crack_length", self.joint)]
+        (number, *_), model = self.failing, self.points[-1].model
+        interface, case = model.equilibrium.interface.joints[number], model.case
+        crack = self.points[-1].last[column_of("crack_length", number)]
         along = interface.xi * interface.length
-        return movement(case.joints[self.joint], crack, along, moved)
+        return movement(case.joints[number], crack, along, self.movements[number])
 
     @property
-    def joint(self) -> int | None:
-        """The number of the joint at which it fails: that slides, or whose jumps change most beyond
-        the limit point; None if the path does not show it.
+    def failing(self) -> tuple[int, ...]:
+        """The numbers of the joints at which it fails: that slide, or the one whose jumps change
+        most beyond the limit point; empty if the path does not show it.
         """
         if self.slides:
             return self.points[self.top].sliding
         sizes = [np.abs(moved).max() for moved in self.movements]
-        return int(np.argmax(sizes)) if sizes else None
+        return (int(np.argmax(sizes)),) if sizes else ()
+
+    @property
+    def joint(self) -> str:
+        """Their names; empty if the dam has a single joint."""
+        return self.points[-1].model.case.named(self.failing) if self.points else ""
 
     @property
     def movements(self) -> list[Array]:

@@ -28,7 +28,7 @@ THREADED_UNKNOWNS = 3000
 def check(case: Case) -> None:
     """Raise InputError if a user's own geometry is unsuitable; all other cases are suitable."""
     if case.geometry:
-        case.with_sections({joint.name: joint.ends for joint in mesh_of(case).joints})
+        case.with_joints([joint.of_case for joint in mesh_of(case).joints])
 
 
 def about(bulk: Condensed) -> dict[str, Any]:
