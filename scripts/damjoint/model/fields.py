@@ -10,9 +10,7 @@ from ..arrays import Array, IntArray, Table
 from ..laws import COLUMNS
 from .mesh import Body
 from .results import FLUX, Results
-
-BODIES = ("dam", "foundation")
-
+from .scene import numbered
 
 @dataclass
 class Field:
@@ -87,8 +85,15 @@ def row_of_nodes(body: Body, rows: Table) -> IntArray:
     return nearest_rows(body.points, rows)
 
 
+def joint_body(bodies: dict[str, Body], joint: int) -> Body:
+    """The surface of a joint, by its number from 0, in the bodies of a mesh."""
+    return bodies[numbered("joint", joint)]
+
+
 def joint_data(result: Results, body: Body, time: float) -> Table:
-    """The joint's table at its mesh nodes: OF_JOINT by name, vectors along x, y, z."""
+    """The table of a joint, the only one of `result`, at its mesh nodes: OF_JOINT by name, vectors
+    along x, y, z.
+    """
     rows = result.at(time)
     nearest = row_of_nodes(body, rows)
     return {

@@ -30,7 +30,7 @@ from ..model.fields import (
 )
 from ..model.results import Results
 from ..statics import gravity
-from ..statics.verdict import overturning_level, statement
+from ..statics.verdict import decisive_joint, overturning_level, statement
 from . import validation
 from .drawing import (
     BLUE,
@@ -90,8 +90,12 @@ def picture(solution: Solution) -> Figure:
         time = shown_time(result)
         left, right = parts[0].subfigures(1, 2, width_ratios=(1, RIGHT))
         draw_dam(left, solution, time)
-        draw_joint(right, result, time)
-        draw_history(parts[1], result)
+        joint = decisive_joint(result)
+        own = result.joints[joint]
+        draw_joint(right, own, time)
+        if case.of_joints:
+            right.suptitle(case.joint_names[joint], fontsize=9)
+        draw_history(parts[1], own)
         if case["dim"] == 3:
             draw_solid(parts[2], solution, time)
     return figure
@@ -343,7 +347,9 @@ TO_VIEW = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]])
 
 def draw_maps(figure: FigureBase, solution: Solution, time: float) -> None:
     """Draw maps of the unrolled joint: opening, effective normal stress, shear stress."""
-    rows, joint = solution.result.at(time), solution.bodies["joint"]
+    number = decisive_joint(solution.result)
+    rows = solution.result.joints[number].at(time)
+    joint = joint_body(solution.bodies, number)
     nearest = row_of_nodes(joint, rows)
     places = np.column_stack([distance(rows)[nearest], joint.points[:, 2]])
     shown = (

@@ -13,6 +13,7 @@ from matplotlib.figure import FigureBase
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from ..arrays import Table
 from ..model.case import has_drains
 from ..model.fields import (
     CLOSED,
@@ -27,7 +28,7 @@ from ..model.fields import (
 from ..model.loads import Loading, line_forces
 from ..model.parameters import constants
 from .drawing import CONCRETE, DARK, GREEN, GREY, ORANGE, RED, ROCK, SILT, VIOLET, WATER, panels
-from .outline import Section, exaggeration, section_of
+from .outline import Section, exaggeration, joint_lines, section_of
 from .units import FORCES, STRESSES, with_unit
 
 #: Length of an arrow over the dam's size.
@@ -54,12 +55,13 @@ def draw_section(figure: FigureBase, solution: Solution, time: float) -> None:
     """Draw the section at a requested time; a note instead if there is none."""
     (axes,) = panels(figure, left=0.6, right=0.1, bottom=1.05).flat
     case, field = solution.result.case, solution.fields.get(time)
-    rows = solution.result.at(time)
-    s = distance(rows)
-    ends = np.array([[rows[axis][i] for axis in "xyz"] for i in (s.argmin(), s.argmax())])
+    rows = [own.at(time) for own in solution.result.joints]
     displacement = field.displacement if field else {}
     scale = exaggeration(displacement, case.size)
-    section = section_of(solution.bodies, displacement, scale, ends) if displacement else None
+    section = None
+    if displacement:
+        lines = joint_lines(case, rows)
+        section = section_of(solution.bodies, displacement, scale, lines)
     if section is None:
         axes.set_axis_off()
         why = "no section: " + (
@@ -80,11 +82,13 @@ class SectionDrawing:
         solution: Solution,
         section: Section,
         time: float,
-        rows: dict[str, np.ndarray],
+        rows: list[Table],
     ) -> None:
+        """rows: of each joint."""
         self.axes, self.section, self.rows = axes, section, rows
-        self.case = solution.result.case
+        self.case, self.joints = solution.result.case, solution.result.joints
         self.state = solution.result.state(time)
+        self.states = [own.state(time) for own in self.joints]
         self.loading = Loading.at(self.case, time, self.state["level"], self.state["tail_level"])
         self.height = np.ptp(section.dam.points[:, 1])
         self.legend: list[tuple[Patch | Line2D, str]] = []
@@ -95,9 +99,11 @@ class SectionDrawing:
         self.water()
         self.bodies()
         self.joint()
-        self.drains()
+        for k in range(len(self.joints)):
+            self.drains(k)
         self.forces()
-        self.resultant()
+        for k in range(len(self.joints)):
+            self.resultant(k)
         self.axes.set(aspect="equal", xlabel="x [m]", ylabel="y [m]")
         handles, labels = zip(*self.legend, strict=True) if self.legend else ((), ())
         self.axes.legend(
@@ -177,7 +183,7 @@ class SectionDrawing:
 
     def bodies(self) -> None:
         """Draw the deformed mesh, and the undeformed outlines."""
-        for body in (self.section.foundation, self.section.dam):
+        for body in reversed(self.section.bodies.values()):
             for name, tables in body.faces.items():
                 for table in tables:
                     color = ROCK if name == "foundation" else CONCRETE
@@ -188,11 +194,18 @@ class SectionDrawing:
             self.axes.plot(*outline.T, "--", color=GREY, linewidth=0.6, zorder=2)
 
     def joint(self) -> None:
-        """Draw both faces of the joint in the colors of its state; water in the crack."""
+        """Draw both faces of each joint in the colors of its state; water in the cracks."""
+        shown = set[int]().union(*(self.faces(k) for k in range(len(self.joints))))
+        for number, (color, width, label) in reversed(STATES.items()):
+            if number in shown and label:
+                self.legend.append((Line2D([], [], color=color, linewidth=width), label))
+
+    def faces(self, joint: int) -> set[int]:
+        """Draw both faces of a joint, and water in its crack; the states that it has."""
         shown, faces = set(), []
-        states = state_of(self.rows)
-        for body, face in self.section.joint_faces:
-            state = states[self.rows_at(body.points[face])]
+        states = state_of(self.rows[joint])
+        for body, face in self.section.joint_faces[joint]:
+            state = states[self.rows_at(body.points[face], joint)]
             both_ends = np.minimum(state[:-1], state[1:])
             faces.append(np.stack([body.moved[face][:-1], body.moved[face][1:]], axis=1))
             for number, (color, width, _) in STATES.items():
@@ -201,27 +214,28 @@ class SectionDrawing:
                 )
                 self.axes.add_collection(lines, autolim=False)
             shown |= set(both_ends.tolist())
-        if self.case["uplift"] != "none" and OPEN in shown:
+        if self.joints[joint].case["uplift"] != "none" and OPEN in shown:
             crack = np.concatenate([faces[0], faces[1][:, ::-1]], axis=1)[both_ends == OPEN]
             self.axes.add_collection(PolyCollection(crack, color=WATER, zorder=2), autolim=False)
-        for number, (color, width, label) in reversed(STATES.items()):
-            if number in shown and label:
-                self.legend.append((Line2D([], [], color=color, linewidth=width), label))
+        return shown
 
-    def rows_at(self, points: np.ndarray) -> np.ndarray:
-        """Rows of the joint's table nearest to points (n, 2) of the section."""
-        lowest = np.full(len(points), self.rows["z"].min())
-        return nearest_rows(np.column_stack([points, lowest]), self.rows)
+    def rows_at(self, points: np.ndarray, joint: int) -> np.ndarray:
+        """Rows of a joint's table nearest to points (n, 2) of the section."""
+        lowest = np.full(len(points), self.rows[joint]["z"].min())
+        return nearest_rows(np.column_stack([points, lowest]), self.rows[joint])
 
-    def drains(self) -> None:
-        """Draw the line of the drains from the joint down into the ground."""
-        case = self.case
+    def drains(self, joint: int) -> None:
+        """Draw the line of a joint's drains from it down into the ground."""
+        case = self.joints[joint].case
         if not has_drains(case):
             return
-        x, y = self.on_joint(case["drain_x"])
+        x, y = self.on_joint(case["drain_x"], joint)
         self.axes.plot([x, x], [y, y - DRAIN * self.height], **DRAINS, zorder=3)
         self.legend.append(
-            (Line2D([], [], **DRAINS), f"drains, {case['drain_x']:.3g} m from the heel")
+            (
+                Line2D([], [], **DRAINS),
+                f"drains{self.of_joint(joint)}, {case['drain_x']:.3g} m from the heel",
+            )
         )
 
     def forces(self) -> None:
@@ -243,28 +257,37 @@ class SectionDrawing:
             shown = ", ".join(f"{n} = {share * case[n]:.3g}" for n in ("k_h", "k_v") if case[n])
             self.legend.append((arrow_handle(RED), f"earthquake, {shown}"))
 
-    def resultant(self) -> None:
-        """Draw the effective resultant where it meets the joint, and the joint's middle third."""
-        length = distance(self.rows).max()
-        third = self.on_joint(np.linspace(length / 3, 2 * length / 3, 30))
+    def of_joint(self, joint: int) -> str:
+        """The name of a joint for a label; empty if there is only one."""
+        name = self.case.named((joint,))
+        return f" of {name}" if name else ""
+
+    def resultant(self, joint: int) -> None:
+        """Draw the effective resultant where it meets a joint, and the joint's middle third."""
+        length = distance(self.rows[joint]).max()
+        third = self.on_joint(np.linspace(length / 3, 2 * length / 3, 30), joint)
         x, y = third.T
         self.axes.plot(x, y - THIRD * self.height, color=GREEN, linewidth=3, zorder=3)
-        self.legend.append((Line2D([], [], color=GREEN, linewidth=3), "middle third of the joint"))
-        at, normal, shear = (self.state[n] for n in ("x_resultant", "N", "T"))
+        if joint == 0:
+            handle = Line2D([], [], color=GREEN, linewidth=3)
+            self.legend.append((handle, "middle third of the joint"))
+        at, normal, shear = (self.states[joint][n] for n in ("x_resultant", "N", "T"))
         if not math.isfinite(at):
             return
-        heel_to_toe = self.section.toe - self.section.heel
+        heel_to_toe = self.section.joints[joint].toe - self.section.joints[joint].heel
         along = heel_to_toe / np.hypot(*heel_to_toe)
         down = np.array([along[1], -along[0]])
-        place = self.on_joint(at / self.case.joint_length * length)
-        self.arrow(place, normal * down + shear * along, GREEN, "", RESULTANT)
-        size = with_unit(math.hypot(normal, shear), FORCES)
-        self.legend.append((arrow_handle(GREEN), f"resultant {size}, {at:.3g} m from the heel"))
+        place = self.on_joint(at / self.joints[joint].case.joint_length * length, joint)
+        longer = RESULTANT * length / distance(self.rows[0]).max()
+        self.arrow(place, normal * down + shear * along, GREEN, "", longer)
+        size, which = with_unit(math.hypot(normal, shear), FORCES), self.of_joint(joint)
+        label = f"resultant{which} {size}, {at:.3g} m from the heel"
+        self.legend.append((arrow_handle(GREEN), label))
 
-    def on_joint(self, s: float | np.ndarray) -> np.ndarray:
-        """Points (..., 2) on the deformed lower face at distances s from the heel [m]."""
-        body, face = self.section.joint_faces[1]
-        along = distance(self.rows)[self.rows_at(body.points[face])]
+    def on_joint(self, s: float | np.ndarray, joint: int) -> np.ndarray:
+        """Points (..., 2) on a joint's deformed lower face at distances s from its heel [m]."""
+        body, face = self.section.joint_faces[joint][1]
+        along = distance(self.rows[joint])[self.rows_at(body.points[face], joint)]
         return np.stack([np.interp(s, along, axis) for axis in body.moved[face].T], axis=-1)
 
     def moved_with_dam(self, place: np.ndarray) -> np.ndarray:

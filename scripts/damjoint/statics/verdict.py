@@ -46,6 +46,22 @@ def failed(results: Results) -> bool:
     return bool(slipped) and not hardening_set
 
 
+def decisive_joint(results: Results) -> int:
+    """The number of the joint at which the dam fails; of a dam that stands, of the one that is
+    cracked or has slipped over the largest part of its length.
+    """
+    _, joint = failure(results)
+    names = results.case.joint_names
+    if joint:
+        return next(k for k, name in enumerate(names) if joint.startswith(name))
+    parts = [
+        max(own.last[n] for n in ("crack_length", "slip_length")) / own.case.joint_along
+        for own in results.joints
+        if results.last
+    ]
+    return int(np.argmax(parts)) if parts else 0
+
+
 def slipped_joints(results: Results) -> tuple[int, ...]:
     """The numbers of joints that have slipped along all of their length and alone hold what is
     above them; empty if there are none.
@@ -326,6 +342,11 @@ def hints_on_run(results: Results) -> list[str]:
     """Hints on the model as a whole, and on the last state of each joint."""
     case, last, messages = results.case, results.last, list[str]()
     reach = min(case["found_side"], case["found_depth"])
+    if case["dim"] == 3 and case["hold_z"] and not case.geometry:
+        messages.append(
+            "an extruded section with hold_z = 1 is in plane strain: dim = 2 has the same "
+            "solution in less time"
+        )
     if not case.geometry and reach < LEAST_FOUNDATION * case["dam_height"]:
         messages.append(
             f"the foundation reaches {reach:g} m: less than {LEAST_FOUNDATION:g} heights of the "
