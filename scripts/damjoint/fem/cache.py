@@ -130,7 +130,9 @@ def write(condensed: Condensed, header: str, path: Path) -> None:
 
 
 #: The dataclasses of which condensed bodies are made.
-CLASSES = {cls.__name__: cls for cls in (Condensed, CondensedJoint, JointDofs, JointMesh, Face, Body)}
+CLASSES = {
+    cls.__name__: cls for cls in (Condensed, CondensedJoint, JointDofs, JointMesh, Face, Body)
+}
 
 
 def pack(value: Any, path: str, arrays: dict[str, Array]) -> object:

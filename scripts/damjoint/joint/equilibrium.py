@@ -46,8 +46,7 @@ class Equilibrium:
     def __init__(self, case: Case, interface: Interface) -> None:
         self.case, self.bulk, self.interface = case, interface.bulk, interface
         self.water = [
-            JointWater(own, joint)
-            for own, joint in zip(case.joints, interface.joints, strict=True)
+            JointWater(own, joint) for own, joint in zip(case.joints, interface.joints, strict=True)
         ]
         #: numbers of the joints in which water flows
         self.flowing = tuple(k for k, water in enumerate(self.water) if water.flowing)

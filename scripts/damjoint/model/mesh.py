@@ -202,8 +202,9 @@ def shares(case: Case) -> dict[str, Setting]:
 def as_text(settings: Mapping[str, Setting]) -> str:
     """Values and lists of numbers in Gmsh's language."""
     lists = {name: value for name, value in settings.items() if isinstance(value, tuple)}
-    values = {name: value for name, value in settings.items() if name not in lists}
-    return assignments(values) + "".join(listing(*item) for item in lists.items())
+    values = {n: value for n, value in settings.items() if not isinstance(value, tuple)}
+    listed = (listing(name, map(float, value)) for name, value in lists.items())
+    return assignments(values) + "".join(listed)
 
 
 def heel_normal(joint: Body, heel: Body) -> Array:

@@ -9,7 +9,7 @@ import re
 import signal
 import tempfile
 import threading
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -256,7 +256,7 @@ def settings(pairs: Iterable[str]) -> dict[str, Setting]:
     return values
 
 
-def checked(name: str, value: Setting | Sequence[str]) -> Setting:
+def checked(name: str, value: Any) -> Setting:
     """The value of a parameter, or the values of each joint, checked.
 
     Raises InputError.
@@ -275,7 +275,7 @@ def checked(name: str, value: Setting | Sequence[str]) -> Setting:
     return tuple(known.check(v) for v in value)
 
 
-def levels_of(name: str, levels: str | Sequence[float]) -> tuple[float, ...]:
+def levels_of(name: str, levels: Any) -> tuple[float, ...]:
     """Heights [m], for example water levels, from numbers or a text 'a,b,c'.
 
     Raises InputError if there is none, or one is not finite.

@@ -110,8 +110,8 @@ def why_stopped(results: Results) -> tuple[str, str]:
 
 
 def shear_resistance(results: Results, normal: float) -> float:
-    """Shear force [N/m] that the joint, the only one of these results, transmits at the last saved state under an effective normal
-    force; infinite if its law does not bound the shear.
+    """Shear force [N/m] that the joint, the only one of these results, transmits at the last saved
+    state under an effective normal force; infinite if its law does not bound the shear.
     """
     case, damage, slip = results.case, mean(results, "damage"), mean(results, "slip")
     return case.law.shear_resistance(normal, case.joint_along, damage, slip)
