@@ -1,13 +1,20 @@
 """Changes of temperature: closed forms of free expansion and bending in both engines, time, what
 they must not change."""
 
+import shutil
+import subprocess
+import sys
+
 import damjoint as dj
+import gmsh
 import numpy as np
 import pytest
-from damjoint import InputError
+from damjoint import InputError, data
+from damjoint.engines.getdp.process import find_getdp
 from damjoint.fem.cache import key_of
 from damjoint.model.case import load
 from damjoint.model.loads import Loading
+from damjoint.model.parameters import start_gmsh
 from numpy.testing import assert_allclose
 
 #: A weightless wall, 2 m thick and 20 m high, free to slide on its base.
@@ -94,9 +101,8 @@ def test_without_a_change_of_temperature_the_bodies_are_the_same():
     assert key_of(load("dam", {"expansion_dam": 2e-5, "temperature_period": 3.0})) == key_of(plain)
     assert key_of(load("dam", {"temperature_found": 1.0, "expansion_found": 0.0})) == key_of(plain)
     assert key_of(load("dam", {"temperature_found": 1.0})) != key_of(plain)
-    assert key_of(load("dam", {"temperature_dam": 1.0})) == key_of(
-        load("dam", {"temperature_dam": 9})
-    )
+    cool, warm = (load("dam", {"temperature_dam": t}) for t in (-1.0, 9.0))
+    assert key_of(cool) == key_of(warm)
 
 
 def test_slip_in_opposite_directions_is_no_sliding():
@@ -111,12 +117,31 @@ def test_slip_in_opposite_directions_is_no_sliding():
 
 
 def test_an_own_geometry_has_a_uniform_temperature_only():
-    moved = [
-        dj.run(dj.case("stepped", levels=[10], tail_levels=4, temperature_dam=t)).history.crest_ux[
-            -1
-        ]
-        for t in (-5, 5)
-    ]
-    assert moved[0] > 0 > moved[1]
+    water = {"levels": [10], "tail_levels": 4}
+    cold, warm = (dj.run(dj.case("stepped", temperature_dam=t, **water)) for t in (-5, 5))
+    assert cold.history.crest_ux[-1] > 0 > warm.history.crest_ux[-1]
     with pytest.raises(InputError, match="temperature_linear = 5: must be 0"):
         dj.case("stepped", temperature_linear=5)
+
+
+def test_the_view_of_the_stress_in_gmsh_is_without_the_free_strain(tmp_path):
+    """The plain problem definition, with a case that has units."""
+    for name in ("geo", "pro", "cases"):
+        shutil.copytree(data(name), tmp_path / name, ignore=shutil.ignore_patterns("res"))
+    cases, units = tmp_path / "cases", {"E": "20*GPa", "K_T": "1*kPa/m", "temperature_dam": "10*K"}
+    lines = [f"default_{n} = {units.get(n, repr(v))};" for n, v in (WALL | units).items()]
+    text = "\n".join(lines).replace("'", '"') + "\nlevels() = {0};\n"
+    (cases / "dam.case").write_text(text)
+    mesh = [sys.executable, "-c", "import gmsh, sys; gmsh.initialize(sys.argv, run=True)"]
+    run = [find_getdp(), "cases/dam.pro", "-msh", "dam.msh", "-solve", "Fill", "-v", "1"]
+    for words in ([*mesh, "-2", "cases/dam.geo", "-o", "dam.msh", "-v", "1"], run):
+        subprocess.run(words, cwd=tmp_path, check=True)
+    start_gmsh()
+    gmsh.merge(str(cases / "res/dam/stress_1.pos"))
+    (kind,), _, (values,) = gmsh.view.getListData(gmsh.view.getTags()[-1])
+    gmsh.view.remove(gmsh.view.getTags()[-1])
+    triangles = values.reshape(-1, 9 + 27)
+    centre, stress = triangles[:, :9].reshape(-1, 3, 3).mean(axis=2), triangles[:, 9:18]
+    dam = stress[centre[:, 1] > 0]
+    assert kind == "TT"
+    assert_allclose(dam[:, [0, 4, 8]], np.tile([0, 0, -2e6], (len(dam), 1)), atol=100)

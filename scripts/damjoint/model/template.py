@@ -11,8 +11,8 @@ from .parameters import Parameter, declared
 
 HEAD = """// {name} - a dam on rock. It runs as it is: damjoint run {name}
 // Change the values of your dam. Lines that begin with // are the other parameters at their
-// defaults; -1: the value follows from others, as the line says. Values
-// are in the unit that the line names, or have one: 25*GPa, 0.2*MPa, 2.4*t/m3, 50*kN/m, 5*mm.
+// defaults; -1: the value follows from others, as the line says. A value is in
+// the unit at the end of its line, or has a unit of its own: 25*GPa, 2.4*t/m3, 50*kN/m, 5*mm.
 
 title = "{title}";
 
