@@ -14,6 +14,7 @@ from .. import RUN_GEO, InputError, data
 from ..arrays import Settings, Value, Values
 from ..laws import LAWS, Law
 from . import casefile
+from .arithmetic import number
 from .constraints import (
     check_also_uplift,
     check_drive,
@@ -34,7 +35,6 @@ from .parameters import (
     independent,
     levels_of,
     listing,
-    number,
     parse,
 )
 from .scene import stacked
