@@ -5,6 +5,7 @@ import pytest
 from damjoint import InputError
 from damjoint.joint.interface import interface_of
 from damjoint.model.case import load
+from damjoint.model.mesh import Mesh
 from damjoint.model.results import column_of
 from damjoint.post import stored
 from damjoint.solver.load_stepper import LoadStepper
@@ -194,3 +195,9 @@ def test_a_case_file_with_lists(tmp_path):
     path.write_text("E_dam() = {1e10, 2e10};")
     with pytest.raises(InputError, match="line 1: .*E_dam = .*: must be a single value"):
         load(str(path))
+
+
+def test_the_mesh_of_one_joint_does_not_depend_on_an_earlier_mesh_of_several():
+    one, several = load("dam", COARSE), load("dam", COARSE | {"lift_heights": LIFTS})
+    before, _, after = Mesh(one), Mesh(several), Mesh(one)
+    assert np.array_equal(before.bodies["dam"].points, after.bodies["dam"].points)

@@ -247,6 +247,10 @@ def mesh_of(case: Case) -> Mesh:
     return mesh
 
 
+#: Options of Gmsh by which geo/dam2d.geo chooses where element sizes come from; 1: the default.
+SIZE_OPTIONS = ("MeshSizeExtendFromBoundary", "MeshSizeFromPoints")
+
+
 def generate(case: Case) -> None:
     """Make the mesh of a case, as Gmsh's current mesh.
 
@@ -256,6 +260,8 @@ def generate(case: Case) -> None:
     gmsh.clear()
     gmsh.parser.clear()
     gmsh.onelab.clear()
+    for option in SIZE_OPTIONS:  # of an earlier geometry in this process
+        gmsh.option.setNumber(f"Mesh.{option}", 1)
     own = case.geometry
     # in a folder of its own: Gmsh runs a file of options, FILE.opt, beside the file it opens
     with tempfile.TemporaryDirectory(prefix="damjoint-") as folder:
