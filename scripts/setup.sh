@@ -81,6 +81,8 @@ if [ -x .venv/bin/python ] &&
   if [ -d .venv/lib/python*/site-packages/mumps ] || [ -e .venv/mumps.log ] ||
      [ -n "$(mumps_packages)" ]; then exit 0; fi
 else
+  # for weasyprint, which writes reports as PDF; not required
+  has libpangoft2-1.0.so.0 || install libpangoft2-1.0-0 >/dev/null 2>&1 || true
   [ -x .venv/bin/python ] || "$python" -m venv .venv
   .venv/bin/pip install -q --disable-pip-version-check -e ".[test]"
 fi
