@@ -33,7 +33,11 @@ def commit() -> str:
 
     def git(*words: str) -> str:
         done = subprocess.run(
-            ["git", "-C", str(package), *words], capture_output=True, text=True, check=True
+            # without locks, which runs at the same time would wait for
+            ["git", "--no-optional-locks", "-C", str(package), *words],
+            capture_output=True,
+            text=True,
+            check=True,
         )
         return done.stdout.strip()
 

@@ -268,13 +268,13 @@ def test_report_of_a_critical_value(command, tmp_path):
     """Requirements do not apply at the limit; both methods are compared at the critical level."""
     (tmp_path / "my.case").write_text(CASE)
     assert command("critical", "my.case", *SMALL, "--set", "adhesion=0", "--out", "limit")[0] == 0
-    found = json.loads((tmp_path / "limit/run.json").read_text())["critical"]["value"]
+    level = json.loads((tmp_path / "limit/run.json").read_text())["critical"]["value"]
     assert command("report", "limit")[0] == 0
     page = (tmp_path / "report.html").read_text()
     assert ">not checked<" in page and ">fail<" not in page
-    assert f"critical level {found:.6g} m" in words_of(page)
+    assert f"critical level {level:.6g} m" in words_of(page)
     both = rows_below(page, "Finite elements and gravity method, at the last level")
-    assert_allclose(column(both, "level")[:2], found, rtol=1e-3)
+    assert_allclose(column(both, "level")[:2], level, rtol=1e-3)
     assert_allclose(column(both, "N'")[0], column(both, "N'")[1], rtol=1e-3)
 
 

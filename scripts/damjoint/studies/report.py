@@ -121,7 +121,7 @@ def write(folders: list[Path], to: Path) -> None:
     rendered = renderer(to)
     runs = [run for folder in folders for part in parts_of(folder) for run in stored.runs_in(part)]
     inside = any(run.resolve() in to.resolve().parents for run in runs)
-    if to.is_dir() or (inside and to.suffix not in (".html", ".pdf")):
+    if to.is_dir() or (inside and to.suffix.lower() not in (".html", ".pdf")):
         raise InputError(
             f"to = {to}: must be a file; in the folder of a run it must end in .html or .pdf"
         )
