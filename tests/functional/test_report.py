@@ -168,7 +168,7 @@ def test_all_input_of_a_run_is_in_its_report(command, folder, tmp_path):
     text = words_of(page)
     for name, entry in entries.items():
         table = rf"{name} {re.escape(entry.meaning)} {re.escape(entry.value)} "
-        dense = rf"{re.escape(entry.meaning)} {name} = {re.escape(entry.value)}"
+        dense = rf"{name} = {re.escape(f'{entry.value} {entry.unit}'.strip())}[;.]"
         assert re.search(rf"{table}|{dense}", text), name
 
 
@@ -282,9 +282,12 @@ def test_limits_of_the_model_follow_the_case():
     """A sentence for each choice of the model; loads that are zero are named."""
     plane = " ".join(report_input.limits(load("dam", {"uplift": "none"})))
     assert "Plane strain" in plane and "no water pressure" in plane
-    assert "Loads that are zero: silt, ice, post-tensioning, earthquake." in plane
+    assert "Loads that are zero: silt, ice, post-tensioning, earthquake, temperature." in plane
     quake = {"k_v": 0.1, "law": "bond", "uplift": "drained", "ice_force": 1e4}
-    sentences = " ".join(report_input.limits(load("dam", quake)))
+    loaded = load("dam", quake | {"temperature_found": -2})
+    sentences = " ".join(report_input.limits(loaded))
+    assert "expansion_found" in report_input.materials(loaded) and "no conduction" in sentences
+    assert "expansion_found" not in report_input.other_input(loaded)
     assert "pseudo-static" in sentences and "Joint law bond: coupled" in sentences
     assert "Drains 3.4 m from the heel" in sentences
     assert "Loads that are zero: silt, post-tensioning." in sentences

@@ -25,8 +25,9 @@ UNITS: dict[str, Units] = {
     "m per s2": (("m/s²", 1),),
     "-": (("", 1),),
 }
-#: Groups of parameters whose values need a source.
+#: Groups of parameters, and others, whose values need a source.
 MATERIALS = ("Bulk", "Joint", "Water")
+OTHER_MATERIALS = ("expansion_dam", "expansion_found")
 #: Groups of parameters that are in the table of the input even with their default.
 SCENE = ("Scene", "Geometry")
 #: Defaults of the moduli of dam and foundation, which are listed themselves.
@@ -53,9 +54,10 @@ LOADS = {
     "ice": ("ice_force",),
     "post-tensioning": ("anchor_force",),
     "earthquake": ("k_h", "k_v"),
+    "temperature": ("temperature_dam", "temperature_linear", "temperature_found"),
 }
 NEVER_MODELLED = (
-    "temperature, shrinkage, creep, swelling of the concrete, dynamic response, pore pressure and "
+    "shrinkage, creep, swelling of the concrete, dynamic response, pore pressure and "
     "seepage in concrete and rock"
 )
 
@@ -103,17 +105,19 @@ def ranges(numbers: list[int]) -> str:
 
 def materials(case: Case) -> dict[str, Entry]:
     """List the properties of bodies, joint and water that matter in a case, by parameter."""
-    return {n: e for n, e in parameters(case).items() if declared()[n].group in MATERIALS}
+    return {n: e for n, e in parameters(case).items() if is_material(n)}
+
+
+def is_material(name: str) -> bool:
+    """Whether a parameter is a property of bodies, joint or water."""
+    return declared()[name].group in MATERIALS or name in OTHER_MATERIALS
 
 
 def other_input(case: Case) -> dict[str, Entry]:
     """List the other parameters that matter in a case by name, and its water levels."""
     entries = loading(case)
-    known = declared()
-    entries |= {n: e for n, e in parameters(case).items() if known[n].group not in MATERIALS}
-    if (
-        case.geometry
-    ):  # the section's dimensions do not apply, but a .geo may use those that are set
+    entries |= {n: e for n, e in parameters(case).items() if not is_material(n)}
+    if case.geometry:  # dimensions of the section do not apply; a .geo may use those that are set
         entries = {n: e for n, e in entries.items() if e.default or not of_section(n)}
     return entries
 
@@ -230,6 +234,8 @@ def limits(case: Case) -> Iterator[str]:
             f"{', added water pressure after Westergaard' if case['added_mass'] else ''}; the "
             "uplift is unchanged."
         )
+    if any(case[name] for name in LOADS["temperature"]):
+        yield "Changes of temperature are prescribed: no conduction of heat is computed."
     absent = [load for load, names in LOADS.items() if not any(case[n] for n in names)]
     yield f"Not modelled: {NEVER_MODELLED}."
     if absent:
