@@ -17,7 +17,7 @@ import numpy as np
 from ..arrays import Array, Sparse
 from ..laws import TANGENT, Law, Mode
 from ..model.case import Case, flows, has_drains
-from ..model.loads import Loading, line_forces, quake_column, water_column
+from ..model.loads import AddedPressure, Loading, line_forces, water_column
 from .flow import FlowSolution
 from .interface import Interface
 from .linear_system import Change
@@ -84,29 +84,27 @@ class Equilibrium:
         if case["face_load"] == "uniform":
             pressure = np.full(len(face.y), self.unit_weight * level)
             return face.spread(-pressure[:, None] * face.normals)
-        shaking = 0.0
-        if face.side == "up" and case["added_mass"]:
-            # Westergaard's pressure, times the part of the acceleration that is normal to the face
-            shaking = 7 / 8 * case["k_h"] * loading.part("quake")
-        floor = self.interface.floor
+        added = AddedPressure(0.0, self.interface.floor)
+        if face.side == "up":
+            added = AddedPressure.of(case, loading, self.interface.floor)
 
         def height(level: float, y: Array, tilt: Array) -> Array:
-            still = np.maximum(level - y, 0)
-            return still + shaking * tilt * np.sqrt(np.maximum(level - floor, 0) * still)
+            return np.maximum(level - y, 0) + added.height(level, y, tilt)
 
         def column(level: float, low: float, high: float) -> tuple[float, float]:
-            still, quake = water_column(level, low, high), quake_column(level, low, high, floor)
-            share = shaking * abs(face.normals[0, 0])
-            return still[0] + share * quake[0], still[1] + share * quake[1]
+            still = water_column(level, low, high)
+            quake = added.column(level, low, high, abs(face.normals[0, 0]))
+            return still[0] + quake[0], still[1] + quake[1]
 
         forces = self.unit_weight * face.press(level, height, column)
         grown = loading.part("silt") if face.side == "up" else 0.0
         if grown > 0 and case["silt_height"] > 0:
-            weight = grown * case["rho_silt"] * case["g"] * case["silt_K0"]
+            weight = grown * case["rho_silt"] * case["g"]
             depth = lambda level, y, _tilt: np.maximum(level - y, 0)
             silt = face.press(case["silt_height"], depth, water_column).reshape(-1, self.bulk.dim)
-            silt[:, 1:] = 0  # a horizontal pressure on the vertical projection
-            forces += weight * silt.ravel()
+            # horizontal pressure on the vertical projection, vertical one on the horizontal
+            silt *= [weight * case["silt_K0"], weight * case["silt_weight"], 0][: self.bulk.dim]
+            forces += silt.ravel()
         return forces
 
     def unit_loads(self, loading: Loading) -> dict[str, float]:
@@ -116,7 +114,7 @@ class Equilibrium:
         loads = {
             "dam_x": case["k_h"] * quake * concrete,
             "dam_y": (case["k_v"] * quake - 1) * concrete,
-            "loadsation_y": 0.0 if case["in_situ"] else -case["rho_loads"] * case["g"],
+            "foundation_y": 0.0 if case["in_situ"] else -case["rho_found"] * case["g"],
         }
         loads |= {"lower_x": loads["dam_x"], "lower_y": loads["dam_y"]}
         for name, force in line_forces(case, loading).items():

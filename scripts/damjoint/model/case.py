@@ -46,6 +46,7 @@ CASES = data("cases")
 SHARED = (
     *("strategy_growth", "strategy_secant", "strategy_release", "strategy_iterations", "cut"),
     *("round_off", "coarsest", "artificial", "release_length", "crack_aperture", "crack_most"),
+    *("zangar_angle", "zangar_cm"),
 )
 
 #: Variables of pro/section.pro: the joint's ends, the segments of the faces, the marks of line

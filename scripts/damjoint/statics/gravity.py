@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..model.case import Case
-from ..model.loads import Loading, line_forces
+from ..model.loads import ZANGAR, Loading, line_forces, zangar_column, zangar_share
 from ..model.parameters import constants
 
 #: Columns of gravity.csv: a row per load on the body above the joint, and their sum.
@@ -114,6 +114,25 @@ class Segment(NamedTuple):
         ).times(part)
 
 
+    def zangar_load(self, surface: float, floor: float) -> Load:
+        """The resultant of a pressure H (u + Sqrt[u]), see `zangar_column` (surface and floor:
+        heights above the toe [m]).
+        """
+        width, rise = self.x1 - self.x0, self.y1 - self.y0
+        if rise == 0:
+            return Load("pressure", 0, 0, 0, 0)
+        column = zangar_column(surface, *sorted((self.y0, self.y1)), floor)
+        total, lever = (math.copysign(1.0, rise) * part for part in column)
+        lean = width / rise
+        return Load(
+            "pressure",
+            -total,
+            lean * total,
+            lever,
+            lean * ((self.x0 - lean * self.y0) * total + lean * lever),
+        )
+
+
 class RigidBlock:
     """The part of the section above the joint: outline, faces, marks, from the joint's toe [m]."""
 
@@ -183,18 +202,28 @@ def water_on(
 
 
 def silt_on(case: Case, body: RigidBlock) -> Load:
-    """Silt on the upstream face: horizontal pressure of an equivalent fluid."""
-    weight = case["rho_silt"] * case["g"] * case["silt_K0"]
-    loads = fluid_on(body.segments("UP"), weight, case["silt_height"] - body.toe[1])
-    return resultant_of("silt", loads)._replace(fy=0.0, moment_of_fy=0.0)
+    """Silt on the upstream face: horizontal pressure of an equivalent fluid; with silt_weight its
+    weight on a batter, too.
+    """
+    unit_weight, surface = case["rho_silt"] * case["g"], case["silt_height"] - body.toe[1]
+    pressure, weight = (
+        resultant_of("silt", fluid_on(body.segments("UP"), unit_weight * share, surface))
+        for share in (case["silt_K0"], case["silt_weight"])
+    )
+    return pressure._replace(fy=weight.fy, moment_of_fy=weight.moment_of_fy)
 
 
 def added_pressure(case: Case, body: RigidBlock, level: float) -> Load:
-    """Westergaard's added pressure 7/8 k_h rho_water g Sqrt[H (H - y)] on the upstream face, H the
-    level, times the normal's horizontal part [USACE EM 1110-2-2200, Westergaard 1933].
+    """The water's added pressure on the upstream face, H the level: Westergaard's 7/8 k_h rho_water
+    g Sqrt[H (H - y)], times the normal's horizontal part [USACE EM 1110-2-2200, Westergaard 1933],
+    or Zangar's C_m/2 k_h rho_water g H (u + Sqrt[u]), u = 1 - (y/H)^2 [Zangar 1952].
     """
     surface = level - body.toe[1]
     wet = [part for s in body.segments("UP") if (part := s.below(surface))]
+    if case["added_mass"] == ZANGAR:
+        size = zangar_share(case, level) / 2 * case["k_h"] * case["rho_water"] * case["g"]
+        loads = [s.zangar_load(surface, -body.toe[1]) for s in wet]
+        return resultant_of("added water pressure", loads).times(size)
     size = 7 / 8 * case["k_h"] * case["rho_water"] * case["g"] * math.sqrt(level)
     loads = [s.westergaard_load(surface) for s in wet]
     return resultant_of("added water pressure", loads).times(size * case["added_mass"])
