@@ -113,7 +113,6 @@ class Segment(NamedTuple):
             lean * ((self.x0 + lean * u0) * half - lean * three_halves),
         ).times(part)
 
-
     def zangar_load(self, surface: float, floor: float) -> Load:
         """The resultant of a pressure H (u + Sqrt[u]), see `zangar_column` (surface and floor:
         heights above the toe [m]).

@@ -7,7 +7,6 @@ precision. A critical level needs no bisection: it is the highest level of the p
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -18,7 +17,6 @@ from typing import Any
 import numpy as np
 from scipy.optimize import bisect
 from threadpoolctl import threadpool_limits
-from tqdm import tqdm
 
 from .. import InputError
 from ..arrays import Values
@@ -31,6 +29,7 @@ from ..model.parameters import parameter
 from ..model.results import Results
 from ..post import folder as folders
 from ..post.tables import write_csv
+from ..progress import Progress
 from ..runner import save
 from ..solver.path import PRECISION, ROUGH, SURE, Point
 from ..statics import gravity
@@ -120,10 +119,9 @@ class Search:
         settings: Values | None = None,
         levels: str | Sequence[float] | None = None,
         tail_levels: str | Sequence[float] | None = None,
-        on_progress: Callable[[str], None] = lambda message: None,
     ) -> None:
         """case, settings, levels, tail_levels: as in model.case.load; of: level, strength, uplift
-        or a parameter; on_progress: called with a message. Raises InputError.
+        or a parameter. Raises InputError.
         """
         self.source = case, levels, tail_levels
         self.of, self.name = of, {"uplift": "drain_effectiveness"}.get(of, of)
@@ -131,7 +129,9 @@ class Search:
         self.settings = QUICK | dict(settings or {}) | {"drive": "level"}
         if own.law.hardening_parameter and not own.hardening_asked:
             self.settings[own.law.hardening_parameter] = 0.0
-        self.own, self.on_progress = own, on_progress
+        self.own = own
+        #: called with a message on the progress
+        self.on_progress: Callable[[str], None] = lambda message: None
         self.trials: list[Trial] = []
         self.check_quantity()
 
@@ -463,18 +463,18 @@ def critical(
     Returns the result, and its lines of text. An interrupted search writes its trials.
     Raises InputError, RunError.
     """
-    shown = tqdm(bar_format="{desc} {elapsed}", disable=not sys.stderr.isatty(), leave=False)
-    search = Search(case, of, settings, levels, tail_levels, shown.set_description_str)
-    out = out or Path("out") / f"{search.own.name}_critical"
+    search = Search(case, of, settings, levels, tail_levels)
+    name = search.own.name
+    out = out or Path("out") / f"{name}_critical"
     folders.check_writable(out)
     start = time.perf_counter()
-    try:
-        answer = search.run()
-    except KeyboardInterrupt as caught:
-        write(search, search.interrupted(caught), out, time.perf_counter() - start)
-        raise
-    finally:
-        shown.close()
+    with Progress(name, bar_format="{desc} {elapsed}", leave=False) as shown:
+        search.on_progress = lambda message: shown.describe(f"{name}: {message}")
+        try:
+            answer = search.run()
+        except KeyboardInterrupt as caught:
+            write(search, search.interrupted(caught), out, time.perf_counter() - start)
+            raise
     write(search, answer, out, time.perf_counter() - start)
     return answer, answer.lines(search)
 
