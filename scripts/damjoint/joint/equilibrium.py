@@ -155,7 +155,7 @@ class Equilibrium:
         that is lower.
 
         Drains reduce the head above their outlet, the tailwater or their own height, by their
-        effectiveness (EM 1110-2-2200).
+        effectiveness (EM 1110-2-2200); USBR counts the reduction from the reservoir's head.
         """
         case, along = self.case, self.interface.fields
         fields = along.heel_y, along.toe_y, along.xi
@@ -166,7 +166,7 @@ class Equilibrium:
         if case["uplift"] != "drained":
             return first + (last - first) * xi
         at = case["drain_x"] / self.interface.length
-        drained = first + (last - first) * at
+        drained = first + (last - first) * (at if case["drain_reference"] == "linear" else 0)
         outlet = np.maximum(heel + (toe - heel) * at, max(case["drain_level"], loading.tail))
         drained = drained - case["drain_effectiveness"] * np.maximum(drained - outlet, 0)
         return np.where(

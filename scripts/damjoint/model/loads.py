@@ -13,12 +13,10 @@ import numpy as np
 
 from ..arrays import Array
 from .case import Case
+from .constraints import ZANGAR
 from .mesh import Face
 from .parameters import TINY
 from .scene import DOWN, TOP, UP
-
-#: Value of added_mass: Zangar's pressure in place of Westergaard's.
-ZANGAR = 2
 
 #: Loads that grow linearly from t = <name>_t - 1 to t = <name>_t.
 STAGED = ("silt", "ice", "force", "anchor", "quake")

@@ -20,7 +20,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..model.case import Case
-from ..model.loads import ZANGAR, Loading, line_forces, zangar_column, zangar_share
+from ..model.constraints import ZANGAR
+from ..model.loads import Loading, line_forces, zangar_column, zangar_share
 from ..model.parameters import constants
 
 #: Columns of gravity.csv: a row per load on the body above the joint, and their sum.
@@ -278,6 +279,8 @@ class Uplift:
             outlet = max(max(case["drain_level"], tail) - (body.heel[1] + at * body.along[1]), 0.0)
             self.drains = at, outlet
             undrained = float(np.interp(at, places[1:], heads[1:]))
+            if mode == "drained" and case["drain_reference"] == "reservoir":
+                undrained = h1
             places.insert(2, at)
             heads.insert(2, drained_head(case, undrained, outlet))
         weight = case["rho_water"] * case["g"] if mode != "none" else 0.0
@@ -304,8 +307,11 @@ def drained_head(case: Case, undrained: float, outlet: float) -> float:
 
 
 def sliding_factor(case: Case, normal: float, shear: float, uncracked: float) -> float:
-    """SSF = (mu N' + c (L - a)) / |T|: shear friction factor, cohesion on the uncracked joint."""
-    resistance = case["mu"] * normal + case["adhesion"] * uncracked
+    """SSF = (mu N' + c (L - a)) / |T|: shear friction factor, cohesion on the uncracked joint; with
+    mu and c divided by their partial factors.
+    """
+    mu, cohesion = case["mu"] / case["factor_mu"], case["adhesion"] / case["factor_c"]
+    resistance = mu * normal + cohesion * uncracked
     return resistance / abs(shear) if shear else math.inf
 
 
@@ -318,11 +324,14 @@ def overturning_factor(loads: tuple[Load, ...], uplift_moment: float) -> float:
     return math.fsum(m for m in moments if m > 0) / overturning if overturning else math.inf
 
 
+#: Parts of a joint, with half of their length over the joint's.
+PARTS = {"middle third": 1 / 6, "middle half": 1 / 4, "within base": 1 / 2}
+
+
 def position(x_resultant: float, length: float) -> str:
     """In which part of a joint N meets it."""
     away = abs(x_resultant / length - 1 / 2)
-    parts = (1 / 6, "middle third"), (1 / 4, "middle half"), (1 / 2, "within base")
-    return next((words for share, words in parts if away <= share), "outside")
+    return next((words for words, share in PARTS.items() if away <= share), "outside")
 
 
 @dataclass(frozen=True)

@@ -41,6 +41,9 @@ from .failure_path import CRITICAL, FailurePath, Trial, row
 #: the stresses of the softening curve are scaled, its jumps are not.
 STRENGTH = ("sigma_max", "adhesion", "mu", "G_f", "G_t")
 
+#: Partial factors that divide them beside it.
+PARTIAL = {"mu": "factor_mu", "adhesion": "factor_c", "G_t": "factor_c"}
+
 #: Few iterations for a step of the level: if it fails a displacement is prescribed.
 QUICK = {"smallest_step": 1.0, "max_iterations": 15.0, "burst_iterations": 15.0}
 
@@ -95,6 +98,9 @@ class CriticalValue:
             mode = f" ({self.mode})" if self.mode else ""
             lines = [f"{name}: critical {of} {self.value:.6g}{unit}{mode}"]
             lines.append(self.why or f"not confirmed: {self.doubt}")
+        if search.of == "strength" and set(search.partial.values()) != {1.0}:
+            mu, cohesion = search.partial["mu"], search.partial["adhesion"]
+            lines.append(f"beyond the partial factors factor_mu = {mu:g}, factor_c = {cohesion:g}")
         if self.point and self.point.model.equilibrium.law.hardens and search.own.hardening_asked:
             lines += filter(None, [statement(last_state(search, self.point))])
         if self.gravity is not None:
@@ -126,7 +132,11 @@ class Search:
         self.source = case, levels, tail_levels
         self.of, self.name = of, {"uplift": "drain_effectiveness"}.get(of, of)
         own = load(case, settings, levels, tail_levels)
-        self.settings = QUICK | dict(settings or {}) | {"drive": "level"}
+        #: partial factors of the case; they are part of the reduced strength, not of a check
+        self.partial = {name: own[factor] for name, factor in PARTIAL.items()}
+        full = dict.fromkeys(PARTIAL.values(), 1.0)
+        own = replace(own, values=own.values | full)
+        self.settings = QUICK | dict(settings or {}) | {"drive": "level"} | full
         if own.law.hardening_parameter and not own.hardening_asked:
             self.settings[own.law.hardening_parameter] = 0.0
         self.own = own
@@ -171,7 +181,8 @@ class Search:
         """
         name, levels, tails = self.source
         if self.of == "strength":
-            changed = {n: self.own[n] / value for n in STRENGTH} | {"pena_rupture": -1.0}
+            factors = {n: value * self.partial.get(n, 1.0) for n in STRENGTH}
+            changed = {n: self.own[n] / factors[n] for n in STRENGTH} | {"pena_rupture": -1.0}
         else:
             changed = {self.name: value}
         return load(name, self.settings | changed, levels, tails)
