@@ -86,7 +86,7 @@ def test_pages_are_current(name):
 @pytest.mark.parametrize("folder", ["pro", "geo", "cases"])
 def test_lines_of_gmsh_and_getdp_files_are_not_too_long(folder):
     """In Python ruff checks it."""
-    for path in damjoint.data(folder).iterdir():
+    for path in damjoint.data(folder).rglob("*"):
         if path.suffix in (".pro", ".geo", ".case"):
             long = [line for line in path.read_text().splitlines() if len(line) > 100]
             assert not long, f"{path}: {long[0]}"
