@@ -40,6 +40,16 @@ class Pressure:
 
 
 @dataclass(frozen=True)
+class Still:
+    """The joint before an earthquake that leaves its water as it is: jump (j,) and internal
+    variables.
+    """
+
+    jump: Array
+    variables: Any
+
+
+@dataclass(frozen=True)
 class Residual:
     """The forces out of balance at a jump and a level (j,), and their derivatives."""
 
@@ -262,19 +272,24 @@ class Equilibrium:
         loading: Loading,
         mode: Mode = TANGENT,
         frozen_lift: Array | None = None,
+        still: Still | None = None,
     ) -> Residual:
         """The residual and its derivatives.
 
-        mode: of the law; frozen_lift (j,): replaces the lift of the flowing water.
+        mode: of the law; frozen_lift (j,): replaces the lift of the flowing water; still: the joint
+        whose opening the water follows instead.
         """
-        interface = self.interface
+        interface, opened = self.interface, still or Still(jump, variables)
         at_points = interface.jumps(interface.at_points, jump)
         traction, tangent = self.law.evaluate(at_points, variables, mode)
+        lost = self.lost_pressure(at_points[:, 0], variables, loading, still)
+        if lost:
+            traction = traction + lost[0]
         value = self.bulk.stiffness @ jump - self.loads(loading) + interface.forces(traction)
 
         flowing, solution = self.flowing and frozen_lift is None, None
         if flowing:
-            lift, solution = self.flowing_lift(jump, variables, loading)
+            lift, solution = self.flowing_lift(opened.jump, opened.variables, loading)
             value = value - lift
         elif frozen_lift is not None:
             value = value - frozen_lift
@@ -283,8 +298,10 @@ class Equilibrium:
             stiffness = tangent
             if secant:
                 stiffness = (mode.frozen or self.law).secant_stiffness(at_points, variables)
+            if lost:
+                stiffness = stiffness + lost[1]
             change = interface.change(stiffness, self.undamaged)
-            if solution is None:
+            if solution is None or still:
                 return change
             growing = self.aperture(jump, variables)[1] * interface.points.weights
             return replace(change, flow=interface.flow.derivative(solution, growing))
@@ -292,15 +309,48 @@ class Equilibrium:
         def by_level() -> Array:
             slope = -self.rate(self._loads, loading)
             if flowing:
-                lifted = lambda other: self.flowing_lift(jump, variables, other)[0]
+                lifted = lambda other: self.flowing_lift(opened.jump, opened.variables, other)[0]
                 slope = slope - self.rate(lifted, loading)
             return slope
 
         return Residual(value, by_jump, by_level)
 
-    def pressure(self, jump: Array, variables: Any, loading: Loading) -> Pressure:
-        """The water pressure in the joint at a jump."""
+    def lost_pressure(
+        self, opening: Array, variables: Any, loading: Loading, still: Still | None
+    ) -> tuple[Array, Array] | None:
+        """Pressure [Pa] that the water loses at the law's points in the crack that an earthquake
+        opens, as a traction (q, 3), and its derivative (q, 3, 3); None if it loses none.
+
+        It grows by K_N with the opening beyond that of a crack, so that a point is as stiff as in
+        contact until all of its pressure is lost.
+        """
+        if not still or self.case["quake_uplift"] != "zero":
+            return None
+        number, K_N = len(opening), self.case["K_N"]
+        traction, rate = np.zeros((number, 3)), np.zeros((number, 3, 3))
+        fields, interface = self.interface.fields, self.interface
+        beyond: Array | float = 0.0
+        if self.flowing:
+            solution = self.solve_flow(still.jump, still.variables, loading)
+            beyond = fields.at_points @ self.expand_to_nodes(solution.pressure)
+        y = interface.points.positions[:, 1]
+        full = self.uplift(loading, fields.at_points, y, beyond)
+        before = interface.jumps(interface.at_points, still.jump)[:, 0]
+        cracked = before > self.law.opening_of_crack(still.variables, number)
+        wider = np.where(cracked, 0, opening - self.law.opening_of_crack(variables, number))
+        traction[:, 0] = np.clip(K_N * wider, 0, full)
+        rate[:, 0, 0] = np.where((wider > 0) & (K_N * wider < full), K_N, 0)
+        return traction, rate
+
+    def pressure(
+        self, jump: Array, variables: Any, loading: Loading, still: Still | None = None
+    ) -> Pressure:
+        """The water pressure in the joint at a jump; still: see `residual`."""
         interface, fields = self.interface, self.interface.fields
+        opening = interface.jumps(interface.at_points, jump)[:, 0]
+        lost = self.lost_pressure(opening, variables, loading, still)
+        if still:
+            jump, variables = still.jump, still.variables
         inner: Array | float = 0.0
         if self.flowing:
             inner = self.solve_flow(jump, variables, loading).pressure
@@ -318,12 +368,18 @@ class Equilibrium:
             total = self.unit_weight * self.head(loading) + beyond
             drains = () if self.drains is None else (self.drains[0],)
             flux, leakage = interface.flow.flux(conductivity, total, self.bulk.width, *drains)
+        points = at(fields.at_points, interface.points.positions)
+        water_points = at(fields.at_water, interface.water_points.positions)
+        nodes = at(fields.at_locations, interface.space.locations)
+        if lost:  # at the nodes so that its resultant is the same
+            weights, lost_at_points = interface.points.weights, lost[0][:, 0]
+            spread = fields.at_points.T @ (weights * lost_at_points)
+            lost_at_nodes = spread / (fields.at_points.T @ weights)
+            points = points - lost_at_points
+            water_points = water_points - fields.at_water @ lost_at_nodes
+            nodes = np.maximum(nodes - fields.at_locations @ lost_at_nodes, 0)
         return Pressure(
-            points=at(fields.at_points, interface.points.positions),
-            water_points=at(fields.at_water, interface.water_points.positions),
-            nodes=at(fields.at_locations, interface.space.locations),
-            flux=flux,
-            leakage=leakage,
+            points=points, water_points=water_points, nodes=nodes, flux=flux, leakage=leakage
         )
 
     def crest(self, jump: Array, loading: Loading) -> float:

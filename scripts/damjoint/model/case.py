@@ -39,6 +39,7 @@ from .parameters import (
 from .values import ParameterValues
 from .values import flows as flows
 from .values import has_drains as has_drains
+from .values import remembers as remembers
 
 CASES = data("cases")
 

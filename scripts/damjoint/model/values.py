@@ -18,6 +18,7 @@ TextName: TypeAlias = Literal[
     "quadrature",
     "force_face",
     "drain_reference",
+    "quake_uplift",
     "required_position",
 ]
 
@@ -64,6 +65,7 @@ class LoadGroup(Group):
     """Loads besides the water."""
 
     force_face: str
+    quake_uplift: str
 
 
 class CheckGroup(Group):
@@ -144,3 +146,11 @@ def flows(values: Values | ParameterValues) -> bool:
 def has_drains(values: Values | ParameterValues) -> bool:
     """Whether drains lower the water pressure in the joint."""
     return values["uplift"] == "drained" or bool(flows(values) and values["drains"])
+
+
+def remembers(values: Values | ParameterValues) -> bool:
+    """Whether the water pressure in an earthquake follows from the joint before it."""
+    mode, uplift = values["quake_uplift"], values["uplift"]
+    if uplift == "none" or not (values["k_h"] or values["k_v"]):
+        return False
+    return mode == "zero" or (mode == "unchanged" and flows(values))
