@@ -7,6 +7,8 @@ from damjoint.engines import engine_of
 from damjoint.model.case import load
 from damjoint.statics import gravity
 from numpy.testing import assert_allclose
+from scipy import sparse
+from scipy.sparse.linalg import spsolve
 
 SMALL = {"n_joint": 40, "h_dam": 8, "h_found": 30}
 QUAKE = {"k_h": 0.1, "law": "bond", "sigma_max": 0, "mu": 1.0}
@@ -29,6 +31,39 @@ def test_resultants_of_zangar_and_of_the_weight_of_silt(solve, shape):
     assert_allclose([last[n] for n in "NTM"], (block.N, block.T, block.M), rtol=1e-6)
     lighter = load("dam", shape | loads | {"silt_weight": 0}, "20,41,41")
     assert block.N > gravity.at(lighter, 3).N
+
+
+def largest_potential_pressure(angle, rows=40):
+    """Largest p / (k_h w H) on a face inclined by an angle [degrees] from the vertical, for an
+    incompressible reservoir of infinite length: Laplace's equation on linear triangles.
+    """
+    y = np.linspace(0, 1, rows + 1)
+    away = np.concatenate([[0], np.geomspace(0.01, 8, 60)])
+    lean = np.tan(np.radians(angle))
+    points = np.array([(lean * height - x, height) for x in away for height in y])
+    first = (np.arange(60)[:, None] * (rows + 1) + np.arange(rows)).ravel()
+    other = first + rows + 1
+    table = np.concatenate(
+        [np.column_stack(c) for c in ((first, other, other + 1), (first, other + 1, first + 1))]
+    )
+    corner = points[table]
+    edge = np.roll(corner, -2, axis=1) - np.roll(corner, -1, axis=1)
+    area = abs(edge[:, 0, 0] * edge[:, 1, 1] - edge[:, 0, 1] * edge[:, 1, 0]) / 2
+    parts = np.einsum("eik,ejk->eij", edge, edge) / (4 * area[:, None, None])
+    entries = np.repeat(table, 3, axis=1).ravel(), np.tile(table, (1, 3)).ravel()
+    laplace = sparse.csr_matrix((parts.ravel(), entries))
+    flow = np.zeros(len(points))  # the normal acceleration times the face's length is that of dy
+    flow[: rows + 1] = np.convolve(np.full(rows, 1 / rows), [0.5, 0.5])
+    below = np.flatnonzero(points[:, 1] < 1)
+    return spsolve(laplace[below][:, below].tocsc(), flow[below]).max()
+
+
+def test_coefficients_of_zangar_against_potential_flow():
+    """0.7425 on a vertical face [Chwang 1978]; the readings of Zangar's curve are near."""
+    assert largest_potential_pressure(0) == pytest.approx(0.7425, abs=2e-3)
+    shared = load("dam").shared
+    for angle, coefficient in zip(shared["zangar_angle"][:-1], shared["zangar_cm"], strict=False):
+        assert coefficient == pytest.approx(largest_potential_pressure(angle), abs=0.05)
 
 
 @pytest.mark.parametrize("uplift", UPLIFTS)
