@@ -143,10 +143,10 @@ class AddedPressure:
     @staticmethod
     def of(case: Case, loading: Loading, floor: float) -> AddedPressure:
         """That of a case at a loading; size 0 without an earthquake."""
-        quake = case["k_h"] * loading.part("quake")
-        if case["added_mass"] == ZANGAR:
-            return AddedPressure(zangar_share(case, loading.level) / 2 * quake, floor, zangar=True)
-        return AddedPressure(7 / 8 * quake if case["added_mass"] else 0.0, floor)
+        zangar = case["added_mass"] == ZANGAR
+        factor = zangar_share(case, loading.level) / 2 if zangar else 7 / 8
+        size = factor * case["k_h"] * loading.part("quake")
+        return AddedPressure(size if case["added_mass"] else 0.0, floor, zangar)
 
     def height(self, level: float, y: Array, tilt: Array) -> Array:
         """Heights of pressure at heights y [m] where the normal has the horizontal part tilt."""
