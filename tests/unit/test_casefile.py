@@ -56,6 +56,7 @@ def test_presets_are_included_from_any_folder(tmp_path, monkeypatch):
     text = 'Include "presets/usbr_uplift.case"; Include "presets/usace_unusual.case";'
     found = casefile.read(write(tmp_path, text + " default_mu = 0.7;"))
     uplift = {"uplift": "drained", "drain_reference": "reservoir", "drain_effectiveness": 2 / 3}
+    uplift |= {"quake_uplift": "zero"}
     required = {"required_SSF": 1.7, "required_position": "middle half"}
     assert found.defaults == {**uplift, **required, "mu": 0.7}
     (tmp_path / "presets").mkdir()

@@ -283,9 +283,10 @@ class Equilibrium:
         interface, opened = self.interface, still or Still(jump, variables)
         at_points = interface.jumps(interface.at_points, jump)
         traction, tangent = self.law.evaluate(at_points, variables, mode)
-        lost = self.lost_pressure(at_points[:, 0], variables, loading, still)
-        if lost:
-            traction = traction + lost[0]
+        dried = still if self.case["quake_uplift"] == "zero" else None
+        if dried:
+            lost, lost_rate = self.lost_pressure(at_points[:, 0], variables, loading, dried)
+            traction = traction + lost
         value = self.bulk.stiffness @ jump - self.loads(loading) + interface.forces(traction)
 
         flowing, solution = self.flowing and frozen_lift is None, None
@@ -299,8 +300,8 @@ class Equilibrium:
             stiffness = tangent
             if secant:
                 stiffness = (mode.frozen or self.law).secant_stiffness(at_points, variables)
-            if lost:
-                stiffness = stiffness + lost[1]
+            if dried:
+                stiffness = stiffness + lost_rate
             change = interface.change(stiffness, self.undamaged)
             if solution is None or still:
                 return change
@@ -312,21 +313,24 @@ class Equilibrium:
             if flowing:
                 lifted = lambda other: self.flowing_lift(opened.jump, opened.variables, other)[0]
                 slope = slope - self.rate(lifted, loading)
+            if dried:
+                losing = lambda other: interface.forces(
+                    self.lost_pressure(at_points[:, 0], variables, other, dried)[0]
+                )
+                slope = slope + self.rate(losing, loading)
             return slope
 
         return Residual(value, by_jump, by_level)
 
     def lost_pressure(
-        self, opening: Array, variables: Any, loading: Loading, still: Still | None
-    ) -> tuple[Array, Array] | None:
+        self, opening: Array, variables: Any, loading: Loading, still: Still
+    ) -> tuple[Array, Array]:
         """Pressure [Pa] that the water loses at the law's points in the crack that an earthquake
-        opens, as a traction (q, 3), and its derivative (q, 3, 3); None if it loses none.
+        opens, as a traction (q, 3), and its derivative (q, 3, 3).
 
         It grows by K_N with the opening beyond that of a crack, so that a point is as stiff as in
         contact until all of its pressure is lost.
         """
-        if not still or self.case["quake_uplift"] != "zero":
-            return None
         number, K_N = len(opening), self.case["K_N"]
         traction, rate = np.zeros((number, 3)), np.zeros((number, 3, 3))
         fields, interface = self.interface.fields, self.interface
@@ -348,13 +352,10 @@ class Equilibrium:
     ) -> Pressure:
         """The water pressure in the joint at a jump; still: see `residual`."""
         interface, fields = self.interface, self.interface.fields
-        opening = interface.jumps(interface.at_points, jump)[:, 0]
-        lost = self.lost_pressure(opening, variables, loading, still)
-        if still:
-            jump, variables = still.jump, still.variables
+        opened = still or Still(jump, variables)
         inner: Array | float = 0.0
         if self.flowing:
-            inner = self.solve_flow(jump, variables, loading).pressure
+            inner = self.solve_flow(opened.jump, opened.variables, loading).pressure
         beyond = self.expand_to_nodes(np.asarray(inner))
 
         def at(matrix: Sparse, positions: Array) -> Array:
@@ -364,7 +365,7 @@ class Equilibrium:
 
         flux, leakage = None, 0.0
         if self.case["uplift"] == "flow":
-            factor, _, narrowest = self.aperture(jump, variables)
+            factor, _, narrowest = self.aperture(opened.jump, opened.variables)
             conductivity = self.case["rho_water"] * narrowest**3 * factor / (12 * self.case["visc"])
             total = self.unit_weight * self.head(loading) + beyond
             drains = () if self.drains is None else (self.drains[0],)
@@ -372,8 +373,10 @@ class Equilibrium:
         points = at(fields.at_points, interface.points.positions)
         water_points = at(fields.at_water, interface.water_points.positions)
         nodes = at(fields.at_locations, interface.space.locations)
-        if lost:  # at the nodes so that its resultant is the same
-            weights, lost_at_points = interface.points.weights, lost[0][:, 0]
+        if still and self.case["quake_uplift"] == "zero":
+            opening = interface.jumps(interface.at_points, jump)[:, 0]
+            lost_at_points = self.lost_pressure(opening, variables, loading, still)[0][:, 0]
+            weights = interface.points.weights  # at the nodes so that the resultant is the same
             spread = fields.at_points.T @ (weights * lost_at_points)
             lost_at_nodes = spread / (fields.at_points.T @ weights)
             points = points - lost_at_points
