@@ -223,7 +223,7 @@ def pictures_of(solution: Solution) -> list[Picture]:
     at_level = f"at level {result.state(time)['level']:.4g} m"
     section, joint, history = figure_of(*HALF), figure_of(*HALF), figure_of(*WIDE)
     pictures.draw_dam(section, solution, time)
-    pictures.draw_joint(joint, result, time)
+    pictures.draw_joint(joint, solution, time)
     pictures.draw_history(history, result)
     colors = "Red: open or broken; violet: softening; orange: slipped."
     drawn = [
