@@ -26,6 +26,8 @@ ELEMENTS = {
 }
 #: Cell types of VTK by shape.
 VTK_TYPES = {"line": 3, "triangle": 5, "quad": 9, "tetra": 10, "hexahedron": 12, "wedge": 13}
+#: Corners of a wedge in the order of VTK, whose first triangle points outwards.
+VTK_WEDGE = [0, 2, 1, 3, 5, 4]
 #: Components xx, xy, xz, yx, ... of a Gmsh tensor among those of `Field.stress`.
 TENSOR = [0, 3, 5, 3, 1, 4, 5, 4, 2]
 
@@ -98,7 +100,9 @@ def write_vtu(
     counts = [len(table) for _, table in cells]
     corners = np.repeat([table.shape[1] for _, table in cells], counts)
     topology = {
-        "connectivity": np.concatenate([table.ravel() for _, table in cells]),
+        "connectivity": np.concatenate(
+            [(t[:, VTK_WEDGE] if shape == "wedge" else t).ravel() for shape, t in cells]
+        ),
         "offsets": np.cumsum(corners),
         "types": np.repeat([VTK_TYPES[shape] for shape, _ in cells], counts),
     }

@@ -270,7 +270,7 @@ class SectionDrawing:
         place = self.on_joint(at / self.case.joint_length * length)
         self.arrow(place, normal * down + shear * along, GREEN, "", RESULTANT)
         size = with_unit(math.hypot(normal, shear), FORCES, 3)
-        self.legend.append((arrow_handle(GREEN), f"resultant {size} at {at:.3g} m"))
+        self.legend.append((arrow_handle(GREEN), f"resultant {size}, {at:.3g} m from heel"))
 
     def on_joint(self, s: float | np.ndarray) -> np.ndarray:
         """Points (..., 2) on the deformed lower face at distances s from the heel [m]."""
