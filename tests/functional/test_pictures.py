@@ -55,9 +55,25 @@ def test_a_picture_fits_a_page_and_nothing_is_clipped(runs, name):
     figure = runs(name).plot()
     width, height = figure.get_size_inches()
     assert width / height == pytest.approx(PAGE, rel=0.05)
-    parts = [*figure.findobj(Axes), *figure.findobj(Legend), *figure.subfigs[0].texts]
     assert len(figure.findobj(Axes)) >= 7 and len(figure.findobj(Legend)) >= 5
-    for part in parts:
+    assert_nothing_is_clipped(figure)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_nothing_is_clipped_in_half_a_page(runs, name):
+    """As in a report."""
+    solution = runs(name).solution
+    for draw in (pictures.draw_dam, pictures.draw_joint):
+        figure = pictures.figure_of(5.2, 4.5)
+        draw(figure, solution, pictures.shown_time(solution.result))
+        assert_nothing_is_clipped(figure)
+
+
+def assert_nothing_is_clipped(figure):
+    """Axes with their labels, legends and texts are within the figure."""
+    figure.canvas.draw()
+    texts = [text for part in (figure, *figure.subfigs) for text in part.texts if text.get_text()]
+    for part in (*figure.findobj(Axes), *figure.findobj(Legend), *texts):
         box = part.get_tightbbox()
         assert box.x0 >= 0 and box.y0 >= 0, part
         assert box.x1 <= figure.bbox.x1 + 1 and box.y1 <= figure.bbox.y1 + 1, part

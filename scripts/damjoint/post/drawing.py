@@ -118,6 +118,7 @@ def legend_above(axes: Axes, columns: int = 4) -> None:
         frameon=False,
         fontsize=7.5,
         borderpad=0.2,
-        columnspacing=1.2,
-        handlelength=2.2,
+        columnspacing=0.9,
+        handletextpad=0.4,
+        handlelength=2.0,
     )

@@ -192,8 +192,8 @@ def draw_jumps(axes: Axes, case: Case, curves: dict[str, np.ndarray]) -> None:
     length, factor = unit([curves["delta_n"], curves["delta_t1"]], LENGTHS)
     for name, style, color, label in (
         ("delta_n", "-", BLUE, "opening"),
-        ("delta_t1", "-.", ORANGE, "tangential (downstream > 0)"),
-        ("slip", ":", ORANGE, f"{case.law.slip_name}, size"),
+        ("delta_t1", "-.", ORANGE, "tangential, downstream > 0"),
+        ("slip", ":", ORANGE, f"|{case.law.slip_name}|"),
     ):
         axes.plot(curves["s"], curves[name] * factor, style, color=color, label=label)
     draw_published(axes, case, curves, {"delta_n": BLUE, "delta_t1": ORANGE}, factor)
@@ -207,7 +207,7 @@ def draw_normal_stress(axes: Axes, case: Case, curves: dict[str, np.ndarray]) ->
     """
     stress, factor = unit([curves["sigma_n"], curves["sigma_n_eff"]], STRESSES)
     s = curves["s"]
-    axes.plot(s, curves["sigma_n"] * factor, color=BLUE, label="total (tension > 0)")
+    axes.plot(s, curves["sigma_n"] * factor, color=BLUE, label="total, tension > 0")
     if case["uplift"] != "none":
         effective = curves["sigma_n_eff"] * factor
         axes.plot(s, effective, "--", color=DARK, label="effective")
@@ -222,7 +222,7 @@ def draw_gravity_stress(axes: Axes, method: gravity.GravityMethod, factor: float
     """Draw the effective stress of the gravity method."""
     if method.stands:
         s, stress = gravity_profile(method)
-        style = {"color": GREY, "linewidth": 1.8, "label": "effective, gravity method"}
+        style = {"color": GREY, "linewidth": 1.8, "label": "gravity method"}
         axes.plot(s, stress * factor, ":", **style)
 
 
@@ -246,7 +246,7 @@ def draw_shear(axes: Axes, case: Case, curves: dict[str, np.ndarray]) -> None:
     limit = shear_limit(case, curves)
     stress, factor = unit([curves["tau_1"], *([limit[1]] if limit else [])], STRESSES)
     shear = curves["tau_1"] * factor
-    axes.plot(curves["s"], shear, color=ORANGE, label="shear stress (downstream > 0)")
+    axes.plot(curves["s"], shear, color=ORANGE, label="shear stress, downstream > 0")
     if limit:
         label, size = limit
         axes.plot(curves["s"], size * factor, "--", color=GREEN, label=label)
@@ -460,7 +460,8 @@ def draw_curve(result: Results) -> FigureBase:
     """
     case, history = result.case, result.history
     figure = figure_of(7, 4.5)
-    (axes,) = panels(figure, top=0.6).flat
+    title = textwrap.wrap(case.title, 80)
+    (axes,) = panels(figure, top=0.15 + 0.2 * len(title)).flat
     driven = history["time"] > case["drive_begin"] + ROUND_OFF
     after = history["time"] > case["drive_end"] + ROUND_OFF
     length, factor = unit([result.heel], LENGTHS)
@@ -477,7 +478,7 @@ def draw_curve(result: Results) -> FigureBase:
         label = f"rigid dam overturns: {bound:.3f} m"
         axes.axhline(bound, color="black", linestyle="--", linewidth=0.8, label=label)
     axes.set(xlabel=f"opening of the heel [{length}]", ylabel="level [m]")
-    axes.set_title(textwrap.fill(case.title, 70), parse_math=False)
+    axes.set_title("\n".join(title), fontsize=11, parse_math=False)
     axes.legend(fontsize=8)
     axes.grid(alpha=0.3)
     return figure
