@@ -103,8 +103,8 @@ def settings_options() -> Parser:
         "--set",
         "NAME=VALUE",
         dest="settings",
-        help="value of a parameter, in the unit of reference/parameters.md (repeatable; default: "
-        "that of the case)",
+        help="value of a parameter, in the unit of reference/parameters.md or with one of its own: "
+        "E_dam=20*GPa (repeatable; default: that of the case)",
     )
     options.add_argument(
         "--run-geo",
@@ -199,11 +199,11 @@ def add_run(commands: Commands) -> None:
 
 def do_run(arguments: argparse.Namespace) -> int:
     """Run damjoint run; 0, or 1 if the dam fails or the run stopped before its last level."""
-    from .post.drawing_process import DrawingProcess  # started before the other libraries load
-
     if arguments.no_picture:
         return run_and_print(arguments, None)
-    with DrawingProcess() as drawing:
+    from .post.drawing_process import DrawingProcess
+
+    with DrawingProcess() as drawing:  # before the other libraries are loaded
         return run_and_print(arguments, drawing)
 
 
@@ -517,7 +517,8 @@ def do_sweep(arguments: argparse.Namespace) -> int:
         arguments.case, plan, settings, out, schedule, arguments.jobs, arguments.scheduler
     )
     print(f"{count} rows computed; {out}")
-    cases = [loaded for _, loaded in cases_of(arguments.case, plan, settings, schedule)]
+    loaded = () if plan.sampled else cases_of(arguments.case, plan, settings, schedule)
+    cases = [row_case for _, row_case in loaded]
     report_sweep(arguments.case, plan, rows, cases, out)
     return 0
 

@@ -10,6 +10,7 @@ import time
 from collections.abc import Iterator
 from importlib.metadata import version
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from tqdm import tqdm
 
@@ -20,7 +21,9 @@ from .model.fields import Solution
 from .model.results import Results
 from .post import folder as folders
 from .post import tables
-from .post.drawing_process import DrawingProcess
+
+if TYPE_CHECKING:  # runs without a picture do not load it
+    from .post.drawing_process import DrawingProcess
 
 
 class Progress:

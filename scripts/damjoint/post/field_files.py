@@ -7,7 +7,6 @@ import sys
 from collections.abc import Mapping
 from pathlib import Path
 
-import gmsh
 import numpy as np
 
 from ..model.fields import OF_JOINT, Field, Solution, joint_data
@@ -153,7 +152,7 @@ def write_collection(folder: Path, fields: dict[float, Field]) -> None:
 
 def write_views(path: Path, points: np.ndarray, cells: Cells, views: list[View]) -> None:
     """Write a mesh with views, a step per time, for Gmsh."""
-    start_gmsh()
+    gmsh = start_gmsh()
     before, own = gmsh.model.getCurrent(), "fields of damjoint"
     gmsh.model.add(own)
     tags = np.arange(1, len(points) + 1)
