@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 
 import damjoint as dj
 import numpy as np
@@ -87,6 +88,20 @@ def test_lines_of_a_panel_differ_without_colors(runs, name):
         lines = [line for line in axes.get_lines() if not line.get_label().startswith("_")]
         styles = {(line.get_linestyle(), line.get_marker()) for line in lines}
         assert len(styles) == len(lines)
+
+
+def test_a_picture_in_3d(runs):
+    """It fits a page upright; without fields there are no view and maps."""
+    solution = dj.run(dj.case("d", n_joint=6, h_dam=3, h_found=4, levels=[6])).solution
+    figure = pictures.picture(solution)
+    width, height = figure.get_size_inches()
+    assert 1 / PAGE < width / height < PAGE
+    titles = [axes.get_title(loc="left") for axes in figure.findobj(Axes)]
+    assert sum(title.startswith(("opening", "effective", "shear")) for title in titles) == 3
+    assert_nothing_is_clipped(figure)
+    without = pictures.picture(replace(solution, bodies={}, fields={}))
+    without.canvas.draw()
+    assert without.get_size_inches()[1] < height
 
 
 def test_the_title_is_just_above_the_panels(runs):

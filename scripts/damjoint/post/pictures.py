@@ -96,7 +96,7 @@ def picture(solution: Solution) -> Figure:
     heights = [head]
     if has_states:
         heights += [HEIGHT - head - HISTORY, HISTORY]
-        if case["dim"] == 3 and not is_own_solid(case):
+        if case["dim"] == 3 and solution.fields and not is_own_solid(case):
             heights.append(SOLID)
     figure = figure_of(WIDTH, sum(heights))
     top, *parts = np.ravel(figure.subfigures(len(heights), 1, height_ratios=heights))
@@ -148,8 +148,10 @@ def shear_limit(case: Case, rows: dict[str, np.ndarray]) -> tuple[str, np.ndarra
 
 
 def draw_joint(figure: FigureBase, solution: Solution, time: float) -> None:
-    """Draw the joint: curves along it, or maps where it is a surface of any shape."""
-    if is_own_solid(solution.result.case):
+    """Draw the joint: curves along it, or maps where it is a surface of any shape (without fields
+    its mesh is not known).
+    """
+    if solution.fields and is_own_solid(solution.result.case):
         draw_maps(figure, solution, time)
     else:
         draw_curves(figure, solution.result, time)
@@ -379,7 +381,7 @@ def view_from(azimuth: float, elevation: float) -> np.ndarray:
     return np.column_stack([right, np.cross(towards, right), towards])
 
 
-#: From downstream, where the dam is, not hidden by the ground.
+#: From downstream and above: the ground does not hide the dam.
 VIEW = view_from(-35, 30)
 
 
