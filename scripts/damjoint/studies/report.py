@@ -402,19 +402,20 @@ def drawn(solution: Solution, time: float, at_level: str) -> Iterator[tuple[str,
         section = figure_of(*HALF)
         pictures.draw_dam(section, solution, time)
         yield "half", f"Section and loads {at_level}, deformed.", section
-    own = result.joints[decisive_joint(result)]
+    number = decisive_joint(result)
+    own = result.joints[number]
     joint = figure_of(*(HALF if has_fields else SOLID))
-    pictures.draw_joint(joint, own, time)
+    pictures.draw_joint(joint, solution.of_joint(number), time)
     name = own.case.joint_names[0] if result.case.of_joints else "joint"
     caption = f"{name[0].upper()}{name[1:]} {at_level}. {colors}"
     yield "half" if has_fields else "full", caption, joint
     history = figure_of(*WIDE)
     pictures.draw_history(history, own)
     yield "full", "", history
-    if result.case["dim"] == 3 and has_fields:
+    if result.case["dim"] == 3 and has_fields and not pictures.is_own_solid(result.case):
         solid = figure_of(*SOLID)
         pictures.draw_solid(solid, solution, time)
-        yield "full", "In 3D: deformed, and the joint unrolled.", solid
+        yield "full", "In 3D: deformed, and maps of the joint.", solid
     if result.case["drive"] != "level":
         yield "half", "Load against opening.", pictures.draw_curve(result)
 
