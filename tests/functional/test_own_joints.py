@@ -92,6 +92,24 @@ def test_blocks_of_different_friction_share_the_thrust(solved):
     assert thrust == pytest.approx(0.5 * WEIGHT, rel=1e-4)
 
 
+@pytest.mark.parametrize("dim", [2, 3])
+def test_monoliths_are_in_equilibrium(dim):
+    """The bases carry the thrust and the weight less the uplift; the contraction joint is inside."""
+    solid = {"n_joint": 6.0, "h_dam": 12.0, "h_found": 40.0} if dim == 3 else {"n_joint": 20.0}
+    case = load("monoliths", solid | {"dim": float(dim)}, [40.0])
+    results = LoadStepper(case, interface_of(case)).run()
+    *bases, contraction = results.joints
+    share = 1 / len(bases) if dim == 3 else 1.0  # per metre of both monoliths
+    area, thrust = (34 + 5) / 2 * 45, WATER * 40**2 / 2
+    weight = 2400 * 9.81 * area
+    total = {n: share * sum(own.last[n] for own in bases) for n in "NTU"}
+    assert total["N"] + total["U"] == pytest.approx(weight, rel=1e-9)
+    assert total["T"] == pytest.approx(thrust, rel=1e-4)  # elements that the waterline cuts
+    assert contraction.last["U"] == 0
+    if dim == 2:  # the downstream block holds what its contraction joint presses
+        assert bases[1].last["T"] == pytest.approx(contraction.last["N"], rel=1e-6)
+
+
 @pytest.mark.parametrize(
     "joints, settings, words",
     [

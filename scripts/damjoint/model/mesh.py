@@ -59,6 +59,9 @@ LINES = ("ice", "force", "anchor")
 #: Regions that every geometry has.
 NEEDED = ("dam", "foundation", "joint", "fixed", "heel", "toe", "crest")
 
+#: Extent along z over that along y below which a joint faces along z.
+FLAT = 1e-6
+
 #: Limit of the joint's element tags: six digits in the keys of GetDP's internal variables.
 MOST_TAGS = 1_000_000
 
@@ -168,8 +171,11 @@ class JointMesh:
 
     @property
     def width(self) -> float:
-        """Extent along z [m]; 1 in the plane."""
-        return float(np.ptp(self.surface.points[:, 2])) if self.dim == 3 else 1.0
+        """Extent along z, or along y if it faces along z [m]; 1 in the plane."""
+        if self.dim == 2:
+            return 1.0
+        _, y, z = np.ptp(self.surface.points, axis=0)
+        return float(z if z > FLAT * y else y)
 
     @property
     def ends(self) -> dict[str, list[float]]:
