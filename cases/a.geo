@@ -1,3 +1,3 @@
 // Mesh of a.case; the differences stand there.
 Include "a.case";
-Include "../geo/dam.geo";
+Include "../geo/window.geo";

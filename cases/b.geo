@@ -1,3 +1,3 @@
 // Mesh of b.case; the differences stand there.
 Include "b.case";
-Include "../geo/dam.geo";
+Include "../geo/window.geo";

@@ -1,3 +1,3 @@
 // Mesh of c.case; the differences stand there.
 Include "c.case";
-Include "../geo/dam.geo";
+Include "../geo/window.geo";

@@ -1,3 +1,3 @@
 // Mesh of d.case; the differences stand there.
 Include "d.case";
-Include "../geo/dam.geo";
+Include "../geo/window.geo";

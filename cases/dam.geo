@@ -1,3 +1,3 @@
 // Mesh of dam.case; the differences stand there.
 Include "dam.case";
-Include "../geo/dam.geo";
+Include "../geo/window.geo";

@@ -1,3 +1,3 @@
 // Mesh of e.case; the differences stand there.
 Include "e.case";
-Include "../geo/dam.geo";
+Include "../geo/window.geo";

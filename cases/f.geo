@@ -1,3 +1,3 @@
 // Mesh of f.case; the differences stand there.
 Include "f.case";
-Include "../geo/dam.geo";
+Include "../geo/window.geo";

@@ -1,3 +1,3 @@
 // Mesh of g.case; the differences stand there.
 Include "g.case";
-Include "../geo/dam.geo";
+Include "../geo/window.geo";

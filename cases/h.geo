@@ -1,3 +1,3 @@
 // Mesh of h.case; the differences stand there.
 Include "h.case";
-Include "../geo/dam.geo";
+Include "../geo/window.geo";

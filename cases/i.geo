@@ -1,3 +1,3 @@
 // Mesh of i.case; the differences stand there.
 Include "i.case";
-Include "../geo/dam.geo";
+Include "../geo/window.geo";

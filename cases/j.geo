@@ -1,3 +1,3 @@
 // Mesh of j.case; the differences stand there.
 Include "j.case";
-Include "../geo/dam.geo";
+Include "../geo/window.geo";

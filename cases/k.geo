@@ -1,3 +1,3 @@
 // Mesh of k.case; the differences stand there.
 Include "k.case";
-Include "../geo/dam.geo";
+Include "../geo/window.geo";

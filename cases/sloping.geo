@@ -1,3 +1,3 @@
 // Mesh of sloping.case; the differences stand there.
 Include "sloping.case";
-Include "../geo/dam.geo";
+Include "../geo/window.geo";

@@ -115,8 +115,8 @@ def solved(case, folder):
     return [result.history[name][-1] for name in SEEN]
 
 
-#: Gmsh's colours of the status in the tree
-GREEN, RED = (127, 218, 127), (255, 72, 63)
+#: Gmsh's colours of the status in the tree; colour of the water
+GREEN, RED, BLUE = (127, 218, 127), (255, 72, 63), (150, 190, 255)
 
 
 @pytest.fixture
@@ -161,7 +161,7 @@ def window(project, tmp_path):
             began, ended = results / "clear.geo", results / "status.geo"
             before = [stamp(began), stamp(ended)]
             pressed, end = 0.0, time.monotonic() + 120
-            while stamp(ended) == before[1]:
+            while stamp(ended) in (0, before[1]):  # a run deletes the file of the one before
                 assert time.monotonic() < end and opened[-1].poll() is None
                 if stamp(began) == before[0] and time.monotonic() > pressed + 10:
                     call("xdotool", "mousemove", "250", "818", "click", "1")
@@ -198,13 +198,58 @@ def pixels(picture, colour):
 
 @pytest.mark.heavy
 def test_window_shows_a_complete_run(window, project):
-    """Run twice: the status is green both times, the views of the first run are removed."""
-    press = window()
+    """Run twice: the status is green both times, the views of the first run are removed, the water
+    of each step is drawn.
+    """
+    press, results = window(), project / "res/a"
     for name in ("first", "second"):
         picture = press(name)
         assert pixels(picture, GREEN) > 500 and not pixels(picture, RED) > 500
-    assert "complete" in (project / "res/a/status.geo").read_text()
-    assert len(list((project / "res/a").glob("opening_*.pos"))) == 8
+        assert pixels(picture, BLUE) > 5000
+        assert (results / "status.geo").read_text().count("'complete'") == 2
+        assert (results / "head.geo").read_text().count("Merge") == 1
+    assert len(list(results.glob("opening_*.pos"))) == 8
+    heights = [water_heights(file) for file in sorted(results.glob("water_*.pos"))]
+    dry = [0.0] * 8  # tailwater; over the crest
+    assert heights == [dry, pytest.approx([3, 6, 8, 8.2, 8.4, 8.6, 8.8, 9]), dry]
+
+
+def water_heights(file):
+    """Height of the water in each step of a view: the displacement of the upper edge."""
+    steps = file.read_text().split("){")[1].split("}")[0].replace("\n", "").split(",")
+    return [float(height) for height in steps[7::12]]
+
+
+def test_the_window_fits_a_small_screen(project):
+    """A window of Gmsh's default size is enlarged; another size is the user's."""
+    for width, expected in (800, 1180), (1000, 1000):
+        start_gmsh()
+        gmsh.option.setNumber("General.GraphicsWidth", width)
+        gmsh.option.setNumber("General.MenuWidth", 200)
+        gmsh.open(str(project / "a.geo"))
+        assert gmsh.option.getNumber("General.GraphicsWidth") == expected
+
+
+def test_results_of_other_parameters_are_not_called_complete(project):
+    """A changed level takes effect on the status at once, also if its value is refused."""
+    status = "0Results/0Status"
+    start_gmsh()
+    gmsh.onelab.clear()
+    gmsh.open(str(project / "a.geo"))
+    assert gmsh.onelab.getString(status) == ["not run yet"]
+    gmsh.onelab.setNumber("0Results/1Water level [m]", [9.0])  # by a run
+    for level, refused in (15.0, False), (25.0, True):
+        gmsh.onelab.setString(status, ["complete"])
+        gmsh.onelab.setNumber("Parameters/1Water levels/20004Level 4 [m]", [level])
+        gmsh.clear()
+        gmsh.parser.clear()
+        if refused:
+            with pytest.raises(Exception, match="Level 4 = 25 m"):
+                gmsh.open(str(project / "a.geo"))
+        else:
+            gmsh.open(str(project / "a.geo"))
+        assert gmsh.onelab.getString(status) == ["changed: press Run"]
+    gmsh.onelab.clear()
 
 
 @pytest.mark.heavy
@@ -214,4 +259,5 @@ def test_window_shows_the_level_of_a_run_that_stops(window, project):
     words += " -setnumber n_joint 10"  # the sliding level does not depend on the mesh
     picture = window(*words.split())("stopped")
     assert pixels(picture, RED) > 500 and not pixels(picture, GREEN) > 500
+    assert "Error" not in (project / "res/a/status.geo").read_text()  # it opens a dialogue
     assert "stopped_at = 7.4" in (project / "res/a/stopped.geo").read_text()
