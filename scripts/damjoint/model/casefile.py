@@ -2,11 +2,13 @@
 
 A case is a list of statements, in any layout, with // and /* */ comments:
 
-    Include "other.case";            the statements of another case file, beside this one
+    Include "other.case";            the statements of another case file, beside this one, or of the
+                                     package: "presets/usace_usual.case"
     title = "words";
     also_uplift = "none";            further uplift modes the case is published with
     geometry = "own.msh";            your own mesh or .geo, beside this file
-    default_<parameter> = value;     a text; arithmetic with + - * / ^ ( ), Pi, defaults set before
+    default_<parameter> = value;     a text; arithmetic with + - * / ^ ( ), Pi, the units of
+                                     pro/units.pro and defaults set before
     levels() = {value, ...};         tail_levels() and times() likewise
 """
 
@@ -19,9 +21,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeAlias
 
-from .. import InputError
+from .. import InputError, data
 from ..arrays import Value
-from .arithmetic import parsed, value_of
+from .arithmetic import arithmetic_value, explained
 from .parameters import assignments, parameter
 
 LISTS = ("levels", "tail_levels", "times")
@@ -98,6 +100,12 @@ def read_into(case: CaseText, path: Path) -> None:
         raise InputError(f"{where}: {excerpt(statement)}: does not end with a semicolon")
 
 
+def included(name: str, path: Path) -> Path:
+    """The file that a case file includes: beside it, else that of the package."""
+    beside, packaged = path.parent / name, data("cases") / name
+    return packaged if packaged.is_file() and not beside.exists() else beside
+
+
 def text_of(path: Path) -> str:
     """The text of a case file, not longer than LONGEST."""
     try:
@@ -122,7 +130,7 @@ def add_statement(case: CaseText, statement: list[Token], path: Path, where: str
     where = f"{where}: {excerpt(statement)}"
     name = tokens[0] if kinds[:1] == ("name",) else ""
     if name == "Include" and kinds[1:] == ("text",):
-        read_into(case, path.parent / tokens[1][1:-1])
+        read_into(case, included(tokens[1][1:-1], path))
     elif name in LISTS and tokens[1:4] == ("(", ")", "="):
         case.lists[name] = numbers(tokens[4:], case, where)
     elif name in TEXTS and tokens[1:2] == ("=",):
@@ -172,9 +180,10 @@ def evaluate(tokens: tuple[str, ...], case: CaseText, where: str) -> float:
     """The value of an arithmetic expression."""
     known = {f"default_{n}": v for n, v in case.defaults.items() if isinstance(v, float)}
     try:
-        return value_of(parsed(" ".join(tokens)), known)
-    except ValueError:
-        raise InputError(
-            f"{where}: must be a number, or arithmetic with + - * / ^ ( ), Pi and defaults set "
-            "before"
-        ) from None
+        return arithmetic_value(" ".join(tokens), known)
+    except ValueError as error:
+        message = (
+            f"{where}: must be a number, or arithmetic with + - * / ^ ( ), Pi, units and defaults "
+            "set before"
+        )
+        raise InputError(explained(message, error)) from None

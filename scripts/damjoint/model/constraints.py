@@ -14,6 +14,9 @@ from ..laws import LAWS
 from .parameters import constants, declared
 from .values import Group, ParameterValues, flows, has_drains
 
+#: Value of added_mass: Zangar's pressure in place of Westergaard's.
+ZANGAR = 2
+
 #: Limits of the numbers of steps between two levels, and of levels, each of which has its table.
 MOST_STEPS, MOST_LEVELS = 100_000, 10_000
 
@@ -27,8 +30,18 @@ def check_values(
         parameter.check(case.values[name])
     if by_parameters:
         check_section(case, section)
+    elif case["temperature_linear"]:
+        raise InputError(
+            f"temperature_linear = {case['temperature_linear']:g}: must be 0 with a geometry of "
+            "one's own (it is linear between the faces of the section)"
+        )
     check_drains(case, section["joint_length"][0])
     check_works(case)
+    if not by_parameters and case["added_mass"] == ZANGAR:
+        raise InputError(
+            "added_mass = 2: must be 0 or 1 with a geometry of one's own (Zangar's pressure needs "
+            "the angle of the section's upstream face)"
+        )
 
 
 def check_energies(case: ParameterValues) -> None:

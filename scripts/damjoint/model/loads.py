@@ -9,18 +9,23 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
+from ..arrays import Array
 from .case import Case
+from .constraints import ZANGAR
 from .mesh import Face
-from .scene import DOWN, TOP, UP
+from .parameters import TINY
+from .scene import DOWN, SIDES, TOP, UP
 
 #: Loads that grow linearly from t = <name>_t - 1 to t = <name>_t.
-STAGED = ("silt", "ice", "force", "anchor", "quake")
+STAGED = ("silt", "ice", "force", "anchor", "quake", "temperature")
 
 
 @dataclass(frozen=True)
 class Loading:
     """The loading at a time: reservoir and tailwater level [m], and the factors of the loads in the
-    order of STAGED, 0 to 1.
+    order of STAGED, 0 to 1 (temperature: -1 to 1).
     """
 
     level: float
@@ -30,12 +35,19 @@ class Loading:
     @staticmethod
     def at(case: Case, time: float, level: float, tail: float) -> Loading:
         """The loading of a case at a time, with levels of its own."""
-        parts = (min(max(time - case[f"{name}_t"] + 1, 0.0), 1.0) for name in STAGED)
-        return Loading(level, tail, tuple(parts))
+        parts = {n: min(max(time - case[f"{n}_t"] + 1, 0.0), 1.0) for n in STAGED}
+        since, period = time - case["temperature_t"], case["temperature_period"]
+        if since > 0 and period > 0:
+            parts["temperature"] = math.cos(2 * math.pi * since / period)
+        return Loading(level, tail, tuple(parts.values()))
 
     def part(self, name: str) -> float:
-        """The factor of a load of STAGED, 0 to 1."""
+        """The factor of a load of STAGED."""
         return self.grown[STAGED.index(name)]
+
+
+#: All loads complete, without water.
+COMPLETE = Loading(0.0, 0.0, (1.0,) * len(STAGED))
 
 
 def line_forces(case: Case, loading: Loading) -> dict[str, tuple[float, float]]:
@@ -53,6 +65,42 @@ def line_forces(case: Case, loading: Loading) -> dict[str, tuple[float, float]]:
         for name, (x, y) in full.items()
         if x or y
     }
+
+
+def thermal_strains(case: Case, loading: Loading) -> dict[str, float]:
+    """Free thermal strains of a case at a loading by region and distribution, if they can occur:
+    uniform, and the difference between downstream and upstream face where it is linear.
+    """
+    loads = case.loads
+    uniform = loads.expansion_dam * loads.temperature_dam
+    linear = loads.expansion_dam * loads.temperature_linear
+    full = {
+        "dam_uniform": uniform,
+        "dam_linear": linear,
+        "lower_uniform": uniform,
+        "lower_linear": linear,
+        "foundation_uniform": loads.expansion_found * loads.temperature_found,
+    }
+    return {name: loading.part("temperature") * strain for name, strain in full.items() if strain}
+
+
+def across(case: Case, positions: Array) -> Array:
+    """Distance from the upstream face of the section over its thickness at the height of each
+    position (n, 3), less a half: from -1/2 to 1/2 (n,).
+    """
+    section, y = case.section, positions[:, 1]
+
+    def face(side: str) -> Array:
+        segments = [i for i, number in enumerate(section["seg_side"]) if SIDES[int(number)] == side]
+        ends = [
+            (section[f"seg_y{k}"][i], section[f"seg_x{k}"][i]) for i in segments for k in (0, 1)
+        ]
+        heights, places = np.array(sorted(ends)).T
+        return np.interp(y, heights, places)
+
+    upstream, downstream = face(UP), face(DOWN)
+    share: Array = (positions[:, 0] - upstream) / (downstream - upstream) - 0.5
+    return share
 
 
 def wet(case: Case, face: Face) -> bool:
@@ -91,3 +139,69 @@ def quake_column(level: float, low: float, high: float, floor: float) -> tuple[f
     first = 2 / 3 * (most**1.5 - least**1.5)
     second = 2 / 5 * (most**2.5 - least**2.5)
     return depth**0.5 * first, depth**0.5 * (level * first - second)
+
+
+def zangar_column(level: float, low: float, high: float, floor: float) -> tuple[float, float]:
+    """Column of Zangar's H (u + sqrt(u)), u = 1 - v^2, v = y'/H, H = level - floor, y' from the
+    floor, per C_m k_h/2 [Zangar 1952].
+    """
+    depth = level - floor
+    if level <= low or depth <= 0:
+        return 0.0, 0.0
+
+    def integrals(y: float) -> tuple[float, float]:
+        v = min((y - floor) / depth, 1.0)
+        root = math.sqrt(1 - v**2)
+        return v - v**3 / 3 + (v * root + math.asin(v)) / 2, v**2 / 2 - v**4 / 4 - root**3 / 3
+
+    (area, lever), (area_low, lever_low) = integrals(high), integrals(low)
+    first = depth**2 * (area - area_low)
+    return first, floor * first + depth**3 * (lever - lever_low)
+
+
+def zangar_share(case: Case, level: float) -> float:
+    """Zangar's largest pressure coefficient C_m, by the angle of the upstream face.
+
+    A face whose vertical part is at least half of the dam's height counts as vertical, any other as
+    the line from its foot to the waterline [USBR 1987].
+    """
+    batter, height, angle = case["batter"], case["batter_height"], 0.0
+    if height > case["dam_height"] / 2 and level > 0:
+        angle = math.degrees(math.atan(batter * min(level, height) / height / level))
+    return float(np.interp(angle, case.shared["zangar_angle"], case.shared["zangar_cm"]))
+
+
+@dataclass(frozen=True)
+class AddedPressure:
+    """The added pressure of the water on the upstream face in an earthquake, per unit weight [m]:
+    of Westergaard, times the horizontal part of the face's normal, or of Zangar.
+    """
+
+    #: 7/8 k_h, or C_m k_h/2
+    size: float
+    #: foot of the face [m]
+    floor: float
+    zangar: bool = False
+
+    @staticmethod
+    def of(case: Case, loading: Loading, floor: float) -> AddedPressure:
+        """That of a case at a loading; size 0 without an earthquake."""
+        zangar = case["added_mass"] == ZANGAR
+        factor = zangar_share(case, loading.level) / 2 if zangar else 7 / 8
+        size = factor * case["k_h"] * loading.part("quake")
+        return AddedPressure(size if case["added_mass"] else 0.0, floor, zangar)
+
+    def height(self, level: float, y: Array, tilt: Array) -> Array:
+        """Heights of pressure at heights y [m] where the normal has the horizontal part tilt."""
+        depth = np.maximum(level - self.floor, 0)
+        if not self.zangar:
+            return self.size * tilt * np.sqrt(depth * np.maximum(level - y, 0))
+        u = np.maximum(1 - ((y - self.floor) / max(depth, TINY)) ** 2, 0) * (y < level)
+        return self.size * depth * (u + np.sqrt(u))
+
+    def column(self, level: float, low: float, high: float, tilt: float) -> tuple[float, float]:
+        """Its column on a face from low to high."""
+        column = zangar_column if self.zangar else quake_column
+        share = self.size * (1.0 if self.zangar else tilt)
+        force, moment = column(level, low, high, self.floor)
+        return share * force, share * moment
