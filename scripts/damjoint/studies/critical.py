@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import chain, zip_longest
 from pathlib import Path
@@ -115,20 +115,15 @@ class Search:
 
     def __init__(
         self,
-        case: str,
+        own: Case,
         of: str,
-        settings: Values | None = None,
-        levels: str | Sequence[float] | None = None,
-        tail_levels: str | Sequence[float] | None = None,
         on_progress: Callable[[str], None] = lambda message: None,
     ) -> None:
-        """case, settings, levels, tail_levels: as in model.case.load; of: level, strength, uplift
-        or a parameter; on_progress: called with a message. Raises InputError.
+        """own: the case, made by model.case.load; of: level, strength, uplift or a parameter;
+        on_progress: called with a message. Raises InputError.
         """
-        self.source = case, levels, tail_levels
         self.of, self.name = of, {"uplift": "drain_effectiveness"}.get(of, of)
-        own = load(case, settings, levels, tail_levels)
-        self.settings = QUICK | dict(settings or {}) | {"drive": "level"}
+        self.settings = QUICK | own.source.overrides | {"drive": "level"}
         if own.law.hardening_parameter and not own.hardening_asked:
             self.settings[own.law.hardening_parameter] = 0.0
         self.own, self.on_progress = own, on_progress
@@ -169,12 +164,11 @@ class Search:
 
         Raises InputError.
         """
-        name, levels, tails = self.source
         if self.of == "strength":
             changed = {n: self.own[n] / value for n in STRENGTH} | {"pena_rupture": -1.0}
         else:
             changed = {self.name: value}
-        return load(name, self.settings | changed, levels, tails)
+        return self.own.varied(self.settings | changed)
 
     def path(self, value: float, case: Case, target: float | None = None) -> FailurePath:
         """The equilibrium path of a case, followed to a first estimate; adds a trial."""
@@ -203,9 +197,9 @@ class Search:
 
     def level(self) -> CriticalValue:
         """The highest level of the path, beyond the case's highest level."""
-        name, *_ = self.source
         last = int(np.argmax(self.own.levels)) + 1
-        case = load(name, self.settings, self.own.levels[:last], self.own.tail_levels[:last])
+        levels, tails = self.own.levels[:last], self.own.tail_levels[:last]
+        case = self.own.varied(self.settings, levels, tails)
         path = self.path(max(case.levels), case, case.highest_level)
         path.follow(SURE)
         path.refine()
@@ -464,7 +458,8 @@ def critical(
     Raises InputError, RunError.
     """
     shown = tqdm(bar_format="{desc} {elapsed}", disable=not sys.stderr.isatty(), leave=False)
-    search = Search(case, of, settings, levels, tail_levels, shown.set_description_str)
+    own = load(case, settings, levels, tail_levels)
+    search = Search(own, of, shown.set_description_str)
     out = out or Path("out") / f"{search.own.name}_critical"
     folders.check_writable(out)
     start = time.perf_counter()
