@@ -82,7 +82,7 @@ if [ -x .venv/bin/python ] &&
      [ -n "$(mumps_packages)" ]; then exit 0; fi
 else
   [ -x .venv/bin/python ] || "$python" -m venv .venv
-  .venv/bin/pip install -q --disable-pip-version-check -e ".[test]"
+  .venv/bin/pip install -q --disable-pip-version-check -e ".[test,docs]"
 fi
 
 # MUMPS, the fast factorisation. Not from pip's cache: a build for another libmumps does not load.

@@ -29,7 +29,7 @@ from .model.results import HISTORY, Results, joint_columns
 from .solver.load_stepper import LoadStepper
 from .solver.state import State
 from .statics.verdict import hints, statement, verdict
-from .studies.plan import Plan, Sample
+from .studies.plan import Plan, Sample, column_of, in_file, listed, plan_with
 
 if TYPE_CHECKING:  # loaded when they are used, with what they draw with
     import pandas
@@ -69,11 +69,18 @@ def case(
 ) -> Case:
     """A case of the package, of a case file, or a variation of another case.
 
-    source: letter or name of a case of the package, path of a case file, or a case; levels,
-    tail_levels: of reservoir and tailwater [m] at t = 1, 2, ...; steps: equal steps between two
-    levels; accuracy: coarse, standard, fine or a percentage, see `damjoint run --help`;
-    parameters: by name, in SI units (reference/parameters.md). What is not given is that of the
-    source. The value of a parameter: case["mu"]. Raises InputError.
+    What is not given is that of the source. `case["mu"]` is the value of a parameter.
+
+    Args:
+        source: letter or name of a case of the package, path of a case file, or a case.
+        levels: of the reservoir [m] at t = 1, 2, ...
+        tail_levels: of the tailwater [m] at t = 1, 2, ..., or the same at all times.
+        steps: equal load steps between two levels.
+        accuracy: coarse, standard, fine or a percentage; mesh and steps are refined for it.
+        parameters: by name, in SI units, as in reference/parameters.md.
+
+    Raises:
+        InputError: name, value, and what is allowed.
     """
     loading = as_list(levels), as_list(tail_levels), steps, accuracy
     if isinstance(source, Case):
@@ -185,8 +192,11 @@ class Run:
 
     def plot(self) -> Figure:
         """The picture of the run, as `damjoint run` writes it."""
+        from matplotlib import pyplot
+
         from .post.pictures import picture
 
+        pyplot.draw_if_interactive()  # loads the backend, by which a notebook shows a figure
         return picture(self.solution)
 
     @property
@@ -241,7 +251,7 @@ class Run:
     def __repr__(self) -> str:
         last = self.results.last
         reached = f", level {last['level']:.6g} m" if last else ""
-        return f"<Run of {self.case.name}: {self.verdict}{reached}>"
+        return f"{self.case.name}: {self.verdict}{reached}"
 
     def _repr_html_(self) -> str:
         """Verdict and table of the levels, for a notebook."""
@@ -282,8 +292,15 @@ def optional(package: str) -> ModuleType:
 def run(source: Case | str | Path, *, engine: str = "auto") -> Run:
     """Solve a case; nothing is written. Of a published case with several uplifts: the first.
 
-    source: a case, or the name or path of one, see `case`; engine: condensed (auto), or getdp.
-    Raises InputError, RunError; an interrupted run raises KeyboardInterrupt.
+    A dam that fails is a result, see `Run.verdict`.
+
+    Args:
+        source: a case, or its name or path, see `case`.
+        engine: condensed (auto), or getdp, the reference model.
+
+    Raises:
+        InputError: the engine can not run the case.
+        RunError: the case could not be computed.
     """
     single = replace(as_case(source), also_uplift=())
     scenes = accuracy.solve(single, engine_of(single, engine), lambda scene, time: None, True)
@@ -317,7 +334,12 @@ class Step:
 def fill(source: Case | str | Path) -> Iterator[Step]:
     """Solve a case step by step with the condensed engine, as far as the loop goes.
 
-    source: a case, or the name or path of one, see `case`. Raises InputError, RunError.
+    Args:
+        source: a case, or its name or path, see `case`.
+
+    Raises:
+        InputError: bad input.
+        RunError: a step could not be computed.
     """
     stepper = LoadStepper(as_case(source))
     for state in stepper.steps():
@@ -327,8 +349,15 @@ def fill(source: Case | str | Path) -> Iterator[Step]:
 def check(cases: Sequence[Case | str | Path]) -> list[SafetyCheck]:
     """Safety factors of load combinations, by the finite elements and by the gravity method.
 
-    `rows` of a check are those of check.csv, `why` is empty if nothing fails, `notes` are what to
-    know. Raises InputError, RunError.
+    Each is computed up to its last level. Of each check, `rows` are those of check.csv, `why` is
+    the reason if it fails, else empty, and `notes` are what to know.
+
+    Args:
+        cases: the load combinations; cases, or their names or paths, see `case`.
+
+    Raises:
+        InputError: bad input, or a case for which there is no gravity method.
+        RunError: a case could not be computed.
     """
     from .studies.check import check_has_section, compare_methods
 
@@ -386,10 +415,16 @@ def critical(
 ) -> Critical:
     """The level, strength, uplift or parameter beyond which there is no equilibrium.
 
-    source, levels, tail_levels, parameters: as of `case`; of: level [m], strength (the factor that
-    divides mu, adhesion, sigma_max and the fracture energies), uplift (effectiveness of the drains)
-    or the name of a parameter. A case with an accuracy has the mesh of its last level. Raises
-    InputError, RunError.
+    Args:
+        source: a case, or its name or path, see `case`. If it has an accuracy, the mesh is that
+            which its levels require.
+        of: level [m], strength (the factor that divides mu, adhesion, sigma_max and the fracture
+            energies), uplift (effectiveness of the drains) or the name of a parameter.
+        levels, tail_levels, parameters: changes of the case, see `case`.
+
+    Raises:
+        InputError: bad input, or a case in which there is nothing to vary.
+        RunError: the case could not be computed.
     """
     from .studies.critical import Search
 
@@ -426,20 +461,26 @@ class Sweep:
         """
         from .studies.outcome import probabilities
 
-        return records(by_column(probabilities(self.plan, self.texts)))
+        return self.statistics(probabilities(self.plan, self.texts))
 
     @property
     def sensitivity(self) -> np.recarray:
         """Of a sample: rank correlation of each sampled parameter with the outcomes."""
         from .studies.outcome import sensitivities
 
-        return records(by_column(sensitivities(self.plan, self.texts)))
+        return self.statistics(sensitivities(self.plan, self.texts))
+
+    def statistics(self, rows: Sequence[Mapping[str, Value]]) -> np.recarray:
+        """Rows of statistics, with the varied values as they were before they became texts."""
+        table = by_column(rows)
+        for name, values in self.plan.varied.items():
+            original = {in_file(value): value for value in values}
+            table[column_of(name)] = [original[str(text)] for text in table[column_of(name)]]
+        return records(table)
 
     @property
     def texts(self) -> list[dict[str, str]]:
         """The rows as in a result file of `damjoint sweep`."""
-        from .studies.plan import in_file
-
         columns = ([in_file(value) for value in column] for column in self.table.values())
         return [dict(zip(self.table, row, strict=True)) for row in zip(*columns, strict=True)]
 
@@ -452,7 +493,7 @@ class Sweep:
 
     def __repr__(self) -> str:
         fails = sum(map(bool, self.table["failed"]))
-        return f"<Sweep of {', '.join(self.plan.names)}: {len(self.rows)} rows, {fails} fail>"
+        return f"sweep of {', '.join(self.plan.names)}: {len(self.rows)} rows, {fails} fail"
 
 
 def column_array(name: str, values: list[Value]) -> np.ndarray:
@@ -478,15 +519,24 @@ def sweep(
 ) -> Sweep:
     """Solve a case with all combinations of listed values, each with the entire sample.
 
-    source: as of `case`; values: of parameters by name, or of the last `level` [m]; sample: random
-    values, such as Sample(100, {"mu": "normal(0.8,0.1)"}); tie: parameters computed from them,
-    such as {"adhesion": "2e5*mu"}; critical: also find the critical level, strength, ... of each
-    row; jobs: number of processes (default: one per core); progress: show a bar. An error of a row
-    is its verdict `failed`. Nothing is written. Raises InputError, RunError.
+    Nothing is written. A row that could not be computed has the verdict `failed`.
+
+    Args:
+        source: a case, or its name or path, see `case`. If it has an accuracy, the mesh of all
+            rows is that which the case itself requires.
+        sample: random values, such as `Sample(100, {"mu": "normal(0.8,0.1)"})`.
+        tie: parameters computed from the others, such as `{"adhesion": "2e5*mu"}`.
+        critical: also find the critical level, strength, ... of each row, see `critical`.
+        jobs: number of processes (default: one per core).
+        progress: show a progress bar.
+        values: lists of values of parameters, by name; `level` [m] is the last level.
+
+    Raises:
+        InputError: bad input.
+        RunError: the mesh for an accuracy could not be computed, or a process was killed.
     """
     from tqdm import tqdm
 
-    from .studies.plan import column_of, listed, plan_with
     from .studies.sweep import check_jobs, compute, planned
 
     check_jobs(jobs)

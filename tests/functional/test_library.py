@@ -22,7 +22,7 @@ def run():
 
 
 def test_the_code_of_the_page_runs(tmp_path, monkeypatch):
-    """One block after the other, with nothing left on disk."""
+    """One block after the other; nothing is written."""
     monkeypatch.chdir(tmp_path)
     names = {}
     try:
@@ -109,7 +109,7 @@ def test_a_package_that_is_not_installed(run, monkeypatch, package):
 
 def test_a_notebook_shows_the_table_of_the_levels(run):
     page = run._repr_html_()
-    assert "stands, level 40 m" in page and page.count("<tr>") == 3
+    assert "<p>dam: stands, level 40 m</p>" in page and page.count("<tr>") == 3
 
 
 def test_a_case_is_varied(tmp_path):
