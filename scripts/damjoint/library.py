@@ -196,7 +196,8 @@ class Run:
 
         from .post.pictures import picture
 
-        pyplot.draw_if_interactive()  # loads the backend, by which a notebook shows a figure
+        # loads the backend, by which a notebook shows a figure
+        pyplot.draw_if_interactive()  # type: ignore[no-untyped-call]
         return picture(self.solution)
 
     @property

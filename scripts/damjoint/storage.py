@@ -1,4 +1,4 @@
-"""Atomic writes, locks on files and folders, detection of truncated files."""
+"""Cache folder, atomic writes, locks on files and folders, detection of truncated files."""
 
 from __future__ import annotations
 
@@ -38,6 +38,17 @@ def atomic_write(path: Path) -> Iterator[Path]:
     finally:
         with contextlib.suppress(OSError):
             part.unlink(missing_ok=True)
+
+
+def cache_folder() -> Path | None:
+    """Folder of data that are computed once: $DAMJOINT_CACHE (empty: none), else in the user's
+    cache folder.
+    """
+    named = os.environ.get("DAMJOINT_CACHE")
+    if named is not None:
+        return Path(named) if named else None
+    home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
+    return Path(home) / "damjoint" if os.path.isabs(home) else None
 
 
 def check_end(path: Path, *ends: str) -> None:

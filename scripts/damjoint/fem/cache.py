@@ -26,21 +26,13 @@ from ..arrays import Array
 from ..model.case import Case
 from ..model.loads import overtopped
 from ..model.mesh import Body, Face, JointMesh, Mesh, mesh_of, shares
+from ..storage import cache_folder
 from .bodies import PARAMETERS, Bodies
 from .condensation import Condensed, CondensedJoint, condense
 from .memory import check_size
 
 #: Size up to which the cache may grow [bytes]; the files longest unused are deleted first.
 LIMIT = 2_000_000_000
-
-
-def folder() -> Path | None:
-    """Folder of the cache: $DAMJOINT_CACHE (empty: none), else in the user's cache folder."""
-    named = os.environ.get("DAMJOINT_CACHE")
-    if named is not None:
-        return Path(named) if named else None
-    home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    return Path(home) / "damjoint" if os.path.isabs(home) else None
 
 
 def key_of(case: Case) -> tuple[object, ...]:
@@ -79,7 +71,7 @@ def cached(case: Case) -> tuple[Condensed, Bodies | None]:
     Raises RunError (mesh, memory).
     """
     header = json.dumps([__version__, sources(), key_of(case)])
-    parent = folder()
+    parent = cache_folder()
     path = parent and parent / (hashlib.sha256(header.encode()).hexdigest()[:24] + ".npz")
     stored = read(path, header) if path else None
     if stored:

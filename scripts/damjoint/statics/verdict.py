@@ -256,6 +256,11 @@ def hints(results: Results) -> list[str]:
     reach = min(case["found_side"], case["found_depth"])
     if case.published:
         return messages
+    if case["dim"] == 3 and case["hold_z"] and not case.geometry:
+        messages.append(
+            "an extruded section with hold_z = 1 is in plane strain: dim = 2 has the same "
+            "solution in less time"
+        )
     if not case.geometry and reach < LEAST_FOUNDATION * case["dam_height"]:
         messages.append(
             f"the foundation reaches {reach:g} m: less than {LEAST_FOUNDATION:g} heights of the "
