@@ -28,7 +28,7 @@ html_title = f"damjoint {version}"
 extensions = ["myst_nb", "sphinx.ext.autodoc"]
 root_doc = "README"
 include_patterns = ["*.md", "docs/*.md", "reference/*.md", "reference/notebooks/*.ipynb"]
-exclude_patterns = [".*", "out", "tests"]
+exclude_patterns = [".*", "**/.*", "out", "tests"]
 
 html_theme = "furo"
 html_copy_source = False
@@ -51,6 +51,7 @@ nb_merge_streams = True
 default_role = "code"  # of `name` in a docstring
 autodoc_member_order = "bysource"
 autodoc_typehints_format = "short"
+autodoc_type_aliases = {"Array": "Array", "BoolArray": "BoolArray", "Table": "Table"}
 add_module_names = False
 
 #: The pages by heading, in the order of the navigation. README.md can not list them itself: the

@@ -11,6 +11,7 @@ import damjoint as dj
 import numpy as np
 import pytest
 from damjoint import library
+from damjoint.post import stored
 
 PAGE = Path(__file__).parents[2] / "reference" / "python.md"
 CASE = {"levels": [30, 40], "n_joint": 20}
@@ -126,6 +127,18 @@ def test_a_case_is_varied(tmp_path):
         dj.case(first, levels=70)
 
 
+def test_a_scene_of_a_published_case_keeps_its_uplift_when_it_is_varied():
+    first, second = dj.case("a").scenes()
+    assert first["uplift"] != second["uplift"]
+    assert dj.case(second, sigma_max=1e5)["uplift"] == second["uplift"]
+
+
+def test_a_case_of_stored_results_can_not_be_varied(run, tmp_path):
+    run.save(tmp_path / "out")
+    with pytest.raises(dj.InputError, match="case dam: of stored results"):
+        dj.case(stored.read(tmp_path / "out").result.case, mu=0.5)
+
+
 def test_bad_input_is_one_line():
     for words, message in (
         ({"mu": -1}, "mu = -1: must be"),
@@ -207,6 +220,15 @@ def test_a_sweep_is_that_of_the_command(command, tmp_path, monkeypatch, accuracy
     np.testing.assert_allclose(swept.probability.probability, [0, 1])
     assert list(swept.sensitivity.input) == ["mu", "mu"]
     assert list(swept.to_pandas()["verdict"]) == list(swept.rows.verdict)
+
+
+@pytest.mark.heavy
+def test_a_critical_value_of_a_case_with_an_accuracy():
+    """On the mesh of the run, which that accuracy requires."""
+    case = dj.case("dam", levels=40, law="friction", adhesion=0, accuracy="3%")
+    limit = dj.critical(case)
+    assert limit.search.own["n_joint"] == dj.run(case).case["n_joint"] > case["n_joint"]
+    assert limit.confirmed and limit.mode == "sliding"
 
 
 def test_values_of_a_sweep_are_checked():
