@@ -77,7 +77,8 @@ def case(
         tail_levels: of the tailwater [m] at t = 1, 2, ..., or the same at all times.
         steps: equal load steps between two levels.
         accuracy: coarse, standard, fine or a percentage; mesh and steps are refined for it.
-        parameters: by name, in SI units, as in reference/parameters.md.
+        parameters: by name, in SI units, as in reference/parameters.md, or as a text with a unit,
+            "20*GPa".
 
     Raises:
         InputError: name, value, and what is allowed.

@@ -19,7 +19,7 @@ def entry(tmp_path, monkeypatch):
     monkeypatch.setenv("DAMJOINT_CACHE", str(tmp_path))
     written, bodies = cache.cached(load("a", SMALL))
     assert bodies is not None
-    (file,) = tmp_path.iterdir()
+    (file,) = tmp_path.glob("*.npz")
     return file, written
 
 

@@ -24,7 +24,7 @@ from scipy import linalg
 from .. import RunError, __version__, data
 from ..arrays import Array
 from ..model.case import Case
-from ..model.loads import overtopped
+from ..model.loads import COMPLETE, overtopped, thermal_strains
 from ..model.mesh import Body, Face, JointMesh, Mesh, mesh_of, shares
 from ..storage import cache_folder
 from .bodies import PARAMETERS, Bodies
@@ -42,7 +42,8 @@ def key_of(case: Case) -> tuple[object, ...]:
     faces = tail > 0, case["floor_water"], overtopped(case)
     # which faces of an own geometry are under water depends on heights that only its mesh has
     levels = (case.reached, tail) if case.geometry else ()
-    return (shape, *(case[n] for n in PARAMETERS), *faces, *levels)
+    thermal = thermal_strains(case, COMPLETE)
+    return (shape, *(case[n] for n in PARAMETERS), *faces, *levels, *thermal)
 
 
 def fingerprint(mesh: Mesh) -> str:

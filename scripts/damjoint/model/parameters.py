@@ -19,6 +19,7 @@ import gmsh
 from .. import InputError, data
 from ..arrays import Value
 from ..laws import LAWS
+from .arithmetic import explained, quantity
 
 DECLARATIONS = data("pro") / "parameters.pro"
 #: The line by which a text includes the declarations.
@@ -39,16 +40,6 @@ def start_gmsh() -> None:
             for number, handler in handlers.items():  # Gmsh has reset them to the system's
                 signal.signal(number, handler)
         gmsh.option.setNumber("General.Verbosity", 0)  # errors are raised instead
-
-
-def number(text: str) -> float:
-    """A number as Gmsh reads it; 1_000 and the digits of other scripts are numbers in Python only.
-
-    Raises ValueError.
-    """
-    if "_" in text or not text.isascii():
-        raise ValueError(text)
-    return float(text)
 
 
 @dataclass(frozen=True)
@@ -97,14 +88,15 @@ class Parameter:
 
         Raises InputError if it is not a number, out of range or not one of the choices.
         """
+        message = f"{self.name} = {value}: must be {self.allowed()} ({self.meaning})"
         result: Value = value
         if not self.text:
             try:
-                result = number(value) if isinstance(value, str) else float(value)
-            except (TypeError, ValueError):
-                result = math.nan
+                result = quantity(value) if isinstance(value, str) else float(value)
+            except (TypeError, ValueError) as error:
+                raise InputError(explained(message, error)) from None
         if not self.allows(result):
-            raise InputError(f"{self.name} = {value}: must be {self.allowed()} ({self.meaning})")
+            raise InputError(message)
         return result
 
     def allows(self, value: Value) -> bool:
@@ -250,13 +242,14 @@ def levels_of(name: str, levels: str | Sequence[float]) -> tuple[float, ...]:
     Raises InputError if there is none, or a level is not finite.
     """
     values = levels.split(",") if isinstance(levels, str) else levels
+    listed = levels if isinstance(levels, str) else ",".join(map(str, levels))
+    message = f"{name} = {listed}: must be a list of levels in metres, such as 3,6,8,9"
     try:
-        result = tuple(number(v) if isinstance(v, str) else float(v) for v in values)
-    except ValueError:
-        result = ()
+        result = tuple(quantity(v) if isinstance(v, str) else float(v) for v in values)
+    except ValueError as error:
+        raise InputError(explained(message, error)) from None
     if not result or not all(map(math.isfinite, result)):
-        listed = levels if isinstance(levels, str) else ",".join(map(str, levels))
-        raise InputError(f"{name} = {listed}: must be a list of levels in metres, such as 3,6,8,9")
+        raise InputError(message)
     return result
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from .. import InputError
 from ..arrays import Array, Value, Values
 from ..model import parameters
-from ..model.arithmetic import parsed, value_of
+from ..model.arithmetic import arithmetic_value, explained, quantity
 from ..model.case import Case
 
 #: A row of a result file: texts by column.
@@ -45,7 +45,7 @@ class Sample:
     correlate: Sequence[str] = ()
 
     def __post_init__(self) -> None:
-        if not 1 <= self.number <= MOST_ROWS or self.number != int(self.number):
+        if self.number not in range(1, MOST_ROWS + 1):
             raise InputError(f"number = {self.number}: must be an integer from 1 to {MOST_ROWS}")
         if self.design not in DESIGNS:
             raise InputError(f"design = {self.design}: must be one of {', '.join(DESIGNS)}")
@@ -58,7 +58,7 @@ class Sample:
         from . import sampling
 
         drawn = sampling.draw(
-            self.number, self.distributions, self.design, self.seed, list(self.correlate)
+            int(self.number), self.distributions, self.design, self.seed, list(self.correlate)
         )
         values = {}
         for name, numbers in drawn.items():
@@ -79,12 +79,13 @@ def checked(name: str, value: Value) -> Value:
     """
     if name != "level":
         return parameters.parameter(name).check(value)
+    message = f"level = {value}: must be a level in metres"
     try:
-        level = parameters.number(value) if isinstance(value, str) else value
-    except ValueError:
-        level = math.nan
+        level = quantity(value) if isinstance(value, str) else value
+    except ValueError as error:
+        raise InputError(explained(message, error)) from None
     if not math.isfinite(level):
-        raise InputError(f"level = {value}: must be a level in metres")
+        raise InputError(message)
     return level
 
 
@@ -122,9 +123,9 @@ def values_of(text: str) -> tuple[str, list[Value]]:
     if ":" not in values:
         return name, [checked(name, v.strip()) for v in values.split(",")]
     try:
-        first, last, step = (parameters.number(v) for v in values.split(":"))
-    except ValueError:
-        raise bad from None
+        first, last, step = (quantity(v) for v in values.split(":"))
+    except ValueError as error:
+        raise InputError(explained(str(bad), error)) from None
     if not np.isfinite([first, last, step]).all() or step == 0 or (last - first) / step < 0:
         raise bad
     if (last - first) / step >= MOST_ROWS:
@@ -223,12 +224,13 @@ def tie(name: str, expression: str, row: Values) -> Value:
     """
     known = {other: value for other, value in row.items() if not isinstance(value, str)}
     try:
-        value = rounded(value_of(parsed(expression), known))
-    except ValueError:
-        raise InputError(
-            f"--tie {name}={expression}: must be arithmetic with + - * / ^ ( ), Pi and the names "
-            f"varied, sampled or tied before ({', '.join(known)})"
-        ) from None
+        value = rounded(arithmetic_value(expression, known))
+    except ValueError as error:
+        message = (
+            f"--tie {name}={expression}: must be arithmetic with + - * / ^ ( ), Pi, units and the "
+            f"names varied, sampled or tied before ({', '.join(known)})"
+        )
+        raise InputError(explained(message, error)) from None
     return checked(name, value)
 
 
