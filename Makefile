@@ -44,6 +44,7 @@ pages: setup
 # broken link is an error
 docs: setup
 	$(BIN)/sphinx-build -q -W --keep-going -E -c docs -d out/doctrees . out/site
+	@echo out/site/index.html
 
 # Remove results and caches
 clean:

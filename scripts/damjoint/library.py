@@ -188,7 +188,7 @@ class Run:
 
     @property
     def hints(self) -> list[str]:
-        """What to know of the result besides its verdict."""
+        """Remarks on the result."""
         return hints(self.results)
 
     def plot(self) -> Figure:
@@ -334,7 +334,9 @@ class Step:
 
 
 def fill(source: Case | str | Path) -> Iterator[Step]:
-    """Solve a case step by step with the condensed engine, as far as the loop goes.
+    """Solve a case with the condensed engine and yield each converged step.
+
+    The computation stops where the loop over the steps ends.
 
     Args:
         source: a case, or its name or path, see `case`.
@@ -352,7 +354,7 @@ def check(cases: Sequence[Case | str | Path]) -> list[SafetyCheck]:
     """Safety factors of load combinations, by the finite elements and by the gravity method.
 
     Each is computed up to its last level. Of each check, `rows` are those of check.csv, `why` is
-    the reason if it fails, else empty, and `notes` are what to know.
+    the reason if it fails, else empty, and `notes` are remarks on the result.
 
     Args:
         cases: the load combinations; cases, or their names or paths, see `case`.

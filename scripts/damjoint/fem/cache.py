@@ -168,7 +168,7 @@ def unpack(tree: Any, arrays: Mapping[str, Array]) -> Any:
 
 def prune(parent: Path) -> None:
     """Delete the files longest unused until the cache is not above its limit."""
-    files = sorted(parent.glob("*.npz"), key=lambda f: f.stat().st_mtime)
+    files = sorted([*parent.glob("*.npz"), *parent.glob("*.json")], key=lambda f: f.stat().st_mtime)
     total = sum(f.stat().st_size for f in files)
     for file in files:
         if total <= LIMIT:

@@ -178,11 +178,11 @@ def by_finite_elements(result: Results) -> MethodResult:
 
 
 def hand_calculation(result: Results) -> GravityMethod:
-    """The gravity method at a case's last level with all loads; under displacement control at the
-    last state of the run.
+    """The gravity method at a case's last level with all loads; at the last state of a run under
+    displacement control or beyond the last level, up to a critical one.
     """
     case, last = result.case, result.last
-    if case["drive"] != "level" and last:
+    if last and (case["drive"] != "level" or last["time"] > case.times[-1]):
         return gravity.at(case, last["time"], last["level"])
     return gravity.at(case, case.times[-1])
 
