@@ -9,6 +9,7 @@
 The package:
 
 storage.py  atomic writes, locks on files and folders
+progress.py progress of long work, on a terminal and in redirected output
 model/      data: parameters, case, mesh, loads, results
 laws/       the joint laws, one file each
 fem/        finite elements of the bodies, condensed onto the joint

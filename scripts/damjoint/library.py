@@ -26,6 +26,7 @@ from .laws import LAWS, Law
 from .model.case import Case, load
 from .model.fields import Solution
 from .model.results import HISTORY, Results, joint_columns
+from .progress import track
 from .solver.load_stepper import LoadStepper
 from .solver.state import State
 from .statics.verdict import hints, statement, verdict
@@ -532,15 +533,13 @@ def sweep(
         tie: parameters computed from the others, such as `{"adhesion": "2e5*mu"}`.
         critical: also find the critical level, strength, ... of each row, see `critical`.
         jobs: number of processes (default: one per core).
-        progress: show a progress bar.
+        progress: show a bar, or where there is no terminal a line every ten seconds.
         values: lists of values of parameters, by name; `level` [m] is the last level.
 
     Raises:
         InputError: bad input.
         RunError: the mesh for an accuracy could not be computed, or a process was killed.
     """
-    from tqdm import tqdm
-
     from .studies.sweep import check_jobs, compute, planned
 
     check_jobs(jobs)
@@ -550,6 +549,7 @@ def sweep(
     plan = plan_with(axes, list((tie or {}).items()), sample, {}, critical)
     rows = list(planned(on_fixed_mesh(as_case(source)), plan))
     tasks = {key: task for key, _, task in rows}
-    results = dict(tqdm(compute(tasks, jobs), total=len(tasks), disable=not progress))
+    computed = compute(tasks, jobs)
+    results = dict(track(computed, "sweep", len(tasks)) if progress else computed)
     cells = [{column_of(n): v for n, v in row.items()} | results[key] for key, row, _ in rows]
     return Sweep(plan, by_column(cells))

@@ -352,10 +352,16 @@ def formulas(rigid: GravityMethod) -> list[str]:
     ]
     if shear:
         lines.append(
-            f"SSF = (µ N' + c B)/T = ({case['mu']:.4g} · {normal:.4g} + "
-            f"{case['adhesion'] / 1e6:.4g} · {uncracked:.4g})/{abs(shear):.4g} = {rigid.SSF:.4g}"
+            f"SSF = (µ N' + c B)/T = ({factored(case, 'mu', 1)} · {normal:.4g} + "
+            f"{factored(case, 'c', 1e6)} · {uncracked:.4g})/{abs(shear):.4g} = {rigid.SSF:.4g}"
         )
     return lines
+
+
+def factored(case: Case, strength: str, unit: float) -> str:
+    """mu or c, with the partial factor that divides it."""
+    value, factor = case["mu" if strength == "mu" else "adhesion"], case[f"factor_{strength}"]
+    return f"{value / unit:.4g}" + (f"/{factor:.4g}" if factor != 1 else "")
 
 
 def pictures_of(solution: Solution) -> list[Picture]:

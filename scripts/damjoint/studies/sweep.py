@@ -7,9 +7,8 @@ import csv
 import hashlib
 import multiprocessing
 import os
-import sys
 import threading
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, replace
@@ -18,7 +17,6 @@ from pathlib import Path
 from typing import TypeAlias
 
 from threadpoolctl import threadpool_limits
-from tqdm import tqdm
 
 from .. import InputError, RunError, __version__, accuracy
 from ..arrays import Value, Values
@@ -27,6 +25,7 @@ from ..joint.interface import Interface, interface_of
 from ..model.case import Case, first_mesh, resolve
 from ..model.results import HISTORY
 from ..post.tables import as_text
+from ..progress import track
 from ..solver.load_stepper import LoadStepper
 from ..statics.limit import mechanism
 from ..statics.verdict import failed, statement, verdict
@@ -311,7 +310,6 @@ def sweep(
     out: Path,
     jobs: int | None = None,
     scheduler: str | None = None,
-    progress: Callable[..., Iterable[tuple[str, dict[str, Value]]]] = tqdm,
 ) -> tuple[int, list[Row]]:
     """Compute the rows of a plan that are missing in out (CSV).
 
@@ -334,12 +332,7 @@ def sweep(
         writer = csv.writer(file, lineterminator="\n")
         if not file.tell():
             writer.writerow(columns)
-        for key, result in progress(
-            computed,
-            total=len(missing),
-            desc=f"sweep {case.name}",
-            disable=not sys.stderr.isatty(),
-        ):
+        for key, result in track(computed, f"sweep {case.name}", len(missing)):
             cells = *values[key].values(), *(result[c] for c in results)
             writer.writerow([key, *(as_text(in_file(cell)) for cell in cells)])
             file.flush()
