@@ -43,7 +43,7 @@ pages: setup
 # Build the site out/site/index.html from the pages, the executed notebooks and the docstrings; a
 # broken link is an error
 docs: setup
-	$(BIN)/sphinx-build -q -W --keep-going -E -c docs -d out/doctrees . out/site
+	$(BIN)/sphinx-build -q -W --keep-going -E -c reference/site -d out/doctrees . out/site
 	@echo out/site/index.html
 
 # Remove results and caches

@@ -39,7 +39,7 @@ class Page(HTMLParser):
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):
     folder = tmp_path_factory.mktemp("docs")
-    words = ["-q", "-W", "--keep-going", "-E", "-c", "docs", "-d"]
+    words = ["-q", "-W", "--keep-going", "-E", "-c", "reference/site", "-d"]
     command = [sys.executable, "-m", "sphinx", *words, folder / "doctrees", ".", folder / "site"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
@@ -89,7 +89,7 @@ def test_formulas_search_and_notebooks(site, pages):
     assert theory.formulas > 300
     index = json.loads((site / "searchindex.js").read_text().split("(", 1)[1].rsplit(")", 1)[0])
     names = {path.relative_to(ROOT).with_suffix("").as_posix() for path in NOTEBOOKS}
-    assert {"README", "reference/theory", "docs/library", *names} <= set(index["docnames"])
+    assert {"README", "reference/theory", "reference/site/library", *names} <= set(index["docnames"])
     assert "uplift" in index["terms"]
     for path in NOTEBOOKS:
         html = site / path.relative_to(ROOT).with_suffix(".html")
@@ -102,7 +102,7 @@ def test_formulas_search_and_notebooks(site, pages):
 def test_a_dead_link_and_an_unknown_command_are_errors(tmp_path):
     """What the site's build has to refuse."""
     for name in ("conf.py", "site.css"):
-        (tmp_path / name).write_text((ROOT / "docs" / name).read_text())
+        (tmp_path / name).write_text((ROOT / "reference" / "site" / name).read_text())
     (tmp_path / "README.md").write_text("# Page\n\n[a](#nowhere), [b](none.md), $\\nothing{a}$\n")
     command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", ".", "site"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)

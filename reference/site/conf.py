@@ -27,7 +27,7 @@ html_title = f"damjoint {version}"
 
 extensions = ["myst_nb", "sphinx.ext.autodoc"]
 root_doc = "README"
-include_patterns = ["*.md", "docs/*.md", "reference/*.md", "reference/notebooks/*.ipynb"]
+include_patterns = ["*.md", "reference/site/*.md", "reference/*.md", "reference/notebooks/*.ipynb"]
 exclude_patterns = [".*", "**/.*", "out", "tests"]
 
 html_theme = "furo"
@@ -62,7 +62,7 @@ CONTENTS = {
         *("reference/python", "reference/notebooks/tour", "reference/notebooks/law"),
     ),
     "Reference": (
-        *("reference/theory", "reference/parameters", "reference/results", "docs/library"),
+        *("reference/theory", "reference/parameters", "reference/results", "reference/site/library"),
         "reference/glossary",
     ),
     "Verification": ("reference/ssnp142", "reference/trust", "reference/benchmarks"),
