@@ -9,6 +9,7 @@ import gmsh
 import numpy as np
 
 from ..model.case import Case
+from ..model.loads import Loading, line_forces
 from ..model.mesh import Body
 from .layout import ABOVE, BELOW, MARGIN, Layout
 
@@ -16,6 +17,8 @@ from .layout import ABOVE, BELOW, MARGIN, Layout
 BESIDE, BELOW_DAM = 0.6, 0.5
 #: Rock shown beyond the ends of a dam across a valley, over its height.
 ACROSS = 0.25
+#: Space above the crest for the arrows of forces with their labels, over the dam's height.
+ARROWS = 0.2
 #: Strips below the scene: their number; over the height of the scene: height of a strip with its
 #: name, least width; share of the strip without its name.
 STRIPS, STRIP, WIDTH, BAND = 3, 0.2, 1.4, 0.55
@@ -149,5 +152,7 @@ def frame(case: Case, all_of_foundation: bool = False) -> np.ndarray:
         lowest = min(0.0, *section["seg_y0"], *section["seg_y1"])
         beside, below = min(beside, BESIDE * height), min(below, BELOW_DAM * height - lowest)
     top = max(height, *case.levels, *case.tail_levels)
+    loading = Loading.at(case, np.inf, max(case.levels), max(case.tail_levels))
+    top += ARROWS * height * bool(line_forces(case, loading))
     depth = case["thickness"] if case["dim"] == 3 else 0.0
     return np.array([(-beside, -below, 0.0), (case["dam_base"] + beside, top, depth)])

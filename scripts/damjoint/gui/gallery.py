@@ -23,10 +23,11 @@ LAKE: Color = (61, 155, 224, 255)
 #: Opaque: where transparent faces meet there would be seams.
 WATER: Color = (158, 206, 240, 255)
 SILT: Color = (190, 172, 148, 255)
-#: Color scales: from small to large displacement, and from compression to tension.
+#: Smallest range of a color scale.
+TINY = 1e-9
+#: Color scale from small to large values.
 STONE = ((226, 222, 212), (168, 187, 205), (88, 137, 186), (11, 60, 120))
-FIRE = ((11, 60, 120), (88, 137, 186), (226, 222, 212), (200, 60, 30))
-#: From below to above zero.
+#: Color scale from below to above zero.
 BALANCED = ((11, 60, 120), (88, 137, 186), (240, 238, 232), (222, 120, 90), (170, 20, 20))
 
 
@@ -82,13 +83,24 @@ class Gallery:
         """Make the background of a graph transparent."""
         gmsh.view.option.setColor(tag, "Background2D", 255, 255, 255, 0)
 
-    def write(self, x: float, y: float, lines: list[str], color: Color, size: int) -> int:
+    def write(
+        self,
+        x: float,
+        y: float,
+        lines: list[str],
+        color: Color,
+        size: int,
+        align: str = "Left",
+    ) -> int:
         """Write text at pixels from the top left (negative: from the right or bottom), a line per
-        step. Returns the tag of its view, to which `label` adds more of the same color.
+        step. Returns the tag of its view, to which `label` adds more.
+
+        Gmsh may draw all but the first text of a view in the color of an earlier view: views with
+        several texts are dark, and come before those with a colored one.
         """
         tag = gmsh.view.add("text")
         self.tags.append(tag)
-        self.label(tag, x, y, lines, size)
+        self.label(tag, x, y, lines, size, align)
         self.color_texts(tag, color)
         self.set_step_of(tag, len(lines))
         return tag
@@ -99,9 +111,11 @@ class Gallery:
         """Add text to a view, at pixels as in `write`."""
         gmsh.view.addListDataString(tag, [x, y], lines, style(size, align))
 
-    def label_point(self, tag: int, point: np.ndarray, lines: list[str], size: int) -> None:
+    def label_point(
+        self, tag: int, point: np.ndarray, lines: list[str], size: int, align: str = "Left"
+    ) -> None:
         """Add text to a view at a point (3,) of the scene [m]."""
-        gmsh.view.addListDataString(tag, point.tolist(), lines, style(size, "Left"))
+        gmsh.view.addListDataString(tag, point.tolist(), lines, style(size, align))
 
     @property
     def step(self) -> int:
@@ -115,6 +129,14 @@ class Gallery:
             last = int(gmsh.view.option.getNumber(tag, "NbTimeStep")) - 1
             gmsh.view.option.setNumber(tag, "TimeStep", min(step, last))
         self.balance(step)
+
+    def balance_about_zero(self, tag: int, largest: np.ndarray, common: bool) -> None:
+        """Give a view a color scale with zero in the middle; largest: absolute value of each step;
+        common: whether all steps have the same scale.
+        """
+        self.balanced[tag] = np.maximum(
+            largest.max() if common else largest, TINY * np.ones_like(largest)
+        )
 
     def balance(self, step: int) -> None:
         """Set the balanced color scales of a step."""

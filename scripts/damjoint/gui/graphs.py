@@ -93,6 +93,8 @@ class Graphs:
 
     def __init__(self, gallery: Gallery, layout: Layout, common: bool) -> None:
         self.gallery, self.layout, self.common, self.count = gallery, layout, common, 0
+        #: names of curves with their places and colors: written last, see `Gallery.write`
+        self.names: list[tuple[str, float, float, Color]] = []
 
     def add(
         self, y_axis: tuple[str, Units], x_axis: tuple[str, Units], curves: list[Curve]
@@ -115,10 +117,17 @@ class Graphs:
             rows = np.broadcast_to(curve.y, (count, curve.y.shape[1]))
             lines = np.array([s.intervals(row) for s, row in zip(scales, rows, strict=True)])
             at_x = along_x.intervals(curve.x)
-            tag = self.line(name, (x, y), (at_x, x_range), lines, curve.color, curve.points)
+            if not curve.points:
+                at_x, lines = thinned(at_x, lines)
+            self.line(name, (x, y), (at_x, x_range), lines, curve.color, curve.points)
             if curve in named and len(named) > 1:
                 place = x + self.layout.graph_size[0], y - 15 + 13 * named.index(curve)
-                self.gallery.label(tag, *place, [curve.name], TEXT, "Right")
+                self.names.append((curve.name, *place, curve.color))
+
+    def write_names(self) -> None:
+        """Write the names of all curves."""
+        for name, x, y, color in self.names:
+            self.gallery.write(x, y, [name], color, TEXT, "Right")
 
     def values_at(self, curves: list[Curve], step: int) -> np.ndarray:
         """Values of all curves that set the scale of a step."""
@@ -222,7 +231,6 @@ def pieces_of(x: np.ndarray, y: np.ndarray, x_range: tuple[float, float]) -> Pie
     """
     if len(x) == 1:
         x, y = x.repeat(2), y.repeat(2, axis=1)
-    x, y = without_straight(x, y)
     points = np.zeros((len(x), 2, 3))
     points[1:, 0, 0], points[1:, 1, 0], points[0, :, 0] = x[:-1], x[1:], x_range
     values = np.stack([y[:, :-1], y[:, 1:]], axis=2)
@@ -230,19 +238,23 @@ def pieces_of(x: np.ndarray, y: np.ndarray, x_range: tuple[float, float]) -> Pie
     return Pieces(points, values[..., None])
 
 
-#: Distance of a point from the line between its neighbours, in intervals, below which it is on it.
-STRAIGHT = 1e-6
+#: In intervals: pitch of points below which one is left out, where the curve bends less than this.
+PITCH, BEND = 0.06, 0.02
 
 
-def without_straight(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Remove points of a curve, x (n,) and y (steps, n), at which it is straight at all steps: many
-    short lines are drawn with gaps.
+def thinned(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Leave out points of a dense curve, x (n,) and y (steps, n): many lines shorter than a few
+    pixels are drawn with gaps.
     """
     before, after = np.diff(x)[:-1], np.diff(x)[1:]
     share = np.divide(before, before + after, out=np.zeros_like(before), where=before + after > 0)
-    bend = np.abs(y[:, 1:-1] - y[:, :-2] - share * (y[:, 2:] - y[:, :-2])).max(axis=0)
-    kept = np.concatenate([[True], (bend > STRAIGHT) | (before <= 0) | (after <= 0), [True]])
-    return x[kept], y[:, kept]
+    bends = np.abs(y[:, 1:-1] - y[:, :-2] - share * (y[:, 2:] - y[:, :-2])).max(axis=0) > BEND
+    shown = [0]
+    for i, bend in enumerate(bends.tolist(), start=1):
+        if bend or abs(x[i] - x[shown[-1]]) > PITCH:
+            shown.append(i)
+    shown.append(len(x) - 1)
+    return x[shown], y[:, shown]
 
 
 #: Curves along the joint, the most important first: title, units, curves (name, column, color).
@@ -273,6 +285,7 @@ def show_graphs(graphs: Graphs, scene: SolvedScene, before: Sequence[SolvedScene
         levels = graphs_of_history(scene, before)
     for y_axis, x_axis, curves in (*joint[:2], *levels[:1], *joint[2:], *levels[1:]):
         graphs.add(y_axis, x_axis, curves)
+    graphs.write_names()
 
 
 def graphs_along_joint(scene: SolvedScene, before: Sequence[SolvedScene]) -> list[Graph]:

@@ -15,10 +15,11 @@ LEFT, MARGIN = 20, 20
 TITLE, LAW, STATE, ABOVE = 26, 46, (68, 86, 104), 122
 #: Space below the scene for color scales, legend and warnings; height of a line of them; most lines
 #: of warnings.
-BELOW, LINE, WARNINGS = 160, 15, 4
-#: Places from the left and the bottom: of the color scales; of the legend's entries.
-BARS = tuple((30 + 170 * i, -76) for i in range(3))
-LEGEND = tuple((LEFT + 170 * (i % 3), -LINE * (9 - i // 3)) for i in range(6))
+BELOW, LINE, WARNINGS = 165, 15, 4
+#: Places of the color scales from the left and the bottom; of the legend: width of an entry, most
+#: entries, its bottom.
+ENTRY, ENTRIES, LEGEND = 165, 5, -130
+BARS = tuple((30 + ENTRY * i, -76) for i in range(3))
 
 
 #: Width of an average character over the size of its font.
@@ -92,6 +93,13 @@ class Layout:
         row, column = divmod(number, max(self.columns, 1))
         x = -COLUMN * (self.columns - column) + BESIDE_AXES
         return x, row * self.pitch + ABOVE_AXES
+
+    @property
+    def legend(self) -> list[tuple[float, float]]:
+        """Places of the legend's entries: x from the left, y from the bottom (< 0)."""
+        columns = max(1, int((self.scene_width - LEFT) // ENTRY))
+        top = LEGEND - LINE * ((ENTRIES - 1) // columns)
+        return [(LEFT + ENTRY * (i % columns), top + LINE * (i // columns)) for i in range(ENTRIES)]
 
     def wrapped(self, text: str, size: int) -> list[str]:
         """Wrap a text in a font size to the width of the scene."""

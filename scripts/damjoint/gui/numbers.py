@@ -91,9 +91,9 @@ def table_of_levels(result: Results) -> Table:
     times = result.history["time"][requested_rows(result)]
     numbers = [Numbers.at(result, time).elements for time in times]
     columns = [[three_digits(row[name]) for row in numbers] for name, *_ in FACTORS]
-    rows = [(*row, *more) for row, *more in zip(table.rows, *columns, strict=True)]
-    heads = [name for name, *_ in FACTORS]
-    return Table([*table.names, *heads], [*table.units, *("" for _ in heads)], rows)
+    rows = [(*row[:-1], *more, row[-1]) for row, *more in zip(table.rows, *columns, strict=True)]
+    names = [*table.names[:-1], *(name for name, *_ in FACTORS), table.names[-1]]
+    return Table(names, [*table.units, *("" for _ in FACTORS)], rows)
 
 
 def warnings(result: Results) -> list[str]:

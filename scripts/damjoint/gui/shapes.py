@@ -60,6 +60,7 @@ class Label:
 
     point: np.ndarray
     lines: list[str]
+    align: str = "Left"
 
 
 def force_label(name: str, force: np.ndarray) -> str:
@@ -69,21 +70,57 @@ def force_label(name: str, force: np.ndarray) -> str:
     return f"{name} {with_unit(float(np.hypot(*force)), FORCES, 3)}"
 
 
+#: Height of a label over the length of an arrow.
+LINE = 0.8
 #: Name of the earthquake among the forces.
 QUAKE = "earthquake"
 
 
-def tail_of(arrow: np.ndarray) -> np.ndarray:
-    """The end (3,) of an arrow (3, 2, 3) at which its label is."""
-    tail: np.ndarray = arrow[0, 0]
-    return tail
+def arrow_labels(arrows: list[tuple[np.ndarray, list[str]]]) -> list[Label]:
+    """Labels of arrows (3, 2, 3) with their texts: above an arrow that is steep, else beside its
+    tail; those of arrows at the same place above one another.
+    """
+    labels, tails = list[Label](), list[np.ndarray]()
+    for lines, texts in arrows:
+        tail, tip = lines[0]
+        x, y, _ = tip - tail
+        length = np.hypot(x, y)
+        steep = abs(y) > abs(x)
+        number = 0 if steep else sum(np.hypot(*(tail - t)[:2]) < length for t in tails)
+        place = tail + np.array([0.0, LINE * number * length, 0.0])
+        align = "Center" if steep else "Right" if x > 0 else "Left"
+        labels.append(Label(place, [f" {text} " for text in texts], align))
+        tails += [] if steep else [tail]
+    return labels
+
+
+#: Height of a label over the length of an arrow.
+LINE = 0.8
+#: Name of the earthquake among the forces.
+QUAKE = "earthquake"
+
+
+def arrow_label(lines: np.ndarray, texts: list[str], number: int) -> Label:
+    """Label of an arrow (3, 2, 3), beside the tail of one that is level and else above it; number:
+    of the arrow, as those at one place have their labels above one another.
+    """
+    tail, tip = lines[0]
+    x, y, _ = tip - tail
+    if abs(y) > abs(x):
+        return Label(tail, texts, "Center")
+    above = np.array([0.0, LINE * number * np.hypot(x, y), 0.0])
+    return Label(tail + above, [f"{text} " for text in texts], "Right" if x > 0 else "Left")
 
 
 def level_labels(places: list[np.ndarray], levels: list[float]) -> list[Label]:
     """Labels of a water surface, one for each step, at the place (2,) of the step."""
     steps = range(len(levels))
     return [
-        Label(np.insert(place, 1, level), [f"{level:.4g} m" * (i == step) for step in steps])
+        Label(
+            np.insert(place, 1, level),
+            [f" {level:.4g} m" * (i == step) for step in steps],
+            "TopLeft",
+        )
         for i, (place, level) in enumerate(zip(places, levels, strict=True))
         if level > 0
     ]
@@ -172,11 +209,8 @@ def undeformed_loads(case: Case) -> tuple[dict[str, Pieces], list[Label]]:
     ]
     length = ARROW * case.size
     arrows = [arrow(tip, np.array(f), length) for tip, f in zip(tips, forces.values(), strict=True)]
-    labels = [
-        Label(tail_of(lines), [force_label(name, np.array(force))])
-        for lines, (name, force) in zip(arrows, forces.items(), strict=True)
-        if np.any(force)
-    ]
+    named = zip(arrows, forces.items(), strict=True)
+    labels = arrow_labels([(a, [force_label(name, np.array(f))]) for a, (name, f) in named])
     beside, downstream = -case["found_side"], case["dam_base"] + case["found_side"]
     labels += level_labels([np.array([beside, depth])], [level])
     labels += level_labels([np.array([downstream, depth])], [tail])
@@ -341,10 +375,12 @@ class Deformed:
 
     def labels(self) -> list[Label]:
         """Labels of the forces and of the water surfaces."""
-        labels = [
-            Label(tail_of(lines[-1]), [force_label(name, f) * bool(f.any()) for f in values])
-            for name, values, lines in self.forces()
-        ]
+        labels = arrow_labels(
+            [
+                (lines[-1], [force_label(name, f) * bool(f.any()) for f in values])
+                for name, values, lines in self.forces()
+            ]
+        )
         if self.undeformed:
             left, right = self.camera.box[:, 0]
             for x, name in ((left, "level"), (right, "tail")):

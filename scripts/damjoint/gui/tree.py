@@ -323,7 +323,7 @@ def show_results(scenes: list[SolvedScene], shown: int, step: int) -> None:
     note = "the level that the drawing area shows"
     rows.insert(0, (f"At t = {scene.times[step]:.4g}", head, note))
     entries = [(label, value, note, "LightYellow") for label, value, note in rows]
-    entries += [(f"Warning {i + 1}", w, w, WARN) for i, w in enumerate(scene.warnings)]
+    entries += [(f"Note {i + 1}", w, w, WARN) for i, w in enumerate(scene.warnings)]
     for i, (label, value, note, highlight) in enumerate(entries):
         more = {"help": note, "attributes": {"Highlight": highlight}}
         put(text(f"{NUMBERS}{i:02d}", value, label=label, readOnly=True, **more))

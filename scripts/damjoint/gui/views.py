@@ -21,7 +21,6 @@ from .camera import CLIPPED
 from .gallery import (
     BALANCED,
     DARK,
-    FIRE,
     GREEN,
     LAKE,
     ORANGE,
@@ -63,8 +62,10 @@ class Display:
         return self.scales == OF_ALL
 
 
-#: States of the joint that are marked: color, legend.
-STATES: dict[int, tuple[Color, str]] = {
+#: Entry of the legend: color and text.
+Entry = tuple[Color, str]
+#: States of the joint that are marked, with their legend.
+STATES: dict[int, Entry] = {
     OPEN: (RED, "joint open or broken"),
     SOFTENING: (VIOLET, "joint softening"),
     SLIPPED: (ORANGE, "joint slipped"),
@@ -103,7 +104,7 @@ def show_loads(
         tag = gallery.write(0, 0, [""] * len(labels[0].lines), DARK, SIZES[3])
         gmsh.view.option.setString(tag, "Name", "labels of the loads")
         for label in labels:
-            gallery.label_point(tag, label.point, label.lines, SIZES[3])
+            gallery.label_point(tag, label.point, label.lines, SIZES[3], label.align)
 
 
 def layer(case: Case, number: int) -> dict[str, float]:
@@ -115,9 +116,8 @@ def show_heading(gallery: Gallery, heading: tuple[str, str], layout: Layout) -> 
     """Show two lines: title of the case; joint law and uplift."""
     title, scene = heading
     shortened = layout.shortened(title, SIZES[0])
-    tag = gallery.write(LEFT, places.TITLE, [shortened], DARK, SIZES[0])
-    gallery.label(tag, LEFT, places.LAW, [scene], SIZES[1])
-    gmsh.view.option.setString(tag, "Name", "heading")
+    gallery.write(LEFT, places.TITLE, [shortened], DARK, SIZES[0])
+    gallery.write(LEFT, places.LAW, [scene], DARK, SIZES[1])
 
 
 def show(
@@ -133,19 +133,21 @@ def show(
     title: of the case; before: earlier runs, whose last curves are drawn in grey for comparison;
     step: that is shown first, by default the last.
     """
-    gallery, case = Gallery(step), scene.result.case
+    gallery, case, legend = Gallery(step), scene.result.case, list[Entry]()
     if display.content == TABLE:
         show_table(gallery, scene, layout)
     else:
         if scene.times.size:
             deformed = Deformed(scene)
-            show_deformed(gallery, deformed, display)
+            legend = show_deformed(gallery, deformed, display)
             if case["dim"] == 3:
                 show_strips(gallery, deformed, display)
             captions = [caption(scene, step) for step in range(len(scene.times))]
             for y, lines in zip(places.STATE, zip(*captions, strict=True), strict=True):
                 gallery.write(LEFT, y, list(lines), DARK, SIZES[2])
         show_graphs(Graphs(gallery, layout, display.common), scene, before)
+        for place, (color, words) in zip(layout.legend, legend, strict=False):
+            gallery.write(*place, [words], color, SIZES[3])
         show_warnings(gallery, scene.warnings, layout)
     show_heading(gallery, (title, f"law {case['law']}, uplift {case['uplift']}"), layout)
     gallery.balance(gallery.step)
@@ -173,8 +175,10 @@ def caption(scene: SolvedScene, step: int) -> tuple[str, str, str]:
     )
 
 
-def show_deformed(gallery: Gallery, deformed: Deformed, display: Display) -> None:
-    """Show dam and foundation, outline, loads, crack and slip, all displaced by one factor."""
+def show_deformed(gallery: Gallery, deformed: Deformed, display: Display) -> list[Entry]:
+    """Show dam and foundation, outline, loads, crack and slip, all displaced by one factor; returns
+    their legend.
+    """
     case = deformed.scene.result.case
     deformed.camera.clip(case.size)
     moves = {"VectorType": 5, "Clip": CLIPPED, "DisplacementFactor": deformed.scale}
@@ -183,14 +187,18 @@ def show_deformed(gallery: Gallery, deformed: Deformed, display: Display) -> Non
     if display.field == STRESS:
         name, factor = unit(deformed.vertical_stress(), STRESSES)
         stress = [pieces.times(factor) for pieces in deformed.stress()]
-        tag = gallery.add(f"{STRESS} [{name}]", stress, FIRE, **scale, Visible=0)
+        scale["RangeType"] = 2
+        tag = gallery.add(f"{STRESS} [{name}]", stress, BALANCED, **scale, Visible=0)
         gallery.hidden.append(tag)
+        largest = np.max([np.abs(p.values).max(axis=(1, 2, 3)) for p in stress], axis=0)
         options = {"ExternalView": gmsh.view.getIndex(tag)}
     name, factor = unit(list(deformed.moved.values()), LENGTHS)
     shown = [pieces.times(factor) for pieces in bodies]
     factors = {**moves, "DisplacementFactor": deformed.scale / factor}
-    colors = FIRE if display.field == STRESS else STONE
-    gallery.add(f"{DISPLACEMENT} [{name}]", shown, colors, **factors, **scale, **options)
+    colors = BALANCED if display.field == STRESS else STONE
+    tag = gallery.add(f"{DISPLACEMENT} [{name}]", shown, colors, **factors, **scale, **options)
+    if display.field == STRESS:
+        gallery.balance_about_zero(tag, largest, display.common)
     flat = {**moves, "ShowScale": 0, "Light": 0}
     show_loads(gallery, case, deformed.loads(), deformed.labels(), flat)
     gallery.add("outline", [deformed.outline()], [DARK], **flat, **layer(case, 1), LineWidth=1.5)
@@ -205,8 +213,7 @@ def show_deformed(gallery: Gallery, deformed: Deformed, display: Display) -> Non
         above = {**flat, **layer(case, 4), "LineWidth": 2.5}
         gallery.add("resultant", [deformed.resultant()], [GREEN], **above)
         legend.append((GREEN, "resultant, middle third"))
-    for place, (color, text) in zip(places.LEGEND, legend, strict=False):
-        gallery.write(*place, [text], color, SIZES[3])
+    return legend
 
 
 def color_bar(number: int) -> dict[str, float]:
@@ -249,8 +256,7 @@ def show_strips(gallery: Gallery, deformed: Deformed, display: Display) -> None:
     opening = at_nodes("delta_n", factor)
     tag = add(0, f"opening [{name}]", opening, BALANCED, {**color_bar(1), "RangeType": 2})
     largest = np.max([np.abs(values).max(axis=(1, 2, 3)) for values in opening], axis=0)
-    largest = np.maximum(np.full_like(largest, largest.max()) if display.common else largest, 1e-9)
-    gallery.balanced[tag] = largest
+    gallery.balance_about_zero(tag, largest, display.common)
     states = np.array([state_of(r) for r in rows], float)[:, nearest]
     # one state an element: between nodes of different states others would appear
     of_elements = [
@@ -276,30 +282,31 @@ def show_warnings(gallery: Gallery, warnings: list[str], layout: Layout) -> None
         gallery.write(LEFT, y, [line], ORANGE, SIZES[3])
 
 
-#: Table: top; width of a column and of a row; characters in a column's heading.
-TABLE_TOP, TABLE_COLUMN, TABLE_ROW, HEADING = 80, (46, 90), 17, 9
+#: Table: top; height of a row; characters in a heading; smallest and largest size of its font.
+TABLE_TOP, ROW, HEADING, FONT = 80, 17, 9, (8, 13)
 
 
 def show_table(gallery: Gallery, scene: SolvedScene, layout: Layout) -> None:
     """Show the table of all levels, the level shown marked; some levels if there are too many."""
     table = scene.table
     names = [
-        [*wrap(n, HEADING), f"[{u}]" if u else ""]
-        for n, u in zip(table.names, table.units, strict=True)
+        [*wrap(name, HEADING), f"[{size}]" if size else ""]
+        for name, size in zip(table.names, table.units, strict=True)
     ]
-    top = TABLE_TOP + places.LINE * max(map(len, names))
-    space = int((layout.height - top) // TABLE_ROW)
-    rows = np.unique(np.linspace(0, len(table.rows) - 1, min(space, len(table.rows))).round())
-    low, high = TABLE_COLUMN
-    width = min(high, max(low, (layout.width - 4 * LEFT) / len(names)))
-    tag = gallery.write(LEFT, 0, [""], DARK, SIZES[3])
-    for column, words in enumerate(names):
-        x = LEFT + width * (column + 0.9)
+    top = TABLE_TOP + places.LINE * max(map(len, names)) + ROW / 2
+    count = min(int((layout.height - top) // ROW), len(table.rows))
+    rows = np.unique(np.linspace(0, len(table.rows) - 1, count).round().astype(int)).tolist()
+    columns = zip(names, zip(*table.rows, strict=True), strict=True)
+    widths = [max(map(len, [*words, *cells])) + 2 for words, cells in columns]
+    room = (layout.width - 2 * LEFT) / places.CHARACTER / sum(widths)
+    size = int(np.clip(room, *FONT))
+    rights = LEFT + np.cumsum(widths) * size * places.CHARACTER
+    tag = gallery.write(LEFT, 0, [""], DARK, size)
+    for right, words, cells in zip(rights, names, zip(*table.rows, strict=True), strict=True):
         for line, word in enumerate(words):
-            gallery.label(tag, x, TABLE_TOP + places.LINE * line, [word], SIZES[3] - 1, "Right")
-        for line, row in enumerate(rows.astype(int)):
-            y, cell = top + TABLE_ROW * (line + 0.5), table.rows[row][column]
-            gallery.label(tag, x, y, [cell], SIZES[3], "Right")
-    for line, row in enumerate(rows.astype(int)):
-        marks = ["> " if row == step else "" for step in range(len(scene.times))]
-        gallery.write(LEFT / 2, top + TABLE_ROW * (line + 0.5), marks, RED, SIZES[2])
+            gallery.label(tag, right, TABLE_TOP + places.LINE * line, [word], size, "Right")
+        for line, row in enumerate(rows):
+            gallery.label(tag, right, top + ROW * line, [cells[row]], size, "Right")
+    for line, row in enumerate(rows):
+        marks = [">" * (row == step) for step in range(len(scene.times))]
+        gallery.write(LEFT / 2, top + ROW * line, marks, RED, size)
