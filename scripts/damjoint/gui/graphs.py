@@ -319,7 +319,9 @@ def graphs_of_history(scene: SolvedScene, before: Sequence[SolvedScene]) -> list
         curves = []
         for other in (scene, *before):
             history = other.result.history
-            x = other.result.heel if driven and column == "max_opening" else history[column]
+            x = history[column]
+            if column == "max_opening":  # below 0 in a closed joint
+                x = other.result.heel if driven else np.maximum(x, 0.0)
             if len(x):
                 name, kind = ("", color) if other is scene else (BEFORE, GREY)
                 curves.append(Curve(name, x, history["level"][None], kind, points=other is scene))

@@ -15,10 +15,10 @@ LEFT, MARGIN = 20, 20
 TITLE, LAW, STATE, ABOVE = 26, 46, (68, 86, 104), 122
 #: Space below the scene for color scales, legend and warnings; height of a line of them; most lines
 #: of warnings.
-BELOW, LINE, WARNINGS = 165, 15, 4
+BELOW, LINE, WARNINGS = 172, 15, 4
 #: Places of the color scales from the left and the bottom; of the legend: width of an entry, most
 #: entries, its bottom.
-ENTRY, ENTRIES, LEGEND = 165, 5, -130
+ENTRY, ENTRIES, LEGEND = 165, 6, -140
 BARS = tuple((30 + ENTRY * i, -76) for i in range(3))
 
 
@@ -44,22 +44,29 @@ GRAPH_HEIGHT, ROWS = (140, 218), 4
 BESIDE_AXES, BEYOND_AXES, ABOVE_AXES, BELOW_AXES = 66, 24, 26, 38
 
 
+#: Options with the sizes of Gmsh's window; GraphicsWidth includes the menu.
+WINDOW = "GraphicsWidth", "GraphicsHeight", "MenuWidth"
+#: Desired size of the window: drawing area with menu. Space for the title bar and the panels of a
+#: desktop, beside and above and below the window.
+DESIRED, DESKTOP = (1600, 900), (0, 70)
+#: Share of the window's width that the menu takes, and its largest width.
+MENU, MENU_WIDTH = 0.38, 560
+
+
 @dataclass(frozen=True)
 class Layout:
-    """Layout for a drawing area of a size."""
+    """Layout for a drawing area of a size; by default that of the desired window."""
 
-    width: float
-    height: float
+    width: float = DESIRED[0] - MENU_WIDTH
+    height: float = DESIRED[1]
 
     @staticmethod
-    def of_window(scratch: Path | None) -> Layout:
+    def of_window(scratch: Path) -> Layout:
         """Layout for the current drawing area of Gmsh's window.
 
-        scratch: file to which Gmsh writes its options, as it updates the sizes only then; None if
-        there is no window.
+        scratch: file to which Gmsh writes its options, as it updates the sizes only then.
         """
-        if scratch:
-            gmsh.write(str(scratch))
+        gmsh.write(str(scratch))
         size = {n: gmsh.option.getNumber(f"General.{n}") for n in WINDOW}
         return Layout(size["GraphicsWidth"] - size["MenuWidth"], size["GraphicsHeight"])
 
@@ -112,15 +119,6 @@ class Layout:
     def characters(self, size: int) -> int:
         """Number of characters in a font size over the width of the scene."""
         return max(20, int((self.scene_width - LEFT) / (CHARACTER * size)))
-
-
-#: Options with the sizes of Gmsh's window; GraphicsWidth includes the menu.
-WINDOW = "GraphicsWidth", "GraphicsHeight", "MenuWidth"
-#: Desired size of the window: drawing area with menu. Space for the title bar and the panels of a
-#: desktop, beside and above and below the window.
-DESIRED, DESKTOP = (1600, 900), (0, 70)
-#: Share of the window's width that the menu takes, and its largest width.
-MENU, MENU_WIDTH = 0.38, 560
 
 
 def open_window() -> None:

@@ -63,7 +63,8 @@ class Numbers:
         rows = []
         for name, head, units, meaning in columns:
             both = [method[name] for method in (self.elements, self.rigid) if name in method]
-            size, factor = unit([np.nan_to_num(both, posinf=0.0)], units)
+            finite = np.nan_to_num(both, posinf=0.0)
+            size, factor = unit([finite], units) if finite.any() else units[0]
             values = BESIDE.join(three_digits(value * factor) for value in both)
             if both and not (name in OPTIONAL and not any(both)):
                 rows.append((name, f"[{size}] {head}".removeprefix("[-] "), values, meaning))

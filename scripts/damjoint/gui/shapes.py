@@ -19,13 +19,15 @@ from ..model.mesh import Body
 from ..model.scene import BED, DOWN, FLOOR, SIDES, TOP, UP
 from ..post.outline import exaggeration, section_of, skin
 from ..post.units import FORCES, with_unit
-from .camera import Camera, result_camera
+from .camera import Camera, result_camera, undeformed_camera
 from .worker import SolvedScene
 
 #: Length of a force's arrow over the dam's size, and of the resultant's.
 ARROW, RESULTANT = 0.12, 0.25
 #: Distance of the middle third below the joint, over the dam's size; its places along the joint.
 THIRD, MIDDLE = 0.02, np.linspace(1 / 3, 2 / 3, 11)
+#: Points along the joint that are drawn, about: shorter lines are drawn with gaps.
+JOINT_POINTS = 60
 #: Cosine of the angle between faces above which a skin counts as smooth.
 SMOOTH = 0.9
 #: Lines of a section below water: of the reservoir, of water on the crest, of the tailwater.
@@ -112,17 +114,17 @@ def arrow_label(lines: np.ndarray, texts: list[str], number: int) -> Label:
     return Label(tail + above, [f"{text} " for text in texts], "Right" if x > 0 else "Left")
 
 
-def level_labels(places: list[np.ndarray], levels: list[float]) -> list[Label]:
-    """Labels of a water surface, one for each step, at the place (2,) of the step."""
+def level_labels(levels: list[float], tails: list[float], box: np.ndarray) -> list[Label]:
+    """Labels of both water surfaces, one for each step, at the sides of a box (2, 3) [m]: below the
+    reservoir's surface, as forces have their labels above it; above the tailwater's.
+    """
+    (left, _, _), (right, _, front) = box
     steps = range(len(levels))
     return [
-        Label(
-            np.insert(place, 1, level),
-            [f" {level:.4g} m" * (i == step) for step in steps],
-            "TopLeft",
-        )
-        for i, (place, level) in enumerate(zip(places, levels, strict=True))
-        if level > 0
+        Label(np.array([x, height, front]), [f" {height:.4g} m " * (i == j) for j in steps], align)
+        for x, heights, align in ((left, levels, "TopLeft"), (right, tails, "Right"))
+        for i, height in enumerate(heights)
+        if height > 0
     ]
 
 
@@ -211,9 +213,7 @@ def undeformed_loads(case: Case) -> tuple[dict[str, Pieces], list[Label]]:
     arrows = [arrow(tip, np.array(f), length) for tip, f in zip(tips, forces.values(), strict=True)]
     named = zip(arrows, forces.items(), strict=True)
     labels = arrow_labels([(a, [force_label(name, np.array(f))]) for a, (name, f) in named])
-    beside, downstream = -case["found_side"], case["dam_base"] + case["found_side"]
-    labels += level_labels([np.array([beside, depth])], [level])
-    labels += level_labels([np.array([downstream, depth])], [tail])
+    labels += level_labels([level], [tail], undeformed_camera(case).box)
     loads = {
         "water": in_space(np.concatenate([fluid_above(*part) for part in water]), depth),
         "silt": in_space(silt, depth),
@@ -247,11 +247,13 @@ class Deformed:
             Loading.at(case, time, state["level"], state["tail_level"])
             for time, state in zip(self.times, states, strict=True)
         ]
-        # the joint's nodes on the side towards the viewer, from heel to toe, and their rows
+        # nodes of the joint on the side towards the viewer, from heel to toe, and their rows
         joint, s = self.scene.bodies["joint"], distance(self.rows[0])
         near = joint.points[:, 2] > joint.points[:, 2].max() - ROUND_OFF * s.max()
         row = nearest_rows(joint.points[near], self.rows[0])
         order = np.argsort(s[row])
+        every = max(1, len(order) // JOINT_POINTS)
+        order = order[np.unique([*range(0, len(order), every), len(order) - 1])]
         self.near_tags, self.near_rows = joint.node_tags[near][order], row[order]
         ends = np.column_stack([self.rows[0][axis] for axis in "xy"])[[s.argmin(), s.argmax()]]
         #: sections, undeformed and by step; None if one section does not represent the geometry
@@ -382,10 +384,8 @@ class Deformed:
             ]
         )
         if self.undeformed:
-            left, right = self.camera.box[:, 0]
-            for x, name in ((left, "level"), (right, "tail")):
-                levels = [getattr(now, name) for now in self.loadings]
-                labels += level_labels([np.array([x, self.depth])] * len(levels), levels)
+            levels = ([getattr(now, name) for now in self.loadings] for name in ("level", "tail"))
+            labels += level_labels(*levels, self.camera.box)
         return labels
 
     def resultant(self) -> Pieces:

@@ -298,7 +298,14 @@ def display_entries() -> list[dict[str, Any]]:
         text(name, own[0], choices=list(own), help=note) for name, (own, note) in choices.items()
     ]
     help_of_keep = "curves of the last run stay in grey, its views in Modules / Post-processing"
-    return [*entries, number(KEEP, 0, choices=[0, 1], help=help_of_keep)]
+    entries.append(number(KEEP, 0, choices=[0, 1], help=help_of_keep))
+    return [{**entry, "visible": False} for entry in entries]
+
+
+def show_display(visible: bool) -> None:
+    """Show or hide the entries of what is shown; they keep their values."""
+    for name in gmsh.onelab.getNames("02Display/.*"):
+        gmsh.onelab.set(json.dumps({**json.loads(gmsh.onelab.get(name)), "visible": visible}))
 
 
 def display() -> Display:
@@ -312,6 +319,7 @@ def show_results(scenes: list[SolvedScene], shown: int, step: int) -> None:
     color = WARN if scene.failed or scene.message else GOOD
     modes = [s.result.case["uplift"] for s in scenes]
     show_verdict(scene.end_state or verdict(scene.result), color, scene.message or "the dam stands")
+    show_display(True)
     put(text(SCENE, modes[shown], choices=modes, visible=len(modes) > 1))
     clear_numbers()
     if not scene.numbers:
@@ -338,6 +346,7 @@ def clear_numbers() -> None:
 def hide_results() -> None:
     """Remove the results from the tree: they are not those of its parameters."""
     clear_numbers()
+    show_display(False)
     show_verdict(NOT_RUN, CALM, "press Run")
 
 

@@ -22,6 +22,7 @@ from .gallery import (
     BALANCED,
     DARK,
     GREEN,
+    GREY,
     LAKE,
     ORANGE,
     RED,
@@ -101,7 +102,7 @@ def show_loads(
         color, number = LOAD_STYLES[name]
         gallery.add(name, [pieces], [color], **options, **layer(case, number), LineWidth=3)
     if labels:
-        tag = gallery.write(0, 0, [""] * len(labels[0].lines), DARK, SIZES[3])
+        tag = gallery.write(0, 0, [" "] * len(labels[0].lines), DARK, SIZES[3])
         gmsh.view.option.setString(tag, "Name", "labels of the loads")
         for label in labels:
             gallery.label_point(tag, label.point, label.lines, SIZES[3], label.align)
@@ -146,6 +147,7 @@ def show(
             for y, lines in zip(places.STATE, zip(*captions, strict=True), strict=True):
                 gallery.write(LEFT, y, list(lines), DARK, SIZES[2])
         show_graphs(Graphs(gallery, layout, display.common), scene, before)
+        legend += [(GREY, "earlier runs")] if before else []
         for place, (color, words) in zip(layout.legend, legend, strict=False):
             gallery.write(*place, [words], color, SIZES[3])
         show_warnings(gallery, scene.warnings, layout)
@@ -301,12 +303,12 @@ def show_table(gallery: Gallery, scene: SolvedScene, layout: Layout) -> None:
     room = (layout.width - 2 * LEFT) / places.CHARACTER / sum(widths)
     size = int(np.clip(room, *FONT))
     rights = LEFT + np.cumsum(widths) * size * places.CHARACTER
-    tag = gallery.write(LEFT, 0, [""], DARK, size)
+    tag = gallery.write(LEFT, 0, [" "], DARK, size)
     for right, words, cells in zip(rights, names, zip(*table.rows, strict=True), strict=True):
         for line, word in enumerate(words):
             gallery.label(tag, right, TABLE_TOP + places.LINE * line, [word], size, "Right")
         for line, row in enumerate(rows):
             gallery.label(tag, right, top + ROW * line, [cells[row]], size, "Right")
     for line, row in enumerate(rows):
-        marks = [">" * (row == step) for step in range(len(scene.times))]
+        marks = [">" if row == step else " " for step in range(len(scene.times))]
         gallery.write(LEFT / 2, top + ROW * line, marks, RED, size)

@@ -21,6 +21,7 @@ from ..model.mesh import shares
 from ..model.parameters import assignments, listing, start_gmsh
 from . import export, tree, views
 from .camera import result_camera, undeformed_camera
+from .gallery import RED, Gallery
 from .layout import MESSAGE, Layout, open_window
 from .sheet import Request, Sheet
 from .worker import EngineProcess, SolvedScene
@@ -29,11 +30,9 @@ from .worker import EngineProcess, SolvedScene
 CHANGES = "check", "load", "reset"
 ACTION, BUTTON = "ONELAB/Action", "ONELAB/Button"
 RUN, STOP = ("Run", "run"), ("Stop", "stop")
-#: Seconds: for the engine's process to start; a turn of the event loop; between progress messages,
-#: as drawing costs more than a step.
-START, TURN, PROGRESS = 60.0, 0.02, 0.2
-#: Seconds between looks at the size of the drawing area.
-LOOK = 0.4
+#: Seconds: a turn of the event loop; between progress messages, as drawing costs more than a step;
+#: between looks at the size of the drawing area.
+TURN, PROGRESS, LOOK = 0.02, 0.2, 0.4
 
 
 class Session:
@@ -59,23 +58,23 @@ class Session:
         self.last_status = "", tree.CALM
         self.title = ""
         #: views of the last run, runs for comparison, loads before a run
-        self.gallery: views.Gallery | None = None
+        self.gallery: Gallery | None = None
         self.scene_shown = 0
-        self.earlier: list[tuple[SolvedScene, views.Gallery]] = []
-        self.loads: views.Gallery | None = None
+        self.earlier: list[tuple[SolvedScene, Gallery]] = []
+        self.loads: Gallery | None = None
         #: views of the heading before a run and of an error message
-        self.heading = views.Gallery()
-        self.message = views.Gallery()
+        self.heading = Gallery()
+        self.message = Gallery()
         #: keys of the current drawing and view, to detect changes
         self.drawn: tuple[Any, ...] = ()
         self.fitted: tuple[Any, ...] = ()
         self.started = self.next_progress = self.next_look = 0.0
-        self.layout = Layout.of_window(None)
+        self.layout = Layout()
         #: what the user has chosen to see, and the step shown, at the last turn
         self.display, self.step = views.Display(), 0
         tree.put(tree.text(ACTION, "", visible=False), button(RUN))
         self.show_status("starting ...", tree.CALM)
-        kind, *content = next(self.engine.messages(START), ("late",))
+        kind, *content = next(self.engine.messages(None))
         if kind != "ready":
             raise RunError(f"gui: the engine's process has not started ({kind}); try again")
         self.tree = tree.Tree(*content)
@@ -124,10 +123,7 @@ class Session:
     def act(self, action: str) -> None:
         """Do an action."""
         if action == STOP[1]:
-            self.engine.stop()
-            self.show_status(
-                "stopping after this step; Stop again: at once, without results", tree.WARN
-            )
+            self.stop()
         elif action == RUN[1] and (self.busy == "saving" or not self.tree.sheet):
             self.pending = "run"
         elif action == RUN[1] and self.busy != "running":
@@ -144,6 +140,14 @@ class Session:
             self.check(Request(self.tree.sheet.request.case))
         elif action in CHANGES and not self.other_display():
             self.check()
+
+    def stop(self) -> None:
+        """Stop a run after its current step; the second time at once."""
+        if self.busy == "running":
+            self.engine.stop()
+            self.show_status(
+                "stopping after this step; Stop again: at once, without results", tree.WARN
+            )
 
     def other_display(self) -> bool:
         """Show what the user has chosen to see of the last run; whether that has changed."""
@@ -302,7 +306,7 @@ class Session:
         """Show an error in the drawing area."""
         for i, line in enumerate(self.layout.wrapped(message, MESSAGE.size)):
             y = MESSAGE.y + i * MESSAGE.pitch
-            self.message.write(MESSAGE.x, y, [line], views.RED, MESSAGE.size)
+            self.message.write(MESSAGE.x, y, [line], RED, MESSAGE.size)
 
     def update(self) -> None:
         """Redraw the window."""

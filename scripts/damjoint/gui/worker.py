@@ -89,9 +89,12 @@ def reached(state: str, result: Results) -> str:
         return state
     words = f"{state} at level {result.last['level']:.4g} m of {case.levels[-1]:.4g} m"
     if estimate:
-        words = f"{state}; results on mesh {len(estimate['n_joint'])} (n_joint = "
-        words += f"{estimate['n_joint'][-1]}) at level {result.last['level']:.4g} m of "
-        words += f"{case.levels[-1]:.4g} m; {estimate['statement']}"
+        meshes = estimate["n_joint"]
+        errors = [q["relative"] for q in estimate["quantities"].values() if q["used"]]
+        words += f" on mesh {len(meshes)} (n_joint = {meshes[-1]})"
+        if errors:
+            words += f"; estimated errors up to {accuracy.percent(max(errors))}"
+            words += f" of {accuracy.percent(estimate['accuracy'])} required"
     return words
 
 
@@ -224,8 +227,8 @@ class EngineProcess:
         with contextlib.suppress(OSError):  # `messages` reports a dead process
             self.pipe.send((kind, argument))
 
-    def messages(self, wait: float = 0.0) -> Iterator[tuple[Any, ...]]:
-        """Receive messages; wait: longest time for the first one [s].
+    def messages(self, wait: float | None = 0.0) -> Iterator[tuple[Any, ...]]:
+        """Receive messages; wait: longest time for the first one [s], None: until it comes.
 
         If the process has died: ("died", message), and a new process is started.
         """
