@@ -239,8 +239,10 @@ def test_fields_and_scales_can_be_chosen(open_window):
     user.type(tree.SCALES, views.OF_LEVEL)
     user.session.gallery.set_step(0)
     assert 0 < option("CustomMax") < of_all
-    user.type("mu", 0.7)  # the choices remain
+    user.type("sigma_max", 2e5)
+    user.run()  # the choices remain
     assert tree.display() == views.Display(field=views.STRESS)
+    assert option("ExternalView") == gmsh.view.getIndex(tagged(user, "vertical stress"))
 
 
 def tagged(user, start):

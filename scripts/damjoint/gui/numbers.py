@@ -71,10 +71,10 @@ class Numbers:
         return rows
 
     @property
-    def position(self) -> str:
-        """In which part of the joint its normal force acts, by both methods."""
+    def positions(self) -> list[str]:
+        """In which part of the joint its normal force acts, by each method."""
         both = [m["x_resultant"] for m in (self.elements, self.rigid) if m]
-        return BESIDE.join(gravity.position(x, self.length) for x in both)
+        return [gravity.position(x, self.length) for x in both]
 
 
 def three_digits(value: float) -> str:

@@ -326,7 +326,9 @@ def show_results(scenes: list[SolvedScene], shown: int, step: int) -> None:
         return
     numbers = scene.numbers[step]
     rows = [(label, value, note) for _, label, value, note in numbers.rows()]
-    rows.append(("N' in", numbers.position, "where the normal force acts on the joint"))
+    rows.append(
+        ("N' in", BESIDE.join(numbers.positions), "where the normal force acts on the joint")
+    )
     head = BESIDE.join(["finite elements", "gravity method"][: 1 + bool(numbers.rigid)])
     note = "the level that the drawing area shows"
     rows.insert(0, (f"At t = {scene.times[step]:.4g}", head, note))

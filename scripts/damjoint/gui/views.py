@@ -168,7 +168,7 @@ def caption(scene: SolvedScene, step: int) -> tuple[str, str, str]:
     resultant = f"N' at {three_digits(now['x_resultant'])} m"
     known = "SSF" if scene.result.case.law.limits_shear else "", "OSF"
     factors = [f"{n} {three_digits(now[n])}" for n in known if n in now]
-    where = scene.numbers[step].position.split(" | ")[0]
+    where = scene.numbers[step].positions[0]
     last = scene.result.case.times[-1]
     return (
         f"level {now['level']:.4g} m{tail} (t = {time:.4g} of {last:g})",
@@ -309,6 +309,6 @@ def show_table(gallery: Gallery, scene: SolvedScene, layout: Layout) -> None:
             gallery.label(tag, right, TABLE_TOP + places.LINE * line, [word], size, "Right")
         for line, row in enumerate(rows):
             gallery.label(tag, right, top + ROW * line, [cells[row]], size, "Right")
-    for line, row in enumerate(rows):
+    for line, row in enumerate(rows if scene.times.size else []):
         marks = [">" if row == step else " " for step in range(len(scene.times))]
         gallery.write(LEFT / 2, top + ROW * line, marks, RED, size)

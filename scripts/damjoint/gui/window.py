@@ -338,8 +338,6 @@ class Session:
             self.loads.show(shown)
         if self.gallery:
             self.gallery.show(not shown)
-        if not shown:
-            self.heading.close()
 
     @property
     def shows_results(self) -> bool:
@@ -358,8 +356,9 @@ class Session:
             camera, width = undeformed_camera(self.tree.sheet.case), self.layout.width
         key = camera.box.tolist(), camera.turn, self.layout, width
         if self.fitted != key:
+            if not self.fitted or self.fitted[1] != camera.turn:
+                camera.rotate()  # else keeps a rotation by the user
             self.fitted = key
-            camera.rotate()
             gmsh.graphics.draw()  # updates the bounding box
             camera.fit(self.layout, width)
 
@@ -375,8 +374,10 @@ class Session:
 
     def show(self, scene: int) -> None:
         """Replace the views by those of a scene of the last run, at the same step."""
-        if self.gallery:
-            self.gallery.close()
+        # views that would be removed later, too, would change the indices of those of the gallery
+        for gallery in (self.gallery, self.heading, self.message):
+            if gallery:
+                gallery.close()
         self.scene_shown, shown = scene, self.scenes[scene]
         self.step = min(self.step, max(len(shown.times) - 1, 0))
         before = [earlier for earlier, _ in self.earlier]
