@@ -60,52 +60,24 @@ if [ -n "$missing" ]; then
   install $missing
 fi
 
-# Packages that are missing to compile python-mumps, and OpenBLAS: MUMPS uses the BLAS of the
-# system, whose reference version is slow.
+# MUMPS, the fast factorisation: scripts/damjoint/fem/mumps.c is compiled at its first use. It uses
+# the BLAS of the system, whose reference version is slow.
 mumps_packages() {
-  [ -x .venv/bin/python ] && python=.venv/bin/python
   echo '#include <dmumps_c.h>
         int main(void) { return 0; }' | cc -x c - -ldmumps_seq -o /dev/null 2>/dev/null ||
     printf ' gcc libc6-dev libmumps-seq-dev'
-  "$python" -c 'import os, sys, sysconfig
-sys.exit(not os.path.exists(os.path.join(sysconfig.get_path("include"), "Python.h")))' ||
-    printf " $debian-dev"
   has libopenblas.so.0 || printf ' libopenblas0-pthread'
 }
-has_mumps() { .venv/bin/python -c "import mumps" 2>/dev/null; }
+lacking=$(mumps_packages)
+if [ -n "$lacking" ] && ! install $lacking >/dev/null 2>&1; then
+  echo "setup: MUMPS is not installed; 3D runs take several times longer with SuperLU. On Debian or" \
+       "Ubuntu type:  sudo apt-get install -y$lacking" >&2
+fi
 
-# The stamp is newer than its sources if everything below has succeeded, except MUMPS.
-if [ -x .venv/bin/python ] &&
-   [ -n "$(find .venv/.stamp -newer pyproject.toml -newer scripts/setup.sh 2>/dev/null)" ]; then
-  # without MUMPS: try again once its packages are installed
-  if [ -d .venv/lib/python*/site-packages/mumps ] || [ -e .venv/mumps.log ] ||
-     [ -n "$(mumps_packages)" ]; then exit 0; fi
-else
+# The stamp is newer than its sources if everything below has succeeded.
+if [ ! -x .venv/bin/python ] ||
+   [ -z "$(find .venv/.stamp -newer pyproject.toml -newer scripts/setup.sh 2>/dev/null)" ]; then
   [ -x .venv/bin/python ] || "$python" -m venv .venv
-  .venv/bin/pip install -q --disable-pip-version-check -e ".[test]"
+  .venv/bin/pip install -q --disable-pip-version-check -e ".[test,fast]"
+  touch .venv/.stamp
 fi
-
-# MUMPS, the fast factorisation. Not from pip's cache: a build for another libmumps does not load.
-# The build starts a script by `env python`, which Debian lacks and .venv has.
-build() {
-  PATH=$PWD/.venv/bin:$PATH \
-    pip install -q --disable-pip-version-check "$@" >.venv/mumps.log 2>&1 && has_mumps
-}
-if ! has_mumps; then
-  lacking=$(mumps_packages)
-  if [ -n "$lacking" ] && install $lacking >/dev/null 2>&1; then lacking=""; fi
-  if [ -z "$lacking" ] && build --no-cache-dir -e ".[fast]"; then :
-  # the only wheel there is, for numpy 1
-  elif [ -d .venv/lib/python3.11 ] &&
-       build --only-binary python-mumps "python-mumps==0.0.2" "numpy<2"; then :
-  else
-    .venv/bin/pip uninstall -q -y python-mumps 2>/dev/null || true
-    help="The error is in .venv/mumps.log; to try again, delete it and make setup."
-    if [ -n "$lacking" ]; then
-      help="On Debian or Ubuntu type:  sudo apt-get install -y$lacking  and make setup."
-      rm -f .venv/mumps.log
-    fi
-    echo "setup: MUMPS is not installed; 3D runs take several times longer with SuperLU. $help" >&2
-  fi
-fi
-touch .venv/.stamp

@@ -10,11 +10,15 @@ import signal
 import subprocess
 import sys
 import time
+import types
 from pathlib import Path
 
+import numpy as np
 import pytest
-from damjoint.fem import factor
+from damjoint import RunError
+from damjoint.fem import factor, memory
 from damjoint.storage import atomic_write, locked_folder
+from scipy import sparse
 
 BARE = ("--set", "n_joint=10", "--set", "h_dam=3", "--set", "h_found=4", "--no-fields")
 RUN = ("run", "c", *BARE, "--no-picture", "--levels", "6")
@@ -281,14 +285,16 @@ def test_a_memory_error_is_one_line(command, monkeypatch):
     assert len(err.splitlines()) == 1
 
 
-@pytest.mark.skipif(factor.mumps is None, reason="MUMPS")
-def test_mumps_out_of_memory_is_a_memory_error(monkeypatch):
-    class Full(RuntimeError):
-        error = -13
-
-    monkeypatch.setattr(factor.mumps, "Context", contextlib.nullcontext)
-    with pytest.raises(MemoryError), factor.context():
-        raise Full("Not enough memory")
+@pytest.mark.skipif(factor.is_slow(), reason="MUMPS")
+def test_mumps_out_of_memory_is_one_line(monkeypatch):
+    matrix, none = sparse.eye(3, format="csr"), np.zeros(0, int)
+    full = types.SimpleNamespace(damjoint_solve=lambda *_: factor.NO_MEMORY)
+    with pytest.raises(MemoryError, match="3 unknowns"):
+        factor.solve_by_mumps(full, matrix, np.ones((3, 1)), none, "3 unknowns")
+    for module in factor, memory:
+        monkeypatch.setattr(module, "available", lambda: 0.0)
+    with pytest.raises(RunError, match="3 unknowns need about"):
+        factor.solve_symmetric(matrix, np.ones((3, 1)))
 
 
 def test_a_getdp_run_that_exceeds_the_memory_is_refused(command, monkeypatch):

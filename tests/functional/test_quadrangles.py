@@ -6,6 +6,7 @@ from closed_forms import differences
 from damjoint import data
 from damjoint.engines import engine_of
 from damjoint.model.case import load
+from damjoint.statics.verdict import hints
 from numpy.testing import assert_allclose
 
 #: A dam on a foundation of three blocks in rows and columns; regular: quadrangles but in the last
@@ -115,3 +116,4 @@ def test_a_slice_needs_as_many_iterations_as_2d(solve, law, uplift):
     assert three.history["iterations"].tolist() == two.history["iterations"].tolist()
     assert two.history["iterations"][-1] > 3
     assert max(differences(two, three)) < 1e-8
+    assert [any("plane strain" in hint for hint in hints(r)) for r in (two, three)] == [False, True]

@@ -24,23 +24,15 @@ from scipy import linalg
 from .. import RunError, __version__, data
 from ..arrays import Array
 from ..model.case import Case
-from ..model.loads import overtopped
+from ..model.loads import COMPLETE, overtopped, thermal_strains
 from ..model.mesh import Body, Face, JointMesh, Mesh, mesh_of, shares
+from ..storage import cache_folder
 from .bodies import PARAMETERS, Bodies
 from .condensation import Condensed, CondensedJoint, condense
 from .memory import check_size
 
 #: Size up to which the cache may grow [bytes]; the files longest unused are deleted first.
 LIMIT = 2_000_000_000
-
-
-def folder() -> Path | None:
-    """Folder of the cache: $DAMJOINT_CACHE (empty: none), else in the user's cache folder."""
-    named = os.environ.get("DAMJOINT_CACHE")
-    if named is not None:
-        return Path(named) if named else None
-    home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    return Path(home) / "damjoint" if os.path.isabs(home) else None
 
 
 def key_of(case: Case) -> tuple[object, ...]:
@@ -50,7 +42,8 @@ def key_of(case: Case) -> tuple[object, ...]:
     faces = tail > 0, case["floor_water"], overtopped(case)
     # which faces of an own geometry are under water depends on heights that only its mesh has
     levels = (case.reached, tail) if case.geometry else ()
-    return (shape, *(case[n] for n in PARAMETERS), *faces, *levels)
+    thermal = thermal_strains(case, COMPLETE)
+    return (shape, *(case[n] for n in PARAMETERS), *faces, *levels, *thermal)
 
 
 def fingerprint(mesh: Mesh) -> str:
@@ -79,7 +72,7 @@ def cached(case: Case) -> tuple[Condensed, Bodies | None]:
     Raises RunError (mesh, memory).
     """
     header = json.dumps([__version__, sources(), key_of(case)])
-    parent = folder()
+    parent = cache_folder()
     path = parent and parent / (hashlib.sha256(header.encode()).hexdigest()[:24] + ".npz")
     stored = read(path, header) if path else None
     if stored:
@@ -175,7 +168,7 @@ def unpack(tree: Any, arrays: Mapping[str, Array]) -> Any:
 
 def prune(parent: Path) -> None:
     """Delete the files longest unused until the cache is not above its limit."""
-    files = sorted(parent.glob("*.npz"), key=lambda f: f.stat().st_mtime)
+    files = sorted([*parent.glob("*.npz"), *parent.glob("*.json")], key=lambda f: f.stat().st_mtime)
     total = sum(f.stat().st_size for f in files)
     for file in files:
         if total <= LIMIT:

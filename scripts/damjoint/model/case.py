@@ -14,6 +14,7 @@ from .. import RUN_GEO, InputError, data
 from ..arrays import Value, Values
 from ..laws import LAWS, Law
 from . import casefile
+from .arithmetic import number
 from .constraints import (
     check_also_uplift,
     check_drive,
@@ -32,7 +33,6 @@ from .parameters import (
     independent,
     levels_of,
     listing,
-    number,
     parameter,
     parse,
 )

@@ -9,7 +9,6 @@ from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
 
-import gmsh
 import numpy as np
 from scipy import sparse
 
@@ -228,7 +227,7 @@ def generate(case: Case) -> None:
 
     Raises RunError, and InputError if a user's own geometry can not be read.
     """
-    start_gmsh()
+    gmsh = start_gmsh()
     gmsh.clear()
     gmsh.parser.clear()
     gmsh.onelab.clear()
@@ -275,6 +274,7 @@ class Mesh:
     """
 
     def __init__(self, case: Case) -> None:
+        gmsh = start_gmsh()
         start = time.perf_counter()
         self.dim, self.own = int(case["dim"]), case.geometry
         generate(case)
@@ -317,11 +317,12 @@ class Mesh:
     @property
     def is_current(self) -> bool:
         """Whether it is Gmsh's current mesh, which `write` writes."""
-        start_gmsh()
+        gmsh = start_gmsh()
         return bool(gmsh.model.getFileName() == self.model)
 
     def _section_regions(self, case: Case) -> tuple[dict[str, int], list[FaceRegion]]:
         """Physical groups by region, and those of the faces."""
+        gmsh = start_gmsh()
         numbers = constants()
         present = {group for _, group in gmsh.model.getPhysicalGroups()}
         tag_of = {name: int(numbers[name.upper()][0]) for name in REGIONS}
@@ -343,6 +344,7 @@ class Mesh:
         """As `_section_regions`, by the names of the physical groups, which get the numbers of the
         package's own geometries.
         """
+        gmsh = start_gmsh()
         numbers, named = constants(), {}
         for d, tag in gmsh.model.getPhysicalGroups():
             if name := gmsh.model.getPhysicalName(d, tag).strip().lower():
@@ -377,6 +379,7 @@ class Mesh:
 
     def _read(self) -> None:
         """Read the nodes of Gmsh's current mesh."""
+        gmsh = start_gmsh()
         tags, coordinates, _ = gmsh.model.mesh.getNodes()
         self.nodes = len(tags)
         self._place = np.zeros(int(tags.max(initial=0)) + 1, int)
@@ -385,6 +388,7 @@ class Mesh:
 
     def _body(self, dimension: int, parts: list[tuple[str, int]]) -> Body:
         """The body of some regions (name, number of the physical group)."""
+        gmsh = start_gmsh()
         blocks: dict[tuple[str, int], list[IntArray]] = {}
         numbers: dict[tuple[str, int], list[IntArray]] = {}
         for name, group in parts:
@@ -419,6 +423,7 @@ class Mesh:
         """Give joint and faces their normals: the joint's from foundation to dam, a face's out of
         its body.
         """
+        gmsh = start_gmsh()
         joint = self.joints[JOINT_NAME]
         upper, lower = self.solids[joint.upper], self.solids[joint.lower]
         if self.own:
@@ -473,6 +478,7 @@ class Mesh:
 
         Raises OSError if the disk is full, which Gmsh does not report.
         """
+        gmsh = start_gmsh()
         gmsh.option.setNumber("Mesh.MshFileVersion", 2.2)
         # else elements are renumbered, shape by shape
         gmsh.option.setNumber("Mesh.PreserveNumberingMsh2", 1)

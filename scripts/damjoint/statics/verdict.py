@@ -9,6 +9,7 @@ import numpy as np
 
 from ..laws import Evidence
 from ..model.case import Case, has_drains
+from ..model.loads import COMPLETE, thermal_strains
 from ..model.results import Results
 from . import gravity
 
@@ -42,10 +43,15 @@ def slipped_from(results: Results) -> float | None:
     sticks, or if a dam that has slipped stands by the joint law.
 
     A point that has slipped once counts as slipped. By the integration points of every
-    step, or by the nodes at the last requested level.
+    step, or by the nodes at the last requested level. A change of temperature can let every point
+    slip, in opposite directions: with it the shear force has to reach the strength, too.
     """
     if results.case.law.stands_slipped:
         return None
+    if thermal_strains(results.case, COMPLETE):
+        resistance = shear_resistance(results, results.last["N"])
+        if abs(results.last["T"]) < (1 - AT_BOUND) * resistance < np.inf:
+            return None
     history, base = results.history, results.case.joint_length
     slipped = np.maximum(history["slip_length"], history["crack_length"]) > base * (1 - 1e-9)
     if slipped.any() and slipped[-1]:
@@ -256,6 +262,11 @@ def hints(results: Results) -> list[str]:
     reach = min(case["found_side"], case["found_depth"])
     if case.published:
         return messages
+    if case["dim"] == 3 and case["hold_z"] and not case.geometry:
+        messages.append(
+            "an extruded section with hold_z = 1 is in plane strain: dim = 2 has the same "
+            "solution in less time"
+        )
     if not case.geometry and reach < LEAST_FOUNDATION * case["dam_height"]:
         messages.append(
             f"the foundation reaches {reach:g} m: less than {LEAST_FOUNDATION:g} heights of the "

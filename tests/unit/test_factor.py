@@ -1,0 +1,67 @@
+"""Sparse factorisations against dense linear algebra."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from damjoint.fem import factor
+from scipy import sparse
+
+
+@pytest.fixture
+def system():
+    """A symmetric positive definite matrix of a grid with two unknowns a node, and loads."""
+    line = sparse.diags([-1, 2.5, -1], [-1, 0, 1], (12, 12))
+    grid = sparse.kron(line, sparse.eye(12)) + sparse.kron(sparse.eye(12), line)
+    matrix = sparse.kron(grid, [[2, 0.5], [0.5, 1]], format="csr")
+    return matrix, np.random.default_rng(0).normal(size=(matrix.shape[0], 3))
+
+
+@pytest.fixture(params=["MUMPS", "MUMPS in METIS's order", "SuperLU"])
+def method(request, monkeypatch):
+    if request.param == "SuperLU":
+        monkeypatch.setattr(factor, "library", lambda: None)
+    elif factor.is_slow():
+        pytest.skip("MUMPS")
+    elif request.param != "MUMPS":
+        pytest.importorskip("pymetis")
+        monkeypatch.setattr(factor, "LARGE", 0)
+
+
+def test_schur_complement(system, method):
+    matrix, loads = system
+    keep = np.array([7, 3, 250, 100, 101])
+    inside = np.setdiff1d(np.arange(len(loads)), keep)
+    dense = matrix.toarray()
+    through = dense[np.ix_(keep, inside)] @ np.linalg.inv(dense[np.ix_(inside, inside)])
+    schur, reduced = factor.schur_complement(matrix, keep, loads)
+    expected = dense[np.ix_(keep, keep)] - through @ dense[np.ix_(inside, keep)]
+    assert schur == pytest.approx(expected, rel=1e-12, abs=1e-13)
+    assert reduced == pytest.approx(loads[keep] - through @ loads[inside], rel=1e-12, abs=1e-13)
+
+
+def test_solution(system, method):
+    matrix, loads = system
+    solution = factor.solve_symmetric(matrix, loads)
+    assert matrix @ solution == pytest.approx(loads, rel=1e-11, abs=1e-12)
+
+
+def test_a_library_that_does_not_load_is_compiled_anew(tmp_path, monkeypatch):
+    if factor.is_slow():
+        pytest.skip("MUMPS")
+    path = tmp_path / Path(factor.library()._name).name
+    path.write_bytes(b"of another machine")
+    monkeypatch.setenv("DAMJOINT_CACHE", str(tmp_path))
+    factor.library.cache_clear()
+    assert factor.library()._name == str(path) and path.stat().st_size > 1000
+
+
+def test_without_a_compiler_there_is_superlu(tmp_path, monkeypatch):
+    monkeypatch.setenv("DAMJOINT_CACHE", str(tmp_path))
+    monkeypatch.setenv("PATH", "")
+    factor.library.cache_clear()
+    try:
+        assert factor.is_slow() and factor.name().startswith("SuperLU")
+        assert not list(tmp_path.iterdir())
+    finally:
+        factor.library.cache_clear()
