@@ -239,7 +239,7 @@ def test_fields_and_scales_can_be_chosen(open_window):
     user.type(tree.SCALES, views.OF_LEVEL)
     user.session.gallery.set_step(0)
     assert 0 < option("CustomMax") < of_all
-    user.type("sigma_max", 2e5)
+    user.type("dam_crest", 2.0)
     user.run()  # the choices remain
     assert tree.display() == views.Display(field=views.STRESS)
     assert option("ExternalView") == gmsh.view.getIndex(tagged(user, "vertical stress"))

@@ -41,7 +41,7 @@ MESSAGE = Message()
 TWO_COLUMNS, ONE_COLUMN, COLUMN = 1000, 620, 268
 GRAPH_HEIGHT, ROWS = (140, 218), 4
 #: Texts of a graph: left and right of its axes, above and below them.
-BESIDE_AXES, BEYOND_AXES, ABOVE_AXES, BELOW_AXES = 66, 24, 26, 38
+BESIDE_AXES, BEYOND_AXES, ABOVE_AXES, BELOW_AXES = 66, 24, 31, 38
 
 
 #: Options with the sizes of Gmsh's window; GraphicsWidth includes the menu.

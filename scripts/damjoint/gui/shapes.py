@@ -90,7 +90,7 @@ def arrow_labels(arrows: list[tuple[np.ndarray, list[str]]]) -> list[Label]:
         steep = abs(y) > abs(x)
         number = 0 if steep else sum(np.hypot(*(tail - t)[:2]) < length for t in tails)
         place = tail + np.array([0.0, LINE * number * length, 0.0])
-        align = "Center" if steep else "Right" if x > 0 else "Left"
+        align = "Right" if x > 0 and not steep else "Left"
         labels.append(Label(place, [f" {text} " for text in texts], align))
         tails += [] if steep else [tail]
     return labels

@@ -299,7 +299,7 @@ def show_table(gallery: Gallery, scene: SolvedScene, layout: Layout) -> None:
     count = min(int((layout.height - top) // ROW), len(table.rows))
     rows = np.unique(np.linspace(0, len(table.rows) - 1, count).round().astype(int)).tolist()
     columns = zip(names, zip(*table.rows, strict=True), strict=True)
-    widths = [max(map(len, [*words, *cells])) + 2 for words, cells in columns]
+    widths = [max(map(len, [*words, *cells])) + 3 for words, cells in columns]
     room = (layout.width - 2 * LEFT) / places.CHARACTER / sum(widths)
     size = int(np.clip(room, *FONT))
     rights = LEFT + np.cumsum(widths) * size * places.CHARACTER
