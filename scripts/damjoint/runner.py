@@ -5,39 +5,31 @@ from __future__ import annotations
 import contextlib
 import re
 import resource
-import sys
 import time
-from importlib.metadata import version
 from pathlib import Path
 
-from tqdm import tqdm
-
-from . import __version__, accuracy
+from . import accuracy, versions
 from .engines import Outcome, engine_of
 from .model.case import Case
 from .model.fields import Solution
 from .model.results import Results
 from .post import folder as folders
 from .post import tables
+from .progress import Progress
 
 
-class Progress:
-    """Progress bar over the times of all scenes, on a terminal only."""
+class RunProgress(Progress):
+    """Progress over the times of all scenes."""
 
     def __init__(self, case: Case, show: bool) -> None:
         count = len(case.scenes())
-        self.bar = tqdm(
-            total=count * case.times[-1],
-            desc=case.name,
-            disable=not show or not sys.stderr.isatty(),
-            bar_format="{desc} {percentage:3.0f}%|{bar}| {elapsed}",
-            leave=False,
-        )
+        bar = "{desc} {percentage:3.0f}%|{bar}| {elapsed}"
+        super().__init__(case.name, count * case.times[-1], show, bar_format=bar, leave=False)
         self.reached = [0.0] * count
 
     def step(self, scene: int, now: float) -> None:
         """Advance to the time of a converged step; called by the engines."""
-        self.bar.update(now - self.reached[scene])
+        self.update(now - self.reached[scene])
         self.reached[scene] = now
 
 
@@ -57,20 +49,20 @@ def run(
     writes its converged steps. Raises InputError, RunError.
     """
     chosen = engine_of(case, engine)
-    bar, outcomes = Progress(case, progress), list[Outcome]()
+    outcomes = list[Outcome]()
     with folders.claim_output_folder(case, out):  # after the checks: bad input removes nothing
         try:
-            for outcome in accuracy.solve(case, chosen, bar.step, fields or picture):
-                save(outcome, case, out)
-                outcomes.append(outcome)
-                if outcome.error:
-                    raise outcome.error
+            with RunProgress(case, progress) as shown:
+                for outcome in accuracy.solve(case, chosen, shown.step, fields or picture):
+                    save(outcome, case, out)
+                    outcomes.append(outcome)
+                    if outcome.error:
+                        raise outcome.error
         except BaseException as error:
             if not outcomes:
                 state = "failed" if isinstance(error, Exception) else "interrupted"
                 folders.write_state(case, out, state, str(error) or "no step had converged")
             raise
-        bar.bar.close()
         for outcome in outcomes if fields or picture else []:
             write_fields_and_picture(outcome, case, out, fields, picture)
     return [outcome.result for outcome in outcomes]
@@ -95,12 +87,16 @@ def save(outcome: Outcome, case: Case, out: Path) -> None:
     start, result = time.perf_counter(), outcome.result
     tables.write(result, folder)
     result.info["wall_seconds"]["post"] = time.perf_counter() - start
-    versions = {"damjoint": __version__, "gmsh": version("gmsh"), "python": sys.version.split()[0]}
-    getdp = result.info.pop("getdp", {})
+    numbers, getdp = versions.versions(), result.info.pop("getdp", {})
     if getdp.get("version"):
-        versions["getdp"] = getdp["version"]
+        numbers["getdp"] = getdp["version"]
     memory = max(peak_memory(), getdp.get("peak_memory_mb") or 0.0)
-    result.info |= {"peak_memory_mb": round(memory, 1), "versions": versions}
+    result.info |= {
+        "peak_memory_mb": round(memory, 1),
+        "versions": numbers,
+        "commit": versions.commit(),
+        "machine": versions.machine(),
+    }
     folders.write_info(result, folder, *early_end(outcome))
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from ..arrays import Array, Sparse
 from ..laws import TANGENT, Law, Mode
 from ..model.case import Case, flows, has_drains
-from ..model.loads import Loading, line_forces, quake_column, thermal_strains, water_column
+from ..model.loads import AddedPressure, Loading, line_forces, thermal_strains, water_column
 from .flow import FlowSolution
 from .interface import Interface
 from .linear_system import Change
@@ -37,6 +37,16 @@ class Pressure:
     #: metre of thickness
     flux: Array | None = None
     leakage: float = 0.0
+
+
+@dataclass(frozen=True)
+class Still:
+    """The joint before an earthquake that leaves its water as it is: jump (j,) and internal
+    variables.
+    """
+
+    jump: Array
+    variables: Any
 
 
 @dataclass(frozen=True)
@@ -84,29 +94,27 @@ class Equilibrium:
         if case["face_load"] == "uniform":
             pressure = np.full(len(face.y), self.unit_weight * level)
             return face.spread(-pressure[:, None] * face.normals)
-        shaking = 0.0
-        if face.side == "up" and case["added_mass"]:
-            # Westergaard's pressure, times the part of the acceleration that is normal to the face
-            shaking = 7 / 8 * case["k_h"] * loading.part("quake")
-        floor = self.interface.floor
+        added = AddedPressure(0.0, self.interface.floor)
+        if face.side == "up":
+            added = AddedPressure.of(case, loading, self.interface.floor)
 
         def height(level: float, y: Array, tilt: Array) -> Array:
-            still = np.maximum(level - y, 0)
-            return still + shaking * tilt * np.sqrt(np.maximum(level - floor, 0) * still)
+            return np.maximum(level - y, 0) + added.height(level, y, tilt)
 
         def column(level: float, low: float, high: float) -> tuple[float, float]:
-            still, quake = water_column(level, low, high), quake_column(level, low, high, floor)
-            share = shaking * abs(face.normals[0, 0])
-            return still[0] + share * quake[0], still[1] + share * quake[1]
+            still = water_column(level, low, high)
+            quake = added.column(level, low, high, abs(face.normals[0, 0]))
+            return still[0] + quake[0], still[1] + quake[1]
 
         forces = self.unit_weight * face.press(level, height, column)
         grown = loading.part("silt") if face.side == "up" else 0.0
         if grown > 0 and case["silt_height"] > 0:
-            weight = grown * case["rho_silt"] * case["g"] * case["silt_K0"]
+            weight = grown * case["rho_silt"] * case["g"]
             depth = lambda level, y, _tilt: np.maximum(level - y, 0)
             silt = face.press(case["silt_height"], depth, water_column).reshape(-1, self.bulk.dim)
-            silt[:, 1:] = 0  # a horizontal pressure on the vertical projection
-            forces += weight * silt.ravel()
+            # horizontal pressure on the vertical projection, vertical one on the horizontal
+            silt *= [weight * case["silt_K0"], weight * case["silt_weight"], 0][: self.bulk.dim]
+            forces += silt.ravel()
         return forces
 
     def unit_loads(self, loading: Loading) -> dict[str, float]:
@@ -158,7 +166,7 @@ class Equilibrium:
         that is lower.
 
         Drains reduce the head above their outlet, the tailwater or their own height, by their
-        effectiveness (EM 1110-2-2200).
+        effectiveness (EM 1110-2-2200); USBR counts the reduction from the reservoir's head.
         """
         case, along = self.case, self.interface.fields
         fields = along.heel_y, along.toe_y, along.xi
@@ -169,7 +177,7 @@ class Equilibrium:
         if case["uplift"] != "drained":
             return first + (last - first) * xi
         at = case["drain_x"] / self.interface.length
-        drained = first + (last - first) * at
+        drained = first + (last - first) * (at if case["drain_reference"] == "linear" else 0)
         outlet = np.maximum(heel + (toe - heel) * at, max(case["drain_level"], loading.tail))
         drained = drained - case["drain_effectiveness"] * np.maximum(drained - outlet, 0)
         return np.where(
@@ -265,19 +273,25 @@ class Equilibrium:
         loading: Loading,
         mode: Mode = TANGENT,
         frozen_lift: Array | None = None,
+        still: Still | None = None,
     ) -> Residual:
         """The residual and its derivatives.
 
-        mode: of the law; frozen_lift (j,): replaces the lift of the flowing water.
+        mode: of the law; frozen_lift (j,): replaces the lift of the flowing water; still: the joint
+        whose opening the water follows instead.
         """
-        interface = self.interface
+        interface, opened = self.interface, still or Still(jump, variables)
         at_points = interface.jumps(interface.at_points, jump)
         traction, tangent = self.law.evaluate(at_points, variables, mode)
+        dried = still if self.case["quake_uplift"] == "zero" else None
+        if dried:
+            lost, lost_rate = self.lost_pressure(at_points[:, 0], variables, loading, dried)
+            traction = traction + lost
         value = self.bulk.stiffness @ jump - self.loads(loading) + interface.forces(traction)
 
         flowing, solution = self.flowing and frozen_lift is None, None
         if flowing:
-            lift, solution = self.flowing_lift(jump, variables, loading)
+            lift, solution = self.flowing_lift(opened.jump, opened.variables, loading)
             value = value - lift
         elif frozen_lift is not None:
             value = value - frozen_lift
@@ -286,8 +300,10 @@ class Equilibrium:
             stiffness = tangent
             if secant:
                 stiffness = (mode.frozen or self.law).secant_stiffness(at_points, variables)
+            if dried:
+                stiffness = stiffness + lost_rate
             change = interface.change(stiffness, self.undamaged)
-            if solution is None:
+            if solution is None or still:
                 return change
             growing = self.aperture(jump, variables)[1] * interface.points.weights
             return replace(change, flow=interface.flow.derivative(solution, growing))
@@ -295,18 +311,51 @@ class Equilibrium:
         def by_level() -> Array:
             slope = -self.rate(self._loads, loading)
             if flowing:
-                lifted = lambda other: self.flowing_lift(jump, variables, other)[0]
+                lifted = lambda other: self.flowing_lift(opened.jump, opened.variables, other)[0]
                 slope = slope - self.rate(lifted, loading)
+            if dried:
+                losing = lambda other: interface.forces(
+                    self.lost_pressure(at_points[:, 0], variables, other, dried)[0]
+                )
+                slope = slope + self.rate(losing, loading)
             return slope
 
         return Residual(value, by_jump, by_level)
 
-    def pressure(self, jump: Array, variables: Any, loading: Loading) -> Pressure:
-        """The water pressure in the joint at a jump."""
+    def lost_pressure(
+        self, opening: Array, variables: Any, loading: Loading, still: Still
+    ) -> tuple[Array, Array]:
+        """Pressure [Pa] that the water loses at the law's points in the crack that an earthquake
+        opens, as a traction (q, 3), and its derivative (q, 3, 3).
+
+        It grows by K_N with the opening beyond that of a crack, so that a point is as stiff as in
+        contact until all of its pressure is lost.
+        """
+        number, K_N = len(opening), self.case["K_N"]
+        traction, rate = np.zeros((number, 3)), np.zeros((number, 3, 3))
+        fields, interface = self.interface.fields, self.interface
+        beyond: Array | float = 0.0
+        if self.flowing:
+            solution = self.solve_flow(still.jump, still.variables, loading)
+            beyond = fields.at_points @ self.expand_to_nodes(solution.pressure)
+        y = interface.points.positions[:, 1]
+        full = self.uplift(loading, fields.at_points, y, beyond)
+        before = interface.jumps(interface.at_points, still.jump)[:, 0]
+        cracked = before > self.law.opening_of_crack(still.variables, number)
+        wider = np.where(cracked, 0, opening - self.law.opening_of_crack(variables, number))
+        traction[:, 0] = np.clip(K_N * wider, 0, full)
+        rate[:, 0, 0] = np.where((wider > 0) & (K_N * wider < full), K_N, 0)
+        return traction, rate
+
+    def pressure(
+        self, jump: Array, variables: Any, loading: Loading, still: Still | None = None
+    ) -> Pressure:
+        """The water pressure in the joint at a jump; still: see `residual`."""
         interface, fields = self.interface, self.interface.fields
+        opened = still or Still(jump, variables)
         inner: Array | float = 0.0
         if self.flowing:
-            inner = self.solve_flow(jump, variables, loading).pressure
+            inner = self.solve_flow(opened.jump, opened.variables, loading).pressure
         beyond = self.expand_to_nodes(np.asarray(inner))
 
         def at(matrix: Sparse, positions: Array) -> Array:
@@ -316,17 +365,25 @@ class Equilibrium:
 
         flux, leakage = None, 0.0
         if self.case["uplift"] == "flow":
-            factor, _, narrowest = self.aperture(jump, variables)
+            factor, _, narrowest = self.aperture(opened.jump, opened.variables)
             conductivity = self.case["rho_water"] * narrowest**3 * factor / (12 * self.case["visc"])
             total = self.unit_weight * self.head(loading) + beyond
             drains = () if self.drains is None else (self.drains[0],)
             flux, leakage = interface.flow.flux(conductivity, total, self.bulk.width, *drains)
+        points = at(fields.at_points, interface.points.positions)
+        water_points = at(fields.at_water, interface.water_points.positions)
+        nodes = at(fields.at_locations, interface.space.locations)
+        if still and self.case["quake_uplift"] == "zero":
+            opening = interface.jumps(interface.at_points, jump)[:, 0]
+            lost_at_points = self.lost_pressure(opening, variables, loading, still)[0][:, 0]
+            weights = interface.points.weights  # at the nodes so that the resultant is the same
+            spread = fields.at_points.T @ (weights * lost_at_points)
+            lost_at_nodes = spread / (fields.at_points.T @ weights)
+            points = points - lost_at_points
+            water_points = water_points - fields.at_water @ lost_at_nodes
+            nodes = np.maximum(nodes - fields.at_locations @ lost_at_nodes, 0)
         return Pressure(
-            points=at(fields.at_points, interface.points.positions),
-            water_points=at(fields.at_water, interface.water_points.positions),
-            nodes=at(fields.at_locations, interface.space.locations),
-            flux=flux,
-            leakage=leakage,
+            points=points, water_points=water_points, nodes=nodes, flux=flux, leakage=leakage
         )
 
     def crest(self, jump: Array, loading: Loading) -> float:

@@ -13,11 +13,11 @@ import numpy as np
 
 from .. import RunError
 from ..arrays import Array
-from ..joint.equilibrium import Equilibrium
+from ..joint.equilibrium import Equilibrium, Still
 from ..joint.interface import Interface, interface_of
 from ..joint.linear_system import Border
 from ..laws import TANGENT, Mode
-from ..model.case import Case
+from ..model.case import Case, remembers
 from ..model.loads import COMPLETE, Loading
 from .controls import Control, DisplacementControl, LevelControl
 from .newton import Convergence, Diverged, Iterate, Strategy, newton
@@ -109,6 +109,14 @@ class Model:
         """The loads of a time, at a level [m]."""
         return Loading.at(self.case, time, level, self.case.tail_at(time))
 
+    def still(self, state: State, time: float) -> Still | None:
+        """The joint before the earthquake, for a step from a state to a time, if the water in it
+        follows from that.
+        """
+        if not remembers(self.case) or not self.loading(time, 0.0).part("quake"):
+            return None
+        return state.still or Still(state.jump, state.variables)
+
     def advance(
         self,
         state: State,
@@ -186,7 +194,7 @@ class Model:
         """A step by one strategy, from a jump and a level, see `advance`. Raises Diverged."""
         equilibrium, start = self.equilibrium, state.begin_step(self.equilibrium.law, time)
         interface, law, variables = equilibrium.interface, equilibrium.law, start.variables
-        law_points = frozen and frozen.points
+        law_points, still = frozen and frozen.points, self.still(state, time)
         loads, convergence = self.loading(time, begin[1]), self.convergence
         stiffness = equilibrium.case["K_N"] * equilibrium.bulk.width
 
@@ -199,7 +207,7 @@ class Model:
                     releasing = crossing & ((side < 0) | (strategy.release > 1))
                     side, mode = np.where(releasing, 0, side), replace(mode, releasing=releasing)
             here = replace(loads, level=level)
-            residual = equilibrium.residual(jump, variables, here, mode, frozen_lift)
+            residual = equilibrium.residual(jump, variables, here, mode, frozen_lift, still)
             size, border = float(np.linalg.norm(residual.value)), None
             if isinstance(control, DisplacementControl):
                 gap = control.value - control.measure(equilibrium, jump, here)
@@ -227,6 +235,7 @@ class Model:
             start.update(equilibrium, end.jump, frozen),
             time=time,
             loading=loading,
-            pressure=equilibrium.pressure(end.jump, variables, loading),
+            pressure=equilibrium.pressure(end.jump, variables, loading, still),
+            still=still,
         )
         return StepResult(new.after(state), iterations, end.size / (self.reference or 1.0))

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Array
-from ..joint.equilibrium import Equilibrium, Pressure
+from ..joint.equilibrium import Equilibrium, Pressure, Still
 from ..laws import Law
 from ..model.loads import Loading
 
@@ -34,6 +34,8 @@ class State:
     node_variables: Any
     #: of the water in the joint; the aperture of what had broken before the step lets it in
     pressure: Pressure | None = None
+    #: the joint before the earthquake that acts, if the water follows from it
+    still: Still | None = None
     #: the state before, without its own
     previous: State | None = None
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..joint.interface import Interface
 from ..laws import UNBREAKABLE
-from ..model.case import Case, flows
+from ..model.case import Case, flows, remembers
 from ..solver.load_stepper import LoadStepper
 
 #: Parameters on which N, T, M do not depend.
@@ -60,7 +60,7 @@ def mechanism(case: Case, interface: Interface) -> tuple[str, str]:
     Sliding: the shear exceeds the law's `shear_bound`. Overturning: with the tensile strength f
     and the joint's length L, the moment of the tension about the toe is at most f L^2/2.
     """
-    if flows(case) or case["drive"] != "level":
+    if flows(case) or remembers(case) or case["drive"] != "level":
         return "", ""
     history, length = resultants(Elastic.of(case, interface)), case.section["joint_length"][0]
     shear = case.law.shear_bound(history["N"], length)
