@@ -56,8 +56,8 @@ class Numbers:
         rigid = {name: float(getattr(method, name)) for name in BY_GRAVITY}
         return Numbers(state, rigid, case.joint_length)
 
-    def rows(self) -> list[tuple[str, str, str, str]]:
-        """Rows of column, label, value and tooltip; values of both methods in a common unit."""
+    def rows(self) -> list[tuple[str, str, str]]:
+        """Rows of label, value and tooltip; values of both methods in a common unit."""
         columns = [(name, head, units, HISTORY[name][1]) for name, head, units in SHOWN]
         columns += [(name, head, NUMBER, meaning) for name, head, meaning in FACTORS]
         rows = []
@@ -67,8 +67,9 @@ class Numbers:
             size, factor = unit([finite], units) if finite.any() else units[0]
             values = BESIDE.join(three_digits(value * factor) for value in both)
             if both and not (name in OPTIONAL and not any(both)):
-                rows.append((name, f"[{size}] {head}".removeprefix("[-] "), values, meaning))
-        return rows
+                rows.append((f"[{size}] {head}".removeprefix("[-] "), values, meaning))
+        where = "part of the joint where its normal force acts"
+        return [*rows, ("N' in", BESIDE.join(self.positions), where)]
 
     @property
     def positions(self) -> list[str]:

@@ -96,24 +96,6 @@ def arrow_labels(arrows: list[tuple[np.ndarray, list[str]]]) -> list[Label]:
     return labels
 
 
-#: Height of a label over the length of an arrow.
-LINE = 0.8
-#: Name of the earthquake among the forces.
-QUAKE = "earthquake"
-
-
-def arrow_label(lines: np.ndarray, texts: list[str], number: int) -> Label:
-    """Label of an arrow (3, 2, 3), beside the tail of one that is level and else above it; number:
-    of the arrow, as those at one place have their labels above one another.
-    """
-    tail, tip = lines[0]
-    x, y, _ = tip - tail
-    if abs(y) > abs(x):
-        return Label(tail, texts, "Center")
-    above = np.array([0.0, LINE * number * np.hypot(x, y), 0.0])
-    return Label(tail + above, [f"{text} " for text in texts], "Right" if x > 0 else "Left")
-
-
 def level_labels(levels: list[float], tails: list[float], box: np.ndarray) -> list[Label]:
     """Labels of both water surfaces, one for each step, at the sides of a box (2, 3) [m]: below the
     reservoir's surface, as forces have their labels above it; above the tailwater's.

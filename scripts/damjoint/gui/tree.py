@@ -325,14 +325,10 @@ def show_results(scenes: list[SolvedScene], shown: int, step: int) -> None:
     if not scene.numbers:
         return
     numbers = scene.numbers[step]
-    rows = [(label, value, note) for _, label, value, note in numbers.rows()]
-    rows.append(
-        ("N' in", BESIDE.join(numbers.positions), "where the normal force acts on the joint")
-    )
     head = BESIDE.join(["finite elements", "gravity method"][: 1 + bool(numbers.rigid)])
     note = "the level that the drawing area shows"
-    rows.insert(0, (f"At t = {scene.times[step]:.4g}", head, note))
-    entries = [(label, value, note, "LightYellow") for label, value, note in rows]
+    rows = [(f"At t = {scene.times[step]:.4g}", head, note), *numbers.rows()]
+    entries = [(*row, "LightYellow") for row in rows]
     entries += [(f"Note {i + 1}", w, w, WARN) for i, w in enumerate(scene.warnings)]
     for i, (label, value, note, highlight) in enumerate(entries):
         more = {"help": note, "attributes": {"Highlight": highlight}}
