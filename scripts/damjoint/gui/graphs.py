@@ -56,7 +56,8 @@ class Scale:
         power = 10.0 ** math.floor(math.log10((high - low) / INTERVALS))
         for interval in (power * number for number in ROUND):
             first = math.floor(low / interval + TINY) * interval if high else -INTERVALS * interval
-            if first + INTERVALS * interval >= high - TINY * interval and first <= low:
+            last, slack = first + INTERVALS * interval, TINY * interval
+            if first <= low + slack and last >= high - slack:
                 break
         return Scale(first, interval, name, factor)
 

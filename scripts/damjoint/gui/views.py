@@ -75,8 +75,8 @@ STATES: dict[int, Entry] = {
 LOAD_STYLES = {
     "water": (WATER, -2),
     "silt": (SILT, -1),
-    "water in the crack": (LAKE, 1),
-    "forces": (DARK, 3),
+    "water in the crack": (LAKE, 3),
+    "forces": (DARK, 4),
 }
 #: Text sizes: title, law and uplift, state, legend and warnings.
 SIZES = 17, 13, 14, 12
@@ -209,10 +209,10 @@ def show_deformed(gallery: Gallery, deformed: Deformed, display: Display) -> lis
     for state, pieces in deformed.marks().items():
         if state in occurring:
             color, text = STATES[state]
-            gallery.add(text, [pieces], [color], **flat, **layer(case, 2), LineWidth=2.5)
+            gallery.add(text, [pieces], [color], **flat, **layer(case, 2), LineWidth=2)
             legend.append((color, text))
     if deformed.undeformed:
-        above = {**flat, **layer(case, 4), "LineWidth": 2.5}
+        above = {**flat, **layer(case, 5), "LineWidth": 2.5}
         gallery.add("resultant", [deformed.resultant()], [GREEN], **above)
         legend.append((GREEN, "resultant, middle third"))
     return legend
