@@ -258,7 +258,11 @@ def test_tension_is_positive_in_all_tables_and_pictures(solve):
     draw_joint(axes, result, method)
     texts = [text.get_text() for text in axes.texts]
     name = texts.index("effective stress, tension > 0")
-    assert texts[name + 1 : name + 3] == [f"{value / 1e6:.3g} MPa" for value in (heel, toe)]
+    computed = result.at()["sigma_n_eff"][[0, -1]]
+    assert texts[name + 1 : name + 3] == [
+        f"FE {fe / 1e6:.3g} MPa\ngravity {by_hand / 1e6:.3g} MPa"
+        for fe, by_hand in zip(computed, (heel, toe), strict=True)
+    ]
     # compression is drawn below the line, tension above it
     stress = axes.get_lines()[-3]
     assert stress.get_linestyle() == "--"

@@ -382,16 +382,16 @@ def drawn(solution: Solution, time: float, at_level: str) -> Iterator[tuple[str,
         pictures.draw_dam(section, solution, time)
         yield "half", f"Section and loads {at_level}, deformed.", section
     joint = figure_of(*(HALF if has_fields else SOLID))
-    pictures.draw_joint(joint, result, time)
+    pictures.draw_joint(joint, solution, time)
     caption = f"Joint {at_level}. {colors}"
     yield "half" if has_fields else "full", caption, joint
     history = figure_of(*WIDE)
     pictures.draw_history(history, result)
     yield "full", "", history
-    if result.case["dim"] == 3 and has_fields:
+    if result.case["dim"] == 3 and has_fields and not pictures.is_own_solid(result.case):
         solid = figure_of(*SOLID)
         pictures.draw_solid(solid, solution, time)
-        yield "full", "In 3D: deformed, and the joint unrolled.", solid
+        yield "full", "In 3D: deformed, and maps of the joint.", solid
     if result.case["drive"] != "level":
         yield "half", "Load against opening.", pictures.draw_curve(result)
 
