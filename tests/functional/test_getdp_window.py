@@ -141,9 +141,15 @@ def window(project, tmp_path):
         "HOME": str(tmp_path),  # settings of the user are neither read nor written
         "LIBGL_ALWAYS_SOFTWARE": "1",
     }
-    # xdotool and import would wait for ever for a missing window
-    call = lambda *words: subprocess.run(words, env=environment, check=True, timeout=60)
+    call = lambda *words: subprocess.run(words, env=environment, check=True)
     opened = [screen]
+
+    def wait(condition):
+        """Until a condition is true; without a window it would never be."""
+        while not condition():
+            assert opened[-1].poll() is None
+            time.sleep(0.2)
+
     sizes = {"GraphicsWidth": 1200, "GraphicsHeight": 800, "MenuWidth": 330}
     places = {"GraphicsPositionX": 0, "GraphicsPositionY": 0}
     command = [sys.executable, "-c", GMSH, "-setstring", "Solver.Executable0", find_getdp()]
@@ -154,26 +160,33 @@ def window(project, tmp_path):
         opened.append(
             subprocess.Popen([*command, *arguments, str(project / "a.pro")], env=environment)
         )
-        call("xdotool", "search", "--sync", "--onlyvisible", "--name", "Gmsh")
+        search = ["xdotool", "search", "--onlyvisible", "--name", "Gmsh"]
+        wait(lambda: subprocess.run(search, env=environment, check=False).returncode == 0)
 
         def press(name):
             results = project / "res/a"
             began, ended = results / "clear.geo", results / "status.geo"
             before = [stamp(began), stamp(ended)]
-            pressed, end = 0.0, time.monotonic() + 120
-            while stamp(ended) in (0, before[1]):  # a run deletes the file of the one before
-                assert time.monotonic() < end and opened[-1].poll() is None
+            pressed = 0.0
+
+            def finished():
+                nonlocal pressed
+                # a click is lost if the window is not drawn yet
                 if stamp(began) == before[0] and time.monotonic() > pressed + 10:
                     call("xdotool", "mousemove", "250", "818", "click", "1")
                     pressed = time.monotonic()
-                time.sleep(0.2)
+                # a run deletes the file of the one before
+                return stamp(ended) not in (0, before[1])
+
             picture = tmp_path / f"{name}.png"
-            while True:
+
+            def drawn():
                 call("import", "-window", "root", str(picture))
-                pixels_of_status = [pixels(imread(picture), colour) for colour in (GREEN, RED)]
-                if max(pixels_of_status) > 500:
-                    return imread(picture)
-                assert time.monotonic() < end
+                return max(pixels(imread(picture), colour) for colour in (GREEN, RED)) > 500
+
+            wait(finished)
+            wait(drawn)
+            return imread(picture)
 
         return press
 
