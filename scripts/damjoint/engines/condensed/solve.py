@@ -27,7 +27,7 @@ THREADED_UNKNOWNS = 2000
 def check(case: Case) -> None:
     """Raise InputError if a user's own geometry is unsuitable; all other cases are suitable."""
     if case.geometry:
-        mesh_of(case)
+        case.with_joints([joint.of_case for joint in mesh_of(case).joints])
 
 
 def about(bulk: Condensed) -> dict[str, Any]:
