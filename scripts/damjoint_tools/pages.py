@@ -245,8 +245,8 @@ def trust_page(results: Path) -> str:
     rows = read_rows(results)
     of = lambda name, value: [row for row in rows if row[name] == value]
     tables = []
-    for name in ("law", "uplift", "dim", "drive"):
-        values = sorted({row[name] for row in rows})
+    for name in ("law", "uplift", "joints", "dim", "drive"):
+        values = sorted({row[name] for row in rows if "," not in row[name]})  # of several joints
         lines = [(f"{name} = {value}", *counts(of(name, value)).values()) for value in values]
         tables += lines
     tables.append(("all", *counts(rows).values()))
@@ -265,7 +265,9 @@ def trust_page(results: Path) -> str:
                 "run` and verified from its result files, by code that is independent of the "
                 "engines. The scenes: dams from 5 to 150 m, $E$ from 1e9 to 1e13 Pa, $K_N$ from "
                 "1e8 to 1e15 Pa/m, all laws and uplifts, sections with batter, neck, sloping and "
-                "lift joint, silt, ice, anchor and earthquake, rising and falling water; one 2D "
+                "lift joint, silt, ice, anchor and earthquake, rising and falling water; four in "
+                "ten have two to four joints, each with its own law and uplift (the rows of a law "
+                "or an uplift below are of dams with one joint); one 2D "
                 "scene in ten is a slender dam with the stiffness of concrete on a brittle joint. "
                 "The name of a scene is SEED-NUMBER. Written by "
                 "`python -m damjoint_tools.pages trust FILE` from the result file.",

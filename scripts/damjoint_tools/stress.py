@@ -13,12 +13,14 @@ import tempfile
 import time
 from collections.abc import Iterator
 from concurrent.futures import as_completed
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from damjoint import InputError
+from damjoint.arrays import Setting
 from damjoint.model.case import Case, has_drains, load
+from damjoint.model.parameters import declared
 from damjoint.progress import track
 from damjoint.storage import lock
 from damjoint.studies.sweep import pool_of, read_done
@@ -28,7 +30,7 @@ from .verification import RunFiles, judge_stop, violations
 
 #: Columns of the result file.
 COLUMNS = (
-    *("scene", "class", "findings", "dim", "law", "uplift", "drive", "verdict", "level"),
+    *("scene", "class", "findings", "dim", "joints", "law", "uplift", "drive", "verdict", "level"),
     "highest_level",
     *("steps", "iterations", "cuts", "seconds", "command"),
     *RECORDED,
@@ -41,6 +43,16 @@ CLASSES = VERIFIED, JUSTIFIED, UNDECIDED, DEFECT = (
 #: Time limit of a scene [s].
 TIME_LIMIT = 300
 
+#: Third number of the seed of the lift joints, which are drawn apart.
+LIFT_DRAWS = 1
+#: Parameters that are drawn for each joint, but for the place of its drains.
+OF_JOINTS = (
+    *("law", "K_N", "K_T", "sigma_max", "adhesion", "mu", "pena_rupture", "alpha", "pena_tang"),
+    *("G_f", "G_t", "joint_slope", "uplift", "aperture_min", "drains"),
+)
+#: Height of the highest lift over the dam's.
+HIGHEST_LIFT = 0.85
+
 #: One thread for each command, as several run at the same time.
 ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL")}
 
@@ -49,7 +61,7 @@ ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL")}
 class RandomScene:
     """Random dam: parameters that differ from the default dam's, and levels as in the command."""
 
-    settings: dict[str, float | str]
+    settings: dict[str, Setting]
     levels: str
     tail_levels: str
     steps: int
@@ -58,7 +70,9 @@ class RandomScene:
     def words(self) -> list[str]:
         """Arguments of the command `damjoint`."""
         changed = [
-            word for item in self.settings.items() for word in ("--set", "{}={}".format(*item))
+            word
+            for name, value in self.settings.items()
+            for word in ("--set", f"{name}={as_text(value)}")
         ]
         water = ["--levels", self.levels, "--tail-levels", self.tail_levels]
         return ["run", "dam", *changed, *water, "--steps", str(self.steps)]
@@ -69,11 +83,16 @@ class RandomScene:
         return load("dam", self.settings, self.levels, self.tail_levels, self.steps)
 
 
+def as_text(value: Setting) -> str:
+    """Format a setting as in the command: a value, or those of all joints."""
+    return ",".join(map(str, value)) if isinstance(value, tuple) else str(value)
+
+
 class RandomNumbers:
     """Random numbers, rounded to three digits to keep the commands readable."""
 
-    def __init__(self, seed: int, number: int) -> None:
-        self.generator = np.random.default_rng([seed, number])
+    def __init__(self, *seed: int) -> None:
+        self.generator = np.random.default_rng(seed)
 
     def uniform(self, low: float, high: float) -> float:
         """Draw a number, uniformly distributed."""
@@ -93,7 +112,13 @@ class RandomNumbers:
 
 
 def random_scene(seed: int, number: int) -> RandomScene:
-    """Draw scene `number` of a seed: any law, uplift, section and loads, stiffnesses over orders of
+    """Draw scene `number` of a seed: a dam with one to four joints."""
+    scene, rng = single_joint_scene(seed, number), RandomNumbers(seed, number, LIFT_DRAWS)
+    return with_lifts(scene, rng) if rng.event(0.4) else scene
+
+
+def single_joint_scene(seed: int, number: int) -> RandomScene:
+    """Draw a dam with one joint: any law, uplift, section and loads, stiffnesses over orders of
     magnitude, rising and falling levels. New draws are appended, so that old seeds stay
     reproducible.
     """
@@ -130,6 +155,41 @@ def random_scene(seed: int, number: int) -> RandomScene:
         levels = sorted(rng.uniform(0.6 * height, height) for _ in levels)
     water = (",".join(f"{level:g}" for level in heights) for heights in (levels, tails))
     return RandomScene(settings, *water, steps)
+
+
+def with_lifts(scene: RandomScene, rng: RandomNumbers) -> RandomScene:
+    """Add one to three lift joints to a scene, each with its own law, strengths, slope, uplift and
+    drains.
+    """
+    case, count = scene.case, int(rng.choice(1, 2, 3))
+    height, settings = case["dam_height"], dict(scene.settings)
+    if settings.get("mesh_pattern") == "regular":
+        settings["mesh_pattern"] = "free"
+    lowest = max(case.section["heel_y"][0], case.section["toe_y"][0])
+    spacing = (HIGHEST_LIFT * height - lowest) / count
+    settings["lift_heights"] = tuple(
+        float(f"{lowest + (k + rng.uniform(0.6, 1)) * spacing:.4g}") for k in range(count)
+    )
+    # each end of a lift moves by less than the distance of two lifts, at least 0.6 of their spacing
+    steepest = np.degrees(np.arctan(0.25 * spacing / case.joint_length))
+    drawn = [
+        joint(rng)
+        | {
+            "joint_slope": rng.uniform(-steepest, steepest) if rng.event(0.4) else 0.0,
+            "uplift": rng.choice("none", "imposed", "drained", "cracked", "flow"),
+            "aperture_min": rng.log_uniform(1e-8, 1e-4),
+            "drains": rng.choice(0, 1),
+        }
+        for _ in range(count)
+    ]
+    drawn = [{n: v for n, v in settings.items() if n in OF_JOINTS}, *drawn]
+    names = [n for n in OF_JOINTS if any(n in own for own in drawn)]
+    default = {name: declared()[name].default for name in names}
+    settings |= {n: tuple(own.get(n, default[n]) for own in drawn) for n in names}
+    dry = replace(scene, settings=settings | {"uplift": "none"}).case
+    lengths = [joint.joint_length for joint in dry.joints]
+    settings["drain_x"] = tuple(rng.uniform(0.05 * length, 0.4 * length) for length in lengths)
+    return replace(scene, settings=settings)
 
 
 def slender_dam(rng: RandomNumbers, height: float) -> dict[str, float | str]:
@@ -263,7 +323,9 @@ def run_and_verify(scene: RandomScene, folder: Path) -> dict[str, object]:
     row = {
         "command": " ".join(["damjoint", *scene.words]),
         "highest_level": max(case.levels),
-        **{name: case[name] for name in ("dim", "law", "uplift", "drive")},
+        "joints": len(case.joints),
+        **{name: case[name] for name in ("dim", "drive")},
+        **{name: as_text(scene.settings.get(name, case[name])) for name in ("law", "uplift")},
     }
     try:
         done = subprocess.run(

@@ -19,7 +19,64 @@ SCENES = {
     "friction": {"law": "friction", "uplift": "cracked", "pena_tang": 5e9, "adhesion": 1e4},
     "bond": {"law": "bond", "uplift": "imposed"},
 }
+SEVERAL = {
+    "lift_heights": (12.0, 25.0),
+    "law": ("rupture", "friction", "bond"),
+    "uplift": ("flow", "cracked", "imposed"),
+    "pena_tang": 5e9,
+    "joint_slope": (0.0, -2.0, 3.0),
+}
 DRAINED = {"drains": 1.0, "drain_x": 6.8}
+
+
+@pytest.fixture(scope="module")
+def lift_files(tmp_path_factory):
+    """The files of a run of three joints."""
+    case = load("dam", SEVERAL | {"n_joint": 20.0}, "30,40", "3")
+    folder = tmp_path_factory.mktemp("lifts")
+    runner.run(case, folder, fields=False, picture=False, progress=False)
+    return RunFiles(case, folder, 0)
+
+
+def test_the_files_of_a_run_of_several_joints_violate_no_rule(lift_files):
+    assert [len(joint.joint) for joint in lift_files.joints] == [2, 2, 2]
+    assert violations(lift_files) == []
+
+
+@pytest.mark.parametrize("number", range(3))
+@pytest.mark.parametrize(
+    "table, column, message",
+    [
+        ("history", "N", "N + U"),
+        ("history", "T", "T ="),
+        ("history", "M", "M ="),
+        ("history", "U", "U ="),
+        ("joint", "sigma_n_eff", "contact"),
+        ("joint", "tau_1", "shear"),
+    ],
+)
+def test_an_altered_column_of_a_joint_is_detected_there(
+    lift_files, tmp_path, number, table, column, message
+):
+    suffix = f"_{number + 1}" if table == "history" and number else ""
+    rows = read_table(lift_files.folder / "joint.csv")["joint"] == number + 1
+    if table == "history":
+        change = lambda v: 1.01 * v
+    else:
+        change = lambda v: np.where(rows, 100 * v + 1e6, v)
+    found = violations(altered(lift_files, tmp_path, table, column + suffix, change))
+    name = lift_files.whole.joint_names[number]
+    assert found and all(line.startswith(f"{name}: ") for line in found), found
+    assert any(line.startswith(f"{name}: {message}") for line in found), found
+
+
+def test_scenes_have_one_to_four_joints_and_can_be_loaded():
+    scenes = [stress.random_scene(7, number) for number in range(40)]
+    assert {len(scene.case.joints) for scene in scenes} == {1, 2, 3, 4}
+    for number, scene in enumerate(scenes):
+        single = stress.single_joint_scene(7, number)
+        assert len(single.case.joints) == 1
+        assert scene == single or "lift_heights" in scene.settings
 
 
 @pytest.fixture(scope="module")
@@ -71,7 +128,7 @@ def altered(files, folder, table, column, change):
     columns = read_table(path)
     columns[column] = change(columns[column])
     write_csv(path, columns)
-    return RunFiles(files.case, folder, 0)
+    return RunFiles(files.whole, folder, 0)
 
 
 def zero_at_the_end(column):
@@ -121,7 +178,7 @@ def test_a_flux_that_drains_can_not_cause_is_detected(run_files, tmp_path, chang
 
 def test_a_wrong_exit_code_is_detected(run_files):
     files = run_files("rupture")
-    assert violations(RunFiles(files.case, files.folder, 1)) == [
+    assert violations(RunFiles(files.whole, files.folder, 1)) == [
         "exit code 1 with state complete, verdict stands"
     ]
 
