@@ -1,5 +1,5 @@
 """Seconds and memory: of the published cases, of growing meshes, of options, of rows of a sweep,
-and of flow under extreme parameters.
+of several joints, and of flow under extreme parameters.
 """
 
 from __future__ import annotations
@@ -209,6 +209,31 @@ def sweep_rows(name: str, case: Case, main: dict) -> tuple:
             call()
             spent.append(time.perf_counter() - start)
     return *spent[:2], len(case.times), *spent[2:]
+
+
+def joints(measurements: Measurements) -> Table:
+    """Measure the seconds of a 45 m dam against the number of its joints, the base and lifts at
+    equal distances, one thread; ratio: of the seconds to those of one joint.
+    """
+    columns = "unknowns", "condensation", "newton", "seconds", "CPU seconds", "iterations", "ratio"
+    table = Table("joints", "joints", *columns)
+    for number in track((1, 2) if measurements.short else (1, 2, 4, 8), "joints"):
+        measured = measurements.get((table.name, number), partial(measure_joints, number))
+        first = (table["seconds"] or measured[3:])[0]
+        table.add(number, *measured, measured[3] / first)
+    return table
+
+
+def measure_joints(number: int) -> tuple:
+    """Measure a dam with a number of joints; returns the columns of `joints` but for the ratio."""
+    lifts = {"lift_heights": tuple(45.0 * k / number for k in range(1, number))}
+    case = load("dam", (lifts if number > 1 else {}) | {"uplift": "imposed"}, "30,40,45")
+    with threadpool_limits(1):
+        wall, cpu = time.perf_counter(), time.process_time()
+        result, spent = solve_timed(case)
+        wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
+    iterations = result.history["iterations"].sum()
+    return spent["unknowns"], spent["condensation"], spent["newton"], wall, cpu, iterations
 
 
 def stress(measurements: Measurements) -> Table:

@@ -177,6 +177,7 @@ def page(
         as_text(tables["growth"]),
         "## Precision on a fine mesh",
         "; ".join(precise) + ".",
+        *of_joints(tables["joints"]),
         *of_stress(tables["stress"]),
     ]
     return "\n\n".join(parts) + "\n"
@@ -264,6 +265,17 @@ def of_costs(costs: Table, sweeps: Table) -> list[str]:
     ]
 
 
+def of_joints(table: Table) -> list[str]:
+    """Dams with several joints."""
+    return [
+        "## Several joints",
+        f"A 45 m dam with up to {table['joints'][-1]} joints, the base and lifts at equal "
+        "distances, water up to the crest, in one process and one thread: "
+        f"{table['joints'][-1]} joints take {table['ratio'][-1]:.1f} times the seconds of one.",
+        as_text(table),
+    ]
+
+
 def of_stress(grid: Table) -> list[str]:
     """Flow with extreme parameters."""
     ends = ", ".join(f"{k} {v}" for k, v in Counter(grid["end"]).items())
@@ -301,7 +313,10 @@ def bench(out: Path, short: bool) -> None:
 def measure(measurements: Measurements) -> tuple[dict[str, Table], list[str]]:
     """Measure all tables, {name: table}, and the errors of balances."""
     tables = [cases := bench_cost.cases(measurements)]
-    studies = bench_cost.switches, bench_cost.sweeps, bench_cost.growth, bench_cost.stress
+    studies = (
+        *(bench_cost.switches, bench_cost.sweeps, bench_cost.growth),
+        *(bench_cost.joints, bench_cost.stress),
+    )
     tables += [study(measurements) for study in studies]
     tables.append(modelings(measurements, cases))
     with threadpool_limits(1):

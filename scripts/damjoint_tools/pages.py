@@ -108,7 +108,8 @@ def results_page() -> str:
         loads,
         "## critical.csv",
         "Written by `damjoint critical`: a row per equilibrium of each trial value; if the dam "
-        "fails, also those after the highest level, under displacement control.",
+        "fails, also those after the highest level, under displacement control. Of several joints, "
+        "the columns of joint 2, 3, ... follow as in history.csv.",
         critical,
         "## CASE_sweep.csv",
         "Written by `damjoint sweep`, a row per combination, in the order of computation: `key`, "

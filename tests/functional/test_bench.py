@@ -6,13 +6,15 @@ import csv
 import json
 
 import pytest
+from damjoint_tools import bench_cost, bench_page
+from damjoint_tools.bench_table import Measurements
 
 
 @pytest.mark.heavy
 def test_the_short_benchmark_writes_consistent_files(command, tmp_path):
     assert command("bench", "--short", "--out", "bench")[0] == 0
     text = (tmp_path / "bench" / "benchmarks.md").read_text()
-    assert text.startswith("# Benchmarks\n") and text.count("\n## ") == 8
+    assert text.startswith("# Benchmarks\n") and text.count("\n## ") == 9
     assert (tmp_path / "bench" / "accuracy.png").read_bytes()[:4] == b"\x89PNG"
     *lines, blank, source = (tmp_path / "bench" / "modelings.md").read_text().splitlines()
     assert len(lines) == 13 and not blank and source in text
@@ -45,3 +47,15 @@ def test_the_short_benchmark_writes_consistent_files(command, tmp_path):
         assert split < 1.2 * plane and plane < coarser
     assert {row["end"] for row in table("stress")} <= {"sliding", "overturning"}
     assert all(float(row["ratio"]) > 0 for row in table("switches"))
+
+
+def test_seconds_of_several_joints(tmp_path):
+    measured = bench_cost.joints(Measurements(tmp_path / "log", short=True))
+    assert measured["joints"] == [1, 2] and measured["ratio"][0] == 1
+    one, two = measured["unknowns"]
+    assert two > one and min(measured["iterations"]) >= 3
+    parts = zip(*(measured[n] for n in ("condensation", "newton", "seconds")), strict=True)
+    assert all(a > 0 and b > 0 and a + b < total for a, b, total in parts)
+    assert measured["ratio"][1] == measured["seconds"][1] / measured["seconds"][0]
+    title, text, rows = bench_page.of_joints(measured)
+    assert title == "## Several joints" and "up to 2 joints" in text and rows.count("\n") == 3

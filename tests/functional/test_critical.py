@@ -11,7 +11,7 @@ from damjoint.model.case import load
 from damjoint.solver import path
 from damjoint.statics import gravity
 from damjoint.statics.verdict import highest_by_statics
-from damjoint.studies.critical import Search, critical
+from damjoint.studies.critical import Search, critical, table
 from damjoint.studies.failure_path import FailurePath
 from scipy.optimize import brentq
 
@@ -267,6 +267,20 @@ def test_files_of_a_search(command, tmp_path):
     assert command("report", folder) == (0, "report.html\n", "")
     page = (tmp_path / "report.html").read_text()
     assert "last state before failure, critical level 6.63399 m; sliding;" in page
+
+
+def test_the_table_has_the_resultants_of_each_joint():
+    """T of each joint is the thrust of the water above it."""
+    joints = {"lift_heights": (12.0, 25.0), "uplift": "none", "mu": (0.9, 1.0, 0.3)}
+    dry = {"law": "friction", "adhesion": 0.0, "pena_tang": 0.0, "n_joint": 16.0, "order": 1.0}
+    search, answer = found("dam", settings=joints | dry, levels="30")
+    assert answer.mode == "sliding" and answer.joint == "lift 25 m"
+    rows = table(search)
+    assert list(rows)[-5:] == ["crack_length_3", "slip_length_3", "N_3", "T_3", "M_3"]
+    depth = np.maximum(rows["level"] - np.array([[0.0], [12.0], [25.0]]), 0)
+    thrust = WATER * depth**2 / 2
+    assert np.allclose([rows[n] for n in ("T", "T_2", "T_3")], thrust, rtol=1e-6, atol=1)
+    assert rows["slip_length_3"][-1] == pytest.approx(search.own.joints[2].joint_length)
 
 
 def test_an_interrupted_search_writes_its_results_so_far(monkeypatch, tmp_path):

@@ -6,7 +6,7 @@ import functools
 import operator
 from collections.abc import Collection
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -67,6 +67,10 @@ HISTORY_OF_JOINTS = (
 )
 
 
+#: Unit and meaning of columns by name.
+Columns: TypeAlias = dict[str, tuple[str, str]]
+
+
 def column_of(name: str, joint: int) -> str:
     """A column of history.csv of a joint, by its number from 0: N, N_2, N_3, ..."""
     return f"{name}_{joint + 1}" if joint else name
@@ -78,15 +82,21 @@ def row_of_joint(row: dict[str, float], joint: int) -> dict[str, float]:
     return row | own
 
 
-def history_columns(case: Case) -> dict[str, tuple[str, str]]:
-    """The columns of a case's history.csv: unit and meaning."""
+def with_all_joints(columns: Columns, case: Case) -> Columns:
+    """Columns of the first joint's table, then those of each further joint."""
     others = {
-        column_of(name, k): (HISTORY[name][0], f"{joint}: {HISTORY[name][1]}")
+        column_of(name, k): (columns[name][0], f"{joint}: {columns[name][1]}")
         for k, joint in enumerate(case.joint_names)
         if k
         for name in HISTORY_OF_JOINTS
+        if name in columns
     }
-    return HISTORY | others
+    return columns | others
+
+
+def history_columns(case: Case) -> Columns:
+    """The columns of a case's history.csv: unit and meaning."""
+    return with_all_joints(HISTORY, case)
 
 
 @dataclass
@@ -178,7 +188,7 @@ def rows_at(table: Table, time: float | None = None) -> Table:
     return {name: column[rows] for name, column in table.items()}
 
 
-def joint_columns(case: Case) -> dict[str, tuple[str, str]]:
+def joint_columns(case: Case) -> Columns:
     """The columns of a case's joint.csv: unit and meaning."""
     of_laws = [dict(joint.law.columns) for joint in case.joints]
     flow = FLUX if any(joint["uplift"] == "flow" for joint in case.joints) else {}

@@ -35,7 +35,7 @@ from ..solver.path import PRECISION, ROUGH, SURE, Point
 from ..statics import gravity
 from ..statics.limit import elastic_heel_stress
 from ..statics.verdict import bound, highest_by_statics, statement, tension_share
-from .failure_path import CRITICAL, FailurePath, Trial, row
+from .failure_path import FailurePath, Trial, critical_columns, row
 
 #: Parameters that are divided by the strength reduction factor. The fracture energies are included:
 #: the stresses of the softening curve are scaled, its jumps are not.
@@ -531,12 +531,13 @@ def critical(
 
 def table(search: Search) -> dict[str, np.ndarray]:
     """critical.csv: the equilibria of all trials."""
+    points = [(k, t, p) for k, t in enumerate(search.trials, 1) for p in t.path.points]
     rows = [
         {"trial": number, "value": trial.value, "stands": float(trial.stands)} | row(point)
-        for number, trial in enumerate(search.trials, 1)
-        for point in trial.path.points
+        for number, trial, point in points
     ]
-    return {name: np.array([cells[name] for cells in rows]) for name in CRITICAL}
+    case = points[0][-1].model.case if points else search.own
+    return {name: np.array([cells[name] for cells in rows]) for name in critical_columns(case)}
 
 
 def last_state(search: Search, point: Point) -> Results:

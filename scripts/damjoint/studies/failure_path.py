@@ -13,11 +13,12 @@ import numpy as np
 
 from ..joint.interface import Interface
 from ..model.case import Case
-from ..model.results import HISTORY
+from ..model.results import HISTORY, Columns, with_all_joints
 from ..solver.load_stepper import LoadStepper
 from ..solver.path import EquilibriumPath, Point
 
-#: Columns of critical.csv: a row per equilibrium of each dam that was tried.
+#: Columns of critical.csv: a row per equilibrium of each dam that was tried. With several joints:
+#: of the first one; see `critical_columns`.
 CRITICAL = {
     "trial": ("-", "number of the trial"),
     "value": ("", "varied quantity: level [m], strength factor or the parameter"),
@@ -39,9 +40,15 @@ FAILURES = 2
 TICK = 1e-3
 
 
+def critical_columns(case: Case) -> Columns:
+    """The columns of a case's critical.csv: unit and meaning."""
+    return with_all_joints(CRITICAL, case)
+
+
 def row(point: Point) -> dict[str, float]:
     """The row of critical.csv of a point, but for trial and value."""
-    return {name: value for name, value in point.last.items() if name in CRITICAL} | {
+    columns = critical_columns(point.model.case)
+    return {name: value for name, value in point.last.items() if name in columns} | {
         "displacement_control": float(point.control != "level"),
         "imposed_displacement": point.imposed,
         "compression": point.compression,
