@@ -10,7 +10,7 @@ from damjoint.model.results import column_of
 from damjoint.post import stored
 from damjoint.solver.load_stepper import LoadStepper
 from damjoint.statics import gravity
-from damjoint.statics.verdict import verdict
+from damjoint.statics.verdict import failed, statement, verdict
 from damjoint.studies.check import FINITE_ELEMENTS, GRAVITY, compare_joints
 from scipy.optimize import brentq
 from sections import resultants
@@ -94,6 +94,23 @@ def test_lowest_closed_form_of_friction_joints_fails_and_is_named(weakest):
     results = LoadStepper(case, interface_of(case)).run()
     assert verdict(results) == f"sliding on {name}"
     assert results.last["level"] == pytest.approx(exact[name], rel=1e-3)
+
+
+@pytest.mark.parametrize("hardening, fails", [((-1.0, 1e9), False), ((1e9, -1.0), True)])
+def test_a_joint_slides_on_a_hardening_that_is_not_set_for_it(tmp_path, hardening, fails):
+    """The lift at 25 m slips along its whole length, T > mu N; its own pena_tang decides."""
+    from damjoint import runner
+    from damjoint.studies.critical import Search
+
+    settings = COARSE | DRY_FRICTION | {"lift_heights": (25.0,), "mu": (2.0, 0.3)}
+    case = load("dam", settings | {"pena_tang": hardening}, [44.0])
+    (result,) = runner.run(case, tmp_path, False, False, False)
+    for results in (result, stored.read(tmp_path).result):
+        assert failed(results) == fails
+        assert ("numerical default" in statement(results)) == fails
+    # a critical value does not rely on it
+    used = tuple(max(value, 0.0) for value in hardening)
+    assert Search(case, "level").settings["pena_tang"] == used
 
 
 def test_strong_joints_tend_to_the_monolith():

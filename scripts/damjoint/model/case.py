@@ -91,6 +91,8 @@ class OfJoint:
     lower: str
     values: dict[str, Value]
     section: dict[str, list[float]] = field(compare=False, repr=False)
+    #: as in Case
+    hardening_asked: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -138,6 +140,7 @@ class Case(ParameterValues):
                 self,
                 values=self.values | own.values,
                 section=own.section,
+                hardening_asked=own.hardening_asked,
                 lift_heights=(),
                 of_joints=(),
             )
@@ -189,7 +192,8 @@ class Case(ParameterValues):
 
         Raises InputError if the case has lists of another length.
         """
-        known = self.of_joints or joints
+        same = [replace(joint, hardening_asked=self.hardening_asked) for joint in joints]
+        known = self.of_joints or same
         if len(known) != len(joints):
             raise InputError(
                 f"case {self.name}: lists of {len(known)} values: must have one for each joint of "
@@ -197,7 +201,7 @@ class Case(ParameterValues):
             )
         ends = [self.section | joint.section for joint in joints]
         of_joints = (
-            replace(joint, values=own.values, section=section)
+            replace(joint, values=own.values, section=section, hardening_asked=own.hardening_asked)
             for own, joint, section in zip(known, joints, ends, strict=True)
         )
         return replace(self, section=ends[0], of_joints=tuple(of_joints) if len(joints) > 1 else ())
@@ -543,6 +547,7 @@ def stacked_joints(
             lower=joint.lower,
             values={n: parsed[n][0] for n in declared() if parsed[n] != variables[n]},
             section={n: parsed[n] for n in SECTION},
+            hardening_asked=bool(parsed["hardening_asked"][0]),
         )
         for joint, parsed in zip(stacked(names), of_joints, strict=True)
     )

@@ -107,13 +107,12 @@ def case_of(info: dict[str, Any]) -> Case:
         for joint in info["joints"]
     ]
     parsed, *of_joints = parsed_by_joint(own or [values], listing("levels", levels), lifts)
-    joints = stacked_joints(parsed, of_joints)
-    if info["geometry"]:
-        ends = ("name", "upper", "lower", "section")
-        joints = tuple(
-            replace(joint, **{name: stored[name] for name in ends})
-            for joint, stored in zip(joints, info["joints"], strict=True)
-        )
+    # a section by parameters is computed again
+    ends = ("name", "upper", "lower", "section") if info["geometry"] else ()
+    joints = tuple(
+        replace(joint, **{name: stored[name] for name in ("hardening_asked", *ends)})
+        for joint, stored in zip(stacked_joints(parsed, of_joints), info["joints"], strict=True)
+    )
     return Case(
         name=info["case"],
         title=str(info["title"]).encode(errors="replace").decode(),

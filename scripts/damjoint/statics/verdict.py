@@ -42,8 +42,8 @@ def failed(results: Results) -> bool:
     if results.stopped or not results.last:
         return True
     slipped = slipped_joints(results)
-    laws = [results.case.joints[k].law for k in slipped]
-    hardening_set = all(law.hardening_parameter for law in laws) and results.case.hardening_asked
+    joints = [results.case.joints[k] for k in slipped]
+    hardening_set = all(j.law.hardening_parameter and j.hardening_asked for j in joints)
     return bool(slipped) and not hardening_set
 
 

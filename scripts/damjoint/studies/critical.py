@@ -107,7 +107,8 @@ class CriticalValue:
             mu, cohesion = search.partial["mu"], search.partial["adhesion"]
             lines.append(f"beyond the partial factors factor_mu = {mu:g}, factor_c = {cohesion:g}")
         laws = self.point.model.equilibrium.laws.laws if self.point else ()
-        if any(law.hardens for law in laws) and search.own.hardening_asked:
+        asked = any(joint.hardening_asked for joint in search.own.joints)
+        if any(law.hardens for law in laws) and asked:
             lines += filter(None, [statement(last_state(search, self.point))])
         if self.gravity is not None:
             values = {"gravity method": self.gravity} | self.gravity_with
@@ -142,9 +143,10 @@ class Search:
             **full,
         }
         own = own.with_values(full)
-        for joint in own.joints:
-            if joint.law.hardening_parameter and not own.hardening_asked:
-                self.settings[joint.law.hardening_parameter] = 0.0
+        defaults = [joint for joint in own.joints if not joint.hardening_asked]
+        for name in {joint.law.hardening_parameter for joint in defaults} - {""}:
+            as_set = [joint[name] if joint.hardening_asked else 0.0 for joint in own.joints]
+            self.settings[name] = of_each(as_set)
         self.own = own
         #: called with a message on the progress
         self.on_progress: Callable[[str], None] = lambda message: None
