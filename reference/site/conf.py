@@ -62,8 +62,8 @@ CONTENTS = {
         *("reference/python", "reference/notebooks/tour", "reference/notebooks/law"),
     ),
     "Reference": (
-        *("reference/theory", "reference/parameters", "reference/results", "reference/site/library"),
-        "reference/glossary",
+        *("reference/theory", "reference/parameters", "reference/results"),
+        *("reference/site/library", "reference/glossary"),
     ),
     "Verification": ("reference/ssnp142", "reference/trust", "reference/benchmarks"),
     "Project": ("CONTRIBUTING", "CHANGELOG"),

@@ -178,11 +178,15 @@ def window(project, tmp_path):
                 # a run deletes the file of the one before
                 return stamp(ended) not in (0, before[1])
 
-            picture = tmp_path / f"{name}.png"
+            picture, shown = tmp_path / f"{name}.png", None
 
             def drawn():
+                """The status is there, and the drawing does not change any more."""
+                nonlocal shown
                 call("import", "-window", "root", str(picture))
-                return max(pixels(imread(picture), colour) for colour in (GREEN, RED)) > 500
+                shown, last = imread(picture), shown
+                status = max(pixels(shown, colour) for colour in (GREEN, RED))
+                return status > 500 and np.array_equal(shown, last)
 
             wait(finished)
             wait(drawn)
