@@ -3,38 +3,77 @@
 // One conforming mesh: the joint is a line of ordinary elements; its two faces are two function
 // spaces on the same nodes (pro/spaces.pro). Element sizes grow with the distance from the joint.
 //
-// Takes     the section: pro/section.pro; parameters of the mesh
-// Provides  physical groups (in 3D by dam3d.geo): the two bodies, joint, heel, toe, crest, fixed
-//           boundary, faces SEGMENT + i, line forces mark_region(k)
-//           for dam3d.geo: surfaces dam(), foundation(), lower(), n_first, n_rest, side_names()
+// Takes     the section: pro/section.pro; parameters of the mesh; lift_drain_x(j - 1): distance of
+//           the drains from the heel of joint j > 0, 0 if it has none
+// Provides  physical groups (in 3D by dam3d.geo): the bodies, joints with their heels and toes,
+//           crest, fixed boundary, faces SEGMENT + i, line forces mark_region(k)
+//           for dam3d.geo: surfaces dam(j) above joint j, foundation(), lower(); side_names(); of
+//           joint j: numbers of elements all_first(j), beyond the drains all_rest(j) (0: no
+//           drains), place of the drains drain_point_x(j), drain_point_y(j)
 
 Include "../pro/parameters.pro";
 
 h_joint = joint_length / n_joint;
 regular = !StrCmp(mesh_pattern, "regular");
 
-Point(1) = {heel_x, heel_y, 0, h_joint};
-Point(2) = {toe_x, toe_y, 0, h_joint};
-n_first = n_joint;  // elements on the first curve of the joint, and on a second one
-n_rest = 0;
-If(drained)  // a node at the drains: two curves
-  n_first = Round(n_joint * drain_x / joint_length);
-  n_first = (n_first < n_joint) ? n_first : n_joint - 1;
-  n_first = (n_first < 1) ? 1 : n_first;
-  n_rest = (n_first < n_joint) ? n_joint - n_first : 1;
-  Point(100) = {drain_line_x, drain_line_y, 0, h_joint};
+If(!Exists(lift_drain_x))
+  lift_drain_x() = {};
+  For j In {1 : top}
+    lift_drain_x() += 0;
+  EndFor
 EndIf
-Line(1) = {1, drained ? 100 : 2};  // joint
-Transfinite Curve {1} = n_first + 1;
+all_first() = {};
+all_rest() = {};
+first_curve() = {};
+drain_point() = {};
+drain_point_x() = {};
+drain_point_y() = {};
+known_x() = {};
+known_y() = {};
+known_point() = {};
+For j In {0 : top}
+  dx = all_toe_x(j) - all_heel_x(j);
+  dy = all_toe_y(j) - all_heel_y(j);
+  length = Sqrt[dx^2 + dy^2];
+  number = all_elements(j);
+  drains_at = drained ? drain_x : 0;
+  If(j > 0)
+    drains_at = lift_drain_x(j - 1);
+  EndIf
+  heel = newp;
+  Point(heel) = {all_heel_x(j), all_heel_y(j), 0, h_joint};
+  toe = newp;
+  Point(toe) = {all_toe_x(j), all_toe_y(j), 0, h_joint};
+  n_first = number;
+  n_rest = 0;
+  drain_point_x() += all_heel_x(j) + dx * drains_at / length;
+  drain_point_y() += all_heel_y(j) + dy * drains_at / length;
+  middle = toe;
+  If(drains_at > 0)  // a node at the drains: two curves
+    n_first = Round(number * drains_at / length);
+    n_first = (n_first < number) ? n_first : number - 1;
+    n_first = (n_first < 1) ? 1 : n_first;
+    n_rest = (n_first < number) ? number - n_first : 1;
+    middle = (j == 0) ? 100 : newp;
+    Point(middle) = {drain_point_x(j), drain_point_y(j), 0, h_joint};
+  EndIf
+  all_first() += n_first;
+  all_rest() += n_rest;
+  drain_point() += middle;
+  line = newl;
+  Line(line) = {heel, middle};
+  Transfinite Curve {line} = n_first + 1;
+  first_curve() += line;
+  known_x() += {all_heel_x(j), all_toe_x(j)};
+  known_y() += {all_heel_y(j), all_toe_y(j)};
+  known_point() += {heel, toe};
+EndFor
 
 side_names() = Str["upstream face", "downstream face", "crest surface", "reservoir floor",
                    "tailwater bed"];
 
 // Segments of the faces, divided at the marks: the curves of segment i are pieces() from
 // piece_start(i) to piece_start(i + 1) - 1.
-known_x() = {heel_x, toe_x};
-known_y() = {heel_y, toe_y};
-known_point() = {1, 2};
 mark_point() = {};
 For k In {1 : #mark_x()}
   mark_point() += 0;
@@ -71,7 +110,7 @@ For i In {0 : #seg_side() - 1}
         point = newp;
         // linear to h_dam at the crest, and to h_found at the depth of the foundation
         h = (seg_side(i) >= FLOOR && (x < 0 || x > dam_base)) ? h_found :
-            (seg_body(i) == UPPER) ?
+            (seg_body(i) != UNDER) ?
             h_joint + (h_dam - h_joint) * (y - heel_y) / (dam_height - heel_y) :
             h_joint + (h_found - h_joint) * (heel_y - y) / (heel_y + found_depth);
         Point(point) = {x, y, 0, (h < h_joint && seg_side(i) < FLOOR) ? h_joint : h};
@@ -96,37 +135,65 @@ For i In {0 : #seg_side() - 1}
   piece_start() += #pieces();
 EndFor
 
-joint_line() = {1};
-joint_back() = {-1};
-If(drained)
-  Line(100) = {100, 2};
-  Transfinite Curve {100} = n_rest + 1;
-  joint_line() = {1, 100};
-  joint_back() = {-100, -1};
-EndIf
+// Curves of joint j: joint_curves() from joint_start(j) to joint_start(j + 1) - 1, heel to toe
+joint_curves() = {};
+joint_start() = {0};
+For j In {0 : top}
+  joint_curves() += first_curve(j);
+  If(all_rest(j) > 0)
+    line = (j == 0) ? 100 : newl;
+    Line(line) = {drain_point(j), known_point(2 * j + 1)};
+    Transfinite Curve {line} = all_rest(j) + 1;
+    joint_curves() += line;
+  EndIf
+  joint_start() += #joint_curves();
+EndFor
+joint_back() = {};  // the first joint, from toe to heel
+For k In {1 : joint_start(1)}
+  joint_back() += -joint_curves(joint_start(1) - k);
+EndFor
 
-// Upper body; lower body: the concrete below a lift joint, bonded to the foundation, and the
-// foundation
-upper() = {joint_line()};
+// Bodies above joint j: along it, downstream, back along joint j + 1, upstream
+dam() = {};
+For j In {0 : top}
+  around() = {};
+  For k In {joint_start(j) : joint_start(j + 1) - 1}
+    around() += joint_curves(k);
+  EndFor
+  below_next = (j < top);
+  For i In {0 : #seg_side() - 1}
+    If(seg_body(i) == UPPER + j)
+      If(below_next && seg_side(i) == UP)
+        below_next = 0;
+        For k In {1 : joint_start(j + 2) - joint_start(j + 1)}
+          around() += -joint_curves(joint_start(j + 2) - k);
+        EndFor
+      EndIf
+      For k In {piece_start(i) : piece_start(i + 1) - 1}
+        around() += pieces(k);
+      EndFor
+    EndIf
+  EndFor
+  body = (j == 0) ? 1 : 100 + j;
+  Curve Loop(body) = {around()};
+  Plane Surface(body) = {body};
+  dam() += body;
+EndFor
+// Lower body: the concrete below a lift joint, bonded to the foundation, and the foundation
 under() = {};
 surface_left() = {};  // surface of the rock, upstream
 surface_right() = {};  // and downstream
 For i In {0 : #seg_side() - 1}
   For k In {piece_start(i) : piece_start(i + 1) - 1}
-    If(seg_body(i) == UPPER)
-      upper() += pieces(k);
-    ElseIf(seg_side(i) == FLOOR)
+    If(seg_side(i) == FLOOR)
       surface_left() += pieces(k);
     ElseIf(seg_side(i) == BED)
       surface_right() += pieces(k);
-    Else
+    ElseIf(seg_body(i) == UNDER)
       under() += pieces(k);
     EndIf
   EndFor
 EndFor
-Curve Loop(1) = {upper()};
-Plane Surface(1) = {1};
-dam() = {1};
 lower() = {};
 base_back() = {joint_back()};
 base_points() = {1, 2};
@@ -202,7 +269,7 @@ Else
   Line(17) = {2, 10};
   Line(18) = {11, 12};
   Line(19) = {13, 14};
-  Transfinite Curve {3, 10} = n_first + n_rest + 1;
+  Transfinite Curve {3, 10} = all_first(0) + all_rest(0) + 1;
   Transfinite Curve {2, -4} = n_dam + 1 Using Progression 1.25 ^ (9 / n_dam);
   Transfinite Curve {16, 17, 18, 19} = n_depth + 1 Using Progression 1.5 ^ (7 / n_depth);
   Transfinite Curve {5, -9, -15, 11} = n_side + 1 Using Progression 1.5 ^ (5 / n_side);
@@ -232,14 +299,36 @@ Else
   surface_right() = {14, 15};
 EndIf
 
+// Between several joints: element sizes by the distance from the nearest one
+If(top > 0)
+  Field[1] = Distance;
+  Field[1].CurvesList = {joint_curves()};
+  Field[1].Sampling = 10 * n_joint;
+  Field[2] = MathEval;
+  Field[2].F = Sprintf("%.16g + %.16g * F1", h_joint, (h_dam - h_joint) / dam_height);
+  Background Field = 2;
+  Mesh.MeshSizeExtendFromBoundary = 0;
+  Mesh.MeshSizeFromPoints = 0;
+EndIf
+
 If(dim == 2)
-  Physical Surface("dam", DAM) = {dam()};
+  For j In {0 : top}
+    suffix = "";
+    If(j > 0)
+      suffix = Sprintf(" %g", j + 1);
+    EndIf
+    curves() = {};
+    For k In {joint_start(j) : joint_start(j + 1) - 1}
+      curves() += joint_curves(k);
+    EndFor
+    Physical Surface(StrCat("dam", suffix), DAM + j * LAYER) = {dam(j)};
+    Physical Curve(StrCat("joint", suffix), JOINT + j * LAYER) = {curves()};
+    Physical Point(StrCat("heel", suffix), HEEL + j * LAYER) = {known_point(2 * j)};
+    Physical Point(StrCat("toe", suffix), TOE + j * LAYER) = {known_point(2 * j + 1)};
+  EndFor
   Physical Surface("foundation", FOUNDATION) = {foundation()};
   Physical Surface("lower dam", LOWER) = {lower()};
-  Physical Curve("joint", JOINT) = {joint_line()};
   Physical Curve("fixed", FIXED) = {fixed()};
-  Physical Point("heel", HEEL) = {1};
-  Physical Point("toe", TOE) = {2};
   For k In {0 : #known_point() - 1}
     If(known_x(k) == batter && known_y(k) == dam_height)
       Physical Point("crest", CREST) = {known_point(k)};

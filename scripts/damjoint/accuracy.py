@@ -226,7 +226,7 @@ def refine_mesh(case: Case, factor: float = 2) -> Case:
         "n_layers": case["n_layers"] * (1 if has_plane_fields(case) else factor),
         **{name: case[name] / factor**0.5 for name in ("h_dam", "h_found")},
     }
-    return replace(case, values=case.values | refined)
+    return case.with_values(refined)
 
 
 def estimate_errors(

@@ -20,5 +20,9 @@ Table: TypeAlias = dict[str, Array]
 
 #: The value of a parameter: a number, or one of its choices.
 Value: TypeAlias = float | str
+#: What a parameter is set to: a value, or one for each joint.
+Setting: TypeAlias = Value | tuple[Value, ...]
+#: Settings by the names of pro/parameters.pro.
+Settings: TypeAlias = Mapping[str, Setting]
 #: Values by the names of pro/parameters.pro.
 Values: TypeAlias = Mapping[str, Value]

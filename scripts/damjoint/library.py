@@ -364,12 +364,14 @@ def check(cases: Sequence[Case | str | Path]) -> list[SafetyCheck]:
         InputError: bad input, or a case for which there is no gravity method.
         RunError: a case could not be computed.
     """
-    from .studies.check import check_has_section, compare_methods
+    from .studies.check import check_has_section, compare_joints
 
     combinations = [as_case(combination) for combination in cases]
     for combination in combinations:
         check_has_section(combination)
-    return [compare_methods(run(combination).results) for combination in combinations]
+    return [
+        check for combination in combinations for check in compare_joints(run(combination).results)
+    ]
 
 
 @dataclass(frozen=True, repr=False)

@@ -12,7 +12,10 @@ from damjoint.post.field_files import write_vtu
 from damjoint.post.tables import write_csv
 from numpy.testing import assert_allclose
 
-JOINT = "time,level,x,y,z,delta_n,delta_t1,delta_t2,sigma_n,tau_1,tau_2,p,damage,slip,s,sigma_n_eff"
+JOINT = (
+    "time,level,joint,x,y,z,delta_n,delta_t1,delta_t2,sigma_n,tau_1,tau_2,p,damage,slip,s,"
+    "sigma_n_eff"
+)
 HISTORY = (
     "time,level,load_factor,iterations,cuts,residual,crack_length,process_zone,slip_length,max_opening,"
     "crest_ux,N,T,M,flux,tail_level,U,x_resultant"

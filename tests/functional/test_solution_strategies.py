@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from damjoint.engines.getdp import process
-from damjoint.laws import Mode
 from damjoint.laws.friction import FrictionVariables
 from damjoint.model.case import load
 from damjoint.model.mesh import mesh_of
@@ -60,7 +59,7 @@ def test_the_line_of_the_shear_release_is_the_law_within_it_and_extended_outside
     law = load("ssnp142", {"sigma_max": 0}).law
     variables = law.initial(3)
     jump = np.array([[0.25, 1e6, 0], [-3.0, 1e6, 0], [5.0, 1e6, 0]]) * law.L_CT
-    line, tangent = law.evaluate(jump, variables, Mode(releasing=np.ones(3, bool)))
+    line, tangent = law.evaluate(jump, variables, np.ones(3, bool))
     np.testing.assert_allclose(line[:, 1], law.K_T * np.array([0.75, 4, -4]) * 1e6 * law.L_CT)
     np.testing.assert_allclose(tangent[:, 1, 0], -law.K_T * 1e6)
     assert law.release_side(jump, variables).tolist() == [0, -1, 1]
@@ -71,7 +70,7 @@ def test_if_the_first_step_fails_the_weight_is_applied_first(solve):
     """The weight alone gives no row; its cut of the step is counted."""
     stiff = {"E": 1.79e10, "K_N": 6.73e14, "K_T": 1.47e14, "law": "friction", "uplift": "flow"}
     shape = {"dam_height": 132, "dam_base": 92, "dam_crest": 19.9, "nu": 0.136, "n_joint": 30}
-    joint = {"mu": 0.957, "adhesion": 26300, "aperture_min": 1.27e-8}
+    joint = {"mu": 0.8, "adhesion": 26300, "aperture_min": 1.27e-8}
     few = {"quadrature": "published"}  # with more points the first step converges at once
     (result,) = solve("dam", "35,41", **shape, **stiff, **joint, **few)
     assert verdict(result) == "stands"

@@ -9,8 +9,15 @@ from damjoint.model import casefile, parameters
 from damjoint.model.case import CASES, load
 from damjoint.post import validation
 
+#: With a list of texts, one for each joint, which Gmsh writes in another way.
+TEXTS_BY_JOINT = {"monoliths"}
 
-@pytest.mark.parametrize("path", sorted(CASES.rglob("*.case")), ids=lambda path: path.stem)
+
+@pytest.mark.parametrize(
+    "path",
+    [path for path in sorted(CASES.rglob("*.case")) if path.stem not in TEXTS_BY_JOINT],
+    ids=lambda path: path.stem,
+)
 def test_damjoint_and_gmsh_read_a_case_alike(path):
     """The cases can be opened in Gmsh and GetDP."""
     ours = casefile.read(path)
@@ -21,7 +28,8 @@ def test_damjoint_and_gmsh_read_a_case_alike(path):
     numbers = {n: gmsh.parser.getNumber(n).tolist() for n in names}
     texts = {n: list(gmsh.parser.getString(n)) for n in names if not numbers[n]}
     expected = {f"default_{n}": [v] for n, v in ours.defaults.items() if isinstance(v, float)}
-    assert {n: v for n, v in numbers.items() if v} == expected | ours.lists
+    expected |= ours.lists | {n: list(values) for n, values in ours.of_joints.items()}
+    assert {n: v for n, v in numbers.items() if v} == expected
     expected = {f"default_{n}": [v] for n, v in ours.defaults.items() if isinstance(v, str)}
     if "geometry" in texts:  # damjoint: relative to the case file
         texts["geometry"] = [str(path.parent / texts["geometry"][0])]

@@ -12,7 +12,7 @@ from ..arrays import Array, IntArray, Sparse
 from ..model.case import Case
 from ..model.loads import COMPLETE, across, thermal_strains, wet
 from ..model.mesh import LINES, Body, Mesh, mesh_of
-from ..model.scene import SOLIDS
+from ..model.scene import MATERIALS
 from .elasticity import (
     Distribution,
     Material,
@@ -24,8 +24,10 @@ from .elasticity import (
 from .elements import WATER, Space, points_of
 
 #: Parameters that the bodies depend on besides those of the mesh.
-MATERIALS = dict.fromkeys(name for solid in SOLIDS.values() for name in solid.materials.values())
-PARAMETERS = ("order", "hold_z", *(f"{p}_{name}" for p in ("E", "nu") for name in MATERIALS))
+PARAMETERS = (
+    *("order", "hold_z"),
+    *(f"{p}_{name}" for p in ("E", "nu") for name in dict.fromkeys(MATERIALS.values())),
+)
 
 #: Weights that act, region and component: concrete also along x (earthquake).
 WEIGHTS = (("dam", 0), ("dam", 1), ("lower", 0), ("lower", 1), ("foundation", 1))
@@ -33,11 +35,7 @@ WEIGHTS = (("dam", 0), ("dam", 1), ("lower", 0), ("lower", 1), ("foundation", 1)
 
 def material_of(case: Case) -> Material:
     """Elastic constants by region."""
-    return {
-        region: (case[f"E_{name}"], case[f"nu_{name}"])
-        for solid in SOLIDS.values()
-        for region, name in solid.materials.items()
-    }
+    return {region: (case[f"E_{name}"], case[f"nu_{name}"]) for region, name in MATERIALS.items()}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,16 +50,16 @@ class ElasticBody:
     unit_loads: dict[str, Array]
     #: thermal strains of those of unit_loads at the middle of each element (elements,)
     unit_strains: dict[str, Array]
-    #: degrees of freedom: zero; on the joint, in its order; of each wet face, in its order
+    #: degrees of freedom: zero; on each of its joints, by number, in the joint's order; of each wet
+    #: face, in its order
     fixed_dofs: IntArray
-    joint_dofs: IntArray
+    joint_dofs: dict[int, IntArray]
     face_dofs: dict[str, IntArray]
 
     @staticmethod
     def of(case: Case, mesh: Mesh, name: str) -> ElasticBody:
         """Number the degrees of freedom of a body and assemble it."""
         dim, order = mesh.dim, int(case["order"])
-        (joint,) = mesh.joints.values()
         body = mesh.solids[name]
         space = Space(body, order)
 
@@ -81,7 +79,11 @@ class ElasticBody:
             unit_loads=dict(unit_loads(space, mesh, name)) | thermal,
             unit_strains={n: at_middles(space, *strain) for n, strain in strains.items()},
             fixed_dofs=np.unique(np.concatenate(fixed)),
-            joint_dofs=dofs(joint.surface),
+            joint_dofs={
+                number: dofs(joint.surface)
+                for number, joint in enumerate(mesh.joints)
+                if name in (joint.upper, joint.lower)
+            },
             face_dofs={
                 n: dofs(face.surface)
                 for n, face in mesh.faces.items()

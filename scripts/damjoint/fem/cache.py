@@ -29,6 +29,7 @@ from ..model.mesh import Body, Face, JointMesh, Mesh, mesh_of, shares
 from ..storage import cache_folder
 from .bodies import PARAMETERS, Bodies
 from .condensation import Condensed, CondensedJoint, condense
+from .gluing import JointDofs
 from .memory import check_size
 
 #: Size up to which the cache may grow [bytes]; the files longest unused are deleted first.
@@ -60,8 +61,10 @@ def fingerprint(mesh: Mesh) -> str:
 @lru_cache(maxsize=1)
 def sources() -> str:
     """Hash of the files that condensed bodies of a case are computed by: meshes and elements."""
-    code = sorted(Path(__file__).parent.glob("*.py"))
-    texts = [path.read_bytes() for path in (*sorted(data("geo").glob("*.geo")), *code)]
+    package = Path(__file__).parents[1]
+    code = package / "model" / "mesh.py", *sorted((package / "fem").glob("*.py"))
+    shapes = data("pro") / "section.pro", *sorted(data("geo").glob("*.geo"))
+    texts = [path.read_bytes() for path in (*shapes, *code)]
     return hashlib.sha256(b"".join(texts)).hexdigest()
 
 
@@ -129,7 +132,9 @@ def write(condensed: Condensed, header: str, path: Path) -> None:
 
 
 #: The dataclasses of which condensed bodies are made.
-CLASSES = {cls.__name__: cls for cls in (Condensed, CondensedJoint, JointMesh, Face, Body)}
+CLASSES = {
+    cls.__name__: cls for cls in (Condensed, CondensedJoint, JointDofs, JointMesh, Face, Body)
+}
 
 
 def pack(value: Any, path: str, arrays: dict[str, Array]) -> object:

@@ -1,18 +1,21 @@
-"""Static condensation of both bodies onto the joint.
+"""Static condensation of all bodies onto the joints.
 
 The bodies are linear elastic and do not change with the level, the law or the water. With their
-unknowns away from the joint eliminated (Schur complements), the upper body (floating, S_u) and the
-lower body (S_l) are coupled by the joint alone:
+unknowns away from the joints eliminated (Schur complements S_b), the bodies b are coupled by the
+joints alone. Glued at the joints they are a single elastic body, which the rock holds, with a
+displacement v there; the jumps d of the joints part them (see gluing.py):
 
-    S_u u_u + t = f_u,    S_l u_l - t = f_l,    delta = u_u - u_l
+    u_b = R_b v + J_b d,    S_b u_b + (joint forces) = f_b
 
-(t: nodal forces of the joint's total traction on its upper face). Eliminating u_u and u_l too
-leaves the displacement jump:
+With v eliminated, too, the joints' nodal forces t, which work on the jumps, are
 
-    t = t_0 - S delta,    M = S_u + S_l,    S = S_u - S_u M^-1 S_u,
-    t_0 = f_u - S_u M^-1 (f_u + f_l).
+    t = t_0 - S d,    K = sum R_b^T S_b R_b,    C = sum R_b^T S_b J_b,
+    S = sum J_b^T S_b J_b - C^T K^-1 C,    t_0 = sum J_b^T f_b - C^T K^-1 sum R_b^T f_b.
 
-S is symmetric; the rigid motions of the upper body are its null space. GetDP is not used for the
+S is symmetric; the motions of the bodies that the joints alone hold are its null space. With a
+single joint, v is the displacement of its lower face, K = S_u + S_l and C = S_u.
+
+GetDP is not used for the
 bodies: its start alone takes as long as all steps of a 2D scene, and an independent assembly checks
 the problem definition (tests compare both).
 """
@@ -31,6 +34,7 @@ from ..model.mesh import Face, JointMesh
 from . import factor
 from .bodies import Bodies, ElasticBody
 from .elements import Space
+from .gluing import BodyDofs, Gluing, JointDofs
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,8 +42,7 @@ class CondensedJoint:
     """A joint of condensed bodies."""
 
     mesh: JointMesh
-    #: jump unknowns, dim * function + component, that are not fixed
-    free: IntArray
+    dofs: JointDofs
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,7 +58,7 @@ class Condensed:
     counts: dict[str, int]
     #: number of free degrees of freedom of all bodies
     unknowns: int
-    joints: dict[str, CondensedJoint]
+    joints: list[CondensedJoint]
     #: the wet faces
     faces: dict[str, Face]
     #: S (j, j), see above
@@ -141,45 +144,66 @@ def loaded_dofs(bodies: Bodies, body: ElasticBody) -> IntArray:
     return np.concatenate(dofs)
 
 
-class FaceElimination:
-    """Displacements of both joint faces eliminated."""
+class JointElimination:
+    """Displacements of the glued bodies on the joints eliminated."""
 
-    def __init__(self, upper: Array, lower: Array) -> None:
-        """upper, lower: S_u and S_l (j, j)."""
-        #: L of M = L L^T, and L^-1 S_u
-        self.factor = linalg.cholesky(lower + upper, lower=True, overwrite_a=True)
-        self.half = linalg.solve_triangular(self.factor, upper, lower=True)
+    def __init__(self, gluing: Gluing, reduced: dict[str, ReducedBody]) -> None:
+        self.gluing = gluing
+        glued = np.zeros((gluing.nodes, gluing.nodes))
+        coupling = np.zeros((gluing.unknowns, gluing.nodes))
+        by_jumps = np.zeros((gluing.unknowns, gluing.unknowns))
+        for name, own in gluing.bodies.items():
+            stiffness, jumps = reduced[name].stiffness, own.jumps
+            glued[np.ix_(own.node, own.node)] += stiffness
+            if jumps.nnz:
+                carried = stiffness @ jumps
+                coupling[:, own.node] += carried.T
+                by_jumps += jumps.T @ carried
+        #: C^T
+        self.coupling = coupling
+        #: L of K = L L^T, and L^-1 C
+        self.factor = linalg.cholesky(glued, lower=True, overwrite_a=True)
+        self.half = linalg.solve_triangular(self.factor, coupling.T, lower=True)
         #: S
-        self.stiffness = upper - self.half.T @ self.half
+        self.stiffness = by_jumps - self.half.T @ self.half
 
-    def transmitted(self, forces: Array, on_upper: bool) -> Array:
-        """t_0 of forces (j, k) on the upper or the lower joint face."""
-        through = self.half.T @ linalg.solve_triangular(self.factor, forces, lower=True)
-        return (forces if on_upper else 0) - through
+    def on_nodes(self, own: BodyDofs, forces: Array) -> Array:
+        """Forces (n, ...) on the degrees of freedom of a body as forces on the glued ones."""
+        total = np.zeros((self.gluing.nodes, *forces.shape[1:]))
+        total[own.node] = forces
+        return total
+
+    def transmitted(self, own: BodyDofs, forces: Array) -> Array:
+        """t_0 of forces (n, k) on the degrees of freedom of a body."""
+        nodes = self.on_nodes(own, forces)
+        through = self.half.T @ linalg.solve_triangular(self.factor, nodes, lower=True)
+        return own.jumps.T @ forces - through
 
 
 def condense(case: Case, bodies: Bodies) -> Condensed:
     """Eliminate the bodies of a case."""
     start, mesh = time.perf_counter(), bodies.mesh
-    ((joint_name, joint),) = mesh.joints.items()
-    upper = bodies.by_name[joint.upper]
-    is_free = ~np.isin(upper.joint_dofs, upper.fixed_dofs)
-    crest = upper.space.find(Space(mesh.bodies["crest"], 1))[:1] * mesh.dim
+    gluing = Gluing.of(bodies)
+    crest_body = mesh.bearer("crest")
+    space = bodies.by_name[crest_body].space
+    crest = space.find(Space(mesh.bodies["crest"], 1))[:1] * mesh.dim
     loaded = {name: loaded_dofs(bodies, body) for name, body in bodies.by_name.items()}
-    loaded[joint.upper] = np.append(loaded[joint.upper], crest)
+    loaded[crest_body] = np.append(loaded[crest_body], crest)
     reduced = {
-        name: ReducedBody.of(body, body.joint_dofs[is_free], loaded[name])
+        name: ReducedBody.of(body, gluing.bodies[name].dofs, loaded[name])
         for name, body in bodies.by_name.items()
     }
-    above = reduced[joint.upper]
-    faces = FaceElimination(above.stiffness, reduced[joint.lower].stiffness)
+    joints = JointElimination(gluing, reduced)
 
-    # The crest: row (forces - coupling^T u_u), with u_u = delta + M^-1 (f_u + f_l - S_u delta)
+    # The crest of body c: row (forces - coupling^T u_c), unless it is on a joint itself;
+    # u_c = R_c v + J_c d with v = K^-1 (sum R_b^T f_b - C d)
+    above, own_dofs = reduced[crest_body], gluing.bodies[crest_body]
     size = len(above.loaded_stiffness)
     at_crest = 1.0 * (above.dofs[:size] == crest[0])
     row = linalg.solve(above.loaded_stiffness, at_crest, assume_a="pos")
-    crest_face = -(above.coupling @ row)
-    crest_both = linalg.cho_solve((faces.factor, True), crest_face)
+    crest_face = 1.0 * (own_dofs.dofs == crest[0]) - above.coupling @ row
+    crest_nodes = joints.on_nodes(own_dofs, crest_face)
+    crest_both = linalg.cho_solve((joints.factor, True), crest_nodes)
 
     pressure: list[Array] = []
     crest_pressure: list[Array] = []
@@ -188,32 +212,39 @@ def condense(case: Case, bodies: Bodies) -> Condensed:
     dof_of_face: dict[str, IntArray] = {}
     count = 0
     for name, body in bodies.by_name.items():
-        own, on_upper = reduced[name], name == joint.upper
-        pressure.append(faces.transmitted(own.forces, on_upper))
-        direct = np.pad(row, (0, len(own.dofs) - size)) if on_upper else 0
-        crest_pressure.append(direct + crest_both @ own.forces)
+        own, dofs_of = reduced[name], gluing.bodies[name]
+        bears_crest = name == crest_body
+        pressure.append(joints.transmitted(dofs_of, own.forces))
+        direct = np.pad(row, (0, len(own.dofs) - size)) if bears_crest else 0
+        crest_pressure.append(direct + crest_both[dofs_of.node] @ own.forces)
         column = np.full(body.stiffness.shape[0], -1)
         column[own.dofs] = count + np.arange(len(own.dofs))
         count += len(own.dofs)
         dof_of_face |= {n: column[dofs] for n, dofs in body.face_dofs.items()}
-        by_load = faces.transmitted(own.units, on_upper)
-        moved = (row @ own.loaded_units if on_upper else 0) + crest_both @ own.units
-        units |= {n: by_load[:, i] for i, n in enumerate(body.unit_loads)}
-        crest_units |= {n: float(moved[i]) for i, n in enumerate(body.unit_loads)}
+        by_load = joints.transmitted(dofs_of, own.units)
+        moved = (row @ own.loaded_units if bears_crest else 0) + (
+            crest_both[dofs_of.node] @ own.units
+        )
+        for i, load in enumerate(body.unit_loads):
+            units[load] = units.get(load, 0) + by_load[:, i]
+            crest_units[load] = crest_units.get(load, 0) + float(moved[i])
 
     return Condensed(
         dim=mesh.dim,
         order=int(case["order"]),
-        width=joint.width,
+        width=mesh.joints[0].width,
         counts=mesh.counts,
         unknowns=sum(b.stiffness.shape[0] - len(b.fixed_dofs) for b in bodies.by_name.values()),
-        joints={joint_name: CondensedJoint(mesh=joint, free=np.flatnonzero(is_free))},
+        joints=[
+            CondensedJoint(mesh=joint, dofs=dofs)
+            for joint, dofs in zip(mesh.joints, gluing.joints, strict=True)
+        ],
         faces={name: face for name, face in mesh.faces.items() if name in dof_of_face},
-        stiffness=faces.stiffness,
+        stiffness=joints.stiffness,
         units=units,
         pressure=np.hstack(pressure),
         dof_of_face=dof_of_face,
-        crest_jump=crest_face - above.stiffness @ crest_both,
+        crest_jump=own_dofs.jumps.T @ crest_face - joints.coupling @ crest_both,
         crest_units=crest_units,
         crest_pressure=np.concatenate(crest_pressure),
         factorisation=factor.name(),

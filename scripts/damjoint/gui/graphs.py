@@ -292,8 +292,8 @@ def show_graphs(graphs: Graphs, scene: SolvedScene, before: Sequence[SolvedScene
 def graphs_along_joint(scene: SolvedScene, before: Sequence[SolvedScene]) -> list[Graph]:
     """Opening, stresses, slip and pressure along the joint (means over z in 3D)."""
     shown = []
-    rows = [along(scene.result.at(time)) for time in scene.times]
-    earlier = [along(other.result.at()) for other in before]
+    rows = [along(scene.own.at(time)) for time in scene.times]
+    earlier = [along(other.own.at()) for other in before]
     wet = scene.result.case["uplift"] != "none"
     for title, units, parts in ALONG_JOINT:
         curves = [
@@ -319,7 +319,7 @@ def graphs_of_history(scene: SolvedScene, before: Sequence[SolvedScene]) -> list
     for title, column, units, color in quantities:
         curves = []
         for other in (scene, *before):
-            history = other.result.history
+            history = other.own.history
             x = history[column]
             if column == "max_opening":  # below 0 in a closed joint
                 x = other.result.heel if driven else np.maximum(x, 0.0)

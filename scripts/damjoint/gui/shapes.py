@@ -12,12 +12,22 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import ROUND_OFF
+from ..arrays import Table
 from ..model.case import Case
-from ..model.fields import BODIES, OPEN, SLIPPED, SOFTENING, distance, nearest_rows, state_of
+from ..model.fields import (
+    OPEN,
+    SLIPPED,
+    SOFTENING,
+    distance,
+    joint_body,
+    nearest_rows,
+    state_of,
+)
 from ..model.loads import Loading, line_forces
 from ..model.mesh import Body
+from ..model.results import Results
 from ..model.scene import BED, DOWN, FLOOR, SIDES, TOP, UP
-from ..post.outline import exaggeration, section_of, skin
+from ..post.outline import exaggeration, joint_lines, section_of, skin
 from ..post.units import FORCES, with_unit
 from .camera import Camera, result_camera, undeformed_camera
 from .worker import SolvedScene
@@ -205,6 +215,26 @@ def undeformed_loads(case: Case) -> tuple[dict[str, Pieces], list[Label]]:
     return {n: fixed(corners) for n, corners in loads.items() if has_extent(corners)}, labels
 
 
+#: Bodies above and below a single joint.
+BODIES = "dam", "foundation"
+
+
+@dataclass(frozen=True)
+class NearSide:
+    """The nodes of a joint on the side towards the viewer, from heel to toe (n,): their tags and
+    rows; names of the bodies above and below, rows of the joint by step.
+    """
+
+    bodies: tuple[str, str]
+    tags: np.ndarray
+    row: np.ndarray
+    rows: list[Table]
+
+    def along(self, values: Callable[[Table], np.ndarray]) -> np.ndarray:
+        """Evaluate a function of the joint's rows on the near side, (steps, n)."""
+        return np.array([values(rows)[self.row] for rows in self.rows])
+
+
 @dataclass
 class Deformed:
     """A scene with its displacement times `scale`; it has reached a requested time."""
@@ -217,52 +247,58 @@ class Deformed:
         #: displacement (steps, nodes, 3) by body [m]
         self.moved = {
             name: np.array([fields[time].displacement[name] for time in self.times])
-            for name in BODIES
+            for name in fields[self.times[0]].displacement
         }
         self.scale = exaggeration(self.moved, case.size)
         self.camera: Camera = result_camera(case, self.scene.bodies)
-        self.skins = {name: skin(self.scene.bodies[name]) for name in BODIES}
+        self.skins = {name: skin(self.scene.bodies[name]) for name in self.moved}
         self.depth = self.scene.bodies["dam"].points[:, 2].max()
-        self.rows = [self.scene.result.at(time) for time in self.times]
+        joints = self.scene.result.joints
+        self.joints = [self.near_side(k, own) for k, own in enumerate(joints)]
         states = [self.scene.result.state(time) for time in self.times]
         self.loadings = [
             Loading.at(case, time, state["level"], state["tail_level"])
             for time, state in zip(self.times, states, strict=True)
         ]
-        # nodes of the joint on the side towards the viewer, from heel to toe, and their rows
-        joint, s = self.scene.bodies["joint"], distance(self.rows[0])
-        near = joint.points[:, 2] > joint.points[:, 2].max() - ROUND_OFF * s.max()
-        row = nearest_rows(joint.points[near], self.rows[0])
-        order = np.argsort(s[row])
-        every = max(1, len(order) // JOINT_POINTS)
-        order = order[np.unique([*range(0, len(order), every), len(order) - 1])]
-        self.near_tags, self.near_rows = joint.node_tags[near][order], row[order]
-        ends = np.column_stack([self.rows[0][axis] for axis in "xy"])[[s.argmin(), s.argmax()]]
+        lines = joint_lines(case, [joint.rows[0] for joint in self.joints])
         #: sections, undeformed and by step; None if one section does not represent the geometry
         self.undeformed, *self.sections = (
-            section_of(self.scene.bodies, fields[time].displacement, scale, ends)
+            section_of(self.scene.bodies, fields[time].displacement, scale, lines)
             if is_extruded(case)
             else None
             for time, scale in [(self.times[0], 0.0), *((t, self.scale) for t in self.times)]
         )
 
+    def near_side(self, number: int, result: Results) -> NearSide:
+        """The near side of a joint, by its number; result: of that joint alone."""
+        joint, rows = joint_body(self.scene.bodies, number), [result.at(t) for t in self.times]
+        s = distance(rows[0])
+        near = joint.points[:, 2] > joint.points[:, 2].max() - ROUND_OFF * s.max()
+        row = nearest_rows(joint.points[near], rows[0])
+        order = np.argsort(s[row])
+        every = max(1, len(order) // JOINT_POINTS)
+        order = order[np.unique([*range(0, len(order), every), len(order) - 1])]
+        of_joints = self.scene.result.case.of_joints
+        names = (of_joints[number].upper, of_joints[number].lower) if of_joints else BODIES
+        return NearSide(names, joint.node_tags[near][order], row[order], rows)
+
     def bodies(self) -> list[Pieces]:
         """Faces of dam and foundation with their displacement [m]."""
         return [
             Pieces(self.scene.bodies[name].points[faces], self.moved[name][:, faces])
-            for name in BODIES
+            for name in self.moved
             for faces, _ in self.skins[name]
         ]
 
     def vertical_stress(self) -> list[np.ndarray]:
         """Vertical stress of the elements of each body (steps, elements) [Pa]."""
         fields = [self.scene.fields[time] for time in self.times]
-        return [np.array([field.stress[name][:, 1] for field in fields]) for name in BODIES]
+        return [np.array([field.stress[name][:, 1] for field in fields]) for name in self.moved]
 
     def stress(self) -> list[Pieces]:
         """Undeformed faces of dam and foundation with the vertical stress of the elements [Pa]."""
         pieces = []
-        for name, vertical in zip(BODIES, self.vertical_stress(), strict=True):
+        for name, vertical in zip(self.moved, self.vertical_stress(), strict=True):
             for faces, owners in self.skins[name]:
                 values = np.repeat(vertical[:, owners, None, None], faces.shape[1], axis=2)
                 pieces.append(Pieces(self.scene.bodies[name].points[faces], values))
@@ -271,44 +307,46 @@ class Deformed:
     def outline(self) -> Pieces:
         """Edges of dam and foundation."""
         points, values = [], []
-        for name in BODIES:
+        for name in self.moved:
             body = self.scene.bodies[name]
             edges = sharp_edges(body, [faces for faces, _ in self.skins[name]])
             points.append(body.points[edges])
             values.append(self.moved[name][:, edges])
         return Pieces(np.concatenate(points), np.concatenate(values, axis=1))
 
-    def joint_face(self, name: str) -> tuple[np.ndarray, np.ndarray]:
-        """A body's face of the joint on the near side: points (n, 3) from heel to toe, and their
+    def joint_face(self, name: str, joint: NearSide) -> tuple[np.ndarray, np.ndarray]:
+        """A body's face of a joint on the near side: points (n, 3) from heel to toe, and their
         displacement (steps, n, 3).
         """
         body = self.scene.bodies[name]
-        index = np.searchsorted(body.node_tags, self.near_tags)
+        index = np.searchsorted(body.node_tags, joint.tags)
         return body.points[index], self.moved[name][:, index]
 
-    def along_joint(self, values: Callable[[dict[str, np.ndarray]], np.ndarray]) -> np.ndarray:
-        """Evaluate a function of the joint's rows on the near side, (steps, n)."""
-        return np.array([values(rows)[self.near_rows] for rows in self.rows])
+    def occurring(self) -> np.ndarray:
+        """The states of the joints on the near side."""
+        return np.unique(np.concatenate([np.ravel(joint.along(state_of)) for joint in self.joints]))
 
     def marks(self) -> dict[int, Pieces]:
-        """Both faces of the joint, by state: open or broken, softening, slipped.
+        """Both faces of each joint, by state: open or broken, softening, slipped.
 
         A segment that is not in that state at a step collapses to a point.
         """
-        state = self.along_joint(state_of)
-        both_ends = np.minimum(state[:, :-1], state[:, 1:])
-        ends, moved = [], []
-        for name in BODIES:
-            points, displacement = self.joint_face(name)
-            ends.append(np.stack([points[:-1], points[1:]], axis=1))
-            moved.append(np.stack([displacement[:, :-1], displacement[:, 1:]], axis=2))
+        ends, moved, of_segments = [], [], []
+        for joint in self.joints:
+            state = joint.along(state_of)
+            for name in joint.bodies:
+                points, displacement = self.joint_face(name, joint)
+                ends.append(np.stack([points[:-1], points[1:]], axis=1))
+                moved.append(np.stack([displacement[:, :-1], displacement[:, 1:]], axis=2))
+                of_segments.append(np.minimum(state[:, :-1], state[:, 1:]))
+        segment_states = np.concatenate(of_segments, axis=1)
         segments, values = np.concatenate(ends), np.concatenate(moved, axis=1)
         collapse = (
             values[:, :, 0] - values[:, :, 1] + (segments[:, 0] - segments[:, 1]) / self.scale
         )
         marks = {}
         for number in (OPEN, SOFTENING, SLIPPED):
-            shown, in_state = values.copy(), np.tile(both_ends == number, len(BODIES))
+            shown, in_state = values.copy(), segment_states == number
             shown[:, :, 1] += np.where(in_state[:, :, None], 0.0, collapse)
             marks[number] = Pieces(segments, shown)
         return marks
@@ -319,7 +357,7 @@ class Deformed:
         loads = {
             "water": self.water(),
             "silt": self.silt(),
-            "water in the crack": self.crack(),
+            "water in the crack": np.concatenate([self.crack(j) for j in self.joints], axis=1),
             "forces": np.concatenate([np.zeros((len(self.times), 0, 2, 3)), *arrows], axis=1),
         }
         return {
@@ -371,10 +409,12 @@ class Deformed:
         return labels
 
     def resultant(self) -> Pieces:
-        """Resultant of the joint's forces without the water in it, and the joint's middle third."""
-        length = self.scene.result.case.joint_length
-        face, displacement = self.joint_face("foundation")
-        s = self.along_joint(distance)[0]
+        """Resultant of the decisive joint's forces without the water in it, and the joint's middle
+        third.
+        """
+        length, joint = self.scene.own.case.joint_length, self.joints[self.scene.joint]
+        face, displacement = self.joint_face(joint.bodies[1], joint)
+        s = joint.along(distance)[0]
         steps = []
         for moved, numbers in zip(
             face + self.scale * displacement, self.scene.numbers, strict=True
@@ -396,7 +436,7 @@ class Deformed:
         """Displaced points of application of a line force on the near side, (steps, 3)."""
         line = self.scene.bodies[name]
         tag = line.node_tags[line.points[:, 2].argmax()]
-        owner = next(n for n in BODIES if tag in self.scene.bodies[n].node_tags)
+        owner = next(n for n in self.moved if tag in self.scene.bodies[n].node_tags)
         index = np.searchsorted(self.scene.bodies[owner].node_tags, tag)
         return self.scene.bodies[owner].points[index] + self.scale * self.moved[owner][:, index]
 
@@ -419,11 +459,12 @@ class Deformed:
             steps.append(fluid_above(edges, level if level > ground else -np.inf))
         return in_space(np.array(steps), self.depth)
 
-    def crack(self) -> np.ndarray:
+    def crack(self, joint: NearSide) -> np.ndarray:
         """Quadrangles of the water under pressure between the faces of an open joint."""
-        lower, lower_displacement = self.joint_face("foundation")
-        upper, upper_displacement = self.joint_face("dam")
-        wet = self.along_joint(lambda rows: (state_of(rows) == OPEN) & (rows["p"] > 0))
+        above, below = joint.bodies
+        lower, lower_displacement = self.joint_face(below, joint)
+        upper, upper_displacement = self.joint_face(above, joint)
+        wet = joint.along(lambda rows: (state_of(rows) == OPEN) & (rows["p"] > 0))
         wet = (wet[:, :-1] & wet[:, 1:])[..., None, None]
         low = lower + self.scale * lower_displacement
         high = upper + self.scale * upper_displacement

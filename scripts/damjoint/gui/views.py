@@ -14,7 +14,16 @@ import gmsh
 import numpy as np
 
 from ..model.case import Case
-from ..model.fields import CLOSED, OPEN, SLIPPED, SOFTENING, distance, row_of_nodes, state_of
+from ..model.fields import (
+    CLOSED,
+    OPEN,
+    SLIPPED,
+    SOFTENING,
+    distance,
+    joint_body,
+    row_of_nodes,
+    state_of,
+)
 from ..post.units import LENGTHS, STRESSES, unit, with_unit
 from . import layout as places
 from .camera import CLIPPED
@@ -170,9 +179,10 @@ def caption(scene: SolvedScene, step: int) -> tuple[str, str, str]:
     factors = [f"{n} {three_digits(now[n])}" for n in known if n in now]
     where = scene.numbers[step].positions[0]
     last = scene.result.case.times[-1]
+    name = scene.result.case.named((scene.joint,))
     return (
         f"level {now['level']:.4g} m{tail} (t = {time:.4g} of {last:g})",
-        state,
+        f"{name}: {state}" if name else state,
         ", ".join([*factors, f"{resultant}: {where}"]),
     )
 
@@ -205,7 +215,7 @@ def show_deformed(gallery: Gallery, deformed: Deformed, display: Display) -> lis
     show_loads(gallery, case, deformed.loads(), deformed.labels(), flat)
     gallery.add("outline", [deformed.outline()], [DARK], **flat, **layer(case, 1), LineWidth=1.5)
     legend = [(DARK, f"displacement x {deformed.scale:g}")]
-    occurring = np.unique(deformed.along_joint(state_of))
+    occurring = deformed.occurring()
     for state, pieces in deformed.marks().items():
         if state in occurring:
             color, text = STATES[state]
@@ -229,8 +239,9 @@ def show_strips(gallery: Gallery, deformed: Deformed, display: Display) -> None:
 
     From heel to toe to the right; of a user's own geometry upwards, as seen from upstream.
     """
-    scene, rows = deformed.scene, deformed.rows
-    case, joint = scene.result.case, scene.bodies["joint"]
+    scene = deformed.scene
+    case, rows = scene.own.case, deformed.joints[scene.joint].rows
+    joint = joint_body(scene.bodies, scene.joint)
     nearest = row_of_nodes(joint, rows[0])
     s, z = distance(rows[0])[nearest], joint.points[:, 2]
     axes = (z, s) if case.geometry else (s, -z)

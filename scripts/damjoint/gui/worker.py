@@ -28,7 +28,7 @@ from ..model.parameters import declared
 from ..model.results import Results
 from ..post.summary import Table
 from ..runner import early_end, write_outcomes
-from ..statics.verdict import failed, statement
+from ..statics.verdict import decisive_joint, failed, statement
 from ..storage import atomic_write
 from .numbers import Numbers, table_of_levels, warnings
 from .sheet import Request, Sheet, case_text, check_request, titles
@@ -59,6 +59,7 @@ class SolvedScene:
     def of(outcome: Outcome) -> SolvedScene:
         """Convert an outcome; computes the bodies' fields."""
         result, (state, _) = outcome.result, early_end(outcome)
+        own = result.joints[decisive_joint(result)]
         message = statement(result)
         if state and isinstance(outcome.error, (InputError, RunError)):
             message = str(outcome.error)
@@ -71,10 +72,20 @@ class SolvedScene:
             end_state=state,
             message=message,
             failed=bool(state) or failed(result),
-            numbers=[Numbers.at(result, time) for time in np.unique(result.joint["time"])],
-            table=table_of_levels(result),
+            numbers=[Numbers.at(own, time) for time in np.unique(result.joint["time"])],
+            table=table_of_levels(own),
             warnings=warnings(result),
         )
+
+    @property
+    def joint(self) -> int:
+        """The number of the joint whose curves and numbers are shown."""
+        return decisive_joint(self.result)
+
+    @property
+    def own(self) -> Results:
+        """The results of that joint."""
+        return self.result.joints[self.joint]
 
     @property
     def times(self) -> np.ndarray:

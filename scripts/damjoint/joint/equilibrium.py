@@ -1,6 +1,6 @@
-"""The equilibrium of the joint with the condensed bodies around it (see fem/condensation.py).
+"""The equilibrium of the joints with the condensed bodies around them (see fem/condensation.py).
 
-Unknown: the jump. Residual R = N^T W t(jump) - (water in the joint) + S jump - t_0(loading) = 0;
+Unknowns: the jumps. Residual R = N^T W t(jump) - (water in the joints) + S jump - t_0(loading) = 0;
 the pressure of flowing water is solved at the same jump before every residual, and its derivative
 is part of the tangent.
 """
@@ -10,43 +10,18 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
-from ..arrays import Array, Sparse
-from ..laws import TANGENT, Law, Mode
-from ..model.case import Case, flows, has_drains
+from ..arrays import Array
+from ..model.case import Case
 from ..model.loads import AddedPressure, Loading, line_forces, thermal_strains, water_column
-from .flow import FlowSolution
+from .flow import FlowDerivative, FlowSolution
 from .interface import Interface
+from .joint_laws import TANGENT, JointLaws, JointVariables, Mode
 from .linear_system import Change
+from .water import JointWater, Pressure, Still
 from .wet_faces import WetFace
-
-
-@dataclass(frozen=True, kw_only=True)
-class Pressure:
-    """Water pressure in the joint [Pa] at the law's points, at the integration points of the water
-    and at the nodes.
-    """
-
-    points: Array
-    water_points: Array
-    nodes: Array
-    #: of flowing water: mass flux, mean of each joint element [kg/(m s)], and out of the toe per
-    #: metre of thickness
-    flux: Array | None = None
-    leakage: float = 0.0
-
-
-@dataclass(frozen=True)
-class Still:
-    """The joint before an earthquake that leaves its water as it is: jump (j,) and internal
-    variables.
-    """
-
-    jump: Array
-    variables: Any
 
 
 @dataclass(frozen=True)
@@ -66,19 +41,22 @@ DIFFERENCE, EMPTY, SMALL_LEVEL = 1e-5, 1e-3, 0.1
 
 
 class Equilibrium:
-    """The joint with the condensed bodies: loads, water pressure, residual and tangent."""
+    """The joints with the condensed bodies: loads, water pressure, residual and tangent."""
 
     def __init__(self, case: Case, interface: Interface) -> None:
         self.case, self.bulk, self.interface = case, interface.bulk, interface
-        self.wet, self.flowing = case["uplift"] != "none", flows(case)
-        #: nodes and points of the drains of flowing water
-        drained = self.flowing and has_drains(case)
-        self.drains = interface.drains(case["drain_x"]) if drained else None
+        self.water = [
+            JointWater(own, joint, number)
+            for number, (own, joint) in enumerate(zip(case.joints, interface.joints, strict=True))
+        ]
+        #: numbers of the joints in which water flows
+        self.flowing = tuple(k for k, water in enumerate(self.water) if water.flowing)
         self.unit_weight = case["rho_water"] * case["g"]
-        self.law: Law[Any] = case.law
-        #: tangent (3, 3) of the undamaged joint
-        self.undamaged = self.law.traction_and_tangent(np.zeros((1, 3)), self.law.initial(1))[1][0]
-        #: forces on the loaded unknowns and t_0; with the water in the joint: of the last loadings
+        self.laws = JointLaws([own.law for own in case.joints])
+        #: tangent (q, 3, 3) of the undamaged joints
+        points = [len(joint.points.weights) for joint in interface.joints]
+        self.undamaged = self.laws.undamaged_tangent(points)
+        #: forces on the loaded unknowns and t_0; with the water in the joints: of the last loadings
         self.external_forces = lru_cache(maxsize=4)(self._external_forces)
         self.loads = lru_cache(maxsize=4)(self._loads)
 
@@ -156,120 +134,39 @@ class Equilibrium:
         above, below = (replace(loading, level=level + s) for s in (step, -step))
         return (of(above) - of(below)) / (2 * step)
 
-    # -- water in the joint
+    # -- water in the joints
     # ---------------------------------------------------------------------------------------------
 
-    def head(self, loading: Loading, matrix: Sparse | None = None) -> Array:
-        """Head [m] in a joint of uniform transmissivity, at the joint's nodes or at the places that
-        an interpolation matrix of `JointFields` leads to: linear along the joint between the levels
-        of reservoir and tailwater; a dry end has its own height, or the head of the other end if
-        that is lower.
-
-        Drains reduce the head above their outlet, the tailwater or their own height, by their
-        effectiveness (EM 1110-2-2200); USBR counts the reduction from the reservoir's head.
-        """
-        case, along = self.case, self.interface.fields
-        fields = along.heel_y, along.toe_y, along.xi
-        heel, toe, xi = fields if matrix is None else (matrix @ field for field in fields)
-        level, tail = loading.level, loading.tail
-        first = np.maximum(level, np.minimum(heel, tail))
-        last = np.maximum(tail, np.minimum(toe, level))
-        if case["uplift"] != "drained":
-            return first + (last - first) * xi
-        at = case["drain_x"] / self.interface.length
-        drained = first + (last - first) * (at if case["drain_reference"] == "linear" else 0)
-        outlet = np.maximum(heel + (toe - heel) * at, max(case["drain_level"], loading.tail))
-        drained = drained - case["drain_effectiveness"] * np.maximum(drained - outlet, 0)
-        return np.where(
-            xi < at,
-            first + (drained - first) * xi / at,
-            drained + (last - drained) * (xi - at) / (1 - at),
-        )
-
-    def uplift(self, loading: Loading, matrix: Sparse, y: Array, beyond: Array | float) -> Array:
-        """Pressure [Pa], not below zero, at places of height y that an interpolation matrix of
-        `JointFields` leads to; beyond: pressure of flowing water beyond the imposed one.
-        """
-        return np.maximum(self.unit_weight * (self.head(loading, matrix) - y) + beyond, 0)
-
-    def lift(self, loading: Loading, beyond: Array | float = 0.0) -> Array:
-        """Forces of the water in the joint on its two faces (j,)."""
-        interface = self.interface
-        weights, y = interface.water_points.weights, interface.water_points.positions[:, 1]
-        pressure = self.uplift(loading, interface.fields.at_water, y, beyond)
-        forces: Array = interface.opening_at_water.T @ (weights * pressure)
-        return forces
-
     def _loads(self, loading: Loading) -> Array:
-        """t_0 and, unless it flows, the water in the joint together (j,)."""
+        """t_0 and, unless it flows, the water in the joints together (j,)."""
         total = self.external_forces(loading)[1]
-        return total + self.lift(loading) if self.wet and not self.flowing else total
-
-    def expand_to_nodes(self, inner: Array) -> Array:
-        """A pressure at all nodes of the joint from that at the inner ones; zero at the ends."""
-        pressure = np.zeros(self.interface.fields.nodes)
-        pressure[self.interface.fields.inside] = inner
-        return pressure
-
-    def aperture(self, jump: Array, variables: Any) -> tuple[Array, Array, float]:
-        """Conductivity at the law's points over that of the closed joint, its derivative with the
-        opening, and the aperture of the closed joint [m].
-
-        flow: cubic law. cracked: the same, but of the opening beyond that of a crack, and bounded
-        where an open point has practically the full head.
-        """
-        opening = self.interface.flow.opening @ jump
-        if self.case["uplift"] == "flow":
-            narrowest, most = self.case["aperture_min"], np.inf
-        else:
-            shared = self.case.shared
-            narrowest, most = (shared[f"crack_{n}"][0] for n in ("aperture", "most"))
-            opening = opening - self.law.opening_of_crack(variables, len(opening))
-        wider = np.maximum(opening, 0) / narrowest
-        factor = 1 + np.minimum(wider, most)
-        growing = (wider > 0) & (wider < most)
-        return factor**3, np.where(growing, 3 / narrowest * factor**2, 0), narrowest
-
-    def solve_flow(self, jump: Array, variables: Any, loading: Loading) -> FlowSolution:
-        """Pressure beyond the imposed one at the inner nodes.
-
-        Drains reduce the head above their outlet, the tailwater or their own height, by their
-        effectiveness e: the pressure is e times that with the outlet's head at the drains, plus
-        1 - e times that without drains. A crack that reaches the drains ends their effect
-        (EM 1110-2-2200).
-        """
-        case, flow = self.case, self.interface.flow
-        factor = self.aperture(jump, variables)[0]
-        conductivity = factor * self.interface.points.weights
-        head = self.head(loading)
-        free = flow.solve(conductivity, self.unit_weight * head)
-        if self.drains is None:
-            return free
-        nodes, points = self.drains
-        own = self.interface.surface.points[nodes, 1]
-        outlet = np.maximum(own, max(case["drain_level"], loading.tail))
-        at_drains = head[nodes] + self.expand_to_nodes(free.pressure)[nodes] / self.unit_weight
-        cracked = case["uplift"] == "cracked" and (factor[points] > 1).any()
-        effect = case["drain_effectiveness"]
-        if cracked or not (at_drains > outlet).all() or effect == 0:
-            return free
-        drained = flow.solve(
-            conductivity, self.unit_weight * head, nodes, self.unit_weight * outlet
-        )
-        return free.mixed(effect, drained)
+        for water in self.water:
+            if water.wet and not water.flowing:
+                total = total + water.lift(loading)
+        return total
 
     def flowing_lift(
-        self, jump: Array, variables: Any, loading: Loading
-    ) -> tuple[Array, FlowSolution]:
-        """Forces of flowing water on the faces of the joint (j,), and its flow's solution."""
-        solution = self.solve_flow(jump, variables, loading)
-        beyond = self.interface.fields.at_water @ self.expand_to_nodes(solution.pressure)
-        return self.lift(loading, beyond), solution
+        self,
+        jump: Array,
+        variables: JointVariables,
+        loading: Loading,
+        still: Still | None = None,
+    ) -> tuple[Array, list[FlowSolution]]:
+        """Forces of flowing water on the faces of the joints (j,), and the solutions of its flow in
+        each joint where it flows; still: see `residual`.
+        """
+        total, solutions = np.zeros(len(jump)), []
+        for k in self.flowing:
+            opened = self.water[k].opened(jump, variables.joints[k], still)
+            lift, solution = self.water[k].flowing_lift(*opened, loading)
+            total += lift
+            solutions.append(solution)
+        return total, solutions
 
     def residual(
         self,
         jump: Array,
-        variables: Any,
+        variables: JointVariables,
         loading: Loading,
         mode: Mode = TANGENT,
         frozen_lift: Array | None = None,
@@ -277,21 +174,21 @@ class Equilibrium:
     ) -> Residual:
         """The residual and its derivatives.
 
-        mode: of the law; frozen_lift (j,): replaces the lift of the flowing water; still: the joint
-        whose opening the water follows instead.
+        mode: of the laws; frozen_lift (j,): replaces the lift of the flowing water; still: the
+        joints whose opening the water follows instead, see `JointWater`.
         """
-        interface, opened = self.interface, still or Still(jump, variables)
+        interface = self.interface
         at_points = interface.jumps(interface.at_points, jump)
-        traction, tangent = self.law.evaluate(at_points, variables, mode)
-        dried = still if self.case["quake_uplift"] == "zero" else None
+        traction, tangent = self.laws.evaluate(at_points, variables, mode)
+        dried = still if any(water.dries for water in self.water) else None
         if dried:
-            lost, lost_rate = self.lost_pressure(at_points[:, 0], variables, loading, dried)
+            lost, lost_rate = self.lost_pressure(at_points, variables, loading, dried)
             traction = traction + lost
         value = self.bulk.stiffness @ jump - self.loads(loading) + interface.forces(traction)
 
-        flowing, solution = self.flowing and frozen_lift is None, None
+        flowing, solutions = bool(self.flowing) and frozen_lift is None, list[FlowSolution]()
         if flowing:
-            lift, solution = self.flowing_lift(opened.jump, opened.variables, loading)
+            lift, solutions = self.flowing_lift(jump, variables, loading, still)
             value = value - lift
         elif frozen_lift is not None:
             value = value - frozen_lift
@@ -299,23 +196,26 @@ class Equilibrium:
         def by_jump(secant: bool) -> Change:
             stiffness = tangent
             if secant:
-                stiffness = (mode.frozen or self.law).secant_stiffness(at_points, variables)
+                stiffness = (mode.frozen or self.laws).secant_stiffness(at_points, variables)
             if dried:
                 stiffness = stiffness + lost_rate
             change = interface.change(stiffness, self.undamaged)
-            if solution is None or still:
-                return change
-            growing = self.aperture(jump, variables)[1] * interface.points.weights
-            return replace(change, flow=interface.flow.derivative(solution, growing))
+            following = {
+                k: self.water[k].derivative(jump, variables.joints[k], solution)
+                for k, solution in zip(self.flowing, solutions, strict=False)
+                if not (still and self.water[k].remembers)
+            }
+            flow = FlowDerivative.joined(list(following.values()))
+            return replace(change, flow=flow, flowing=tuple(following))
 
         def by_level() -> Array:
             slope = -self.rate(self._loads, loading)
             if flowing:
-                lifted = lambda other: self.flowing_lift(opened.jump, opened.variables, other)[0]
+                lifted = lambda other: self.flowing_lift(jump, variables, other, still)[0]
                 slope = slope - self.rate(lifted, loading)
             if dried:
                 losing = lambda other: interface.forces(
-                    self.lost_pressure(at_points[:, 0], variables, other, dried)[0]
+                    self.lost_pressure(at_points, variables, other, dried)[0]
                 )
                 slope = slope + self.rate(losing, loading)
             return slope
@@ -323,68 +223,26 @@ class Equilibrium:
         return Residual(value, by_jump, by_level)
 
     def lost_pressure(
-        self, opening: Array, variables: Any, loading: Loading, still: Still
+        self, jump: Array, variables: JointVariables, loading: Loading, still: Still
     ) -> tuple[Array, Array]:
-        """Pressure [Pa] that the water loses at the law's points in the crack that an earthquake
-        opens, as a traction (q, 3), and its derivative (q, 3, 3).
-
-        It grows by K_N with the opening beyond that of a crack, so that a point is as stiff as in
-        contact until all of its pressure is lost.
+        """The losses of `JointWater.lost_pressure` at the points of all joints, for jumps (q, 3)
+        there.
         """
-        number, K_N = len(opening), self.case["K_N"]
-        traction, rate = np.zeros((number, 3)), np.zeros((number, 3, 3))
-        fields, interface = self.interface.fields, self.interface
-        beyond: Array | float = 0.0
-        if self.flowing:
-            solution = self.solve_flow(still.jump, still.variables, loading)
-            beyond = fields.at_points @ self.expand_to_nodes(solution.pressure)
-        y = interface.points.positions[:, 1]
-        full = self.uplift(loading, fields.at_points, y, beyond)
-        before = interface.jumps(interface.at_points, still.jump)[:, 0]
-        cracked = before > self.law.opening_of_crack(still.variables, number)
-        wider = np.where(cracked, 0, opening - self.law.opening_of_crack(variables, number))
-        traction[:, 0] = np.clip(K_N * wider, 0, full)
-        rate[:, 0, 0] = np.where((wider > 0) & (K_N * wider < full), K_N, 0)
+        pairs = zip(self.water, variables.split(jump[:, 0]), variables.joints, strict=True)
+        losses = [water.lost_pressure(own, v, loading, still) for water, own, v in pairs]
+        traction, rate = (np.concatenate(parts) for parts in zip(*losses, strict=True))
         return traction, rate
 
-    def pressure(
-        self, jump: Array, variables: Any, loading: Loading, still: Still | None = None
-    ) -> Pressure:
-        """The water pressure in the joint at a jump; still: see `residual`."""
-        interface, fields = self.interface, self.interface.fields
-        opened = still or Still(jump, variables)
-        inner: Array | float = 0.0
-        if self.flowing:
-            inner = self.solve_flow(opened.jump, opened.variables, loading).pressure
-        beyond = self.expand_to_nodes(np.asarray(inner))
-
-        def at(matrix: Sparse, positions: Array) -> Array:
-            if not self.wet:
-                return np.zeros(len(positions))
-            return self.uplift(loading, matrix, positions[:, 1], matrix @ beyond)
-
-        flux, leakage = None, 0.0
-        if self.case["uplift"] == "flow":
-            factor, _, narrowest = self.aperture(opened.jump, opened.variables)
-            conductivity = self.case["rho_water"] * narrowest**3 * factor / (12 * self.case["visc"])
-            total = self.unit_weight * self.head(loading) + beyond
-            drains = () if self.drains is None else (self.drains[0],)
-            flux, leakage = interface.flow.flux(conductivity, total, self.bulk.width, *drains)
-        points = at(fields.at_points, interface.points.positions)
-        water_points = at(fields.at_water, interface.water_points.positions)
-        nodes = at(fields.at_locations, interface.space.locations)
-        if still and self.case["quake_uplift"] == "zero":
-            opening = interface.jumps(interface.at_points, jump)[:, 0]
-            lost_at_points = self.lost_pressure(opening, variables, loading, still)[0][:, 0]
-            weights = interface.points.weights  # at the nodes so that the resultant is the same
-            spread = fields.at_points.T @ (weights * lost_at_points)
-            lost_at_nodes = spread / (fields.at_points.T @ weights)
-            points = points - lost_at_points
-            water_points = water_points - fields.at_water @ lost_at_nodes
-            nodes = np.maximum(nodes - fields.at_locations @ lost_at_nodes, 0)
-        return Pressure(
-            points=points, water_points=water_points, nodes=nodes, flux=flux, leakage=leakage
-        )
+    def pressures(
+        self,
+        jump: Array,
+        variables: JointVariables,
+        loading: Loading,
+        still: Still | None = None,
+    ) -> tuple[Pressure, ...]:
+        """The water pressure in each joint at a jump; still: see `residual`."""
+        pairs = zip(self.water, variables.joints, strict=True)
+        return tuple(water.pressure(jump, own, loading, still) for water, own in pairs)
 
     def crest(self, jump: Array, loading: Loading) -> float:
         """The crest's displacement along x [m]."""

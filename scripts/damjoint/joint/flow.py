@@ -109,6 +109,18 @@ class FlowDerivative:
     pressure: Array
     columns: IntArray
 
+    @staticmethod
+    def joined(parts: list[FlowDerivative]) -> FlowDerivative | None:
+        """The derivatives of several joints, one below the other; None if there is none."""
+        if len(parts) < 2:
+            return parts[0] if parts else None
+        columns = np.unique(np.concatenate([part.columns for part in parts]))
+        ends = np.cumsum([0, *(len(part.pressure) for part in parts)])
+        pressure = np.zeros((ends[-1], len(columns)))
+        for first, last, part in zip(ends, ends[1:], parts, strict=False):
+            pressure[first:last, np.searchsorted(columns, part.columns)] = part.pressure
+        return FlowDerivative(pressure=pressure, columns=columns)
+
 
 class Flow:
     """Water that flows in the joint: pressure beyond the imposed one, unknown at the nodes between

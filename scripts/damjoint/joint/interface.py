@@ -1,10 +1,10 @@
-"""The joint of condensed bodies, whatever its law, its water and its levels: interpolations, flow
+"""The joints of condensed bodies, whatever their laws, water and levels: interpolations, flow
 operators, and the linear systems of Newton's method.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -13,9 +13,9 @@ from scipy import sparse
 from ..arrays import Array, IntArray, Sparse
 from ..fem import elements
 from ..fem.cache import cached, key_of
-from ..fem.condensation import Condensed
-from ..model.case import Case
-from ..model.mesh import JointMesh, ends_of, heel_normal
+from ..fem.condensation import Condensed, CondensedJoint
+from ..model.case import Case, OfJoint
+from ..model.mesh import JointMesh, heel_normal
 from ..model.scene import UP
 from .flow import Flow, JointFields
 from .linear_system import Border, Change, UndamagedSystem
@@ -39,11 +39,14 @@ def frames(normals: Array) -> Array:
 @dataclass(frozen=True, kw_only=True)
 class Chord:
     """The straight line from heel to toe (3D: between the means of both lines), to which resultants
-    refer.
+    refer, in a plane.
     """
 
+    #: unit vectors of the plane (2, 3): x and y, unless the joint faces along z; then those towards
+    #: the toe and along the joint's normal
+    plane: Array
     toe: Array
-    #: unit vectors in the x-y plane: towards the toe, upwards
+    #: unit vectors in the plane: towards the toe, upwards
     along: Array
     normal: Array
     length: float
@@ -51,14 +54,18 @@ class Chord:
     @staticmethod
     def of(joint: JointMesh) -> Chord:
         """The chord of a joint."""
-        heel, toe = (
-            joint.surface.points[nodes][:, :2].mean(axis=0)
-            for nodes in (joint.heel_nodes, joint.toe_nodes)
-        )
+        surface = joint.surface
+        ends = [surface.points[n].mean(axis=0) for n in (joint.heel_nodes, joint.toe_nodes)]
+        plane, faces = np.eye(3)[:2], surface.normals.mean(axis=0)
+        if np.abs(faces[:2]).max() < abs(faces[2]):
+            across = np.cross(faces, ends[1] - ends[0])
+            plane = np.array([np.cross(across, faces), faces])
+            plane /= np.linalg.norm(plane, axis=1)[:, None]
+        heel, toe = (plane @ end for end in ends)
         length = float(np.linalg.norm(toe - heel))
         along = (toe - heel) / length
         normal = np.array([-along[1], along[0]])
-        return Chord(toe=toe, along=along, normal=normal, length=length)
+        return Chord(plane=plane, toe=toe, along=along, normal=normal, length=length)
 
     def resultants(
         self, weights: Array, positions: Array, traction: Array
@@ -66,20 +73,21 @@ class Chord:
         """N (compression > 0), T (downstream > 0) and M (about the toe, holding down > 0) of a
         traction (q, 3) along x, y, z at positions (q, 3).
         """
-        force = weights[:, None] * traction[:, :2]
-        total, arm = force.sum(axis=0), positions[:, :2] - self.toe
+        force = weights[:, None] * (traction @ self.plane.T)
+        total, arm = force.sum(axis=0), positions @ self.plane.T - self.toe
         moment = np.sum(arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0])
         return -total @ self.normal, total @ self.along, float(moment)
 
 
-class Interface:
-    """A joint of condensed bodies; unknowns: its free displacement jumps (j,)."""
+class JointInterface:
+    """A joint of condensed bodies; unknowns: the free displacement jumps of all joints (j,)."""
 
-    def __init__(self, bulk: Condensed, quadrature: str) -> None:
-        self.bulk, self.dim = bulk, bulk.dim
-        (self.joint,) = bulk.joints.values()
-        self.mesh, self.surface = self.joint.mesh, self.joint.mesh.surface
+    def __init__(self, bulk: Condensed, joint: CondensedJoint, quadrature: str) -> None:
+        self.dim, self.order = bulk.dim, bulk.order
+        self.mesh, self.surface = joint.mesh, joint.mesh.surface
         space = self.space = elements.Space(self.surface, bulk.order)
+        #: jump of the space's functions from the unknowns, dim rows each
+        self._unknowns = joint.dofs.matrix(self.dim * len(space.locations), len(bulk.stiffness))
         #: number of Gauss points of the law, by shape
         self.rule = elements.JOINT[quadrature][bulk.order]
         self.points = elements.points_of(space, self.rule)
@@ -88,9 +96,6 @@ class Interface:
         self.flat = np.allclose(self.frames, self.frames[0], rtol=0, atol=1e-9)
         #: jump at the Gauss points from the unknowns, dim rows each: normal, tangent 1, tangent 2
         self.at_points = self._components(self.points.values, self.frames[self.points.elements])
-        self.from_points = self.at_points.T.tocsr()
-        #: pattern of from_points: unknowns on which each component at a Gauss point acts
-        self.touched = self.from_points != 0
         #: jump at the nodes likewise, dim rows for each of `rows`, indices of locations; where the
         #: joint bends, a node has rows in the frame of each of its elements
         self.rows, node_frames = self._node_frames()
@@ -100,17 +105,12 @@ class Interface:
         self.opening_at_water = self._components(
             self.water_points.values, self.frames[self.water_points.elements], 1
         )
-        self.faces = {
-            name: WetFace(face, bulk.order, bulk.dim) for name, face in bulk.faces.items()
-        }
         self.heel = self._heel_row()
-        upstream = [f.surface.points[:, 1].min() for f in self.faces.values() if f.side == UP]
-        #: height of the reservoir floor [m]
-        self.floor = min(upstream, default=0.0)
         self.chord = Chord.of(self.mesh)
+        #: extent along z [m], 1 in 2D
+        self.width = self.mesh.width
         #: from heel to toe along the joint [m], a mean in 3D
-        self.length = self.points.weights.sum() / bulk.width
-        self._undamaged: UndamagedSystem | None = None
+        self.length = self.points.weights.sum() / self.width
 
     def _node_frames(self) -> tuple[IntArray, Array]:
         """Locations (rows,) and frames of their jumps (rows, 3, 3); on a plane joint one each."""
@@ -131,20 +131,11 @@ class Interface:
         means = [np.bincount(self.rows, column) / count for column in columns.T]
         return np.column_stack(means) if values.ndim > 1 else means[0]
 
-    def _select(self, component: int) -> Sparse:
-        """A component of the jump of the space's functions, from the unknowns."""
-        functions, components = np.divmod(self.joint.free, self.dim)
-        selected = np.flatnonzero(components == component)
-        return sparse.csr_matrix(
-            (np.ones(len(selected)), (functions[selected], selected)),
-            (len(self.space.locations), len(self.joint.free)),
-        )
-
     def _components(self, values: Sparse, frames: Array, most: int = 3) -> Sparse:
         """The first `most` components in frames (q, 3, 3) of the jump, interpolated by values (q,
         functions): point by point, from the unknowns.
         """
-        parts = [values @ self._select(c) for c in range(self.dim)]
+        parts = [values @ self._unknowns[c :: self.dim] for c in range(self.dim)]
         number = min(self.dim, most)
         stacked = sparse.vstack(
             [
@@ -163,27 +154,21 @@ class Interface:
         """delta_n, delta_t1, delta_t2 (q, 3) by at_points or at_nodes."""
         return np.pad((matrix @ unknowns).reshape(-1, self.dim), ((0, 0), (0, 3 - self.dim)))
 
-    def forces(self, traction: Array) -> Array:
-        """Nodal forces (j,) of a traction (q, 3) at the Gauss points."""
-        weighted = self.points.weights[:, None] * traction[:, : self.dim]
-        return np.asarray(self.from_points @ weighted.ravel())
-
     def _heel_row(self) -> Array:
         """Mean opening along the heel, from the unknowns."""
-        heel = elements.Space(self.mesh.heel, self.bulk.order)
+        heel = elements.Space(self.mesh.heel, self.order)
         points = elements.points_of(heel, elements.WATER)
         functions = self.space.find(heel)
         normal = heel_normal(self.surface, heel.body)
         weights = np.zeros(len(self.space.locations))
         weights[functions] = points.values.T @ points.weights / points.weights.sum()
-        functions, components = np.divmod(self.joint.free, self.dim)
-        return weights[functions] * normal[components]
+        return np.asarray(self._unknowns.T @ np.outer(weights, normal[: self.dim]).ravel())
 
     @property
     def section(self) -> dict[str, list[float]]:
         """Ends and length of the joint, by the names of pro/section.pro."""
-        heel = self.chord.toe - self.chord.length * self.chord.along
-        return ends_of(heel, self.chord.toe, self.length)
+        ends = self.mesh.ends
+        return ends | {"joint_along": [float(self.length)]}
 
     # -- flow
 
@@ -219,43 +204,93 @@ class Interface:
         beside = np.concatenate([np.isin(table, nodes).any(axis=1) for table in tables])
         return nodes, np.flatnonzero(beside[self.points.elements])
 
+
+def stacked(matrices: list[Sparse]) -> Sparse:
+    """Matrices below each other."""
+    return sparse.vstack(matrices, format="csr")
+
+
+class Interface:
+    """The joints of condensed bodies; unknowns: their free displacement jumps (j,)."""
+
+    def __init__(self, bulk: Condensed, quadrature: str) -> None:
+        self.bulk, self.dim = bulk, bulk.dim
+        self.joints = [JointInterface(bulk, joint, quadrature) for joint in bulk.joints]
+        #: of the Gauss points of all joints, joint by joint: weights; jump from the unknowns
+        self.weights = np.concatenate([joint.points.weights for joint in self.joints])
+        self.at_points = stacked([joint.at_points for joint in self.joints])
+        #: likewise at the nodes, by the rows of each joint
+        self.at_nodes = stacked([joint.at_nodes for joint in self.joints])
+        self.from_points = self.at_points.T.tocsr()
+        #: pattern of from_points: unknowns on which each component at a Gauss point acts
+        self.touched = self.from_points != 0
+        self.faces = {
+            name: WetFace(face, bulk.order, bulk.dim) for name, face in bulk.faces.items()
+        }
+        upstream = [f.surface.points[:, 1].min() for f in self.faces.values() if f.side == UP]
+        #: height of the reservoir floor [m]
+        self.floor = min(upstream, default=0.0)
+        self._undamaged: UndamagedSystem | None = None
+        self._lift: tuple[tuple[int, ...], Sparse] = (), None
+
+    def jumps(self, matrix: Sparse, unknowns: Array) -> Array:
+        """delta_n, delta_t1, delta_t2 (q, 3) by at_points or at_nodes."""
+        return np.pad((matrix @ unknowns).reshape(-1, self.dim), ((0, 0), (0, 3 - self.dim)))
+
+    def forces(self, traction: Array) -> Array:
+        """Nodal forces (j,) of a traction (q, 3) at the Gauss points."""
+        weighted = self.weights[:, None] * traction[:, : self.dim]
+        return np.asarray(self.from_points @ weighted.ravel())
+
+    def lift(self, flowing: tuple[int, ...]) -> Sparse:
+        """Nodal forces of the pressures of the joints of these numbers; the last ones are kept."""
+        if flowing != self._lift[0]:
+            lifts = [self.joints[k].flow.lift for k in flowing]
+            self._lift = flowing, sparse.hstack(lifts, format="csr")
+        return self._lift[1]
+
+    @property
+    def of_joints(self) -> list[OfJoint]:
+        """Names, bodies and ends of the joints."""
+        return [replace(joint.mesh.of_case, section=joint.section) for joint in self.joints]
+
     # -- linear systems
 
     def stiffness(self, tangent: Array, points: IntArray) -> Sparse:
         """Stiffness (j, j) of some Gauss points with a tangent (points, 3, 3)."""
         number, d = len(points), self.dim
         if not number:
-            return sparse.csr_matrix((len(self.joint.free),) * 2)
+            return sparse.csr_matrix((self.at_points.shape[1],) * 2)
         rows = self.at_points[(d * points[:, None] + np.arange(d)).ravel()]
-        blocks = self.points.weights[points, None, None] * tangent[:, :d, :d]
+        blocks = self.weights[points, None, None] * tangent[:, :d, :d]
         diagonal = blocks, np.arange(number), np.arange(number + 1)
         return (rows.T @ (sparse.bsr_matrix(diagonal, (d * number,) * 2) @ rows)).tocsr()
 
     def undamaged(self, tangent: Array) -> UndamagedSystem:
-        """Linear system of the undamaged joint for a tangent (3, 3); the last one is kept."""
+        """Linear system of the undamaged joints for a tangent (q, 3, 3); the last one is kept."""
         if self._undamaged is None or not np.array_equal(tangent, self._undamaged.tangent):
-            points = np.arange(len(self.points.weights))
-            everywhere = np.broadcast_to(tangent, (len(points), 3, 3))
-            matrix = self.bulk.stiffness + self.stiffness(everywhere, points).toarray()
+            points = np.arange(len(self.weights))
+            matrix = self.bulk.stiffness + self.stiffness(tangent, points).toarray()
             self._undamaged = UndamagedSystem(tangent, matrix)
         return self._undamaged
 
     def change(self, tangent: Array, undamaged: Array) -> Change:
-        """Change by the law for a tangent (q, 3, 3), from the undamaged one (3, 3)."""
+        """Change by the laws for a tangent, from the undamaged one (q, 3, 3)."""
         # rows: components of the traction
         differs = (tangent != undamaged).any(axis=2)[:, : self.dim]
         points = np.flatnonzero(differs.any(axis=1))
         rows = np.flatnonzero(self.touched @ differs.ravel())
-        return Change(law=self.stiffness(tangent[points] - undamaged, points)[rows], rows=rows)
+        change = tangent[points] - undamaged[points]
+        return Change(law=self.stiffness(change, points)[rows], rows=rows)
 
     def solve(
         self, undamaged: Array, change: Change, right: Array, border: Border | None
     ) -> tuple[Array, float]:
         """Solve A x = right (j,), bordered or not; see UndamagedSystem.solve.
 
-        undamaged: tangent (3, 3). Raises LinAlgError if the system is singular.
+        undamaged: tangent (q, 3, 3). Raises LinAlgError if the system is singular.
         """
-        lift = self.flow.lift if change.flow else None
+        lift = self.lift(change.flowing) if change.flow else None
         return self.undamaged(undamaged).solve(change, right, border, lift)
 
 
@@ -269,7 +304,7 @@ class LastInterface:
     interface: Interface | None = None
 
     def of(self, case: Case) -> Interface:
-        """The joint of a case with its condensed bodies."""
+        """The joints of a case with its condensed bodies."""
         key = *key_of(case), case["quadrature"]
         if self.interface is None or key != self.key:
             self.interface = None  # free its memory first

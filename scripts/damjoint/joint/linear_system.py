@@ -1,6 +1,6 @@
-"""Linear systems of Newton's method on the joint.
+"""Linear systems of Newton's method on the joints.
 
-The tangent is that of the undamaged joint, A_0 = S + K_0, and its change where the joint has
+The tangent is that of the undamaged joints, A_0 = S + K_0, and its change where a joint has
 opened, broken or slipped: A = A_0 + L - B P (L: change by the law, on few rows; P: derivative of
 the pressures of flowing water; B: their nodal forces). With C = A_0^-1, computed once, A x = r is
 
@@ -24,11 +24,12 @@ from .flow import FlowDerivative
 
 @dataclass(frozen=True, kw_only=True)
 class Change:
-    """L (rows, j), without its zero rows, and P if water flows."""
+    """L (rows, j), without its zero rows, and P if water flows, in joints of these numbers."""
 
     law: Sparse
     rows: IntArray
     flow: FlowDerivative | None = None
+    flowing: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -42,10 +43,10 @@ class Border:
 
 
 class UndamagedSystem:
-    """The inverse tangent of the undamaged joint, C = A_0^-1 (j, j)."""
+    """The inverse tangent of the undamaged joints, C = A_0^-1 (j, j)."""
 
     def __init__(self, tangent: Array, matrix: Array) -> None:
-        """tangent: (3, 3) of all Gauss points; matrix: A_0, overwritten.
+        """tangent: (q, 3, 3) of the Gauss points; matrix: A_0, overwritten.
 
         Raises LinAlgError if A_0 is not positive definite: the joint does not support the dam.
         """
@@ -55,13 +56,13 @@ class UndamagedSystem:
             raise linalg.LinAlgError("tangent of the undamaged joint: not positive definite")
         inverse, _ = linalg.lapack.dpotri(factor, lower=True, overwrite_c=True)
         self.compliance: Array = np.tril(inverse) + np.tril(inverse, -1).T
-        self._by_pressure: Array | None = None
+        self._by_pressure: tuple[Sparse, Array] | None = None
 
     def by_pressure(self, lift: Sparse) -> Array:
-        """C B (j, p), the jumps by unit pressures with nodal forces B; computed once."""
-        if self._by_pressure is None:
-            self._by_pressure = np.ascontiguousarray((lift.T @ self.compliance).T)
-        return self._by_pressure
+        """C B (j, p), the jumps by unit pressures with nodal forces B; the last one is kept."""
+        if self._by_pressure is None or self._by_pressure[0] is not lift:
+            self._by_pressure = lift, np.ascontiguousarray((lift.T @ self.compliance).T)
+        return self._by_pressure[1]
 
     def solve(
         self, change: Change, right: Array, border: Border | None = None, lift: Sparse | None = None

@@ -9,10 +9,10 @@ from importlib import import_module
 from pkgutil import iter_modules
 from typing import Any
 
-from .base import TANGENT, Evidence, Law, Mode
+from .base import Evidence, Law
 from .friction import UNBREAKABLE
 
-__all__ = ["COLUMNS", "LAWS", "TANGENT", "UNBREAKABLE", "Evidence", "Law", "Mode"]
+__all__ = ["COLUMNS", "LAWS", "UNBREAKABLE", "Evidence", "Law"]
 
 #: By the value of the parameter `law`.
 LAWS: dict[str, type[Law[Any]]] = {

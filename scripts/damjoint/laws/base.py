@@ -20,19 +20,6 @@ V = TypeVar("V")
 
 
 @dataclass(frozen=True)
-class Mode:
-    """How the solver evaluates a law in an iteration."""
-
-    #: the law with frozen damage, see `Law.freeze`
-    frozen: Law[Any] | None = None
-    #: points (q,) that are placed inside the release of their shear, see `Law.shear_release`
-    releasing: BoolArray | None = None
-
-
-TANGENT = Mode()
-
-
-@dataclass(frozen=True)
 class Evidence:
     """Results of a run that `Law.hints` depends on."""
 
@@ -122,14 +109,17 @@ class Law(Generic[V]):
         """
         raise NotImplementedError
 
-    def evaluate(self, jump: Array, variables: V, mode: Mode = TANGENT) -> tuple[Array, Array]:
-        """Traction and tangent in a mode of the solver."""
-        law: Law[V] = mode.frozen or self
-        traction, tangent = law.traction_and_tangent(jump, variables)
-        if mode.releasing is not None and mode.releasing.any():
-            shear, slope = law.shear_release(jump, variables)
-            traction[mode.releasing, 1:] = shear[mode.releasing]
-            tangent[mode.releasing, 1:, 0] = slope[mode.releasing]
+    def evaluate(
+        self, jump: Array, variables: V, releasing: BoolArray | None = None
+    ) -> tuple[Array, Array]:
+        """Traction and tangent; releasing: points (q,) placed inside the release of their shear,
+        see `shear_release`.
+        """
+        traction, tangent = self.traction_and_tangent(jump, variables)
+        if releasing is not None and releasing.any():
+            shear, slope = self.shear_release(jump, variables)
+            traction[releasing, 1:] = shear[releasing]
+            tangent[releasing, 1:, 0] = slope[releasing]
         return traction, tangent
 
     # -- meaning of jump and internal variables

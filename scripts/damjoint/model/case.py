@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from .. import RUN_GEO, InputError, data
-from ..arrays import Value, Values
+from ..arrays import Setting, Settings, Value, Values
 from ..laws import LAWS, Law
 from . import casefile
 from .arithmetic import number
@@ -19,6 +19,7 @@ from .constraints import (
     check_also_uplift,
     check_drive,
     check_levels,
+    check_lifts,
     check_softening,
     check_steps,
     check_tail_levels,
@@ -29,13 +30,14 @@ from .constraints import (
 from .parameters import (
     INCLUDE,
     assignments,
+    checked,
     declared,
     independent,
     levels_of,
     listing,
-    parameter,
     parse,
 )
+from .scene import stacked
 from .values import ParameterValues
 from .values import flows as flows
 from .values import has_drains as has_drains
@@ -67,20 +69,35 @@ class Source:
 
     path: Path
     text: casefile.CaseText
-    overrides: dict[str, Value]
+    overrides: dict[str, Setting]
     levels: str | Sequence[float] | None = None
     tail_levels: str | Sequence[float] | None = None
     steps: int | None = None
     accuracy: str | None = None
 
-    def with_overrides(self, overrides: Values) -> Source:
+    def with_overrides(self, overrides: Settings) -> Source:
         """The source with further overrides, which win."""
         return replace(self, overrides={**self.overrides, **overrides})
 
 
 @dataclass(frozen=True, kw_only=True)
+class OfJoint:
+    """What a joint of several has for itself: the values that differ from the case's, and SECTION
+    with this joint alone; its name and those of the bodies above and below it.
+    """
+
+    name: str
+    upper: str
+    lower: str
+    values: dict[str, Value]
+    section: dict[str, list[float]] = field(compare=False, repr=False)
+
+
+@dataclass(frozen=True, kw_only=True)
 class Case(ParameterValues):
-    """A scene and its loading: all that a run depends on."""
+    """A scene and its loading: all that a run depends on. With several joints, its values are those
+    of the first one; each of `joints` is a case of a single joint.
+    """
 
     name: str
     title: str
@@ -106,6 +123,82 @@ class Case(ParameterValues):
     shared: dict[str, list[float]] = field(default_factory=dict, compare=False, repr=False)
     #: SECTION of pro/section.pro
     section: dict[str, list[float]] = field(default_factory=dict, compare=False, repr=False)
+    #: heights of the joints above the first one [m]
+    lift_heights: tuple[float, ...] = ()
+    #: an entry for each joint, from the lowest; empty if there is only one
+    of_joints: tuple[OfJoint, ...] = ()
+
+    @cached_property
+    def joints(self) -> tuple[Case, ...]:
+        """The case of each joint, from the lowest: its own values, and the section above it."""
+        if not self.of_joints:
+            return (self,)
+        return tuple(
+            replace(
+                self,
+                values=self.values | own.values,
+                section=own.section,
+                lift_heights=(),
+                of_joints=(),
+            )
+            for own in self.of_joints
+        )
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the joints, for messages."""
+        return tuple(own.name for own in self.of_joints) or (joint_name(self["joint_height"]),)
+
+    def separates(self, numbers: Collection[int]) -> bool:
+        """Whether without the joints of these numbers a body has no connection to the rock."""
+        if not self.of_joints:
+            return bool(numbers)
+        pairs = [(own.lower, own.upper) for own in self.of_joints]
+        rest = [pair for k, pair in enumerate(pairs) if k not in numbers]
+        reached, before = {"foundation"}, set[str]()
+        while reached != before:
+            before = set(reached)
+            reached |= {name for pair in rest if reached & set(pair) for name in pair}
+        return any(not reached.issuperset(pair) for pair in pairs)
+
+    def separating(self, numbers: Sequence[int]) -> tuple[int, ...]:
+        """The first of some joints, by their numbers, that alone holds what is above it; or those
+        on the rock, if all of these are among them; else none.
+        """
+        alone = [(k,) for k in numbers if self.separates((k,))]
+        on_rock = tuple(k for k, own in enumerate(self.of_joints) if own.lower == "foundation")
+        together = [on_rock] if set(on_rock) <= set(numbers) else []
+        return next(iter([*alone, *together]), ())
+
+    def named(self, numbers: Sequence[int]) -> str:
+        """The names of joints by their numbers; empty if there is only one joint."""
+        return " and ".join(self.joint_names[k] for k in numbers) if self.of_joints else ""
+
+    def with_values(self, values: Values) -> Case:
+        """The case with other values, the same for all joints; without the checks of `changed`."""
+        others = tuple(
+            replace(own, values={n: v for n, v in own.values.items() if n not in values})
+            for own in self.of_joints
+        )
+        return replace(self, values={**self.values, **values}, of_joints=others)
+
+    def with_joints(self, joints: Sequence[OfJoint]) -> Case:
+        """The case of a user's own geometry, with the names and ends of its joints.
+
+        Raises InputError if the case has lists of another length.
+        """
+        known = self.of_joints or joints
+        if len(known) != len(joints):
+            raise InputError(
+                f"case {self.name}: lists of {len(known)} values: must have one for each joint of "
+                f"the geometry ({len(joints)}: {', '.join(joint.name for joint in joints)})"
+            )
+        ends = [self.section | joint.section for joint in joints]
+        of_joints = (
+            replace(joint, values=own.values, section=section)
+            for own, joint, section in zip(known, joints, ends, strict=True)
+        )
+        return replace(self, section=ends[0], of_joints=tuple(of_joints) if len(joints) > 1 else ())
 
     @cached_property
     def law(self) -> Law[Any]:
@@ -175,13 +268,13 @@ class Case(ParameterValues):
         if not checked.keys() <= independent():
             raise KeyError(*checked.keys() - independent())
         source = self.source and self.source.with_overrides(checked)
-        result = replace(self, values=self.values | checked, source=source, published=False)
-        check_values(result, result.section, result.geometry is None)
+        result = replace(self.with_values(checked), source=source, published=False)
+        check_joints(result)
         return result
 
     def varied(
         self,
-        overrides: Values | None = None,
+        overrides: Settings | None = None,
         levels: str | Sequence[float] | None = None,
         tail_levels: str | Sequence[float] | None = None,
         steps: int | None = None,
@@ -205,8 +298,7 @@ class Case(ParameterValues):
     def with_uplift(self, mode: str) -> Case:
         """The case with another uplift, and no further uplift modes."""
         source = self.source and self.source.with_overrides({"uplift": mode})
-        values = {**self.values, "uplift": mode}
-        return replace(self, values=values, source=source, also_uplift=())
+        return replace(self.with_values({"uplift": mode}), source=source, also_uplift=())
 
 
 def between(levels: tuple[float, ...], time: float) -> float:
@@ -214,6 +306,11 @@ def between(levels: tuple[float, ...], time: float) -> float:
     points, time = (0.0, *levels), min(time, len(levels))
     i = min(int(time), len(points) - 2)
     return points[i] + (time - i) * (points[i + 1] - points[i])
+
+
+def joint_name(height: float) -> str:
+    """The name of a joint whose heel is at a height [m]."""
+    return f"lift {height:g} m" if height else "base"
 
 
 def is_name(text: str) -> bool:
@@ -294,7 +391,7 @@ def first_mesh(case: Case) -> dict[str, float | str]:
 
 def load(
     case: str,
-    overrides: Values | None = None,
+    overrides: Settings | None = None,
     levels: str | Sequence[float] | None = None,
     tail_levels: str | Sequence[float] | None = None,
     steps: int | None = None,
@@ -302,10 +399,10 @@ def load(
 ) -> Case:
     """Read a case file, apply overrides, resolve the parameters that follow others, check all.
 
-    case: letter, name or path; overrides: {name: value}; levels, tail_levels: [m] at t = 1, 2, 3,
-    also as a text 'a,b,c'; steps: equal steps between two levels; accuracy: coarse, standard, fine
-    or a percentage, chooses order, first mesh (overrides win) and one step per level. Raises
-    InputError.
+    case: letter, name or path; overrides: {name: value, or a value for each joint}, also
+    lift_heights [m]; levels, tail_levels: [m] at t = 1, 2, 3, also as a text 'a,b,c'; steps: equal
+    steps between two levels; accuracy: coarse, standard, fine or a percentage, chooses order, first
+    mesh (overrides win) and one step per level. Raises InputError.
     """
     path = case_file(case)
     text = casefile.read(path)
@@ -322,7 +419,7 @@ def resolve(source: Source) -> Case:
     steps, accuracy, error = source.steps, source.accuracy, None
     if accuracy is not None:
         error, plain = relative_error(accuracy), resolve(Source(path, file, overrides))
-        overrides = first_mesh(plain) | overrides
+        overrides = {**first_mesh(plain), **overrides}
         steps = steps or (1 if plain["drive"] == "level" else None)
     if steps is not None:
         check_steps(steps)
@@ -334,10 +431,14 @@ def resolve(source: Source) -> Case:
     tails = lists.pop("tail_levels", (0.0,))
     if tail_levels is not None:
         tails = levels_of("tail_levels", tail_levels)
-    overrides = {name: parameter(name).check(value) for name, value in overrides.items()}
-    text = assignments(file.defaults | overrides)
-    variables = parse(text + "".join(listing(n, v) for n, v in lists.items()) + INCLUDE)
+    overrides = {name: checked(name, value) for name, value in overrides.items()}
+    lifts = lists.pop("lift_heights", ())
+    if "lift_heights" in overrides:
+        lifts = levels_of("lift_heights", overrides.pop("lift_heights"))
     geometry = own_geometry(file.texts["geometry"]) if "geometry" in file.texts else None
+    values = settings_of_joints({**file.defaults, **file.of_joints, **overrides}, lifts, geometry)
+    listed = "".join(listing(n, v) for n, v in lists.items())
+    variables, *of_joints = parsed_by_joint(values, listed, lifts)
     if accuracy is not None and geometry and geometry.suffix != ".geo":
         raise InputError(
             f"accuracy = {accuracy}: must not be set with a mesh as geometry "
@@ -360,11 +461,106 @@ def resolve(source: Source) -> Case:
         source=source,
         shared={n: variables[n] for n in SHARED},
         section={n: variables[n] for n in SECTION},
+        lift_heights=lifts,
+        of_joints=stacked_joints(variables, of_joints),
     )
-    check_softening(result.joint, bool(variables["softening_twice"][0]))
-    check_values(result, result.section, result.geometry is None)
+    for joint, parsed in zip(result.joints, of_joints or [variables], strict=True):
+        check_softening(joint.joint, bool(parsed["softening_twice"][0]))
+    check_joints(result)
     check_loading(result, tails, of_case=tail_levels is None)
     return with_drive_times(result)
+
+
+def settings_of_joints(
+    settings: Settings, lifts: tuple[float, ...], geometry: Path | None
+) -> list[dict[str, Value]]:
+    """The settings of each joint, from the lowest.
+
+    lifts: heights of the joints above the first [m]. Raises InputError if a list has another length
+    than there are joints.
+    """
+    single = {n: v for n, v in settings.items() if not isinstance(v, tuple)}
+    lists = {n: v for n, v in settings.items() if isinstance(v, tuple)}
+    if geometry and lifts:
+        raise InputError(
+            "lift_heights: must not be set for a geometry of one's own, whose mesh has the joints"
+        )
+    number = max([1, *map(len, lists.values())]) if geometry else 1 + len(lifts)
+    for name, values in lists.items():
+        if len(values) != number:
+            raise InputError(
+                f"{name} = {','.join(map(str, values))}: must be one value, or as many as there "
+                f"are joints ({number})"
+            )
+    heights = {} if geometry else {"joint_height": lifts}
+    return [
+        {
+            **single,
+            **{n: v[k] for n, v in lists.items()},
+            **({n: v[k - 1] for n, v in heights.items()} if k else {}),
+        }
+        for k in range(number)
+    ]
+
+
+def parsed_by_joint(
+    values: list[dict[str, Value]], listed: str, lifts: tuple[float, ...]
+) -> list[dict[str, list[Any]]]:
+    """Variables of Gmsh's parser for a case, and, if it has several joints, for each of them alone.
+
+    values: settings of each joint; listed: the lists of the case, as text.
+    """
+    several = ""
+    if lifts:
+        slopes = (number(str(v.get("joint_slope", default_of("joint_slope")))) for v in values[1:])
+        several = listing("lift_heights", lifts) + listing("lift_slopes", slopes)
+    whole = parse(assignments(values[0]) + listed + several + INCLUDE)
+    if len(values) == 1:
+        return [whole]
+    elements = whole["all_elements"] if lifts else [whole["n_joint"][0]] * len(values)
+    sizes = {n: whole[n][0] for n in ("h_dam", "h_found")}
+    base = f"base_toe_y = {whole['base_toe_y'][0]!r};\n"
+    return [
+        whole,
+        *(
+            parse(assignments({**own, **sizes, "n_joint": n}) + listed + base + INCLUDE)
+            for own, n in zip(values, elements, strict=True)
+        ),
+    ]
+
+
+def stacked_joints(
+    variables: dict[str, list[Any]], of_joints: list[dict[str, list[Any]]]
+) -> tuple[OfJoint, ...]:
+    """The joints of a section, from the variables of `parsed_by_joint`."""
+    names = [joint_name(parsed["joint_height"][0]) for parsed in of_joints]
+    return tuple(
+        OfJoint(
+            name=joint.name,
+            upper=joint.upper,
+            lower=joint.lower,
+            values={n: parsed[n][0] for n in declared() if parsed[n] != variables[n]},
+            section={n: parsed[n] for n in SECTION},
+        )
+        for joint, parsed in zip(stacked(names), of_joints, strict=True)
+    )
+
+
+def default_of(name: str) -> float:
+    """The default of a parameter that is a number."""
+    return float(declared()[name].default)
+
+
+def check_joints(case: Case) -> None:
+    """Check the values of a case, joint by joint, and the heights of its lifts.
+
+    Raises InputError.
+    """
+    for joint in case.joints:
+        check_values(joint, joint.section, joint.geometry is None)
+    if case.lift_heights:
+        sections = [joint.section for joint in case.joints]
+        check_lifts(case, case.lift_heights, sections)
 
 
 def check_loading(case: Case, tails: Sequence[float], of_case: bool) -> None:
@@ -428,7 +624,7 @@ def is_mesh(path: Path) -> bool:
         raise InputError(f"geometry = {path}: {error.strerror}") from None
 
 
-def as_published(path: Path, overrides: Values, *loading: str | Sequence[float] | None) -> bool:
+def as_published(path: Path, overrides: Settings, *loading: str | Sequence[float] | None) -> bool:
     """Whether a case of the package is unchanged but for mesh, solver and uplift."""
     harmless = {n for n, p in declared().items() if p.group in ("Mesh", "Solver")}
     own = path.resolve().parent == CASES.resolve()

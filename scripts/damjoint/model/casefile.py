@@ -9,14 +9,17 @@ A case is a list of statements, in any layout, with // and /* */ comments:
     geometry = "own.msh";            your own mesh or .geo, beside this file
     default_<parameter> = value;     a text; arithmetic with + - * / ^ ( ), Pi, the units of
                                      pro/units.pro and defaults set before
-    levels() = {value, ...};         tail_levels() and times() likewise
+    levels() = {value, ...};         tail_levels(), times() and lift_heights() likewise
+    <parameter>() = {value, ...};    of a joint: a value for each joint, the lowest first
 """
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 import re
 import unicodedata
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeAlias
@@ -24,9 +27,9 @@ from typing import TypeAlias
 from .. import InputError, data
 from ..arrays import Value
 from .arithmetic import arithmetic_value, explained
-from .parameters import assignments, parameter
+from .parameters import assignments, checked, declared, parameter
 
-LISTS = ("levels", "tail_levels", "times")
+LISTS = ("levels", "tail_levels", "times", "lift_heights")
 TEXTS = ("title", "also_uplift", "geometry")
 #: Limits: bytes of a case file, files of a case.
 LONGEST, MOST_FILES = 1_000_000, 50
@@ -41,6 +44,8 @@ TOKEN = re.compile(
 
 #: A token: its kind (a group of TOKEN) and its text.
 Token: TypeAlias = tuple[str, str]
+#: Kinds and texts of the tokens of a value.
+Item: TypeAlias = tuple[tuple[str, ...], tuple[str, ...]]
 
 
 @dataclass
@@ -50,6 +55,8 @@ class CaseText:
     defaults: dict[str, Value] = field(default_factory=dict)
     lists: dict[str, list[float]] = field(default_factory=dict)
     texts: dict[str, str] = field(default_factory=dict)
+    #: values of each joint, by parameter
+    of_joints: dict[str, tuple[Value, ...]] = field(default_factory=dict)
     #: number of files read
     files: int = field(default=0, compare=False)
 
@@ -68,9 +75,15 @@ def written(case: CaseText) -> str:
     """The text of a case file from which `read` gives the same statements."""
     lines = [f'{name} = "{words}";\n' for name, words in case.texts.items()]
     lists = [
-        f"{name}() = {{{', '.join(map(repr, values))}}};\n" for name, values in case.lists.items()
+        f"{name}() = {{{', '.join(map(literal, values))}}};\n"
+        for name, values in (case.lists | case.of_joints).items()
     ]
     return "".join([*lines, assignments(case.defaults), *lists])
+
+
+def literal(value: Value) -> str:
+    """A value as it is written in a case file."""
+    return f'"{value}"' if isinstance(value, str) else repr(value)
 
 
 def read_into(case: CaseText, path: Path) -> None:
@@ -132,7 +145,7 @@ def add_statement(case: CaseText, statement: list[Token], path: Path, where: str
     if name == "Include" and kinds[1:] == ("text",):
         read_into(case, included(tokens[1][1:-1], path))
     elif name in LISTS and tokens[1:4] == ("(", ")", "="):
-        case.lists[name] = numbers(tokens[4:], case, where)
+        case.lists[name] = numbers(items_of(kinds[4:], tokens[4:], where), case, where)
     elif name in TEXTS and tokens[1:2] == ("=",):
         if kinds[2:] != ("text",):
             raise InputError(f'{where}: must be {name} = "words"')
@@ -142,12 +155,17 @@ def add_statement(case: CaseText, statement: list[Token], path: Path, where: str
         case.texts[name] = words
     elif name.startswith("default_") and tokens[1:2] == ("=",):
         name = name.removeprefix("default_")
-        try:
+        with located(where):
             known = parameter(name)
-        except InputError as error:
-            raise InputError(f"{where}: {error}") from None
-        value = tokens[2][1:-1] if kinds[2:] == ("text",) else evaluate(tokens[2:], case, where)
-        case.defaults[name] = known.check(value)
+        case.of_joints.pop(name, None)
+        case.defaults[name] = known.check(value_in((kinds[2:], tokens[2:]), case, where))
+    elif tokens[1:4] == ("(", ")", "=") and name in declared():
+        items = items_of(kinds[4:], tokens[4:], where)
+        values = tuple(value_in(item, case, where) for item in items)
+        with located(where):
+            checked(name, values)
+        case.defaults.pop(name, None)
+        case.of_joints[name] = values
     else:
         allowed = [*(f"{n}()" for n in LISTS), *TEXTS, "Include", "default_<parameter>"]
         near = difflib.get_close_matches("".join(tokens[:3]).partition("=")[0], allowed, 1)
@@ -155,25 +173,40 @@ def add_statement(case: CaseText, statement: list[Token], path: Path, where: str
             f"{where}: not a statement of a case; allowed: "
             + (f"{near[0]} (did you mean that?), " if near else "")
             + 'Include "file.case", title, also_uplift, geometry, default_<parameter> = value, '
-            + "levels() = {...}, tail_levels() = {...}, times() = {...}"
+            + ", ".join(f"{n}() = {{...}}" for n in LISTS)
+            + ", <parameter of a joint>() = {...}"
         )
 
 
-def numbers(tokens: tuple[str, ...], case: CaseText, where: str) -> list[float]:
-    """The values of a list: numbers or arithmetic between commas, in braces."""
+@contextlib.contextmanager
+def located(where: str) -> Iterator[None]:
+    """Add the place of a statement to the message of an InputError."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+
+
+def items_of(kinds: tuple[str, ...], tokens: tuple[str, ...], where: str) -> list[Item]:
+    """The items of a list between commas, in braces."""
     if tokens[:1] != ("{",) or tokens[-1:] != ("}",):
         raise InputError(f"{where}: must be a list of numbers in braces, such as {{3, 6, 8, 9}}")
     if len(tokens) == 2:
         raise InputError(f"{where}: must have at least one number")
-    items: list[float] = []
-    part: list[str] = []
-    for token in (*tokens[1:-1], ","):
-        if token == ",":
-            items.append(evaluate(tuple(part), case, where))
-            part = []
-        else:
-            part.append(token)
-    return items
+    commas = [i for i, token in enumerate(tokens) if token == ","]
+    starts, ends = [1, *(i + 1 for i in commas)], [*commas, len(tokens) - 1]
+    return [(kinds[a:b], tokens[a:b]) for a, b in zip(starts, ends, strict=True)]
+
+
+def numbers(items: list[Item], case: CaseText, where: str) -> list[float]:
+    """The values of a list of numbers."""
+    return [evaluate(tokens, case, where) for _, tokens in items]
+
+
+def value_in(item: Item, case: CaseText, where: str) -> Value:
+    """A text or the value of an arithmetic expression."""
+    kinds, tokens = item
+    return tokens[0][1:-1] if kinds == ("text",) else evaluate(tokens, case, where)
 
 
 def evaluate(tokens: tuple[str, ...], case: CaseText, where: str) -> float:

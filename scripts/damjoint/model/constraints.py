@@ -5,6 +5,7 @@ All raise InputError, "name = value: must be ...".
 
 from __future__ import annotations
 
+import itertools
 import math
 import operator
 from collections.abc import Mapping, Sequence
@@ -96,6 +97,25 @@ def check_section(case: ParameterValues, section: Mapping[str, Sequence[float]])
             "mesh_pattern = regular: must be free, layers or split for a section with batter, "
             "neck, lift joint or line forces"
         )
+
+
+def check_lifts(
+    case: ParameterValues,
+    heights: Sequence[float],
+    sections: Sequence[Mapping[str, Sequence[float]]],
+) -> None:
+    """Heights of the joints above the first one [m]; sections: of each joint, from the lowest."""
+    listed = ",".join(f"{h:g}" for h in heights)
+    if case.mesh.mesh_pattern == "regular":
+        raise InputError("mesh_pattern = regular: must be free, layers or split with lift_heights")
+    for lower, upper in itertools.pairwise(sections):
+        for end in ("heel", "toe"):
+            low, high = (section[f"{end}_y"][0] for section in (lower, upper))
+            if not low < high:
+                raise InputError(
+                    f"lift_heights = {listed}: must increase from above the first joint; the {end} "
+                    f"of a joint, at {high:g} m, is not above that of the one below it, {low:g} m"
+                )
 
 
 def check_drains(case: ParameterValues, length: float) -> None:

@@ -10,9 +10,7 @@ from ..arrays import Array, IntArray, Table
 from ..laws import COLUMNS
 from .mesh import Body
 from .results import FLUX, Results
-from .scene import SOLIDS
-
-BODIES = tuple(SOLIDS)
+from .scene import numbered
 
 
 @dataclass
@@ -32,6 +30,13 @@ class Solution:
     result: Results
     bodies: dict[str, Body]
     fields: dict[float, Field]
+
+    def of_joint(self, number: int) -> Solution:
+        """The same with the results and the surface of a single joint, by its number from 0."""
+        own = numbered("joint", number)
+        surface = {"joint": self.bodies[own]} if own in self.bodies else {}
+        result = self.result.joints[number]
+        return Solution(result, self.bodies | surface, self.fields)
 
 
 #: Fields of the joint: name, unit, and the columns of joint.csv along x, y, z (or a single column).
@@ -88,8 +93,15 @@ def row_of_nodes(body: Body, rows: Table) -> IntArray:
     return nearest_rows(body.points, rows)
 
 
+def joint_body(bodies: dict[str, Body], joint: int) -> Body:
+    """The surface of a joint, by its number from 0, in the bodies of a mesh."""
+    return bodies[numbered("joint", joint)]
+
+
 def joint_data(result: Results, body: Body, time: float) -> Table:
-    """The joint's table at its mesh nodes: OF_JOINT by name, vectors along x, y, z."""
+    """The table of a joint, the only one of `result`, at its mesh nodes: OF_JOINT by name, vectors
+    along x, y, z.
+    """
     rows = result.at(time)
     nearest = row_of_nodes(body, rows)
     return {

@@ -10,14 +10,14 @@ import re
 import signal
 import tempfile
 import threading
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from types import ModuleType
 from typing import Any
 
 from .. import InputError, __version__, data
-from ..arrays import Value
+from ..arrays import Setting, Value
 from ..laws import LAWS
 from ..storage import cached
 from .arithmetic import explained, quantity
@@ -28,6 +28,13 @@ INCLUDE = f'Include "{DECLARATIONS}";\n'
 
 #: The value of a parameter that follows others.
 AUTOMATIC = -1.0
+#: Parameters of which each joint may have its own value, besides those of the group Joint.
+OF_JOINTS = (
+    *("law", "uplift", "joint_slope", "aperture_min"),
+    *("drains", "drain_x", "drain_effectiveness", "drain_level"),
+    "drain_reference",
+    *("grout_pressure", "grout_t", "saw_thickness", "saw_t"),
+)
 #: Limits that mean > 0 and < 0.5 in the declarations; limit of ONELAB that means none.
 TINY, BELOW_HALF, ANY = 1e-30, 0.5 - 1e-9, 1e200
 
@@ -75,6 +82,11 @@ class Parameter:
     #: default, and the scenes in which it matters (empty: all), as in the declaration
     default: str = ""
     matters: str = ""
+
+    @property
+    def of_joints(self) -> bool:
+        """Whether each joint may have its own value."""
+        return self.group == "Joint" or self.name in OF_JOINTS
 
     @property
     def meaning(self) -> str:
@@ -258,24 +270,44 @@ def parameter(name: str) -> Parameter:
     return known[name]
 
 
-def settings(pairs: Iterable[str]) -> dict[str, Value]:
-    """{name: checked value} from texts 'name=value'.
+def settings(pairs: Iterable[str]) -> dict[str, Setting]:
+    """{name: checked value} from texts 'name=value', or 'name=value,value' with a value for each
+    joint.
 
     Raises InputError.
     """
-    values = {}
+    values: dict[str, Setting] = {}
     for pair in pairs:
-        name, equals, value = pair.partition("=")
+        name, equals, value = (part.strip() for part in pair.partition("="))
         if not equals:
             raise InputError(f"--set {pair}: must be NAME=VALUE")
-        values[name.strip()] = parameter(name.strip()).check(value.strip())
+        values[name] = checked(name, value.split(",") if "," in value else value)
     return values
 
 
-def levels_of(name: str, levels: str | Sequence[float]) -> tuple[float, ...]:
-    """Water levels [m] from numbers, or a text 'a,b,c'.
+def checked(name: str, value: Any) -> Setting:
+    """The value of a parameter, or the values of each joint, checked.
 
-    Raises InputError if there is none, or a level is not finite.
+    Raises InputError.
+    """
+    if name == "lift_heights":
+        return levels_of(name, value)
+    known = parameter(name)
+    if isinstance(value, (str, float, int)):
+        return known.check(value)
+    if not known.of_joints:
+        listed = ",".join(map(str, value))
+        raise InputError(
+            f"{name} = {listed}: must be a single value; only parameters of a joint "
+            "can have one for each joint"
+        )
+    return tuple(known.check(v) for v in value)
+
+
+def levels_of(name: str, levels: Any) -> tuple[float, ...]:
+    """Heights [m], for example water levels, from numbers or a text 'a,b,c'.
+
+    Raises InputError if there is none, or one is not finite.
     """
     values = levels.split(",") if isinstance(levels, str) else levels
     listed = levels if isinstance(levels, str) else ",".join(map(str, levels))
@@ -289,7 +321,7 @@ def levels_of(name: str, levels: str | Sequence[float]) -> tuple[float, ...]:
     return result
 
 
-def assignments(values: dict[str, Value]) -> str:
+def assignments(values: Mapping[str, Value]) -> str:
     """Lines default_name = value; in the common language of Gmsh and GetDP."""
     lines = (
         f'default_{n} = "{v}";\n' if isinstance(v, str) else f"default_{n} = {v!r};\n"

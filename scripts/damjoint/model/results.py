@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import functools
+import operator
+from collections.abc import Collection
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -14,6 +17,7 @@ from .case import Case
 JOINT = {
     "time": ("-", "t of the requested level"),
     "level": ("m", "reservoir level above the base (y = 0)"),
+    "joint": ("-", "number of the joint, from the lowest"),
     "x": ("m", "coordinate of the node, downstream"),
     "y": ("m", "coordinate of the node, upwards from the base's heel"),
     "z": ("m", "coordinate of the node along the dam axis, 3D"),
@@ -56,11 +60,40 @@ HISTORY = {
     "U": ("N/m", "uplift: resultant of the water pressure in the joint"),
     "x_resultant": ("m", "position of N on the joint, from the heel"),
 }
+#: Those of a joint. With several joints: of the first one; of joint 2, 3, ... by `column_of`.
+HISTORY_OF_JOINTS = (
+    *("crack_length", "process_zone", "slip_length", "max_opening"),
+    *("N", "T", "M", "flux", "U", "x_resultant"),
+)
+
+
+def column_of(name: str, joint: int) -> str:
+    """A column of history.csv of a joint, by its number from 0: N, N_2, N_3, ..."""
+    return f"{name}_{joint + 1}" if joint else name
+
+
+def row_of_joint(row: dict[str, float], joint: int) -> dict[str, float]:
+    """A row of history.csv with the columns of a joint, by its number from 0, without suffix."""
+    own = {n: row[column_of(n, joint)] for n in HISTORY_OF_JOINTS if column_of(n, joint) in row}
+    return row | own
+
+
+def history_columns(case: Case) -> dict[str, tuple[str, str]]:
+    """The columns of a case's history.csv: unit and meaning."""
+    others = {
+        column_of(name, k): (HISTORY[name][0], f"{joint}: {HISTORY[name][1]}")
+        for k, joint in enumerate(case.joint_names)
+        if k
+        for name in HISTORY_OF_JOINTS
+    }
+    return HISTORY | others
 
 
 @dataclass
 class Results:
-    """The results of a run: tables as {column: array}."""
+    """The results of a run: tables as {column: array}. With several joints, each of `joints` are
+    the results of a single one.
+    """
 
     case: Case
     #: a row per converged step, columns HISTORY
@@ -72,13 +105,35 @@ class Results:
     extrapolated: Table
     #: whether the run ended before its last level
     stopped: bool = False
-    #: opening of the heel [m] at each row of history
+    #: opening of the heel of the first joint [m] at each row of history
     heel: Array = field(default_factory=lambda: np.zeros(0))
     #: about the run itself, for run.json: engine, sizes, versions, seconds
     info: dict[str, Any] = field(default_factory=dict)
 
+    @property
+    def joints(self) -> list[Results]:
+        """The results of each joint, with its own case, rows, and columns of the history."""
+        cases = self.case.joints
+        return [self.of_joint(k) for k in range(len(cases))] if len(cases) > 1 else [self]
+
+    def of_joint(self, number: int) -> Results:
+        """The results of a joint, by its number from 0."""
+        history = {n: self.history[n] for n in HISTORY if n not in HISTORY_OF_JOINTS}
+        history |= {n: self.history[column_of(n, number)] for n in HISTORY_OF_JOINTS}
+        case = self.case.joints[number]
+        return replace(
+            self,
+            case=case,
+            history={name: history[name] for name in HISTORY},
+            joint=rows_of(self.joint, number, joint_columns(case)),
+            extrapolated=rows_of(self.extrapolated, number, joint_columns(case)),
+            heel=self.heel if number == 0 else np.zeros(0),
+        )
+
     def at(self, time: float | None = None) -> Table:
-        """The joint rows of a requested time, the last one by default, from heel to toe."""
+        """The rows of the joints at a requested time, the last one by default, joint by joint from
+        heel to toe.
+        """
         return rows_at(self.joint, time)
 
     def at_extrapolated(self, time: float | None = None) -> Table:
@@ -104,25 +159,37 @@ class Results:
         return self.case["drive"] == "level" and time < self.case.times[-1] - 1e-9
 
 
+def rows_of(table: Table, number: int, columns: Collection[str]) -> Table:
+    """The rows and columns of a joint, by its number from 0."""
+    if not table:
+        return table
+    rows = table["joint"] == number + 1
+    return {name: table[name][rows] for name in columns}
+
+
 def rows_at(table: Table, time: float | None = None) -> Table:
-    """The rows of one time (the last one by default), sorted from heel to toe, then by z."""
+    """The rows of one time (the last one by default), sorted joint by joint, from heel to toe, then
+    by z.
+    """
     time = table["time"].max() if time is None else time
     rows = np.flatnonzero(np.isclose(table["time"], time))
     s, z = (np.round(table[n][rows] / (np.abs(table["s"]).max() or 1.0), 9) for n in "sz")
-    rows = rows[np.lexsort((z, s))]
+    rows = rows[np.lexsort((z, s, table["joint"][rows]))]
     return {name: column[rows] for name, column in table.items()}
 
 
 def joint_columns(case: Case) -> dict[str, tuple[str, str]]:
     """The columns of a case's joint.csv: unit and meaning."""
-    return JOINT | dict(case.law.columns) | (FLUX if case["uplift"] == "flow" else {})
+    of_laws = [dict(joint.law.columns) for joint in case.joints]
+    flow = FLUX if any(joint["uplift"] == "flow" for joint in case.joints) else {}
+    return functools.reduce(operator.or_, [JOINT, *of_laws, flow])
 
 
 def joint_table(case: Case, blocks: list[Array]) -> Table:
-    """The joint's table from blocks of rows, one per requested time, whose columns are those of the
+    """The joints' table from blocks of rows, one per requested time, whose columns are those of the
     table but for sigma_n_eff.
 
-    Adds sigma_n_eff and sorts each block from heel to toe, then by z.
+    Adds sigma_n_eff and sorts each block as `rows_at`.
     """
     columns = joint_columns(case)
     names = [name for name in columns if name != "sigma_n_eff"]
@@ -141,7 +208,10 @@ def history_table(case: Case, rows: Table) -> Table:
     """The history from an engine's output at each step; adds load_factor and x_resultant."""
     scheduled = np.array([case.level_at(time) for time in rows["time"]])
     factor = np.divide(rows["level"], scheduled, out=np.ones_like(scheduled), where=scheduled > 0)
-    # where M = N (length - x)
-    arm = np.divide(rows["M"], rows["N"], out=np.full_like(scheduled, np.nan), where=rows["N"] > 0)
-    rows = rows | {"load_factor": factor, "x_resultant": case.joint_length - arm}
-    return {name: rows[name] for name in HISTORY}
+    rows = rows | {"load_factor": factor}
+    for k, joint in enumerate(case.joints):
+        N, M = (rows[column_of(name, k)] for name in "NM")
+        # where M = N (length - x)
+        arm = np.divide(M, N, out=np.full_like(scheduled, np.nan), where=N > 0)
+        rows |= {column_of("x_resultant", k): joint.joint_length - arm}
+    return {name: rows[name] for name in history_columns(case)}

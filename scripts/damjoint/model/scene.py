@@ -1,37 +1,40 @@
-"""The parts of a scene: two named bodies and the joint between them."""
+"""The parts of a scene: the rock, bodies of concrete, and joints between them."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-
-@dataclass(frozen=True)
-class Solid:
-    """An elastic body: material (suffix of E_, nu_ and rho_) by region."""
-
-    materials: dict[str, str]
+#: Material (suffix of E_, nu_ and rho_) of each region. The region lower: concrete bonded to rock.
+MATERIALS = {"dam": "dam", "foundation": "found", "lower": "dam"}
 
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint: its two bodies, the regions of its ends, the parameter that selects its law."""
+    """A joint: its name for messages, its two bodies, the names of its region and of its ends."""
 
+    name: str
     upper: str
     lower: str
-    heel: str
-    toe: str
-    law: str
+    region: str = "joint"
+    heel: str = "heel"
+    toe: str = "toe"
 
 
-#: Bodies by name. The region under a lift joint is of the dam's concrete.
-SOLIDS = {
-    "dam": Solid({"dam": "dam"}),
-    "foundation": Solid({"foundation": "found", "lower": "dam"}),
-}
-#: Joints by the name of their region.
-JOINTS = {"joint": Joint(upper="dam", lower="foundation", heel="heel", toe="toe", law="law")}
-#: The name of the only joint.
-(JOINT_NAME,) = JOINTS
+def numbered(name: str, number: int) -> str:
+    """The name of a body or region of joint number 0, 1, ...: dam, dam 2, ..."""
+    return f"{name} {number + 1}" if number else name
+
+
+def stacked(names: Sequence[str]) -> list[Joint]:
+    """The joints of a section, from the lowest: each below a body of its own."""
+    bodies = ["foundation", *(numbered("dam", k) for k in range(len(names)))]
+    parts = ("joint", "heel", "toe")
+    return [
+        Joint(name, bodies[k + 1], bodies[k], *(numbered(part, k) for part in parts))
+        for k, name in enumerate(names)
+    ]
+
 
 #: Sides of a face, in the order of the numbers in pro/section.pro: reservoir, tailwater, water on
 #: the crest, on the reservoir's floor, on the tailwater's bed.

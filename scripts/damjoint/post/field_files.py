@@ -9,7 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..model.fields import OF_JOINT, Field, Solution, joint_data
+from ..arrays import Table
+from ..model.fields import OF_JOINT, Field, Solution, joint_body, joint_data
 from ..model.mesh import Body
 from ..model.parameters import constants, start_gmsh
 from ..storage import atomic_write
@@ -43,13 +44,13 @@ def write_fields(solution: Solution, folder: Path) -> None:
     Dam and foundation have their own points on the joint, so that the opening is visible.
     """
     folder.mkdir(exist_ok=True)
-    fields, joint = solution.fields, solution.bodies["joint"]
+    fields, joint = solution.fields, all_joints(solution)
     bodies = {n: solution.bodies[n] for n in next(iter(fields.values())).displacement}
     points = np.concatenate([body.points for body in bodies.values()])
     cells, regions = bulk_cells(bodies)
     displacement = {t: np.vstack([f.displacement[n] for n in bodies]) for t, f in fields.items()}
     stress = {t: np.vstack([f.stress[n] for n in bodies]) for t, f in fields.items()}
-    on_joint = {time: joint_data(solution.result, joint, time) for time in fields}
+    on_joint = {time: joints_data(solution, time) for time in fields}
 
     for time in fields:
         at_nodes = {"displacement": displacement[time]}
@@ -62,8 +63,9 @@ def write_fields(solution: Solution, folder: Path) -> None:
         ("stress [Pa]", "ElementData", {t: s[:, TENSOR] for t, s in stress.items()}),
     ]
     joint_views: list[View] = [
-        (f"{name} [{OF_JOINT[name][0]}]", "NodeData", {t: d[name] for t, d in on_joint.items()})
-        for name in next(iter(on_joint.values()))
+        (f"{name} [{unit}]", "NodeData", {t: d[name] for t, d in on_joint.items()})
+        for name, (unit, _) in OF_JOINT.items()
+        if name in next(iter(on_joint.values()))
     ]
     with atomic_write(folder / "bulk.msh") as path:
         write_views(path, points, cells, bulk_views)
@@ -71,17 +73,57 @@ def write_fields(solution: Solution, folder: Path) -> None:
         write_views(path, joint.points, joint.cells, joint_views)
 
 
+def all_joints(solution: Solution) -> Body:
+    """The surfaces of all joints as one."""
+    surfaces = [joint_body(solution.bodies, k) for k in range(len(solution.result.joints))]
+    starts = np.cumsum([0, *(len(surface.points) for surface in surfaces)])
+    return Body(
+        np.concatenate([surface.points for surface in surfaces]),
+        np.concatenate([surface.node_tags for surface in surfaces]),
+        [
+            (shape, table + start)
+            for start, surface in zip(starts, surfaces, strict=False)
+            for shape, table in surface.cells
+        ],
+        np.concatenate([surface.element_tags for surface in surfaces]),
+    )
+
+
+def joints_data(solution: Solution, time: float) -> Table:
+    """The tables of all joints at their mesh nodes, see `joint_data`; nan where a joint has no such
+    column.
+    """
+    parts = []
+    for k, own in enumerate(solution.result.joints):
+        surface = joint_body(solution.bodies, k)
+        number = np.full(len(surface.points), k + 1.0)
+        parts.append(joint_data(own, surface, time) | {"joint": number})
+    names = [name for name in (*OF_JOINT, "joint") if any(name in part for part in parts)]
+    missing = [np.full(len(part["joint"]), np.nan) for part in parts]
+    return {
+        name: np.concatenate([p.get(name, m) for p, m in zip(parts, missing, strict=True)])
+        for name in names
+    }
+
+
 def bulk_cells(bodies: dict[str, Body]) -> tuple[Cells, np.ndarray]:
     """Collect the cells of bodies with common point numbers, and the region number of each cell
     (n,).
     """
     cells, regions, first = [], [], 0
-    for body in bodies.values():
+    for name, body in bodies.items():
         cells += [(shape, table + first) for shape, table in body.cells]
         for region, (_, table) in zip(body.regions, body.cells, strict=True):
-            regions.append(np.full(len(table), int(constants()[region.upper()][0])))
+            regions.append(np.full(len(table), number_of(name, region)))
         first += len(body.points)
     return cells, np.concatenate(regions)
+
+
+def number_of(body: str, region: str) -> int:
+    """Number of a body's region: 1 dam, 1001 dam 2, ..."""
+    _, _, which = body.partition(" ")
+    layer = int(constants()["LAYER"][0]) * (int(which) - 1 if which else 0)
+    return int(constants()[region.upper()][0]) + layer
 
 
 def write_vtu(

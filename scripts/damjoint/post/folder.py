@@ -10,13 +10,14 @@ import json
 import os
 import re
 from collections.abc import Iterator
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from .. import InputError, __version__
-from ..model.case import Case, is_name
+from ..model.case import Case, OfJoint, is_name
 from ..model.parameters import declared
-from ..model.results import HISTORY, Results, joint_columns
+from ..model.results import Results, history_columns, joint_columns
 from ..statics.verdict import hints, statement, verdict
 from ..storage import PART, atomic_write, locked_folder
 
@@ -139,6 +140,8 @@ def write_info(results: Results, folder: Path, state: str = "", why: str = "") -
             "statement": why or statement(results),
             "hints": hints(results),
             "parameters": case.values,
+            "lift_heights": case.lift_heights,
+            "joints": [stored(case, own) for own in case.of_joints],
             "levels": case.levels,
             "tail_levels": case.tail_levels,
             "times": case.times,
@@ -149,9 +152,16 @@ def write_info(results: Results, folder: Path, state: str = "", why: str = "") -
             "published": case.published,
             "hardening_asked": case.hardening_asked,
             **results.info,
-            "units": {n: unit for n, (unit, _) in (joint_columns(case) | HISTORY).items()},
+            "units": {
+                n: unit for n, (unit, _) in (joint_columns(case) | history_columns(case)).items()
+            },
         },
     )
+
+
+def stored(case: Case, own: OfJoint) -> dict[str, Any]:
+    """What run.json has of a joint; a section by parameters is computed again."""
+    return asdict(own) | {"section": own.section if case.geometry else {}}
 
 
 def write_json(folder: Path, info: dict[str, Any]) -> None:

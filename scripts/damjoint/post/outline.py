@@ -9,7 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import ROUND_OFF
-from ..model.fields import BODIES
+from ..arrays import Table
+from ..model.case import Case
+from ..model.fields import distance
 from ..model.mesh import Body
 
 #: Relative distance of points that count as level: a user's crest may be slightly off.
@@ -136,21 +138,44 @@ def plane_body(body: Body, displacement: np.ndarray, scale: float) -> PlaneBody 
     return PlaneBody(points, moved, faces, boundary(points, tables))
 
 
-@dataclass
-class Section:
-    """The plane section: dam and foundation, ends of the joint (2,) [m]."""
+@dataclass(frozen=True)
+class JointLine:
+    """A joint of a section: names of its bodies, heel and toe (2,) [m]."""
 
-    dam: PlaneBody
-    foundation: PlaneBody
+    upper: str
+    lower: str
     heel: np.ndarray
     toe: np.ndarray
 
+
+def joint_lines(case: Case, rows: list[Table]) -> list[JointLine]:
+    """The joints of a case, from the rows of each at one time."""
+    bodies = [(own.upper, own.lower) for own in case.of_joints] or [("dam", "foundation")]
+    lines = []
+    for names, own in zip(bodies, rows, strict=True):
+        s = distance(own)
+        ends = (np.array([own[axis][i] for axis in "xy"]) for i in (s.argmin(), s.argmax()))
+        lines.append(JointLine(*names, *ends))
+    return lines
+
+
+@dataclass
+class Section:
+    """The plane section: bodies by name, and joints."""
+
+    bodies: dict[str, PlaneBody]
+    joints: list[JointLine]
+
     def __post_init__(self) -> None:
-        #: both joint faces from heel to toe, as point numbers of their body
-        self.joint_faces = (
-            (self.dam, self.dam.between(self.heel, self.toe)),
-            (self.foundation, self.foundation.between(self.toe, self.heel)[::-1]),
-        )
+        self.foundation = self.bodies["foundation"]
+        #: all bodies above the foundation
+        self.dam = union([body for name, body in self.bodies.items() if name != "foundation"])
+        on_rock = [joint for joint in self.joints if joint.lower == "foundation"]
+        #: ends of the dam on the foundation (2,) [m]
+        self.heel = min((joint.heel for joint in on_rock), key=lambda end: end[0])
+        self.toe = max((joint.toe for joint in on_rock), key=lambda end: end[0])
+        #: both faces of each joint from heel to toe, as point numbers of their bodies
+        self.joint_faces = [self.faces_of(joint) for joint in self.joints]
         around = self.dam.between(self.toe, self.heel)
         height = self.dam.points[around, 1]
         crest = np.flatnonzero(height > height.max() - LEVEL * np.ptp(height))
@@ -169,6 +194,16 @@ class Section:
         self.floor = self.foundation.moved[ground[: left + 1]]
         self.bed = self.foundation.moved[ground[right:]]
 
+    def faces_of(
+        self, joint: JointLine
+    ) -> tuple[tuple[PlaneBody, np.ndarray], tuple[PlaneBody, np.ndarray]]:
+        """The upper and the lower face of a joint from heel to toe: body, numbers of its points."""
+        upper, lower = self.bodies[joint.upper], self.bodies[joint.lower]
+        return (
+            (upper, upper.between(joint.heel, joint.toe)),
+            (lower, lower.between(joint.toe, joint.heel)[::-1]),
+        )
+
     def reservoir(self, level: float) -> np.ndarray:
         """Polygon (n, 2) [m] of the water upstream, and above the crest, up to a level."""
         crest = self.crest[: -1 if level > self.top else 0]
@@ -179,15 +214,34 @@ class Section:
         return fill_to_level(np.concatenate([self.bed, self.downstream]), level)
 
 
-def section_of(
-    bodies: dict[str, Body], displacement: dict[str, np.ndarray], scale: float, ends: np.ndarray
-) -> Section | None:
-    """Cut the displaced mesh at its lowest z; None if a body has no face there.
+def union(bodies: list[PlaneBody]) -> PlaneBody:
+    """Several bodies as one; its outline passes their joints."""
+    if len(bodies) == 1:
+        return bodies[0]
+    starts = np.cumsum([0, *(len(body.points) for body in bodies)])
+    points = np.concatenate([body.points for body in bodies])
+    moved = np.concatenate([body.moved for body in bodies])
+    faces: dict[str, list[np.ndarray]] = {}
+    for start, body in zip(starts, bodies, strict=False):
+        for name, tables in body.faces.items():
+            faces.setdefault(name, []).extend(table + start for table in tables)
+    places = np.round(points / np.ptp(points, axis=0).max(), 9)
+    _, first, same = np.unique(places, axis=0, return_index=True, return_inverse=True)
+    glued = first[same.ravel()]  # points of the same place as a single one
+    tables = [glued[table] for own in faces.values() for table in own]
+    return PlaneBody(points, moved, faces, boundary(points, tables))
 
-    ends: heel and toe of the joint (2, 2 or 3) [m].
-    """
-    dam, foundation = (plane_body(bodies[n], displacement[n], scale) for n in BODIES)
-    return Section(dam, foundation, ends[0, :2], ends[1, :2]) if dam and foundation else None
+
+def section_of(
+    bodies: dict[str, Body],
+    displacement: dict[str, np.ndarray],
+    scale: float,
+    joints: list[JointLine],
+) -> Section | None:
+    """Cut the displaced mesh at its lowest z; None if a body has no face there."""
+    planes = {n: plane_body(bodies[n], u, scale) for n, u in displacement.items()}
+    shown = {name: plane for name, plane in planes.items() if plane}
+    return Section(shown, joints) if len(shown) == len(planes) else None
 
 
 def fill_to_level(shore: np.ndarray, level: float) -> np.ndarray:

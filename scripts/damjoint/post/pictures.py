@@ -25,7 +25,7 @@ from ..model.fields import Solution, along, distance, row_of_nodes, state_of
 from ..model.mesh import Body
 from ..model.results import Results
 from ..statics import gravity
-from ..statics.verdict import overturning_level, statement
+from ..statics.verdict import decisive_joint, overturning_level, statement
 from . import validation
 from .drawing import (
     BLUE,
@@ -105,8 +105,9 @@ def picture(solution: Solution) -> Figure:
         time = shown_time(result)
         left, right = parts[0].subfigures(1, 2, width_ratios=(1, RIGHT))
         draw_dam(left, solution, time)
-        draw_joint(right, solution, time)
-        draw_history(parts[1], result)
+        own = solution.of_joint(decisive_joint(result))
+        draw_joint(right, own, time)
+        draw_history(parts[1], own.result)
         if len(parts) > 2:
             draw_solid(parts[2], solution, time)
     return figure
@@ -134,7 +135,8 @@ def heading(result: Results) -> str:
         title += f", tailwater {state['tail_level']:.4g} m"
     if case["uplift"] == "flow":
         title += f", leakage {state['flux']:.3g} kg/(m s)"
-    return title
+    shown = case.named((decisive_joint(result),))
+    return title + (f"; curves: {shown}" if shown else "")
 
 
 def shear_limit(case: Case, rows: dict[str, np.ndarray]) -> tuple[str, np.ndarray] | None:
@@ -337,7 +339,7 @@ def draw_solid(figure: FigureBase, solution: Solution, time: float) -> None:
     """Draw what an extruded section in 3D has besides: a view and maps of the joint."""
     left, right = figure.subfigures(1, 2, width_ratios=(1, RIGHT))
     draw_view(left, solution, time)
-    draw_maps(right, solution, time)
+    draw_maps(right, solution.of_joint(decisive_joint(solution.result)), time)
 
 
 def draw_view(figure: FigureBase, solution: Solution, time: float) -> None:

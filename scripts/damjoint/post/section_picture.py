@@ -14,6 +14,7 @@ from matplotlib.figure import FigureBase
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from ..arrays import Table
 from ..model.case import has_drains
 from ..model.fields import OPEN, Solution, distance, nearest_rows, state_of
 from ..model.loads import Loading, line_forces
@@ -31,7 +32,7 @@ from .drawing import (
     panels,
     runs_of,
 )
-from .outline import Section, exaggeration, section_of
+from .outline import Section, exaggeration, joint_lines, section_of
 from .units import FORCES, STRESSES, with_unit
 
 #: Length of an arrow over the dam's size.
@@ -54,12 +55,13 @@ def draw_section(figure: FigureBase, solution: Solution, time: float) -> None:
     (axes,) = panels(figure, left=0.55, right=0.1, bottom=0.4 + LEGEND, top=0.25).flat
     axes.set_anchor("N")
     case, field = solution.result.case, solution.fields.get(time)
-    rows = solution.result.at(time)
-    s = distance(rows)
-    ends = np.array([[rows[axis][i] for axis in "xyz"] for i in (s.argmin(), s.argmax())])
+    rows = [own.at(time) for own in solution.result.joints]
     displacement = field.displacement if field else {}
     scale = exaggeration(displacement, case.size)
-    section = section_of(solution.bodies, displacement, scale, ends) if displacement else None
+    section = None
+    if displacement:
+        lines = joint_lines(case, rows)
+        section = section_of(solution.bodies, displacement, scale, lines)
     if section is None:
         axes.set_axis_off()
         why = "no section: " + (
@@ -80,11 +82,13 @@ class SectionDrawing:
         solution: Solution,
         section: Section,
         time: float,
-        rows: dict[str, np.ndarray],
+        rows: list[Table],
     ) -> None:
+        """rows: of each joint."""
         self.axes, self.section, self.rows = axes, section, rows
-        self.case = solution.result.case
+        self.case, self.joints = solution.result.case, solution.result.joints
         self.state = solution.result.state(time)
+        self.states = [own.state(time) for own in self.joints]
         self.loading = Loading.at(self.case, time, self.state["level"], self.state["tail_level"])
         self.height = np.ptp(section.dam.points[:, 1])
         self.legend: list[tuple[Patch | Line2D, str]] = []
@@ -95,9 +99,11 @@ class SectionDrawing:
         self.water()
         self.bodies()
         self.joint()
-        self.drains()
+        for k in range(len(self.joints)):
+            self.drains(k)
         self.forces()
-        self.resultant()
+        for k in range(len(self.joints)):
+            self.resultant(k)
         self.axes.set_aspect("equal")
         self.axes.set_xlabel("x [m]", fontsize=9)
         self.axes.set_ylabel("y [m]", fontsize=9)
@@ -182,7 +188,7 @@ class SectionDrawing:
 
     def bodies(self) -> None:
         """Draw the deformed mesh, and the undeformed outlines."""
-        for body in (self.section.foundation, self.section.dam):
+        for body in reversed(self.section.bodies.values()):
             for name, tables in body.faces.items():
                 for table in tables:
                     color = ROCK if name == "foundation" else CONCRETE
@@ -193,23 +199,10 @@ class SectionDrawing:
             self.axes.plot(*outline.T, "--", color=GREY, linewidth=0.6, zorder=2)
 
     def joint(self) -> None:
-        """Draw both faces of the joint in the style of its state; water in the crack."""
-        faces = []
-        states = state_of(self.rows)
-        for body, face in self.section.joint_faces:
-            state = states[self.rows_at(body.points[face])]
-            both_ends = np.minimum(state[:-1], state[1:])
-            line = body.moved[face]
-            faces.append(np.stack([line[:-1], line[1:]], axis=1))
-            self.axes.plot(*line.T, color=DARK, linewidth=0.8, zorder=3)
-            for number, first, end in runs_of(both_ends):
-                if number in STATES:
-                    self.axes.plot(*line[first : end + 1].T, **self.joint_style(number), zorder=3)
-        if self.case["uplift"] != "none" and (both_ends == OPEN).any():
-            crack = np.concatenate([faces[0], faces[1][:, ::-1]], axis=1)[both_ends == OPEN]
-            self.axes.add_collection(PolyCollection(crack, color=WATER, zorder=2), autolim=False)
+        """Draw both faces of each joint in the style of its state; water in the cracks."""
+        shown = set[int]().union(*(self.faces(k) for k in range(len(self.joints))))
         for number, style in STATES.items():
-            if (both_ends == number).any():
+            if number in shown:
                 handle = Line2D([], [], **self.joint_style(number))
                 self.legend.append((handle, f"joint {style.label}"))
 
@@ -219,20 +212,41 @@ class SectionDrawing:
         style = STATES[number]
         return {"color": style.color, "linestyle": style.line, "linewidth": 2.4}
 
-    def rows_at(self, points: np.ndarray) -> np.ndarray:
-        """Rows of the joint's table nearest to points (n, 2) of the section."""
-        lowest = np.full(len(points), self.rows["z"].min())
-        return nearest_rows(np.column_stack([points, lowest]), self.rows)
+    def faces(self, joint: int) -> set[int]:
+        """Draw both faces of a joint, and water in its crack; the states of the lower face."""
+        faces = []
+        states = state_of(self.rows[joint])
+        for body, face in self.section.joint_faces[joint]:
+            state = states[self.rows_at(body.points[face], joint)]
+            both_ends = np.minimum(state[:-1], state[1:])
+            line = body.moved[face]
+            faces.append(np.stack([line[:-1], line[1:]], axis=1))
+            self.axes.plot(*line.T, color=DARK, linewidth=0.8, zorder=3)
+            for number, first, end in runs_of(both_ends):
+                if number in STATES:
+                    self.axes.plot(*line[first : end + 1].T, **self.joint_style(number), zorder=3)
+        if self.joints[joint].case["uplift"] != "none" and (both_ends == OPEN).any():
+            crack = np.concatenate([faces[0], faces[1][:, ::-1]], axis=1)[both_ends == OPEN]
+            self.axes.add_collection(PolyCollection(crack, color=WATER, zorder=2), autolim=False)
+        return set(both_ends.tolist())
 
-    def drains(self) -> None:
-        """Draw the line of the drains from the joint down into the ground."""
-        case = self.case
+    def rows_at(self, points: np.ndarray, joint: int) -> np.ndarray:
+        """Rows of a joint's table nearest to points (n, 2) of the section."""
+        lowest = np.full(len(points), self.rows[joint]["z"].min())
+        return nearest_rows(np.column_stack([points, lowest]), self.rows[joint])
+
+    def drains(self, joint: int) -> None:
+        """Draw the line of a joint's drains from it down into the ground."""
+        case = self.joints[joint].case
         if not has_drains(case):
             return
-        x, y = self.on_joint(case["drain_x"])
+        x, y = self.on_joint(case["drain_x"], joint)
         self.axes.plot([x, x], [y, y - DRAIN * self.height], **DRAINS, zorder=3)
         self.legend.append(
-            (Line2D([], [], **DRAINS), f"drains, {case['drain_x']:.3g} m from the heel")
+            (
+                Line2D([], [], **DRAINS),
+                f"drains{self.of_joint(joint)}, {case['drain_x']:.3g} m from the heel",
+            )
         )
 
     def forces(self) -> None:
@@ -254,28 +268,37 @@ class SectionDrawing:
             shown = ", ".join(f"{n} = {share * case[n]:.3g}" for n in ("k_h", "k_v") if case[n])
             self.legend.append((arrow_handle(RED), f"earthquake, {shown}"))
 
-    def resultant(self) -> None:
-        """Draw the effective resultant where it meets the joint, and the joint's middle third."""
-        length = distance(self.rows).max()
-        third = self.on_joint(np.linspace(length / 3, 2 * length / 3, 30))
+    def of_joint(self, joint: int) -> str:
+        """The name of a joint for a label; empty if there is only one."""
+        name = self.case.named((joint,))
+        return f" of {name}" if name else ""
+
+    def resultant(self, joint: int) -> None:
+        """Draw the effective resultant where it meets a joint, and the joint's middle third."""
+        length = distance(self.rows[joint]).max()
+        third = self.on_joint(np.linspace(length / 3, 2 * length / 3, 30), joint)
         x, y = third.T
         self.axes.plot(x, y - THIRD * self.height, color=GREEN, linewidth=3, zorder=3)
-        self.legend.append((Line2D([], [], color=GREEN, linewidth=3), "middle third"))
-        at, normal, shear = (self.state[n] for n in ("x_resultant", "N", "T"))
+        if joint == 0:
+            handle = Line2D([], [], color=GREEN, linewidth=3)
+            self.legend.append((handle, "middle third"))
+        at, normal, shear = (self.states[joint][n] for n in ("x_resultant", "N", "T"))
         if not math.isfinite(at):
             return
-        heel_to_toe = self.section.toe - self.section.heel
+        heel_to_toe = self.section.joints[joint].toe - self.section.joints[joint].heel
         along = heel_to_toe / np.hypot(*heel_to_toe)
         down = np.array([along[1], -along[0]])
-        place = self.on_joint(at / self.case.joint_length * length)
-        self.arrow(place, normal * down + shear * along, GREEN, "", RESULTANT)
-        size = with_unit(math.hypot(normal, shear), FORCES, 3)
-        self.legend.append((arrow_handle(GREEN), f"resultant {size}, {at:.3g} m from heel"))
+        place = self.on_joint(at / self.joints[joint].case.joint_length * length, joint)
+        longer = RESULTANT * length / distance(self.rows[0]).max()
+        self.arrow(place, normal * down + shear * along, GREEN, "", longer)
+        which = self.case.named((joint,)) or "resultant"
+        label = f"{which} {with_unit(math.hypot(normal, shear), FORCES, 3)}, {at:.3g} m from heel"
+        self.legend.append((arrow_handle(GREEN), label))
 
-    def on_joint(self, s: float | np.ndarray) -> np.ndarray:
-        """Points (..., 2) on the deformed lower face at distances s from the heel [m]."""
-        body, face = self.section.joint_faces[1]
-        along = distance(self.rows)[self.rows_at(body.points[face])]
+    def on_joint(self, s: float | np.ndarray, joint: int) -> np.ndarray:
+        """Points (..., 2) on a joint's deformed lower face at distances s from its heel [m]."""
+        body, face = self.section.joint_faces[joint][1]
+        along = distance(self.rows[joint])[self.rows_at(body.points[face], joint)]
         return np.stack([np.interp(s, along, axis) for axis in body.moved[face].T], axis=-1)
 
     def moved_with_dam(self, place: np.ndarray) -> np.ndarray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +13,19 @@ import numpy as np
 
 from .. import InputError
 from ..arrays import Value
-from ..model.case import SECTION, SHARED, Case, is_name
+from ..model.case import (
+    SECTION,
+    SHARED,
+    Case,
+    is_name,
+    parsed_by_joint,
+    stacked_joints,
+)
 from ..model.fields import Field, Solution
 from ..model.mesh import Body
-from ..model.parameters import INCLUDE, assignments, constants, declared, listing, parse
+from ..model.parameters import INCLUDE, assignments, constants, declared, listing
 from ..model.results import HISTORY, Results
+from ..model.scene import numbered
 from .folder import read_info, scene_folders
 
 #: Errors that reading damaged files can raise; SyntaxError: by XML.
@@ -60,11 +69,11 @@ def read_results(info: dict[str, Any], folder: Path) -> Results:
     Raises InputError if a column is missing, as in files of earlier versions.
     """
     history = read_csv(folder / "history.csv")
-    if missing := [name for name in HISTORY if name not in history]:
-        version = info["versions"]["damjoint"]
-        raise InputError(
-            f"history.csv of damjoint {version} lacks {', '.join(missing)}: run the case again"
-        )
+    joint = read_csv(folder / "joint.csv")
+    for name, table, columns in (("history", history, HISTORY), ("joint", joint, ("joint",))):
+        if missing := [column for column in columns if column not in table]:
+            version, lacks = info["versions"]["damjoint"], ", ".join(missing)
+            raise InputError(f"{name}.csv of damjoint {version} lacks {lacks}: run the case again")
     case = case_of(info)
     heel = np.zeros(0)
     if case["drive"] != "level":
@@ -72,7 +81,7 @@ def read_results(info: dict[str, Any], folder: Path) -> Results:
     return Results(
         case,
         history,
-        read_csv(folder / "joint.csv"),
+        joint,
         {},
         stopped=info["state"] == "stopped",
         heel=heel,
@@ -92,7 +101,19 @@ def case_of(info: dict[str, Any]) -> Case:
         raise InputError(f"run.json of damjoint {version} lacks parameters: {', '.join(missing)}")
     values = {n: p.check(info["parameters"][n]) for n, p in declared().items()}
     levels, tail_levels, times = (finite(n, info[n]) for n in ("levels", "tail_levels", "times"))
-    parsed = parse(parser_input(values, levels))
+    lifts = finite("lift_heights", info["lift_heights"])
+    own = [
+        values | {n: declared()[n].check(v) for n, v in joint["values"].items()}
+        for joint in info["joints"]
+    ]
+    parsed, *of_joints = parsed_by_joint(own or [values], listing("levels", levels), lifts)
+    joints = stacked_joints(parsed, of_joints)
+    if info["geometry"]:
+        ends = ("name", "upper", "lower", "section")
+        joints = tuple(
+            replace(joint, **{name: stored[name] for name in ends})
+            for joint, stored in zip(joints, info["joints"], strict=True)
+        )
     return Case(
         name=info["case"],
         title=str(info["title"]).encode(errors="replace").decode(),
@@ -105,6 +126,8 @@ def case_of(info: dict[str, Any]) -> Case:
         shared={n: parsed[n] for n in SHARED},
         geometry=Path(info["geometry"]) if info["geometry"] else None,
         section={n: parsed[n] for n in SECTION} | info["section"],
+        lift_heights=lifts,
+        of_joints=joints,
     )
 
 
@@ -156,12 +179,9 @@ def read_fields(folder: Path, times: np.ndarray) -> tuple[dict[str, Body], dict[
             check_file(folder / f"joint_t{time:g}.vtu")
             # not meshio.read: it exits the process if a file is damaged
             bulk, joint = (meshio.vtu.read(p) for p in (path, folder / f"joint_t{time:g}.vtu"))
-            parts = {
-                "dam": extract_body(bulk, "dam"),
-                "foundation": extract_body(bulk, "foundation", "lower"),
-            }
+            parts = {name: extract_body(bulk, regions) for name, regions in parts_of(bulk).items()}
             bodies = {name: body for name, (body, _, _) in parts.items()}
-            bodies["joint"] = body_of(joint.points, [(b.type, b.data) for b in joint.cells])
+            bodies |= extract_joints(joint)
             displacement = bulk.point_data["displacement"]
             fields[time] = Field(
                 {name: displacement[points] for name, (_, points, _) in parts.items()},
@@ -170,9 +190,37 @@ def read_fields(folder: Path, times: np.ndarray) -> tuple[dict[str, Body], dict[
     return bodies, fields
 
 
-def extract_body(bulk: meshio.Mesh, *regions: str) -> tuple[Body, np.ndarray, np.ndarray]:
-    """Extract regions of a mesh: body, indices of its points (n,), stress (elements, 6) [Pa]."""
-    numbers = {constants()[name.upper()][0]: name for name in regions}
+def parts_of(bulk: meshio.Mesh) -> dict[str, dict[int, str]]:
+    """The bodies of a mesh, from the highest: their regions by number."""
+    layer = int(constants()["LAYER"][0])
+    present = np.unique(np.concatenate(bulk.cell_data["body"])).astype(int).tolist()
+    dams = (number // layer for number in reversed(present))
+    dam = int(constants()["DAM"][0])
+    parts = {
+        numbered("dam", k): {dam + k * layer: "dam"} for k in dams if dam + k * layer in present
+    }
+    rock = {int(constants()[name.upper()][0]): name for name in ("foundation", "lower")}
+    return parts | {"foundation": rock}
+
+
+def extract_joints(mesh: meshio.Mesh) -> dict[str, Body]:
+    """The surfaces of the joints of a mesh, by the numbers of its points' joints."""
+    number, joints = mesh.point_data["joint"].astype(int), {}
+    for k in np.unique(number).tolist():
+        used = np.flatnonzero(number == k)
+        cells = [
+            (block.type, np.searchsorted(used, block.data[number[block.data[:, 0]] == k]))
+            for block in mesh.cells
+        ]
+        shown = [(shape, table) for shape, table in cells if len(table)]
+        joints[numbered("joint", k - 1)] = body_of(mesh.points[used], shown)
+    return joints
+
+
+def extract_body(bulk: meshio.Mesh, numbers: dict[int, str]) -> tuple[Body, np.ndarray, np.ndarray]:
+    """Extract regions of a mesh, by number: body, indices of its points (n,), stress (elements, 6)
+    [Pa].
+    """
     blocks = [
         (numbers[number], block.type, block.data[own == number], stress[own == number])
         for block, own, stress in zip(

@@ -58,7 +58,9 @@ def table_of(columns: list[tuple[str, np.ndarray, Units]]) -> Table:
 
 
 def levels_table(result: Results) -> Table:
-    """Tabulate the history at the requested levels and at the end of the run."""
+    """Tabulate the history of a joint, the only one of these results, at the requested levels and
+    at the end of the run.
+    """
     history, case = result.history, result.case
     rows = requested_rows(result)
     # a joint that is closed everywhere has its "largest opening" below 0
@@ -84,7 +86,14 @@ def requested_rows(result: Results) -> np.ndarray:
 
 
 def text(result: Results) -> str:
-    """Format the table of the levels for the terminal."""
+    """Format the tables of the levels for the terminal, one for each joint."""
+    case = result.case
+    tables = zip(case.joint_names, map(text_of_joint, result.joints), strict=True)
+    return "\n\n".join(f"{name}:\n{table}" if case.of_joints else table for name, table in tables)
+
+
+def text_of_joint(result: Results) -> str:
+    """Format the table of the levels of the only joint of these results."""
     names, sizes, rows = levels_table(result)
     heads = [
         "\n".join([*wrap(name, 10), f"[{size}]" if size else ""])

@@ -57,11 +57,11 @@ class CrestControl(DisplacementControl):
 
 @dataclass(frozen=True)
 class HeelControl(DisplacementControl):
-    """The opening of the heel."""
+    """The opening of the heel of the first joint."""
 
     def gradient(self, equilibrium: Equilibrium) -> Array:
         """See `DisplacementControl`."""
-        return equilibrium.interface.heel
+        return equilibrium.interface.joints[0].heel
 
 
 @dataclass(frozen=True)
@@ -88,14 +88,16 @@ def process_zone(equilibrium: Equilibrium, state: State) -> Array | None:
     """
     if state.previous is None:
         return None
-    law, interface = equilibrium.law, equilibrium.interface
+    laws, interface = equilibrium.laws, equilibrium.interface
     ends = state.previous, state
     jumps = [interface.jumps(interface.at_points, end.jump) for end in ends]
-    before, after = (law.damage(jump, end.variables) for jump, end in zip(jumps, ends, strict=True))
+    before, after = (
+        laws.damage(jump, end.variables) for jump, end in zip(jumps, ends, strict=True)
+    )
     opened = np.array([True, False, False]) == (jumps[1][:, :1] > 0)
     direction = (jumps[1] - jumps[0]) * opened
     size = np.linalg.norm(direction, axis=1)
-    weights = interface.points.weights * np.maximum(after - before, 0) * (size > 0)
+    weights = interface.weights * np.maximum(after - before, 0) * (size > 0)
     if not weights.any():
         return None
     direction *= (weights / np.where(size > 0, size, 1) / weights.sum())[:, None]

@@ -10,13 +10,54 @@ import numpy as np
 
 from ..arrays import Array
 from ..joint.equilibrium import Equilibrium
+from ..joint.interface import JointInterface
 from ..model.case import Case
-from ..model.results import HISTORY, Results, history_table, joint_table
+from ..model.results import (
+    HISTORY_OF_JOINTS,
+    Results,
+    column_of,
+    history_table,
+    joint_columns,
+    joint_table,
+)
 from .model import StepResult
 from .state import State
 
-#: What is recorded of each step; the other columns of HISTORY are made from these.
-RECORDED = (*(set(HISTORY) - {"load_factor", "x_resultant"}), "heel")
+#: What is recorded of each step, and of each joint; the other columns of HISTORY are made from
+#: these.
+RECORDED = ("time", "level", "tail_level", "iterations", "cuts", "residual", "crest_ux")
+RECORDED_OF_JOINTS = (*(n for n in HISTORY_OF_JOINTS if n != "x_resultant"), "heel")
+
+
+def recorded(joints: int) -> list[str]:
+    """Names of what is recorded of a number of joints."""
+    return [column_of(name, k) for k in range(joints) for name in RECORDED_OF_JOINTS]
+
+
+def joint_row(equilibrium: Equilibrium, state: State, number: int) -> dict[str, float]:
+    """RECORDED_OF_JOINTS of a joint, by its number, at a state."""
+    joint, law = equilibrium.interface.joints[number], equilibrium.laws.laws[number]
+    variables, pressure = state.variables.joints[number], state.pressures[number]
+    at_points = joint.jumps(joint.at_points, state.jump)
+    traction, _ = law.traction_and_tangent(at_points, variables)
+    weights = joint.points.weights / joint.width
+    frames = joint.frames[joint.points.elements]
+    along_axes = np.einsum("qk,qkc->qc", traction, frames)
+    N, T, M = joint.chord.resultants(weights, joint.points.positions, along_axes)
+    normals = joint.surface.normals[joint.water_points.elements]
+    uplift = joint.water_points.weights * pressure.water_points / joint.width
+    return {
+        "crack_length": weights @ law.is_open(at_points, variables),
+        "process_zone": weights @ law.in_process_zone(at_points, variables),
+        "slip_length": weights @ law.has_slipped(variables, len(weights)),
+        "max_opening": joint.jumps(joint.at_nodes, state.jump)[:, 0].max(),
+        "N": N,
+        "T": T,
+        "M": M,
+        "U": uplift @ (normals @ joint.chord.plane.T) @ joint.chord.normal,
+        "flux": pressure.leakage,
+        "heel": joint.heel @ state.jump,
+    }
 
 
 @dataclass
@@ -27,11 +68,15 @@ class History:
     #: the state under the weight alone, from where displacements count; None: from no load at all
     at_rest: State | None = None
     #: RECORDED, a value per step
-    rows: dict[str, list[float]] = field(default_factory=lambda: {name: [] for name in RECORDED})
+    rows: dict[str, list[float]] = field(default_factory=dict)
     #: per requested level: the joint's rows, and those extrapolated from element means
     tables: list[tuple[Array, Array]] = field(default_factory=list)
     #: the states of the tables
     saved: list[State] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        joints = len(self.equilibrium.interface.joints)
+        self.rows = self.rows or {name: [] for name in (*RECORDED, *recorded(joints))}
 
     def copy(self) -> History:
         """Another one, that can be continued independently."""
@@ -63,17 +108,6 @@ class History:
     def add(self, step: StepResult, cuts: int) -> None:
         """The row of a converged step; cuts: how often it was shortened."""
         state, equilibrium = step.state, self.equilibrium
-        law, interface = equilibrium.law, equilibrium.interface
-        at_points = interface.jumps(interface.at_points, state.jump)
-        traction, _ = law.traction_and_tangent(at_points, state.variables)
-        weights = interface.points.weights / equilibrium.bulk.width
-        frames = interface.frames[interface.points.elements]
-        along_axes = np.einsum("qk,qkc->qc", traction, frames)
-        N, T, M = interface.chord.resultants(weights, interface.points.positions, along_axes)
-        pressure = state.pressure
-        assert pressure is not None  # of any converged state
-        normals = interface.surface.normals[interface.water_points.elements]
-        uplift = interface.water_points.weights * pressure.water_points / equilibrium.bulk.width
         row = {
             "time": state.time,
             "level": state.loading.level,
@@ -81,18 +115,11 @@ class History:
             "iterations": step.iterations,
             "cuts": cuts,
             "residual": step.residual,
-            "crack_length": weights @ law.is_open(at_points, state.variables),
-            "process_zone": weights @ law.in_process_zone(at_points, state.variables),
-            "slip_length": weights @ law.has_slipped(state.variables, len(weights)),
-            "max_opening": interface.jumps(interface.at_nodes, state.jump)[:, 0].max(),
             "crest_ux": self.crest(state),
-            "N": N,
-            "T": T,
-            "M": M,
-            "U": uplift @ normals[:, :2] @ interface.chord.normal,
-            "flux": pressure.leakage,
-            "heel": interface.heel @ state.jump,
         }
+        for k in range(len(equilibrium.interface.joints)):
+            of_joint = joint_row(equilibrium, state, k)
+            row |= {column_of(name, k): value for name, value in of_joint.items()}
         for name, value in row.items():
             self.rows[name].append(float(value))
 
@@ -102,61 +129,84 @@ class History:
         return crest(state.jump, state.loading) - (crest(rest.jump, rest.loading) if rest else 0.0)
 
     def save(self, state: State) -> None:
-        """The joint at the state last added, node by node; and with jump and stress made from
+        """The joints at the state last added, node by node; and with jump and stress made from
         element means.
         """
-        equilibrium = self.equilibrium
-        law, interface = equilibrium.law, equilibrium.interface
-        place, corners = interface.space.locations, len(interface.surface.points)
-        pressure, variables = state.pressure, state.node_variables
-        assert pressure is not None  # of any converged state
-        jump = interface.jumps(interface.at_nodes, state.jump)
-        traction, _ = law.traction_and_tangent(jump, variables)
-        damage, slip = law.damage(jump, variables), law.slip(variables, len(jump))
-        nodes = interface.mean_at_nodes(np.column_stack([jump, traction, damage, slip]))
-        nodes[:, 3] -= pressure.nodes
-        columns = [
-            np.full((len(place), 2), (state.time, state.loading.level)),
-            place,
-            nodes[:, :6],
-            pressure.nodes[:, None],
-            nodes[:, 6:],
-            interface.xi[:, None] * interface.length,
+        parts = [
+            joint_rows(self.equilibrium, state, k)
+            for k in range(len(self.equilibrium.interface.joints))
         ]
-        of_law = law.column_values(variables)
-        columns += [interface.mean_at_nodes(of_law[name])[:, None] for name in law.columns]
-        if pressure.flux is not None:
-            columns.append(self.node_means(pressure.flux[:, None], True))
-        table = np.hstack(columns)
-        at_points = interface.jumps(interface.at_points, state.jump)
-        stress, _ = law.traction_and_tangent(at_points, state.variables)
-        stress[:, 0] -= pressure.points
-        weights, elements = interface.points.weights, interface.points.elements
-        total = np.bincount(elements, weights)
-        parts = (*at_points.T, *stress.T)
-        means = np.column_stack([np.bincount(elements, weights * v) / total for v in parts])
-        extrapolated = table.copy()
-        extrapolated[:corners, 5:11] = self.node_means(means, False)
         self.saved.append(state)
+        table, extrapolated = (np.vstack(rows) for rows in zip(*parts, strict=True))
         self.tables.append((table, extrapolated))
-
-    def node_means(self, values: Array, middles: bool) -> Array:
-        """Mean over the joint elements around each node (and each middle of an edge) of element
-        values (e, m).
-        """
-        space = self.equilibrium.interface.space
-        number = len(space.locations) if middles else len(space.body.points)
-        total, count, start = np.zeros((number, values.shape[1])), np.zeros(number), 0
-        for (_, functions), (_, cells) in zip(space.connectivity, space.body.cells, strict=True):
-            table = functions if middles else cells
-            rows = np.repeat(np.arange(start, start + len(table)), table.shape[1])
-            np.add.at(total, table.ravel(), values[rows])
-            np.add.at(count, table.ravel(), 1)
-            start += len(table)
-        return total / count[:, None]
 
     def results(self, case: Case, stopped: bool) -> Results:
         """All tables so far."""
         rows = {name: np.array(values, float) for name, values in self.rows.items()}
         joint, extrapolated = (joint_table(case, [t[k] for t in self.tables]) for k in (0, 1))
         return Results(case, history_table(case, rows), joint, extrapolated, stopped, rows["heel"])
+
+
+def joint_rows(equilibrium: Equilibrium, state: State, number: int) -> tuple[Array, Array]:
+    """The rows of a joint, by its number, at a state: node by node, columns `joint_columns` but for
+    sigma_n_eff; and the same with jump and stress made from element means.
+    """
+    joint, law = equilibrium.interface.joints[number], equilibrium.laws.laws[number]
+    variables, pressure = state.node_variables.joints[number], state.pressures[number]
+    place, corners = joint.space.locations, len(joint.surface.points)
+    jump = joint.jumps(joint.at_nodes, state.jump)
+    traction, _ = law.traction_and_tangent(jump, variables)
+    damage, slip = law.damage(jump, variables), law.slip(variables, len(jump))
+    nodes = joint.mean_at_nodes(np.column_stack([jump, traction, damage, slip]))
+    nodes[:, 3] -= pressure.nodes
+    columns = {
+        "time": np.full(len(place), state.time),
+        "level": np.full(len(place), state.loading.level),
+        "joint": np.full(len(place), number + 1.0),
+        **dict(zip("xyz", place.T, strict=True)),
+        **dict(zip(JUMP_AND_STRESS, nodes.T, strict=False)),
+        "p": pressure.nodes,
+        "damage": nodes[:, 6],
+        "slip": nodes[:, 7],
+        "s": joint.xi * joint.length,
+    }
+    of_law = law.column_values(variables)
+    columns |= {name: joint.mean_at_nodes(of_law[name]) for name in law.columns}
+    if pressure.flux is not None:
+        columns["flux"] = node_means(joint, pressure.flux[:, None], True)[:, 0]
+    at_points = joint.jumps(joint.at_points, state.jump)
+    stress, _ = law.traction_and_tangent(at_points, state.variables.joints[number])
+    stress[:, 0] -= pressure.points
+    weights, elements = joint.points.weights, joint.points.elements
+    total = np.bincount(elements, weights)
+    parts = (*at_points.T, *stress.T)
+    means = np.column_stack([np.bincount(elements, weights * v) / total for v in parts])
+    extrapolated = {name: columns[name].copy() for name in JUMP_AND_STRESS}
+    at_corners = node_means(joint, means, False)
+    for name, values in zip(JUMP_AND_STRESS, at_corners.T, strict=True):
+        extrapolated[name][:corners] = values
+    nothing = np.full(len(place), np.nan)  # of a column that only other joints have
+    names = [name for name in joint_columns(equilibrium.case) if name != "sigma_n_eff"]
+    tables = columns, columns | extrapolated
+    one, other = (np.column_stack([t.get(name, nothing) for name in names]) for t in tables)
+    return one, other
+
+
+#: Columns of joint.csv that are made from element means, too.
+JUMP_AND_STRESS = ("delta_n", "delta_t1", "delta_t2", "sigma_n", "tau_1", "tau_2")
+
+
+def node_means(joint: JointInterface, values: Array, middles: bool) -> Array:
+    """Mean over the joint elements around each node (and each middle of an edge) of element values
+    (e, m).
+    """
+    space = joint.space
+    number = len(space.locations) if middles else len(space.body.points)
+    total, count, start = np.zeros((number, values.shape[1])), np.zeros(number), 0
+    for (_, functions), (_, cells) in zip(space.connectivity, space.body.cells, strict=True):
+        table = functions if middles else cells
+        rows = np.repeat(np.arange(start, start + len(table)), table.shape[1])
+        np.add.at(total, table.ravel(), values[rows])
+        np.add.at(count, table.ravel(), 1)
+        start += len(table)
+    return total / count[:, None]

@@ -37,6 +37,8 @@ class Mechanism:
     time: float
     #: the highest level [m]
     level: float = np.nan
+    #: the joint that fails, or several; empty if the dam has only one
+    joint: str = ""
 
 
 class LoadStepper:
@@ -236,14 +238,14 @@ class LoadStepper:
         kink and a turn at every point. Else, and where the path is lost, by relaxation.
         """
         equilibrium, step = self.model.equilibrium, None
-        law = equilibrium.law
-        follows = not (law.releases_shear or self.drives or self.path_ended)
+        laws = equilibrium.laws
+        follows = not (laws.releases_shear or self.drives or self.path_ended)
         if follows and (smallest or not cuts):
             step = self.along_path(time)
             if self.path_ended and not smallest:  # shorter steps from where the path has ended
                 return None
-        if step is None and (law.softens or equilibrium.flowing):
-            accept_relaxed = law.softens and (bool(self.relaxed_at) or smallest or cuts > 0)
+        if step is None and (laws.softens or equilibrium.flowing):
+            accept_relaxed = laws.softens and (bool(self.relaxed_at) or smallest or cuts > 0)
             step, relaxed = over_unstable_growth(
                 self.model, self.state, time, self.control(time), accept_relaxed
             )
@@ -315,7 +317,7 @@ class LoadStepper:
     def mechanism_of(self, path: EquilibriumPath) -> Mechanism:
         """The mechanism of a path that does not reach the prescribed level."""
         ratio = path.points[-1].imposed / path.imposed(path.points[path.limit_point])
-        return Mechanism(path.mode, float(ratio), path.time)
+        return Mechanism(path.mode, float(ratio), path.time, joint=path.joint)
 
     def end_at_limit_point(self, path: EquilibriumPath) -> None:
         """Take a path's limit point as a step, in which nothing but the level has changed."""

@@ -13,10 +13,11 @@ import numpy as np
 
 from .. import RunError
 from ..arrays import Array
-from ..joint.equilibrium import Equilibrium, Still
+from ..joint.equilibrium import Equilibrium
 from ..joint.interface import Interface, interface_of
+from ..joint.joint_laws import TANGENT, Mode
 from ..joint.linear_system import Border
-from ..laws import TANGENT, Mode
+from ..joint.water import Still
 from ..model.case import Case, remembers
 from ..model.loads import COMPLETE, Loading
 from .controls import Control, DisplacementControl, LevelControl
@@ -45,10 +46,10 @@ class Model:
     """The equilibrium of a case, and how a step of it is solved."""
 
     def __init__(self, case: Case, interface: Interface | None = None) -> None:
-        """interface: the joint of the condensed bodies; by default from the cache, or made."""
+        """interface: the joints of the condensed bodies; by default from the cache, or made."""
         interface = interface or interface_of(case)
-        if case.geometry:  # the ends of its joint follow from the mesh
-            case = replace(case, section=case.section | interface.section)
+        if case.geometry:
+            case = case.with_joints(interface.of_joints)
         self.case, self.equilibrium = case, Equilibrium(case, interface)
         self.reference = self.unbalanced()
 
@@ -83,7 +84,7 @@ class Model:
         parts = ("growth", "secant", "release", "iterations")
         table = zip(*(self.case.shared[f"strategy_{n}"] for n in parts), strict=True)
         halvings = int(self.case["max_halvings"])
-        most = 2 if self.equilibrium.law.releases_shear else 1
+        most = 2 if self.equilibrium.laws.releases_shear else 1
         return tuple(
             Strategy(growth, int(secant), int(release), int(iterations), halvings)
             for growth, secant, release, iterations in table
@@ -110,10 +111,10 @@ class Model:
         return Loading.at(self.case, time, level, self.case.tail_at(time))
 
     def still(self, state: State, time: float) -> Still | None:
-        """The joint before the earthquake, for a step from a state to a time, if the water in it
-        follows from that.
+        """The joints before the earthquake, for a step from a state to a time, if the water in one
+        of them follows from that.
         """
-        if not remembers(self.case) or not self.loading(time, 0.0).part("quake"):
+        if not any(map(remembers, self.case.joints)) or not self.loading(time, 0.0).part("quake"):
             return None
         return state.still or Still(state.jump, state.variables)
 
@@ -192,16 +193,16 @@ class Model:
         frozen_lift: Array | None = None,
     ) -> StepResult | None:
         """A step by one strategy, from a jump and a level, see `advance`. Raises Diverged."""
-        equilibrium, start = self.equilibrium, state.begin_step(self.equilibrium.law, time)
-        interface, law, variables = equilibrium.interface, equilibrium.law, start.variables
-        law_points, still = frozen and frozen.points, self.still(state, time)
+        equilibrium, start = self.equilibrium, state.begin_step(self.equilibrium.laws, time)
+        interface, laws, variables = equilibrium.interface, equilibrium.laws, start.variables
+        frozen_laws, still = frozen and frozen.points, self.still(state, time)
         loads, convergence = self.loading(time, begin[1]), self.convergence
         stiffness = equilibrium.case["K_N"] * equilibrium.bulk.width
 
         def evaluate(jump: Array, level: float, last: Iterate | None) -> Iterate:
-            side, mode = None, Mode(frozen=law_points) if law_points else TANGENT
+            side, mode = None, Mode(frozen=frozen_laws) if frozen_laws else TANGENT
             if strategy.release:
-                side = law.release_side(interface.jumps(interface.at_points, jump), variables)
+                side = laws.release_side(interface.jumps(interface.at_points, jump), variables)
                 if last and last.side is not None:
                     crossing = side * last.side < 0
                     releasing = crossing & ((side < 0) | (strategy.release > 1))
@@ -235,7 +236,7 @@ class Model:
             start.update(equilibrium, end.jump, frozen),
             time=time,
             loading=loading,
-            pressure=equilibrium.pressure(end.jump, variables, loading, still),
+            pressures=equilibrium.pressures(end.jump, variables, loading, still),
             still=still,
         )
         return StepResult(new.after(state), iterations, end.size / (self.reference or 1.0))

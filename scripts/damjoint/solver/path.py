@@ -17,6 +17,7 @@ import numpy as np
 from .. import ROUND_OFF
 from ..arrays import Array
 from ..model.case import Case
+from ..model.results import column_of
 from .controls import (
     DRIVES,
     Control,
@@ -53,6 +54,10 @@ ROUGH, SURE = 1.5, 4.0
 #: Levels that differ relatively by less are the same.
 PLATEAU = 1e-7
 
+#: A joint takes part in a mechanism if its jumps change by more than this part of the largest
+#: change.
+MOVES = 0.5
+
 #: Points at most that are added where a path ends.
 MOST_REFINED = 30
 
@@ -79,32 +84,51 @@ class Point:
         return self.state.loading.level
 
     @cached_property
-    def slides(self) -> bool:
-        """Whether a plane joint transmits the shear by its whole strength, which slip cannot raise:
-        a higher level has no equilibrium, it pushes more and presses less.
+    def sliding(self) -> int | None:
+        """The number of a joint that alone holds what is above it and, being plane, transmits the
+        shear by its whole strength, which slip cannot raise: a higher level has no equilibrium, it
+        pushes more and presses less. None if there is none.
         """
         equilibrium, state = self.model.equilibrium, self.state
-        law, interface = equilibrium.law, equilibrium.interface
-        if law.hardens or not interface.flat:
-            return False
-        jump = interface.jumps(interface.at_points, state.jump)
-        traction, _ = law.traction_and_tangent(jump, state.variables)
-        damage, slip = law.damage(jump, state.variables), law.slip(state.variables, len(jump))
-        strength = law.shear_strength(traction[:, 0], damage, slip)
-        shear = np.linalg.norm(traction[:, 1:], axis=1)
-        weights = interface.points.weights
-        return bool(weights @ shear >= (1 - PRECISION / 2) * (weights @ strength))
+        for k, joint in enumerate(equilibrium.interface.joints):
+            law, variables = equilibrium.laws.laws[k], state.variables.joints[k]
+            if law.hardens or not joint.flat or not self.model.case.separates((k,)):
+                continue
+            jump = joint.jumps(joint.at_points, state.jump)
+            traction, _ = law.traction_and_tangent(jump, variables)
+            damage, slip = law.damage(jump, variables), law.slip(variables, len(jump))
+            strength = law.shear_strength(traction[:, 0], damage, slip)
+            shear, weights = np.linalg.norm(traction[:, 1:], axis=1), joint.points.weights
+            if weights @ shear >= (1 - PRECISION / 2) * (weights @ strength):
+                return k
+        return None
+
+    @property
+    def slides(self) -> bool:
+        """Whether there is such a joint."""
+        return self.sliding is not None
 
     @cached_property
-    def compression(self) -> float:
-        """Largest total compression at the toe [Pa]."""
+    def compressions(self) -> list[float]:
+        """Largest total compression at the toe of each joint [Pa]."""
         equilibrium, state = self.model.equilibrium, self.state
-        law, interface = equilibrium.law, equilibrium.interface
-        assert state.pressure is not None  # of any converged state
-        jump = interface.jumps(interface.at_nodes, state.jump)
-        traction, _ = law.traction_and_tangent(jump, state.node_variables)
-        toe = interface.xi > 1 - ROUND_OFF
-        return float((state.pressure.nodes - interface.mean_at_nodes(traction[:, 0]))[toe].max())
+        parts = zip(
+            *(equilibrium.interface.joints, equilibrium.laws.laws, state.pressures),
+            state.node_variables.joints,
+            strict=True,
+        )
+        largest = []
+        for joint, law, pressure, variables in parts:
+            jump = joint.jumps(joint.at_nodes, state.jump)
+            traction, _ = law.traction_and_tangent(jump, variables)
+            total = pressure.nodes - joint.mean_at_nodes(traction[:, 0])
+            largest.append(float(total[joint.xi > 1 - ROUND_OFF].max()))
+        return largest
+
+    @property
+    def compression(self) -> float:
+        """The largest of them [Pa]."""
+        return max(self.compressions)
 
     @property
     def last(self) -> dict[str, float]:
@@ -222,14 +246,41 @@ class EquilibriumPath:
         """How the dam fails; empty if the path does not show it."""
         if self.slides:
             return "sliding"
-        if not self.points or self.limit_point + 1 >= len(self.points):
+        if not self.failing:
             return ""
-        top, last = self.points[self.limit_point], self.points[-1]
-        interface = last.model.equilibrium.interface
-        moved = interface.jumps(interface.at_nodes, last.state.jump - top.state.jump)
+        (number, *_), model = self.failing, self.points[-1].model
+        interface, case = model.equilibrium.interface.joints[number], model.case
+        crack = self.points[-1].last[column_of("crack_length", number)]
         along = interface.xi * interface.length
-        crack = self.points[-1].last["crack_length"]
-        return movement(last.model.case, crack, along, interface.mean_at_nodes(moved))
+        return movement(case.joints[number], crack, along, self.movements[number])
+
+    @property
+    def failing(self) -> tuple[int, ...]:
+        """The numbers of the joints at which it fails: that slides, or whose jumps change most
+        beyond the limit point; empty if the path does not show it.
+        """
+        slides = self.points[self.top].sliding if self.points else None
+        if slides is not None:
+            return (slides,)
+        sizes = np.array([np.abs(moved).max() for moved in self.movements])
+        return tuple(np.flatnonzero(sizes > MOVES * sizes.max(initial=0)).tolist())
+
+    @property
+    def joint(self) -> str:
+        """Their names; empty if the dam has a single joint."""
+        return self.points[-1].model.case.named(self.failing) if self.points else ""
+
+    @property
+    def movements(self) -> list[Array]:
+        """By how much the jumps at the nodes of each joint (n, 3) have changed beyond the limit
+        point [m]; empty if the path ends there.
+        """
+        if not self.points or self.limit_point + 1 >= len(self.points):
+            return []
+        top, last = self.points[self.limit_point], self.points[-1]
+        change = last.state.jump - top.state.jump
+        joints = last.model.equilibrium.interface.joints
+        return [joint.mean_at_nodes(joint.jumps(joint.at_nodes, change)) for joint in joints]
 
     # -- its continuation
     # ----------------------------------------------------------------------------------------------

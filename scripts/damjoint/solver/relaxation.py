@@ -26,11 +26,11 @@ def relax(model: Model, begin: State, time: float, control: Control) -> StepResu
     relaxed state is more damaged than a direct step would give.
     """
     equilibrium, state = model.equilibrium, begin
-    law, iterations, sizes = equilibrium.law, 0, list[float]()
+    laws, iterations, sizes = equilibrium.laws, 0, list[float]()
     still = model.still(begin, time)
     strategies = [strategy for strategy in model.strategies[:-1] if not strategy.release]
     for _ in range(ROUNDS):
-        start = state.begin_step(law, time)
+        start = state.begin_step(laws, time)
         frozen = start.freeze(equilibrium)
         coupled = strategies[:1] if equilibrium.flowing else strategies
         step = model.advance(start, time, control, strategies=coupled, persist=False, frozen=frozen)
@@ -52,12 +52,12 @@ def relax(model: Model, begin: State, time: float, control: Control) -> StepResu
             return None
         iterations += step.iterations
         state = replace(step.state, time=begin.time)
-        jump, variables = state.jump, state.begin_step(law, time).variables
+        jump, variables = state.jump, state.begin_step(laws, time).variables
         residual = equilibrium.residual(jump, variables, state.loading, still=still).value
         size = float(np.linalg.norm(residual))
         if size <= model.convergence.tolerance:
-            pressure = equilibrium.pressure(jump, variables, state.loading, still)
-            relaxed = replace(step.state, pressure=pressure).after(begin)
+            pressures = equilibrium.pressures(jump, variables, state.loading, still)
+            relaxed = replace(step.state, pressures=pressures).after(begin)
             return StepResult(relaxed, iterations, size / (model.reference or 1.0))
         if repeats(size, sizes, SAME):
             return None

@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from ..arrays import Array
-from ..joint.equilibrium import Equilibrium, Pressure, Still
-from ..laws import Law
+from ..joint.equilibrium import Equilibrium
+from ..joint.joint_laws import JointLaws, JointVariables
+from ..joint.water import Pressure, Still
 from ..model.loads import Loading
 
 
 @dataclass(frozen=True)
 class Frozen:
-    """The joint's law with frozen damage, at its integration points and at its nodes."""
+    """The laws of the joints with frozen damage, at the integration points and at the nodes."""
 
-    points: Law[Any]
-    nodes: Law[Any]
+    points: JointLaws
+    nodes: JointLaws
 
 
 @dataclass(frozen=True)
@@ -29,12 +29,12 @@ class State:
     loading: Loading
     #: the unknowns (j,) [m]
     jump: Array
-    variables: Any
-    #: by `rows` of the interface
-    node_variables: Any
-    #: of the water in the joint; the aperture of what had broken before the step lets it in
-    pressure: Pressure | None = None
-    #: the joint before the earthquake that acts, if the water follows from it
+    variables: JointVariables
+    #: by `rows` of each joint
+    node_variables: JointVariables
+    #: of the water in each joint; the aperture of what had broken before the step lets it in
+    pressures: tuple[Pressure, ...] = ()
+    #: the joints before the earthquake that acts, if the water follows from them
     still: Still | None = None
     #: the state before, without its own
     previous: State | None = None
@@ -42,31 +42,32 @@ class State:
     @staticmethod
     def undamaged(equilibrium: Equilibrium) -> State:
         """Before any load."""
-        law, interface = equilibrium.law, equilibrium.interface
-        number = len(interface.points.weights), len(interface.rows)
+        joints, laws = equilibrium.interface.joints, equilibrium.laws
+        numbers = [len(j.points.weights) for j in joints], [len(j.rows) for j in joints]
         jump = np.zeros(len(equilibrium.bulk.stiffness))
-        return State(0.0, Loading(0.0, 0.0), jump, *(law.initial(n) for n in number))
+        points, nodes = (laws.initial(n) for n in numbers)
+        return State(0.0, Loading(0.0, 0.0), jump, points, nodes)
 
     def after(self, previous: State) -> State:
         """This state, as the one that follows another."""
         return replace(self, previous=replace(previous, previous=None))
 
-    def begin_step(self, law: Law[Any], time: float) -> State:
+    def begin_step(self, laws: JointLaws, time: float) -> State:
         """The state with the internal variables for a step to a time."""
         both = self.variables, self.node_variables
-        points, nodes = (law.begin_step(v, self.time, time) for v in both)
+        points, nodes = (laws.begin_step(v, self.time, time) for v in both)
         return replace(self, variables=points, node_variables=nodes)
 
     def freeze(self, equilibrium: Equilibrium) -> Frozen:
-        """The law with the damage frozen that this state's jump leads to."""
+        """The laws with the damage frozen that this state's jump leads to."""
         points, nodes = both_jumps(equilibrium, self.jump)
-        law = equilibrium.law
-        return Frozen(law.freeze(points, self.variables), law.freeze(nodes, self.node_variables))
+        laws = equilibrium.laws
+        return Frozen(laws.freeze(points, self.variables), laws.freeze(nodes, self.node_variables))
 
     def update(self, equilibrium: Equilibrium, jump: Array, frozen: Frozen | None) -> State:
         """The state with a jump, and the internal variables after it."""
         points, nodes = both_jumps(equilibrium, jump)
-        laws = frozen or Frozen(equilibrium.law, equilibrium.law)
+        laws = frozen or Frozen(equilibrium.laws, equilibrium.laws)
         return replace(
             self,
             jump=jump,
@@ -76,6 +77,6 @@ class State:
 
 
 def both_jumps(equilibrium: Equilibrium, jump: Array) -> tuple[Array, Array]:
-    """The jump at the law's points and at the nodes, (q, 3) each."""
+    """The jump at the laws' points and at the nodes, (q, 3) each."""
     interface = equilibrium.interface
     return interface.jumps(interface.at_points, jump), interface.jumps(interface.at_nodes, jump)

@@ -7,7 +7,7 @@ and a sample needs no load steps. The converse does not hold.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
@@ -15,6 +15,7 @@ import numpy as np
 from ..joint.interface import Interface
 from ..laws import UNBREAKABLE
 from ..model.case import Case, flows, remembers
+from ..model.results import column_of
 from ..solver.load_stepper import LoadStepper
 
 #: Parameters on which N, T, M do not depend.
@@ -36,8 +37,13 @@ class Elastic:
     def of(case: Case, interface: Interface) -> Elastic:
         """The case with a joint that does not fail."""
         values = tuple((n, v) for n, v in case.values.items() if n not in STRENGTHS)
-        strong = replace(case, values=case.values | UNBREAKABLE)
-        return Elastic((values, case.levels, case.tail_levels, case.times), strong, interface)
+        strong = case.with_values(UNBREAKABLE)
+        own = tuple(
+            (joint.name, *((n, v) for n, v in joint.values.items() if n not in STRENGTHS))
+            for joint in case.of_joints
+        )
+        key = values, own, case.levels, case.tail_levels, case.times
+        return Elastic(key, strong, interface)
 
 
 @lru_cache(maxsize=1)
@@ -47,10 +53,10 @@ def resultants(elastic: Elastic) -> dict[str, np.ndarray]:
 
 
 def elastic_heel_stress(case: Case, interface: Interface) -> float:
-    """Largest effective normal stress [Pa] at the heel at the last level of a case whose joint does
-    not fail. It depends on the mesh, as the heel is a corner.
+    """Largest effective normal stress [Pa] at the first joint's heel at the last level of a case
+    whose joints do not fail. It depends on the mesh, as the heel is a corner.
     """
-    rows = LoadStepper(Elastic.of(case, interface).case, interface).run().at()
+    rows = LoadStepper(Elastic.of(case, interface).case, interface).run().joints[0].at()
     return float(rows["sigma_n_eff"][rows["s"] <= rows["s"].min()].max())
 
 
@@ -60,9 +66,23 @@ def mechanism(case: Case, interface: Interface) -> tuple[str, str]:
     Sliding: the shear exceeds the law's `shear_bound`. Overturning: with the tensile strength f
     and the joint's length L, the moment of the tension about the toe is at most f L^2/2.
     """
-    if flows(case) or remembers(case) or case["drive"] != "level":
+    follows = (flows(joint) or remembers(joint) for joint in case.joints)
+    if case["drive"] != "level" or any(follows):
         return "", ""
-    history, length = resultants(Elastic.of(case, interface)), case.section["joint_length"][0]
+    if case.geometry:
+        case = case.with_joints(interface.of_joints)
+    history = resultants(Elastic.of(case, interface))
+    for k, joint in enumerate(case.joints):
+        own = {name: history[column_of(name, k)] for name in "NTM"} | {"level": history["level"]}
+        if case.separates((k,)) and (failure := mechanism_of_joint(joint, own))[0]:
+            where = case.named((k,))
+            return failure if not where else (f"{failure[0]} on {where}", failure[1])
+    return "", ""
+
+
+def mechanism_of_joint(case: Case, history: dict[str, np.ndarray]) -> tuple[str, str]:
+    """See `mechanism`, of a case with a single joint; history: level, N, T, M at its steps."""
+    length = case.section["joint_length"][0]
     shear = case.law.shear_bound(history["N"], length)
     for name, demand, bound, words in (
         ("sliding", np.abs(history["T"]), shear, "T = {:.6g} N/m exceeds the strength, {:.6g} N/m"),

@@ -10,22 +10,29 @@ import numpy as np
 from ..laws import Evidence
 from ..model.case import Case, has_drains, remembers
 from ..model.loads import COMPLETE, thermal_strains
-from ..model.results import Results
+from ..model.results import Results, row_of_joint
 from . import gravity
 
 
 def verdict(results: Results) -> str:
     """One of: stands, sliding, overturning, broken through, out of range, not converged, no
-    equilibrium, interrupted.
+    equilibrium, interrupted; a failure with its joint if there are several: "sliding on base".
 
     "no equilibrium": not even at the first step. "sliding" also where the whole joint has slipped
     or opened and only the hardening of the joint resists.
     """
+    mode, joint = failure(results)
+    return f"{mode} on {joint}" if joint else mode or "stands"
+
+
+def failure(results: Results) -> tuple[str, str]:
+    """How the dam fails, empty if it stands, and at which joint, if there are several."""
     if not results.last:
-        return "no equilibrium"
+        return "no equilibrium", ""
     if results.stopped:
         return why_stopped(results)
-    return "sliding" if slipped_from(results) is not None else "stands"
+    slipped = slipped_joints(results)
+    return ("sliding", results.case.named(slipped)) if slipped else ("", "")
 
 
 def failed(results: Results) -> bool:
@@ -34,13 +41,39 @@ def failed(results: Results) -> bool:
     """
     if results.stopped or not results.last:
         return True
-    hardening_set = results.case.law.hardening_parameter and results.case.hardening_asked
-    return slipped_from(results) is not None and not hardening_set
+    slipped = slipped_joints(results)
+    laws = [results.case.joints[k].law for k in slipped]
+    hardening_set = all(law.hardening_parameter for law in laws) and results.case.hardening_asked
+    return bool(slipped) and not hardening_set
+
+
+def decisive_joint(results: Results) -> int:
+    """The number of the joint at which the dam fails; of a dam that stands, of the one that is
+    cracked or has slipped over the largest part of its length.
+    """
+    _, joint = failure(results)
+    names = results.case.joint_names
+    if joint:
+        return next(k for k, name in enumerate(names) if joint.startswith(name))
+    parts = [
+        max(own.last[n] for n in ("crack_length", "slip_length")) / own.case.joint_along
+        for own in results.joints
+        if results.last
+    ]
+    return int(np.argmax(parts)) if parts else 0
+
+
+def slipped_joints(results: Results) -> tuple[int, ...]:
+    """The numbers of joints that have slipped along all of their length and alone hold what is
+    above them; empty if there are none.
+    """
+    slipped = [k for k, own in enumerate(results.joints) if slipped_from(own) is not None]
+    return results.case.separating(slipped)
 
 
 def slipped_from(results: Results) -> float | None:
-    """The level [m] from which on the whole joint has slipped or is open; None if a part of it
-    sticks, or if a dam that has slipped stands by the joint law.
+    """The level [m] from which on the whole joint, the only one of these results, has slipped or is
+    open; None if a part of it sticks, or if a dam that has slipped stands by the joint law.
 
     A point that has slipped once counts as slipped. By the integration points of every
     step, or by the nodes at the last requested level. A change of temperature can let every point
@@ -62,8 +95,9 @@ def slipped_from(results: Results) -> float | None:
     return None
 
 
-def why_stopped(results: Results) -> str:
-    """Out of range, sliding, overturning, broken through or not converged.
+def why_stopped(results: Results) -> tuple[str, str]:
+    """Out of range, sliding, overturning, broken through or not converged; and the joint that
+    fails, if there are several.
 
     Out of range: under displacement control the level of the next step, by extrapolation, would be
     below 0 or above the highest allowed. A failure is named if the equilibrium path shows its
@@ -73,14 +107,17 @@ def why_stopped(results: Results) -> str:
     case, last = results.case, results.last
     ahead = 2 * last["level"] - [0.0, *results.history["level"]][-2]
     if case["drive"] != "level" and not 0 <= ahead <= case.highest_level:
-        return "out of range"
+        return "out of range", ""
     shown = results.info.get("mechanism") or {}
-    return shown.get("mode") or bound(results)[0] or "not converged"
+    if shown.get("mode"):
+        return shown["mode"], shown.get("joint", "")
+    mode, _, joint = bound(results)
+    return mode or "not converged", joint
 
 
 def shear_resistance(results: Results, normal: float) -> float:
-    """Shear force [N/m] that the joint transmits at the last saved state under an effective normal
-    force; infinite if its law does not bound the shear.
+    """Shear force [N/m] that the joint, the only one of these results, transmits at the last saved
+    state under an effective normal force; infinite if its law does not bound the shear.
     """
     case, damage, slip = results.case, mean(results, "damage"), mean(results, "slip")
     return case.law.shear_resistance(normal, case.joint_along, damage, slip)
@@ -94,9 +131,20 @@ AT_BOUND = 5e-3
 ARM_AT_TOE, ELEMENTS_AT_TOE = 0.01, 0.5
 
 
-def bound(results: Results) -> tuple[str, str]:
-    """The bound of statics that the last state has reached, sliding or overturning, and why; both
-    empty if none.
+def bound(results: Results) -> tuple[str, str, str]:
+    """The bound of statics that the last state has reached, sliding or overturning, why, and at
+    which joint, if there are several; all empty if none.
+    """
+    case = results.case
+    for k, own in enumerate(results.joints):
+        mode, why = bound_of_joint(own)
+        if mode and case.separates((k,)):
+            return mode, why, case.named((k,))
+    return "", "", ""
+
+
+def bound_of_joint(results: Results) -> tuple[str, str]:
+    """The bound that the only joint of these results has reached, and why; both empty if none.
 
     A rigid block on a joint without tension has M >= 0; on elements the compression ends within the
     last one at the toe. Friction's tension c/mu of the open part is no compression.
@@ -122,9 +170,23 @@ def bound(results: Results) -> tuple[str, str]:
 SAME_CRACK = 0.01
 
 
-def highest_by_statics(case: Case, last: dict[str, float]) -> tuple[float, str, str]:
-    """The level [m] above which no equilibrium exists, how the dam fails and why; infinite and
-    empty where statics gives no bound.
+def highest_by_statics(case: Case, last: dict[str, float]) -> tuple[float, str, str, str]:
+    """The level [m] above which no equilibrium exists, how the dam fails, why, and at which joint,
+    if there are several; infinite and empty where statics gives no bound.
+
+    last: the last row of the history.
+    """
+    bounds = (
+        (*highest_on_joint(joint, row_of_joint(last, k)), case.named((k,)))
+        for k, joint in enumerate(case.joints)
+        if case.separates((k,))
+    )
+    return min(bounds, default=(np.inf, "", "", ""))
+
+
+def highest_on_joint(case: Case, last: dict[str, float]) -> tuple[float, str, str]:
+    """The level [m] above which no equilibrium of a case's only joint exists, see
+    `highest_by_statics`.
 
     Whatever the distribution of stress: with the tensile strength f over the length l that is not
     cracked, M >= -f l^2/2, and the shear is at most the law's `shear_bound`; the crack does not
@@ -161,7 +223,9 @@ def highest_by_statics(case: Case, last: dict[str, float]) -> tuple[float, str, 
 
 
 def mean(results: Results, column: str) -> float:
-    """The mean of a column along the joint at the last saved state; 0 if there is none."""
+    """The mean of a column along the only joint of these results at the last saved state; 0 if
+    there is none.
+    """
     if not len(results.joint["time"]):
         return 0.0
     rows = results.at()
@@ -172,21 +236,24 @@ def mean(results: Results, column: str) -> float:
 
 def statement(results: Results) -> str:
     """Why and where a run has stopped, or that the dam slides; empty if it stands."""
-    case, last, outcome = results.case, results.last, verdict(results)
-    if outcome == "no equilibrium":
+    case, last, (mode, joint) = results.case, results.last, failure(results)
+    if mode == "no equilibrium":
         return "no equilibrium even at the first step"
     if results.stopped:
         where = f"level {last['level']:.6g} m (t = {last['time']:.6g})"
-        if outcome == "out of range":
+        if mode == "out of range":
             return (
                 f"out of range: the displacement needs a level below 0 or above "
                 f"{case.highest_level:g} m beyond {where}; the last converged state is saved"
             )
-        return f"{outcome}: {reason_of_stop(results)}; the last converged state is saved"
-    if outcome == "stands":
+        return f"{verdict(results)}: {reason_of_stop(results)}; the last converged state is saved"
+    if not mode:
         return ""
-    level, hardening = slipped_from(results), case.law.hardening_parameter
-    slides = f"sliding: the whole joint has slipped or is open from level {level:.6g} m on"
+    slipped = slipped_joints(results)
+    level = max(slipped_from(results.joints[k]) or 0.0 for k in slipped)
+    case = case.joints[slipped[0]]
+    hardening, where = case.law.hardening_parameter, joint or "joint"
+    slides = f"sliding: the whole {where} has slipped or is open from level {level:.6g} m on"
     if not hardening:
         return f"{slides}; the joint has no further shear strength"
     default = ", a numerical default; set it if your joint hardens"
@@ -207,8 +274,10 @@ def reason_of_stop(results: Results) -> str:
         with_all = f" under the loads of t = {shown['time']:g}" if most < last["level"] else ""
         path = f"the equilibrium path{along} reaches {most:.6g} m at most{with_all}"
         return f"no equilibrium beyond {where}: {path}"
-    if reached := bound(results)[1]:
-        return f"no equilibrium beyond {where}: {reached}"
+    _, reached, joint = bound(results)
+    if reached:
+        at_joint = f"{joint}: " if joint else ""
+        return f"no equilibrium beyond {where}: {at_joint}{reached}"
     arm = case.joint_along - last["x_resultant"]
     return (
         f"no equilibrium is found beyond {where}, and no mechanism either{stiff_joint(results)}; "
@@ -245,8 +314,21 @@ SOFT_JOINT = 1
 
 
 def hints(results: Results) -> list[str]:
-    """Hints on a result besides its verdict: limits of the model, what to change."""
-    case, last, messages = results.case, results.last, []
+    """Hints on a result besides its verdict: limits of the model, what to change; with several
+    joints those of a joint with its name.
+    """
+    case, of_joints = results.case, list[str]()
+    for k, own in enumerate(results.joints):
+        name = case.named((k,))
+        of_joints += (f"{name}: {hint}" if name else hint for hint in hints_on_joint(own))
+    if case.published:
+        return of_joints
+    return of_joints + hints_on_run(results)
+
+
+def hints_on_joint(results: Results) -> list[str]:
+    """Hints on the stiffness of the only joint of these results."""
+    case, messages = results.case, list[str]()
     ratio = stiffness_ratio(results)
     if ratio >= STIFF_JOINT and case["quadrature"] == "published":
         messages.append(
@@ -259,9 +341,13 @@ def hints(results: Results) -> list[str]:
             f"K_N L/E = {soft:.3g}: the joint is softer than the dam; a closed joint of "
             "concrete on rock has 10 to 1000"
         )
+    return messages
+
+
+def hints_on_run(results: Results) -> list[str]:
+    """Hints on the model as a whole, and on the last state of each joint."""
+    case, last, messages = results.case, results.last, list[str]()
     reach = min(case["found_side"], case["found_depth"])
-    if case.published:
-        return messages
     if case["dim"] == 3 and case["hold_z"] and not case.geometry:
         messages.append(
             "an extruded section with hold_z = 1 is in plane strain: dim = 2 has the same "
@@ -287,11 +373,13 @@ def hints(results: Results) -> list[str]:
             "the engine getdp does not follow the equilibrium path beyond a limit point: "
             "--engine condensed does"
         )
-    if last:
-        unstable = bool(levels) or verdict(results) == "not converged"
-        share = tension_share(case, last)
-        messages += case.law.hints(Evidence(last["crack_length"], unstable, share))
-        messages += hints_on_state(results, last)
+    unstable = bool(levels) or verdict(results) == "not converged"
+    for k, own in enumerate(results.joints if last else []):
+        name, last = case.named((k,)), own.last
+        share = tension_share(own.case, last)
+        evidence = Evidence(last["crack_length"], unstable, share)
+        of_joint = [*own.case.law.hints(evidence), *hints_on_state(own, last)]
+        messages += (f"{name}: {hint}" if name else hint for hint in of_joint)
     return messages
 
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -37,9 +37,11 @@ UNCHECKED, REQUIREMENTS = (
 #: Value of a requirement that requires nothing.
 NOTHING = 0.0, "any"
 
-#: Columns of check.csv: a row per scene and method at the last level, and one of differences.
+#: Columns of check.csv: a row per scene, joint and method at the last level, and one of
+#: differences.
 CHECK = {
     "case": ("", "name of the case"),
+    "joint": ("", "name of the joint: base, lift at a height"),
     "answer": (
         "",
         "method: finite elements, gravity method (also with a longer crack); or their difference",
@@ -88,9 +90,11 @@ SHOWN: tuple[tuple[Units, dict[str, str]], ...] = (
 
 @dataclass(frozen=True)
 class MethodResult:
-    """Result of one method for a scene at its last level."""
+    """Result of one method for a joint of a scene at its last level."""
 
+    #: of the joint
     case: Case
+    joint: str
     method: str
     #: t of the state; nan if there is none
     time: float
@@ -139,6 +143,7 @@ class MethodResult:
         """Row of check.csv."""
         return {
             "case": self.case.name,
+            "joint": self.joint,
             "answer": self.method,
             "uplift": self.case["uplift"],
             "load": "partial" if self.partial else "full",
@@ -165,19 +170,24 @@ def by_gravity(method: GravityMethod, name: str = GRAVITY) -> MethodResult:
     """Result of the gravity method."""
     statement = "" if method.stands else "overturning: no part of the joint is under compression"
     numbers = {name: float(getattr(method, name)) for name in NUMBERS}
-    return MethodResult(method.case, name, method.time, numbers, statement)
+    (joint,) = method.case.joint_names
+    return MethodResult(method.case, joint, name, method.time, numbers, statement)
 
 
-def by_finite_elements(result: Results) -> MethodResult:
-    """Result of a run at the last level it reached, with safety factors from its resultants.
+def by_finite_elements(result: Results, statement: str | None = None) -> MethodResult:
+    """Result of a run for a joint, the only one of `result`, at the last level it reached, with
+    safety factors from its resultants.
 
-    Stresses are node values at the ends of the joint; those of an elastic body depend on the mesh.
+    statement: why it fails, or empty; by default that of the result. Stresses are node values at
+    the ends of the joint; those of an elastic body depend on the mesh.
     """
     case, last, partial = result.case, result.last, result.partial_load
-    statement = verdict.statement(result) if verdict.failed(result) else ""
+    (joint,) = case.joint_names
+    if statement is None:
+        statement = verdict.statement(result) if verdict.failed(result) else ""
     if not last:
         nothing = dict.fromkeys(NUMBERS, math.nan)
-        return MethodResult(case, FINITE_ELEMENTS, math.nan, nothing, statement, partial)
+        return MethodResult(case, joint, FINITE_ELEMENTS, math.nan, nothing, statement, partial)
     if partial and not statement:
         statement = f"ended at t = {last['time']:.6g} of {case.times[-1]:g}"
     method, rows = gravity.at(case, last["time"], last["level"]), along(result.at())
@@ -189,12 +199,13 @@ def by_finite_elements(result: Results) -> MethodResult:
     uplift_moment = method.resultant.moment - last["M"]
     numbers["OSF"] = gravity.overturning_factor(method.loads, uplift_moment)
     numbers = {name: float(numbers[name]) for name in NUMBERS}
-    return MethodResult(case, FINITE_ELEMENTS, last["time"], numbers, statement, partial)
+    return MethodResult(case, joint, FINITE_ELEMENTS, last["time"], numbers, statement, partial)
 
 
 def hand_calculation(result: Results) -> GravityMethod:
-    """The gravity method at a case's last level with all loads; at the last state of a run under
-    displacement control or beyond the last level, up to a critical one.
+    """The gravity method for a joint, the only one of `result`, at a case's last level with all
+    loads; at the last state of a run under displacement control or beyond the last level, up to a
+    critical one.
     """
     case, last = result.case, result.last
     if last and (case["drive"] != "level" or last["time"] > case.times[-1]):
@@ -202,11 +213,13 @@ def hand_calculation(result: Results) -> GravityMethod:
     return gravity.at(case, case.times[-1])
 
 
-def compare_methods(result: Results) -> SafetyCheck:
-    """Apply both methods to the scene of a run."""
+def compare_methods(result: Results, statement: str | None = None) -> SafetyCheck:
+    """Apply both methods to a joint, the only one of `result`; statement: see
+    `by_finite_elements`.
+    """
     method = hand_calculation(result)
     return SafetyCheck(
-        by_finite_elements(result),
+        by_finite_elements(result, statement),
         by_gravity(method),
         result.info.get("error_estimate", {}).get("statement", ""),
         [by_gravity(longer, LONGER) for longer in method.further],
@@ -214,9 +227,22 @@ def compare_methods(result: Results) -> SafetyCheck:
     )
 
 
+def compare_joints(result: Results) -> list[SafetyCheck]:
+    """Apply both methods to each joint of the scene of a run.
+
+    A run that stopped fails for all joints; a joint that has slipped, only for itself.
+    """
+    why = verdict.statement(result) if verdict.failed(result) else ""
+    slipped = () if result.stopped else verdict.slipped_joints(result)
+    return [
+        compare_methods(own, why if k in slipped or not slipped else "")
+        for k, own in enumerate(result.joints)
+    ]
+
+
 @dataclass(frozen=True)
 class SafetyCheck:
-    """Results of both methods for a scene."""
+    """Results of both methods for a joint of a scene."""
 
     finite_elements: MethodResult
     gravity: MethodResult
@@ -233,6 +259,13 @@ class SafetyCheck:
         return [self.finite_elements, self.gravity, *self.longer]
 
     @property
+    def margin(self) -> float:
+        """The smallest safety factor of both methods; below 0 if one of them fails."""
+        factors = [r.numbers[name] for r in self.results for name in ("SSF", "OSF")]
+        least = min([f for f in factors if not math.isnan(f)], default=0.0)
+        return least - 1e9 * bool(self.why)
+
+    @property
     def comparable(self) -> bool:
         """Whether both methods have the same load: the same t, by which loads grow, and level."""
         elements, rigid = self.finite_elements, self.gravity
@@ -247,7 +280,7 @@ class SafetyCheck:
         if not self.comparable:
             return rows
         numbers = {n: difference(elements.numbers[n], rigid.numbers[n]) for n in NUMBERS}
-        row = MethodResult(elements.case, DIFFERENCE, elements.time, numbers).row
+        row = replace(elements, method=DIFFERENCE, numbers=numbers, partial=False).row
         return [*rows, row | NO_VERDICT]
 
     @property
@@ -257,7 +290,7 @@ class SafetyCheck:
         factors, where = required_by_case(case), position_by_case(case)
         if all(map(math.isnan, factors.values())) and not where:
             return self.rows
-        scene = {"case": case.name, "uplift": case["uplift"]}
+        scene = {n: self.gravity.row[n] for n in ("case", "joint", "uplift")}
         blank = dict.fromkeys(NUMBERS, math.nan)
         row = scene | {"answer": REQUIRED} | blank | factors | NO_VERDICT | {"position": where}
         return [*self.rows, row]
@@ -351,9 +384,16 @@ def text_table(checks: list[SafetyCheck]) -> str:
 
 
 def scene_label(checks: list[SafetyCheck], row: Row) -> str:
-    """Name of a row's case, with its uplift if the case has several scenes."""
-    scenes = {c.gravity.case["uplift"] for c in checks if c.gravity.case.name == row["case"]}
-    return row["case"] + (f", {row['uplift']}" if len(scenes) > 1 else "")
+    """Name of a row's case, with its uplift if the case has several scenes, and its joint if it has
+    several.
+    """
+    same = [c.gravity for c in checks if c.gravity.case.name == row["case"]]
+    joints = list(dict.fromkeys(result.joint for result in same))
+    scenes = {result.case["uplift"] for result in same if result.joint == joints[0]}
+    parts = [row["case"]]
+    parts += [row["uplift"]] if len(scenes) > 1 else []
+    parts += [row["joint"]] if len(joints) > 1 else []
+    return ", ".join(parts)
 
 
 def method_label(row: Row) -> str:
@@ -395,14 +435,26 @@ def check_cases(cases: list[Case], out: Path) -> list[SafetyCheck]:
     checks = []
     for case in cases:
         for result in run(case, out / case.name):
-            method, check = hand_calculation(result), compare_methods(result)
-            checks.append(check)
+            of_joints, methods = compare_joints(result), list(map(hand_calculation, result.joints))
+            checks += of_joints
             folder = folders.scene_folder(case, result.case, out / case.name)
-            write_csv(folder / "gravity.csv", method.table())
-            draw_check(result, method, picture_table(check), check.why, folder)
+            write_csv(folder / "gravity.csv", loads_table(methods))
+            k = min(range(len(methods)), key=lambda k: of_joints[k].margin)
+            worst = of_joints[k]
+            draw_check(result.joints[k], methods[k], picture_table(worst), worst.why, folder)
         rows = [row for check in checks for row in check.rows]
         write_csv(out / "check.csv", {name: [row[name] for row in rows] for name in CHECK})
     return checks
+
+
+def loads_table(methods: list[GravityMethod]) -> dict[str, list[Any]]:
+    """Loads on the body above each joint; with the name of the joint if there are several."""
+    tables = [method.table() for method in methods]
+    if len(tables) == 1:
+        return tables[0]
+    names = [method.case.joint_names[0] for method in methods]
+    rows = [name for name, table in zip(names, tables, strict=True) for _ in table["load"]]
+    return {"joint": rows} | {n: [v for t in tables for v in t[n]] for n in tables[0]}
 
 
 def picture_table(check: SafetyCheck) -> list[tuple[str, ...]]:

@@ -8,7 +8,7 @@ precision. A critical level needs no bisection: it is the highest level of the p
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain, zip_longest
 from pathlib import Path
@@ -19,14 +19,14 @@ from scipy.optimize import bisect
 from threadpoolctl import threadpool_limits
 
 from .. import InputError
-from ..arrays import Values
+from ..arrays import Setting, Settings
 from ..engines import Outcome
 from ..engines.condensed.solve import about
 from ..joint.interface import interface_of
 from ..laws import Evidence
 from ..model.case import Case, load
 from ..model.parameters import parameter
-from ..model.results import Results
+from ..model.results import Results, column_of, row_of_joint
 from ..post import folder as folders
 from ..post.tables import write_csv
 from ..progress import Progress
@@ -85,6 +85,9 @@ class CriticalValue:
     gravity_with: Mapping[str, float] = field(default_factory=dict)
     #: a note on the gravity method's values
     note: str = ""
+    #: the joint that fails, if there are several, and the events on the way
+    joint: str = ""
+    events: Sequence[str] = ()
     #: error or interrupt that ended the search
     error: BaseException | None = None
 
@@ -99,23 +102,28 @@ class CriticalValue:
         if self.value is None:
             lines = [f"{name}: no critical {of} found: {self.doubt}"]
         else:
-            mode = f" ({self.mode})" if self.mode else ""
+            where = f" on {self.joint}" if self.mode and self.joint else ""
+            mode = f" ({self.mode}{where})" if self.mode else ""
             lines = [f"{name}: critical {of} {self.value:.6g}{unit}{mode}"]
             lines.append(self.why or f"not confirmed: {self.doubt}")
+        lines += self.events
         if search.of == "strength" and set(search.partial.values()) != {1.0}:
             mu, cohesion = search.partial["mu"], search.partial["adhesion"]
             lines.append(f"beyond the partial factors factor_mu = {mu:g}, factor_c = {cohesion:g}")
-        if self.point and self.point.model.equilibrium.law.hardens and search.own.hardening_asked:
+        laws = self.point.model.equilibrium.laws.laws if self.point else ()
+        if any(law.hardens for law in laws) and search.own.hardening_asked:
             lines += filter(None, [statement(last_state(search, self.point))])
         if self.gravity is not None:
             values = {"gravity method": self.gravity} | self.gravity_with
             lines.append("; ".join(f"{n}: {v:.6g}{unit}" for n, v in values.items()))
         if self.note:
             lines.append(self.note)
-        if self.point:
-            last, law = self.point.last, search.own.law
-            share = tension_share(search.own, last)
-            lines += law.hints(Evidence(last["crack_length"], False, share))
+        case = self.point.model.case if self.point else search.own
+        for k, joint in enumerate(case.joints if self.point else ()):
+            last, name = row_of_joint(self.point.last, k), case.named((k,))
+            share = tension_share(joint, last)
+            hints = joint.law.hints(Evidence(last["crack_length"], False, share))
+            lines += (f"{name}: {hint}" if name else hint for hint in hints)
         return lines
 
 
@@ -131,10 +139,16 @@ class Search:
         #: partial factors of the case; they are part of the reduced strength, not of a check
         self.partial = {name: own[factor] for name, factor in PARTIAL.items()}
         full = dict.fromkeys(PARTIAL.values(), 1.0)
-        self.settings = QUICK | own.source.overrides | {"drive": "level"} | full
-        own = replace(own, values=own.values | full)
-        if own.law.hardening_parameter and not own.hardening_asked:
-            self.settings[own.law.hardening_parameter] = 0.0
+        self.settings: dict[str, Setting] = {
+            **QUICK,
+            **own.source.overrides,
+            "drive": "level",
+            **full,
+        }
+        own = own.with_values(full)
+        for joint in own.joints:
+            if joint.law.hardening_parameter and not own.hardening_asked:
+                self.settings[joint.law.hardening_parameter] = 0.0
         self.own = own
         #: called with a message on the progress
         self.on_progress: Callable[[str], None] = lambda message: None
@@ -181,7 +195,9 @@ class Search:
         """
         if self.of == "strength":
             factors = {n: value * self.partial.get(n, 1.0) for n in STRENGTH}
-            changed = {n: self.own[n] / factors[n] for n in STRENGTH} | {"pena_rupture": -1.0}
+            joints = self.own.joints
+            changed = {n: of_each([joint[n] / factors[n] for joint in joints]) for n in STRENGTH}
+            changed["pena_rupture"] = -1.0
         else:
             changed = {self.name: value}
         return self.own.varied(self.settings | changed)
@@ -362,15 +378,16 @@ class Search:
         self, value: float | None, failing: FailurePath, point: Point | None
     ) -> CriticalValue:
         """The result for a value and the path that fails beyond it."""
-        mode, why = failing.mode, ""
+        mode, why, joint = failing.mode, "", failing.joint
         doubt = "no further equilibrium is found, but no mechanism either"
         if not failing.points:
             doubt = "no equilibrium is found even in the first step"
         elif failing.crushed_at_top:
             why = f"beyond it the toe's compression passes f_c = {failing.case['f_c']:g} Pa"
         elif failing.slides:
-            last = failing.points[failing.top].last
-            why = f"there the whole joint slips: T = {last['T']:.5g} N/m is its shear strength"
+            last = row_of_joint(failing.points[failing.top].last, failing.failing[0])
+            what = failing.joint or "joint"
+            why = f"there the whole {what} slips: T = {last['T']:.5g} N/m is its shear strength"
         elif failing.settled(SURE):
             top, limit = failing.points[failing.top], failing.points[failing.limit_point]
             ratio = failing.points[-1].imposed / failing.imposed(limit)
@@ -378,11 +395,15 @@ class Search:
                 f"the equilibrium path, followed to {ratio:.2g} times that displacement, reaches "
                 f"{top.level:.6g} m at most"
             )
-            if reached := bound(last_state(self, top))[1]:
-                why += f"; there {reached}"
+            _, reached, where = bound(last_state(self, top))
+            if reached:
+                why += f"; there {f'on {where} ' if where else ''}{reached}"
         else:
-            mode, why = self.by_statics(failing)
-        result = CriticalValue(value, mode, why, "" if why else doubt, point)
+            mode, why, joint = self.by_statics(failing)
+        events = events_on(failing.admissible) if failing.points else []
+        result = CriticalValue(
+            value, mode, why, "" if why else doubt, point, joint=joint, events=events
+        )
         if value is None or (by_hand := self.by_gravity(value)) is None:
             return result
         others: dict[str, float] = {}
@@ -393,35 +414,36 @@ class Search:
                 others[name] = other
         return replace(result, gravity=by_hand, gravity_with=others, note=self.tension(value))
 
-    def by_statics(self, failing: FailurePath) -> tuple[str, str]:
-        """How an unconfirmed path fails, and why: its resultants have no equilibrium above a level
-        near its highest (below the target, for another quantity than the level). Why is empty if
-        they have.
+    def by_statics(self, failing: FailurePath) -> tuple[str, str, str]:
+        """How an unconfirmed path fails, why, and at which joint, if there are several: its
+        resultants have no equilibrium above a level near its highest (below the target, for another
+        quantity than the level). Why is empty if they have.
         """
         top = failing.points[failing.top]
-        level, mode, words = highest_by_statics(failing.case, top.last)
+        level, mode, words, joint = highest_by_statics(top.model.case, top.last)
         if not level < (top.level * (1 + NEAR_BOUND) if self.of == "level" else failing.target):
-            return failing.mode, ""
-        return mode, (
+            return failing.mode, "", failing.joint
+        why = (
             f"by statics there is no equilibrium above {level:.6g} m, where {words}; the highest "
             f"computed level is {top.level:.6g} m"
         )
+        return mode, why, joint
 
     # -- the gravity method
     # ----------------------------------------------------------------------------------------------
 
     def tension(self, value: float) -> str:
         """A note where the gravity method is uncracked but the elastic stress of the finite
-        elements exceeds the tensile strength at the heel; else empty.
+        elements exceeds the tensile strength at the first joint's heel; else empty.
         """
-        method = self.rigid_block(value)
+        method, *_ = self.rigid_blocks(value)
         strength = method.case.law.tensile_strength
         if method.crack_length or method.tip_stress <= 0:
             return ""
-        case = method.case
+        case = self.own if self.of == "level" else self.case_at(value)
         if self.of == "level":
             level = {"levels": (*case.levels[:-1], value)}
-            case = replace(case, values=case.values | {"drive": "level"}, **level)
+            case = replace(case.with_values({"drive": "level"}), **level)
         elastic = elastic_heel_stress(case, interface_of(case))
         if elastic <= strength:
             return ""
@@ -449,29 +471,55 @@ class Search:
                     return float(bisect(sign, value, other, rtol=PRECISION / 1000))
         return None
 
-    def rigid_block(self, value: float, tension: bool = True) -> gravity.GravityMethod | None:
-        """The gravity method with a value; None if the case allows no such value, or its geometry
-        no gravity method.
+    def rigid_blocks(self, value: float, tension: bool = True) -> list[gravity.GravityMethod]:
+        """The gravity method with a value, joint by joint; empty if the case allows no such value,
+        or its geometry no gravity method.
         """
         if self.own.geometry:
-            return None
+            return []
         try:
             case = self.own if self.of == "level" else self.case_at(value)
         except InputError:
-            return None
-        return gravity.at(case, case.times[-1], value if self.of == "level" else None, tension)
+            return []
+        level = value if self.of == "level" else None
+        return [gravity.at(joint, case.times[-1], level, tension) for joint in case.joints]
 
     def rigid_block_stands(self, value: float, tension: bool, longest: bool) -> bool | None:
-        """Whether the gravity method finds an equilibrium, with friction if the law has it, and a
-        toe that is not crushed; None if there is no gravity method.
+        """Whether the gravity method finds an equilibrium of all joints, with friction if the law
+        has it, and toes that are not crushed; None if there is no gravity method.
         """
-        method = self.rigid_block(value, tension)
-        if method is None:
-            return None
-        case, method = method.case, (method, *method.further)[-1] if longest else method
-        slides = case.law.limits_shear and method.SSF < 1
-        crushed = 0 < case["f_c"] < -method.sigma_n_toe
-        return method.stands and not slides and not crushed
+        methods = self.rigid_blocks(value, tension)
+        return all(block_stands(method, longest) for method in methods) if methods else None
+
+
+def block_stands(method: gravity.GravityMethod, longest: bool) -> bool:
+    """Whether a rigid block stands; longest: with the longest of several cracks in equilibrium."""
+    case, method = method.case, (method, *method.further)[-1] if longest else method
+    slides = case.law.limits_shear and method.SSF < 1
+    crushed = 0 < case["f_c"] < -method.sigma_n_toe
+    return method.stands and not slides and not crushed
+
+
+def of_each(values: list[float]) -> Setting:
+    """A setting from the values of each joint."""
+    return tuple(values) if len(values) > 1 else values[0]
+
+
+#: What happens to a joint, by the column of the history that is then positive.
+EVENTS = {"crack_length": "opens", "slip_length": "slips"}
+
+
+def events_on(points: list[Point]) -> list[str]:
+    """When each of several joints first opens and slips on a path, in the order of the levels."""
+    case, events = points[0].model.case, list[tuple[int, str]]()
+    for k in range(len(case.of_joints)):
+        for name, verb in EVENTS.items():
+            first = next((i for i, p in enumerate(points) if p.last[column_of(name, k)] > 0), None)
+            if first is not None:
+                level = points[first].level
+                events.append((first, f"{case.named((k,))} {verb} from {level:.5g} m"))
+    listed = ", ".join(text for _, text in sorted(events))
+    return [f"on the way: {listed}"] if listed else []
 
 
 def point_at_target(trial: Trial) -> Point:
@@ -510,7 +558,7 @@ def outwards(value: float, end: float) -> Iterator[float]:
 def critical(
     case: str,
     of: str,
-    settings: Values | None = None,
+    settings: Settings | None = None,
     levels: str | None = None,
     tail_levels: str | None = None,
     out: Path | None = None,
@@ -552,7 +600,7 @@ def last_state(search: Search, point: Point) -> Results:
     required = {n: search.own[n] for n in (*QUICK, *DRIVE)}
     if point.state.time > history.saved_until:
         history.save(point.state)
-    return history.results(replace(case, values=case.values | required), stopped=False)
+    return history.results(case.with_values(required), stopped=False)
 
 
 def write(search: Search, answer: CriticalValue, out: Path, seconds: float) -> None:
@@ -582,6 +630,8 @@ def as_json(search: Search, answer: CriticalValue) -> dict[str, Any]:
         "value": answer.value,
         "unit": search.unit.strip(),
         "mode": answer.mode,
+        "joint": answer.joint,
+        "events": answer.events,
         "confirmed": answer.why,
         "doubt": answer.doubt,
         "gravity_method": answer.gravity,

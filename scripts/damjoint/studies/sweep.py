@@ -23,7 +23,7 @@ from ..arrays import Value, Values
 from ..engines import engine_of
 from ..joint.interface import Interface, interface_of
 from ..model.case import Case, first_mesh, resolve
-from ..model.results import HISTORY
+from ..model.results import history_columns
 from ..post.tables import as_text
 from ..progress import track
 from ..solver.load_stepper import LoadStepper
@@ -36,7 +36,9 @@ from .plan import Plan, Row, cases_of, column_of, in_file
 
 def key_of(case: Case) -> str:
     """The key of a scene and its loading in a result file."""
-    identity = sorted(case.values.items()), case.levels, case.tail_levels, case.times, __version__
+    of_joints = ((own.name, sorted(own.values.items())) for own in case.of_joints)
+    loading = case.levels, case.tail_levels, case.times
+    identity = sorted(case.values.items()), *loading, __version__, *of_joints
     return hashlib.sha256(repr(identity).encode()).hexdigest()[:16]
 
 
@@ -95,7 +97,7 @@ def last_rows(tasks: list[Task]) -> list[dict[str, Value]]:
 
 def last_row(task: Task, solved: Solved) -> dict[str, Value]:
     """The row of a case; an error is an outcome, and the sweep continues."""
-    row: dict[str, Value] = dict.fromkeys(HISTORY, "")
+    row: dict[str, Value] = dict.fromkeys(history_columns(task.case), "")
     try:
         interface = interface_of(task.case)
         mode, why = mechanism(task.case, interface) if task.quick else ("", "")
@@ -322,9 +324,10 @@ def sweep(
         raise InputError(f"out = {out}: must be a file in an existing folder")
     rows = list(planned(case, plan))
     values = {key: row for key, row, _ in rows}
-    results = [*HISTORY, *OUTCOME, *plan.critical_columns]
+    of_steps = list(history_columns(case))
+    results = [*of_steps, *OUTCOME, *plan.critical_columns]
     columns = ["key", *map(column_of, plan.names), *results]
-    done = read_done(out, columns, (*HISTORY, "failed"))
+    done = read_done(out, columns, (*of_steps, "failed"))
     missing = {key: task for key, _, task in rows if key not in done}
     computed = compute(missing, jobs, scheduler)
     with out.open("a", newline="") as file:

@@ -12,6 +12,7 @@ from ...arrays import Array, IntArray, Sparse
 from ...fem.bodies import Bodies, ElasticBody, material_of
 from ...fem.elasticity import stress
 from ...fem.factor import solve_symmetric
+from ...fem.gluing import Gluing
 from ...joint.equilibrium import Equilibrium
 from ...model.fields import Field
 from ...solver.history import History
@@ -20,36 +21,36 @@ from ...solver.state import State
 
 @dataclass(frozen=True, kw_only=True)
 class GluedBodies:
-    """Both bodies, glued at the joint to a single elastic body; numbers of the lower body first."""
+    """All bodies, glued at the joints to a single elastic body; the last body's numbers first."""
 
     stiffness: Sparse
     #: degrees of freedom that are not fixed
     free: IntArray
-    #: number of each degree of freedom of the upper body, and the Boolean matrix of these numbers
-    number: IntArray
-    from_upper: Sparse
+    #: by body: the Boolean matrix of the numbers of its degrees of freedom
+    numbers: dict[str, Sparse]
 
     @staticmethod
-    def of(upper: ElasticBody, lower: ElasticBody) -> GluedBodies:
-        """Assemble two bodies."""
-        upper_size, lower_size = upper.stiffness.shape[0], lower.stiffness.shape[0]
-        number = np.full(upper_size, -1)
-        number[upper.joint_dofs] = lower.joint_dofs
-        own = np.flatnonzero(number < 0)
-        number[own] = lower_size + np.arange(len(own))
-        size = lower_size + len(own)
-        from_upper = sparse.csr_matrix(
-            (np.ones(upper_size), (np.arange(upper_size), number)), (upper_size, size)
-        )
-        empty = sparse.csr_matrix((len(own), len(own)))
-        stiffness = sparse.block_diag([lower.stiffness, empty]) + (
-            from_upper.T @ upper.stiffness @ from_upper
-        )
-        fixed = np.union1d(lower.fixed_dofs, number[upper.fixed_dofs])
-        free = np.setdiff1d(np.arange(size), fixed)
-        return GluedBodies(
-            stiffness=stiffness.tocsr(), free=free, number=number, from_upper=from_upper
-        )
+    def of(bodies: dict[str, ElasticBody], gluing: Gluing) -> GluedBodies:
+        """Assemble bodies."""
+        shared = np.full(gluing.nodes, -1)
+        numbers, fixed, size = {}, list[IntArray](), 0
+        for name, body in reversed(bodies.items()):
+            of_body, own = gluing.bodies[name], body.stiffness.shape[0]
+            number = np.full(own, -1)
+            number[of_body.dofs] = shared[of_body.node]
+            new = np.flatnonzero(number < 0)
+            number[new] = size + np.arange(len(new))
+            shared[of_body.node] = number[of_body.dofs]
+            size += len(new)
+            numbers[name] = number
+            fixed.append(number[body.fixed_dofs])
+        matrices = {
+            name: sparse.csr_matrix((np.ones(len(n)), (np.arange(len(n)), n)), (len(n), size))
+            for name, n in numbers.items()
+        }
+        stiffness = sum(m.T @ bodies[name].stiffness @ m for name, m in matrices.items())
+        free = np.setdiff1d(np.arange(size), np.concatenate(fixed))
+        return GluedBodies(stiffness=stiffness.tocsr(), free=free, numbers=matrices)
 
     def solve(self, loads: Array) -> Array:
         """Displacements (n, m) under loads (n, m)."""
@@ -81,8 +82,8 @@ def recover(bodies: Bodies, scenes: list[tuple[Equilibrium, History]]) -> list[d
     """Fields of the saved states of scenes on the same bodies, by scene and time. Displacements
     count from the state under the weight alone, if there is one.
 
-    The glued bodies are also loaded by the forces -K_u jump of the jump in the upper body; the
-    water pressure in the joint acts on both joint faces and cancels.
+    The glued bodies are also loaded by the forces -K_b J_b d of the jumps that a body carries; the
+    water pressure in a joint acts on both joint faces and cancels.
     """
     states = [
         (equilibrium, state)
@@ -91,24 +92,24 @@ def recover(bodies: Bodies, scenes: list[tuple[Equilibrium, History]]) -> list[d
     ]
     if not any(history.saved for _, history in scenes):
         return [{} for _ in scenes]
-    (joint,) = bodies.mesh.joints.values()
-    upper, lower = bodies.by_name[joint.upper], bodies.by_name[joint.lower]
-    lower_size = lower.stiffness.shape[0]
-    glued = GluedBodies.of(upper, lower)
-    jumps = np.zeros((len(states), upper.stiffness.shape[0]))
+    gluing = Gluing.of(bodies)
+    glued = GluedBodies.of(bodies.by_name, gluing)
     loads = np.zeros((glued.stiffness.shape[0], len(states)))
+    jumps = {
+        name: np.zeros((len(states), body.stiffness.shape[0]))
+        for name, body in bodies.by_name.items()
+    }
     for i, (equilibrium, state) in enumerate(states):
-        jumps[i, upper.joint_dofs[equilibrium.interface.joint.free]] = state.jump
-        on_upper, on_lower = -upper.stiffness @ jumps[i], np.zeros(lower_size)
-        add_external_forces(on_upper, upper, equilibrium, state)
-        add_external_forces(on_lower, lower, equilibrium, state)
-        loads[:, i] = glued.from_upper.T @ on_upper
-        loads[:lower_size, i] += on_lower
+        for name, body in bodies.by_name.items():
+            of_body = gluing.bodies[name]
+            jumps[name][i, of_body.dofs] = of_body.jumps @ state.jump
+            load = -body.stiffness @ jumps[name][i]
+            add_external_forces(load, body, equilibrium, state)
+            loads[:, i] += glued.numbers[name].T @ load
     solution = glued.solve(loads)
 
     displacements = {
-        joint.upper: solution[glued.number].T + jumps,
-        joint.lower: solution[:lower_size].T,
+        name: (glued.numbers[name] @ solution).T + jumps[name] for name in bodies.by_name
     }
     at_nodes, stresses = {}, {}
     material, dim = material_of(states[0][0].case), bodies.mesh.dim

@@ -21,13 +21,13 @@ from ...solver.load_stepper import LoadStepper
 from .. import OnStep, Outcome
 
 #: Number of jump unknowns from which on several threads of the linear algebra are faster than one.
-THREADED_UNKNOWNS = 3000
+THREADED_UNKNOWNS = 2000
 
 
 def check(case: Case) -> None:
     """Raise InputError if a user's own geometry is unsuitable; all other cases are suitable."""
     if case.geometry:
-        mesh_of(case)
+        case.with_joints([joint.of_case for joint in mesh_of(case).joints])
 
 
 def about(bulk: Condensed) -> dict[str, Any]:
