@@ -13,6 +13,7 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import TypeAlias
 
@@ -55,6 +56,9 @@ UNDECIDED = (ERROR, "not converged", "interrupted")
 #: Limit of the rows that are computed together: they share the steps up to their common level.
 MOST_TOGETHER = 8
 
+#: Bundles in a task of a scheduler: at most, and so few that each of its threads has some tasks.
+MOST_IN_TASK, TASKS_PER_THREAD = 50, 10
+
 #: Solved cases that differ in levels only, by levels, tailwater and times.
 Solved: TypeAlias = dict[tuple[tuple[float, ...], ...], LoadStepper]
 
@@ -93,6 +97,11 @@ def last_rows(tasks: list[Task]) -> list[dict[str, Value]]:
     solved: Solved = {}
     with threadpool_limits(1):
         return [last_row(task, solved) | critical_value(task) for task in tasks]
+
+
+def rows_of_bundles(bundles: list[list[Task]]) -> list[dict[str, Value]]:
+    """The rows of several bundles, see `last_rows`."""
+    return [row for tasks in bundles for row in last_rows(tasks)]
 
 
 def last_row(task: Task, solved: Solved) -> dict[str, Value]:
@@ -241,10 +250,13 @@ def spread(
                 f"--scheduler {scheduler}: no scheduler answers at this address ({error})"
             ) from None
         with client:
-            futures = {
-                client.submit(last_rows, some, key=f"damjoint-{'-'.join(keys)}"): keys
-                for keys, some in zip(work, chosen, strict=True)
-            }
+            threads = max(sum(client.nthreads().values()), 1)
+            size = min(max(len(work) // (TASKS_PER_THREAD * threads), 1), MOST_IN_TASK)
+            futures = {}
+            for i in range(0, len(work), size):
+                keys = list(chain.from_iterable(work[i : i + size]))
+                name = f"damjoint-{hashlib.sha256(' '.join(keys).encode()).hexdigest()[:32]}"
+                futures[client.submit(rows_of_bundles, chosen[i : i + size], key=name)] = keys
             for future in as_finished(futures):
                 yield from zip(futures[future], future.result(), strict=True)
     elif jobs == 1 or len(work) == 1:
