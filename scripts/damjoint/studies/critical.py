@@ -63,6 +63,9 @@ TINY = 1e-30
 #: precision of that value.
 BESIDE_GRAVITY, GUESS_PRECISION = 0.01, 1e-3
 
+#: How often a step of the search is doubled at most.
+MOST_DOUBLED = 20
+
 #: Relative distances from a value at which the gravity method's critical value is sought.
 DISTANCES = (0.02, 0.05, 0.1, 0.2, 0.5, 0.9)
 
@@ -258,12 +261,15 @@ class Search:
             if not fails.stands:
                 return self.result(stands.value, fails.path, point_at_target(stands))
             self.factor = SURE  # the first estimate is wrong for this dam
-            stands, fails = self.beyond(fails, fails.value - stands.value)
+            ends = self.beyond(fails, fails.value - stands.value)
+            if ends is None:
+                return self.no_change(fails)
+            stands, fails = ends
 
-    def beyond(self, stands: Trial, step: float) -> tuple[Trial, Trial]:
+    def beyond(self, stands: Trial, step: float) -> tuple[Trial, Trial] | None:
         """The last stand and the first failure beyond a trial that stands: of the trials that
         failed by their first estimate, now followed further; else at distances doubled from a step
-        on.
+        on. None if all values that the case allows stand.
         """
         ahead = lambda trial: (trial.value - stands.value) * np.sign(step)
         known = sorted((t for t in self.trials if not t.stands and ahead(t) > 0), key=ahead)
@@ -272,12 +278,16 @@ class Search:
             if not trial.stands:
                 return stands, trial
             stands, step = trial, trial.value - stands.value
-        while True:
+        for _ in range(MOST_DOUBLED):
             step *= 2
-            trial = self.trial(stands.value + step)
+            try:
+                trial = self.trial(stands.value + step)
+            except InputError:  # the case allows no such value
+                break
             if not trial.stands:
                 return stands, trial
             stands = trial
+        return None
 
     def no_change(self, first: Trial) -> CriticalValue:
         """The result if all trials stand, or all fail."""
@@ -343,8 +353,8 @@ class Search:
             if inside:
                 value = inside[0]
             else:
-                value = (self.extrapolate(stands, fails) if turn % 3 else None) or middle(*ends)
-                turn += 1
+                secant = self.extrapolate(stands, fails) if turn % 3 else None
+                value, turn = middle(*ends) if secant is None else secant, turn + 1
             trial = self.trial(value)
             stands, fails = (trial, fails) if trial.stands else (stands, trial)
             ends = stands.value, fails.value
