@@ -10,6 +10,7 @@ engines/    the engines: condensed/ from the parts above, getdp/ by the problem 
 statics/    gravity method, limit analysis, verdict
 post/       tables, pictures, fields and folders of results
 accuracy.py mesh refinement to a required accuracy, error estimate
+versions.py versions of the code and of what it uses, machine
 runner.py   solves a case and writes its results
 studies/    checks, sweeps, critical values, a law along a path, reports
 library.py  the interface for Python: case, run, check, critical, fill, own laws

@@ -283,10 +283,16 @@ def do_plot(arguments: argparse.Namespace) -> int:
 
 def add_report(commands: Commands) -> None:
     """Add damjoint report."""
-    command = add_command(commands, do_report, "write one HTML page about runs")
-    command.add_path("out", "FOLDER", nargs="+", help="output folders of the runs")
+    command = add_command(commands, do_report, "write a report on runs, as HTML or PDF")
     command.add_path(
-        "--to", "FILE", default=Path("report.html"), help="the page (default: report.html)"
+        "out", "FOLDER", nargs="+", help="output folders of runs, or that of damjoint check"
+    )
+    command.add_path(
+        "--to",
+        "FILE",
+        default=Path("report.html"),
+        help="the report; a PDF if the name ends in .pdf, which needs weasyprint (default: "
+        "report.html)",
     )
 
 

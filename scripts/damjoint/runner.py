@@ -7,12 +7,11 @@ import re
 import resource
 import sys
 import time
-from importlib.metadata import version
 from pathlib import Path
 
 from tqdm import tqdm
 
-from . import __version__, accuracy
+from . import accuracy, versions
 from .engines import Outcome, engine_of
 from .model.case import Case
 from .model.fields import Solution
@@ -95,12 +94,16 @@ def save(outcome: Outcome, case: Case, out: Path) -> None:
     start, result = time.perf_counter(), outcome.result
     tables.write(result, folder)
     result.info["wall_seconds"]["post"] = time.perf_counter() - start
-    versions = {"damjoint": __version__, "gmsh": version("gmsh"), "python": sys.version.split()[0]}
-    getdp = result.info.pop("getdp", {})
+    numbers, getdp = versions.versions(), result.info.pop("getdp", {})
     if getdp.get("version"):
-        versions["getdp"] = getdp["version"]
+        numbers["getdp"] = getdp["version"]
     memory = max(peak_memory(), getdp.get("peak_memory_mb") or 0.0)
-    result.info |= {"peak_memory_mb": round(memory, 1), "versions": versions}
+    result.info |= {
+        "peak_memory_mb": round(memory, 1),
+        "versions": numbers,
+        "commit": versions.commit(),
+        "machine": versions.machine(),
+    }
     folders.write_info(result, folder, *early_end(outcome))
 
 

@@ -11,7 +11,7 @@ from damjoint_tools import pages
 PACKAGE = Path(damjoint.__file__).parent
 #: Each part uses only those before it.
 PARTS = ["", "storage", "laws", "model", "fem", "joint", "solver", "engines", "statics", "post"]
-PARTS += ["accuracy", "runner", "studies", "library", "gui", "cli", "__main__"]
+PARTS += ["accuracy", "versions", "runner", "studies", "library", "gui", "cli", "__main__"]
 
 
 def part_of(path):

@@ -189,10 +189,11 @@ def by_finite_elements(result: Results, statement: str | None = None) -> MethodR
 
 def hand_calculation(result: Results) -> GravityMethod:
     """The gravity method for a joint, the only one of `result`, at a case's last level with all
-    loads; under displacement control at the last state of the run.
+    loads; at the last state of a run under displacement control or beyond the last level, up to a
+    critical one.
     """
     case, last = result.case, result.last
-    if case["drive"] != "level" and last:
+    if last and (case["drive"] != "level" or last["time"] > case.times[-1]):
         return gravity.at(case, last["time"], last["level"])
     return gravity.at(case, case.times[-1])
 
