@@ -592,7 +592,7 @@ def add_law(commands: Commands) -> None:
     """Add damjoint law."""
     summary = "evaluate a joint law along a path of displacement jumps"
     command = add_command(commands, do_law, summary, settings_options())
-    command.add_argument("law", metavar="LAW", help="rupture, friction or bond")
+    command.add_argument("law", metavar="LAW", help="rupture, friction, bond or endo")
     command.add_path(
         "--path",
         "FILE",

@@ -1,6 +1,7 @@
 """The pages that are made from the code: python -m damjoint_tools.pages NAME.
 
-Run from the checkout: `make pages` (parameters, results, tour, validation: all), `make bench`.
+Run from the checkout: `make pages` (parameters, results, tour, laws, validation: all), or
+`make bench`.
 """
 
 from __future__ import annotations
@@ -20,6 +21,8 @@ from damjoint.statics.gravity import LOADS
 from damjoint.studies.check import CHECK
 from damjoint.studies.failure_path import CRITICAL
 from tabulate import tabulate
+
+from .law_picture import draw as draw_laws
 
 REFERENCE = Path("reference")
 
@@ -280,7 +283,9 @@ def trust_page(results: Path) -> str:
 
 
 def main(words: list[str]) -> None:
-    """Write the pages of a name: bench, trust, parameters, results, tour, validation or all."""
+    """Write the pages of a name: bench, trust, parameters, results, tour, laws (a picture),
+    validation or all.
+    """
     if words[0] == "bench":
         take_bench(Path(words[1]))
     if words[0] == "trust":
@@ -291,6 +296,8 @@ def main(words: list[str]) -> None:
         (REFERENCE / "results.md").write_text(results_page())
     if words[0] in ("tour", "all"):
         (REFERENCE / "tour.md").write_text(tour_page())
+    if words[0] in ("laws", "all"):
+        draw_laws(REFERENCE / "pictures" / "laws.png")
     if words[0] in ("validation", "all"):
         (REFERENCE / "ssnp142.md").write_text(validation_page())
 

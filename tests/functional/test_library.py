@@ -67,7 +67,7 @@ def test_rows_of_a_level_or_a_time(run):
 def test_bad_input_is_one_line():
     for words, message in (
         ({"mu": -1}, "mu = -1: must be"),
-        ({"law": "glue"}, "law = glue: must be one of rupture, friction, bond"),
+        ({"law": "glue"}, "law = glue: must be one of rupture, friction, bond, endo"),
         ({"levels": [-3]}, "levels = -3: must be"),
         ({"colour": 3}, "colour: unknown parameter"),
     ):

@@ -71,6 +71,11 @@ class Law(Generic[V]):
         """
         return {}
 
+    @classmethod
+    def violations(cls, parameters: Mapping[str, Any]) -> Iterator[str]:
+        """Conditions of the law between parameters that their values violate, as messages."""
+        yield from ()
+
     # -- internal variables
 
     def initial(self, points: int) -> V:

@@ -35,6 +35,8 @@ def check_values(
         )
     check_drains(case, section["joint_length"][0])
     check_works(case)
+    for violation in LAWS[case["law"]].violations(case.values):
+        raise InputError(violation)
 
 
 def check_energies(case: ParameterValues) -> None:
