@@ -13,7 +13,7 @@ from pathlib import Path
 from . import __version__
 
 #: Folders of the checkout that hold the code.
-CODE_FOLDERS = ":/scripts", ":/pro", ":/geo", ":/cases"
+CODE_FOLDERS = "scripts", "pro", "geo", "cases"
 #: Packages whose versions are recorded.
 PACKAGES = "gmsh", "numpy", "scipy"
 
@@ -29,12 +29,14 @@ def commit() -> str:
     """Return the commit of the checkout, with a note if its code has changes; empty outside of a
     checkout of this project.
     """
-    package = Path(__file__).parents[1]
+    checkout = Path(__file__).parents[2]
+    if not (checkout / ".git").exists():
+        return ""
 
     def git(*words: str) -> str:
         done = subprocess.run(
             # without locks, which runs at the same time would wait for
-            ["git", "--no-optional-locks", "-C", str(package), *words],
+            ["git", "--no-optional-locks", "-C", str(checkout), *words],
             capture_output=True,
             text=True,
             check=True,
@@ -42,7 +44,6 @@ def commit() -> str:
         return done.stdout.strip()
 
     try:
-        git("ls-files", "--error-unmatch", "damjoint")  # fails in another project's checkout
         changed = git("status", "--porcelain", "--", *CODE_FOLDERS)
         return git("rev-parse", "--short=7", "HEAD") + (" with changes" if changed else "")
     except (OSError, subprocess.CalledProcessError):

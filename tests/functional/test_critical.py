@@ -22,7 +22,7 @@ UNBONDED = {"law": "bond", "sigma_max": 0.0, "adhesion": 0.0}
 
 
 def found(case, of="level", settings=None, levels=None, tail_levels=None):
-    search = Search(case, of, settings, levels, tail_levels)
+    search = Search(load(case, settings, levels, tail_levels), of)
     return search, search.run()
 
 
@@ -89,6 +89,21 @@ def test_critical_effectiveness_of_drains():
 
 
 @pytest.mark.heavy
+def test_critical_strength_with_partial_factors():
+    """Sliding: (mu / 1.5 N + c / 3 L) / F = T, without a crack. The level does not use them."""
+    settings = DAM | {"law": "friction", "mu": 0.9, "adhesion": 6e5, "uplift": "none"}
+    partial = {"factor_mu": 1.5, "factor_c": 3.0}
+    search, answer = found("dam", "strength", settings | partial, levels="45", tail_levels="0")
+    block = gravity.at(load("dam", settings, "45", "0"), 1)
+    expected = (0.6 * block.N + 2e5 * block.body.length) / block.T
+    assert answer.value == pytest.approx(expected, rel=2e-4)
+    assert answer.gravity == pytest.approx(answer.value, rel=2e-4)
+    assert "beyond the partial factors factor_mu = 1.5, factor_c = 3" in answer.lines(search)
+    _, level = found("dam", "level", DAM | UNBONDED | {"mu": 0.7} | partial, tail_levels="3")
+    assert level.value == pytest.approx(43.161, rel=5e-4)
+
+
+@pytest.mark.heavy
 def test_critical_earthquake():
     """It acts together with the only level: under a strong one there is no first step. T = mu N,
     whatever the crack.
@@ -122,7 +137,7 @@ def test_the_gravity_method_without_tension(command, tmp_path):
 def test_the_gravity_method_with_a_crack_past_the_drains():
     """The short crack is in equilibrium up to the drains; mu N = T with the crack past them."""
     drains = {"dam_base": 30.0, "uplift": "cracked", "drains": 1.0, "drain_x": 6.0, "mu": 1.0}
-    search = Search("dam", "level", DAM | UNBONDED | drains, "40,44", "3")
+    search = Search(load("dam", DAM | UNBONDED | drains, "40,44", "3"), "level")
     first, longer = (search.by_gravity(44.4, True, longest) for longest in (False, True))
     method = gravity.at(search.own, 2.0, first - 1e-5)
     assert method.SSF > 1 and method.crack_length == pytest.approx(6, abs=1e-3)

@@ -5,6 +5,7 @@ import pytest
 from damjoint import InputError
 from damjoint.joint.interface import interface_of
 from damjoint.model.case import load
+from damjoint.model.mesh import Mesh
 from damjoint.model.results import column_of
 from damjoint.post import stored
 from damjoint.solver.load_stepper import LoadStepper
@@ -50,6 +51,16 @@ def test_resultants_of_each_joint_are_those_of_statics(uplift):
             assert np.abs(computed - np.array([block.N, block.T, block.M, block.U])).max() < (
                 1e-9 * scale.max()
             )
+
+
+@pytest.mark.parametrize("pattern", ["layers", "free"])
+def test_resultants_of_each_joint_in_3d(pattern):
+    solid = {"dim": 3.0, "mesh_pattern": pattern, "n_joint": 8.0, "thickness": 6.0}
+    results = solved([42], uplift="imposed", **(solid | SLOPES))
+    for own in results.joints:
+        block = gravity.with_crack(own.case, 1.0, 42.0, 0.0)
+        computed = [own.last[name] for name in "NTU"]
+        assert computed == pytest.approx([block.N, block.T, block.U], rel=1e-6)
 
 
 @pytest.mark.parametrize("joint", range(4))
@@ -192,5 +203,11 @@ def test_a_case_file_with_lists(tmp_path):
     assert [own["adhesion"] for own in case.joints] == [3e5] * 3  # the later statement
     assert [own["mu"] for own in load(str(path), {"mu": 0.6}).joints] == [0.6] * 3
     path.write_text("E_dam() = {1e10, 2e10};")
-    with pytest.raises(InputError, match="line 1: .*E_dam = .*: must be a single value"):
+    with pytest.raises(InputError, match=r"line 1: .*E_dam = .*: must be a single value"):
         load(str(path))
+
+
+def test_the_mesh_of_one_joint_does_not_depend_on_an_earlier_mesh_of_several():
+    one, several = load("dam", COARSE), load("dam", COARSE | {"lift_heights": LIFTS})
+    before, _, after = Mesh(one), Mesh(several), Mesh(one)
+    assert np.array_equal(before.bodies["dam"].points, after.bodies["dam"].points)

@@ -10,7 +10,16 @@ from .parameters import declared
 
 #: The parameters whose values are texts, for type checkers: all others are numbers.
 TextName: TypeAlias = Literal[
-    "law", "uplift", "face_load", "drive", "mesh_pattern", "quadrature", "force_face"
+    "law",
+    "uplift",
+    "face_load",
+    "drive",
+    "mesh_pattern",
+    "quadrature",
+    "force_face",
+    "drain_reference",
+    "quake_uplift",
+    "required_position",
 ]
 
 
@@ -46,10 +55,23 @@ class MeshGroup(Group):
     quadrature: str
 
 
+class WaterGroup(Group):
+    """Density and viscosity of the water, aperture of the closed joint, drains."""
+
+    drain_reference: str
+
+
 class LoadGroup(Group):
     """Loads besides the water."""
 
     force_face: str
+    quake_uplift: str
+
+
+class CheckGroup(Group):
+    """Safety factors, position of the resultant and strength that are required."""
+
+    required_position: str
 
 
 class ParameterValues:
@@ -96,9 +118,9 @@ class ParameterValues:
         return Group(self._group("Joint"))
 
     @cached_property
-    def water(self) -> Group:
+    def water(self) -> WaterGroup:
         """Density and viscosity of the water, aperture of the closed joint, drains."""
-        return Group(self._group("Water"))
+        return WaterGroup(self._group("Water"))
 
     @cached_property
     def loads(self) -> LoadGroup:
@@ -111,9 +133,9 @@ class ParameterValues:
         return Group(self._group("Solver"))
 
     @cached_property
-    def checks(self) -> Group:
-        """Safety factors and strength that are required."""
-        return Group(self._group("Checks"))
+    def checks(self) -> CheckGroup:
+        """Safety factors, position of the resultant and strength that are required."""
+        return CheckGroup(self._group("Checks"))
 
 
 def flows(values: Values | ParameterValues) -> bool:
@@ -124,3 +146,11 @@ def flows(values: Values | ParameterValues) -> bool:
 def has_drains(values: Values | ParameterValues) -> bool:
     """Whether drains lower the water pressure in the joint."""
     return values["uplift"] == "drained" or bool(flows(values) and values["drains"])
+
+
+def remembers(values: Values | ParameterValues) -> bool:
+    """Whether the water pressure in an earthquake follows from the joint before it."""
+    mode, uplift = values["quake_uplift"], values["uplift"]
+    if uplift == "none" or not (values["k_h"] or values["k_v"]):
+        return False
+    return mode == "zero" or (mode == "unchanged" and flows(values))

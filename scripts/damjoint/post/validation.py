@@ -207,3 +207,11 @@ def summary(comparisons: list[Comparison]) -> str:
     if counts["pass"] + counts["fail"]:
         text += f"; the worst uses {worst(comparisons):.0%} of its tolerance"
     return text
+
+
+def shown_time(result: Results) -> float:
+    """Requested time of the state drawn: the last, or that of the published numbers."""
+    times = result.joint["time"]
+    published_time = reference_time(result.case)
+    published = references(result.case) and np.isclose(times, published_time).any()
+    return published_time if published else times.max()

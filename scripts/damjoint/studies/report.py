@@ -25,15 +25,16 @@ from ..post.drawing import figure_of
 from ..post.summary import Table, levels_table, table_of
 from ..post.units import FORCES, MOMENTS, Units, unit
 from ..statics.gravity import GravityMethod, force, resultant_of
-from ..statics.verdict import failed, statement, stiffness_ratio
+from ..statics.verdict import decisive_joint, failed, statement, stiffness_ratio
 from ..storage import atomic_write
 from . import report_input
 from .check import (
     REQUIRED,
     SHOWN,
     UNCHECKED,
+    MethodResult,
     SafetyCheck,
-    compare_methods,
+    compare_joints,
     hand_calculation,
     required_by_case,
 )
@@ -224,11 +225,13 @@ def run_section(folder: Path, solution: Solution) -> RunSection:
     result = solution.result
     case, info = result.case, result.info
     # the gravity method needs a section by parameters
-    check = None if case.geometry else compare_methods(result)
-    rigid = None if case.geometry else hand_calculation(result)
+    checks = [] if case.geometry else compare_joints(result)
+    number = decisive_joint(result)
+    own, check = result.joints[number], checks[number] if checks else None
+    rigid = None if case.geometry else hand_calculation(own)
     critical = critical_value(info.get("critical"))
     # requirements do not apply to the last state before a failure
-    failures = [] if critical else failures_of(result, check)
+    failures = [] if critical else failures_of(result, checks)
     verdict = check.finite_elements.verdict if check and not critical else UNCHECKED
     made = datetime.fromtimestamp((folder / "run.json").stat().st_mtime)
     return RunSection(
@@ -240,14 +243,17 @@ def run_section(folder: Path, solution: Solution) -> RunSection:
         verdict="fail" if failures else verdict,
         run_verdict="critical value" if critical else info["verdict"],
         failures=failures,
-        hints=[*filter(None, [critical, *info["hints"], discretisation_error(result)])],
+        hints=[
+            *filter(None, [which_joint(result), critical, *info["hints"]]),
+            *filter(None, [discretisation_error(result)]),
+        ],
         pictures=pictures_of(solution) if len(result.joint["time"]) else [],
-        levels=levels_table(result),
-        methods=methods_table(check, judged=not critical) if check else None,
+        levels=levels_table(own),
+        methods=methods_table(case, checks, judged=not critical) if checks else None,
         loads=loads_table(rigid) if rigid else None,
         formulas=formulas(rigid) if rigid and rigid.stands else [],
         notes=check.notes if check else [],
-        summary=summary_of(result, check),
+        summary=summary_of(own, check),
         computation=computation(result),
         materials=report_input.materials(case),
         other_input=report_input.other_input(case),
@@ -256,12 +262,19 @@ def run_section(folder: Path, solution: Solution) -> RunSection:
     )
 
 
-def failures_of(result: Results, check: SafetyCheck | None) -> list[str]:
+def which_joint(result: Results) -> str:
+    """Which of several joints the curves and the tables of levels and loads are of; else empty."""
+    name = result.case.named((decisive_joint(result),))
+    return f"curves and tables of levels and loads: {name}" if name else ""
+
+
+def failures_of(result: Results, checks: list[SafetyCheck]) -> list[str]:
     """Messages on a run that failed and on requirements that are not met."""
     info = result.info
     messages = [info["statement"]] if info["state"] in ("failed", "interrupted") else []
-    if check:
-        messages += [f"{r.method}: {why}" for r in check.results for why in r.failures]
+    if checks:
+        judged = [r for check in checks for r in check.results]
+        messages += [f"{label(r, result.case)}: {why}" for r in judged for why in r.failures]
     elif failed(result):
         messages.append(statement(result))
     return messages
@@ -287,10 +300,18 @@ def summary_of(result: Results, check: SafetyCheck | None) -> dict[str, float]:
     return values
 
 
-def methods_table(check: SafetyCheck, judged: bool) -> Table:
-    """Tabulate both methods at the last level, what is required and, if judged, the verdicts."""
-    rows = [(r.method, r.numbers, r.verdict if judged else "") for r in check.results]
-    factors = required_by_case(check.gravity.case)
+def label(result: MethodResult, case: Case) -> str:
+    """Method of a result, and its joint if the case has several."""
+    return f"{result.joint}, {result.method}" if case.of_joints else result.method
+
+
+def methods_table(case: Case, checks: list[SafetyCheck], judged: bool) -> Table:
+    """Tabulate both methods at the last level for each joint, what is required and, if judged, the
+    verdicts.
+    """
+    results = [result for check in checks for result in check.results]
+    rows = [(label(r, case), r.numbers, r.verdict if judged else "") for r in results]
+    factors = required_by_case(checks[0].gravity.case)
     if np.isfinite([*factors.values()]).any():
         rows.append((REQUIRED, factors, ""))
     columns = []
@@ -352,10 +373,16 @@ def formulas(rigid: GravityMethod) -> list[str]:
     ]
     if shear:
         lines.append(
-            f"SSF = (µ N' + c B)/T = ({case['mu']:.4g} · {normal:.4g} + "
-            f"{case['adhesion'] / 1e6:.4g} · {uncracked:.4g})/{abs(shear):.4g} = {rigid.SSF:.4g}"
+            f"SSF = (µ N' + c B)/T = ({factored(case, 'mu', 1)} · {normal:.4g} + "
+            f"{factored(case, 'c', 1e6)} · {uncracked:.4g})/{abs(shear):.4g} = {rigid.SSF:.4g}"
         )
     return lines
+
+
+def factored(case: Case, strength: str, unit: float) -> str:
+    """mu or c, with the partial factor that divides it."""
+    value, factor = case["mu" if strength == "mu" else "adhesion"], case[f"factor_{strength}"]
+    return f"{value / unit:.4g}" + (f"/{factor:.4g}" if factor != 1 else "")
 
 
 def pictures_of(solution: Solution) -> list[Picture]:
@@ -375,17 +402,20 @@ def drawn(solution: Solution, time: float, at_level: str) -> Iterator[tuple[str,
         section = figure_of(*HALF)
         pictures.draw_dam(section, solution, time)
         yield "half", f"Section and loads {at_level}, deformed.", section
+    number = decisive_joint(result)
+    own = result.joints[number]
     joint = figure_of(*(HALF if has_fields else SOLID))
-    pictures.draw_joint(joint, result, time)
-    caption = f"Joint {at_level}. {colors}"
+    pictures.draw_joint(joint, solution.of_joint(number), time)
+    name = own.case.joint_names[0] if result.case.of_joints else "joint"
+    caption = f"{name[0].upper()}{name[1:]} {at_level}. {colors}"
     yield "half" if has_fields else "full", caption, joint
     history = figure_of(*WIDE)
-    pictures.draw_history(history, result)
+    pictures.draw_history(history, own)
     yield "full", "", history
-    if result.case["dim"] == 3 and has_fields:
+    if result.case["dim"] == 3 and has_fields and not pictures.is_own_solid(result.case):
         solid = figure_of(*SOLID)
         pictures.draw_solid(solid, solution, time)
-        yield "full", "In 3D: deformed, and the joint unrolled.", solid
+        yield "full", "In 3D: deformed, and maps of the joint.", solid
     if result.case["drive"] != "level":
         yield "half", "Load against opening.", pictures.draw_curve(result)
 

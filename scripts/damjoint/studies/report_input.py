@@ -50,6 +50,12 @@ UPLIFTS = {
     "cracked": "full reservoir head in the crack, linear beyond it",
     "flow": "laminar flow by the cubic law, with the computed opening",
 }
+ADDED_MASS = {1: "Westergaard", 2: "Zangar"}
+QUAKE_UPLIFTS = {
+    "crack": "that of the crack at each moment",
+    "unchanged": "as before the earthquake",
+    "zero": "none in the crack that the earthquake opens",
+}
 #: Loads by the parameters that are 0 without them.
 LOADS = {
     "silt": ("silt_height",),
@@ -231,10 +237,11 @@ def limits(case: Case) -> Iterator[str]:
     if not case["floor_water"]:
         yield "No water pressure acts on the reservoir floor and on the tailwater bed."
     if case["k_h"] or case["k_v"]:
+        pressure = ADDED_MASS.get(case["added_mass"])
         yield (
             "The earthquake is pseudo-static: seismic coefficients times the weight"
-            f"{', added water pressure after Westergaard' if case['added_mass'] else ''}; the "
-            "uplift is unchanged."
+            f"{f', added water pressure after {pressure}' if pressure else ''}; uplift: "
+            f"{QUAKE_UPLIFTS[case['quake_uplift']]}."
         )
     if any(case[name] for name in LOADS["temperature"]):
         yield "Changes of temperature are prescribed: no conduction of heat is computed."
