@@ -372,8 +372,8 @@ def add_validate(commands: Commands) -> None:
         nargs="*",
         metavar="FAMILY|CASE",
         default=["ssnp142"],
-        help="families of tests (ssnp142, ssnp162, ssnp164, ssnv503; all) or cases, such as "
-        "the modelings a to k of SSNP142 (default: ssnp142)",
+        help="families of tests (ssnp142, ssnp143, ssnp162, ssnp164, ssnv503; all) or cases, such "
+        "as the modelings a to k of SSNP142 (default: ssnp142)",
     )
     command.add_path(
         "--out",

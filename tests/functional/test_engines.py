@@ -47,6 +47,11 @@ def test_grouted_and_sawn_laws_agree_point_by_point(works):
     laws_agree("rupture", 1, WORKS[works])
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_a_sawn_friction_law_agrees_point_by_point(seed):
+    laws_agree("friction", seed, WORKS["sawn"])
+
+
 @pytest.mark.parametrize("law_name", LAWS)
 @pytest.mark.parametrize("seed", range(3))
 def test_laws_agree_point_by_point(law_name, seed):
@@ -93,7 +98,11 @@ def laws_agree(law_name, seed, works):
 
 @pytest.mark.parametrize(
     "law_name, works",
-    [*((name, {}) for name in LAWS), *(("rupture", works) for works in WORKS.values() if works)],
+    [
+        *((name, {}) for name in LAWS),
+        *(("rupture", works) for works in WORKS.values() if works),
+        ("friction", WORKS["sawn"]),
+    ],
 )
 def test_the_tangent_is_the_derivative(law_name, works):
     """Central differences, away from kinks of the law."""

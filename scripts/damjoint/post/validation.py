@@ -18,6 +18,7 @@ from ..model.results import Results
 FAMILIES = {
     "ssnp142": "a 10 m dam under rising water: rupture and friction, uplift, flow, 2D and 3D, past "
     "the critical load",
+    "ssnp143": "two blocks on a vertical joint: grouted, sawn; rupture and friction, 2D and 3D",
     "ssnp162": "the laws rupture and friction at one point: to and fro in tension and shear",
     "ssnp164": "the law endo at one point: tension, shear, both, and opened by water",
     "ssnv503": "a slider on a plane of 30 degrees: sticks at 99 %, slips at 101 % of the friction",
@@ -82,7 +83,7 @@ def table(family: str) -> list[Reference]:
 def reference(family: str, row: Mapping[str, str]) -> Reference:
     """A row of a table; columns that a family does not have are empty."""
     number = lambda name: float(row[name]) if row.get(name) else None
-    coordinate = next(name for name in ("x", "y", "t") if name in row)
+    coordinate = next(name for name in ("x", "y", "t") if row.get(name))
     return Reference(
         family=family,
         modeling=row["modeling"],

@@ -49,8 +49,9 @@ def follow(test: LawTest) -> dict[str, Array]:
     inclined by 30 degrees; total_sigma_n; largest_sigma_n up to the step.
     """
     law = load("dam", {**test.settings, "law": test.law}).law
-    variables, jump, rows = law.initial(1), np.zeros(3), []
+    variables, jump, rows, before = law.initial(1), np.zeros(3), [], 0.0
     for time, *controls in test.steps:
+        variables, before = law.begin_step(variables, before, time), time
         # prescribed components first; of loaded ones the normal one, independent of the others
         order = sorted(range(3), key=lambda k: isinstance(controls[k], Loaded))
         for k in order:
@@ -97,6 +98,21 @@ def ramp(times: Sequence[float], values: Sequence[float]) -> Iterator[tuple[floa
     """Steps of length 1 along a piecewise linear function of t."""
     for t in np.arange(1.0, times[-1] + 1):
         yield float(t), float(np.interp(t, times, values))
+
+
+def ssnp143() -> dict[str, LawTest]:
+    """C: two blocks of 10 m in all and their joint in series, pressed by a displacement of 3e-6 m;
+    the joint is sawn at t = 2. All points are alike, also in 3D (D).
+    """
+    settings: Values = {"K_N": 1e12, "K_T": 2e12, "saw_thickness": 1e-6, "saw_t": 2.0}
+    rupture: Values = {"sigma_max": 3e6, "pena_rupture": 0.2, "pena_contact": 0.8}
+    friction: Values = {"mu": 0.35, "adhesion": 1000.0, "pena_tang": 2e11}
+    spring = 3e12 / 10
+    steps = [(t, Loaded(-spring * 3e-6, spring), 0.0, 0.0) for t in (1.0, 2.0, 3.0)]
+    return {
+        "C rupture": LawTest("rupture", settings | rupture, steps),
+        "C friction": LawTest("friction", settings | friction, steps),
+    }
 
 
 def ssnp162() -> dict[str, LawTest]:
@@ -178,4 +194,4 @@ def ssnv503() -> dict[str, LawTest]:
     }
 
 
-FAMILIES = {"ssnp162": ssnp162, "ssnp164": ssnp164, "ssnv503": ssnv503}
+FAMILIES = {"ssnp143": ssnp143, "ssnp162": ssnp162, "ssnp164": ssnp164, "ssnv503": ssnv503}

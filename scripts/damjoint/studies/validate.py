@@ -30,9 +30,8 @@ def chosen(names: Sequence[str]) -> dict[str, list[str]]:
 
 def tests_of(family: str) -> list[str]:
     """The tests of a family."""
-    if family in law_tests.FAMILIES:
-        return list(law_tests.FAMILIES[family]())
-    return validation.modelings(family)
+    points = law_tests.FAMILIES[family]() if family in law_tests.FAMILIES else {}
+    return [*validation.modelings(family), *points]
 
 
 def family_of(name: str) -> str:
@@ -55,11 +54,11 @@ def compare(
 
     Raises RunError if a case stops before its last level.
     """
-    if family in law_tests.FAMILIES:
-        for name, test in law_tests.FAMILIES[family]().items():
-            yield from validation.compare_point(family, name, law_tests.follow(test))
-        return
+    points = law_tests.FAMILIES[family]() if family in law_tests.FAMILIES else {}
     for name in names:
+        if name in points:
+            yield from validation.compare_point(family, name, law_tests.follow(points[name]))
+            continue
         case = load(name)
         for result in run(case, out / case.name, False, picture, engine=engine):
             if result.stopped:
