@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 import scipy
 from scipy import sparse
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from ..arrays import Array, IntArray, Sparse
 from ..storage import atomic_write, cache_folder
@@ -118,15 +119,18 @@ def solve_by_mumps(
     def pointer(values: Array | IntArray) -> ctypes.c_void_p:
         return ctypes.c_void_p(values.ctypes.data)
 
+    # MUMPS has a BLAS of its own, which a limit does not reach that was set before it was loaded
+    threads = min(pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas")
     row, column, indices = ((i + 1).astype(np.int32) for i in (upper.row, upper.col, keep))
-    error = mumps.damjoint_solve(
-        *(matrix.shape[0], ctypes.c_longlong(upper.nnz)),
-        *(pointer(row), pointer(column), pointer(upper.data)),
-        None if order is None else pointer(order),
-        *(len(keep), pointer(indices), pointer(schur)),
-        *(solution.shape[1], pointer(solution)),
-        *(ctypes.c_double((available() - beside) / 1e6), ctypes.byref(needed)),
-    )
+    with threadpool_limits(threads, "blas"):
+        error = mumps.damjoint_solve(
+            *(matrix.shape[0], ctypes.c_longlong(upper.nnz)),
+            *(pointer(row), pointer(column), pointer(upper.data)),
+            None if order is None else pointer(order),
+            *(len(keep), pointer(indices), pointer(schur)),
+            *(solution.shape[1], pointer(solution)),
+            *(ctypes.c_double((available() - beside) / 1e6), ctypes.byref(needed)),
+        )
     if error == TOO_LARGE:
         check_memory(beside + 1e6 * needed.value, what)
     if error in (TOO_LARGE, NO_MEMORY):
