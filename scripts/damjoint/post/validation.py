@@ -49,8 +49,6 @@ class Reference:
     read_as: str
     #: the published code's own value, where the reference is something else
     code: float | None = None
-    #: whether it is for information only although it has a tolerance: its sources contradict
-    informative: bool = False
 
 
 @dataclass(frozen=True)
@@ -67,8 +65,8 @@ class Comparison:
 
     @property
     def verdict(self) -> str:
-        """Pass or fail; info if the reference is for information only."""
-        if self.reference.tolerance is None or self.reference.informative:
+        """Pass or fail; info if the reference has no tolerance."""
+        if self.reference.tolerance is None:
             return "info"
         return "pass" if abs(self.difference) <= self.reference.tolerance else "fail"
 
@@ -98,7 +96,6 @@ def reference(family: str, row: Mapping[str, str]) -> Reference:
         note=row["note"],
         read_as=row.get("read_as", "node"),
         code=number("code"),
-        informative=bool(row.get("informative")),
     )
 
 
