@@ -30,7 +30,7 @@ def chosen(names: Sequence[str]) -> dict[str, list[str]]:
 
 def tests_of(family: str) -> list[str]:
     """The tests of a family."""
-    points = law_tests.FAMILIES[family]() if family in law_tests.FAMILIES else {}
+    points = law_tests.FAMILIES.get(family, dict)()
     return [*validation.modelings(family), *points]
 
 
@@ -54,7 +54,7 @@ def compare(
 
     Raises RunError if a case stops before its last level.
     """
-    points = law_tests.FAMILIES[family]() if family in law_tests.FAMILIES else {}
+    points = law_tests.FAMILIES.get(family, dict)()
     for name in names:
         if name in points:
             yield from validation.compare_point(family, name, law_tests.follow(points[name]))
