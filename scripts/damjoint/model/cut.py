@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import combinations
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..arrays import Array, IntArray
-
-if TYPE_CHECKING:
-    from .mesh import Body
+from .body import Body
 
 
 def cut(body: Body, surface: Body, upwards: Array, new_tag: int) -> tuple[Body, IntArray]:

@@ -16,6 +16,7 @@ import numpy as np
 from .. import InputError, RunError, data
 from ..arrays import Array, BoolArray, IntArray, Setting
 from ..storage import check_end
+from .body import Body as Body
 from .case import Case, OfJoint, has_drains
 from .cut import cut
 from .parameters import assignments, constants, listing, start_gmsh
@@ -105,26 +106,6 @@ OWN_FACES = {
 def dimension(region: str, dim: int) -> int:
     """The dimension of a region's elements in 2D or 3D."""
     return 0 if region == "crest" else dim - REGIONS[region.split(" ")[0]]
-
-
-@dataclass
-class Body:
-    """One or several regions of the mesh: points (n, 3) [m], their node tags (n,), cells by shape
-    as indices of points, element tags in that order.
-    """
-
-    points: Array
-    node_tags: IntArray
-    cells: list[tuple[str, IntArray]]
-    element_tags: IntArray
-    #: the region of each block of cells
-    regions: list[str] = field(default_factory=list)
-    #: of a surface: unit normals (elements, 3), out of the body it belongs to
-    normals: Array = field(default_factory=lambda: np.zeros((0, 3)))
-
-    def middles(self) -> Array:
-        """The middle of each element (elements, 3)."""
-        return np.concatenate([self.points[table].mean(axis=1) for _, table in self.cells])
 
 
 @dataclass
