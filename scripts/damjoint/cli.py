@@ -365,9 +365,16 @@ def do_new(arguments: argparse.Namespace) -> int:
 
 def add_validate(commands: Commands) -> None:
     """Add damjoint validate."""
-    summary = "compare with the published numbers of SSNP142; exit code 1 if a row fails"
+    summary = "compare with the published numbers; exit code 1 if a row fails"
     command = add_command(commands, do_validate, summary)
-    command.add_argument("cases", nargs="*", metavar="CASE", help="letters a to k (default: all)")
+    command.add_argument(
+        "tests",
+        nargs="*",
+        metavar="FAMILY|CASE",
+        default=["ssnp142"],
+        help="families of tests (ssnp142, ssnp143, ssnp162, ssnp164, ssnv503; all) or cases, such "
+        "as the modelings a to k of SSNP142 (default: ssnp142)",
+    )
     command.add_path(
         "--out",
         "FOLDER",
@@ -379,25 +386,20 @@ def add_validate(commands: Commands) -> None:
 
 def do_validate(arguments: argparse.Namespace) -> int:
     """Run damjoint validate; 1 if a row fails."""
-    from .model.case import load
     from .post import validation
-    from .runner import run
-    from .statics.verdict import statement
+    from .studies import validate
 
-    cases = [load(name) for name in arguments.cases or validation.modelings()]
-    for case in cases:
-        if not validation.references(case):
-            allowed = ", ".join(validation.modelings())
-            raise InputError(f"case {case.name}: has no reference values; must be one of {allowed}")
-    comparisons = []
-    for case in cases:
-        out = arguments.out / case.name
-        for result in run(case, out, fields=False, engine=arguments.engine):
-            if result.stopped:
-                raise RunError(f"{case.name}: {statement(result)}")
-            comparisons += validation.compare(result)
-    print(validation.report(comparisons))
-    return int(any(c.verdict == "fail" for c in comparisons))
+    families, failed = validate.chosen(arguments.tests), False
+    summaries = []
+    for family, names in families.items():
+        comparisons = list(validate.compare(family, names, arguments.out, arguments.engine))
+        print(f"{family.upper()}: {validation.FAMILIES[family]}\n")
+        print(validation.report(comparisons), end="\n\n" if len(families) > 1 else "\n")
+        summaries.append(f"{family}: {validation.summary(comparisons)}")
+        failed |= any(c.verdict == "fail" for c in comparisons)
+    if len(families) > 1:
+        print("\n".join(summaries))
+    return int(failed)
 
 
 def add_critical(commands: Commands) -> None:
@@ -607,7 +609,7 @@ def add_law(commands: Commands) -> None:
     """Add damjoint law."""
     summary = "evaluate a joint law along a path of displacement jumps"
     command = add_command(commands, do_law, summary, settings_options())
-    command.add_argument("law", metavar="LAW", help="rupture, friction or bond")
+    command.add_argument("law", metavar="LAW", help="rupture, friction, bond or endo")
     command.add_path(
         "--path",
         "FILE",
