@@ -28,9 +28,7 @@ WEIGHTS = (("dam", 0), ("dam", 1), ("lower", 0), ("lower", 1), ("foundation", 1)
 
 def material_of(case: Case) -> Material:
     """Elastic constants by region."""
-    return {
-        region: (case[f"E_{name}"], case[f"nu_{name}"]) for region, name in MATERIALS.items()
-    }
+    return {region: (case[f"E_{name}"], case[f"nu_{name}"]) for region, name in MATERIALS.items()}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -46,8 +46,8 @@ class JointWater:
     def head(self, loading: Loading, matrix: Sparse | None = None) -> Array:
         """Head [m] in a joint of uniform transmissivity, at the joint's nodes or at the places that
         an interpolation matrix of `JointFields` leads to: linear along the joint between the levels
-        of reservoir (plus joint_head_offset) and tailwater; a dry end has its own height, or the head of the other end if
-        that is lower.
+        of reservoir (plus joint_head_offset) and tailwater; a dry end has its own height, or the
+        head of the other end if that is lower.
 
         Drains reduce the head above their outlet, the tailwater or their own height, by their
         effectiveness (EM 1110-2-2200).
