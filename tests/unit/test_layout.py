@@ -10,7 +10,7 @@ from damjoint_tools import pages
 
 PACKAGE = Path(damjoint.__file__).parent
 #: Each part uses only those before it.
-PARTS = ["", "storage", "laws", "model", "fem", "joint", "solver", "engines", "statics", "post"]
+PARTS = ["", "storage", "laws", "model", "fem", "joint", "solver", "dynamics", "engines", "statics", "post"]
 PARTS += ["accuracy", "runner", "studies", "library", "gui", "cli", "__main__"]
 
 

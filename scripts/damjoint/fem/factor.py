@@ -144,19 +144,19 @@ class MumpsFactors:
 
     def solve(self, right: Array) -> Array:
         """Solution (n, m) with the unknowns `keep` zero."""
-        solution = np.array(right, order="F")
+        solution = np.array(right, float, order="F")
         self._run(solution, 0, None)
         return solution
 
     def reduce(self, right: Array) -> Array:
         """Right-hand side (k,) of the Schur complement, from that (n,) of the matrix."""
-        self._partial, reduced = np.array(right), np.zeros(len(self.keep))
+        self._partial, reduced = np.array(right, float), np.zeros(len(self.keep))
         self._run(self._partial, 1, reduced)
         return reduced
 
     def expand(self, solution: Array) -> Array:
         """The solution (n,) for the right-hand side last reduced, from that (k,) of `keep`."""
-        self._run(self._partial, 2, np.array(solution))
+        self._run(self._partial, 2, np.array(solution, float))
         return self._partial
 
     def _run(self, right: Array, part: int, reduced: Array | None) -> None:

@@ -96,6 +96,8 @@ class Case(ParameterValues):
     accuracy: float | None = None
     #: the user's own geometry instead of the section by parameters
     geometry: Path | None = None
+    #: file of the ground's acceleration, for `damjoint quake`
+    record: Path | None = None
     #: SHARED of pro/parameters.pro
     shared: dict[str, list[float]] = field(default_factory=dict, compare=False, repr=False)
     #: SECTION of pro/section.pro
@@ -353,14 +355,15 @@ def load(
     tail_levels: str | Sequence[float] | None = None,
     steps: int | None = None,
     accuracy: str | None = None,
+    record: Path | None = None,
 ) -> Case:
     """Read a case file, apply overrides, resolve the parameters that follow others, check all.
 
     case: letter, name or path; overrides: {name: value, or a value for each joint}, also
     lift_heights [m]; levels, tail_levels: [m] at t = 1, 2, 3,
     also as a text 'a,b,c'; steps: equal steps between two levels; accuracy: coarse, standard, fine
-    or a percentage, chooses order, first mesh (overrides win) and one step per level. Raises
-    InputError.
+    or a percentage, chooses order, first mesh (overrides win) and one step per level; record: file
+    of the ground's acceleration. Raises InputError.
     """
     path, overrides = case_file(case), dict(overrides or {})
     error = None
@@ -405,6 +408,7 @@ def load(
         hardening_asked=bool(variables["hardening_asked"][0]),
         accuracy=error,
         geometry=geometry,
+        record=record or (Path(file.texts["record"]) if "record" in file.texts else None),
         shared={n: variables[n] for n in SHARED},
         section={n: variables[n] for n in SECTION},
         lift_heights=lifts,

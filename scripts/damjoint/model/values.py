@@ -10,7 +10,16 @@ from .parameters import declared
 
 #: The parameters whose values are texts, for type checkers: all others are numbers.
 TextName: TypeAlias = Literal[
-    "law", "uplift", "face_load", "drive", "mesh_pattern", "quadrature", "force_face"
+    "law",
+    "uplift",
+    "face_load",
+    "drive",
+    "mesh_pattern",
+    "quadrature",
+    "force_face",
+    "record_unit",
+    "record_component",
+    "quake_uplift",
 ]
 
 
@@ -50,6 +59,14 @@ class LoadGroup(Group):
     """Loads besides the water."""
 
     force_face: str
+
+
+class EarthquakeGroup(Group):
+    """Record, time integration, damping, water in the joints during an earthquake."""
+
+    record_unit: str
+    record_component: str
+    quake_uplift: str
 
 
 class ParameterValues:
@@ -104,6 +121,11 @@ class ParameterValues:
     def loads(self) -> LoadGroup:
         """Loads besides the water, works on the joint."""
         return LoadGroup(self._group("Loads"))
+
+    @cached_property
+    def earthquake(self) -> EarthquakeGroup:
+        """Record, time integration, damping, water in the joints during an earthquake."""
+        return EarthquakeGroup(self._group("Earthquake"))
 
     @cached_property
     def solver(self) -> Group:

@@ -1,0 +1,168 @@
+"""Mass, damping and stiffness of the glued bodies and of the jumps that part them.
+
+Unknowns w = (v, d), relative to the ground and to the static state: displacement v of the glued
+bodies, jumps d of the joints (see fem/gluing.py). A body moves by u_b = T_b w, so that a jump
+carries the mass of all that is above it: M = sum T_b^T M_b T_b, likewise K.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import LinearOperator, eigsh
+
+from ..arrays import Array, IntArray, Sparse
+from ..fem.bodies import Bodies, ElasticBody
+from ..fem.elasticity import mass
+from ..fem.elements import Space
+from ..fem.factor import partial_factors
+from ..fem.glued_bodies import GluedBodies
+from ..fem.gluing import Gluing
+from ..joint.interface import Interface
+from ..joint.wet_faces import WetFace
+from ..model.case import Case
+from ..model.loads import quake_column
+from ..model.scene import UP
+
+#: Regions that have mass, and the parameter of their density.
+MASSIVE = {"dam": "rho_dam", "lower": "rho_dam"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class System:
+    """The matrices over w (n,), of which the last ones, `jumps`, are those of the joints."""
+
+    mass: Sparse
+    stiffness: Sparse
+    #: of the bodies T_b (degrees of freedom, n), by name
+    motion: dict[str, Sparse]
+    #: mass times a unit acceleration of the ground along x and y (n, 2)
+    inertia: Array
+    #: mass [kg] of all that moves above the rock, and of the water that moves with it along x
+    total_mass: float
+    water_mass: float
+    #: displacement of the crest along x and y (2, n)
+    crest: Sparse
+    jumps: IntArray
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return int(self.mass.shape[0])
+
+    @staticmethod
+    def of(case: Case, bodies: Bodies, interface: Interface) -> System:
+        """Assemble the bodies of a case, with the added mass of the reservoir at its last level."""
+        gluing = Gluing.of(bodies)
+        glued = GluedBodies.of(bodies.by_name, gluing)
+        dim, size = bodies.mesh.dim, len(glued.free) + gluing.unknowns
+        total = lambda: sparse.csr_matrix((size, size))
+        stiffness, of_mass, inertia = total(), total(), np.zeros((size, 2))
+        motion: dict[str, Sparse] = {}
+        concrete = water = 0.0
+        densities = {region: case[name] for region, name in MASSIVE.items()}
+        for name, body in bodies.by_name.items():
+            of_body, own = gluing.bodies[name], body.stiffness.shape[0]
+            ones = np.ones(len(of_body.dofs))
+            places = of_body.dofs, np.arange(len(of_body.dofs))
+            carried = sparse.csr_matrix((ones, places), (own, len(of_body.dofs))) @ of_body.jumps
+            moved = sparse.hstack([glued.numbers[name][:, glued.free], carried], format="csr")
+            of_solid = mass(body.space, dim, densities)
+            of_water = added_mass(case, interface, body)
+            stiffness += moved.T @ body.stiffness @ moved
+            of_mass += moved.T @ (of_solid + of_water) @ moved
+            x, y = (translation(body, dim, axis) for axis in (0, 1))
+            # the water follows a vertical motion of the ground
+            inertia += moved.T @ np.column_stack([(of_solid + of_water) @ x, of_solid @ y])
+            concrete += x @ of_solid @ x
+            water += x @ of_water @ x
+            motion[name] = moved
+        return System(
+            mass=of_mass.tocsr(),
+            stiffness=stiffness.tocsr(),
+            motion=motion,
+            inertia=inertia,
+            total_mass=float(concrete),
+            water_mass=float(water),
+            crest=crest_rows(bodies, motion),
+            jumps=np.arange(len(glued.free), size),
+        )
+
+    def frequencies(self, of_joints: Sparse, number: int) -> tuple[Array, Array]:
+        """The lowest natural frequencies (number,) [Hz] with a stiffness of the joints (j, j), and
+        their modes (n, number), undamped.
+        """
+        n, j = self.size, len(self.jumps)
+        joint = sparse.block_diag([sparse.csr_matrix((n - j, n - j)), of_joints], format="csr")
+        matrix = (self.stiffness + joint).tocsr()
+        factors = partial_factors(matrix, self.jumps)
+        inverse = np.linalg.inv(factors.schur)
+        solve = lambda right: factors.expand(inverse @ factors.reduce(np.ravel(right)))
+        squares, modes = eigsh(
+            matrix,
+            k=number,
+            M=self.mass,
+            sigma=0.0,
+            OPinv=LinearOperator((n, n), matvec=solve),
+            v0=np.ones(n),
+        )
+        order = np.argsort(squares)
+        return np.sqrt(squares[order]) / (2 * math.pi), modes[:, order]
+
+
+def translation(body: ElasticBody, dim: int, axis: int) -> Array:
+    """The displacement (degrees of freedom,) of a body that moves by 1 along an axis."""
+    result = np.zeros(body.stiffness.shape[0])
+    result[axis : dim * len(body.space.body.points) : dim] = 1
+    return result
+
+
+def crest_rows(bodies: Bodies, motion: dict[str, Sparse]) -> Sparse:
+    """Displacement of the crest along x and y (2, n)."""
+    mesh = bodies.mesh
+    name = mesh.bearer("crest")
+    functions = bodies.by_name[name].space.find(Space(mesh.bodies["crest"], 1))
+    first = mesh.dim * int(functions[0])
+    return motion[name][[first, first + 1]]
+
+
+def added_mass(case: Case, interface: Interface, body: ElasticBody) -> Sparse:
+    """Mass matrix of the water in front of the upstream faces of a body (degrees of freedom, ...).
+
+    Westergaard (1933): 7/8 rho_w sqrt(H (H - y)) per area, normal to the face; of an inclined face
+    Kuo's (1982) normal component. Zero without the parameter added_mass.
+    """
+    size = body.stiffness.shape[0]
+    result = sparse.csr_matrix((size, size))
+    level = case.levels[-1]
+    for name, dofs in body.face_dofs.items():
+        face = interface.faces[name]
+        if face.side == UP and case["added_mass"] and level > face.y.min():
+            density = 7 / 8 * case["rho_water"] * water_depths(face, level, interface.floor)
+            dim = face.dim
+            normal = sparse.hstack(
+                [face.points.values.multiply(face.normals[:, [axis]]) for axis in range(dim)]
+            ).tocsr()
+            weighted = normal.T @ sparse.diags(face.points.weights * density) @ normal
+            functions = face.points.values.shape[1]
+            number = dofs.reshape(functions, dim).T.ravel()
+            places = sparse.csr_matrix(
+                (np.ones(len(number)), (number, np.arange(len(number)))), (size, len(number))
+            )
+            result += places @ weighted @ places.T
+    return result
+
+
+def water_depths(face: WetFace, level: float, floor: float) -> Array:
+    """sqrt(H (H - y)) (q,) [m] at the points of a face, H the depth of the reservoir; on a straight
+    face with exact resultant and moment.
+    """
+    depth = max(level - floor, 0.0)
+    height = lambda surface, y, _tilt: np.sqrt(depth * np.maximum(surface - y, 0))
+    if face.straight and not face.flat:
+        column = lambda surface, low, high: quake_column(surface, low, high, floor)
+        return face.corrected(level, height, column)
+    return np.asarray(height(level, face.y, face.tilt))
