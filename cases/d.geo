@@ -1,3 +1,4 @@
 // Mesh of d.case; the differences stand there.
+Include "../pro/units.pro";
 Include "d.case";
 Include "../geo/dam.geo";

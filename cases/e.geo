@@ -1,3 +1,4 @@
 // Mesh of e.case; the differences stand there.
+Include "../pro/units.pro";
 Include "e.case";
 Include "../geo/dam.geo";

@@ -1,3 +1,4 @@
 // Mesh of i.case; the differences stand there.
+Include "../pro/units.pro";
 Include "i.case";
 Include "../geo/dam.geo";

@@ -1,3 +1,4 @@
 // Mesh of j.case; the differences stand there.
+Include "../pro/units.pro";
 Include "j.case";
 Include "../geo/dam.geo";

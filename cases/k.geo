@@ -1,3 +1,4 @@
 // Mesh of k.case; the differences stand there.
+Include "../pro/units.pro";
 Include "k.case";
 Include "../geo/dam.geo";

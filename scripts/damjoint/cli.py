@@ -101,8 +101,8 @@ def settings_options() -> Parser:
         "--set",
         "NAME=VALUE",
         dest="settings",
-        help="value of a parameter, in the unit of reference/parameters.md (repeatable; default: "
-        "that of the case)",
+        help="value of a parameter, in the unit of reference/parameters.md or with one of its own: "
+        "E_dam=20*GPa (repeatable; default: that of the case)",
     )
     options.add_argument(
         "--run-geo",

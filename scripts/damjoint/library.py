@@ -49,7 +49,7 @@ def case(
     source: letter or name of a case of the package, or path of a case file; levels, tail_levels:
     of reservoir and tailwater [m] at t = 1, 2, ...; steps: equal steps between two levels;
     accuracy: coarse, standard, fine or a percentage, see `damjoint run --help`; parameters: by
-    name, in SI units. Raises InputError.
+    name, in SI units, or as a text with a unit, "20*GPa". Raises InputError.
     """
     heights = as_list(levels), as_list(tail_levels)
     return load(str(source), parameters, *heights, steps, accuracy)

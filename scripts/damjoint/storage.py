@@ -5,10 +5,13 @@ from __future__ import annotations
 import contextlib
 import errno
 import fcntl
+import hashlib
+import json
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 from . import InputError
 
@@ -49,6 +52,24 @@ def cache_folder() -> Path | None:
         return Path(named) if named else None
     home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
     return Path(home) / "damjoint" if os.path.isabs(home) else None
+
+
+def cached(kind: str, key: str, compute: Callable[[], Any]) -> Any:
+    """A value of JSON from the cache folder, or computed and added to it; key: all that it depends
+    on. A file that cannot be read is replaced; one that cannot be written only costs the entry.
+    """
+    parent = cache_folder()
+    if parent is None:
+        return compute()
+    path = parent / f"{kind}-{hashlib.sha256(key.encode()).hexdigest()[:24]}.json"
+    with contextlib.suppress(OSError, ValueError):
+        return json.loads(path.read_text())
+    value = compute()
+    with contextlib.suppress(OSError):
+        parent.mkdir(parents=True, exist_ok=True)
+        with atomic_write(path) as part:
+            part.write_text(json.dumps(value))
+    return value
 
 
 def check_end(path: Path, *ends: str) -> None:

@@ -35,6 +35,7 @@ def parameters_page() -> str:
         "# Parameters",
         "Made from [pro/parameters.pro](../pro/parameters.pro) by `make pages`. A parameter is set "
         "by `--set name=value`, by `default_name = value;` in a case file, or in the Gmsh window. "
+        "A value is in the unit of its row, or has a [unit of its own](usage.md#units): `20*GPa`. "
         "The defaults are those of a 45 m dam of ordinary concrete on rock; "
         "[cases/ssnp142.case](../cases/ssnp142.case) contains those of the verification case. "
         'The default -1 means a value computed from others: see the column "allowed". A parameter '

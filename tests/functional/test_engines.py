@@ -148,6 +148,7 @@ SMALL = {"n_joint": 20.0, "h_dam": 8.0, "h_found": 30.0}
 SHAPE = {"batter": 4.0, "batter_height": 20.0, "neck_height": 6.0}
 STAGED = {"silt_height": 12.0, "ice_force": 1e5, "ice_level": 40.0, "anchor_force": 2e6}
 STAGED |= {"anchor_angle": 10.0, "k_h": 0.1, "k_v": 0.05, "floor_water": 1.0, "force_x": 3e4}
+WARM = {"temperature_dam": -8.0, "temperature_linear": 15.0, "temperature_found": 3.0}
 SOLID = {"dim": 3.0, "thickness": 3.0, "n_layers": 2.0, "mesh_pattern": "split", "n_joint": 10.0}
 SECTIONS = {
     "all loads": (SHAPE | STAGED, "20,41", "0"),
@@ -159,6 +160,13 @@ SECTIONS = {
     "cracked bond": ({"uplift": "cracked", "law": "bond", "joint_slope": 2.0}, "20,40,46", "0"),
     "flow driven": ({"uplift": "flow", "drive": "crest", "drive_by": 1e-3}, "20,40", "0"),
     "solid": (SOLID | SHAPE | {"joint_slope": 4.0, "silt_height": 12.0, "k_h": 0.1}, "20,41", "0"),
+    "temperature": (SHAPE | WARM | {"joint_slope": 3.0, "k_h": 0.05}, "20,41", "0"),
+    "temperature, lift": (WARM | {"joint_height": 10.0, "law": "bond", "order": 1.0}, "20,41", "0"),
+    "a year": (WARM | {"temperature_period": 3.0, "joint_slope": -4.0}, "30,44,40", "2"),
+    "temperature, quadrangles": (WARM | {"mesh_pattern": "regular"}, "30,44", "2"),
+    "temperature driven": (WARM | {"drive": "crest", "drive_by": 1e-3}, "20,40", "0"),
+    "temperature, solid": (SOLID | SHAPE | WARM, "20,41", "0"),
+    "settling rock": ({"rho_found": 2700.0, "in_situ": 0.0}, "30,44", "0"),
     "solid lift, flow": (SOLID | {"joint_height": 20.0, "uplift": "flow"}, "30,41", "0"),
 }
 

@@ -175,3 +175,12 @@ def test_drains_beyond_the_joint_or_below_an_unknown_level_are_refused():
     ):
         with pytest.raises(InputError, match=message):
             load("c", {"uplift": "drained"} | settings)
+
+
+def test_the_weight_of_settling_rock_stays_in_the_rock(solve):
+    """It moves the dam and adds nothing to N, T, M."""
+    rock = {"rho_found": 2700.0, "n_joint": 20, "weight_first": 0}
+    (firm,), (settled,) = (solve("dam", "40", in_situ=value, **rock) for value in (1, 0))
+    for name in ("N", "T", "M"):
+        assert_allclose(settled.history[name], firm.history[name], rtol=1e-9)
+    assert abs(settled.history["crest_ux"][-1] - firm.history["crest_ux"][-1]) > 1e-5

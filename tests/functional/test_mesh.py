@@ -90,7 +90,7 @@ def test_a_force_at_the_corner_of_the_crest():
 def test_a_joint_lies_between_its_bodies(settings):
     """Its nodes are nodes of both; its normals point to the upper one; its ends bound it."""
     found = mesh.Mesh(load("dam", {"n_joint": 6.0, "mesh_pattern": "free"} | settings))
-    (joint,) = found.joints.values()
+    (joint,) = found.joints
     assert found.solids.keys() == {joint.upper, joint.lower}
     for name, side in ((joint.upper, 1), (joint.lower, -1)):
         body = found.solids[name]

@@ -47,13 +47,13 @@ def resultants(case, level, tail):
         surface = tail if face.side == "down" else level
         parts += push(face.surface, lambda y, top=surface: unit * np.maximum(top - y, 0))
     place, force = (np.concatenate(both)[:, :2] for both in zip(*parts, strict=True))
-    ends = {name: values[0] for name, values in mesh.joints["joint"].ends.items()}
+    ends = {name: values[0] for name, values in mesh.joints[0].ends.items()}
     chord = np.array([ends["toe_x"] - ends["heel_x"], ends["toe_y"] - ends["heel_y"]])
     along = chord / np.linalg.norm(chord)
     across, arm = np.array([-along[1], along[0]]), place - [ends["toe_x"], ends["toe_y"]]
     total = force.sum(axis=0)
     moment = np.sum(arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0])
-    return np.array([-total @ across, total @ along, moment]) / mesh.joints["joint"].width
+    return np.array([-total @ across, total @ along, moment]) / mesh.joints[0].width
 
 
 @pytest.mark.parametrize(

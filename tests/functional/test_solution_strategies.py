@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from damjoint.laws import Mode
 from damjoint.laws.friction import FrictionVariables
 from damjoint.model.case import load
 from damjoint.statics.verdict import verdict
@@ -58,7 +57,7 @@ def test_the_line_of_the_shear_release_is_the_law_within_it_and_extended_outside
     law = load("ssnp142", {"sigma_max": 0}).law
     variables = law.initial(3)
     jump = np.array([[0.25, 1e6, 0], [-3.0, 1e6, 0], [5.0, 1e6, 0]]) * law.L_CT
-    line, tangent = law.evaluate(jump, variables, Mode(releasing=np.ones(3, bool)))
+    line, tangent = law.evaluate(jump, variables, np.ones(3, bool))
     np.testing.assert_allclose(line[:, 1], law.K_T * np.array([0.75, 4, -4]) * 1e6 * law.L_CT)
     np.testing.assert_allclose(tangent[:, 1, 0], -law.K_T * 1e6)
     assert law.release_side(jump, variables).tolist() == [0, -1, 1]

@@ -4,6 +4,8 @@ a file is executed.
 
 import os
 import pickle
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -19,7 +21,7 @@ def entry(tmp_path, monkeypatch):
     monkeypatch.setenv("DAMJOINT_CACHE", str(tmp_path))
     written, bodies = cache.cached(load("a", SMALL))
     assert bodies is not None
-    (file,) = tmp_path.iterdir()
+    (file,) = tmp_path.glob("*.npz")
     return file, written
 
 
@@ -150,3 +152,20 @@ def test_the_least_recently_used_files_are_removed(tmp_path, monkeypatch):
     monkeypatch.setattr(cache, "LIMIT", 20)
     cache.prune(tmp_path)
     assert sorted(file.stem for file in tmp_path.iterdir()) == ["b", "d"]
+
+
+def test_a_command_with_cached_data_does_not_start_gmsh(tmp_path, monkeypatch):
+    """Parameters and the case are read from the cache, and give the same bytes."""
+    monkeypatch.setenv("DAMJOINT_CACHE", str(tmp_path / "cache"))
+    program = (
+        "import sys; from damjoint.cli import main; code = main(sys.argv[1:]); "
+        "print('gmsh' in sys.modules); sys.exit(code)"
+    )
+    small = [word for name, size in SMALL.items() for word in ("--set", f"{name}={size}")]
+    loaded, tables = [], []
+    for out in "first", "second":
+        words = ["run", "a", *small, "--no-fields", "--no-picture", "--out", str(tmp_path / out)]
+        result = subprocess.run([sys.executable, "-c", program, *words], capture_output=True)
+        loaded.append(result.stdout.split()[-1])
+        tables.append((tmp_path / out / "joint.csv").read_bytes())
+    assert loaded == [b"True", b"False"] and tables[0] == tables[1]

@@ -21,7 +21,8 @@ def test_damjoint_and_gmsh_read_a_case_alike(path):
     numbers = {n: gmsh.parser.getNumber(n).tolist() for n in names}
     texts = {n: list(gmsh.parser.getString(n)) for n in names if not numbers[n]}
     expected = {f"default_{n}": [v] for n, v in ours.defaults.items() if isinstance(v, float)}
-    assert {n: v for n, v in numbers.items() if v} == expected | ours.lists
+    expected |= ours.lists | {n: list(values) for n, values in ours.of_joints.items()}
+    assert {n: v for n, v in numbers.items() if v} == expected
     expected = {f"default_{n}": [v] for n, v in ours.defaults.items() if isinstance(v, str)}
     if "geometry" in texts:  # damjoint: relative to the case file
         texts["geometry"] = [str(path.parent / texts["geometry"][0])]

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from damjoint.fem.elasticity import body_force, elasticity, stress
+from damjoint.fem.elasticity import at_middles, body_force, elasticity, stress, thermal_load
 from damjoint.fem.elements import CORNERS, Space, basis, corners_of
 from damjoint.model.mesh import Body
 from scipy.sparse.linalg import spsolve
@@ -119,3 +119,35 @@ def test_the_functions_of_a_face_are_those_of_the_body(shape, corners):
     here = whole.interpolation(2)[found].toarray()
     assert here[:, found] == pytest.approx(part.interpolation(2).toarray(), abs=1e-15)
     assert np.abs(here).sum() == pytest.approx(np.abs(here[:, found]).sum())
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("shape", CELLS)
+def test_free_thermal_expansion_has_no_stress(shape, order):
+    """On distorted elements; also of a temperature that is linear in x, which bends the body, with
+    order 2. In plane strain the expansion is 1 + nu times larger, and sigma_zz is prevented.
+    """
+    body, dim = grid(shape)
+    space, material = Space(body, order), {"dam": (YOUNG, POISSON)}
+    stiffness = elasticity(space, dim, material)
+    free = 1 + POISSON if dim == 2 else 1
+
+    def bent(x):
+        """Displacement of the strain x in all directions."""
+        squares = x[:, :1] ** 2 - (x[:, 1:] ** 2).sum(axis=1, keepdims=True)
+        return np.hstack([squares / 2, x[:, :1] * x[:, 1:]])
+
+    fields = [(lambda p: np.ones(len(p)), lambda x: x)]
+    if order == 2:
+        fields.append((lambda p: p[:, 0], bent))
+    for strain, displacement in fields:
+        wanted = free * displacement(space.locations[:, :dim])
+        wanted = spsolve(space.interpolation(2).tocsc(), wanted) if order == 2 else wanted
+        load = thermal_load(space, dim, material, "dam", strain)
+        assert stiffness @ wanted.ravel() == pytest.approx(load, abs=1e-12 * np.abs(load).max())
+        thermal = at_middles(space, "dam", strain)[None]
+        computed = stress(space, wanted.reshape(1, -1, dim), material, thermal)[0]
+        prevented = np.zeros_like(computed)
+        if dim == 2:
+            prevented[:, 2] = -YOUNG * thermal[0]
+        assert computed == pytest.approx(prevented, abs=1e-11 * YOUNG)

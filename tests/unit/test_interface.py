@@ -34,21 +34,23 @@ def test_the_reduced_system_has_the_solution_of_the_full_one(interface, flowing,
     """A third of the points with another, unsymmetric tangent; pressures that depend on some of the
     unknowns."""
     rng = np.random.default_rng(142)
-    number, size = len(interface.points.weights), len(interface.bulk.stiffness)
-    tangent = np.broadcast_to(UNDAMAGED, (number, 3, 3)).copy()
+    number, size = len(interface.weights), len(interface.bulk.stiffness)
+    undamaged = np.broadcast_to(UNDAMAGED, (number, 3, 3))
+    tangent = undamaged.copy()
     changed = rng.permutation(number)[: number // 3]
     tangent[changed] = 1e11 * rng.normal(size=(len(changed), 3, 3)) + np.diag([1e8, 2e12, 1e8])
-    change = interface.change(tangent, UNDAMAGED)
+    change = interface.change(tangent, undamaged)
     assert 0 < len(change.rows) < size
     matrix = interface.bulk.stiffness + interface.stiffness(tangent, np.arange(number)).toarray()
     if flowing:
         columns = np.sort(rng.permutation(size)[: size // 4])
-        pressure = 1e10 * rng.normal(size=(interface.flow.lift.shape[1], size // 4))
-        matrix[:, columns] -= interface.flow.lift @ pressure
+        lift = interface.lift((0,))
+        pressure = 1e10 * rng.normal(size=(lift.shape[1], size // 4))
+        matrix[:, columns] -= lift @ pressure
         change = replace(change, flow=FlowDerivative(pressure=pressure, columns=columns))
     right, slope, row = rng.normal(size=(3, size))
     border = Border(slope, row, 0.3, 0.7) if bordered else None
-    x, s = interface.solve(UNDAMAGED, change, right, border)
+    x, s = interface.solve(undamaged, change, right, border, (0,))
     if bordered:
         whole = np.block([[matrix, slope[:, None]], [row[None, :], np.array([[0.3]])]])
         expected = np.linalg.solve(whole, np.append(right, 0.7))
@@ -63,10 +65,11 @@ def test_the_reduced_system_has_the_solution_of_the_full_one(interface, flowing,
 def test_pressures_derivatives(interface):
     """With the jump, against central differences; and linear in the imposed head."""
     rng = np.random.default_rng(142)
-    flow, weights = interface.flow, interface.points.weights
+    (joint,) = interface.joints
+    flow, weights = joint.flow, joint.points.weights
     jump, imposed = (
         rng.normal(1, 0.3, len(interface.bulk.stiffness)),
-        9e4 * (1 - interface.fields.xi),
+        9e4 * (1 - joint.fields.xi),
     )
 
     def pressure(jump, imposed=imposed):

@@ -13,7 +13,7 @@ from damjoint.model.fields import (
     state_of,
 )
 from damjoint.model.mesh import Body
-from damjoint.post.outline import fill_to_level, section_of, skin
+from damjoint.post.outline import JointLine, fill_to_level, section_of, skin
 from damjoint.post.units import FORCES, LENGTHS, unit, with_unit
 from numpy.testing import assert_allclose
 
@@ -23,6 +23,11 @@ def body(points, **quads):
     points = np.array([(*p, 0.0) for p in points])
     cells = [("quad", np.array(some)) for some in quads.values()]
     return Body(points, np.arange(len(points)), cells, np.arange(len(quads)), list(quads))
+
+
+def joint_of(ends):
+    """The only joint of a section, with these ends."""
+    return [JointLine("dam", "foundation", *np.array(ends, float))]
 
 
 @pytest.fixture
@@ -51,13 +56,14 @@ def area(polygon):
 
 def test_outlines_of_a_lift_joint(lift):
     bodies, still, ends = lift
-    section = section_of(bodies, still, 1.0, ends)
+    section = section_of(bodies, still, 1.0, joint_of(ends))
     assert_allclose(section.upstream, [(2, 8), (1, 4)])
     assert_allclose(section.downstream, [(8, 4), (4, 8)])
     assert_allclose(section.crest, [(4, 8), (2, 8)])
     assert_allclose(section.floor, [(1, 4), (0, 0), (-5, 0)])
     assert_allclose(section.bed, [(20, 0), (12, 0), (8, 4)])
-    for body, face in section.joint_faces:
+    ((*faces,),) = section.joint_faces
+    for body, face in faces:
         assert_allclose(body.points[face], ends)
     assert {name: len(*tables) for name, tables in section.foundation.faces.items()} == {
         "foundation": 3,
@@ -72,14 +78,15 @@ def test_outlines_of_a_lift_joint(lift):
 )
 def test_area_of_water_up_to_a_level(lift, level, held):
     """Beside a batter 1:4 from the end of the rock; over the crest over its whole length."""
-    polygon = section_of(*lift[:2], 1.0, lift[2]).reservoir(level)
+    polygon = section_of(*lift[:2], 1.0, joint_of(lift[2])).reservoir(level)
     assert (area(polygon) if len(polygon) else 0) == pytest.approx(held)
 
 
 def test_water_follows_the_displaced_dam(lift):
     """Tailwater beside a slope 1:1, displaced by 0.5 m, ten times exaggerated."""
     bodies, still, ends = lift
-    section = section_of(bodies, still | {"dam": still["dam"] + (0.05, 0, 0)}, 10.0, ends)
+    moved = still | {"dam": still["dam"] + (0.05, 0, 0)}
+    section = section_of(bodies, moved, 10.0, joint_of(ends))
     below, above = 4 * (8 + 2), 2 * (20 - 8 - 0.5 + 1)
     assert area(section.tailwater(6)) == pytest.approx(below + above)
     assert_allclose(section.crest[:, 0], (4.5, 2.5))
@@ -88,7 +95,7 @@ def test_water_follows_the_displaced_dam(lift):
 def test_a_body_without_a_face_at_the_lowest_z_has_no_section(lift):
     bodies, still, ends = lift
     bodies["dam"].points[:2, 2] = 1.0
-    assert section_of(bodies, still, 1.0, ends) is None
+    assert section_of(bodies, still, 1.0, joint_of(ends)) is None
 
 
 def test_water_below_an_overhang():

@@ -55,7 +55,12 @@ def test_sliding_of_a_bond_by_its_undamaged_cohesion():
     for law, left in (("bond", 0.5), ("friction", 1.0)):
         result = stopped(law)
         length = result.case.joint_along
-        half = {"time": np.ones(2), "x": np.array([0, length]), "s": np.array([0, length])}
+        half = {
+            "time": np.ones(2),
+            "joint": np.ones(2),
+            "x": np.array([0, length]),
+            "s": np.array([0, length]),
+        }
         result.joint.update(
             half | {"slip": np.zeros(2), "z": np.zeros(2), "damage": np.full(2, 0.5)}
         )

@@ -10,10 +10,17 @@ import numpy as np
 
 from ..arrays import Array, IntArray, Sparse
 from ..model.case import Case
-from ..model.loads import wet
+from ..model.loads import COMPLETE, across, thermal_strains, wet
 from ..model.mesh import LINES, Body, Mesh, mesh_of
 from ..model.scene import MATERIALS
-from .elasticity import Material, body_force, elasticity
+from .elasticity import (
+    Distribution,
+    Material,
+    at_middles,
+    body_force,
+    elasticity,
+    thermal_load,
+)
 from .elements import WATER, Space, points_of
 
 #: Parameters that the bodies depend on besides those of the mesh.
@@ -39,8 +46,10 @@ class ElasticBody:
     #: (n, n) [N/m]
     stiffness: Sparse
     #: load vectors (n,) by name: weight densities dam_x, dam_y, lower_x, ... [N/m3], forces per
-    #: metre of a line ice_x, ice_y, ... [N/m]
+    #: metre of a line ice_x, ice_y, ... [N/m], thermal strains dam_uniform, ... [-]
     unit_loads: dict[str, Array]
+    #: thermal strains of those of unit_loads at the middle of each element (elements,)
+    unit_strains: dict[str, Array]
     #: degrees of freedom: zero; on each of its joints, by number, in the joint's order; of each wet
     #: face, in its order
     fixed_dofs: IntArray
@@ -58,13 +67,17 @@ class ElasticBody:
             functions = space.find(Space(part, order))
             return np.ravel(dim * functions[:, None] + np.array(components))
 
+        material = material_of(case)
+        strains = {n: s for n, s in unit_strains(case).items() if s[0] in body.regions}
+        thermal = {n: thermal_load(space, dim, material, *s) for n, s in strains.items()}
         fixed = [dofs(within(mesh.bodies["fixed"], body))]
         if dim == 3 and case["hold_z"]:
             fixed.append(dofs(within(mesh.bodies["sides"], body), [2]))
         return ElasticBody(
             space=space,
-            stiffness=elasticity(space, dim, material_of(case)),
-            unit_loads=dict(unit_loads(space, mesh, name)),
+            stiffness=elasticity(space, dim, material),
+            unit_loads=dict(unit_loads(space, mesh, name)) | thermal,
+            unit_strains={n: at_middles(space, *strain) for n, strain in strains.items()},
             fixed_dofs=np.unique(np.concatenate(fixed)),
             joint_dofs={
                 number: dofs(joint.surface)
@@ -93,6 +106,16 @@ def unit_loads(space: Space, mesh: Mesh, name: str) -> Iterator[tuple[str, Array
                 load = np.zeros(dim * len(space.locations))
                 load[dim * space.find(part) + component] = points.values.T @ points.weights
                 yield f"{line}_{'xyz'[component]}", load
+
+
+def unit_strains(case: Case) -> dict[str, tuple[str, Distribution]]:
+    """Region and distribution of the thermal strains of a case, by name."""
+    distributions: dict[str, Distribution] = {
+        "uniform": lambda positions: np.ones(len(positions)),
+        "linear": lambda positions: across(case, positions),
+    }
+    names = [name.split("_") for name in thermal_strains(case, COMPLETE)]
+    return {f"{region}_{form}": (region, distributions[form]) for region, form in names}
 
 
 def within(surface: Body, body: Body) -> Body:

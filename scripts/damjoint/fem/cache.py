@@ -24,7 +24,7 @@ from scipy import linalg
 from .. import RunError, __version__, data
 from ..arrays import Array
 from ..model.case import Case
-from ..model.loads import overtopped
+from ..model.loads import COMPLETE, overtopped, thermal_strains
 from ..model.mesh import Body, Face, JointMesh, Mesh, mesh_of, shares
 from ..storage import cache_folder
 from .bodies import PARAMETERS, Bodies
@@ -43,7 +43,8 @@ def key_of(case: Case) -> tuple[object, ...]:
     faces = tail > 0, case["floor_water"], overtopped(case)
     # which faces of an own geometry are under water depends on heights that only its mesh has
     levels = (case.reached, tail) if case.geometry else ()
-    return (shape, *(case[n] for n in PARAMETERS), *faces, *levels)
+    thermal = thermal_strains(case, COMPLETE)
+    return (shape, *(case[n] for n in PARAMETERS), *faces, *levels, *thermal)
 
 
 def fingerprint(mesh: Mesh) -> str:
@@ -130,7 +131,9 @@ def write(condensed: Condensed, header: str, path: Path) -> None:
 
 
 #: The dataclasses of which condensed bodies are made.
-CLASSES = {cls.__name__: cls for cls in (Condensed, CondensedJoint, JointDofs, JointMesh, Face, Body)}
+CLASSES = {
+    cls.__name__: cls for cls in (Condensed, CondensedJoint, JointDofs, JointMesh, Face, Body)
+}
 
 
 def pack(value: Any, path: str, arrays: dict[str, Array]) -> object:
@@ -169,7 +172,7 @@ def unpack(tree: Any, arrays: Mapping[str, Array]) -> Any:
 
 def prune(parent: Path) -> None:
     """Delete the files longest unused until the cache is not above its limit."""
-    files = sorted(parent.glob("*.npz"), key=lambda f: f.stat().st_mtime)
+    files = sorted([*parent.glob("*.npz"), *parent.glob("*.json")], key=lambda f: f.stat().st_mtime)
     total = sum(f.stat().st_size for f in files)
     for file in files:
         if total <= LIMIT:

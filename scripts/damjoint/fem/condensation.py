@@ -31,9 +31,9 @@ from scipy import linalg
 from ..arrays import Array, IntArray
 from ..model.case import Case
 from ..model.mesh import Face, JointMesh
+from . import factor
 from .bodies import Bodies, ElasticBody
 from .elements import Space
-from .factor import schur_complement
 from .gluing import BodyDofs, Gluing, JointDofs
 
 
@@ -73,6 +73,8 @@ class Condensed:
     crest_jump: Array
     crest_units: dict[str, float]
     crest_pressure: Array
+    #: library that eliminated them, with its version
+    factorisation: str
     #: wall seconds of mesh, assembly and condensation
     seconds: dict[str, float]
 
@@ -110,7 +112,7 @@ class ReducedBody:
         number = np.full(size, -1)
         number[free] = np.arange(len(free))
         n, ends = len(joint), np.concatenate([number[joint], number[loaded]])
-        schur, reduced_loads = schur_complement(stiffness[free][:, free], ends, loads[free])
+        schur, reduced_loads = factor.schur_complement(stiffness[free][:, free], ends, loads[free])
         jj, jl, ll = schur[:n, :n], schur[:n, n:], schur[n:, n:]
         units, loaded_units = reduced_loads[:n], reduced_loads[n:]
         spread = jl
@@ -245,6 +247,7 @@ def condense(case: Case, bodies: Bodies) -> Condensed:
         crest_jump=own_dofs.jumps.T @ crest_face - joints.coupling @ crest_both,
         crest_units=crest_units,
         crest_pressure=np.concatenate(crest_pressure),
+        factorisation=factor.name(),
         seconds={
             "mesh": mesh.seconds,
             "assembly": bodies.seconds,

@@ -1,18 +1,23 @@
-"""Linear elasticity of a body: stiffness, weight, stress.
+"""Linear elasticity of a body: stiffness, weight, thermal load, stress.
 
 Plane strain in 2D.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 from scipy import sparse
 
-from ..arrays import Array, IntArray, Sparse
+from ..arrays import Array, BoolArray, IntArray, Sparse
 from .elements import BULK, MASS, Space, basis, corners_of, geometry, nodal, points_of, tabulated
 
 #: Young's modulus [Pa] and Poisson's ratio [-] by region.
 Material = dict[str, tuple[float, float]]
+#: Values (n,) at positions (n, 3).
+Distribution = Callable[[Array], Array]
 
 
 def lame(young: float, poisson: float) -> tuple[float, float]:
@@ -85,10 +90,8 @@ def body_force(space: Space, dim: int, component: int, region: str | None = None
     body or in all.
     """
     points = points_of(space, BULK[space.order])
-    sizes = [len(table) for _, table in space.connectivity]
-    inside = np.repeat([region in (None, own) for own in space.body.regions], sizes)
     load = np.zeros((len(space.locations), dim))
-    load[:, component] = points.values.T @ (points.weights * inside[points.elements])
+    load[:, component] = points.values.T @ (points.weights * inside(space, region)[points.elements])
     return load.ravel()
 
 
@@ -116,10 +119,46 @@ def mass(space: Space, dim: int, densities: dict[str, float]) -> Sparse:
     return sparse.kron(scalar, sparse.eye(dim), format="csr")
 
 
-def stress(space: Space, displacements: Array, material: Material) -> Array:
+def thermal_modulus(young: float, poisson: float) -> float:
+    """Stress over prevented thermal strain [Pa], of any direction: 3 lambda + 2 mu."""
+    return young / (1 - 2 * poisson)
+
+
+def thermal_load(
+    space: Space, dim: int, material: Material, region: str, strain: Distribution
+) -> Array:
+    """Load vector [N] of a free thermal strain, equal in all directions, in a region of the body:
+    the integral of the prevented stress times the divergence of each function.
+    """
+    points = points_of(space, BULK[space.order], gradients=True)
+    size = points.weights * inside(space, region)[points.elements] * strain(points.positions)
+    size = thermal_modulus(*material[region]) * size
+    return np.column_stack([points.gradients[i].T @ size for i in range(dim)]).ravel()
+
+
+def inside(space: Space, region: str | None) -> BoolArray:
+    """Whether each element of a body is in a region, or in any."""
+    return by_element(space, [region in (None, own) for own in space.body.regions])
+
+
+def by_element(space: Space, values: list[Any]) -> Any:
+    """Values of the regions of a body, in the order of its elements (elements,)."""
+    return np.repeat(values, [len(table) for _, table in space.connectivity])
+
+
+def at_middles(space: Space, region: str, strain: Distribution) -> Array:
+    """A strain in a region of the body at the middle of each element (elements,)."""
+    values: Array = inside(space, region) * strain(space.body.middles())
+    return values
+
+
+def stress(
+    space: Space, displacements: Array, material: Material, thermal: Array | None = None
+) -> Array:
     """Stress xx, yy, zz, xy, yz, xz (states, elements, 6) at the middle of each element.
 
-    displacements: (states, functions, 2 or 3)
+    displacements: (states, functions, 2 or 3); thermal: free thermal strain at the middle of each
+    element (states, elements)
     """
     number, _, dim = displacements.shape
     blocks = []
@@ -139,4 +178,8 @@ def stress(space: Space, displacements: Array, material: Material) -> Array:
             full[:, :, i, i] += lam * np.trace(strain, axis1=2, axis2=3)
         parts = [full[:, :, i, k] for i, k in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))]
         blocks.append(np.stack(parts, axis=2))
-    return np.concatenate(blocks, axis=1)
+    result = np.concatenate(blocks, axis=1)
+    if thermal is not None:
+        moduli = [thermal_modulus(*material[region]) for region in space.body.regions]
+        result[:, :, :3] -= (by_element(space, moduli) * thermal)[:, :, None]
+    return result

@@ -15,21 +15,19 @@ import tempfile
 import weakref
 from functools import cache
 from pathlib import Path
-from typing import Literal
+from types import ModuleType
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import scipy
 from scipy import sparse
-from scipy.sparse.linalg import SuperLU, splu
 
 from ..arrays import Array, IntArray, Sparse
 from ..storage import atomic_write, cache_folder
 from .memory import available, check_memory, dense_memory
 
-try:
-    import pymetis
-except ImportError:
-    pymetis = None  # type: ignore[assignment]
+if TYPE_CHECKING:  # loaded where it is used, as a command with cached data does not need it
+    from scipy.sparse.linalg import SuperLU
 
 #: Number of unknowns from which on METIS's order saves more time than it takes.
 LARGE = 15000
@@ -59,13 +57,24 @@ def library() -> ctypes.CDLL | None:
         return None
 
 
+@cache
+def metis() -> ModuleType | None:
+    """The module pymetis; None if it is not installed."""
+    try:
+        import pymetis
+    except ImportError:
+        return None
+    return pymetis
+
+
 def name() -> str:
     """Library that factorises, with its version, and the order of large matrices."""
     mumps = library()
     if mumps is None:
         return f"SuperLU (scipy {scipy.__version__})"
     mumps.damjoint_mumps_version.restype = ctypes.c_char_p
-    order = "" if pymetis is None else f", METIS (pymetis {pymetis.version})"
+    ordering = metis()
+    order = f", METIS (pymetis {ordering.version})" if ordering else ""
     return f"MUMPS {mumps.damjoint_mumps_version().decode()}{order}"
 
 
@@ -79,7 +88,8 @@ def elimination_order(matrix: Sparse, keep: IntArray) -> IntArray | None:
     for MUMPS's own order.
     """
     size = matrix.shape[0]
-    if pymetis is None or size < LARGE:
+    pymetis = metis() if size >= LARGE else None
+    if pymetis is None:
         return None
     inside = np.setdiff1d(np.arange(size), keep)
     graph = matrix[inside][:, inside].tocsr()
@@ -226,6 +236,8 @@ def schur_complement(matrix: Sparse, keep: IntArray, loads: Array) -> tuple[Arra
 
 def superlu(matrix: Sparse, ordering: Literal["NATURAL", "MMD_AT_PLUS_A"]) -> SuperLU:
     """SuperLU factors of a symmetric matrix, pivots on the diagonal."""
+    from scipy.sparse.linalg import splu
+
     return splu(matrix, permc_spec=ordering, diag_pivot_thresh=0.0, options={"SymmetricMode": True})
 
 

@@ -83,8 +83,9 @@ class Gluing:
         node[low] = node[up] = order[place]
 
         def of_body(name: str) -> BodyDofs:
-            inside = lambda m: (m >= first[name]) & (m < first[name] + sizes[names.index(name)])
-            own = np.where(inside(up), up, low)[inside(up) | inside(low)]
+            end = first[name] + sizes[names.index(name)]
+            above, below = ((m >= first[name]) & (m < end) for m in (up, low))
+            own = np.column_stack([up, low])[np.column_stack([above, below])]
             own = own[np.sort(np.unique(own, return_index=True)[1])]
             matrix = combined([carried.get(int(m), {}) for m in own], column, unknowns)
             return BodyDofs(dofs=own - first[name], node=node[own], jumps=matrix)

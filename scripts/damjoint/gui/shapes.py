@@ -12,12 +12,22 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import ROUND_OFF
+from ..arrays import Table
 from ..model.case import Case
-from ..model.fields import BODIES, OPEN, SLIPPED, SOFTENING, distance, nearest_rows, state_of
+from ..model.fields import (
+    OPEN,
+    SLIPPED,
+    SOFTENING,
+    distance,
+    joint_body,
+    nearest_rows,
+    state_of,
+)
 from ..model.loads import Loading, line_forces
 from ..model.mesh import Body
+from ..model.results import Results
 from ..model.scene import BED, DOWN, FLOOR, SIDES, TOP, UP
-from ..post.outline import exaggeration, section_of, skin
+from ..post.outline import exaggeration, joint_lines, section_of, skin
 from .worker import SolvedScene
 
 #: Length of a force's arrow over the dam's size.
@@ -137,6 +147,26 @@ def undeformed_loads(case: Case) -> dict[str, Pieces]:
     return {name: fixed(corners) for name, corners in loads.items() if has_extent(corners)}
 
 
+#: Bodies above and below a single joint.
+BODIES = "dam", "foundation"
+
+
+@dataclass(frozen=True)
+class NearSide:
+    """The nodes of a joint on the side towards the viewer, from heel to toe (n,): their tags and
+    rows; names of the bodies above and below, rows of the joint by step.
+    """
+
+    bodies: tuple[str, str]
+    tags: np.ndarray
+    row: np.ndarray
+    rows: list[Table]
+
+    def along(self, values: Callable[[Table], np.ndarray]) -> np.ndarray:
+        """Evaluate a function of the joint's rows on the near side, (steps, n)."""
+        return np.array([values(rows)[self.row] for rows in self.rows])
+
+
 @dataclass
 class Deformed:
     """A scene with its displacement times `scale`; it has reached a requested time."""
@@ -149,44 +179,50 @@ class Deformed:
         #: displacement (steps, nodes, 3) by body [m]
         self.moved = {
             name: np.array([fields[time].displacement[name] for time in self.times])
-            for name in BODIES
+            for name in fields[self.times[0]].displacement
         }
         self.scale = exaggeration(self.moved, case.size)
-        self.skins = {name: skin(self.scene.bodies[name]) for name in BODIES}
+        self.skins = {name: skin(self.scene.bodies[name]) for name in self.moved}
         self.depth = self.scene.bodies["dam"].points[:, 2].max()
-        self.rows = [self.scene.result.at(time) for time in self.times]
+        joints = self.scene.result.joints
+        self.joints = [self.near_side(k, own) for k, own in enumerate(joints)]
         states = [self.scene.result.state(time) for time in self.times]
         self.loadings = [
             Loading.at(case, time, state["level"], state["tail_level"])
             for time, state in zip(self.times, states, strict=True)
         ]
-        # the joint's nodes on the side towards the viewer, from heel to toe, and their rows
-        joint, s = self.scene.bodies["joint"], distance(self.rows[0])
-        near = joint.points[:, 2] > joint.points[:, 2].max() - ROUND_OFF * s.max()
-        row = nearest_rows(joint.points[near], self.rows[0])
-        order = np.argsort(s[row])
-        self.near_tags, self.near_rows = joint.node_tags[near][order], row[order]
-        ends = np.column_stack([self.rows[0][axis] for axis in "xy"])[[s.argmin(), s.argmax()]]
+        lines = joint_lines(case, [joint.rows[0] for joint in self.joints])
         #: sections, undeformed and by step; None if one section does not represent the geometry
         self.undeformed, *self.sections = (
-            section_of(self.scene.bodies, fields[time].displacement, scale, ends)
+            section_of(self.scene.bodies, fields[time].displacement, scale, lines)
             if is_extruded(case)
             else None
             for time, scale in [(self.times[0], 0.0), *((t, self.scale) for t in self.times)]
         )
 
+    def near_side(self, number: int, result: Results) -> NearSide:
+        """The near side of a joint, by its number; result: of that joint alone."""
+        joint, rows = joint_body(self.scene.bodies, number), [result.at(t) for t in self.times]
+        s = distance(rows[0])
+        near = joint.points[:, 2] > joint.points[:, 2].max() - ROUND_OFF * s.max()
+        row = nearest_rows(joint.points[near], rows[0])
+        order = np.argsort(s[row])
+        of_joints = self.scene.result.case.of_joints
+        names = (of_joints[number].upper, of_joints[number].lower) if of_joints else BODIES
+        return NearSide(names, joint.node_tags[near][order], row[order], rows)
+
     def bodies(self) -> list[Pieces]:
         """Faces of dam and foundation with their displacement [m]."""
         return [
             Pieces(self.scene.bodies[name].points[faces], self.moved[name][:, faces])
-            for name in BODIES
+            for name in self.moved
             for faces, _ in self.skins[name]
         ]
 
     def stress(self) -> list[Pieces]:
         """Undeformed faces of dam and foundation with the vertical stress of the elements [Pa]."""
         fields, pieces = self.scene.fields, []
-        for name in BODIES:
+        for name in self.moved:
             vertical = np.array([fields[time].stress[name][:, 1] for time in self.times])
             for faces, owners in self.skins[name]:
                 values = np.repeat(vertical[:, owners, None, None], faces.shape[1], axis=2)
@@ -196,45 +232,48 @@ class Deformed:
     def outline(self) -> Pieces:
         """Edges of dam and foundation."""
         points, values = [], []
-        for name in BODIES:
+        for name in self.moved:
             body = self.scene.bodies[name]
             edges = sharp_edges(body, [faces for faces, _ in self.skins[name]])
             points.append(body.points[edges])
             values.append(self.moved[name][:, edges])
         return Pieces(np.concatenate(points), np.concatenate(values, axis=1))
 
-    def joint_face(self, name: str) -> tuple[np.ndarray, np.ndarray]:
-        """A body's face of the joint on the near side: points (n, 3) from heel to toe, and their
+    def joint_face(self, name: str, joint: NearSide) -> tuple[np.ndarray, np.ndarray]:
+        """A body's face of a joint on the near side: points (n, 3) from heel to toe, and their
         displacement (steps, n, 3).
         """
         body = self.scene.bodies[name]
-        index = np.searchsorted(body.node_tags, self.near_tags)
+        index = np.searchsorted(body.node_tags, joint.tags)
         return body.points[index], self.moved[name][:, index]
 
-    def along_joint(self, values: Callable[[dict[str, np.ndarray]], np.ndarray]) -> np.ndarray:
-        """Evaluate a function of the joint's rows on the near side, (steps, n)."""
-        return np.array([values(rows)[self.near_rows] for rows in self.rows])
+    @property
+    def softens(self) -> bool:
+        """Whether a joint softens somewhere."""
+        return any((joint.along(state_of) == SOFTENING).any() for joint in self.joints)
 
     def marks(self) -> dict[str, Pieces]:
-        """Both faces of the joint where it is open or broken, softens, or has slipped.
+        """Both faces of each joint where it is open or broken, softens, or has slipped.
 
         A segment that is not in that state at a step collapses to a point.
         """
         states = {"open": OPEN, "softening": SOFTENING, "slipped": SLIPPED}
-        state = self.along_joint(state_of)
-        both_ends = np.minimum(state[:, :-1], state[:, 1:])
-        ends, moved = [], []
-        for name in BODIES:
-            points, displacement = self.joint_face(name)
-            ends.append(np.stack([points[:-1], points[1:]], axis=1))
-            moved.append(np.stack([displacement[:, :-1], displacement[:, 1:]], axis=2))
+        ends, moved, of_segments = [], [], []
+        for joint in self.joints:
+            state = joint.along(state_of)
+            for name in joint.bodies:
+                points, displacement = self.joint_face(name, joint)
+                ends.append(np.stack([points[:-1], points[1:]], axis=1))
+                moved.append(np.stack([displacement[:, :-1], displacement[:, 1:]], axis=2))
+                of_segments.append(np.minimum(state[:, :-1], state[:, 1:]))
+        segment_states = np.concatenate(of_segments, axis=1)
         segments, values = np.concatenate(ends), np.concatenate(moved, axis=1)
         collapse = (
             values[:, :, 0] - values[:, :, 1] + (segments[:, 0] - segments[:, 1]) / self.scale
         )
         marks = {}
         for name, number in states.items():
-            shown, in_state = values.copy(), np.tile(both_ends == number, len(BODIES))
+            shown, in_state = values.copy(), segment_states == number
             shown[:, :, 1] += np.where(in_state[:, :, None], 0.0, collapse)
             marks[name] = Pieces(segments, shown)
         return marks
@@ -247,11 +286,12 @@ class Deformed:
         }
 
     def water(self) -> np.ndarray:
-        """Reservoir and tailwater up to their levels, and water in the crack."""
+        """Reservoir and tailwater up to their levels, and water in the cracks."""
         level, tail = ([getattr(now, name) for now in self.loadings] for name in ("level", "tail"))
         over = level if self.scene.result.case["crest_water"] else [-np.inf] * len(level)
         parts = (RESERVOIR, level), (OVER, over), (TAIL, tail)
-        return np.concatenate([*(self.fluid(*part) for part in parts), self.crack()], axis=1)
+        cracks = (self.crack(joint) for joint in self.joints)
+        return np.concatenate([*(self.fluid(*part) for part in parts), *cracks], axis=1)
 
     def silt(self) -> np.ndarray:
         """Silt upstream, once it acts."""
@@ -275,7 +315,7 @@ class Deformed:
         """Displaced points of application of a line force on the near side, (steps, 3)."""
         line = self.scene.bodies[name]
         tag = line.node_tags[line.points[:, 2].argmax()]
-        owner = next(n for n in BODIES if tag in self.scene.bodies[n].node_tags)
+        owner = next(n for n in self.moved if tag in self.scene.bodies[n].node_tags)
         index = np.searchsorted(self.scene.bodies[owner].node_tags, tag)
         return self.scene.bodies[owner].points[index] + self.scale * self.moved[owner][:, index]
 
@@ -298,11 +338,12 @@ class Deformed:
             steps.append(fluid_above(edges, level if level > ground else -np.inf))
         return in_space(np.array(steps), self.depth)
 
-    def crack(self) -> np.ndarray:
+    def crack(self, joint: NearSide) -> np.ndarray:
         """Quadrangles of the water under pressure between the faces of an open joint."""
-        lower, lower_displacement = self.joint_face("foundation")
-        upper, upper_displacement = self.joint_face("dam")
-        wet = self.along_joint(lambda rows: (state_of(rows) == OPEN) & (rows["p"] > 0))
+        above, below = joint.bodies
+        lower, lower_displacement = self.joint_face(below, joint)
+        upper, upper_displacement = self.joint_face(above, joint)
+        wet = joint.along(lambda rows: (state_of(rows) == OPEN) & (rows["p"] > 0))
         wet = (wet[:, :-1] & wet[:, 1:])[..., None, None]
         low = lower + self.scale * lower_displacement
         high = upper + self.scale * upper_displacement

@@ -15,8 +15,9 @@ import numpy as np
 
 from .. import ROUND_OFF
 from ..model.case import Case
-from ..model.fields import CLOSED, OPEN, SOFTENING, along, distance, row_of_nodes, state_of
+from ..model.fields import CLOSED, OPEN, along, distance, joint_body, row_of_nodes, state_of
 from ..post.units import LENGTHS, STRESSES, Units, unit, with_unit
+from ..statics.verdict import decisive_joint
 from .camera import CLIPPED, MAPS, clip, frame
 from .shapes import Deformed, Pieces, is_extruded, undeformed_loads
 from .worker import SolvedScene
@@ -183,8 +184,11 @@ def show(scene: SolvedScene, title: str, before: Sequence[SolvedScene] = ()) -> 
 
 
 def captions(deformed: Deformed) -> list[str]:
-    """Describe each step in a line: level, opening, crack, fracture process zone."""
-    result, lines = deformed.scene.result, []
+    """Describe each step in a line: level, opening, crack, fracture process zone of the decisive
+    joint.
+    """
+    number, lines = decisive_joint(deformed.scene.result), []
+    result, name = deformed.scene.result.joints[number], deformed.scene.result.case.named((number,))
     for time in deformed.times:
         now = result.state(time)
         tail = f", tailwater {now['tail_level']:.4g} m" if now["tail_level"] > 0 else ""
@@ -193,7 +197,7 @@ def captions(deformed: Deformed) -> list[str]:
         line += f", crack {now['crack_length']:.3g} m"
         if now["process_zone"] > 0:
             line += f", softening {now['process_zone']:.3g} m"
-        lines.append(f"level {now['level']:.4g} m{tail}: {line}")
+        lines.append(f"level {now['level']:.4g} m{tail}: {name and f'{name}: '}{line}")
     return lines
 
 
@@ -215,7 +219,7 @@ def show_deformed(gallery: Gallery, deformed: Deformed) -> None:
     broken = gallery.add("open or broken joint", [marks["open"]], [RED], **above)
     label(broken, LEFT, LEGEND, ["red: joint open or broken"], 13)
     label(slipped, 210, LEGEND, ["orange: joint slipped"], 13)
-    if (deformed.along_joint(state_of) == SOFTENING).any():
+    if deformed.softens:
         softening = gallery.add("softening joint", [marks["softening"]], [VIOLET], **above)
         label(softening, 370, LEGEND, ["violet: joint softening"], 13)
     gallery.write(LEFT, NOTES, [f"displacement x {deformed.scale:g}"], DARK, 13)
@@ -229,8 +233,9 @@ def scale_at(place: int) -> dict[str, float]:
 
 def show_maps(gallery: Gallery, deformed: Deformed) -> None:
     """Show maps of the unrolled 3D joint below the foundation: opening, state, pressure."""
-    scene, rows = deformed.scene, deformed.rows
-    case, joint = scene.result.case, scene.bodies["joint"]
+    scene, number = deformed.scene, decisive_joint(deformed.scene.result)
+    case, rows = scene.result.joints[number].case, deformed.joints[number].rows
+    joint = joint_body(scene.bodies, number)
     nearest = row_of_nodes(joint, rows[0])
     length, per_m = unit([r["delta_n"] for r in rows], LENGTHS)
     stress, per_pa = unit([r["p"] for r in rows], STRESSES)
@@ -275,9 +280,12 @@ class Curve:
 
 def show_curves(graphs: Graphs, scene: SolvedScene, before: Sequence[SolvedScene]) -> None:
     """Show opening, slip, stresses and pressure along the joint (means over z in 3D)."""
-    rows = [along(scene.result.at(time)) for time in scene.times]
-    earlier = [along(other.result.at()) for other in before]
-    wet = scene.result.case["uplift"] != "none"
+    number = decisive_joint(scene.result)
+    own = scene.result.joints[number]
+    rows = [along(own.at(time)) for time in scene.times]
+    same = [other.result.joints for other in before if len(other.result.joints) > number]
+    earlier = [along(joints[number].at()) for joints in same]
+    wet = own.case["uplift"] != "none"
     shown: list[tuple[str, Units, list[tuple[str, str, Color]]]] = [
         ("opening", LENGTHS, [("", "delta_n", BLUE)]),
         ("slip", LENGTHS, [("jump", "delta_t1", ORANGE), ("slip", "slip", DARK)]),
@@ -298,8 +306,10 @@ def show_curves(graphs: Graphs, scene: SolvedScene, before: Sequence[SolvedScene
 
 
 def show_history(graphs: Graphs, scene: SolvedScene, before: Sequence[SolvedScene]) -> None:
-    """Show the level over opening, crest displacement and crack length, all converged steps."""
-    driven = scene.result.case["drive"] != "level"
+    """Show the level over opening, crest displacement and crack length of the decisive joint, all
+    converged steps.
+    """
+    driven, number = scene.result.case["drive"] != "level", decisive_joint(scene.result)
     shown = (
         ("heel opening" if driven else "largest opening", "max_opening", LENGTHS, BLUE),
         ("crest movement", "crest_ux", LENGTHS, BLUE),
@@ -308,7 +318,8 @@ def show_history(graphs: Graphs, scene: SolvedScene, before: Sequence[SolvedScen
     for title, column, units, color in shown:
         curves = []
         for other in (scene, *before):
-            history = other.result.history
+            joints = other.result.joints
+            history = joints[min(number, len(joints) - 1)].history
             x = other.result.heel if driven and column == "max_opening" else history[column]
             if len(x):
                 name, kind = ("", color) if other is scene else (BEFORE, GREY)

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..model.case import Case
-from ..model.loads import Loading, line_forces, quake_column, water_column
+from ..model.loads import Loading, line_forces, quake_column, thermal_strains, water_column
 from .flow import FlowDerivative, FlowSolution
 from .interface import Interface
 from .joint_laws import TANGENT, JointLaws, JointVariables, Mode
@@ -46,8 +46,7 @@ class Equilibrium:
     def __init__(self, case: Case, interface: Interface) -> None:
         self.case, self.bulk, self.interface = case, interface.bulk, interface
         self.water = [
-            JointWater(own, joint)
-            for own, joint in zip(case.joints, interface.joints, strict=True)
+            JointWater(own, joint) for own, joint in zip(case.joints, interface.joints, strict=True)
         ]
         #: numbers of the joints in which water flows
         self.flowing = tuple(k for k, water in enumerate(self.water) if water.flowing)
@@ -98,17 +97,18 @@ class Equilibrium:
         return forces
 
     def unit_loads(self, loading: Loading) -> dict[str, float]:
-        """Sizes of the unit loads that act: weights [N/m3] and line forces [N/m]."""
+        """Sizes of the unit loads that act: weights [N/m3], line forces [N/m], strains [-]."""
         case, quake = self.case, loading.part("quake")
         concrete = case["rho_dam"] * case["g"]
         loads = {
             "dam_x": case["k_h"] * quake * concrete,
             "dam_y": (case["k_v"] * quake - 1) * concrete,
-            "loadsation_y": 0.0 if case["in_situ"] else -case["rho_loads"] * case["g"],
+            "foundation_y": 0.0 if case["in_situ"] else -case["rho_found"] * case["g"],
         }
         loads |= {"lower_x": loads["dam_x"], "lower_y": loads["dam_y"]}
         for name, force in line_forces(case, loading).items():
             loads |= {f"{name}_{axis}": part for axis, part in zip("xy", force, strict=True)}
+        loads |= thermal_strains(case, loading)
         return {name: value for name, value in loads.items() if value and name in self.bulk.units}
 
     def _external_forces(self, loading: Loading) -> tuple[Array, Array]:

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import linalg, sparse
-from scipy.sparse.linalg import splu
 
 from ..arrays import Array, IntArray, Sparse
 from ..fem import elements
@@ -64,6 +63,8 @@ def harmonic(laplace: Sparse, fixed: IntArray, values: Array) -> Array:
     field[fixed] = values
     free = np.setdiff1d(np.arange(len(field)), fixed)
     if len(free):
+        from scipy.sparse.linalg import splu  # takes long to load
+
         field[free] = splu(laplace[free][:, free]).solve(-laplace[free][:, fixed] @ values)
     return field
 

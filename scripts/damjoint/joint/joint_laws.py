@@ -26,7 +26,7 @@ class JointVariables:
     #: where the points of each joint start, and the end of the last
     starts: tuple[int, ...]
 
-    def split(self, values: Array) -> list[Array]:
+    def split(self, values: NDArray[Any]) -> list[NDArray[Any]]:
         """Values (q, ...) of all points, joint by joint."""
         return [values[begin:end] for begin, end in pairwise(self.starts)]
 
@@ -89,7 +89,9 @@ class JointLaws:
             )
         ]
 
-    def _joined(self, method: Callable[..., Array], jump: Array, variables: JointVariables) -> Any:
+    def _joined(
+        self, method: Callable[..., NDArray[Any]], jump: Array, variables: JointVariables
+    ) -> Any:
         """The values of a method of `Law` for all points."""
         return np.concatenate(self._each(method, jump, variables))
 
@@ -97,9 +99,14 @@ class JointLaws:
 
     def undamaged_tangent(self, points: Sequence[int]) -> Array:
         """Tangent (q, 3, 3) of undamaged joints with these numbers of points."""
-        one = ((law, law.traction_and_tangent(np.zeros((1, 3)), law.initial(1))) for law in self.laws)
+        one = (
+            (law, law.traction_and_tangent(np.zeros((1, 3)), law.initial(1))) for law in self.laws
+        )
         return np.concatenate(
-            [np.repeat(tangent, n, axis=0) for (_, (_, tangent)), n in zip(one, points, strict=True)]
+            [
+                np.repeat(tangent, n, axis=0)
+                for (_, (_, tangent)), n in zip(one, points, strict=True)
+            ]
         )
 
     def evaluate(
@@ -107,8 +114,9 @@ class JointLaws:
     ) -> tuple[Array, Array]:
         """Traction and tangent in a mode of the solver, see `Law`."""
         frozen = mode.frozen.laws if mode.frozen else self.laws
-        none = [None] * len(self.laws)
-        releasing = none if mode.releasing is None else variables.split(mode.releasing)
+        releasing: list[Any] = [None] * len(self.laws)
+        if mode.releasing is not None:
+            releasing = variables.split(mode.releasing)
         parts = [
             law.evaluate(own, state, points)
             for law, own, state, points in zip(

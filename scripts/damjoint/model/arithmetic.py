@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import ast
+import difflib
 import math
 import operator
+import re
 import warnings
 from collections.abc import Callable, Mapping
+from functools import lru_cache
+
+from .. import data
 
 BINARY: dict[type[ast.operator], Callable[[float, float], float]] = {
     ast.Add: operator.add,
@@ -20,12 +25,69 @@ UNARY: dict[type[ast.unaryop], Callable[[float], float]] = {
     ast.USub: operator.neg,
 }
 
+PI = {"Pi": math.pi}
+#: Numbers and powers in Python only: 1_000, 0x10, 2**3.
+PYTHON_ONLY = re.compile(r"\b\d+[_xXoObB]|\*\*")
+
+
+class UnknownName(ValueError):
+    """A name that is neither a unit nor known."""
+
+    def __init__(self, name: str, known: Mapping[str, float]) -> None:
+        near = difflib.get_close_matches(name, known, 1)
+        hint = f"did you mean {near[0]}?" if near else f"units: {', '.join(units())}"
+        super().__init__(f"{name} is unknown ({hint})")
+
+
+def explained(message: str, error: Exception) -> str:
+    """A message, with the unknown name if that is the error."""
+    return f"{message}; {error}" if isinstance(error, UnknownName) else message
+
+
+@lru_cache(maxsize=1)
+def units() -> dict[str, float]:
+    """SI values of the units by name, from pro/units.pro; an angle's in degrees."""
+    text = re.sub(r"//[^\n]*", "", (data("pro") / "units.pro").read_text())
+    pairs = re.findall(r"(\w+) = ([^;]+);", text)
+    return {name: value_of(parsed(value), PI) for name, value in pairs}
+
+
+def arithmetic_value(text: str, known: Mapping[str, float] | None = None) -> float:
+    """The value of arithmetic with numbers, + - * / ^ ( ), Pi, units and known names: 20*GPa.
+
+    Raises ValueError.
+    """
+    return value_of(parsed(text), PI | units() | dict(known or {}))
+
+
+def quantity(text: str) -> float:
+    """The value of a number, also nan or inf, or of arithmetic with units.
+
+    Raises ValueError.
+    """
+    try:
+        return number(text)
+    except ValueError:
+        return arithmetic_value(text)
+
+
+def number(text: str) -> float:
+    """A number as Gmsh reads it; 1_000 and the digits of other scripts are numbers in Python only.
+
+    Raises ValueError.
+    """
+    if "_" in text or not text.isascii():
+        raise ValueError(text)
+    return float(text)
+
 
 def parsed(text: str) -> ast.expr:
     """The expression of a text, with ^ for powers.
 
     Raises ValueError.
     """
+    if PYTHON_ONLY.search(text) or not text.isascii():
+        raise ValueError(text)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")  # Python warns of 1if 1else 2
@@ -35,7 +97,7 @@ def parsed(text: str) -> ast.expr:
 
 
 def value_of(node: ast.expr, known: Mapping[str, float]) -> float:
-    """The value of numbers, + - * / ^ ( ), Pi and known names.
+    """The value of numbers, + - * / ^ ( ) and known names.
 
     Raises ValueError if it is anything else, or no finite real number.
     """
@@ -45,10 +107,10 @@ def value_of(node: ast.expr, known: Mapping[str, float]) -> float:
             if isinstance(node.value, (int, float)):
                 return float(node.value)
             raise ValueError(node.value)
-        if isinstance(node, ast.Name) and node.id in known:
+        if isinstance(node, ast.Name):
+            if node.id not in known:
+                raise UnknownName(node.id, known)
             return known[node.id]
-        if isinstance(node, ast.Name) and node.id == "Pi":
-            return math.pi
         if isinstance(node, ast.BinOp) and type(node.op) in BINARY:
             return BINARY[type(node.op)](value(node.left), value(node.right))
         if isinstance(node, ast.UnaryOp) and type(node.op) in UNARY:
@@ -65,14 +127,16 @@ def value_of(node: ast.expr, known: Mapping[str, float]) -> float:
 
 
 def call_of(text: str) -> tuple[str, list[float], dict[str, float]]:
-    """Name, arguments and named arguments of 'name(1, 2, scale=3)', all of them numbers.
+    """Name, arguments and named arguments of 'name(1, 2, scale=3)', all of them numbers or
+    arithmetic with units.
 
     Raises ValueError.
     """
     node = parsed(text)
     if not isinstance(node, ast.Call) or not isinstance(node.func, ast.Name):
         raise ValueError(text)
-    named = {word.arg: value_of(word.value, {}) for word in node.keywords if word.arg}
+    known = PI | units()
+    named = {word.arg: value_of(word.value, known) for word in node.keywords if word.arg}
     if len(named) < len(node.keywords):
         raise ValueError(text)
-    return node.func.id, [value_of(argument, {}) for argument in node.args], named
+    return node.func.id, [value_of(argument, known) for argument in node.args], named

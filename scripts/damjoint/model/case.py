@@ -14,6 +14,7 @@ from .. import RUN_GEO, InputError, data
 from ..arrays import Settings, Value, Values
 from ..laws import LAWS, Law
 from . import casefile
+from .arithmetic import number
 from .constraints import (
     check_also_uplift,
     check_drive,
@@ -34,7 +35,6 @@ from .parameters import (
     independent,
     levels_of,
     listing,
-    number,
     parse,
 )
 from .scene import stacked
@@ -158,7 +158,7 @@ class Case(ParameterValues):
             replace(own, values={n: v for n, v in own.values.items() if n not in values})
             for own in self.of_joints
         )
-        return replace(self, values=self.values | values, of_joints=others)
+        return replace(self, values={**self.values, **values}, of_joints=others)
 
     def with_joints(self, joints: Sequence[OfJoint]) -> Case:
         """The case of a user's own geometry, with the names and ends of its joints.
@@ -176,9 +176,7 @@ class Case(ParameterValues):
             replace(joint, values=own.values, section=section)
             for own, joint, section in zip(known, joints, ends, strict=True)
         )
-        return replace(
-            self, section=ends[0], of_joints=tuple(of_joints) if len(joints) > 1 else ()
-        )
+        return replace(self, section=ends[0], of_joints=tuple(of_joints) if len(joints) > 1 else ())
 
     @cached_property
     def law(self) -> Law[Any]:
@@ -254,8 +252,7 @@ class Case(ParameterValues):
     def scenes(self) -> list[Case]:
         """The case itself, then with its further uplift modes."""
         others = (
-            replace(self.with_values({"uplift": mode}), also_uplift=())
-            for mode in self.also_uplift
+            replace(self.with_values({"uplift": mode}), also_uplift=()) for mode in self.also_uplift
         )
         return [self, *others]
 
@@ -384,7 +381,8 @@ def load(
         tails = levels_of("tail_levels", tail_levels)
     overrides = {name: checked(name, value) for name, value in overrides.items()}
     lifts = lists.pop("lift_heights", ())
-    lifts = tuple(map(float, overrides.pop("lift_heights", lifts)))
+    if "lift_heights" in overrides:
+        lifts = levels_of("lift_heights", overrides.pop("lift_heights"))
     geometry = own_geometry(file.texts["geometry"]) if "geometry" in file.texts else None
     values = settings_of_joints({**file.defaults, **file.of_joints, **overrides}, lifts, geometry)
     listed = "".join(listing(n, v) for n, v in lists.items())
@@ -464,8 +462,7 @@ def parsed_by_joint(
     if lifts:
         slopes = (number(str(v.get("joint_slope", default_of("joint_slope")))) for v in values[1:])
         several = listing("lift_heights", lifts) + listing("lift_slopes", slopes)
-    text = lambda own, more: assignments(own) + listed + more + INCLUDE
-    whole = parse(text(values[0], several))
+    whole = parse(assignments(values[0]) + listed + several + INCLUDE)
     if len(values) == 1:
         return [whole]
     elements = whole["all_elements"] if lifts else [whole["n_joint"][0]] * len(values)
@@ -474,7 +471,7 @@ def parsed_by_joint(
     return [
         whole,
         *(
-            parse(text({**own, **sizes, "n_joint": n}, base))
+            parse(assignments({**own, **sizes, "n_joint": n}) + listed + base + INCLUDE)
             for own, n in zip(values, elements, strict=True)
         ),
     ]
@@ -575,7 +572,7 @@ def is_mesh(path: Path) -> bool:
         raise InputError(f"geometry = {path}: {error.strerror}") from None
 
 
-def as_published(path: Path, overrides: Values, *loading: str | Sequence[float] | None) -> bool:
+def as_published(path: Path, overrides: Settings, *loading: str | Sequence[float] | None) -> bool:
     """Whether a case of the package is unchanged but for mesh, solver and uplift."""
     harmless = {n for n, p in declared().items() if p.group in ("Mesh", "Solver")}
     own = path.resolve().parent == CASES.resolve()

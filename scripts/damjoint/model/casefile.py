@@ -7,7 +7,8 @@ A case is a list of statements, in any layout, with // and /* */ comments:
     also_uplift = "none";            further uplift modes the case is published with
     geometry = "own.msh";            your own mesh or .geo, beside this file
     record = "quake.csv";            accelerations of the ground, beside this file
-    default_<parameter> = value;     a text; arithmetic with + - * / ^ ( ), Pi, defaults set before
+    default_<parameter> = value;     a text; arithmetic with + - * / ^ ( ), Pi, the units of
+                                     pro/units.pro and defaults set before
     levels() = {value, ...};         tail_levels(), times() and lift_heights() likewise
     <parameter>() = {value, ...};    of a joint: a value for each joint, the lowest first
 """
@@ -25,7 +26,7 @@ from typing import TypeAlias
 
 from .. import InputError
 from ..arrays import Value
-from .arithmetic import parsed, value_of
+from .arithmetic import arithmetic_value, explained
 from .parameters import assignments, checked, declared, parameter
 
 LISTS = ("levels", "tail_levels", "times", "lift_heights")
@@ -206,9 +207,10 @@ def evaluate(tokens: tuple[str, ...], case: CaseText, where: str) -> float:
     """The value of an arithmetic expression."""
     known = {f"default_{n}": v for n, v in case.defaults.items() if isinstance(v, float)}
     try:
-        return value_of(parsed(" ".join(tokens)), known)
-    except ValueError:
-        raise InputError(
-            f"{where}: must be a number, or arithmetic with + - * / ^ ( ), Pi and defaults set "
-            "before"
-        ) from None
+        return arithmetic_value(" ".join(tokens), known)
+    except ValueError as error:
+        message = (
+            f"{where}: must be a number, or arithmetic with + - * / ^ ( ), Pi, units and defaults "
+            "set before"
+        )
+        raise InputError(explained(message, error)) from None

@@ -28,6 +28,11 @@ def check_values(
         parameter.check(case.values[name])
     if by_parameters:
         check_section(case, section)
+    elif case["temperature_linear"]:
+        raise InputError(
+            f"temperature_linear = {case['temperature_linear']:g}: must be 0 with a geometry of "
+            "one's own (it is linear between the faces of the section)"
+        )
     check_drains(case, section["joint_length"][0])
     check_works(case)
 

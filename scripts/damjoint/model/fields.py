@@ -12,6 +12,7 @@ from .mesh import Body
 from .results import FLUX, Results
 from .scene import numbered
 
+
 @dataclass
 class Field:
     """The bodies at one time: displacement (nodes, 3) [m], stress (elements, 6) [Pa] at the

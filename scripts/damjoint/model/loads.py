@@ -9,18 +9,21 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
+from ..arrays import Array
 from .case import Case
 from .mesh import Face
-from .scene import DOWN, TOP, UP
+from .scene import DOWN, SIDES, TOP, UP
 
 #: Loads that grow linearly from t = <name>_t - 1 to t = <name>_t.
-STAGED = ("silt", "ice", "force", "anchor", "quake")
+STAGED = ("silt", "ice", "force", "anchor", "quake", "temperature")
 
 
 @dataclass(frozen=True)
 class Loading:
     """The loading at a time: reservoir and tailwater level [m], and the factors of the loads in the
-    order of STAGED, 0 to 1.
+    order of STAGED, 0 to 1 (temperature: -1 to 1).
     """
 
     level: float
@@ -30,12 +33,19 @@ class Loading:
     @staticmethod
     def at(case: Case, time: float, level: float, tail: float) -> Loading:
         """The loading of a case at a time, with levels of its own."""
-        parts = (min(max(time - case[f"{name}_t"] + 1, 0.0), 1.0) for name in STAGED)
-        return Loading(level, tail, tuple(parts))
+        parts = {n: min(max(time - case[f"{n}_t"] + 1, 0.0), 1.0) for n in STAGED}
+        since, period = time - case["temperature_t"], case["temperature_period"]
+        if since > 0 and period > 0:
+            parts["temperature"] = math.cos(2 * math.pi * since / period)
+        return Loading(level, tail, tuple(parts.values()))
 
     def part(self, name: str) -> float:
-        """The factor of a load of STAGED, 0 to 1."""
+        """The factor of a load of STAGED."""
         return self.grown[STAGED.index(name)]
+
+
+#: All loads complete, without water.
+COMPLETE = Loading(0.0, 0.0, (1.0,) * len(STAGED))
 
 
 def line_forces(case: Case, loading: Loading) -> dict[str, tuple[float, float]]:
@@ -53,6 +63,42 @@ def line_forces(case: Case, loading: Loading) -> dict[str, tuple[float, float]]:
         for name, (x, y) in full.items()
         if x or y
     }
+
+
+def thermal_strains(case: Case, loading: Loading) -> dict[str, float]:
+    """Free thermal strains of a case at a loading by region and distribution, if they can occur:
+    uniform, and the difference between downstream and upstream face where it is linear.
+    """
+    loads = case.loads
+    uniform = loads.expansion_dam * loads.temperature_dam
+    linear = loads.expansion_dam * loads.temperature_linear
+    full = {
+        "dam_uniform": uniform,
+        "dam_linear": linear,
+        "lower_uniform": uniform,
+        "lower_linear": linear,
+        "foundation_uniform": loads.expansion_found * loads.temperature_found,
+    }
+    return {name: loading.part("temperature") * strain for name, strain in full.items() if strain}
+
+
+def across(case: Case, positions: Array) -> Array:
+    """Distance from the upstream face of the section over its thickness at the height of each
+    position (n, 3), less a half: from -1/2 to 1/2 (n,).
+    """
+    section, y = case.section, positions[:, 1]
+
+    def face(side: str) -> Array:
+        segments = [i for i, number in enumerate(section["seg_side"]) if SIDES[int(number)] == side]
+        ends = [
+            (section[f"seg_y{k}"][i], section[f"seg_x{k}"][i]) for i in segments for k in (0, 1)
+        ]
+        heights, places = np.array(sorted(ends)).T
+        return np.interp(y, heights, places)
+
+    upstream, downstream = face(UP), face(DOWN)
+    share: Array = (positions[:, 0] - upstream) / (downstream - upstream) - 0.5
+    return share
 
 
 def wet(case: Case, face: Face) -> bool:

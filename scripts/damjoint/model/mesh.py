@@ -10,7 +10,6 @@ from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
 
-import gmsh
 import numpy as np
 from scipy import sparse
 
@@ -202,8 +201,9 @@ def shares(case: Case) -> dict[str, Setting]:
 def as_text(settings: Mapping[str, Setting]) -> str:
     """Values and lists of numbers in Gmsh's language."""
     lists = {name: value for name, value in settings.items() if isinstance(value, tuple)}
-    values = {name: value for name, value in settings.items() if name not in lists}
-    return assignments(values) + "".join(listing(*item) for item in lists.items())
+    values = {n: value for n, value in settings.items() if not isinstance(value, tuple)}
+    listed = (listing(name, map(float, value)) for name, value in lists.items())
+    return assignments(values) + "".join(listed)
 
 
 def heel_normal(joint: Body, heel: Body) -> Array:
@@ -247,15 +247,21 @@ def mesh_of(case: Case) -> Mesh:
     return mesh
 
 
+#: Options of Gmsh by which geo/dam2d.geo chooses where element sizes come from; 1: the default.
+SIZE_OPTIONS = ("MeshSizeExtendFromBoundary", "MeshSizeFromPoints")
+
+
 def generate(case: Case) -> None:
     """Make the mesh of a case, as Gmsh's current mesh.
 
     Raises RunError, and InputError if a user's own geometry can not be read.
     """
-    start_gmsh()
+    gmsh = start_gmsh()
     gmsh.clear()
     gmsh.parser.clear()
     gmsh.onelab.clear()
+    for option in SIZE_OPTIONS:  # of an earlier geometry in this process
+        gmsh.option.setNumber(f"Mesh.{option}", 1)
     own = case.geometry
     # in a folder of its own: Gmsh runs a file of options, FILE.opt, beside the file it opens
     with tempfile.TemporaryDirectory(prefix="damjoint-") as folder:
@@ -299,6 +305,7 @@ class Mesh:
     """
 
     def __init__(self, case: Case) -> None:
+        gmsh = start_gmsh()
         start = time.perf_counter()
         self.dim, self.own = int(case["dim"]), case.geometry
         generate(case)
@@ -344,11 +351,12 @@ class Mesh:
     @property
     def is_current(self) -> bool:
         """Whether it is Gmsh's current mesh, which `write` writes."""
-        start_gmsh()
+        gmsh = start_gmsh()
         return bool(gmsh.model.getFileName() == self.model)
 
     def _section_regions(self, case: Case) -> tuple[list[Joint], dict[str, int], list[FaceRegion]]:
         """The joints; physical groups by region, and those of the faces."""
+        gmsh = start_gmsh()
         numbers, scene = constants(), stacked(case.joint_names)
         present = {group for _, group in gmsh.model.getPhysicalGroups()}
         tag_of = {name: int(numbers[name.upper()][0]) for name in REGIONS}
@@ -377,6 +385,7 @@ class Mesh:
         """As `_section_regions`, by the names of the physical groups, which get the numbers of the
         package's own geometries.
         """
+        gmsh = start_gmsh()
         numbers, named = constants(), {}
         for d, tag in gmsh.model.getPhysicalGroups():
             if name := gmsh.model.getPhysicalName(d, tag).strip().lower():
@@ -411,6 +420,7 @@ class Mesh:
 
     def _read(self) -> None:
         """Read the nodes of Gmsh's current mesh."""
+        gmsh = start_gmsh()
         tags, coordinates, _ = gmsh.model.mesh.getNodes()
         self.nodes = len(tags)
         self._place = np.zeros(int(tags.max(initial=0)) + 1, int)
@@ -419,6 +429,7 @@ class Mesh:
 
     def _body(self, dimension: int, parts: list[tuple[str, int]]) -> Body:
         """The body of some regions (name, number of the physical group)."""
+        gmsh = start_gmsh()
         blocks: dict[tuple[str, int], list[IntArray]] = {}
         numbers: dict[tuple[str, int], list[IntArray]] = {}
         for name, group in parts:
@@ -453,6 +464,7 @@ class Mesh:
         """Give joint and faces their normals: the joint's from foundation to dam, a face's out of
         its body.
         """
+        gmsh = start_gmsh()
         (joint, *_) = self.joints
         upper, lower = self.solids[joint.upper], self.solids[joint.lower]
         if self.own:
@@ -510,6 +522,7 @@ class Mesh:
 
         Raises OSError if the disk is full, which Gmsh does not report.
         """
+        gmsh = start_gmsh()
         gmsh.option.setNumber("Mesh.MshFileVersion", 2.2)
         # else elements are renumbered, shape by shape
         gmsh.option.setNumber("Mesh.PreserveNumberingMsh2", 1)

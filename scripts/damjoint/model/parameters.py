@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 import difflib
+import itertools
 import json
 import math
 import re
 import signal
 import tempfile
 import threading
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
+from types import ModuleType
 from typing import Any
 
-import gmsh
-
-from .. import InputError, data
+from .. import InputError, __version__, data
 from ..arrays import Setting, Value
 from ..laws import LAWS
+from ..storage import cached
+from .arithmetic import explained, quantity
 
 DECLARATIONS = data("pro") / "parameters.pro"
 #: The line by which a text includes the declarations.
@@ -36,8 +38,18 @@ OF_JOINTS = (
 TINY, BELOW_HALF, ANY = 1e-30, 0.5 - 1e-9, 1e200
 
 
-def start_gmsh() -> None:
-    """Start Gmsh once per process, quietly and without reading the user's settings."""
+#: Texts that a process caches: those of a run, but not of all rows of a sweep.
+CACHED = 10
+COUNTER = itertools.count()
+
+
+def start_gmsh() -> ModuleType:
+    """The module gmsh, started once per process, quietly and without reading the user's settings.
+
+    It is imported here, as a command with cached data does not need it.
+    """
+    import gmsh
+
     if not gmsh.isInitialized():
         handlers = {n: signal.getsignal(n) for n in (signal.SIGTERM, signal.SIGHUP)}
         gmsh.initialize(readConfigFiles=False, interruptible=False)
@@ -45,16 +57,7 @@ def start_gmsh() -> None:
             for number, handler in handlers.items():  # Gmsh has reset them to the system's
                 signal.signal(number, handler)
         gmsh.option.setNumber("General.Verbosity", 0)  # errors are raised instead
-
-
-def number(text: str) -> float:
-    """A number as Gmsh reads it; 1_000 and the digits of other scripts are numbers in Python only.
-
-    Raises ValueError.
-    """
-    if "_" in text or not text.isascii():
-        raise ValueError(text)
-    return float(text)
+    return gmsh
 
 
 @dataclass(frozen=True)
@@ -108,14 +111,15 @@ class Parameter:
 
         Raises InputError if it is not a number, out of range or not one of the choices.
         """
+        message = f"{self.name} = {value}: must be {self.allowed()} ({self.meaning})"
         result: Value = value
         if not self.text:
             try:
-                result = number(value) if isinstance(value, str) else float(value)
-            except (TypeError, ValueError):
-                result = math.nan
+                result = quantity(value) if isinstance(value, str) else float(value)
+            except (TypeError, ValueError) as error:
+                raise InputError(explained(message, error)) from None
         if not self.allows(result):
-            raise InputError(f"{self.name} = {value}: must be {self.allowed()} ({self.meaning})")
+            raise InputError(message)
         return result
 
     def allows(self, value: Value) -> bool:
@@ -132,11 +136,18 @@ class Parameter:
 
 def parse(text: str) -> dict[str, list[Any]]:
     """Variables of Gmsh's parser after it has read a text written by this package: {name: numbers
-    or texts}.
+    or texts}; the first CACHED texts of a process are cached, which spares the start of Gmsh.
 
     Raises InputError.
     """
-    start_gmsh()
+    if next(COUNTER) >= CACHED:
+        return parse_by_gmsh(text)
+    return cached("variables", sources() + text, lambda: parse_by_gmsh(text))
+
+
+def parse_by_gmsh(text: str) -> dict[str, list[Any]]:
+    """The same without the cache; the ONELAB database is that of the text afterwards."""
+    gmsh = start_gmsh()
     gmsh.parser.clear()
     gmsh.onelab.clear()
     with tempfile.NamedTemporaryFile("w", suffix=".geo") as file:
@@ -166,20 +177,37 @@ def constants() -> dict[str, list[Any]]:
 
 
 @lru_cache(maxsize=1)
+def sources() -> str:
+    """The texts of the declarations and of the files that they include."""
+    texts = (DECLARATIONS.with_name(f"{n}.pro") for n in ("parameters", "section", "units"))
+    return __version__ + "".join(text.read_text() for text in texts)
+
+
+@lru_cache(maxsize=1)
 def declared() -> dict[str, Parameter]:
     """All declared parameters by name."""
-    parse(INCLUDE)
     text = re.sub(r"//[^\n]*", "", DECLARATIONS.read_text())
-    return {name: declaration(name, rest, text) for name, rest in DECLARED.findall(text)}
+    rest_of = dict(DECLARED.findall(text))
+    label_of = {name: matched(r'Name\s+"([^"]+)"', rest) for name, rest in rest_of.items()}
+    entries = cached("parameters", sources(), lambda: onelab_entries(list(label_of.values())))
+    return {
+        name: declaration(name, rest, text, label_of[name], entries[label_of[name]])
+        for name, rest in rest_of.items()
+    }
 
 
-def declaration(name: str, rest: str, text: str) -> Parameter:
-    """A parameter from the rest of its declaration, the text of all declarations, and its entry in
-    the ONELAB database.
+def onelab_entries(labels: list[str]) -> dict[str, Any]:
+    """Entries of the ONELAB database by label, without a case."""
+    parse_by_gmsh(INCLUDE)
+    gmsh = start_gmsh()
+    return {label: json.loads(gmsh.onelab.get(label)) for label in labels}
+
+
+def declaration(name: str, rest: str, text: str, label: str, entry: dict[str, Any]) -> Parameter:
+    """A parameter from the rest of its declaration, the text of all declarations, its label and its
+    entry in the ONELAB database.
     """
-    label = matched(r'Name\s+"([^"]+)"', rest)
     group, description, unit = re.findall(LABEL, label)[0]
-    entry = json.loads(gmsh.onelab.get(label))
     # Min is -1 for a parameter that may be -1
     otherwise = entry.get("attributes", {}).get("Otherwise")
     low = {None: entry.get("min", -ANY), "> 0": TINY, ">= 0": 0.0}[otherwise]
@@ -256,7 +284,7 @@ def settings(pairs: Iterable[str]) -> dict[str, Setting]:
     return values
 
 
-def checked(name: str, value: Setting | Sequence[str]) -> Setting:
+def checked(name: str, value: Any) -> Setting:
     """The value of a parameter, or the values of each joint, checked.
 
     Raises InputError.
@@ -275,19 +303,20 @@ def checked(name: str, value: Setting | Sequence[str]) -> Setting:
     return tuple(known.check(v) for v in value)
 
 
-def levels_of(name: str, levels: str | Sequence[float]) -> tuple[float, ...]:
+def levels_of(name: str, levels: Any) -> tuple[float, ...]:
     """Heights [m], for example water levels, from numbers or a text 'a,b,c'.
 
     Raises InputError if there is none, or one is not finite.
     """
     values = levels.split(",") if isinstance(levels, str) else levels
+    listed = levels if isinstance(levels, str) else ",".join(map(str, levels))
+    message = f"{name} = {listed}: must be a list of levels in metres, such as 3,6,8,9"
     try:
-        result = tuple(number(v) if isinstance(v, str) else float(v) for v in values)
-    except ValueError:
-        result = ()
+        result = tuple(quantity(v) if isinstance(v, str) else float(v) for v in values)
+    except ValueError as error:
+        raise InputError(explained(message, error)) from None
     if not result or not all(map(math.isfinite, result)):
-        listed = levels if isinstance(levels, str) else ",".join(map(str, levels))
-        raise InputError(f"{name} = {listed}: must be a list of levels in metres, such as 3,6,8,9")
+        raise InputError(message)
     return result
 
 

@@ -11,7 +11,8 @@ from .parameters import Parameter, declared
 
 HEAD = """// {name} - a dam on rock. It runs as it is: damjoint run {name}
 // Change the values of your dam. Lines that begin with // are the other parameters at their
-// defaults; -1: the value follows from others, as the line says. All units are SI.
+// defaults; -1: the value follows from others, as the line says. A value is in
+// the unit at the end of its line, or has a unit of its own: 25*GPa, 2.4*t/m3, 50*kN/m, 5*mm.
 
 title = "{title}";
 
@@ -39,8 +40,9 @@ def line(parameter: Parameter, value: str) -> str:
     return f"{mark}default_{parameter.name} = {value};  // {about}"
 
 
-#: Values of the example of parameters that are -1 by default.
-EXAMPLE = {"E_dam": "2.5e10", "E_found": "2.5e10", "G_f": "100"}
+#: Values of the example: of parameters that are -1 by default, and with units.
+EXAMPLE = {"E_dam": "25*GPa", "E_found": "25*GPa", "G_f": "100*N/m", "rho_dam": "2.4*t/m3"}
+EXAMPLE |= {"sigma_max": "0.2*MPa", "adhesion": "0.2*MPa"}
 
 
 def text(name: str, title: str) -> str:

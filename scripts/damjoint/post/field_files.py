@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import gmsh
 import meshio
 import numpy as np
 
@@ -147,7 +146,7 @@ def write_collection(folder: Path, fields: dict[float, Field]) -> None:
 
 def write_views(path: Path, points: np.ndarray, cells: Cells, views: list[View]) -> None:
     """Write a mesh with views, a step per time, for Gmsh."""
-    start_gmsh()
+    gmsh = start_gmsh()
     before, own = gmsh.model.getCurrent(), "fields of damjoint"
     gmsh.model.add(own)
     tags = np.arange(1, len(points) + 1)

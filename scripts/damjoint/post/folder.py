@@ -152,7 +152,9 @@ def write_info(results: Results, folder: Path, state: str = "", why: str = "") -
             "published": case.published,
             "hardening_asked": case.hardening_asked,
             **results.info,
-            "units": {n: unit for n, (unit, _) in (joint_columns(case) | history_columns(case)).items()},
+            "units": {
+                n: unit for n, (unit, _) in (joint_columns(case) | history_columns(case)).items()
+            },
         },
     )
 

@@ -25,6 +25,7 @@ from ..model.fields import (
     Solution,
     along,
     distance,
+    joint_body,
     row_of_nodes,
     state_of,
 )

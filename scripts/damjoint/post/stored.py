@@ -25,6 +25,7 @@ from ..model.fields import Field, Solution
 from ..model.mesh import Body
 from ..model.parameters import INCLUDE, assignments, constants, declared, listing
 from ..model.results import HISTORY, Results
+from ..model.scene import numbered
 from .folder import read_info, scene_folders
 
 #: Errors that reading damaged files can raise; SyntaxError: by XML.
@@ -178,12 +179,9 @@ def read_fields(folder: Path, times: np.ndarray) -> tuple[dict[str, Body], dict[
             check_file(folder / f"joint_t{time:g}.vtu")
             # not meshio.read: it exits the process if a file is damaged
             bulk, joint = (meshio.vtu.read(p) for p in (path, folder / f"joint_t{time:g}.vtu"))
-            parts = {
-                "dam": extract_body(bulk, "dam"),
-                "foundation": extract_body(bulk, "foundation", "lower"),
-            }
+            parts = {name: extract_body(bulk, regions) for name, regions in parts_of(bulk).items()}
             bodies = {name: body for name, (body, _, _) in parts.items()}
-            bodies["joint"] = body_of(joint.points, [(b.type, b.data) for b in joint.cells])
+            bodies |= extract_joints(joint)
             displacement = bulk.point_data["displacement"]
             fields[time] = Field(
                 {name: displacement[points] for name, (_, points, _) in parts.items()},
@@ -192,9 +190,37 @@ def read_fields(folder: Path, times: np.ndarray) -> tuple[dict[str, Body], dict[
     return bodies, fields
 
 
-def extract_body(bulk: meshio.Mesh, *regions: str) -> tuple[Body, np.ndarray, np.ndarray]:
-    """Extract regions of a mesh: body, indices of its points (n,), stress (elements, 6) [Pa]."""
-    numbers = {constants()[name.upper()][0]: name for name in regions}
+def parts_of(bulk: meshio.Mesh) -> dict[str, dict[int, str]]:
+    """The bodies of a mesh, from the highest: their regions by number."""
+    layer = int(constants()["LAYER"][0])
+    present = np.unique(np.concatenate(bulk.cell_data["body"])).astype(int).tolist()
+    dams = (number // layer for number in reversed(present))
+    dam = int(constants()["DAM"][0])
+    parts = {
+        numbered("dam", k): {dam + k * layer: "dam"} for k in dams if dam + k * layer in present
+    }
+    rock = {int(constants()[name.upper()][0]): name for name in ("foundation", "lower")}
+    return parts | {"foundation": rock}
+
+
+def extract_joints(mesh: meshio.Mesh) -> dict[str, Body]:
+    """The surfaces of the joints of a mesh, by the numbers of its points' joints."""
+    number, joints = mesh.point_data["joint"].astype(int), {}
+    for k in np.unique(number).tolist():
+        used = np.flatnonzero(number == k)
+        cells = [
+            (block.type, np.searchsorted(used, block.data[number[block.data[:, 0]] == k]))
+            for block in mesh.cells
+        ]
+        shown = [(shape, table) for shape, table in cells if len(table)]
+        joints[numbered("joint", k - 1)] = body_of(mesh.points[used], shown)
+    return joints
+
+
+def extract_body(bulk: meshio.Mesh, numbers: dict[int, str]) -> tuple[Body, np.ndarray, np.ndarray]:
+    """Extract regions of a mesh, by number: body, indices of its points (n,), stress (elements, 6)
+    [Pa].
+    """
     blocks = [
         (numbers[number], block.type, block.data[own == number], stress[own == number])
         for block, own, stress in zip(

@@ -91,7 +91,9 @@ def process_zone(equilibrium: Equilibrium, state: State) -> Array | None:
     laws, interface = equilibrium.laws, equilibrium.interface
     ends = state.previous, state
     jumps = [interface.jumps(interface.at_points, end.jump) for end in ends]
-    before, after = (laws.damage(jump, end.variables) for jump, end in zip(jumps, ends, strict=True))
+    before, after = (
+        laws.damage(jump, end.variables) for jump, end in zip(jumps, ends, strict=True)
+    )
     opened = np.array([True, False, False]) == (jumps[1][:, :1] > 0)
     direction = (jumps[1] - jumps[0]) * opened
     size = np.linalg.norm(direction, axis=1)

@@ -18,7 +18,7 @@ from ..joint.interface import Interface, interface_of
 from ..joint.joint_laws import TANGENT, Mode
 from ..joint.linear_system import Border
 from ..model.case import Case
-from ..model.loads import STAGED, Loading
+from ..model.loads import COMPLETE, Loading
 from .controls import Control, DisplacementControl, LevelControl
 from .newton import Convergence, Diverged, Iterate, Strategy, newton
 from .state import Frozen, State
@@ -68,7 +68,7 @@ class Model:
         measured by.
         """
         start, case = self.start(), self.case
-        highest = Loading(max(case.levels), max(case.tail_levels), (1.0,) * len(STAGED))
+        highest = replace(COMPLETE, level=max(case.levels), tail=max(case.tail_levels))
         residual = self.equilibrium.residual(start.jump, start.variables, highest).value
         size = float(np.linalg.norm(residual))
         if not np.isfinite(size):

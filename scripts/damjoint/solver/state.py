@@ -43,7 +43,8 @@ class State:
         joints, laws = equilibrium.interface.joints, equilibrium.laws
         numbers = [len(j.points.weights) for j in joints], [len(j.rows) for j in joints]
         jump = np.zeros(len(equilibrium.bulk.stiffness))
-        return State(0.0, Loading(0.0, 0.0), jump, *(laws.initial(n) for n in numbers))
+        points, nodes = (laws.initial(n) for n in numbers)
+        return State(0.0, Loading(0.0, 0.0), jump, points, nodes)
 
     def after(self, previous: State) -> State:
         """This state, as the one that follows another."""

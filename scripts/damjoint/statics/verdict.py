@@ -9,6 +9,7 @@ import numpy as np
 
 from ..laws import Evidence
 from ..model.case import Case, has_drains
+from ..model.loads import COMPLETE, thermal_strains
 from ..model.results import Results, row_of_joint
 from . import gravity
 
@@ -75,10 +76,15 @@ def slipped_from(results: Results) -> float | None:
     open; None if a part of it sticks, or if a dam that has slipped stands by the joint law.
 
     A point that has slipped once counts as slipped. By the integration points of every
-    step, or by the nodes at the last requested level.
+    step, or by the nodes at the last requested level. A change of temperature can let every point
+    slip, in opposite directions: with it the shear force has to reach the strength, too.
     """
     if results.case.law.stands_slipped:
         return None
+    if thermal_strains(results.case, COMPLETE):
+        resistance = shear_resistance(results, results.last["N"])
+        if abs(results.last["T"]) < (1 - AT_BOUND) * resistance < np.inf:
+            return None
     history, base = results.history, results.case.joint_length
     slipped = np.maximum(history["slip_length"], history["crack_length"]) > base * (1 - 1e-9)
     if slipped.any() and slipped[-1]:
@@ -110,8 +116,8 @@ def why_stopped(results: Results) -> tuple[str, str]:
 
 
 def shear_resistance(results: Results, normal: float) -> float:
-    """Shear force [N/m] that the joint, the only one of these results, transmits at the last saved state under an effective normal
-    force; infinite if its law does not bound the shear.
+    """Shear force [N/m] that the joint, the only one of these results, transmits at the last saved
+    state under an effective normal force; infinite if its law does not bound the shear.
     """
     case, damage, slip = results.case, mean(results, "damage"), mean(results, "slip")
     return case.law.shear_resistance(normal, case.joint_along, damage, slip)

@@ -163,7 +163,8 @@ def by_finite_elements(result: Results, statement: str | None = None) -> MethodR
     """Result of a run for a joint, the only one of `result`, at the last level it reached, with
     safety factors from its resultants.
 
-    statement: why it fails, or empty; by default that of the result. Stresses are node values at the ends of the joint; those of an elastic body depend on the mesh.
+    statement: why it fails, or empty; by default that of the result. Stresses are node values at
+    the ends of the joint; those of an elastic body depend on the mesh.
     """
     case, last, partial = result.case, result.last, result.partial_load
     (joint,) = case.joint_names

@@ -353,9 +353,9 @@ class Search:
         return replace(result, gravity=by_hand, gravity_with=others, note=self.tension(value))
 
     def by_statics(self, failing: FailurePath) -> tuple[str, str, str]:
-        """How an unconfirmed path fails, why, and at which joint, if there are several: its resultants have no equilibrium above a level
-        near its highest (below the target, for another quantity than the level). Why is empty if
-        they have.
+        """How an unconfirmed path fails, why, and at which joint, if there are several: its
+        resultants have no equilibrium above a level near its highest (below the target, for another
+        quantity than the level). Why is empty if they have.
         """
         top = failing.points[failing.top]
         level, mode, words, joint = highest_by_statics(top.model.case, top.last)

@@ -14,7 +14,7 @@ import numpy as np
 from .. import InputError
 from ..arrays import Array, Value, Values
 from ..model import parameters
-from ..model.arithmetic import parsed, value_of
+from ..model.arithmetic import arithmetic_value, explained, quantity
 from ..model.case import Case, load
 
 #: A row of a result file: texts by column.
@@ -90,12 +90,13 @@ def checked(name: str, value: Value) -> Value:
     """
     if name != "level":
         return parameters.parameter(name).check(value)
+    message = f"level = {value}: must be a level in metres"
     try:
-        level = parameters.number(value) if isinstance(value, str) else value
-    except ValueError:
-        level = math.nan
+        level = quantity(value) if isinstance(value, str) else value
+    except ValueError as error:
+        raise InputError(explained(message, error)) from None
     if not math.isfinite(level):
-        raise InputError(f"level = {value}: must be a level in metres")
+        raise InputError(message)
     return level
 
 
@@ -125,9 +126,9 @@ def values_of(text: str) -> tuple[str, list[Value]]:
     if ":" not in values:
         return name, [checked(name, v.strip()) for v in values.split(",")]
     try:
-        first, last, step = (parameters.number(v) for v in values.split(":"))
-    except ValueError:
-        raise bad from None
+        first, last, step = (quantity(v) for v in values.split(":"))
+    except ValueError as error:
+        raise InputError(explained(str(bad), error)) from None
     if not np.isfinite([first, last, step]).all() or step == 0 or (last - first) / step < 0:
         raise bad
     if (last - first) / step >= MOST_ROWS:
@@ -226,12 +227,13 @@ def tie(name: str, expression: str, row: Values) -> Value:
     """
     known = {other: value for other, value in row.items() if not isinstance(value, str)}
     try:
-        value = rounded(value_of(parsed(expression), known))
-    except ValueError:
-        raise InputError(
-            f"--tie {name}={expression}: must be arithmetic with + - * / ^ ( ), Pi and the names "
-            f"varied, sampled or tied before ({', '.join(known)})"
-        ) from None
+        value = rounded(arithmetic_value(expression, known))
+    except ValueError as error:
+        message = (
+            f"--tie {name}={expression}: must be arithmetic with + - * / ^ ( ), Pi, units and the "
+            f"names varied, sampled or tied before ({', '.join(known)})"
+        )
+        raise InputError(explained(message, error)) from None
     return checked(name, value)
 
 

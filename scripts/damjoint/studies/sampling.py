@@ -7,7 +7,7 @@ from scipy import linalg, stats
 
 from .. import InputError
 from ..arrays import Array, IntArray
-from ..model.arithmetic import call_of
+from ..model.arithmetic import call_of, explained
 
 #: Distributions by scipy's names, and `normal`.
 DISTRIBUTIONS = {
@@ -33,8 +33,9 @@ def distribution(name: str, text: str) -> stats.distributions.rv_frozen:
     message = f"--sample {name}={text}: must be a distribution of scipy.stats with numbers"
     try:
         kind, numbers, named = call_of(text)
-    except ValueError:
-        raise InputError(f"{message}, such as normal(1.0,0.15) or uniform(0.5,scale=0.3)") from None
+    except ValueError as error:
+        message += ", such as normal(1.0,0.15) or uniform(0.5,scale=0.3)"
+        raise InputError(explained(message, error)) from None
     if kind not in DISTRIBUTIONS:
         known = "normal, lognorm, truncnorm, uniform, triang, weibull_min, gumbel_r, beta, ..."
         raise InputError(f"{message}; {kind} is none; known: {known}")

@@ -29,6 +29,12 @@ def add_external_forces(
             load += size * body.unit_loads[name]
 
 
+def free_strain(body: ElasticBody, equilibrium: Equilibrium, state: State) -> Array:
+    """Free thermal strain of a state at the middle of each element of a body (elements,)."""
+    sizes = equilibrium.unit_loads(state.loading)
+    return np.sum([sizes.get(name, 0) * unit for name, unit in body.unit_strains.items()], axis=0)
+
+
 def recover(bodies: Bodies, scenes: list[tuple[Equilibrium, History]]) -> list[dict[float, Field]]:
     """Fields of the saved states of scenes on the same bodies, by scene and time. Displacements
     count from the state under the weight alone, if there is one.
@@ -65,9 +71,12 @@ def recover(bodies: Bodies, scenes: list[tuple[Equilibrium, History]]) -> list[d
     at_nodes, stresses = {}, {}
     material, dim = material_of(states[0][0].case), bodies.mesh.dim
     for name, values in displacements.items():
-        space = bodies.by_name[name].space
+        body, space = bodies.by_name[name], bodies.by_name[name].space
         u = values.reshape(len(states), -1, dim)
-        stresses[name] = stress(space, u, material)
+        strains = None
+        if body.unit_strains:
+            strains = np.array([free_strain(body, *state) for state in states])
+        stresses[name] = stress(space, u, material, strains)
         at_nodes[name] = np.pad(u[:, : len(space.body.points)], ((0, 0), (0, 0), (0, 3 - dim)))
 
     def fields_of(first: int, history: History) -> Iterator[tuple[float, Field]]:

@@ -9,7 +9,6 @@ from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from ...fem import factor
 from ...fem.bodies import Bodies
 from ...fem.cache import cached
 from ...fem.condensation import Condensed
@@ -35,7 +34,7 @@ def about(bulk: Condensed) -> dict[str, Any]:
     """Entries of run.json on the engine and its mesh."""
     return {
         "engine": "condensed",
-        "factorisation": factor.name(),
+        "factorisation": bulk.factorisation,
         "mesh": bulk.counts,
         "unknowns": bulk.unknowns,
     }

@@ -82,14 +82,19 @@ def environment(folder: Path, threads: int = 1) -> dict[str, str]:
 
 def own_lists(mesh: Mesh) -> dict[str, list[float]]:
     """The lists of pro/section.pro for a user's own geometry."""
-    (joint,), bodies, faces = mesh.joints.values(), mesh.bodies, mesh.faces.values()
+    (joint,), bodies, faces = mesh.joints, mesh.bodies, mesh.faces.values()
     length = area(joint.heel) if mesh.dim == 3 else 1.0
     normal, crest = heel_normal(joint.surface, joint.heel), bodies["crest"].points[0]
     lines = [name for name in LINES if name in bodies]
     shapes = {shape for solid in mesh.solids.values() for shape, _ in solid.cells}
+
+    def body_number(body: str) -> float:
+        """Number of a body in pro/section.pro."""
+        return float(constants()["UPPER" if body == joint.upper else "UNDER"][0])
+
     return {
         "own_side": [float(SIDES.index(face.side)) for face in faces],
-        "own_body": [float(face.body != joint.upper) for face in faces],
+        "own_body": [body_number(face.body) for face in faces],
         "own_low": [float(face.surface.points[:, 1].min()) for face in faces],
         "own_ends": [
             *(values[0] for values in joint.ends.values()),
@@ -97,7 +102,7 @@ def own_lists(mesh: Mesh) -> dict[str, list[float]]:
         ],
         "own_quadrangles": [float("quad" in shapes)],
         "own_mark_region": [constants()[name.upper()][0] for name in lines],
-        "own_mark_body": [float(mesh.bearer(name) != joint.upper) for name in lines],
+        "own_mark_body": [body_number(mesh.bearer(name)) for name in lines],
     }
 
 

@@ -8,7 +8,6 @@ import tempfile
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -28,6 +27,11 @@ SOLID = ("free", "split")
 def check(case: Case) -> None:
     """Raise InputError if there is no GetDP, or it cannot run the case."""
     process.find_getdp()
+    joints = len(mesh_of(case).joints if case.geometry else case.joints)
+    if joints > 1:
+        raise InputError(
+            f"engine = getdp: must be condensed for a dam with several joints ({joints})"
+        )
     if case["dim"] == 3 and case["mesh_pattern"] not in SOLID:
         raise InputError(
             f"mesh_pattern = {case['mesh_pattern']}: must be one of {', '.join(SOLID)} "
@@ -48,7 +52,7 @@ def check_own(mesh: Mesh, case: Case) -> None:
     shapes = {shape for solid in mesh.solids.values() for shape, _ in solid.cells}
     if mesh.dim == 3 and shapes != {"tetra"}:
         raise InputError(f"geometry = {case.geometry}: must have tetrahedra with engine = getdp")
-    ends = [end for joint in mesh.joints.values() for end in (joint.heel, joint.toe)]
+    ends = [end for joint in mesh.joints for end in (joint.heel, joint.toe)]
     level = all(np.ptp(end.points[:, 1]) < 1e-9 * case.size for end in ends)
     if not level and case["uplift"] != "none":
         raise InputError(
@@ -82,8 +86,7 @@ def solve(case: Case, on_step: OnStep, fields: bool) -> Iterator[Outcome]:
     with tempfile.TemporaryDirectory(prefix="damjoint-") as name, ThreadPoolExecutor(2) as pool:
         mesh_file = Path(name) / "scene.msh"
         mesh.write(mesh_file)
-        (joint,) = mesh.joints.values()
-        case = replace(case, section=case.section | joint.ends)
+        case = case.with_joints([joint.of_case for joint in mesh.joints])
         scenes, running, runner = case.scenes(), [], process.Runner()
         for number, scene in enumerate(scenes):
             folder = Path(name) / scene["uplift"]

@@ -100,7 +100,7 @@ def read_joint(
         for name in joint_columns(case)
         if name not in JOINT
     ]
-    when = np.tile([time, level], (len(nodes), 1))
+    when = np.tile([time, level, 1.0], (len(nodes), 1))
     distance = case.joint_along * node_means(rows, table("path", 1)[1], len(nodes))
     averaged = np.hstack([when, nodes, jump[:, order], traction[:, order], state, distance, *more])
     extrapolated = averaged.copy()
@@ -108,7 +108,7 @@ def read_joint(
     _, corner_rows = nodes_of(np.vstack([nodes, corners]))
     corner_rows = corner_rows[len(nodes) :]
     present = np.unique(corner_rows)
-    means = (slice(5, 8), mean_jump), (slice(8, 11), table("mean_traction")[1])
+    means = (slice(6, 9), mean_jump), (slice(9, 12), table("mean_traction")[1])
     for columns, values in means:
         with np.errstate(invalid="ignore"):
             at_nodes = node_means(corner_rows, values[:, order], len(nodes))

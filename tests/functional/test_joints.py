@@ -1,0 +1,203 @@
+"""Dams with several joints: statics of each, which one fails, closed forms."""
+
+import numpy as np
+import pytest
+from damjoint import InputError
+from damjoint.joint.interface import interface_of
+from damjoint.model.case import load
+from damjoint.model.mesh import Mesh
+from damjoint.model.results import column_of
+from damjoint.post import stored
+from damjoint.solver.load_stepper import LoadStepper
+from damjoint.statics import gravity
+from damjoint.statics.verdict import verdict
+from damjoint.studies.check import FINITE_ELEMENTS, GRAVITY, compare_joints
+from scipy.optimize import brentq
+from sections import resultants
+
+LIFTS = (12.0, 25.0, 38.0)
+COARSE = {"n_joint": 24.0, "order": 1.0}
+#: Contact and friction only, without hardening.
+DRY_FRICTION = {"law": "friction", "adhesion": 0.0, "pena_tang": 0.0, "uplift": "none"}
+#: A section with batter, neck and joints of different slopes.
+SLOPES = {
+    "batter": 4.0,
+    "batter_height": 18.0,
+    "neck_height": 5.0,
+    "dam_crest": 6.0,
+    "joint_slope": (3.0, -2.0, 4.0, 0.0),
+    "silt_height": 15.0,
+    "k_h": 0.05,
+    "anchor_force": 1e5,
+}
+
+
+def solved(levels, case="dam", **settings):
+    """The results of a case with lift joints."""
+    case = load(case, COARSE | {"lift_heights": LIFTS} | settings, levels)
+    return LoadStepper(case, interface_of(case)).run()
+
+
+@pytest.mark.parametrize("uplift", ["none", "imposed"])
+def test_resultants_of_each_joint_are_those_of_statics(uplift):
+    results = solved([30, 42], uplift=uplift, K_N=(1e11, 2e11, 5e10, 1e12), **SLOPES)
+    assert len(results.joints) == 4
+    for own in results.joints:
+        for row, level in enumerate((30.0, 42.0)):
+            time = row + 1.0
+            block = gravity.with_crack(own.case, time, level, 0.0)
+            computed = [own.history[name][row] for name in "NTMU"]
+            scale = abs(block.N) * np.array([1, 1, own.case.joint_length, 1])
+            assert np.abs(computed - np.array([block.N, block.T, block.M, block.U])).max() < (
+                1e-9 * scale.max()
+            )
+
+
+@pytest.mark.parametrize("joint", range(4))
+def test_gravity_method_lift_by_lift(joint):
+    """By a quadrature over the outline above the joint; the earthquake acts in full."""
+    flat = SLOPES | {"joint_slope": (0.0, -2.0, 4.0, 0.0)}
+    case = load("dam", flat | {"lift_heights": LIFTS, "uplift": "none", "added_mass": 0.0}, [42.0])
+    own = case.joints[joint]
+    block = gravity.with_crack(own, 1.0, 42.0, 0.0)
+    exact = resultants(own, 42.0, 0.0)
+    assert np.allclose([block.N, block.T, block.M], exact, rtol=1e-9, atol=0)
+
+
+@pytest.mark.parametrize("weakest", range(1, 4))
+def test_lowest_closed_form_of_friction_joints_fails_and_is_named(weakest):
+    """T = mu N' on each joint; the weakest has half of the friction that the others need."""
+    mu = [2.0, 2.0, 2.0, 2.0]
+    mu[weakest] = (0.75, 0.65, 0.6, 0.4)[weakest]
+    case = load("dam", COARSE | DRY_FRICTION | {"lift_heights": LIFTS, "mu": tuple(mu)}, [80.0])
+
+    def excess(level, own):
+        block = gravity.with_crack(own, 1.0, level, 0.0)
+        return block.T - own["mu"] * block.N
+
+    exact = {}
+    for name, own in zip(case.joint_names, case.joints, strict=True):
+        if excess(80.0, own) > 0:
+            exact[name] = brentq(excess, 10, 80, args=(own,))
+    name = min(exact, key=exact.get)
+    assert name == case.joint_names[weakest]
+    results = LoadStepper(case, interface_of(case)).run()
+    assert verdict(results) == f"sliding on {name}"
+    assert results.last["level"] == pytest.approx(exact[name], rel=1e-3)
+
+
+def test_strong_joints_tend_to_the_monolith():
+    """The crest's displacement, with an error of first order in the joints' compliance."""
+    crest = []
+    for stiffness in (1e13, 1e14, 1e15):
+        strong = {"K_N": stiffness, "K_T": stiffness, "law": "friction", "adhesion": 1e30}
+        crest.append(solved([40], uplift="none", **strong).last["crest_ux"])
+    first, second = np.diff(crest)
+    assert abs(second / crest[-1]) < 1e-3
+    assert first / second == pytest.approx(10, rel=0.02)
+
+
+def test_flow_in_each_joint_has_its_own_heads():
+    """Leakage of closed joints: rho g H w^3 / (12 eta L), H of the heel above the toe."""
+    apertures = (1e-4, 2e-4, 3e-4, 1e-4)
+    strong = {"law": "friction", "adhesion": 1e30}
+    results = solved([40], uplift="flow", aperture_min=apertures, **strong)
+    case = results.case
+    for k, own in enumerate(case.joints):
+        head = max(40 - max(0.0, own.section["toe_y"][0]), 0)  # a dry toe has its own height
+        flux = 1000 * 1000 * 9.81 * head * apertures[k] ** 3 / (12e-3 * own.joint_along)
+        opened = results.joints[k].at()["delta_n"].max() > 0
+        assert opened or results.last[column_of("flux", k)] == pytest.approx(flux, rel=1e-9)
+
+
+def test_the_table_has_the_rows_of_each_joint():
+    results = solved([40], law=("bond", "friction", "bond", "rupture"))
+    rows = results.at()
+    assert set(rows["joint"]) == {1, 2, 3, 4}
+    for own, height in zip(results.joints, (0.0, *LIFTS), strict=True):
+        joint = own.at()
+        assert np.allclose(joint["y"], height)
+        assert np.all(np.diff(joint["s"]) > 0)
+        assert ("lambda" in joint) == (own.case["law"] == "friction")
+    assert np.isnan(rows["lambda"][rows["joint"] != 2]).all()
+
+
+def test_a_run_is_read_as_it_was_written(tmp_path):
+    from damjoint import runner
+
+    case = load("dam", COARSE | {"lift_heights": LIFTS, "mu": (0.9, 1.0, 0.8, 1.0)}, [40.0])
+    (result,) = runner.run(case, tmp_path, progress=False)
+    solution = stored.read(tmp_path)
+    again = solution.result
+    assert again.case.joint_names == case.joint_names
+    for own, other in zip(result.joints, again.joints, strict=True):
+        assert own.case.values == other.case.values
+        assert own.case.section == other.case.section
+        assert np.allclose(own.at()["sigma_n"], other.at()["sigma_n"], rtol=1e-9)
+    assert set(solution.bodies) >= {"dam", "dam 4", "foundation", "joint", "joint 4"}
+    assert set(solution.fields[1.0].displacement) == {
+        *("dam", "dam 2", "dam 3", "dam 4", "foundation")
+    }
+
+
+def test_check_has_a_row_per_joint_by_both_methods():
+    results = solved([42], uplift="none", law="friction", adhesion=1e30)
+    checks = compare_joints(results)
+    assert [check.gravity.joint for check in checks] == list(results.case.joint_names)
+    for check in checks:
+        rows = {row["answer"]: row for row in check.rows}
+        elements, rigid = rows[FINITE_ELEMENTS], rows[GRAVITY]
+        assert all(elements[n] == pytest.approx(rigid[n], rel=1e-8) for n in "NTM")
+        assert elements["OSF"] == pytest.approx(rigid["OSF"], rel=1e-8)
+
+
+def test_settings_of_a_joint_apply_to_it_alone():
+    """A joint without tensile strength at 25 m opens, the others do not."""
+    weak = {"sigma_max": (5e6, 5e6, 0.0, 5e6), "adhesion": (1e6, 1e6, 1e4, 1e6)}
+    weak["G_f"] = (1e6, 1e6, 10.0, 1e6)
+    results = solved([60], uplift="none", law="bond", **weak)
+    cracks = [own.last["crack_length"] for own in results.joints]
+    assert cracks[2] > 1
+    assert cracks[0] == cracks[1] == cracks[3] == 0
+
+
+@pytest.mark.parametrize(
+    "settings, words",
+    [
+        ({"mu": (0.9, 1.0)}, "mu = 0.9,1.0: must be one value, or as many as there are joints (4)"),
+        ({"lift_heights": (25.0, 12.0, 38.0)}, "lift_heights = 25,12,38: must increase"),
+        ({"lift_heights": (12.0, 25.0, 50.0)}, "joint_height = 50: must be < dam_height"),
+        ({"E_dam": (1e10, 2e10, 1e10, 1e10)}, "E_dam = 1"),
+        ({"mu": (0.9, -1.0, 1.0, 1.0)}, "mu = -1.0: must be"),
+        ({"mesh_pattern": "regular"}, "mesh_pattern = regular: must be"),
+        ({"joint_slope": (20.0, -20.0, 0.0, 0.0)}, "lift_heights = 12,25,38: must increase"),
+    ],
+)
+def test_bad_input_of_several_joints(settings, words):
+    with pytest.raises(InputError) as error:
+        load("dam", {"lift_heights": LIFTS} | settings)
+    assert words in str(error.value)
+
+
+def test_a_case_file_with_lists(tmp_path):
+    path = tmp_path / "own.case"
+    path.write_text(
+        'lift_heights() = {12, 25};\nlaw() = {"bond", "friction", "bond"};\n'
+        "default_mu = 0.7;\nmu() = {0.9, 2 * 0.5, 1};\nadhesion() = {1e5, 0, 0};\n"
+        "default_adhesion = 3e5;\n"
+    )
+    case = load(str(path))
+    assert case.joint_names == ("base", "lift 12 m", "lift 25 m")
+    assert [own["law"] for own in case.joints] == ["bond", "friction", "bond"]
+    assert [own["mu"] for own in case.joints] == [0.9, 1.0, 1.0]
+    assert [own["adhesion"] for own in case.joints] == [3e5] * 3  # the later statement
+    assert [own["mu"] for own in load(str(path), {"mu": 0.6}).joints] == [0.6] * 3
+    path.write_text("E_dam() = {1e10, 2e10};")
+    with pytest.raises(InputError, match="line 1: .*E_dam = .*: must be a single value"):
+        load(str(path))
+
+
+def test_the_mesh_of_one_joint_does_not_depend_on_an_earlier_mesh_of_several():
+    one, several = load("dam", COARSE), load("dam", COARSE | {"lift_heights": LIFTS})
+    before, _, after = Mesh(one), Mesh(several), Mesh(one)
+    assert np.array_equal(before.bodies["dam"].points, after.bodies["dam"].points)
