@@ -166,7 +166,8 @@ def add_statement(case: CaseText, statement: list[Token], path: Path, where: str
         raise InputError(
             f"{where}: not a statement of a case; allowed: "
             + (f"{near[0]} (did you mean that?), " if near else "")
-            + 'Include "file.case", title, also_uplift, geometry, record, default_<parameter> = value, '
+            + 'Include "file.case", title, also_uplift, geometry, record, '
+            + "default_<parameter> = value, "
             + ", ".join(f"{n}() = {{...}}" for n in LISTS)
             + ", <parameter of a joint>() = {...}"
         )
