@@ -175,6 +175,7 @@ def parser() -> Parser:
     add_new(commands)
     add_validate(commands)
     add_critical(commands)
+    add_quake(commands)
     add_sweep(commands)
     add_stress(commands)
     add_bench(commands)
@@ -421,6 +422,49 @@ def do_critical(arguments: argparse.Namespace) -> int:
     )
     print("\n".join(lines))
     return int(not answer.confirmed)
+
+
+def add_quake(commands: Commands) -> None:
+    """Add damjoint quake."""
+    summary = (
+        "the dam through a recorded earthquake, after its static loads; continues if it was "
+        "interrupted; exit code 1 if the dam does not stand after it"
+    )
+    command = add_command(commands, do_quake, summary, settings_options(), loading_options())
+    command.add_argument("case", metavar="CASE", help=CASE)
+    command.add_path(
+        "--record",
+        "FILE",
+        help="CSV of the ground's acceleration: time [s], horizontal and, if any, vertical, in "
+        "record_unit (default: that of the case)",
+    )
+    command.add_path("--out", "FOLDER", help="output folder (default: out/CASE_quake)")
+    command.add_argument("--no-picture", action="store_true", help="draw no PNG")
+
+
+def do_quake(arguments: argparse.Namespace) -> int:
+    """Run damjoint quake; 1 if there is no static equilibrium after the earthquake."""
+    from .model import parameters
+    from .model.case import load
+    from .studies import quake
+
+    if arguments.accuracy:
+        raise InputError(f"accuracy = {arguments.accuracy}: must not be set for damjoint quake")
+    case = load(
+        arguments.case,
+        parameters.settings(arguments.settings),
+        arguments.levels,
+        arguments.tail_levels,
+        arguments.steps,
+        record=arguments.record,
+    )
+    if case["dim"] == 3:
+        warn_if_slow()
+    out = arguments.out or Path("out") / f"{case.name}_quake"
+    result = quake.run(case, out, not arguments.no_picture)
+    print(f"{case.name}: {result.statement}; {len(result.rows['time'])} steps; {out}\n")
+    print(quake.text(result))
+    return int(not result.stands)
 
 
 def add_sweep(commands: Commands) -> None:

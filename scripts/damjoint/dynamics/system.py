@@ -21,7 +21,7 @@ from ..fem.elements import Space
 from ..fem.factor import partial_factors
 from ..fem.glued_bodies import GluedBodies
 from ..fem.gluing import Gluing
-from ..joint.interface import Interface
+from ..joint.interface import Interface, JointInterface
 from ..joint.wet_faces import WetFace
 from ..model.case import Case
 from ..model.loads import quake_column
@@ -41,9 +41,6 @@ class System:
     motion: dict[str, Sparse]
     #: mass times a unit acceleration of the ground along x and y (n, 2)
     inertia: Array
-    #: mass [kg] of all that moves above the rock, and of the water that moves with it along x
-    total_mass: float
-    water_mass: float
     #: displacement of the crest along x and y (2, n)
     crest: Sparse
     jumps: IntArray
@@ -62,7 +59,6 @@ class System:
         total = lambda: sparse.csr_matrix((size, size))
         stiffness, of_mass, inertia = total(), total(), np.zeros((size, 2))
         motion: dict[str, Sparse] = {}
-        concrete = water = 0.0
         densities = {region: case[name] for region, name in MASSIVE.items()}
         for name, body in bodies.by_name.items():
             of_body, own = gluing.bodies[name], body.stiffness.shape[0]
@@ -77,19 +73,26 @@ class System:
             x, y = (translation(body, dim, axis) for axis in (0, 1))
             # the water follows a vertical motion of the ground
             inertia += moved.T @ np.column_stack([(of_solid + of_water) @ x, of_solid @ y])
-            concrete += x @ of_solid @ x
-            water += x @ of_water @ x
             motion[name] = moved
         return System(
             mass=of_mass.tocsr(),
             stiffness=stiffness.tocsr(),
             motion=motion,
             inertia=inertia,
-            total_mass=float(concrete),
-            water_mass=float(water),
             crest=crest_rows(bodies, motion),
             jumps=np.arange(len(glued.free), size),
         )
+
+    def sliding(self, joint: JointInterface, direction: Array) -> Array:
+        """The unknowns (n,) of a unit motion of all that is above a joint, along x and y (2,)."""
+        result = np.zeros(self.size)
+        nodes = len(joint.surface.points)
+        rows = np.zeros(joint.dim * len(joint.space.locations))
+        for axis in (0, 1):
+            rows[axis : joint.dim * nodes : joint.dim] = direction[axis]
+        jumps = joint.unknowns
+        result[self.jumps] = (jumps.T @ rows) / np.maximum(np.ravel(abs(jumps).sum(axis=0)), 1)
+        return result
 
     def frequencies(self, of_joints: Sparse, number: int) -> tuple[Array, Array]:
         """The lowest natural frequencies (number,) [Hz] with a stiffness of the joints (j, j), and

@@ -1,0 +1,138 @@
+"""What is recorded of an earthquake: a row per time step, and the stress along the joints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..arrays import Array, Table
+from ..model.case import Case
+from ..model.results import column_of
+from ..solver.history import joint_row
+from ..solver.state import State
+from .stepper import Converged, Earthquake
+
+#: Columns of quake.csv: unit and meaning. Displacements are relative to the ground.
+QUAKE = {
+    "time": ("s", "time from the start of the computation"),
+    "ground_ax": ("m/s2", "acceleration of the ground, downstream > 0"),
+    "ground_ay": ("m/s2", "acceleration of the ground, upwards > 0"),
+    "crest_ux": ("m", "displacement of the crest along x since the static state"),
+    "crest_ax": ("m/s2", "absolute acceleration of the crest along x"),
+    "heel_opening": ("m", "opening of the joint at the heel"),
+    "toe_opening": ("m", "opening of the joint at the toe"),
+    "slip_mean": ("m", "mean tangential jump since the static state, downstream > 0"),
+    "slip_heel": ("m", "the same at the heel"),
+    "slip_toe": ("m", "the same at the toe"),
+    "N": ("N/m", "effective normal force on the joint, compression > 0"),
+    "T": ("N/m", "shear force on the joint, downstream > 0"),
+    "M": ("N m/m", "moment of N about the toe, stabilising > 0"),
+    "U": ("N/m", "uplift: resultant of the water pressure in the joint"),
+    "shear_reserve": ("N/m", "largest shear force that the joint transmits, mu N + c L, minus |T|"),
+    "open_length": ("m", "length of joint that is open or broken"),
+    "iterations": ("-", "Newton iterations of the step"),
+    "dt": ("s", "length of the step"),
+    "residual": ("-", "norm of the out-of-balance forces over that of the static loads"),
+}
+#: Those of a joint. With several joints: of the first one; of joint 2, 3, ... by `column_of`.
+QUAKE_OF_JOINTS = (
+    *("heel_opening", "toe_opening", "slip_mean", "slip_heel", "slip_toe"),
+    *("N", "T", "M", "U", "shear_reserve", "open_length"),
+)
+
+
+def quake_columns(case: Case) -> dict[str, tuple[str, str]]:
+    """The columns of a case's quake.csv: unit and meaning."""
+    others = {
+        column_of(name, k): (QUAKE[name][0], f"{joint}: {QUAKE[name][1]}")
+        for k, joint in enumerate(case.joint_names)
+        if k
+        for name in QUAKE_OF_JOINTS
+    }
+    return QUAKE | others
+
+
+def at_ends(quake: Earthquake, state: State, number: int) -> tuple[Array, Array]:
+    """delta_n and delta_t1 of a joint, by its number, at its heel and at its toe (2,)."""
+    joint = quake.problem.model.equilibrium.interface.joints[number]
+    nodes = joint.mean_at_nodes(joint.jumps(joint.at_nodes, state.jump))
+    heel, toe = (nodes[n].mean(axis=0)[:2] for n in (joint.mesh.heel_nodes, joint.mesh.toe_nodes))
+    return heel, toe
+
+
+def row_of_joint(quake: Earthquake, state: State, number: int) -> dict[str, float]:
+    """QUAKE_OF_JOINTS of a joint, by its number, at a state."""
+    equilibrium, static = quake.problem.model.equilibrium, quake.problem.static
+    joint, law = equilibrium.interface.joints[number], equilibrium.laws.laws[number]
+    row = joint_row(equilibrium, state, number)
+    heel, toe = at_ends(quake, state, number)
+    heel_before, toe_before = at_ends(quake, static, number)
+    jump, before = (joint.jumps(joint.at_points, s.jump) for s in (state, static))
+    variables, weights = state.variables.joints[number], joint.points.weights
+    traction, _ = law.traction_and_tangent(jump, variables)
+    damage, slip = law.damage(jump, variables), law.slip(variables, len(jump))
+    strength = weights @ law.shear_strength(traction[:, 0], damage, slip) / joint.width
+    return {
+        "heel_opening": heel[0],
+        "toe_opening": toe[0],
+        "slip_mean": weights @ (jump - before)[:, 1] / weights.sum(),
+        "slip_heel": heel[1] - heel_before[1],
+        "slip_toe": toe[1] - toe_before[1],
+        **{name: row[name] for name in ("N", "T", "M", "U")},
+        "shear_reserve": strength - abs(row["T"]),
+        "open_length": row["crack_length"],
+    }
+
+
+def stress_at_nodes(quake: Earthquake, state: State) -> Array:
+    """Effective normal stress (nodes,) [Pa] at the nodes of the first joint, from heel to toe."""
+    equilibrium = quake.problem.model.equilibrium
+    joint, law = equilibrium.interface.joints[0], equilibrium.laws.laws[0]
+    jump = joint.jumps(joint.at_nodes, state.jump)
+    traction, _ = law.traction_and_tangent(jump, state.node_variables.joints[0])
+    return joint.mean_at_nodes(traction[:, 0])[np.argsort(joint.xi)]
+
+
+@dataclass
+class QuakeHistory:
+    """Rows of an earthquake so far."""
+
+    #: columns of quake.csv
+    rows: dict[str, list[float]]
+    #: effective normal stress at the first joint's nodes, from heel to toe, of each row [Pa]
+    stress: list[Array] = field(default_factory=list)
+
+    @staticmethod
+    def of(case: Case) -> QuakeHistory:
+        """No rows."""
+        return QuakeHistory({name: [] for name in quake_columns(case)})
+
+    def __len__(self) -> int:
+        return len(self.rows["time"])
+
+    @property
+    def table(self) -> Table:
+        """The rows by column."""
+        return {name: np.array(values) for name, values in self.rows.items()}
+
+    def add(self, quake: Earthquake, step: Converged) -> None:
+        """The row of a converged step."""
+        motion, state, crest = step.end.motion, step.end.state, quake.system.crest
+        row = {
+            "time": step.end.time,
+            "ground_ax": step.ground[0],
+            "ground_ay": step.ground[1],
+            "crest_ux": float((crest @ motion.displacement)[0]),
+            "crest_ax": float((crest @ motion.acceleration)[0]) + step.ground[0],
+            "iterations": step.iterations,
+            "dt": step.dt,
+            "residual": step.residual,
+        }
+        for k in range(len(quake.case.joints)):
+            of_joint = row_of_joint(quake, state, k)
+            row |= {column_of(name, k): value for name, value in of_joint.items()}
+        stress = stress_at_nodes(quake, state)
+        for name, value in row.items():
+            self.rows[name].append(float(value))
+        self.stress.append(stress)
