@@ -8,6 +8,7 @@ carries the mass of all that is above it: M = sum T_b^T M_b T_b, likewise K.
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,8 +38,9 @@ class System:
 
     mass: Sparse
     stiffness: Sparse
-    #: of the bodies T_b (degrees of freedom, n), by name
+    #: T_b (degrees of freedom, n) and function space of each body
     motion: dict[str, Sparse]
+    spaces: dict[str, Space]
     #: mass times a unit acceleration of the ground along x and y (n, 2)
     inertia: Array
     #: displacement of the crest along x and y (2, n)
@@ -70,7 +72,7 @@ class System:
             of_water = added_mass(case, interface, body)
             stiffness += moved.T @ body.stiffness @ moved
             of_mass += moved.T @ (of_solid + of_water) @ moved
-            x, y = (translation(body, dim, axis) for axis in (0, 1))
+            x, y = (translation(body.space, dim, axis) for axis in np.eye(2))
             # the water follows a vertical motion of the ground
             inertia += moved.T @ np.column_stack([(of_solid + of_water) @ x, of_solid @ y])
             motion[name] = moved
@@ -78,20 +80,27 @@ class System:
             mass=of_mass.tocsr(),
             stiffness=stiffness.tocsr(),
             motion=motion,
+            spaces={name: body.space for name, body in bodies.by_name.items()},
             inertia=inertia,
             crest=crest_rows(bodies, motion),
             jumps=np.arange(len(glued.free), size),
         )
 
-    def sliding(self, joint: JointInterface, direction: Array) -> Array:
-        """The unknowns (n,) of a unit motion of all that is above a joint, along x and y (2,)."""
+    def translation(self, joint: JointInterface, above: Collection[str], along: Array) -> Array:
+        """The unknowns (n,) of a unit translation along x and y (2,) of the bodies of these names,
+        which a joint separates from the others.
+        """
         result = np.zeros(self.size)
-        nodes = len(joint.surface.points)
-        rows = np.zeros(joint.dim * len(joint.space.locations))
-        for axis in (0, 1):
-            rows[axis : joint.dim * nodes : joint.dim] = direction[axis]
-        jumps = joint.unknowns
-        result[self.jumps] = (jumps.T @ rows) / np.maximum(np.ravel(abs(jumps).sum(axis=0)), 1)
+        moving = sorted(self.motion, key=lambda name: name not in above)
+        for (
+            name
+        ) in moving:  # the others last: shared degrees of freedom are those of the lower body
+            value = translation(self.spaces[name], joint.dim, along) * (name in above)
+            of_body = self.motion[name][:, : self.jumps[0]]
+            touched = np.unique(of_body.indices)
+            result[touched] = (of_body.T @ value)[touched]
+        jumps, value = joint.unknowns, translation(joint.space, joint.dim, along)
+        result[self.jumps] = (jumps.T @ value) / np.maximum(np.ravel(abs(jumps).sum(axis=0)), 1)
         return result
 
     def frequencies(self, of_joints: Sparse, number: int) -> tuple[Array, Array]:
@@ -116,11 +125,11 @@ class System:
         return np.sqrt(squares[order]) / (2 * math.pi), modes[:, order]
 
 
-def translation(body: ElasticBody, dim: int, axis: int) -> Array:
-    """The displacement (degrees of freedom,) of a body that moves by 1 along an axis."""
-    result = np.zeros(body.stiffness.shape[0])
-    result[axis : dim * len(body.space.body.points) : dim] = 1
-    return result
+def translation(space: Space, dim: int, along: Array) -> Array:
+    """The displacement (degrees of freedom,) of a unit translation along x and y (2,)."""
+    result = np.zeros((len(space.locations), dim))
+    result[: len(space.body.points), :2] = along
+    return result.ravel()
 
 
 def crest_rows(bodies: Bodies, motion: dict[str, Sparse]) -> Sparse:

@@ -128,17 +128,21 @@ class Case(ParameterValues):
         """Names of the joints, for messages."""
         return tuple(own.name for own in self.of_joints) or (joint_name(self["joint_height"]),)
 
-    def separates(self, numbers: Collection[int]) -> bool:
-        """Whether without the joints of these numbers a body has no connection to the rock."""
+    def above(self, numbers: Collection[int]) -> set[str]:
+        """The bodies that without the joints of these numbers have no connection to the rock."""
         if not self.of_joints:
-            return bool(numbers)
+            return {"dam"} if numbers else set()
         pairs = [(own.lower, own.upper) for own in self.of_joints]
         rest = [pair for k, pair in enumerate(pairs) if k not in numbers]
         reached, before = {"foundation"}, set[str]()
         while reached != before:
             before = set(reached)
             reached |= {name for pair in rest if reached & set(pair) for name in pair}
-        return any(not reached.issuperset(pair) for pair in pairs)
+        return {name for pair in pairs for name in pair} - reached
+
+    def separates(self, numbers: Collection[int]) -> bool:
+        """Whether without the joints of these numbers a body has no connection to the rock."""
+        return bool(self.above(numbers))
 
     def separating(self, numbers: Sequence[int]) -> tuple[int, ...]:
         """The first of some joints, by their numbers, that alone holds what is above it; all of

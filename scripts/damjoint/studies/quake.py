@@ -284,7 +284,11 @@ def rigid_block(quake: Earthquake, number: int) -> RigidBlock:
     equilibrium = problem.model.equilibrium
     joint, law = equilibrium.interface.joints[number], equilibrium.laws.laws[number]
     row = joint_row(equilibrium, problem.static, number)
-    along, across = (system.sliding(joint, d) for d in (joint.chord.along, joint.chord.normal))
+    above = quake.case.above([number])
+    along, across = (
+        system.translation(joint, above, direction)
+        for direction in (joint.chord.along, joint.chord.normal)
+    )
     end = quake.now.state
     jump = joint.jumps(joint.at_points, end.jump)
     weights = joint.points.weights / joint.points.weights.sum()
