@@ -77,6 +77,8 @@ fi
 # The stamp is newer than its sources if everything below has succeeded.
 if [ ! -x .venv/bin/python ] ||
    [ -z "$(find .venv/.stamp -newer pyproject.toml -newer scripts/setup.sh 2>/dev/null)" ]; then
+  # for weasyprint, which writes reports as PDF; not required
+  has libpangoft2-1.0.so.0 || install libpangoft2-1.0-0 >/dev/null 2>&1 || true
   [ -x .venv/bin/python ] || "$python" -m venv .venv
   .venv/bin/pip install -q --disable-pip-version-check -e ".[test,fast]"
   touch .venv/.stamp

@@ -18,6 +18,8 @@ from . import RUN_GEO, InputError, RunError, __version__
 if TYPE_CHECKING:
     from argparse import _SubParsersAction as Commands
 
+    from .model.case import Case
+    from .post.drawing_process import DrawingProcess
     from .studies.plan import Plan, Row
 
 CASE = "a letter a to k (verification case SSNP142), dam, or the path of a .case file"
@@ -198,6 +200,16 @@ def add_run(commands: Commands) -> None:
 
 def do_run(arguments: argparse.Namespace) -> int:
     """Run damjoint run; 0, or 1 if the dam fails or the run stopped before its last level."""
+    if arguments.no_picture:
+        return run_and_print(arguments, None)
+    from .post.drawing_process import DrawingProcess
+
+    with DrawingProcess() as drawing:  # before the other libraries are loaded
+        return run_and_print(arguments, drawing)
+
+
+def run_and_print(arguments: argparse.Namespace, drawing: DrawingProcess | None) -> int:
+    """Run a case and print its results; drawing: draws its pictures (None: there are none)."""
     from .model import parameters
     from .model.case import load
     from .post import summary
@@ -213,11 +225,11 @@ def do_run(arguments: argparse.Namespace) -> int:
         arguments.accuracy,
     )
     out = arguments.out or Path("out") / case.name
-    fields, picture = not arguments.no_fields, not arguments.no_picture
+    fields, picture = not arguments.no_fields, drawing is not None
     code = 0
     if case["dim"] == 3 and arguments.engine != "getdp":
         warn_if_slow()
-    for result in run(case, out, fields, picture, engine=arguments.engine):
+    for result in run(case, out, fields, picture, engine=arguments.engine, drawing=drawing):
         history = result.history
         print(
             f"{case.name}, uplift {result.case['uplift']}: {verdict(result)}; "
@@ -284,10 +296,16 @@ def do_plot(arguments: argparse.Namespace) -> int:
 
 def add_report(commands: Commands) -> None:
     """Add damjoint report."""
-    command = add_command(commands, do_report, "write one HTML page about runs")
-    command.add_path("out", "FOLDER", nargs="+", help="output folders of the runs")
+    command = add_command(commands, do_report, "write a report on runs, as HTML or PDF")
     command.add_path(
-        "--to", "FILE", default=Path("report.html"), help="the page (default: report.html)"
+        "out", "FOLDER", nargs="+", help="output folders of runs, or that of damjoint check"
+    )
+    command.add_path(
+        "--to",
+        "FILE",
+        default=Path("report.html"),
+        help="the report; a PDF if the name ends in .pdf, which needs weasyprint (default: "
+        "report.html)",
     )
 
 
@@ -526,7 +544,7 @@ def add_sweep(commands: Commands) -> None:
 def do_sweep(arguments: argparse.Namespace) -> int:
     """Run damjoint sweep."""
     from .model import parameters
-    from .studies.plan import Schedule, plan_of, sample_of
+    from .studies.plan import Schedule, cases_of, plan_of, sample_of
     from .studies.sweep import meshed, sweep
 
     out = arguments.out or Path(f"{Path(arguments.case).stem}_sweep.csv")
@@ -549,11 +567,13 @@ def do_sweep(arguments: argparse.Namespace) -> int:
         arguments.case, plan, settings, out, schedule, arguments.jobs, arguments.scheduler
     )
     print(f"{count} rows computed; {out}")
-    report_sweep(arguments.case, plan, rows, out)
+    loaded = () if plan.sampled else cases_of(arguments.case, plan, settings, schedule)
+    cases = [row_case for _, row_case in loaded]
+    report_sweep(arguments.case, plan, rows, cases, out)
     return 0
 
 
-def report_sweep(case: str, plan: Plan, rows: list[Row], out: Path) -> None:
+def report_sweep(case: str, plan: Plan, rows: list[Row], cases: list[Case], out: Path) -> None:
     """Print the statistics of a sweep and draw its chart beside its CSV file."""
     from .studies import chart
     from .studies.plan import beside
@@ -563,7 +583,7 @@ def report_sweep(case: str, plan: Plan, rows: list[Row], out: Path) -> None:
 
         print(outcome.report(plan, rows, out))
     picture = beside(out, ".png")
-    reason = chart.draw(plan, rows, f"{Path(case).stem}: {len(rows)} rows", picture)
+    reason = chart.draw(plan, rows, cases, f"{Path(case).stem}: {len(rows)} rows", picture)
     print(reason or picture)
 
 

@@ -5,39 +5,36 @@ from __future__ import annotations
 import contextlib
 import re
 import resource
-import sys
 import time
-from importlib.metadata import version
+from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from tqdm import tqdm
-
-from . import __version__, accuracy
+from . import accuracy, versions
 from .engines import Outcome, engine_of
 from .model.case import Case
 from .model.fields import Solution
 from .model.results import Results
 from .post import folder as folders
 from .post import tables
+from .progress import Progress
+
+if TYPE_CHECKING:  # runs without a picture do not load it
+    from .post.drawing_process import DrawingProcess
 
 
-class Progress:
-    """Progress bar over the times of all scenes, on a terminal only."""
+class RunProgress(Progress):
+    """Progress over the times of all scenes."""
 
     def __init__(self, case: Case, show: bool) -> None:
         count = len(case.scenes())
-        self.bar = tqdm(
-            total=count * case.times[-1],
-            desc=case.name,
-            disable=not show or not sys.stderr.isatty(),
-            bar_format="{desc} {percentage:3.0f}%|{bar}| {elapsed}",
-            leave=False,
-        )
+        bar = "{desc} {percentage:3.0f}%|{bar}| {elapsed}"
+        super().__init__(case.name, count * case.times[-1], show, bar_format=bar, leave=False)
         self.reached = [0.0] * count
 
     def step(self, scene: int, now: float) -> None:
         """Advance to the time of a converged step; called by the engines."""
-        self.bar.update(now - self.reached[scene])
+        self.update(now - self.reached[scene])
         self.reached[scene] = now
 
 
@@ -48,31 +45,33 @@ def run(
     picture: bool = True,
     progress: bool = True,
     engine: str = "auto",
+    drawing: DrawingProcess | None = None,
 ) -> list[Results]:
     """Solve all scenes of a case and write their results below out, replacing an earlier run's.
 
     fields: also write displacement, stress and joint fields for Gmsh and ParaView; picture: also a
-    PNG; engine: condensed (auto) or getdp, the reference model.
+    PNG; engine: condensed (auto) or getdp, the reference model; drawing: draws the pictures, by
+    default this process does.
     Returns the results in the order of case.scenes(). A run that stops early or is interrupted
     writes its converged steps. Raises InputError, RunError.
     """
     chosen = engine_of(case, engine)
-    bar, outcomes = Progress(case, progress), list[Outcome]()
+    outcomes = list[Outcome]()
     with folders.claim_output_folder(case, out):  # after the checks: bad input removes nothing
         try:
-            for outcome in accuracy.solve(case, chosen, bar.step, fields or picture):
-                save(outcome, case, out)
-                outcomes.append(outcome)
-                if outcome.error:
-                    raise outcome.error
+            with RunProgress(case, progress) as shown:
+                for outcome in accuracy.solve(case, chosen, shown.step, fields or picture):
+                    save(outcome, case, out)
+                    outcomes.append(outcome)
+                    if outcome.error:
+                        raise outcome.error
         except BaseException as error:
             if not outcomes:
                 state = "failed" if isinstance(error, Exception) else "interrupted"
                 folders.write_state(case, out, state, str(error) or "no step had converged")
             raise
-        bar.bar.close()
-        for outcome in outcomes if fields or picture else []:
-            write_fields_and_picture(outcome, case, out, fields, picture)
+        if fields or picture:
+            write_fields_and_pictures(outcomes, case, out, fields, picture, drawing)
     return [outcome.result for outcome in outcomes]
 
 
@@ -84,8 +83,7 @@ def write_outcomes(case: Case, outcomes: list[Outcome], out: Path) -> None:
     with folders.claim_output_folder(case, out):
         for outcome in outcomes:
             save(outcome, case, out)
-        for outcome in outcomes:
-            write_fields_and_picture(outcome, case, out, fields=True, picture=True)
+        write_fields_and_pictures(outcomes, case, out, fields=True, picture=True)
 
 
 def save(outcome: Outcome, case: Case, out: Path) -> None:
@@ -95,12 +93,16 @@ def save(outcome: Outcome, case: Case, out: Path) -> None:
     start, result = time.perf_counter(), outcome.result
     tables.write(result, folder)
     result.info["wall_seconds"]["post"] = time.perf_counter() - start
-    versions = {"damjoint": __version__, "gmsh": version("gmsh"), "python": sys.version.split()[0]}
-    getdp = result.info.pop("getdp", {})
+    numbers, getdp = versions.versions(), result.info.pop("getdp", {})
     if getdp.get("version"):
-        versions["getdp"] = getdp["version"]
+        numbers["getdp"] = getdp["version"]
     memory = max(peak_memory(), getdp.get("peak_memory_mb") or 0.0)
-    result.info |= {"peak_memory_mb": round(memory, 1), "versions": versions}
+    result.info |= {
+        "peak_memory_mb": round(memory, 1),
+        "versions": numbers,
+        "commit": versions.commit(),
+        "machine": versions.machine(),
+    }
     folders.write_info(result, folder, *early_end(outcome))
 
 
@@ -114,23 +116,43 @@ def early_end(outcome: Outcome) -> tuple[str, str]:
     return state, f"{state}{where}" + (f": {outcome.error}" if str(outcome.error) else "")
 
 
-def write_fields_and_picture(
-    outcome: Outcome, case: Case, out: Path, fields: bool, picture: bool
+def write_fields_and_pictures(
+    outcomes: list[Outcome],
+    case: Case,
+    out: Path,
+    fields: bool,
+    picture: bool,
+    drawing: DrawingProcess | None = None,
 ) -> None:
-    """Write fields and picture of a scene; add the time of writing to run.json."""
-    start, result = time.perf_counter(), outcome.result
-    folder = folders.scene_folder(case, result.case, out)
-    solution = Solution(result, outcome.mesh().bodies, outcome.fields())
-    if fields and solution.fields:
-        from .post.field_files import write_fields
+    """Write fields and pictures of the scenes of a case; add the seconds to run.json."""
+    for outcome in outcomes:
+        with added_seconds(outcome.result):
+            folder = folders.scene_folder(case, outcome.result.case, out)
+            solution = Solution(outcome.result, outcome.mesh().bodies, outcome.fields())
+            if picture and drawing:
+                drawing.send(solution, folder)
+            if fields and solution.fields:
+                from .post.field_files import write_fields
 
-        write_fields(solution, folder / "fields")
-    if picture:
-        from .post.pictures import draw
+                write_fields(solution, folder / "fields")
+            if picture and not drawing:
+                from .post.pictures import draw
 
-        draw(solution, folder)
+                draw(solution, folder)
+    for outcome in outcomes:
+        with added_seconds(outcome.result):
+            if picture and drawing:
+                drawing.wait()
+        folder = folders.scene_folder(case, outcome.result.case, out)
+        folders.write_info(outcome.result, folder, *early_end(outcome))
+
+
+@contextlib.contextmanager
+def added_seconds(result: Results) -> Iterator[None]:
+    """Add the seconds of a block to those of writing the results."""
+    start = time.perf_counter()
+    yield
     result.info["wall_seconds"]["post"] += time.perf_counter() - start
-    folders.write_info(result, folder, *early_end(outcome))
 
 
 def peak_memory() -> float:

@@ -12,6 +12,7 @@ from damjoint import accuracy as refinement
 from damjoint.engines import engine_of
 from damjoint.model.case import ACCURACIES, Case, load
 from damjoint.model.results import Results
+from damjoint.progress import track
 
 from .bench_scenes import (
     PARTS,
@@ -25,7 +26,7 @@ from .bench_scenes import (
     run_cold,
     solve_timed,
 )
-from .bench_table import Measurements, Table, progress
+from .bench_table import Measurements, Table
 
 #: Ordinary concrete on rock, with a weak joint: E [Pa], strengths [Pa].
 ROCK = {"E_dam": 2e10, "E_found": 3e10, "sigma_max": 2e4, "adhesion": 1e5, "mu": 1.0}
@@ -73,7 +74,7 @@ def overkill(measurements: Measurements) -> tuple[dict[str, np.ndarray], Table]:
         return quantities(solve_timed(load(name, settings))[0])
 
     scene_of = {case: scene for scene, case in SCENES.items()}
-    for name in progress(scene_of if measurements.short else PUBLISHED, "overkill"):
+    for name in track(scene_of if measurements.short else PUBLISHED, "overkill"):
         wanted = numbers if name in scene_of else numbers[-1:]
         values = [
             measurements.get(("overkill", name, n), partial(measure, name, n)) for n in wanted
@@ -116,7 +117,7 @@ def accuracy(measurements: Measurements, exact: dict[str, np.ndarray], start: fl
         return spent["unknowns"], sum(parts), *parts, *errors, max(errors)
 
     for scene, name in SCENES.items():
-        for mesh in progress(meshes(measurements.short), scene):
+        for mesh in track(meshes(measurements.short), scene):
             table.add_measured(measurements, (scene, *mesh), partial(measure, name, mesh))
     return table
 
@@ -164,7 +165,7 @@ def recommended(measurements: Measurements, exact: dict[str, np.ndarray]) -> Tab
             row += [error, wall, wall - sum(record["wall_seconds"].values())]
         return row
 
-    for name in progress(list(exact), "accuracy"):
+    for name in track(list(exact), "accuracy"):
         table.add_measured(measurements, (name,), partial(measure, name))
     table.add(
         "sum, worst", *(max(c) if "error" in n else sum(c) for n, c in table.items() if n != "case")
@@ -204,7 +205,7 @@ def estimates(measurements: Measurements) -> Table:
             rows.append([level, reached, record["n_joint"][-1], *cells])
         return rows
 
-    for scene in progress(DAMS, "estimates"):
+    for scene in track(DAMS, "estimates"):
         if not measurements.short or "imposed" in scene:
             for row in measurements.get(("estimates", scene), partial(measure, scene)):
                 table.add(scene, *row)

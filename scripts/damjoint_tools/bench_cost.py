@@ -18,6 +18,7 @@ from damjoint.fem.bodies import Bodies
 from damjoint.fem.condensation import condense
 from damjoint.joint.interface import Interface, interface_of
 from damjoint.model.case import Case, load
+from damjoint.progress import track
 from damjoint.runner import run
 from damjoint.solver.load_stepper import LoadStepper
 from damjoint.statics.verdict import verdict
@@ -33,7 +34,7 @@ from .bench_scenes import (
     run_cold,
     solve_timed,
 )
-from .bench_table import Measurements, Table, progress
+from .bench_table import Measurements, Table
 
 
 def cases(measurements: Measurements) -> Table:
@@ -52,7 +53,7 @@ def cases(measurements: Measurements) -> Table:
         faster = published, published / wall, getdp, published / getdp
         return wall, wall - sum(spent), *spent, record["peak_memory_mb"], *faster
 
-    for name in progress(PUBLISHED, "cases"):
+    for name in track(PUBLISHED, "cases"):
         table.add_measured(measurements, (name,), partial(measure, name))
     total = {n: sum(c) for n, c in table.items() if n != "case"}
     table.add(
@@ -87,7 +88,7 @@ def growth(measurements: Measurements) -> Table:
         wall, record = run_cold(["a", *words, "--levels", "9"])
         return record["unknowns"], wall, record["peak_memory_mb"]
 
-    for size in progress(sizes, "growth"):
+    for size in track(sizes, "growth"):
         table.add_measured(measurements, size, partial(measure, *size))
     return table
 
@@ -135,7 +136,7 @@ def switches(measurements: Measurements) -> Table:
 
     table = Table("switches", "option", "with", "without", "ratio")
     with threadpool_limits(1), tempfile.TemporaryDirectory() as folder:
-        for option, calls in progress(options(Path(folder)).items(), "switches"):
+        for option, calls in track(options(Path(folder)).items(), "switches"):
             table.add_measured(measurements, (option,), partial(measure, *calls))
     return table
 
@@ -179,7 +180,7 @@ def sweeps(measurements: Measurements) -> Table:
     rows = "first run", "another level", "steps", "another strength", "another stiffness"
     table = Table("sweeps", "case", "dim", *rows)
 
-    for name in progress("ac" if measurements.short else PUBLISHED, "sweeps"):
+    for name in track("ac" if measurements.short else PUBLISHED, "sweeps"):
         main = {"uplift": main_uplift(name)}
         case = load(name, main)
         if case["drive"] == "level":
@@ -228,7 +229,7 @@ def stress(measurements: Measurements) -> Table:
             for values in grid
             if (table.name, *values) not in measurements
         }
-        for values in progress(grid, "stress"):
+        for values in track(grid, "stress"):
             table.add_measured(measurements, values, lambda v=values: ends[v].result())
     return table
 

@@ -41,7 +41,7 @@ def draw(table: Table, path: Path) -> None:
 
     columns = {n: np.array(c, object) for n, c in table.items()}
     error, seconds = 100 * columns["worst"].astype(float), columns["seconds"].astype(float)
-    figure = Figure(figsize=(13, 8), layout="constrained")
+    figure = Figure(figsize=(8.4, 7.2), layout="constrained")
     FigureCanvasAgg(figure)
     panels = figure.subplots(2, len(SCENES), sharex=True, sharey=True)
     for row, dim in zip(panels, (2, 3), strict=True):
@@ -52,22 +52,29 @@ def draw(table: Table, path: Path) -> None:
                 some = shown & (columns["pattern"] == pattern) & (columns["order"] == order)
                 color = {1: "#cc7a00", 2: "#0b5394"}[order]
                 label = f"{name}, order {order}"
-                axes.loglog(
-                    seconds[some], error[some], marker, color=color, ms=4, alpha=0.7, label=label
-                )
+                fill = color if order == 2 else "white"  # also in black and white
+                style = {"color": color, "mfc": fill, "ms": 5, "alpha": 0.8, "label": label}
+                axes.loglog(seconds[some], error[some], marker, **style)
             best = np.flatnonzero(shown)
             best = best[front(seconds[best], error[best])]
-            axes.loglog(seconds[best], error[best], "k-", linewidth=0.8, label="efficient front")
-            axes.set(title=f"{scene}, {dim}D")
-            axes.grid(alpha=0.3, which="both")
-        row[0].set_ylabel("worst error [%]")
-        row[-1].legend(fontsize=7)
+            axes.loglog(seconds[best], error[best], "k-", linewidth=1, label="efficient front")
+            axes.set_title(f"{scene}, {dim}D", fontsize=11)
+            axes.grid(alpha=0.3)
+        row[0].set_ylabel("worst error [%]", fontsize=11)
     for axes in panels[-1]:
-        axes.set_xlabel("seconds, start and mesh included")
-        ticks = [0.3, 0.5, 1, 2, 5, 10]
+        axes.set_xlabel("seconds", fontsize=11)
+        ticks = [
+            t for t in (0.3, 0.5, 1, 2, 5, 10, 20) if seconds.min() / 2 < t < seconds.max() * 2
+        ]
         axes.set_xticks(ticks, [f"{t:g}" for t in ticks])
         axes.xaxis.set_minor_formatter(NullFormatter())
-    figure.savefig(path, dpi=100)
+    shown = {}
+    for row in panels:
+        shown |= dict(zip(*reversed(row[-1].get_legend_handles_labels()), strict=True))
+    shown["efficient front"] = shown.pop("efficient front")  # last
+    style = {"loc": "outside lower center", "ncols": 4, "fontsize": 10, "frameon": False}
+    figure.legend(shown.values(), shown.keys(), **style)
+    figure.savefig(path, dpi=130)
 
 
 def front(seconds: np.ndarray, error: np.ndarray, gain: float = 1.0) -> np.ndarray:

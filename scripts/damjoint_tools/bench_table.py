@@ -5,13 +5,11 @@ from __future__ import annotations
 import contextlib
 import csv
 import json
-import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 from damjoint.storage import atomic_write
-from tqdm import tqdm
 
 from .provenance import provenance
 
@@ -99,8 +97,3 @@ class Table(dict):
             writer = csv.writer(file, lineterminator="\n")
             writer.writerow(self)
             writer.writerows(zip(*self.values(), strict=True))
-
-
-def progress(items: Iterable, title: str) -> Iterable:
-    """Iterate with a progress bar, on a terminal."""
-    return tqdm(items, desc=title, disable=not sys.stderr.isatty())

@@ -3,48 +3,23 @@
 from __future__ import annotations
 
 import hashlib
-import os
 import platform
-import re
-import subprocess
 from collections.abc import Mapping, Sequence
 from datetime import date
 from pathlib import Path
 
 import damjoint
-from damjoint import __version__, data
+from damjoint import __version__, data, versions
 from damjoint.fem import factor
 
 #: Fields that are recorded with measured figures; code: fingerprint of all source files.
 RECORDED = ("version", "commit", "code", "machine", "date")
-#: Folders of the checkout that hold the code.
-CODE_FOLDERS = ":/scripts", ":/pro", ":/geo", ":/cases"
 
 
 def provenance() -> dict[str, str]:
     """Return RECORDED of figures that are measured now."""
-    values = __version__, commit(), code_fingerprint(), machine(), f"{date.today()}"
+    values = __version__, versions.commit(), code_fingerprint(), machine(), f"{date.today()}"
     return dict(zip(RECORDED, values, strict=True))
-
-
-def commit() -> str:
-    """Return the commit of the checkout, with a note if its code has changes; empty outside of a
-    checkout of this project.
-    """
-    package = Path(__file__).parents[1]
-
-    def git(*words: str) -> str:
-        done = subprocess.run(
-            ["git", "-C", str(package), *words], capture_output=True, text=True, check=True
-        )
-        return done.stdout.strip()
-
-    try:
-        git("ls-files", "--error-unmatch", "damjoint_tools")  # fails in another project's checkout
-        changed = git("status", "--porcelain", "--", *CODE_FOLDERS)
-        return git("rev-parse", "--short=7", "HEAD") + (" with changes" if changed else "")
-    except (OSError, subprocess.CalledProcessError):
-        return ""
 
 
 def code_fingerprint() -> str:
@@ -58,12 +33,7 @@ def code_fingerprint() -> str:
 
 def machine() -> str:
     """Return processor, cores, Python and factorisation, in a line."""
-    try:
-        processor = re.search(r"model name\s*:\s*(.*)", Path("/proc/cpuinfo").read_text())[1]
-    except (OSError, TypeError):
-        processor = platform.processor() or platform.machine()
-    cores = len(os.sched_getaffinity(0))
-    return f"{processor}, {cores} cores, Python {platform.python_version()}, {factor.name()}"
+    return f"{versions.machine()}, Python {platform.python_version()}, {factor.name()}"
 
 
 def source_line(records: Sequence[Mapping[str, str]], verb: str = "Measured") -> str:

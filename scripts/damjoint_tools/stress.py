@@ -11,7 +11,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import as_completed
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,9 +19,9 @@ from pathlib import Path
 import numpy as np
 from damjoint import InputError
 from damjoint.model.case import Case, has_drains, load
+from damjoint.progress import track
 from damjoint.storage import lock
 from damjoint.studies.sweep import pool_of, read_done
-from tqdm import tqdm
 
 from .provenance import RECORDED, provenance
 from .verification import RunFiles, judge_stop, violations
@@ -316,9 +316,7 @@ def rows_as_completed(seed: int, numbers: list[int], jobs: int) -> Iterator[dict
         yield from (future.result() for future in as_completed(waiting))
 
 
-def stress(
-    count: int, seed: int, out: Path, jobs: int | None = None, progress: Callable = tqdm
-) -> list[dict[str, str]]:
+def stress(count: int, seed: int, out: Path, jobs: int | None = None) -> list[dict[str, str]]:
     """Run those of the scenes 0 .. count - 1 of a seed that are not in the result file yet; returns
     the rows of all.
 
@@ -343,9 +341,7 @@ def stress(
         if not file.tell():
             writer.writeheader()
         rows = rows_as_completed(seed, missing, jobs or os.cpu_count() or 1)
-        for row in progress(
-            rows, total=len(missing), desc="stress", disable=not sys.stderr.isatty()
-        ):
+        for row in track(rows, "stress", len(missing)):
             writer.writerow(row | now)
             file.flush()
     return [row for row in read_rows(out) if row["scene"] in names]

@@ -7,6 +7,7 @@ import math
 import re
 from dataclasses import replace
 
+import damjoint as dj
 import matplotlib.image
 import pytest
 from damjoint.post import folder as folders
@@ -257,7 +258,11 @@ def test_tension_is_positive_in_all_tables_and_pictures(solve):
     draw_joint(axes, result, method)
     texts = [text.get_text() for text in axes.texts]
     name = texts.index("effective stress, tension > 0")
-    assert texts[name + 1 : name + 3] == [f"{value / 1e6:.3g} MPa" for value in (heel, toe)]
+    computed = result.at()["sigma_n_eff"][[0, -1]]
+    assert texts[name + 1 : name + 3] == [
+        f"FE {fe / 1e6:.3g} MPa\ngravity {by_hand / 1e6:.3g} MPa"
+        for fe, by_hand in zip(computed, (heel, toe), strict=True)
+    ]
     # compression is drawn below the line, tension above it
     stress = axes.get_lines()[-3]
     assert stress.get_linestyle() == "--"
@@ -273,3 +278,40 @@ def test_resultants_but_uplift_agree_with_flow(solve):
     assert last["N"] + last["U"] == pytest.approx(method.N + method.U, rel=1e-6)
     assert last["T"] == pytest.approx(method.T, rel=1e-6)
     assert last["U"] == pytest.approx(method.U, rel=0.1)
+
+
+def check_of(settings, level="45"):
+    """The check of a coarse dam."""
+    common = {"n_joint": 10, "h_dam": 15, "h_found": 60, "law": "bond"}
+    return dj.check([dj.case("dam", levels=[float(level)], **common | settings)])[0]
+
+
+@pytest.mark.parametrize(
+    "required, level, verdict",
+    [
+        ("middle third", "30", "pass"),
+        ("middle third", "45", "fail"),
+        ("middle half", "45", "pass"),
+        ("within base", "45", "pass"),
+        ("any", "45", "not checked"),
+    ],
+)
+def test_required_position_of_the_resultant(required, level, verdict):
+    """M/N of the 45 m dam: 11.0 m of 34 m from the toe at 45 m, in the middle half."""
+    check = check_of({"required_position": required}, level)
+    assert {result.verdict for result in check.results} == {verdict}
+    assert ("N middle half: must be in middle third" in check.why) == (verdict == "fail")
+    table, cells = text_table([check]), picture_table(check)
+    assert (required in table.split("required")[-1]) == (required != "any")
+    assert [row[-1] for row in cells if row[0] == "N' in"] == [required] * (required != "any")
+    assert {row["required_position"] for row in check.rows} == {required}
+
+
+def test_partial_factors_on_friction_and_adhesion():
+    """(mu / 1.5 N + c / 3 L) / T."""
+    check = check_of({"mu": 0.9, "adhesion": 3e5, "factor_mu": 1.5, "factor_c": 3.0}, "30")
+    for result in check.results:
+        numbers = result.numbers
+        resistance = 0.6 * numbers["N"] + 1e5 * (34 - numbers["crack_length"])
+        assert numbers["SSF"] == pytest.approx(resistance / numbers["T"], rel=1e-9)
+    assert "SSF with the partial factors factor_mu = 1.5, factor_c = 3" in check.notes

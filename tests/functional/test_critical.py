@@ -89,6 +89,21 @@ def test_critical_effectiveness_of_drains():
 
 
 @pytest.mark.heavy
+def test_critical_strength_with_partial_factors():
+    """Sliding: (mu / 1.5 N + c / 3 L) / F = T, without a crack. The level does not use them."""
+    settings = DAM | {"law": "friction", "mu": 0.9, "adhesion": 6e5, "uplift": "none"}
+    partial = {"factor_mu": 1.5, "factor_c": 3.0}
+    search, answer = found("dam", "strength", settings | partial, levels="45", tail_levels="0")
+    block = gravity.at(load("dam", settings, "45", "0"), 1)
+    expected = (0.6 * block.N + 2e5 * block.body.length) / block.T
+    assert answer.value == pytest.approx(expected, rel=2e-4)
+    assert answer.gravity == pytest.approx(answer.value, rel=2e-4)
+    assert "beyond the partial factors factor_mu = 1.5, factor_c = 3" in answer.lines(search)
+    _, level = found("dam", "level", DAM | UNBONDED | {"mu": 0.7} | partial, tail_levels="3")
+    assert level.value == pytest.approx(43.161, rel=5e-4)
+
+
+@pytest.mark.heavy
 def test_critical_earthquake():
     """It acts together with the only level: under a strong one there is no first step. T = mu N,
     whatever the crack.
@@ -251,7 +266,7 @@ def test_files_of_a_search(command, tmp_path):
     assert {row["displacement_control"] for row in rows} == {"0", "1"}
     assert command("report", folder) == (0, "report.html\n", "")
     page = (tmp_path / "report.html").read_text()
-    assert "<td>critical level, and the last state before it</td><td>6.63399 m; sliding;" in page
+    assert "last state before failure, critical level 6.63399 m; sliding;" in page
 
 
 def test_an_interrupted_search_writes_its_results_so_far(monkeypatch, tmp_path):

@@ -148,6 +148,8 @@ SMALL = {"n_joint": 20.0, "h_dam": 8.0, "h_found": 30.0}
 SHAPE = {"batter": 4.0, "batter_height": 20.0, "neck_height": 6.0}
 STAGED = {"silt_height": 12.0, "ice_force": 1e5, "ice_level": 40.0, "anchor_force": 2e6}
 STAGED |= {"anchor_angle": 10.0, "k_h": 0.1, "k_v": 0.05, "floor_water": 1.0, "force_x": 3e4}
+STEEP = {"batter": 5.0, "batter_height": 35.0}
+HEAVY_SILT = {"silt_height": 12.0, "silt_weight": 1.0, "k_h": 0.1, "added_mass": 2.0}
 WARM = {"temperature_dam": -8.0, "temperature_linear": 15.0, "temperature_found": 3.0}
 SOLID = {"dim": 3.0, "thickness": 3.0, "n_layers": 2.0, "mesh_pattern": "split", "n_joint": 10.0}
 SECTIONS = {
@@ -156,6 +158,9 @@ SECTIONS = {
     "falling base": ({"joint_slope": -4.0, "law": "friction", "adhesion": 4e5}, "30,44", "2"),
     "sloping lift": ({"joint_height": 20.0, "joint_slope": 3.0} | SHAPE, "30,46.5", "0,24"),
     "drains, overtopped": ({"uplift": "drained", "joint_slope": 3.0}, "20,46.5", "0,5"),
+    "drains, USBR": ({"uplift": "drained", "drain_reference": "reservoir"}, "20,45", "0,5"),
+    "Zangar, silt's weight": (STEEP | HEAVY_SILT, "20,41,41", "0"),
+    "Zangar, lift": (SHAPE | HEAVY_SILT | {"joint_height": 8.0}, "20,41,47", "0"),
     "cracked": ({"uplift": "cracked", "sigma_max": 1e5}, "20,40,45", "0,0,5"),
     "cracked bond": ({"uplift": "cracked", "law": "bond", "joint_slope": 2.0}, "20,40,46", "0"),
     "flow driven": ({"uplift": "flow", "drive": "crest", "drive_by": 1e-3}, "20,40", "0"),

@@ -193,7 +193,7 @@ def test_a_case_file_with_lists(tmp_path):
     assert [own["adhesion"] for own in case.joints] == [3e5] * 3  # the later statement
     assert [own["mu"] for own in load(str(path), {"mu": 0.6}).joints] == [0.6] * 3
     path.write_text("E_dam() = {1e10, 2e10};")
-    with pytest.raises(InputError, match="line 1: .*E_dam = .*: must be a single value"):
+    with pytest.raises(InputError, match=r"line 1: .*E_dam = .*: must be a single value"):
         load(str(path))
 
 

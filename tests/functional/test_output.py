@@ -8,10 +8,14 @@ import sys
 import meshio
 import numpy as np
 import pytest
+from damjoint.post.field_files import write_vtu
 from damjoint.post.tables import write_csv
 from numpy.testing import assert_allclose
 
-JOINT = "time,level,x,y,z,delta_n,delta_t1,delta_t2,sigma_n,tau_1,tau_2,p,damage,slip,s,sigma_n_eff"
+JOINT = (
+    "time,level,joint,x,y,z,delta_n,delta_t1,delta_t2,sigma_n,tau_1,tau_2,p,damage,slip,s,"
+    "sigma_n_eff"
+)
 HISTORY = (
     "time,level,load_factor,iterations,cuts,residual,crack_length,process_zone,slip_length,max_opening,"
     "crest_ux,N,T,M,flux,tail_level,U,x_resultant"
@@ -112,6 +116,24 @@ def test_fields_for_paraview(folder):
         assert bulk.cell_data["stress"][0].shape == (918, 6)
         right = bulk.points[bulk.cells[0].data].mean(axis=1)[:, 1] > 0
         assert np.array_equal(bulk.cell_data["body"][0] == 1, right)  # 1 dam, 2 foundation
+
+
+def test_fields_of_any_cells_are_read_as_they_were_written(tmp_path):
+    """Several shapes, floats and integers, scalars and vectors."""
+    points = np.arange(27.0).reshape(9, 3)
+    shapes = {"triangle": 3, "quad": 4, "tetra": 4, "wedge": 6, "hexahedron": 8, "line": 2}
+    cells = [(n, np.arange(2 * k).reshape(2, k) % 9) for n, k in shapes.items()]
+    on_points = {"u": points / 7, "number": np.arange(9)}
+    in_cells = {"stress": np.arange(72.0).reshape(12, 6), "body": np.repeat([1, 2], 6)}
+    write_vtu(tmp_path / "some.vtu", points, cells, on_points, in_cells)
+    mesh = meshio.read(tmp_path / "some.vtu")
+    assert np.array_equal(mesh.points, points)
+    assert [block.type for block in mesh.cells] == [*shapes]
+    assert all(np.array_equal(b.data, t) for b, (_, t) in zip(mesh.cells, cells, strict=True))
+    for name, values in on_points.items():
+        assert np.array_equal(mesh.point_data[name], values)
+    for name, values in in_cells.items():
+        assert np.array_equal(np.concatenate(mesh.cell_data[name]), values)
 
 
 def test_fields_for_gmsh(folder):

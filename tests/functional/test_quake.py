@@ -1,5 +1,7 @@
 """Time integration of an earthquake: closed forms, balance of momentum, order, both signs."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from damjoint.dynamics.scheme import Motion
@@ -66,10 +68,10 @@ def test_a_rocking_block_against_its_equations_of_motion(tmp_path):
     quake = earthquake(record, BLOCK | narrow)
     joint = joint_of(quake)
     x, weights = joint.points.positions[:, 0] - 0.5, joint.points.weights
-    openings, at = [], []
+    opening, at = [], []
     for step in quake.steps():
         jump = joint.jumps(joint.at_nodes, step.end.state.jump)
-        openings.append([jump[joint.mesh.heel_nodes[0], 0], jump[joint.mesh.toe_nodes[0], 0]])
+        opening.append(jump[joint.mesh.toe_nodes[0], 0])
         at.append(step.end.time)
     mass = 2400 * 4.0
     inertia = mass * (1 + 16) / 12
@@ -85,11 +87,10 @@ def test_a_rocking_block_against_its_equations_of_motion(tmp_path):
     begin = [-mass * G / stiffness, 0, 0, 0, 0, 0]
     exact = solve_ivp(rates, (0, at[-1]), begin, "Radau", at, rtol=1e-8, atol=1e-12, max_step=dt).y
     toe = exact[0] + 0.5 * exact[2]
-    openings = np.array(openings)
-    first = np.argmax(np.diff(toe) < 0)  # the first swing, up to its largest opening
     assert toe.max() > 0.02
-    assert openings[:, 1].max() == pytest.approx(toe.max(), rel=2e-3)
-    assert openings[:first, 1] == pytest.approx(toe[:first], abs=5e-3 * toe.max())
+    assert max(opening) == pytest.approx(toe.max(), rel=2e-3)
+    swing = slice(np.argmax(toe))
+    assert opening[swing] == pytest.approx(toe[swing], abs=1e-2 * toe.max())
 
 
 # -- exact at every step
@@ -210,10 +211,9 @@ def test_free_vibration_decays_as_rayleigh_damping_says(tmp_path):
     dt = 2 * np.pi / omega / 200
     start = Motion(mode, np.zeros(len(mode)), -(omega**2) * mode)
     forces = of_joints @ mode[system.jumps]
-    state = problem.at_rest
-    state = type(state)(time=0.0, state=state.state, motion=start, forces=forces)
     static = problem.static
-    state.state.__dict__.update(jump=static.jump + mode[system.jumps])
+    moved = replace(static, jump=static.jump + mode[system.jumps])
+    state = replace(problem.at_rest, state=moved, motion=start, forces=forces)
     step, crest = TimeStep(problem, dt), []
     nothing = (np.zeros(2), np.zeros(2))
     for _ in range(600):

@@ -1,15 +1,20 @@
-"""Pictures and page of a run, made from its files."""
+"""Pictures and report of runs, made from their files."""
 
+import csv
 import html
 import json
 import re
 import shutil
+import sys
 
 import numpy as np
 import pytest
 from damjoint import cli
+from damjoint.model.case import load
 from damjoint.post import stored
 from damjoint.post.pictures import shear_limit
+from damjoint.statics import gravity
+from damjoint.studies import report, report_input
 from numpy.testing import assert_allclose
 from PIL import Image
 
@@ -71,7 +76,8 @@ def test_plot_and_report_of_a_user_geometry(command, tmp_path):
     assert read.result.case.joint_length == pytest.approx(np.hypot(34, 4))
     assert command("report", "out/stepped")[0] == 0
     page = (tmp_path / "report.html").read_text()
-    assert "geometry stepped.geo" in page and "Beside the gravity method" not in page
+    assert "geometry stepped.geo" in page and "Loads of the gravity method" not in page
+    assert "dam_base" not in page and "n_joint" in page
 
 
 def damaged(folder, name, text):
@@ -103,6 +109,29 @@ def change(folder, **entries):
     (folder / "run.json").write_text(json.dumps(record | entries))
 
 
+def words_of(text):
+    """Text of a part of a page, without its marks."""
+    return re.sub(r"\s+", " ", html.unescape(re.sub(r"<[^>]*>", " ", text))).strip()
+
+
+def rows_below(page, heading):
+    """Cells of the first table below a heading: [row][column], with the heads."""
+    table = page.split(f">{heading}<", 1)[1].split("<table", 1)[1].split("</table>", 1)[0]
+    return [
+        [words_of(f"<{cell}") for cell in re.split(r"<(?=t[hd])", row)[1:]]
+        for row in table.split("<tr>")[1:]
+    ]
+
+
+def column(rows, head):
+    """Numbers of a column, in SI units by the unit in its head."""
+    (i,) = (i for i, cell in enumerate(rows[0]) if cell.split(" [")[0] == head)
+    size = {"MN": 1e6, "kN": 1e3, "N": 1, "MPa": 1e6, "kPa": 1e3, "mm": 1e-3, "µm": 1e-6}
+    unit = re.sub(r".*\[([^ /\]]*).*", r"\1", rows[0][i])
+    numbers = [float("nan" if row[i] == "-" else row[i]) for row in rows[1:]]
+    return np.array(numbers) * size.get(unit, 1)
+
+
 def test_report_has_results_and_parameters(command, folder, tmp_path):
     """One page without external files."""
     assert command("run", "a", *SMALL, "--set", "order=1")[0] == 0
@@ -111,21 +140,204 @@ def test_report_has_results_and_parameters(command, folder, tmp_path):
     page = (tmp_path / "page.html").read_text()
     assert not re.search(r"(src|href)=\"(?!data:|#)|url\(|@import", page)
     assert "<i>" not in page and "&lt;i&gt;my&lt;/i&gt; dam &amp; joint" in page
-    sections = page.split("<section")[1:]
-    assert len(sections) == 3  # a has two scenes
-    mine = sections[0]
+    mine, first, second, common = page.split("<section")[1:]  # a has two scenes
     assert mine.count("data:image/svg+xml;base64,") == 3
     assert re.search(r"SSF [\d.]+ &lt; 50", mine) and ">fail<" in mine  # required by the case
-    assert ">not checked<" in sections[1] and ">pass<" not in page  # case a requires none
-    assert 'class="verdict not-checked"' in sections[1]
-    words = re.sub(r"\s+", " ", re.sub(r"<[^>]*>", " ", mine))
-    assert "K_N Normal stiffness K_N 2e+10 Pa per m 1e+11" in words
-    assert "dam_height" in words and "E_dam" not in words  # follows E, which is not set
-    assert (
-        "reservoir" in words
-        and "tailwater" in words
-        and "not estimated; damjoint run --accuracy 1% estimates it" in words
+    for scene in (first, second):  # case a requires none
+        assert ">not checked<" in scene and 'class="verdict not-checked"' in scene
+    assert ">pass<" not in page
+    assert "not estimated; damjoint run --accuracy 1% estimates it" in mine
+    words = words_of(common)
+    assert "K_N Normal stiffness K_N 1 20 GPa/m 100" in words
+    assert "sigma_max Tensile strength sigma_max, rupture and bond 2, 3" in words
+    assert "levels Reservoir levels at t = 1, 2, ... 1 8, 10 m" in words
+    assert "E_dam Young's modulus of the dam 1 25 GPa" in words
+    record = json.loads((folder / "run.json").read_text())
+    for name in ("gmsh", "numpy", "python"):
+        assert f"{name} {record['versions'][name]}" in words
+    assert f"machine {record['machine']}" in words and "cores" in record["machine"]
+
+
+def test_all_input_of_a_run_is_in_its_report(command, folder, tmp_path):
+    """Every parameter that matters in the scene, with its value."""
+    assert command("report", folder)[0] == 0
+    page = (tmp_path / "report.html").read_text()
+    case = stored.read(folder).result.case
+    entries = report_input.parameters(case)
+    assert len(entries) > 40 and not entries.keys() & report_input.COMMON_MODULI
+    text = words_of(page)
+    for name, entry in entries.items():
+        table = rf"{name} {re.escape(entry.meaning)} {re.escape(entry.value)} "
+        dense = rf"{name} = {re.escape(f'{entry.value} {entry.unit}'.strip())}[;.]"
+        assert re.search(rf"{table}|{dense}", text), name
+
+
+def test_tables_of_the_report_have_the_values_of_the_files(command, folder, tmp_path):
+    """History at the levels; both methods; loads with lever arms; to the four digits printed."""
+    assert command("report", folder)[0] == 0
+    page = (tmp_path / "report.html").read_text()
+    result = stored.read(folder).result
+    levels = rows_below(page, "At the requested levels, by finite elements")
+    for head, name in (("N'", "N"), ("T", "T"), ("M", "M"), ("crest movement", "crest_ux")):
+        assert_allclose(column(levels, head), result.history[name], rtol=1e-3)
+
+    method = gravity.at(result.case, 2.0)
+    both = rows_below(page, "Finite elements and gravity method, at the last level")
+    assert [row[0] for row in both[1:]] == ["finite elements", "gravity method", "required"]
+    assert_allclose(column(both, "SSF"), [method.SSF, method.SSF, 50], rtol=1e-3)
+    assert_allclose(column(both, "U")[:2], method.U, rtol=1e-3)
+    stresses = result.at()["sigma_n_eff"][-1], method.sigma_n_eff_toe
+    assert_allclose(column(both, "eff. toe")[:2], stresses, rtol=1e-3)
+    factor = re.search(r"SSF = \(µ N' \+ c B\)/T = \(.*?\)/[\d.]+ = ([\d.]+)", words_of(page))[1]
+    assert float(factor) == pytest.approx(method.SSF, rel=1e-3)
+
+    loads = rows_below(
+        page, "Loads of the gravity method on the body above the joint, at the last level"
     )
+    table = method.table()
+    assert [row[0] for row in loads[1:]] == table["load"]
+    fx, fy, moment = (column(loads, h) for h in ("downstream", "upwards", "moment about the toe"))
+    for shown, name in ((fx, "Fx"), (fy, "Fy"), (moment, "moment")):
+        assert_allclose(shown, table[name], rtol=1e-3, atol=1e-9)
+    height, away = (
+        column(loads, h) for h in ("height above the toe", "distance upstream of the toe")
+    )
+    arms = np.nan_to_num(height) * fx + np.nan_to_num(away) * fy
+    assert_allclose(arms[:-1], -moment[:-1], rtol=2e-3)
+    reservoir = table["load"].index("reservoir")
+    assert height[reservoir] == pytest.approx(10 / 3, rel=1e-3)  # of a triangle of pressure
+
+
+def test_lever_arms_of_the_uplift_on_a_sloping_joint():
+    """It acts on the joint, and normal to it."""
+    case = load("sloping")
+    method = gravity.at(case, case.times[-1])
+    rows = {row[0]: row[1:] for row in report.loads_table(method).rows}
+    fx, height, fy, away, moment = map(float, rows["uplift"])
+    slope = np.tan(np.radians(case["joint_slope"]))
+    assert fx / fy == pytest.approx(-slope, rel=1e-3)
+    assert height / away == pytest.approx(-slope, rel=1e-3)  # the toe is the higher end
+    assert height * fx + away * fy == pytest.approx(-moment, rel=1e-3)
+
+
+COMBINATIONS = {"usual": (8, 0.1), "flood": (11, 50), "empty": (0.5, 0)}
+
+
+@pytest.fixture(scope="module")
+def checked(tmp_path_factory):
+    """The folder of damjoint check for three load combinations."""
+    work = tmp_path_factory.mktemp("checked")
+    for name, (level, factor) in COMBINATIONS.items():
+        text = CASE.replace("<i>my</i> dam & joint", name).replace("{8, 10}", f"{{8, {level}}}")
+        (work / f"{name}.case").write_text(text.replace("SSF = 50", f"SSF = {factor}"))
+    cases = [str(work / f"{name}.case") for name in COMBINATIONS]
+    assert cli.main(["check", *cases, *SMALL, "--out", str(work / "out")]) == 1
+    return work / "out"
+
+
+def test_report_of_load_combinations(command, checked, tmp_path):
+    """The summary has the factors and verdicts of check.csv, in its order."""
+    assert command("report", checked)[0] == 0
+    summary = rows_below((tmp_path / "report.html").read_text(), "Summary")
+    with (checked / "check.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [row[1].split(",")[0] for row in summary[1:]] == list(COMBINATIONS)
+    verdicts = [" ".join(row[-1].split()[:-1]) for row in summary[1:]]
+    assert verdicts == ["pass", "fail", "not checked"]
+    for head, method, name in (
+        ("SSF", "finite elements", "SSF"),
+        ("SSF gravity", "gravity method", "SSF"),
+        ("OSF gravity", "gravity method", "OSF"),
+        ("N'", "finite elements", "N"),
+    ):
+        values = [float(row[name]) for row in rows if row["answer"] == method]
+        assert_allclose(column(summary, head), values, rtol=1e-3)
+    assert_allclose(column(summary, "SSF required"), [1, 50, np.nan])  # friction needs 1
+
+
+def test_a_damaged_table_of_load_combinations_is_reported(command, checked, tmp_path):
+    copy = shutil.copytree(checked, tmp_path / "out")
+    for text in ("x,y\n1,2\n", "case\n../elsewhere\n"):
+        (copy / "check.csv").write_text(text)
+        code, out, err = command("report", "out")
+        assert (code, out) == (2, "") and "out = out: its check.csv is damaged" in err
+    assert not (tmp_path / "report.html").exists()
+
+
+def test_report_of_a_critical_value(command, tmp_path):
+    """Requirements do not apply at the limit; both methods are compared at the critical level."""
+    (tmp_path / "my.case").write_text(CASE)
+    assert command("critical", "my.case", *SMALL, "--set", "adhesion=0", "--out", "limit")[0] == 0
+    level = json.loads((tmp_path / "limit/run.json").read_text())["critical"]["value"]
+    assert command("report", "limit")[0] == 0
+    page = (tmp_path / "report.html").read_text()
+    assert ">not checked<" in page and ">fail<" not in page
+    assert f"critical level {level:.6g} m" in words_of(page)
+    both = rows_below(page, "Finite elements and gravity method, at the last level")
+    assert_allclose(column(both, "level")[:2], level, rtol=1e-3)
+    assert_allclose(column(both, "N'")[0], column(both, "N'")[1], rtol=1e-3)
+
+
+def test_limits_of_the_model_follow_the_case():
+    """A sentence for each choice of the model; loads that are zero are named."""
+    plane = " ".join(report_input.limits(load("dam", {"uplift": "none"})))
+    assert "Plane strain" in plane and "no water pressure" in plane
+    assert "Loads that are zero: silt, ice, post-tensioning, earthquake, temperature." in plane
+    quake = {"k_v": 0.1, "law": "bond", "uplift": "drained", "ice_force": 1e4}
+    loaded = load("dam", quake | {"temperature_found": -2})
+    sentences = " ".join(report_input.limits(loaded))
+    assert "expansion_found" in report_input.materials(loaded) and "no conduction" in sentences
+    assert "expansion_found" not in report_input.other_input(loaded)
+    assert "pseudo-static" in sentences and "Joint law bond: coupled" in sentences
+    assert "Drains 3.4 m from the heel" in sentences
+    assert "Loads that are zero: silt, post-tensioning." in sentences
+    solid = " ".join(report_input.limits(load("b")))
+    assert "Three dimensions: the section over 1 m" in solid and "Plane strain" not in solid
+    own = " ".join(report_input.limits(load("stepped")))
+    assert "gravity method" not in own and "foundation reaches" not in own
+
+
+def test_values_are_merged_over_runs():
+    runs = [{"a": 1, "b": 1}, {"a": 1, "b": 2}, {"a": 1}, {"a": 1, "b": 2}, {"a": 1, "b": 2}]
+    merged = report_input.by_runs(runs)
+    assert merged == [("a", 1, ""), ("b", 1, "1"), ("b", 2, "2, 4, 5")]
+    assert report_input.by_runs([{"a": 1}] * 3 + [{"a": 2}])[0] == ("a", 1, "1 to 3")
+
+
+def test_pages_of_the_printed_report(checked):
+    """A summary, a page per run, a page of input; nothing is wider than the page's text."""
+    weasyprint = pytest.importorskip("weasyprint", exc_type=(ImportError, OSError))
+    folders = [checked / name for name in COMBINATIONS]
+    page = report.page_of([report.read_section(folder) for folder in folders])
+    pages = weasyprint.HTML(string=page).render().pages
+    assert len(pages) == 1 + len(folders) + 1
+    chapters = [label for part in pages for level, label, *_ in part.bookmarks if level == 2]
+    assert [chapter.split()[0] for chapter in chapters[:5]] == ["Summary", "Limits", *["Run"] * 3]
+    for part in pages:
+        box = part._page_box
+        left, right = box.content_box_x(), box.content_box_x() + box.width
+        bottom = box.content_box_y() + box.height
+        for child in box.children[0].descendants():
+            if child.element_tag in ("td", "th", "img", "p", "li"):
+                assert left - 0.1 <= child.position_x, words_of(str(child))
+                assert child.position_x + child.border_width() <= right + 0.1
+                assert child.position_y + child.border_height() <= bottom + 0.1
+
+
+def test_report_as_pdf(command, checked, tmp_path):
+    pytest.importorskip("weasyprint", exc_type=(ImportError, OSError))
+    folder = checked / "usual"
+    assert command("report", folder, "--to", "my.PDF") == (0, "my.PDF\n", "")
+    content = (tmp_path / "my.PDF").read_bytes()
+    assert content.startswith(b"%PDF-") and content.rstrip().endswith(b"%%EOF")
+
+
+def test_a_pdf_without_weasyprint_is_refused(command, checked, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "weasyprint", None)
+    code, out, err = command("report", checked, "--to", "my.pdf")
+    assert (code, out) == (1, "") and len(err.splitlines()) == 1
+    assert "to = my.pdf" in err and "pip install weasyprint" in err and "browser" in err
+    assert not list(tmp_path.iterdir())
 
 
 def test_report_of_a_dam_that_passes_with_its_estimated_error(command, tmp_path):
@@ -135,7 +347,7 @@ def test_report_of_a_dam_that_passes_with_its_estimated_error(command, tmp_path)
     estimate = json.loads((tmp_path / "out/dam/run.json").read_text())["error_estimate"]
     assert command("report", "out/dam")[0] == 0
     page = (tmp_path / "report.html").read_text()
-    assert 'class="verdict pass"' in page and "not checked" not in page
+    assert 'class="verdict pass"' in page and 'not-checked"' not in page
     assert estimate["statement"] and estimate["statement"] in html.unescape(page)
     assert "not estimated" not in page
 

@@ -84,6 +84,16 @@ def test_resultants_in_3d(solve):
     check(result)
 
 
+def test_weight_of_the_foundation(solve):
+    """It settles an unstressed rock, and the dam with it; in equilibrium it changes nothing."""
+    plain, in_situ, settling = (
+        solve("dam", "20", uplift="none", weight_first=0, **SMALL, **rock)[0].last
+        for rock in ({}, {"rho_found": 2700}, {"rho_found": 2700, "in_situ": 0})
+    )
+    assert in_situ["crest_ux"] == plain["crest_ux"] != settling["crest_ux"]
+    assert_allclose([settling[n] for n in "NTM"], [plain[n] for n in "NTM"], rtol=1e-6)
+
+
 def test_crest_displacements_count_from_the_state_under_weight(solve):
     (first,), (both,) = (
         solve("dam", "0.001,20", uplift="none", weight_first=w, **SMALL) for w in (1, 0)

@@ -10,8 +10,10 @@ import time
 
 import pytest
 from closed_forms import slide_level
-from damjoint.model.case import CASES
-from damjoint.studies import sweep
+from damjoint.model.case import CASES, load
+from damjoint.post.units import LENGTHS
+from damjoint.statics import gravity
+from damjoint.studies import chart, sweep
 from damjoint.studies.plan import plan_of
 from distributed import LocalCluster
 from scipy import stats
@@ -267,6 +269,8 @@ def test_a_failed_row_has_its_reason_and_the_others_are_computed(command, tmp_pa
         (("--vary", "mu=0.4,0.5"), True),
         (("--vary", "mu=0.4,0.5", "--vary", "uplift=none,imposed"), True),
         (("--vary", "mu=0.4,0.5", "--vary", "level=8,9"), True),
+        (("--vary", "uplift=none,imposed"), True),
+        (("--vary", "mu=0.4,0.5", "--critical", "level"), True),
         (("--vary", "level=8,9", "--sample", "3", "mu=uniform(0.3,0.2)"), True),
         (("--sample", "3", "mu=uniform(0.3,0.2)", "adhesion=uniform(0,1e3)"), True),
         (("--vary", "mu=0.4", "--vary", "level=9", "--vary", "adhesion=1,2"), False),
@@ -277,3 +281,38 @@ def test_the_chart_of_a_sweep(command, tmp_path, words, drawn):
     code, out, _ = command("sweep", "c", *words, *common)
     assert code == 0 and ("no chart" in out) != drawn
     assert (tmp_path / "s.png").exists() == drawn
+
+
+def chart_panels(command, tmp_path, monkeypatch, *words):
+    """The axes of a sweep's chart by the quantity on their vertical axis."""
+    figures = []
+    monkeypatch.setattr(chart, "write_picture", lambda figure, *_: figures.append(figure))
+    assert command("sweep", *words, "--set", "n_joint=10", "--jobs", "1", "--out", "s.csv")[0] == 0
+    return {axes.get_ylabel().split(" [")[0]: axes for axes in figures[0].axes}
+
+
+def test_a_chart_of_texts_has_categories(command, tmp_path, monkeypatch):
+    """And no scale where nothing is cracked; verdicts with the factor against sliding."""
+    words = "dam", "--vary", "uplift=none,imposed", "--levels", "20", "--set", "required_SSF=3"
+    panels = chart_panels(command, tmp_path, monkeypatch, *words)
+    crack, factor = panels["open or broken joint"], panels["safety factor against sliding"]
+    assert [text.get_text() for text in crack.get_xticklabels()] == ["none", "imposed"]
+    assert crack.get_xlabel() == "uplift"
+    assert [text.get_text() for text in crack.texts] == ["zero in all rows"]
+    assert list(crack.get_yticks()) == [0]
+    cases = [load("dam", {"uplift": n, "n_joint": 10.0}, [20]) for n in ("none", "imposed")]
+    expected = [gravity.at(case, 1.0, 20).SSF for case in cases]
+    (verdicts,) = (line for line in factor.get_lines() if line.get_label() == "stands")
+    assert verdicts.get_ydata() == pytest.approx(expected, rel=1e-4)
+    assert "required 3" in [text.get_text() for text in factor.get_legend().get_texts()]
+
+
+def test_rows_that_fail_do_not_set_the_scale_of_a_chart(command, tmp_path, monkeypatch):
+    """Their last state may be a metre from the others; few values are ticks and curves."""
+    words = "dam", "--vary", "level=30,40,60", "--set", "dam_base=26", "--set", "law=bond"
+    panels = chart_panels(command, tmp_path, monkeypatch, *words)
+    opening = panels["largest opening"]
+    assert list(opening.get_xticks()) == [30, 40, 60]
+    (row,) = (row for row in rows(tmp_path / "s.csv") if row["failed"] == "1")
+    (size,) = re.findall(r"\[(.*)\]", opening.get_ylabel())
+    assert float(row["max_opening"]) * dict(LENGTHS)[size] > 3 * opening.get_ylim()[1]

@@ -10,7 +10,7 @@ from damjoint.model.case import CASES, load
 from damjoint.post import validation
 
 
-@pytest.mark.parametrize("path", sorted(CASES.glob("*.case")), ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", sorted(CASES.rglob("*.case")), ids=lambda path: path.stem)
 def test_damjoint_and_gmsh_read_a_case_alike(path):
     """The cases can be opened in Gmsh and GetDP."""
     ours = casefile.read(path)
@@ -50,6 +50,26 @@ def test_values_of_included_files_can_be_changed(tmp_path):
     write(tmp_path, "default_mu = 0.5; default_E = 1e9;", "common.case")
     found = casefile.read(write(tmp_path, 'Include "common.case"; default_mu = 0.7;'))
     assert found.defaults == {"mu": 0.7, "E": 1e9}
+
+
+def test_presets_are_included_from_any_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    text = 'Include "presets/usbr_uplift.case"; Include "presets/usace_unusual.case";'
+    found = casefile.read(write(tmp_path, text + " default_mu = 0.7;"))
+    uplift = {"uplift": "drained", "drain_reference": "reservoir", "drain_effectiveness": 2 / 3}
+    uplift |= {"quake_uplift": "zero"}
+    required = {"required_SSF": 1.7, "required_position": "middle half"}
+    assert found.defaults == {**uplift, **required, "mu": 0.7}
+    (tmp_path / "presets").mkdir()
+    write(tmp_path, "default_required_SSF = 1.4;", "presets/usace_unusual.case")
+    found = casefile.read(write(tmp_path, text))  # the file beside the case is preferred
+    assert found.defaults == {**uplift, "required_SSF": 1.4}
+
+
+@pytest.mark.parametrize("path", sorted((CASES / "presets").glob("*.case")), ids=lambda p: p.stem)
+def test_every_preset_fits_a_dam(tmp_path, path):
+    case = load(str(write(tmp_path, f'Include "presets/{path.name}";')))
+    assert case["uplift"] != "imposed" if "uplift" in path.stem else case["required_SSF"] >= 1
 
 
 @pytest.mark.parametrize(

@@ -192,6 +192,47 @@ def test_silt_and_westergaard(section):
     assert quake[1] == pytest.approx(0.05 * weight[1])
 
 
+@pytest.mark.parametrize("section", ["batter", "whole"])
+def test_weight_of_silt(section):
+    """Horizontal pressure times K_0, and the full vertical pressure on the batter."""
+    settings = SECTIONS[section] | {"silt_height": 12.0, "silt_K0": 0.4, "silt_weight": 1.0}
+    case = load("dam", settings, "30", "0")
+    pressure = lambda y, _: 900 * 9.81 * max(12 - y, 0)
+    normal, horizontal = (by_quadrature(case, "UP", pressure, part) for part in (False, True))
+    found = load_of(case, "silt")
+    assert found[1] < 0
+    assert_allclose(found, normal + (0.4 - 1) * horizontal, rtol=1e-8, atol=1e-2)
+
+
+@pytest.mark.parametrize(
+    "section, angle",
+    [
+        ({}, 0),
+        ({"batter": 4.0, "batter_height": 20.0}, 0),  # vertical over more than half
+        ({"batter": 4.0, "batter_height": 30.0}, math.atan(4 / 38)),  # level above the batter
+        ({"batter": 8.0, "batter_height": 45.0}, math.atan(8 / 45)),
+        ({"batter": 8.0, "batter_height": 45.0, "joint_height": 8.0}, math.atan(8 / 45)),
+        ({"batter": 20.0, "dam_base": 60.0}, math.atan(20 / 45)),
+    ],
+)
+def test_zangar(section, angle):
+    """Formula and C_m of Zangar (1952), normal to the face; 0.726 C_m k_h w H^2 on a vertical one
+    [USBR, Design of Small Dams].
+    """
+    case = load("dam", section | {"k_h": 0.1, "added_mass": 2.0}, "38", "0")
+    angles, coefficients = np.arange(0, 91, 10), [0.735, 0.67, 0.62, 0.55, 0.48, 0.4, 0.31]
+    share = np.interp(math.degrees(angle), angles[:7], coefficients)
+
+    def pressure(y, _):
+        r = max(38 - y, 0) / 38
+        return share / 2 * 0.1 * WATER * 38 * (r * (2 - r) + math.sqrt(r * (2 - r)))
+
+    expected = by_quadrature(case, "UP", pressure)
+    assert_allclose(load_of(case, "added water pressure"), expected, rtol=1e-7, atol=1)
+    if not section:
+        assert expected[0] == pytest.approx(0.726 * 0.735 * 0.1 * WATER * 38**2, rel=1e-3)
+
+
 @pytest.mark.parametrize("section", SECTIONS)
 def test_weight_by_slices(section):
     """Area and first moments of the upper body by integration of its width."""
@@ -273,6 +314,52 @@ def test_inclined_joint():
 
 
 # -- uplift
+
+
+def test_drains_that_reduce_the_head_of_the_reservoir():
+    """USBR: a third of the difference remains at the drains."""
+    settings = {"uplift": "drained", "drain_reference": "reservoir", "drain_effectiveness": 2 / 3}
+    uplift = gravity.at(large(settings | {"drain_x": 5.0}), 1).uplift
+    assert_allclose(uplift.s, [0, 0, 5, 34])
+    assert_allclose(uplift.p / WATER, [45, 45, 3 + 42 / 3, 3])
+
+
+# -- uplift in an earthquake
+
+QUAKE = {"k_h": 0.1, "sigma_max": 0.0, "law": "bond"}
+
+
+@pytest.mark.parametrize("uplift", ["cracked", "flow"])
+def test_uplift_unchanged_by_an_earthquake(uplift):
+    """That of the crack before it: of 2.42 m at 45 m."""
+    settings = QUAKE | {"uplift": uplift, "quake_uplift": "unchanged"}
+    before = gravity.at(large(settings | {"k_h": 0.0}), 1)
+    assert before.crack_length == pytest.approx(2.42, abs=0.01)
+    found = gravity.at(large(settings), 1)
+    assert found.U == before.U and found.crack_length > before.crack_length
+    assert found.tip_stress == pytest.approx(0, abs=1)
+    crack = gravity.at(large(settings | {"quake_uplift": "crack"}), 1)
+    assert crack.U > found.U and crack.crack_length > found.crack_length
+
+
+@pytest.mark.parametrize("uplift", ["imposed", "drained", "cracked"])
+def test_no_uplift_in_the_crack_that_an_earthquake_opens(uplift):
+    """By quadrature of the pressure beside the crack, and without tension at its tip."""
+    settings = QUAKE | {"uplift": uplift, "drain_x": 8.0}
+    before = gravity.at(large(settings | {"k_h": 0.0}), 1)
+    found = gravity.at(large(settings | {"quake_uplift": "zero"}), 1)
+    a0, a = before.crack_length, found.crack_length
+    assert found.uplift.p[0] == (before.uplift.p[0] if a0 else 0)
+    pressure = lambda s: float(np.interp(s, before.uplift.s, before.uplift.p))
+    parts = [(0, a0), (a, 34)]
+    integrals = [
+        sum(quad(lambda s, k=k: pressure(s) * (34 - s) ** k, *p, points=[8.0])[0] for p in parts)
+        for k in (0, 1)
+    ]
+    assert (found.U, found.uplift.moment) == pytest.approx(integrals, rel=1e-7)
+    # the resultant acts at a third of the uncracked length
+    assert found.M == pytest.approx(found.N * (34 - a) / 3, rel=1e-9) and a > a0
+    assert a < gravity.at(large(settings), 1).crack_length
 
 
 def test_heads_are_measured_from_the_joint():

@@ -10,8 +10,9 @@ from damjoint_tools import pages
 
 PACKAGE = Path(damjoint.__file__).parent
 #: Each part uses only those before it.
-PARTS = ["", "storage", "laws", "model", "fem", "joint", "solver", "dynamics", "engines", "statics", "post"]
-PARTS += ["accuracy", "runner", "studies", "library", "gui", "cli", "__main__"]
+PARTS = ["", "storage", "progress", "laws", "model", "fem", "joint", "solver", "dynamics"]
+PARTS += ["engines", "statics", "post", "accuracy", "versions", "runner", "studies", "library"]
+PARTS += ["gui", "cli", "__main__"]
 
 
 def part_of(path):
@@ -86,7 +87,7 @@ def test_pages_are_current(name):
 @pytest.mark.parametrize("folder", ["pro", "geo", "cases"])
 def test_lines_of_gmsh_and_getdp_files_are_not_too_long(folder):
     """In Python ruff checks it."""
-    for path in damjoint.data(folder).iterdir():
+    for path in damjoint.data(folder).rglob("*"):
         if path.suffix in (".pro", ".geo", ".case"):
             long = [line for line in path.read_text().splitlines() if len(line) > 100]
             assert not long, f"{path}: {long[0]}"

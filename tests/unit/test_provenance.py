@@ -50,7 +50,7 @@ def test_the_commit_is_that_of_the_checkout_with_its_changes(tmp_path):
         return done.stdout.strip()
 
     def commit():
-        script = "from damjoint_tools.provenance import commit; print(commit())"
+        script = "from damjoint.versions import commit; print(commit())"
         words = [sys.executable, "-c", f"import sys; sys.path.insert(0, '{copy.parent}'); {script}"]
         return subprocess.run(words, capture_output=True, text=True, check=True).stdout.strip()
 

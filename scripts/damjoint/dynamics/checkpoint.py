@@ -6,6 +6,7 @@ numpy's npz: arrays and a header, nothing that could be executed.
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass, replace
@@ -63,20 +64,19 @@ def write(path: Path, key: str, quake: Earthquake, history: QuakeHistory) -> Non
     """Write the last converged step and all rows; key: fingerprint of the case."""
     now = quake.now
     variables = now.state.variables.joints, now.state.node_variables.joints
-    arrays = {f"variable_{i}": leaf for i, leaf in enumerate(leaves(variables))}
+    content: dict[str, Any] = {
+        "key": np.array(key),
+        "time": np.array(now.time),
+        "jump": now.state.jump,
+        "motion": np.array(list(leaves(now.motion))),
+        "forces": now.forces,
+        "columns": np.array(list(history.rows)),
+        "rows": np.array(list(history.rows.values())),
+        "stress": np.array(history.stress),
+    }
+    content |= {f"variable_{i}": leaf for i, leaf in enumerate(leaves(variables))}
     with atomic_write(path) as part, part.open("wb") as file:
-        np.savez(
-            file,
-            key=np.array(key),
-            time=np.array(now.time),
-            jump=now.state.jump,
-            motion=np.array(list(leaves(now.motion))),
-            forces=now.forces,
-            columns=np.array(list(history.rows)),
-            rows=np.array(list(history.rows.values())),
-            stress=np.array(history.stress),
-            **arrays,
-        )
+        np.savez(file, **content)
 
 
 def read(path: Path, key: str, quake: Earthquake) -> QuakeHistory | None:
@@ -89,9 +89,7 @@ def read(path: Path, key: str, quake: Earthquake) -> QuakeHistory | None:
                 return None
             stored = dict(file)
         static = quake.problem.static
-        arrays = iter(
-            [stored[f"variable_{i}"] for i in range(len(stored)) if f"variable_{i}" in stored]
-        )
+        arrays = (stored[f"variable_{i}"] for i in itertools.count())
         points, nodes = with_leaves((static.variables.joints, static.node_variables.joints), arrays)
         state = replace(
             static,

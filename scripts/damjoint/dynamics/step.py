@@ -21,7 +21,7 @@ from ..fem.factor import partial_factors
 from ..joint.equilibrium import Equilibrium
 from ..joint.interface import Interface
 from ..joint.joint_laws import TANGENT, JointLaws, JointVariables, Mode
-from ..joint.water import Pressure
+from ..joint.water import Pressure, Still
 from ..model.loads import Loading
 from ..solver.controls import LevelControl
 from ..solver.model import Model, StepResult
@@ -88,7 +88,11 @@ class DynamicEquilibrium(Equilibrium):
         self.pressure: tuple[Pressure, ...] = ()
 
     def pressures(
-        self, jump: Array, variables: JointVariables, loading: Loading
+        self,
+        jump: Array,
+        variables: JointVariables,
+        loading: Loading,
+        still: Still | None = None,
     ) -> tuple[Pressure, ...]:
         """The water pressure in each joint, which does not change within a step."""
         return self.pressure

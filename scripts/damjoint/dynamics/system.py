@@ -25,7 +25,8 @@ from ..fem.gluing import Gluing
 from ..joint.interface import Interface, JointInterface
 from ..joint.wet_faces import WetFace
 from ..model.case import Case
-from ..model.loads import quake_column
+from ..model.loads import AddedPressure
+from ..model.parameters import TINY
 from ..model.scene import UP
 
 #: Regions that have mass, and the parameter of their density.
@@ -58,8 +59,8 @@ class System:
         gluing = Gluing.of(bodies)
         glued = GluedBodies.of(bodies.by_name, gluing)
         dim, size = bodies.mesh.dim, len(glued.free) + gluing.unknowns
-        total = lambda: sparse.csr_matrix((size, size))
-        stiffness, of_mass, inertia = total(), total(), np.zeros((size, 2))
+        stiffness: Sparse = sparse.csr_matrix((size, size))
+        of_mass, inertia = stiffness, np.zeros((size, 2))
         motion: dict[str, Sparse] = {}
         densities = {region: case[name] for region, name in MASSIVE.items()}
         for name, body in bodies.by_name.items():
@@ -70,8 +71,8 @@ class System:
             moved = sparse.hstack([glued.numbers[name][:, glued.free], carried], format="csr")
             of_solid = mass(body.space, dim, densities)
             of_water = added_mass(case, interface, body)
-            stiffness += moved.T @ body.stiffness @ moved
-            of_mass += moved.T @ (of_solid + of_water) @ moved
+            stiffness = stiffness + moved.T @ body.stiffness @ moved
+            of_mass = of_mass + moved.T @ (of_solid + of_water) @ moved
             x, y = (translation(body.space, dim, axis) for axis in np.eye(2))
             # the water follows a vertical motion of the ground
             inertia += moved.T @ np.column_stack([(of_solid + of_water) @ x, of_solid @ y])
@@ -144,37 +145,38 @@ def crest_rows(bodies: Bodies, motion: dict[str, Sparse]) -> Sparse:
 def added_mass(case: Case, interface: Interface, body: ElasticBody) -> Sparse:
     """Mass matrix of the water in front of the upstream faces of a body (degrees of freedom, ...).
 
-    Westergaard (1933): 7/8 rho_w sqrt(H (H - y)) per area, normal to the face; of an inclined face
-    Kuo's (1982) normal component. Zero without the parameter added_mass.
+    The mass per area whose inertia is the pressure of a horizontal acceleration (Westergaard 1933,
+    Zangar 1952), normal to the face; on an inclined face it follows the normal component (Kuo
+    1982). Zero with added_mass = 0.
     """
     size = body.stiffness.shape[0]
     result = sparse.csr_matrix((size, size))
     level = case.levels[-1]
     for name, dofs in body.face_dofs.items():
         face = interface.faces[name]
-        if face.side == UP and case["added_mass"] and level > face.y.min():
-            density = 7 / 8 * case["rho_water"] * water_depths(face, level, interface.floor)
-            dim = face.dim
-            normal = sparse.hstack(
-                [face.points.values.multiply(face.normals[:, [axis]]) for axis in range(dim)]
-            ).tocsr()
-            weighted = normal.T @ sparse.diags(face.points.weights * density) @ normal
-            functions = face.points.values.shape[1]
-            number = dofs.reshape(functions, dim).T.ravel()
-            places = sparse.csr_matrix(
-                (np.ones(len(number)), (number, np.arange(len(number)))), (size, len(number))
-            )
-            result += places @ weighted @ places.T
+        if face.side != UP or not case["added_mass"] or level <= face.y.min():
+            continue
+        density = case["rho_water"] * water_depths(case, face, level, interface.floor)
+        normal = sparse.hstack(
+            [face.points.values.multiply(face.normals[:, [axis]]) for axis in range(face.dim)]
+        ).tocsr()
+        weighted = normal.T @ sparse.diags(face.points.weights * density) @ normal
+        number = dofs.reshape(-1, face.dim).T.ravel()
+        places = sparse.csr_matrix(
+            (np.ones(len(number)), (number, np.arange(len(number)))), (size, len(number))
+        )
+        result += places @ weighted @ places.T
     return result
 
 
-def water_depths(face: WetFace, level: float, floor: float) -> Array:
-    """sqrt(H (H - y)) (q,) [m] at the points of a face, H the depth of the reservoir; on a straight
+def water_depths(case: Case, face: WetFace, level: float, floor: float) -> Array:
+    """Depth of water (q,) [m] that moves with the points of a face, along its normal; on a straight
     face with exact resultant and moment.
     """
-    depth = max(level - floor, 0.0)
-    height = lambda surface, y, _tilt: np.sqrt(depth * np.maximum(surface - y, 0))
+    added = AddedPressure.unit(case, level, floor)
     if face.straight and not face.flat:
-        column = lambda surface, low, high: quake_column(surface, low, high, floor)
-        return face.corrected(level, height, column)
-    return np.asarray(height(level, face.y, face.tilt))
+        column = lambda surface, low, high: added.column(surface, low, high, face.tilt[0])
+        heights = face.corrected(level, added.height, column)
+    else:
+        heights = added.height(level, face.y, face.tilt)
+    return heights / np.maximum(face.tilt, TINY)

@@ -15,12 +15,12 @@ import numpy as np
 
 from ..arrays import Array
 from ..model.case import Case
-from ..model.loads import Loading, line_forces, quake_column, thermal_strains, water_column
+from ..model.loads import AddedPressure, Loading, line_forces, thermal_strains, water_column
 from .flow import FlowDerivative, FlowSolution
 from .interface import Interface
 from .joint_laws import TANGENT, JointLaws, JointVariables, Mode
 from .linear_system import Change
-from .water import JointWater, Pressure
+from .water import JointWater, Pressure, Still
 from .wet_faces import WetFace
 
 
@@ -46,7 +46,8 @@ class Equilibrium:
     def __init__(self, case: Case, interface: Interface) -> None:
         self.case, self.bulk, self.interface = case, interface.bulk, interface
         self.water = [
-            JointWater(own, joint) for own, joint in zip(case.joints, interface.joints, strict=True)
+            JointWater(own, joint, number)
+            for number, (own, joint) in enumerate(zip(case.joints, interface.joints, strict=True))
         ]
         #: numbers of the joints in which water flows
         self.flowing = tuple(k for k, water in enumerate(self.water) if water.flowing)
@@ -71,29 +72,27 @@ class Equilibrium:
         if case["face_load"] == "uniform":
             pressure = np.full(len(face.y), self.unit_weight * level)
             return face.spread(-pressure[:, None] * face.normals)
-        shaking = 0.0
-        if face.side == "up" and case["added_mass"]:
-            # Westergaard's pressure, times the part of the acceleration that is normal to the face
-            shaking = 7 / 8 * case["k_h"] * loading.part("quake")
-        floor = self.interface.floor
+        added = AddedPressure(0.0, self.interface.floor)
+        if face.side == "up":
+            added = AddedPressure.of(case, loading, self.interface.floor)
 
         def height(level: float, y: Array, tilt: Array) -> Array:
-            still = np.maximum(level - y, 0)
-            return still + shaking * tilt * np.sqrt(np.maximum(level - floor, 0) * still)
+            return np.maximum(level - y, 0) + added.height(level, y, tilt)
 
         def column(level: float, low: float, high: float) -> tuple[float, float]:
-            still, quake = water_column(level, low, high), quake_column(level, low, high, floor)
-            share = shaking * abs(face.normals[0, 0])
-            return still[0] + share * quake[0], still[1] + share * quake[1]
+            still = water_column(level, low, high)
+            quake = added.column(level, low, high, abs(face.normals[0, 0]))
+            return still[0] + quake[0], still[1] + quake[1]
 
         forces = self.unit_weight * face.press(level, height, column)
         grown = loading.part("silt") if face.side == "up" else 0.0
         if grown > 0 and case["silt_height"] > 0:
-            weight = grown * case["rho_silt"] * case["g"] * case["silt_K0"]
+            weight = grown * case["rho_silt"] * case["g"]
             depth = lambda level, y, _tilt: np.maximum(level - y, 0)
             silt = face.press(case["silt_height"], depth, water_column).reshape(-1, self.bulk.dim)
-            silt[:, 1:] = 0  # a horizontal pressure on the vertical projection
-            forces += weight * silt.ravel()
+            # horizontal pressure on the vertical projection, vertical one on the horizontal
+            silt *= [weight * case["silt_K0"], weight * case["silt_weight"], 0][: self.bulk.dim]
+            forces += silt.ravel()
         return forces
 
     def unit_loads(self, loading: Loading) -> dict[str, float]:
@@ -147,14 +146,19 @@ class Equilibrium:
         return total
 
     def flowing_lift(
-        self, jump: Array, variables: JointVariables, loading: Loading
+        self,
+        jump: Array,
+        variables: JointVariables,
+        loading: Loading,
+        still: Still | None = None,
     ) -> tuple[Array, list[FlowSolution]]:
         """Forces of flowing water on the faces of the joints (j,), and the solutions of its flow in
-        each joint where it flows.
+        each joint where it flows; still: see `residual`.
         """
         total, solutions = np.zeros(len(jump)), []
         for k in self.flowing:
-            lift, solution = self.water[k].flowing_lift(jump, variables.joints[k], loading)
+            opened = self.water[k].opened(jump, variables.joints[k], still)
+            lift, solution = self.water[k].flowing_lift(*opened, loading)
             total += lift
             solutions.append(solution)
         return total, solutions
@@ -166,19 +170,25 @@ class Equilibrium:
         loading: Loading,
         mode: Mode = TANGENT,
         frozen_lift: Array | None = None,
+        still: Still | None = None,
     ) -> Residual:
         """The residual and its derivatives.
 
-        mode: of the laws; frozen_lift (j,): replaces the lift of the flowing water.
+        mode: of the laws; frozen_lift (j,): replaces the lift of the flowing water; still: the
+        joints whose opening the water follows instead, see `JointWater`.
         """
         interface = self.interface
         at_points = interface.jumps(interface.at_points, jump)
         traction, tangent = self.laws.evaluate(at_points, variables, mode)
+        dried = still if any(water.dries for water in self.water) else None
+        if dried:
+            lost, lost_rate = self.lost_pressure(at_points, variables, loading, dried)
+            traction = traction + lost
         value = self.bulk.stiffness @ jump - self.loads(loading) + interface.forces(traction)
 
         flowing, solutions = bool(self.flowing) and frozen_lift is None, list[FlowSolution]()
         if flowing:
-            lift, solutions = self.flowing_lift(jump, variables, loading)
+            lift, solutions = self.flowing_lift(jump, variables, loading, still)
             value = value - lift
         elif frozen_lift is not None:
             value = value - frozen_lift
@@ -187,28 +197,52 @@ class Equilibrium:
             stiffness = tangent
             if secant:
                 stiffness = (mode.frozen or self.laws).secant_stiffness(at_points, variables)
+            if dried:
+                stiffness = stiffness + lost_rate
             change = interface.change(stiffness, self.undamaged)
-            flow = [
-                self.water[k].derivative(jump, variables.joints[k], solution)
+            following = {
+                k: self.water[k].derivative(jump, variables.joints[k], solution)
                 for k, solution in zip(self.flowing, solutions, strict=False)
-            ]
-            return replace(change, flow=FlowDerivative.joined(flow))
+                if not (still and self.water[k].remembers)
+            }
+            flow = FlowDerivative.joined(list(following.values()))
+            return replace(change, flow=flow, flowing=tuple(following))
 
         def by_level() -> Array:
             slope = -self.rate(self._loads, loading)
             if flowing:
-                lifted = lambda other: self.flowing_lift(jump, variables, other)[0]
+                lifted = lambda other: self.flowing_lift(jump, variables, other, still)[0]
                 slope = slope - self.rate(lifted, loading)
+            if dried:
+                losing = lambda other: interface.forces(
+                    self.lost_pressure(at_points, variables, other, dried)[0]
+                )
+                slope = slope + self.rate(losing, loading)
             return slope
 
         return Residual(value, by_jump, by_level)
 
+    def lost_pressure(
+        self, jump: Array, variables: JointVariables, loading: Loading, still: Still
+    ) -> tuple[Array, Array]:
+        """The losses of `JointWater.lost_pressure` at the points of all joints, for jumps (q, 3)
+        there.
+        """
+        pairs = zip(self.water, variables.split(jump[:, 0]), variables.joints, strict=True)
+        losses = [water.lost_pressure(own, v, loading, still) for water, own, v in pairs]
+        traction, rate = (np.concatenate(parts) for parts in zip(*losses, strict=True))
+        return traction, rate
+
     def pressures(
-        self, jump: Array, variables: JointVariables, loading: Loading
+        self,
+        jump: Array,
+        variables: JointVariables,
+        loading: Loading,
+        still: Still | None = None,
     ) -> tuple[Pressure, ...]:
-        """The water pressure in each joint at a jump."""
+        """The water pressure in each joint at a jump; still: see `residual`."""
         pairs = zip(self.water, variables.joints, strict=True)
-        return tuple(water.pressure(jump, own, loading) for water, own in pairs)
+        return tuple(water.pressure(jump, own, loading, still) for water, own in pairs)
 
     def crest(self, jump: Array, loading: Loading) -> float:
         """The crest's displacement along x [m]."""

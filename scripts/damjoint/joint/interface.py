@@ -277,19 +277,13 @@ class Interface:
         return Change(law=self.stiffness(change, points)[rows], rows=rows)
 
     def solve(
-        self,
-        undamaged: Array,
-        change: Change,
-        right: Array,
-        border: Border | None,
-        flowing: tuple[int, ...],
+        self, undamaged: Array, change: Change, right: Array, border: Border | None
     ) -> tuple[Array, float]:
         """Solve A x = right (j,), bordered or not; see UndamagedSystem.solve.
 
-        undamaged: tangent (q, 3, 3); flowing: numbers of the joints in which water flows. Raises
-        LinAlgError if the system is singular.
+        undamaged: tangent (q, 3, 3). Raises LinAlgError if the system is singular.
         """
-        lift = self.lift(flowing) if change.flow else None
+        lift = self.lift(change.flowing) if change.flow else None
         return self.undamaged(undamaged).solve(change, right, border, lift)
 
 

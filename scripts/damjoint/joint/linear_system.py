@@ -24,11 +24,12 @@ from .flow import FlowDerivative
 
 @dataclass(frozen=True, kw_only=True)
 class Change:
-    """L (rows, j), without its zero rows, and P if water flows."""
+    """L (rows, j), without its zero rows, and P if water flows, in joints of these numbers."""
 
     law: Sparse
     rows: IntArray
     flow: FlowDerivative | None = None
+    flowing: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,21 @@ import numpy as np
 
 from ..arrays import Array, Sparse
 from ..laws import Law
-from ..model.case import Case, flows, has_drains
+from ..model.case import Case, flows, has_drains, remembers
 from ..model.loads import Loading
 from .flow import FlowDerivative, FlowSolution
 from .interface import JointInterface
+from .joint_laws import JointVariables
+
+
+@dataclass(frozen=True)
+class Still:
+    """The joints before an earthquake that leaves their water as it is: jumps (j,) and internal
+    variables.
+    """
+
+    jump: Array
+    variables: JointVariables
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,9 +44,13 @@ class Pressure:
 class JointWater:
     """The water in a joint."""
 
-    def __init__(self, case: Case, joint: JointInterface) -> None:
-        """case: of the joint, see `Case.joints`."""
-        self.case, self.joint = case, joint
+    def __init__(self, case: Case, joint: JointInterface, number: int) -> None:
+        """case: of the joint, see `Case.joints`; number: of the joint, from 0."""
+        self.case, self.joint, self.number = case, joint, number
+        #: whether it follows in an earthquake from the joint before, and is absent in the crack
+        #: that the earthquake opens
+        self.remembers = remembers(case)
+        self.dries = self.remembers and case["quake_uplift"] == "zero"
         self.wet, self.flowing = case["uplift"] != "none", flows(case)
         #: nodes and points of the drains of flowing water
         drained = self.flowing and has_drains(case)
@@ -50,7 +65,7 @@ class JointWater:
         head of the other end if that is lower.
 
         Drains reduce the head above their outlet, the tailwater or their own height, by their
-        effectiveness (EM 1110-2-2200).
+        effectiveness (EM 1110-2-2200); USBR counts the reduction from the reservoir's head.
         """
         case, along = self.case, self.joint.fields
         fields = along.heel_y, along.toe_y, along.xi
@@ -61,7 +76,7 @@ class JointWater:
         if case["uplift"] != "drained":
             return first + (last - first) * xi
         at = case["drain_x"] / self.joint.length
-        drained = first + (last - first) * at
+        drained = first + (last - first) * (at if case["drain_reference"] == "linear" else 0)
         outlet = np.maximum(heel + (toe - heel) * at, max(case["drain_level"], loading.tail))
         drained = drained - case["drain_effectiveness"] * np.maximum(drained - outlet, 0)
         return np.where(
@@ -145,17 +160,56 @@ class JointWater:
         beyond = self.joint.fields.at_water @ self.expand_to_nodes(solution.pressure)
         return self.lift(loading, beyond), solution
 
+    def opened(self, jump: Array, variables: Any, still: Still | None) -> tuple[Array, Any]:
+        """Jump and internal variables that the water follows: the present ones, or those before an
+        earthquake.
+        """
+        if still and self.remembers:
+            return still.jump, still.variables.joints[self.number]
+        return jump, variables
+
+    def lost_pressure(
+        self, opening: Array, variables: Any, loading: Loading, still: Still
+    ) -> tuple[Array, Array]:
+        """Pressure [Pa] that the water loses at the law's points in the crack that an earthquake
+        opens, as a traction (q, 3), and its derivative (q, 3, 3).
+
+        It grows by K_N with the opening beyond that of a crack, so that a point is as stiff as in
+        contact until all of its pressure is lost.
+        """
+        number, K_N = len(opening), self.case["K_N"]
+        traction, rate = np.zeros((number, 3)), np.zeros((number, 3, 3))
+        if not self.dries:
+            return traction, rate
+        fields, joint = self.joint.fields, self.joint
+        jump, before_variables = self.opened(still.jump, None, still)
+        beyond: Array | float = 0.0
+        if self.flowing:
+            solution = self.solve_flow(jump, before_variables, loading)
+            beyond = fields.at_points @ self.expand_to_nodes(solution.pressure)
+        y = joint.points.positions[:, 1]
+        full = self.uplift(loading, fields.at_points, y, beyond)
+        before = joint.jumps(joint.at_points, jump)[:, 0]
+        cracked = before > self.law.opening_of_crack(before_variables, number)
+        wider = np.where(cracked, 0, opening - self.law.opening_of_crack(variables, number))
+        traction[:, 0] = np.clip(K_N * wider, 0, full)
+        rate[:, 0, 0] = np.where((wider > 0) & (K_N * wider < full), K_N, 0)
+        return traction, rate
+
     def derivative(self, jump: Array, variables: Any, solution: FlowSolution) -> FlowDerivative:
         """Derivative of the pressure of flowing water with the unknowns."""
         growing = self.aperture(jump, variables)[1] * self.joint.points.weights
         return self.joint.flow.derivative(solution, growing)
 
-    def pressure(self, jump: Array, variables: Any, loading: Loading) -> Pressure:
-        """The water pressure in the joint at a jump."""
+    def pressure(
+        self, jump: Array, variables: Any, loading: Loading, still: Still | None = None
+    ) -> Pressure:
+        """The water pressure in the joint at a jump; still: the joints before an earthquake."""
         joint, fields = self.joint, self.joint.fields
+        opened = self.opened(jump, variables, still)
         inner: Array | float = 0.0
         if self.flowing:
-            inner = self.solve_flow(jump, variables, loading).pressure
+            inner = self.solve_flow(*opened, loading).pressure
         beyond = self.expand_to_nodes(np.asarray(inner))
 
         def at(matrix: Sparse, positions: Array) -> Array:
@@ -165,15 +219,23 @@ class JointWater:
 
         flux, leakage = None, 0.0
         if self.case["uplift"] == "flow":
-            factor, _, narrowest = self.aperture(jump, variables)
+            factor, _, narrowest = self.aperture(*opened)
             conductivity = self.case["rho_water"] * narrowest**3 * factor / (12 * self.case["visc"])
             total = self.unit_weight * self.head(loading) + beyond
             drains = () if self.drains is None else (self.drains[0],)
             flux, leakage = joint.flow.flux(conductivity, total, joint.width, *drains)
+        points = at(fields.at_points, joint.points.positions)
+        water_points = at(fields.at_water, joint.water_points.positions)
+        nodes = at(fields.at_locations, joint.space.locations)
+        if still and self.dries:
+            opening = joint.jumps(joint.at_points, jump)[:, 0]
+            lost_at_points = self.lost_pressure(opening, variables, loading, still)[0][:, 0]
+            weights = joint.points.weights  # at the nodes so that the resultant is the same
+            spread = fields.at_points.T @ (weights * lost_at_points)
+            lost_at_nodes = spread / (fields.at_points.T @ weights)
+            points = points - lost_at_points
+            water_points = water_points - fields.at_water @ lost_at_nodes
+            nodes = np.maximum(nodes - fields.at_locations @ lost_at_nodes, 0)
         return Pressure(
-            points=at(fields.at_points, joint.points.positions),
-            water_points=at(fields.at_water, joint.water_points.positions),
-            nodes=at(fields.at_locations, joint.space.locations),
-            flux=flux,
-            leakage=leakage,
+            points=points, water_points=water_points, nodes=nodes, flux=flux, leakage=leakage
         )

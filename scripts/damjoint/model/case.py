@@ -41,6 +41,7 @@ from .scene import stacked
 from .values import ParameterValues
 from .values import flows as flows
 from .values import has_drains as has_drains
+from .values import remembers as remembers
 
 CASES = data("cases")
 
@@ -48,6 +49,7 @@ CASES = data("cases")
 SHARED = (
     *("strategy_growth", "strategy_secant", "strategy_release", "strategy_iterations", "cut"),
     *("round_off", "coarsest", "artificial", "release_length", "crack_aperture", "crack_most"),
+    *("zangar_angle", "zangar_cm"),
 )
 
 #: Variables of pro/section.pro: the joint's ends, the segments of the faces, the marks of line

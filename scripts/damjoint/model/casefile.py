@@ -2,7 +2,8 @@
 
 A case is a list of statements, in any layout, with // and /* */ comments:
 
-    Include "other.case";            the statements of another case file, beside this one
+    Include "other.case";            the statements of another case file, beside this one, or of the
+                                     package: "presets/usace_usual.case"
     title = "words";
     also_uplift = "none";            further uplift modes the case is published with
     geometry = "own.msh";            your own mesh or .geo, beside this file
@@ -24,7 +25,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeAlias
 
-from .. import InputError
+from .. import InputError, data
 from ..arrays import Value
 from .arithmetic import arithmetic_value, explained
 from .parameters import assignments, checked, declared, parameter
@@ -113,6 +114,12 @@ def read_into(case: CaseText, path: Path) -> None:
         raise InputError(f"{where}: {excerpt(statement)}: does not end with a semicolon")
 
 
+def included(name: str, path: Path) -> Path:
+    """The file that a case file includes: beside it, else that of the package."""
+    beside, packaged = path.parent / name, data("cases") / name
+    return packaged if packaged.is_file() and not beside.exists() else beside
+
+
 def text_of(path: Path) -> str:
     """The text of a case file, not longer than LONGEST."""
     try:
@@ -137,7 +144,7 @@ def add_statement(case: CaseText, statement: list[Token], path: Path, where: str
     where = f"{where}: {excerpt(statement)}"
     name = tokens[0] if kinds[:1] == ("name",) else ""
     if name == "Include" and kinds[1:] == ("text",):
-        read_into(case, path.parent / tokens[1][1:-1])
+        read_into(case, included(tokens[1][1:-1], path))
     elif name in LISTS and tokens[1:4] == ("(", ")", "="):
         case.lists[name] = numbers(items_of(kinds[4:], tokens[4:], where), case, where)
     elif name in TEXTS and tokens[1:2] == ("=",):

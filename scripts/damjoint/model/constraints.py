@@ -15,6 +15,9 @@ from ..laws import LAWS
 from .parameters import constants, declared
 from .values import Group, ParameterValues, flows, has_drains
 
+#: Value of added_mass: Zangar's pressure in place of Westergaard's.
+ZANGAR = 2
+
 #: Limits of the numbers of steps between two levels, and of levels, each of which has its table.
 MOST_STEPS, MOST_LEVELS = 100_000, 10_000
 
@@ -35,6 +38,11 @@ def check_values(
         )
     check_drains(case, section["joint_length"][0])
     check_works(case)
+    if not by_parameters and case["added_mass"] == ZANGAR:
+        raise InputError(
+            "added_mass = 2: must be 0 or 1 with a geometry of one's own (Zangar's pressure needs "
+            "the angle of the section's upstream face)"
+        )
 
 
 def check_energies(case: ParameterValues) -> None:

@@ -31,6 +31,13 @@ class Solution:
     bodies: dict[str, Body]
     fields: dict[float, Field]
 
+    def of_joint(self, number: int) -> Solution:
+        """The same with the results and the surface of a single joint, by its number from 0."""
+        own = numbered("joint", number)
+        surface = {"joint": self.bodies[own]} if own in self.bodies else {}
+        result = self.result.joints[number]
+        return Solution(result, self.bodies | surface, self.fields)
+
 
 #: Fields of the joint: name, unit, and the columns of joint.csv along x, y, z (or a single column).
 OF_JOINT = {

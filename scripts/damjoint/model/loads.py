@@ -7,13 +7,15 @@ Coordinates: y = 0 at the heel of the base. A column is the resultant of a press
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..arrays import Array
 from .case import Case
+from .constraints import ZANGAR
 from .mesh import Face
+from .parameters import TINY
 from .scene import DOWN, SIDES, TOP, UP
 
 #: Loads that grow linearly from t = <name>_t - 1 to t = <name>_t.
@@ -137,3 +139,74 @@ def quake_column(level: float, low: float, high: float, floor: float) -> tuple[f
     first = 2 / 3 * (most**1.5 - least**1.5)
     second = 2 / 5 * (most**2.5 - least**2.5)
     return depth**0.5 * first, depth**0.5 * (level * first - second)
+
+
+def zangar_column(level: float, low: float, high: float, floor: float) -> tuple[float, float]:
+    """Column of Zangar's H (u + sqrt(u)), u = 1 - v^2, v = y'/H, H = level - floor, y' from the
+    floor, per C_m k_h/2 [Zangar 1952].
+    """
+    depth = level - floor
+    if level <= low or depth <= 0:
+        return 0.0, 0.0
+
+    def integrals(y: float) -> tuple[float, float]:
+        v = min((y - floor) / depth, 1.0)
+        root = math.sqrt(1 - v**2)
+        return v - v**3 / 3 + (v * root + math.asin(v)) / 2, v**2 / 2 - v**4 / 4 - root**3 / 3
+
+    (area, lever), (area_low, lever_low) = integrals(high), integrals(low)
+    first = depth**2 * (area - area_low)
+    return first, floor * first + depth**3 * (lever - lever_low)
+
+
+def zangar_share(case: Case, level: float) -> float:
+    """Zangar's largest pressure coefficient C_m, by the angle of the upstream face.
+
+    A face whose vertical part is at least half of the dam's height counts as vertical, any other as
+    the line from its foot to the waterline [USBR 1987].
+    """
+    batter, height, angle = case["batter"], case["batter_height"], 0.0
+    if height > case["dam_height"] / 2 and level > 0:
+        angle = math.degrees(math.atan(batter * min(level, height) / height / level))
+    return float(np.interp(angle, case.shared["zangar_angle"], case.shared["zangar_cm"]))
+
+
+@dataclass(frozen=True)
+class AddedPressure:
+    """The added pressure of the water on the upstream face in an earthquake, per unit weight [m]:
+    of Westergaard, times the horizontal part of the face's normal, or of Zangar.
+    """
+
+    #: 7/8 k_h, or C_m k_h/2
+    size: float
+    #: foot of the face [m]
+    floor: float
+    zangar: bool = False
+
+    @staticmethod
+    def of(case: Case, loading: Loading, floor: float) -> AddedPressure:
+        """That of a case at a loading; size 0 without an earthquake."""
+        full = AddedPressure.unit(case, loading.level, floor)
+        return replace(full, size=full.size * case["k_h"] * loading.part("quake"))
+
+    @staticmethod
+    def unit(case: Case, level: float, floor: float) -> AddedPressure:
+        """That of a case for k_h = 1: the depth of water that moves with the face."""
+        zangar = case["added_mass"] == ZANGAR
+        factor = zangar_share(case, level) / 2 if zangar else 7 / 8
+        return AddedPressure(factor if case["added_mass"] else 0.0, floor, zangar)
+
+    def height(self, level: float, y: Array, tilt: Array) -> Array:
+        """Heights of pressure at heights y [m] where the normal has the horizontal part tilt."""
+        depth = np.maximum(level - self.floor, 0)
+        if not self.zangar:
+            return self.size * tilt * np.sqrt(depth * np.maximum(level - y, 0))
+        u = np.maximum(1 - ((y - self.floor) / max(depth, TINY)) ** 2, 0) * (y < level)
+        return self.size * depth * (u + np.sqrt(u))
+
+    def column(self, level: float, low: float, high: float, tilt: float) -> tuple[float, float]:
+        """Its column on a face from low to high."""
+        column = zangar_column if self.zangar else quake_column
+        share = self.size * (1.0 if self.zangar else tilt)
+        force, moment = column(level, low, high, self.floor)
+        return share * force, share * moment

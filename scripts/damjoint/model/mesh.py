@@ -8,10 +8,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scipy import sparse
 
 from .. import InputError, RunError, data
 from ..arrays import Array, BoolArray, IntArray, Setting
@@ -19,6 +18,9 @@ from ..storage import check_end
 from .case import Case, OfJoint, has_drains
 from .parameters import assignments, constants, listing, start_gmsh
 from .scene import BED, DOWN, FLOOR, SIDES, TOP, UP, Joint, numbered, stacked
+
+if TYPE_CHECKING:
+    from scipy import sparse
 
 #: Parameters that the mesh always depends on.
 GEOMETRY = (
@@ -593,6 +595,8 @@ def outward(surface: Body, body: Body) -> tuple[Array, BoolArray] | None:
 
 def incidence(body: Body, size: int) -> sparse.csr_matrix:
     """Which of the mesh's nodes each element has (elements, size)."""
+    from scipy import sparse  # a tenth of a second, which pictures do not need
+
     columns = np.concatenate([body.node_tags[table].ravel() for _, table in body.cells])
     widths = np.concatenate([np.full(len(t), t.shape[1]) for _, t in body.cells])
     pointers = np.concatenate([[0], np.cumsum(widths)])

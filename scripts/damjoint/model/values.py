@@ -17,9 +17,11 @@ TextName: TypeAlias = Literal[
     "mesh_pattern",
     "quadrature",
     "force_face",
+    "drain_reference",
+    "quake_uplift",
+    "required_position",
     "record_unit",
     "record_component",
-    "quake_uplift",
 ]
 
 
@@ -55,18 +57,30 @@ class MeshGroup(Group):
     quadrature: str
 
 
+class WaterGroup(Group):
+    """Density and viscosity of the water, aperture of the closed joint, drains."""
+
+    drain_reference: str
+
+
 class LoadGroup(Group):
     """Loads besides the water."""
 
     force_face: str
+    quake_uplift: str
+
+
+class CheckGroup(Group):
+    """Safety factors, position of the resultant and strength that are required."""
+
+    required_position: str
 
 
 class EarthquakeGroup(Group):
-    """Record, time integration, damping, water in the joints during an earthquake."""
+    """Record of the ground, time integration, damping."""
 
     record_unit: str
     record_component: str
-    quake_uplift: str
 
 
 class ParameterValues:
@@ -113,9 +127,9 @@ class ParameterValues:
         return Group(self._group("Joint"))
 
     @cached_property
-    def water(self) -> Group:
+    def water(self) -> WaterGroup:
         """Density and viscosity of the water, aperture of the closed joint, drains."""
-        return Group(self._group("Water"))
+        return WaterGroup(self._group("Water"))
 
     @cached_property
     def loads(self) -> LoadGroup:
@@ -124,7 +138,7 @@ class ParameterValues:
 
     @cached_property
     def earthquake(self) -> EarthquakeGroup:
-        """Record, time integration, damping, water in the joints during an earthquake."""
+        """Record of the ground, time integration, damping."""
         return EarthquakeGroup(self._group("Earthquake"))
 
     @cached_property
@@ -133,9 +147,9 @@ class ParameterValues:
         return Group(self._group("Solver"))
 
     @cached_property
-    def checks(self) -> Group:
-        """Safety factors and strength that are required."""
-        return Group(self._group("Checks"))
+    def checks(self) -> CheckGroup:
+        """Safety factors, position of the resultant and strength that are required."""
+        return CheckGroup(self._group("Checks"))
 
 
 def flows(values: Values | ParameterValues) -> bool:
@@ -146,3 +160,11 @@ def flows(values: Values | ParameterValues) -> bool:
 def has_drains(values: Values | ParameterValues) -> bool:
     """Whether drains lower the water pressure in the joint."""
     return values["uplift"] == "drained" or bool(flows(values) and values["drains"])
+
+
+def remembers(values: Values | ParameterValues) -> bool:
+    """Whether the water pressure in an earthquake follows from the joint before it."""
+    mode, uplift = values["quake_uplift"], values["uplift"]
+    if uplift == "none" or not (values["k_h"] or values["k_v"]):
+        return False
+    return mode == "zero" or (mode == "unchanged" and flows(values))

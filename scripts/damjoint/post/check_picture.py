@@ -15,8 +15,18 @@ from ..model.fields import SOFTENING, along, state_of
 from ..model.parameters import constants
 from ..model.results import Results
 from ..statics.gravity import GravityMethod
-from .drawing import BLUE, CONCRETE, GREEN, ORANGE, RED, VIOLET, WATER, figure_of, write_picture
-from .pictures import heading
+from .drawing import (
+    BLUE,
+    CONCRETE,
+    GREEN,
+    ORANGE,
+    RED,
+    STATES,
+    WATER,
+    figure_of,
+    write_picture,
+)
+from .pictures import gravity_profile, heading
 from .units import STRESSES, unit
 
 ROCK, SILT, EDGE = "#e6dcc8", "#a98d5d", "#5a5a5a"
@@ -26,11 +36,14 @@ LOWER_BODY, LINES = "#dde2e8", "#b0b0b0"
 UPLIFT_AT, STRESS_AT, TALL = 0.14, 0.52, 0.24
 CRACK_AT, LONGER_AT, ARROW = -0.02, -0.04, 0.4
 #: Ground beside the dam over its base; below the dam over its height.
-BESIDE, BELOW = 0.45, 0.1
+BESIDE, BELOW = 0.6, 0.1
 #: Places along the joint between which a resultant is drawn; heel 0, toe 1.
 DRAWN_RESULTANT = (-0.3, 1.3)
-#: Of the figure: axes of section and table (left, bottom, width, height).
-SECTION, TABLE = (0.055, 0.075, 0.59, 0.81), (0.665, 0.075, 0.325, 0.81)
+#: Size of the figure [inches]; of the figure: left and width of section and table, their bottom,
+#: left margin, heights of a line of the title and of the reasons.
+SIZE = (11.2, 7.2)
+SECTION, TABLE = (0.06, 0.585), (0.665, 0.325)
+BOTTOM, MARGIN, TITLE, REASON = 0.075, 0.02, 0.035, 0.025
 #: Of the table's axes: height of a row and of the table at most.
 ROW, TALLEST = 0.045, 0.75
 
@@ -48,19 +61,31 @@ def draw_check(
     cells: table beside the picture, headings in the first row, quantities in the first column;
     why: the requirements that are not met.
     """
-    figure = figure_of(11, 7.2)
-    section, beside = figure.add_axes(SECTION), figure.add_axes(TABLE)
-    title = textwrap.fill(heading(result), 100)
-    figure.text(SECTION[0], 0.975, title, fontsize=13, va="top", parse_math=False)
-    figure.text(SECTION[0], 0.94, textwrap.fill(why, 150), fontsize=9, color=RED, va="top")
+    figure = figure_of(*SIZE)
+    title, reasons = textwrap.wrap(heading(result), 100), textwrap.wrap(why, 150)
+    top = 0.97 - TITLE * len(title) - REASON * len(reasons)
+    section, beside = (
+        figure.add_axes((left, BOTTOM, width, top - BOTTOM)) for left, width in (SECTION, TABLE)
+    )
+    figure.text(MARGIN, 0.985, "\n".join(title), fontsize=12, va="top", parse_math=False)
+    figure.text(
+        *(MARGIN, 0.98 - TITLE * len(title)),
+        "\n".join(reasons),
+        fontsize=9,
+        color=RED,
+        va="top",
+        parse_math=False,
+    )
     draw_scene(section, method)
     draw_joint(section, result, method)
+    section.set_anchor("NW")
     handles, labels = section.get_legend_handles_labels()
-    beside.legend(handles, labels, loc="lower left", fontsize=9, frameon=False)
+    labels = [textwrap.fill(label, 48) for label in labels]
+    beside.legend(handles, labels, loc="lower left", fontsize=8.5, frameon=False, handlelength=3)
     beside.axis("off")
     draw_cells(beside, cells)
     path = folder / f"{method.case.name}_check.png"
-    write_picture(figure, path, 130)
+    write_picture(figure, path, 120)
     return path
 
 
@@ -184,9 +209,11 @@ def draw_joint(axes: Axes, result: Results, method: GravityMethod) -> None:
     uplift = method.uplift.s / under.length, method.uplift.p
     computed_p, computed_stress = (rows.get(name, none) for name in ("p", "sigma_n_eff"))
     stress = f"effective stress, {SIGN}"
+    by_hand, gravity_stress = gravity_profile(method)
+    profile = by_hand / under.length, gravity_stress
     for diagram in (
         Diagram("uplift", UPLIFT_AT, WATER, 1, uplift, (s, computed_p)),
-        Diagram(stress, STRESS_AT, ORANGE, -1, effective_stress(method), (s, computed_stress)),
+        Diagram(stress, STRESS_AT, ORANGE, -1, profile, (s, computed_stress)),
     ):
         draw_diagram(axes, under, diagram, f"{diagram.name}, {label}")
     if rows:
@@ -223,11 +250,13 @@ def draw_states(
         axes.plot(*line, color=RED, linewidth=3, label=f"crack, {label}", zorder=4)
     if (softening := state_of(rows) == SOFTENING).any():
         line = under.place(s, np.where(softening, 0, np.nan))
-        axes.plot(*line, color=VIOLET, linewidth=3, label=f"softening, {label}", zorder=2)
+        style = STATES[SOFTENING]
+        look = {"color": style.color, "linestyle": style.line, "linewidth": 3, "zorder": 2}
+        axes.plot(*line, **look, label=f"{style.label}, {label}")
 
 
 def draw_diagram(axes: Axes, under: UnderJoint, diagram: Diagram, label: str) -> None:
-    """Draw a diagram with its name and the end values of the gravity method."""
+    """Draw a diagram with its name and the values of both methods at its ends."""
     by_hand, computed, depth = diagram.gravity, diagram.computed, diagram.depth
     both = by_hand[1], computed[1]
     size, factor = unit(list(both), STRESSES)
@@ -242,21 +271,12 @@ def draw_diagram(axes: Axes, under: UnderJoint, diagram: Diagram, label: str) ->
         axes.plot(*line, color=diagram.color, label=label)
     axes.plot(*outline(*by_hand), "--", color="black", linewidth=1)
     axes.text(*under.place(0.5, depth - 0.02), diagram.name, ha="center", va="bottom", fontsize=9)
-    for s, value, side in ((-0.015, by_hand[1][0], "right"), (1.015, by_hand[1][-1], "left")):
-        text = f"{value * factor:.3g} {size}"
-        axes.text(*under.place(s, depth), text, ha=side, va="center", fontsize=8.5)
-
-
-def effective_stress(method: GravityMethod) -> tuple[np.ndarray, np.ndarray]:
-    """Effective stress of the gravity method: places s and values [Pa], tension > 0; zero in the
-    crack, linear beyond its tip.
-    """
-    if not method.uncracked:
-        return np.array([0.0, 1.0]), np.zeros(2)
-    tip = method.crack_length / method.body.length
-    s, stress = [tip, 1.0], [method.tip_stress, method.sigma_n_eff_toe]
-    crack = [0.0, tip] if tip else []
-    return np.array([*crack, *s]), np.array([*(0.0 for _ in crack), *stress])
+    for end, s, side in ((0, -0.015, "right"), (-1, 1.015, "left")):
+        values = {"FE": computed[1], "gravity": by_hand[1]}
+        shown = {name: f"{v[end] * factor:.3g} {size}" for name, v in values.items() if len(v)}
+        same = len(set(shown.values())) == 1
+        lines = [shown["gravity"]] if same else [f"{name} {v}" for name, v in shown.items()]
+        axes.text(*under.place(s, depth), "\n".join(lines), ha=side, va="center", fontsize=8)
 
 
 def draw_resultant(

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import base64
+import sys
+from collections.abc import Mapping
 from pathlib import Path
 
-import meshio
 import numpy as np
 
 from ..arrays import Table
@@ -22,6 +24,10 @@ ELEMENTS = {
     "hexahedron": (5, 3),
     "wedge": (6, 3),
 }
+#: Cell types of VTK by shape.
+VTK_TYPES = {"line": 3, "triangle": 5, "quad": 9, "tetra": 10, "hexahedron": 12, "wedge": 13}
+#: Corners of a wedge in the order of VTK, whose first triangle points outwards.
+VTK_WEDGE = [0, 2, 1, 3, 5, 4]
 #: Components xx, xy, xz, yx, ... of a Gmsh tensor among those of `Field.stress`.
 TENSOR = [0, 3, 5, 3, 1, 4, 5, 4, 2]
 
@@ -46,19 +52,11 @@ def write_fields(solution: Solution, folder: Path) -> None:
     stress = {t: np.vstack([f.stress[n] for n in bodies]) for t, f in fields.items()}
     on_joint = {time: joints_data(solution, time) for time in fields}
 
-    cuts = np.cumsum([len(table) for _, table in cells])[:-1]
     for time in fields:
-        bulk = meshio.Mesh(
-            points,
-            cells,
-            point_data={"displacement": displacement[time]},
-            cell_data={"stress": np.split(stress[time], cuts), "body": regions},
-        )
-        write_vtu(folder / f"bulk_t{time:g}.vtu", bulk)
-        write_vtu(
-            folder / f"joint_t{time:g}.vtu",
-            meshio.Mesh(joint.points, joint.cells, point_data=on_joint[time]),
-        )
+        at_nodes = {"displacement": displacement[time]}
+        in_elements = {"stress": stress[time], "body": regions}
+        write_vtu(folder / f"bulk_t{time:g}.vtu", points, cells, at_nodes, in_elements)
+        write_vtu(folder / f"joint_t{time:g}.vtu", joint.points, joint.cells, on_joint[time], {})
     write_collection(folder, fields)
     bulk_views: list[View] = [
         ("displacement [m]", "NodeData", displacement),
@@ -108,15 +106,17 @@ def joints_data(solution: Solution, time: float) -> Table:
     }
 
 
-def bulk_cells(bodies: dict[str, Body]) -> tuple[Cells, list[np.ndarray]]:
-    """Collect the cells of bodies with common point numbers, and the region number of each cell."""
+def bulk_cells(bodies: dict[str, Body]) -> tuple[Cells, np.ndarray]:
+    """Collect the cells of bodies with common point numbers, and the region number of each cell
+    (n,).
+    """
     cells, regions, first = [], [], 0
     for name, body in bodies.items():
         cells += [(shape, table + first) for shape, table in body.cells]
         for region, (_, table) in zip(body.regions, body.cells, strict=True):
             regions.append(np.full(len(table), number_of(name, region)))
         first += len(body.points)
-    return cells, regions
+    return cells, np.concatenate(regions)
 
 
 def number_of(body: str, region: str) -> int:
@@ -126,10 +126,58 @@ def number_of(body: str, region: str) -> int:
     return int(constants()[region.upper()][0]) + layer
 
 
-def write_vtu(path: Path, mesh: meshio.Mesh) -> None:
-    """Write a mesh with its data for ParaView."""
+def write_vtu(
+    path: Path,
+    points: np.ndarray,
+    cells: Cells,
+    point_data: Mapping[str, np.ndarray],
+    cell_data: Mapping[str, np.ndarray],
+) -> None:
+    """Write a mesh with its data for ParaView, in VTK's XML format: arrays in base64, each after
+    the number of its bytes.
+
+    points: (n, 3); point_data, cell_data: arrays (n,) or (n, components) by name.
+    """
+    counts = [len(table) for _, table in cells]
+    corners = np.repeat([table.shape[1] for _, table in cells], counts)
+    topology = {
+        "connectivity": np.concatenate(
+            [(t[:, VTK_WEDGE] if shape == "wedge" else t).ravel() for shape, t in cells]
+        ),
+        "offsets": np.cumsum(corners),
+        "types": np.repeat([VTK_TYPES[shape] for shape, _ in cells], counts),
+    }
+    parts = {
+        "Points": {"Points": points},
+        "Cells": topology,
+        "PointData": point_data,
+        "CellData": cell_data,
+    }
+    content = "".join(
+        f"<{tag}>\n{''.join(data_array(*item) for item in arrays.items())}</{tag}>\n"
+        for tag, arrays in parts.items()
+    )
+    order = f'byte_order="{sys.byteorder.title()}Endian" header_type="UInt64"'
+    lines = [
+        f'<VTKFile type="UnstructuredGrid" version="1.0" {order}>',
+        "<UnstructuredGrid>",
+        f'<Piece NumberOfPoints="{len(points)}" NumberOfCells="{sum(counts)}">',
+        f"{content}</Piece>",
+        "</UnstructuredGrid>",
+        "</VTKFile>",
+    ]
     with atomic_write(path) as part:
-        mesh.write(part, compression=None)
+        part.write_text("\n".join(lines) + "\n")
+
+
+def data_array(name: str, values: np.ndarray) -> str:
+    """XML element of an array of floats or integers (n,) or (n, components)."""
+    kind = {"f": "Float", "i": "Int"}[values.dtype.kind] + str(8 * values.itemsize)
+    components = f' NumberOfComponents="{values.shape[1]}"' if values.ndim > 1 else ""
+    text = base64.b64encode(np.uint64(values.nbytes).tobytes() + values.tobytes()).decode()
+    return (
+        f'<DataArray type="{kind}" Name="{name}"{components} format="binary">{text}</DataArray>\n'
+    )
 
 
 def write_collection(folder: Path, fields: dict[float, Field]) -> None:

@@ -6,6 +6,7 @@ Each is drawn into a figure or subfigure: side by side in CASE.png, alone in a r
 
 from __future__ import annotations
 
+import os
 import textwrap
 from pathlib import Path
 from typing import NamedTuple
@@ -13,22 +14,15 @@ from typing import NamedTuple
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
+from matplotlib.colors import TwoSlopeNorm
 from matplotlib.figure import Figure, FigureBase
-from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+from matplotlib.ticker import MaxNLocator
+from matplotlib.tri import Triangulation
 
 from .. import ROUND_OFF
 from ..model.case import Case
-from ..model.fields import (
-    OPEN,
-    SLIPPED,
-    SOFTENING,
-    Solution,
-    along,
-    distance,
-    joint_body,
-    row_of_nodes,
-    state_of,
-)
+from ..model.fields import Solution, along, distance, row_of_nodes, state_of
+from ..model.mesh import Body
 from ..model.results import Results
 from ..statics import gravity
 from ..statics.verdict import decisive_joint, overturning_level, statement
@@ -40,29 +34,37 @@ from .drawing import (
     GREY,
     ORANGE,
     RED,
+    STATES,
     VIOLET,
     WATER,
     figure_of,
     legend_above,
     panels,
+    runs_of,
     write_picture,
 )
 from .outline import exaggeration, skin
 from .section_picture import draw_section
 from .units import FLUXES, LENGTHS, STRESSES, Units, unit
+from .validation import shown_time
 
-DPI = 110
-#: Inches: width of the figure; heights of heading, section with joint, history, 3D view with maps.
-WIDTH, HEAD, UPPER, HISTORY, SOLID = 13.0, 0.75, 7.2, 2.5, 4.6
-#: Left margin [inches]; characters per inch and height in the figure of title and message.
-MARGIN = 0.7
-TITLE, MESSAGE = (8.5, 0.8), (14, 0.35)
+DPI = 120
+#: Inches: size of the figure, which fits a page A4 across (in 3D with the maps: upright); height of
+#: the history, of 3D view and maps, of a line of the title and of the message.
+WIDTH, HEIGHT, HISTORY, SOLID = 11.2, 7.8, 1.85, 4.0
+TITLE, MESSAGE = 0.3, 0.18
+#: Left margin [inches]; characters per inch of title and message.
+MARGIN, PER_INCH = 0.15, (9.5, 15)
 #: Width of the panels on the right over that of the section on the left.
-RIGHT = 1.15
+RIGHT = 1.25
 #: Share of the shear's range that must be negative for the limit to be drawn with both signs.
 BOTH_SIGNS = 0.02
 #: Limits of an axis in percent: lines at 0 and 100 are visible.
 PERCENT = (-3, 103)
+#: Percentiles between which a map has a scale; its last colors are those of all values beyond.
+SCALED, CLIPPED = (2, 98), 0.25
+#: Intervals of the scale of a map, about; its least range.
+LEVELS, TINY = 10, 1e-9
 DISTANCE = "distance from the heel along the joint [m]"
 
 
@@ -76,48 +78,48 @@ def draw(solution: Solution, folder: Path) -> Path:
     return path
 
 
+def prepare() -> None:
+    """Load what drawing loads at its first use: fonts and the writer of PNG."""
+    figure = figure_of(1, 1)
+    figure.text(0, 0, "0")
+    write_picture(figure, Path(os.devnull), DPI)
+
+
 def picture(solution: Solution) -> Figure:
     """Section and joint at the last state, or that of the published numbers; the history."""
     result = solution.result
     case = result.case
     has_states = bool(len(result.joint["time"]))
-    heights = [HEAD]
+    title = textwrap.wrap(heading(result), int(PER_INCH[0] * WIDTH))
+    message = textwrap.wrap(statement(result), int(PER_INCH[1] * WIDTH))
+    head = TITLE * len(title) + MESSAGE * len(message) + 0.05
+    heights = [head]
     if has_states:
-        heights += [UPPER, HISTORY, SOLID] if case["dim"] == 3 else [UPPER, HISTORY]
+        heights += [HEIGHT - head - HISTORY, HISTORY]
+        if case["dim"] == 3 and solution.fields and not is_own_solid(case):
+            heights.append(SOLID)
     figure = figure_of(WIDTH, sum(heights))
-    head, *parts = np.ravel(figure.subfigures(len(heights), 1, height_ratios=heights))
-    write_heading(head, result)
+    top, *parts = np.ravel(figure.subfigures(len(heights), 1, height_ratios=heights))
+    write_heading(top, title, message)
     if has_states:
         time = shown_time(result)
         left, right = parts[0].subfigures(1, 2, width_ratios=(1, RIGHT))
         draw_dam(left, solution, time)
-        joint = decisive_joint(result)
-        own = result.joints[joint]
+        own = solution.of_joint(decisive_joint(result))
         draw_joint(right, own, time)
-        if case.of_joints:
-            right.suptitle(case.joint_names[joint], fontsize=9)
-        draw_history(parts[1], own)
-        if case["dim"] == 3:
+        draw_history(parts[1], own.result)
+        if len(parts) > 2:
             draw_solid(parts[2], solution, time)
     return figure
 
 
-def shown_time(result: Results) -> float:
-    """Requested time of the state drawn: the last, or that of the published numbers."""
-    times = result.joint["time"]
-    published_time = validation.reference_time(result.case)
-    published = validation.references(result.case) and np.isclose(times, published_time).any()
-    return published_time if published else times.max()
-
-
-def write_heading(figure: FigureBase, result: Results) -> None:
-    """Write the title of the picture and the message of the run."""
-    width = figure.bbox.width / figure.dpi
-    (per_inch, y), (small_per_inch, lower_y) = TITLE, MESSAGE
-    title = textwrap.fill(heading(result), int(per_inch * width))
-    figure.text(MARGIN / width, y, title, fontsize=13, va="top", parse_math=False)
-    message = textwrap.fill(statement(result), int(small_per_inch * width))
-    figure.text(MARGIN / width, lower_y, message, fontsize=9, color=RED, va="top")
+def write_heading(figure: FigureBase, title: list[str], message: list[str]) -> None:
+    """Write the lines of title and message."""
+    width, height = figure.bbox.size / figure.dpi
+    x, y = MARGIN / width, 1 - 0.1 / height
+    figure.text(x, y, "\n".join(title), fontsize=12, va="top", parse_math=False)
+    y -= TITLE * len(title) / height
+    figure.text(x, y, "\n".join(message), fontsize=8.5, color=RED, va="top", parse_math=False)
 
 
 def heading(result: Results) -> str:
@@ -133,7 +135,8 @@ def heading(result: Results) -> str:
         title += f", tailwater {state['tail_level']:.4g} m"
     if case["uplift"] == "flow":
         title += f", leakage {state['flux']:.3g} kg/(m s)"
-    return title
+    shown = case.named((decisive_joint(result),))
+    return title + (f"; curves: {shown}" if shown else "")
 
 
 def shear_limit(case: Case, rows: dict[str, np.ndarray]) -> tuple[str, np.ndarray] | None:
@@ -146,29 +149,46 @@ def shear_limit(case: Case, rows: dict[str, np.ndarray]) -> tuple[str, np.ndarra
     return f"limit: {law.shear_strength_formula}{hardening}", strength
 
 
-def draw_joint(figure: FigureBase, result: Results, time: float) -> None:
+def draw_joint(figure: FigureBase, solution: Solution, time: float) -> None:
+    """Draw the joint: curves along it, or maps where it is a surface of any shape (without fields
+    its mesh is not known).
+    """
+    if solution.fields and is_own_solid(solution.result.case):
+        draw_maps(figure, solution, time)
+    else:
+        draw_curves(figure, solution.result, time)
+
+
+def draw_curves(figure: FigureBase, result: Results, time: float) -> None:
     """Draw jumps, normal stress and shear along the joint (means over z in 3D), with the published
     values, or without any the stress of the gravity method.
     """
     case, curves = result.case, along(result.at(time))
-    jumps, normals, shears = panels(figure, 3, 1, top=0.5, down=0.42).flat
+    s, states = curves["s"], state_of(curves)
+    jumps, normals, shears = panels(figure, 3, 1, bottom=0.55, top=0.28, down=0.32).flat
     draw_jumps(jumps, case, curves)
     factor = draw_normal_stress(normals, case, curves)
     if not (validation.references(case) or case.geometry):
         draw_gravity_stress(normals, gravity.at(case, time, result.state(time)["level"]), factor)
     draw_shear(shears, case, curves)
-    state = state_of(curves)
+    ends = np.concatenate([s[:1], (s[1:] + s[:-1]) / 2, s[-1:]])
     for axes in (jumps, normals, shears):
         full_height = axes.get_xaxis_transform()
-        for number, color in ((OPEN, RED), (SOFTENING, VIOLET), (SLIPPED, ORANGE)):
-            style = {"color": color, "alpha": 0.07, "linewidth": 0, "transform": full_height}
-            axes.fill_between(curves["s"], 0, 1, where=state == number, **style)
+        for number, first, end in runs_of(states):
+            if number in STATES:
+                parts = [(ends[first], ends[end] - ends[first])]
+                style = STATES[number].area()
+                axes.broken_barh(parts, (0, 1), transform=full_height, zorder=0, **style)
         axes.axhline(0, color="black", linewidth=0.5)
         axes.grid(alpha=0.3)
         axes.margins(x=0.01)
         axes.tick_params(labelbottom=axes is shears)
         legend_above(axes)
-    shears.set_xlabel(DISTANCE)
+    shears.set_xlabel(DISTANCE, fontsize=9)
+    occurring = [style.patch() for number, style in STATES.items() if (states == number).any()]
+    if occurring:
+        place = {"loc": "lower left", "bbox_to_anchor": (0.1, -0.01), "ncols": len(occurring)}
+        figure.legend(handles=occurring, **place, fontsize=7.5, frameon=False, borderpad=0.2)
 
 
 def draw_jumps(axes: Axes, case: Case, curves: dict[str, np.ndarray]) -> None:
@@ -176,12 +196,12 @@ def draw_jumps(axes: Axes, case: Case, curves: dict[str, np.ndarray]) -> None:
     length, factor = unit([curves["delta_n"], curves["delta_t1"]], LENGTHS)
     for name, style, color, label in (
         ("delta_n", "-", BLUE, "opening"),
-        ("delta_t1", "-", ORANGE, "tangential (downstream > 0)"),
-        ("slip", "--", ORANGE, f"{case.law.slip_name}, size"),
+        ("delta_t1", "-.", ORANGE, "tangential, downstream > 0"),
+        ("slip", ":", ORANGE, f"|{case.law.slip_name}|"),
     ):
         axes.plot(curves["s"], curves[name] * factor, style, color=color, label=label)
     draw_published(axes, case, curves, {"delta_n": BLUE, "delta_t1": ORANGE}, factor)
-    axes.set_ylabel(f"jump [{length}]")
+    axes.set_ylabel(f"jump [{length}]", fontsize=9)
 
 
 def draw_normal_stress(axes: Axes, case: Case, curves: dict[str, np.ndarray]) -> float:
@@ -191,24 +211,38 @@ def draw_normal_stress(axes: Axes, case: Case, curves: dict[str, np.ndarray]) ->
     """
     stress, factor = unit([curves["sigma_n"], curves["sigma_n_eff"]], STRESSES)
     s = curves["s"]
-    axes.plot(s, curves["sigma_n"] * factor, color=BLUE, label="total (tension > 0)")
+    axes.plot(s, curves["sigma_n"] * factor, color=BLUE, label="total, tension > 0")
     if case["uplift"] != "none":
         effective = curves["sigma_n_eff"] * factor
         axes.plot(s, effective, "--", color=DARK, label="effective")
         style = {"color": WATER, "alpha": 0.25, "linewidth": 0}
         axes.fill_between(s, -curves["p"] * factor, 0, **style, label="uplift")
     draw_published(axes, case, curves, {"sigma_n": BLUE}, factor)
-    axes.set_ylabel(f"normal stress [{stress}]")
+    axes.set_ylabel(f"normal stress [{stress}]", fontsize=9)
     return factor
 
 
 def draw_gravity_stress(axes: Axes, method: gravity.GravityMethod, factor: float) -> None:
-    """Draw the effective stress of the gravity method: zero in the crack, linear beyond its tip."""
+    """Draw the effective stress of the gravity method."""
     if method.stands:
-        crack, length = method.crack_length, method.body.length
-        s = [0, crack, crack, length]
-        stress = np.array([0, 0, method.tip_stress, method.sigma_n_eff_toe]) * factor
-        axes.plot(s, stress, ":", color=GREY, linewidth=1.8, label="gravity method")
+        s, stress = gravity_profile(method)
+        style = {"color": GREY, "linewidth": 1.8, "label": "gravity method"}
+        axes.plot(s, stress * factor, ":", **style)
+
+
+def gravity_profile(method: gravity.GravityMethod) -> tuple[np.ndarray, np.ndarray]:
+    """Effective stress of the gravity method: distances from the heel [m] and values [Pa], tension
+    > 0; zero in the crack, linear beyond its tip, zero if the entire joint is cracked.
+    """
+    crack, length = method.crack_length, method.body.length
+    if not method.uncracked:
+        return np.array([0.0, length]), np.zeros(2)
+    s, stress = [crack, length], [method.tip_stress, method.sigma_n_eff_toe]
+    return (
+        (np.array([0.0, crack, *s]), np.array([0.0, 0.0, *stress]))
+        if crack
+        else (np.array(s), np.array(stress))
+    )
 
 
 def draw_shear(axes: Axes, case: Case, curves: dict[str, np.ndarray]) -> None:
@@ -216,13 +250,13 @@ def draw_shear(axes: Axes, case: Case, curves: dict[str, np.ndarray]) -> None:
     limit = shear_limit(case, curves)
     stress, factor = unit([curves["tau_1"], *([limit[1]] if limit else [])], STRESSES)
     shear = curves["tau_1"] * factor
-    axes.plot(curves["s"], shear, color=ORANGE, label="shear stress (downstream > 0)")
+    axes.plot(curves["s"], shear, color=ORANGE, label="shear stress, downstream > 0")
     if limit:
         label, size = limit
         axes.plot(curves["s"], size * factor, "--", color=GREEN, label=label)
         if shear.min() < -BOTH_SIGNS * np.ptp(shear):
             axes.plot(curves["s"], -size * factor, "--", color=GREEN)
-    axes.set_ylabel(f"shear stress [{stress}]")
+    axes.set_ylabel(f"shear stress [{stress}]", fontsize=9)
 
 
 def draw_published(
@@ -253,15 +287,16 @@ class Line(NamedTuple):
 def draw_history(figure: FigureBase, result: Results) -> None:
     """Draw opening, crest displacement, crack and, with flow, leakage against the level."""
     panels_shown = history_panels(result)
-    row = panels(figure, 1, len(panels_shown), left=0.85, across=0.95).flat
+    row = panels(figure, 1, len(panels_shown), bottom=0.42, top=0.25).flat
     for axes, (quantity, units, lines) in zip(row, panels_shown, strict=True):
         name, factor = unit([result.history[line.column] for line in lines], units)
         # the lines often coincide: those drawn later are dashed or dotted
-        for line, style in zip(lines, ("o-", "o--", "o:"), strict=False):
+        for line, style in zip(lines, ("o-", "s--", "^:"), strict=False):
             values = result.history[line.column] * factor
             look = {"color": line.color, "markersize": 3, "label": line.label}
             axes.plot(result.history["level"], values, style, **look)
-        axes.set(xlabel="reservoir level [m]", ylabel=f"{quantity} [{name}]")
+        axes.set_xlabel("reservoir level [m]", fontsize=9)
+        axes.set_ylabel(f"{quantity} [{name}]", fontsize=8.5)
         axes.grid(alpha=0.3)
         if name == "%":
             axes.set_ylim(*PERCENT)
@@ -277,7 +312,7 @@ def history_panels(result: Results) -> list[tuple[str, Units, list[Line]]]:
     shown: list[tuple[str, Units, list[Line]]] = [
         ("largest opening", LENGTHS, [Line("max_opening", BLUE)]),
         ("crest movement", LENGTHS, [Line("crest_ux", BLUE)]),
-        ("part of the joint", (("%", 100 / joint_length(result)),), lengths),
+        ("share of the joint", (("%", 100 / joint_length(result)),), lengths),
     ]
     if result.case["uplift"] == "flow":
         shown.append(("leakage", FLUXES, [Line("flux", BLUE)]))
@@ -301,81 +336,126 @@ def draw_dam(figure: FigureBase, solution: Solution, time: float) -> None:
 
 
 def draw_solid(figure: FigureBase, solution: Solution, time: float) -> None:
-    """Draw what 3D has besides: a view (if `draw_dam` has not drawn it) and maps of the joint."""
-    if is_own_solid(solution.result.case):
-        draw_maps(figure, solution, time)
-        return
+    """Draw what an extruded section in 3D has besides: a view and maps of the joint."""
     left, right = figure.subfigures(1, 2, width_ratios=(1, RIGHT))
     draw_view(left, solution, time)
-    draw_maps(right, solution, time)
+    draw_maps(right, solution.of_joint(decisive_joint(solution.result)), time)
 
 
 def draw_view(figure: FigureBase, solution: Solution, time: float) -> None:
-    """Draw the deformed skin of all bodies, in colors of the displacement."""
+    """Draw the deformed skin of all bodies, in colors of the displacement; no view without
+    fields.
+    """
     field = solution.fields.get(time)
     if field is None:
         return
     scale = exaggeration(field.displacement, solution.result.case.size)
     sizes = {name: np.linalg.norm(u, axis=1) for name, u in field.displacement.items()}
     length, factor = unit(list(sizes.values()), LENGTHS)
-    polygons, values = [], []
+    polygons, depths, values = [], [], []
     for name, displacement in field.displacement.items():
         body = solution.bodies[name]
-        points = (body.points + scale * displacement) @ TO_VIEW
+        places = (body.points + scale * displacement) @ VIEW
         for table, _ in skin(body):
-            polygons += list(points[table])
+            polygons += list(places[table, :2])
+            depths.append(places[table, 2].mean(axis=1))
             values.append(sizes[name][table].mean(axis=1) * factor)
-    axes = figure.add_axes((0.0, 0.0, 0.86, 0.95), projection="3d", computed_zorder=False)
-    faces = Poly3DCollection(
-        polygons, array=np.concatenate(values), cmap="YlGnBu", edgecolor=GREY, linewidth=0.1
-    )
-    faces.set_rasterized(True)
-    axes.add_collection3d(faces)
-    corners = np.concatenate(polygons)
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    axes.set_box_aspect(high - low, zoom=1.05)
-    axes.view_init(elev=30, azim=-35)
+    order = np.argsort(np.concatenate(depths))  # the nearest faces are drawn last
+    (axes,) = panels(figure, left=0.15, right=0.85, bottom=0.15, top=0.3).flat
+    faces = PolyCollection([polygons[i] for i in order], cmap="YlGnBu", edgecolor=GREY)
+    faces.set(array=np.concatenate(values)[order], linewidth=0.1, rasterized=True)
+    axes.add_collection(faces)
+    axes.autoscale_view()
+    axes.set_aspect("equal", anchor="N")
     axes.set_axis_off()
-    bar = figure.add_axes((0.88, 0.2, 0.02, 0.6))
-    figure.colorbar(faces, cax=bar)
-    axes.set_title(f"displacement [{length}], drawn x {scale:g}", fontsize=9, loc="left")
+    title = f"displacement [{length}], drawn x {scale:g}"
+    axes.set_title(title, fontsize=8, loc="left")
+    figure.colorbar(faces, ax=axes, shrink=0.7, aspect=25).ax.tick_params(labelsize=8)
 
 
-#: From our x, y, z to matplotlib's, whose z is the height.
-TO_VIEW = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]])
+def view_from(azimuth: float, elevation: float) -> np.ndarray:
+    """Matrix (3, 3) from x, y, z to the coordinates of a view, y upwards: right, up, towards the
+    viewer; angles [degrees] of the viewer from x towards -z, and above the horizon.
+    """
+    a, e = np.radians([azimuth, elevation])
+    towards = np.array([np.cos(e) * np.cos(a), np.sin(e), -np.cos(e) * np.sin(a)])
+    right = np.array([-np.sin(a), 0, -np.cos(a)])
+    return np.column_stack([right, np.cross(towards, right), towards])
+
+
+#: From downstream and above: the ground does not hide the dam.
+VIEW = view_from(-35, 30)
 
 
 def draw_maps(figure: FigureBase, solution: Solution, time: float) -> None:
-    """Draw maps of the unrolled joint: opening, effective normal stress, shear stress."""
-    number = decisive_joint(solution.result)
-    rows = solution.result.joints[number].at(time)
-    joint = joint_body(solution.bodies, number)
+    """Draw maps of the joint in true shape: opening, effective normal stress, shear stress."""
+    rows, joint = solution.result.at(time), solution.bodies["joint"]
     nearest = row_of_nodes(joint, rows)
-    places = np.column_stack([distance(rows)[nearest], joint.points[:, 2]])
-    shown = (
-        ("delta_n", "opening", LENGTHS, "Blues"),
-        ("sigma_n_eff", "effective normal stress", STRESSES, "Blues_r"),
-        ("tau_1", "shear stress", STRESSES, "Oranges"),
+    names, places = projected(joint)
+    corners = np.concatenate(
+        [table[:, part] for _, table in joint.cells for part in HALVES[table.shape[1]]]
     )
-    for axes, (name, label, units, colors) in zip(
-        panels(figure, len(shown), 1, right=0.3, down=0.4).flat, shown, strict=True
-    ):
+    shape = Triangulation(*places, corners)
+    shown = (
+        ("delta_n", "opening", LENGTHS),
+        ("sigma_n_eff", "effective normal stress, tension > 0", STRESSES),
+        ("tau_1", "shear stress, downstream > 0", STRESSES),
+    )
+    maps = panels(figure, len(shown), 1, right=0.3, bottom=0.45, top=0.25, down=0.4).flat
+    for axes, (name, label, units) in zip(maps, shown, strict=True):
         size, factor = unit([rows[name]], units)
-        values = rows[name][nearest] * factor
-        for _, table in joint.cells:
-            faces = PolyCollection(
-                places[table], array=values[table].mean(axis=1), cmap=colors, edgecolor="face"
-            )
-            faces.set(clim=(values.min(), values.max()), rasterized=True)
-            axes.add_collection(faces)
-        axes.autoscale_view()
-        axes.margins(0)
-        axes.set_ylabel("z [m]")
-        axes.set_title(f"{label} [{size}]", fontsize=9, loc="left")
+        draw_map(axes, shape, rows[name][nearest] * factor, f"{label} [{size}]")
+        axes.set_ylabel(f"{names[1]} [m]", fontsize=9)
         axes.tick_params(labelbottom=name == shown[-1][0])
-        figure.colorbar(faces, ax=axes, pad=0.02)
-    axes.set_xlabel(DISTANCE)
+    axes.set_xlabel(f"{names[0]} [m]", fontsize=9)
+
+
+#: Triangles of a face by the number of its corners.
+HALVES = {3: ([0, 1, 2],), 4: ([0, 1, 2], [0, 2, 3])}
+
+
+def projected(joint: Body) -> tuple[list[str], np.ndarray]:
+    """The joint in the plane of two axes in which its area is largest: their names, that of its
+    longer side first, and the places of its nodes (2, n) [m].
+    """
+    normals = np.zeros(3)
+    for _, table in joint.cells:
+        first, second, *_, last = (joint.points[table[:, i]] for i in range(table.shape[1]))
+        normals += np.abs(np.cross(second - first, last - first)).sum(axis=0)
+    extent = np.ptp(joint.points, axis=0)
+    axes = sorted(set(range(3)) - {int(normals.argmax())}, key=lambda i: -extent[i])
+    return ["xyz"[i] for i in axes], joint.points[:, axes].T
+
+
+def draw_map(axes: Axes, shape: Triangulation, values: np.ndarray, title: str) -> None:
+    """Draw a map of values at the nodes, with a thick line at zero; its scale diverges from zero,
+    and ends before extremes of small parts of the joint.
+    """
+    values = np.where(np.abs(values) < ROUND_OFF * np.abs(values).max(), 0, values)
+    low, high = scale_of(values)
+    if (low, high) != (values.min(), values.max()):
+        title += f"; {values.min():.3g} to {values.max():.3g}, colors clipped"
+    levels = MaxNLocator(LEVELS).tick_values(low, max(high, low + TINY))
+    norm = TwoSlopeNorm(0, min(levels[0], -levels[-1] / 1e3), max(levels[-1], -levels[0] / 1e3))
+    shown = np.clip(values, levels[0], levels[-1])
+    filled = axes.tricontourf(shape, shown, levels, cmap="RdBu_r", norm=norm)
+    axes.tricontour(shape, shown, levels, colors="black", linewidths=0.25)
+    if values.min() < 0 < values.max():
+        axes.tricontour(shape, values, [0], colors="black", linewidths=1.4)
+    axes.set_title(title, fontsize=8, loc="left")
+    axes.set_aspect("equal")
+    bar = axes.figure.colorbar(filled, ax=axes, pad=0.02, fraction=0.05, aspect=12)
+    ticks = MaxNLocator(4).tick_values(levels[0], levels[-1])
+    bar.set_ticks(ticks[(ticks >= levels[0]) & (ticks <= levels[-1])])
+    bar.ax.tick_params(labelsize=7)
+
+
+def scale_of(values: np.ndarray) -> tuple[float, float]:
+    """Ends of a map's scale: the extremes, or percentiles that are far from them."""
+    low, high = np.percentile(values, SCALED)
+    near = CLIPPED * (high - low)
+    least, most = values.min(), values.max()
+    return least if low - least <= near else low, most if most - high <= near else high
 
 
 def draw_curve(result: Results) -> FigureBase:
@@ -384,7 +464,8 @@ def draw_curve(result: Results) -> FigureBase:
     """
     case, history = result.case, result.history
     figure = figure_of(7, 4.5)
-    (axes,) = panels(figure, top=0.6).flat
+    title = textwrap.wrap(case.title, 80)
+    (axes,) = panels(figure, top=0.15 + 0.2 * len(title)).flat
     driven = history["time"] > case["drive_begin"] + ROUND_OFF
     after = history["time"] > case["drive_end"] + ROUND_OFF
     length, factor = unit([result.heel], LENGTHS)
@@ -401,7 +482,7 @@ def draw_curve(result: Results) -> FigureBase:
         label = f"rigid dam overturns: {bound:.3f} m"
         axes.axhline(bound, color="black", linestyle="--", linewidth=0.8, label=label)
     axes.set(xlabel=f"opening of the heel [{length}]", ylabel="level [m]")
-    axes.set_title(textwrap.fill(case.title, 70), parse_math=False)
+    axes.set_title("\n".join(title), fontsize=11, parse_math=False)
     axes.legend(fontsize=8)
     axes.grid(alpha=0.3)
     return figure

@@ -5,29 +5,33 @@ resultant. Displacements are exaggerated.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.collections import PolyCollection
 from matplotlib.figure import FigureBase
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from ..arrays import Table
 from ..model.case import has_drains
-from ..model.fields import (
-    CLOSED,
-    OPEN,
-    SLIPPED,
-    SOFTENING,
-    Solution,
-    distance,
-    nearest_rows,
-    state_of,
-)
+from ..model.fields import OPEN, Solution, distance, nearest_rows, state_of
 from ..model.loads import Loading, line_forces
 from ..model.parameters import constants
-from .drawing import CONCRETE, DARK, GREEN, GREY, ORANGE, RED, ROCK, SILT, VIOLET, WATER, panels
+from .drawing import (
+    CONCRETE,
+    DARK,
+    GREEN,
+    GREY,
+    RED,
+    ROCK,
+    SILT,
+    STATES,
+    WATER,
+    panels,
+    runs_of,
+)
 from .outline import Section, exaggeration, joint_lines, section_of
 from .units import FORCES, STRESSES, with_unit
 
@@ -39,21 +43,17 @@ BESIDE, BELOW, MARK, DRAIN, THIRD = 0.6, 0.45, 0.12, 0.3, 0.025
 #: Length of the resultant's arrow over that of the others; space above all, for a label, over the
 #: height of the picture.
 RESULTANT, LABEL = 2.5, 0.05
+#: Height of the legend below the section, up to four rows [inches].
+LEGEND = 0.62
 #: Arrows of a uniform pressure: places along the face, away from its ends.
 PRESSED = np.linspace(0.04, 0.96, 9)
-#: The joint's states: color, width of the line, text in the legend.
-STATES = {
-    CLOSED: (DARK, 0.8, ""),
-    SLIPPED: (ORANGE, 2.2, "joint slipped"),
-    SOFTENING: (VIOLET, 2.2, "joint softening"),
-    OPEN: (RED, 2.2, "joint open or broken"),
-}
 DRAINS = {"color": "#1565c0", "linestyle": "-.", "linewidth": 1.5}
 
 
 def draw_section(figure: FigureBase, solution: Solution, time: float) -> None:
     """Draw the section at a requested time; a note instead if there is none."""
-    (axes,) = panels(figure, left=0.6, right=0.1, bottom=1.05).flat
+    (axes,) = panels(figure, left=0.55, right=0.1, bottom=0.4 + LEGEND, top=0.25).flat
+    axes.set_anchor("N")
     case, field = solution.result.case, solution.fields.get(time)
     rows = [own.at(time) for own in solution.result.joints]
     displacement = field.displacement if field else {}
@@ -70,7 +70,7 @@ def draw_section(figure: FigureBase, solution: Solution, time: float) -> None:
         axes.text(0.5, 0.5, why, ha="center", color=GREY, transform=axes.transAxes)
         return
     SectionDrawing(axes, solution, section, time, rows).draw()
-    axes.set_title(f"displacements x {scale:g}; dashed: undeformed", fontsize=9, loc="left")
+    axes.set_title(f"displacements x {scale:g}; dashed: undeformed", fontsize=8, loc="left")
 
 
 class SectionDrawing:
@@ -104,16 +104,21 @@ class SectionDrawing:
         self.forces()
         for k in range(len(self.joints)):
             self.resultant(k)
-        self.axes.set(aspect="equal", xlabel="x [m]", ylabel="y [m]")
+        self.axes.set_aspect("equal")
+        self.axes.set_xlabel("x [m]", fontsize=9)
+        self.axes.set_ylabel("y [m]", fontsize=9)
         handles, labels = zip(*self.legend, strict=True) if self.legend else ((), ())
-        self.axes.legend(
+        self.axes.figure.legend(
             handles,
             labels,
-            loc="upper left",
-            bbox_to_anchor=(-0.1, -0.1),
+            loc="lower left",
+            bbox_to_anchor=(0.01, 0),
             ncols=2,
-            fontsize=8,
+            fontsize=7.5,
             frameon=False,
+            borderpad=0.2,
+            columnspacing=1.0,
+            labelspacing=0.3,
         )
 
     def set_limits(self) -> None:
@@ -188,36 +193,42 @@ class SectionDrawing:
                 for table in tables:
                     color = ROCK if name == "foundation" else CONCRETE
                     cells = PolyCollection(body.moved[table], facecolor=color, zorder=1)
-                    cells.set(edgecolor=GREY, linewidth=0.12, rasterized=True)
+                    cells.set(edgecolor=GREY, linewidth=0.15, rasterized=True)
                     self.axes.add_collection(cells, autolim=False)
             outline = body.points[[*body.loop, body.loop[0]]]
             self.axes.plot(*outline.T, "--", color=GREY, linewidth=0.6, zorder=2)
 
     def joint(self) -> None:
-        """Draw both faces of each joint in the colors of its state; water in the cracks."""
+        """Draw both faces of each joint in the style of its state; water in the cracks."""
         shown = set[int]().union(*(self.faces(k) for k in range(len(self.joints))))
-        for number, (color, width, label) in reversed(STATES.items()):
-            if number in shown and label:
-                self.legend.append((Line2D([], [], color=color, linewidth=width), label))
+        for number, style in STATES.items():
+            if number in shown:
+                handle = Line2D([], [], **self.joint_style(number))
+                self.legend.append((handle, f"joint {style.label}"))
+
+    @staticmethod
+    def joint_style(number: int) -> dict[str, Any]:
+        """Line of the joint in a state."""
+        style = STATES[number]
+        return {"color": style.color, "linestyle": style.line, "linewidth": 2.4}
 
     def faces(self, joint: int) -> set[int]:
-        """Draw both faces of a joint, and water in its crack; the states that it has."""
-        shown, faces = set(), []
+        """Draw both faces of a joint, and water in its crack; the states of the lower face."""
+        faces = []
         states = state_of(self.rows[joint])
         for body, face in self.section.joint_faces[joint]:
             state = states[self.rows_at(body.points[face], joint)]
             both_ends = np.minimum(state[:-1], state[1:])
-            faces.append(np.stack([body.moved[face][:-1], body.moved[face][1:]], axis=1))
-            for number, (color, width, _) in STATES.items():
-                lines = LineCollection(
-                    faces[-1][both_ends == number], color=color, linewidth=width, zorder=3
-                )
-                self.axes.add_collection(lines, autolim=False)
-            shown |= set(both_ends.tolist())
-        if self.joints[joint].case["uplift"] != "none" and OPEN in shown:
+            line = body.moved[face]
+            faces.append(np.stack([line[:-1], line[1:]], axis=1))
+            self.axes.plot(*line.T, color=DARK, linewidth=0.8, zorder=3)
+            for number, first, end in runs_of(both_ends):
+                if number in STATES:
+                    self.axes.plot(*line[first : end + 1].T, **self.joint_style(number), zorder=3)
+        if self.joints[joint].case["uplift"] != "none" and (both_ends == OPEN).any():
             crack = np.concatenate([faces[0], faces[1][:, ::-1]], axis=1)[both_ends == OPEN]
             self.axes.add_collection(PolyCollection(crack, color=WATER, zorder=2), autolim=False)
-        return shown
+        return set(both_ends.tolist())
 
     def rows_at(self, points: np.ndarray, joint: int) -> np.ndarray:
         """Rows of a joint's table nearest to points (n, 2) of the section."""
@@ -270,7 +281,7 @@ class SectionDrawing:
         self.axes.plot(x, y - THIRD * self.height, color=GREEN, linewidth=3, zorder=3)
         if joint == 0:
             handle = Line2D([], [], color=GREEN, linewidth=3)
-            self.legend.append((handle, "middle third of the joint"))
+            self.legend.append((handle, "middle third"))
         at, normal, shear = (self.states[joint][n] for n in ("x_resultant", "N", "T"))
         if not math.isfinite(at):
             return
@@ -280,8 +291,8 @@ class SectionDrawing:
         place = self.on_joint(at / self.joints[joint].case.joint_length * length, joint)
         longer = RESULTANT * length / distance(self.rows[0]).max()
         self.arrow(place, normal * down + shear * along, GREEN, "", longer)
-        size, which = with_unit(math.hypot(normal, shear), FORCES), self.of_joint(joint)
-        label = f"resultant{which} {size}, {at:.3g} m from the heel"
+        which = self.case.named((joint,)) or "resultant"
+        label = f"{which} {with_unit(math.hypot(normal, shear), FORCES, 3)}, {at:.3g} m from heel"
         self.legend.append((arrow_handle(GREEN), label))
 
     def on_joint(self, s: float | np.ndarray, joint: int) -> np.ndarray:

@@ -152,3 +152,11 @@ def report(comparisons: list[Comparison], style: str = "simple") -> str:
     counts = {v: sum(c.verdict == v for c in comparisons) for v in ("pass", "fail", "info")}
     summary = "{pass} passed, {fail} failed, {info} for information only".format(**counts)
     return f"{tabulate(rows, heads, style, disable_numparse=True)}\n\n{summary}"
+
+
+def shown_time(result: Results) -> float:
+    """Requested time of the state drawn: the last, or that of the published numbers."""
+    times = result.joint["time"]
+    published_time = reference_time(result.case)
+    published = references(result.case) and np.isclose(times, published_time).any()
+    return published_time if published else times.max()

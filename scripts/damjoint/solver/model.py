@@ -17,7 +17,8 @@ from ..joint.equilibrium import Equilibrium
 from ..joint.interface import Interface, interface_of
 from ..joint.joint_laws import TANGENT, Mode
 from ..joint.linear_system import Border
-from ..model.case import Case
+from ..joint.water import Still
+from ..model.case import Case, remembers
 from ..model.loads import COMPLETE, Loading
 from .controls import Control, DisplacementControl, LevelControl
 from .newton import Convergence, Diverged, Iterate, Strategy, newton
@@ -109,6 +110,14 @@ class Model:
         """The loads of a time, at a level [m]."""
         return Loading.at(self.case, time, level, self.case.tail_at(time))
 
+    def still(self, state: State, time: float) -> Still | None:
+        """The joints before the earthquake, for a step from a state to a time, if the water in one
+        of them follows from that.
+        """
+        if not any(map(remembers, self.case.joints)) or not self.loading(time, 0.0).part("quake"):
+            return None
+        return state.still or Still(state.jump, state.variables)
+
     def advance(
         self,
         state: State,
@@ -186,7 +195,7 @@ class Model:
         """A step by one strategy, from a jump and a level, see `advance`. Raises Diverged."""
         equilibrium, start = self.equilibrium, state.begin_step(self.equilibrium.laws, time)
         interface, laws, variables = equilibrium.interface, equilibrium.laws, start.variables
-        frozen_laws = frozen and frozen.points
+        frozen_laws, still = frozen and frozen.points, self.still(state, time)
         loads, convergence = self.loading(time, begin[1]), self.convergence
         stiffness = equilibrium.case["K_N"] * equilibrium.bulk.width
 
@@ -199,7 +208,7 @@ class Model:
                     releasing = crossing & ((side < 0) | (strategy.release > 1))
                     side, mode = np.where(releasing, 0, side), replace(mode, releasing=releasing)
             here = replace(loads, level=level)
-            residual = equilibrium.residual(jump, variables, here, mode, frozen_lift)
+            residual = equilibrium.residual(jump, variables, here, mode, frozen_lift, still)
             size, border = float(np.linalg.norm(residual.value)), None
             if isinstance(control, DisplacementControl):
                 gap = control.value - control.measure(equilibrium, jump, here)
@@ -209,9 +218,7 @@ class Model:
             def correction(secant: bool) -> tuple[Array, float]:
                 edge = border and Border(residual.by_level(), *border)
                 change = residual.by_jump(secant)
-                return interface.solve(
-                    equilibrium.undamaged, change, -residual.value, edge, equilibrium.flowing
-                )
+                return interface.solve(equilibrium.undamaged, change, -residual.value, edge)
 
             return Iterate(jump, level, residual.value, size, correction, side)
 
@@ -229,6 +236,7 @@ class Model:
             start.update(equilibrium, end.jump, frozen),
             time=time,
             loading=loading,
-            pressures=equilibrium.pressures(end.jump, variables, loading),
+            pressures=equilibrium.pressures(end.jump, variables, loading, still),
+            still=still,
         )
         return StepResult(new.after(state), iterations, end.size / (self.reference or 1.0))

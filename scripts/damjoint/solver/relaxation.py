@@ -27,6 +27,7 @@ def relax(model: Model, begin: State, time: float, control: Control) -> StepResu
     """
     equilibrium, state = model.equilibrium, begin
     laws, iterations, sizes = equilibrium.laws, 0, list[float]()
+    still = model.still(begin, time)
     strategies = [strategy for strategy in model.strategies[:-1] if not strategy.release]
     for _ in range(ROUNDS):
         start = state.begin_step(laws, time)
@@ -36,7 +37,8 @@ def relax(model: Model, begin: State, time: float, control: Control) -> StepResu
         if step is None and equilibrium.flowing:
             level = control.level if isinstance(control, LevelControl) else start.loading.level
             loading = model.loading(time, level)
-            lift, _ = equilibrium.flowing_lift(start.jump, start.variables, loading)
+            opened = still or start
+            lift, _ = equilibrium.flowing_lift(opened.jump, opened.variables, loading)
             step = model.advance(
                 start,
                 time,
@@ -51,10 +53,10 @@ def relax(model: Model, begin: State, time: float, control: Control) -> StepResu
         iterations += step.iterations
         state = replace(step.state, time=begin.time)
         jump, variables = state.jump, state.begin_step(laws, time).variables
-        residual = equilibrium.residual(jump, variables, state.loading).value
+        residual = equilibrium.residual(jump, variables, state.loading, still=still).value
         size = float(np.linalg.norm(residual))
         if size <= model.convergence.tolerance:
-            pressures = equilibrium.pressures(jump, variables, state.loading)
+            pressures = equilibrium.pressures(jump, variables, state.loading, still)
             relaxed = replace(step.state, pressures=pressures).after(begin)
             return StepResult(relaxed, iterations, size / (model.reference or 1.0))
         if repeats(size, sizes, SAME):

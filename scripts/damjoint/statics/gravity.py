@@ -19,8 +19,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..model.case import Case
-from ..model.loads import Loading, line_forces
+from ..model.case import Case, remembers
+from ..model.constraints import ZANGAR
+from ..model.loads import Loading, line_forces, zangar_column, zangar_share
 from ..model.parameters import constants
 
 #: Columns of gravity.csv: a row per load on the body above the joint, and their sum.
@@ -113,6 +114,24 @@ class Segment(NamedTuple):
             lean * ((self.x0 + lean * u0) * half - lean * three_halves),
         ).times(part)
 
+    def zangar_load(self, surface: float, floor: float) -> Load:
+        """The resultant of a pressure H (u + Sqrt[u]), see `zangar_column` (surface and floor:
+        heights above the toe [m]).
+        """
+        width, rise = self.x1 - self.x0, self.y1 - self.y0
+        if rise == 0:
+            return Load("pressure", 0, 0, 0, 0)
+        column = zangar_column(surface, *sorted((self.y0, self.y1)), floor)
+        total, lever = (math.copysign(1.0, rise) * part for part in column)
+        lean = width / rise
+        return Load(
+            "pressure",
+            -total,
+            lean * total,
+            lever,
+            lean * ((self.x0 - lean * self.y0) * total + lean * lever),
+        )
+
 
 class RigidBlock:
     """The part of the section above the joint: outline, faces, marks, from the joint's toe [m]."""
@@ -183,18 +202,28 @@ def water_on(
 
 
 def silt_on(case: Case, body: RigidBlock) -> Load:
-    """Silt on the upstream face: horizontal pressure of an equivalent fluid."""
-    weight = case["rho_silt"] * case["g"] * case["silt_K0"]
-    loads = fluid_on(body.segments("UP"), weight, case["silt_height"] - body.toe[1])
-    return resultant_of("silt", loads)._replace(fy=0.0, moment_of_fy=0.0)
+    """Silt on the upstream face: horizontal pressure of an equivalent fluid; with silt_weight its
+    weight on a batter, too.
+    """
+    unit_weight, surface = case["rho_silt"] * case["g"], case["silt_height"] - body.toe[1]
+    pressure, weight = (
+        resultant_of("silt", fluid_on(body.segments("UP"), unit_weight * share, surface))
+        for share in (case["silt_K0"], case["silt_weight"])
+    )
+    return pressure._replace(fy=weight.fy, moment_of_fy=weight.moment_of_fy)
 
 
 def added_pressure(case: Case, body: RigidBlock, level: float) -> Load:
-    """Westergaard's added pressure 7/8 k_h rho_water g Sqrt[H (H - y)] on the upstream face, H the
-    level, times the normal's horizontal part [USACE EM 1110-2-2200, Westergaard 1933].
+    """The water's added pressure on the upstream face, H the level: Westergaard's 7/8 k_h rho_water
+    g Sqrt[H (H - y)], times the normal's horizontal part [USACE EM 1110-2-2200, Westergaard 1933],
+    or Zangar's C_m/2 k_h rho_water g H (u + Sqrt[u]), u = 1 - (y/H)^2 [Zangar 1952].
     """
     surface = level - body.toe[1]
     wet = [part for s in body.segments("UP") if (part := s.below(surface))]
+    if case["added_mass"] == ZANGAR:
+        size = zangar_share(case, level) / 2 * case["k_h"] * case["rho_water"] * case["g"]
+        loads = [s.zangar_load(surface, -body.toe[1]) for s in wet]
+        return resultant_of("added water pressure", loads).times(size)
     size = 7 / 8 * case["k_h"] * case["rho_water"] * case["g"] * math.sqrt(level)
     loads = [s.westergaard_load(surface) for s in wet]
     return resultant_of("added water pressure", loads).times(size * case["added_mass"])
@@ -236,14 +265,23 @@ class Uplift:
     """
 
     def __init__(
-        self, case: Case, body: RigidBlock, level: float, tail: float, crack: float
+        self,
+        case: Case,
+        body: RigidBlock,
+        level: float,
+        tail: float,
+        crack: float,
+        dry_until: float = 0.0,
     ) -> None:
+        """dry_until: end of the part behind the crack [m] that an earthquake has opened, without
+        pressure.
+        """
         self.length, mode = body.length, case["uplift"]
         head = level + case["joint_head_offset"]
         self.h1, self.h2 = h1, h2 = max(head - body.heel[1], 0.0), max(tail - body.toe[1], 0.0)
         #: distance from the heel and head of the outlet [m] of drains that the crack has not passed
         self.drains: tuple[float, float] | None = None
-        crack = crack if mode in ("cracked", "flow") else 0.0
+        wet_crack, crack = crack, crack if mode in ("cracked", "flow") else 0.0
         drained = mode == "drained" or (mode == "cracked" and case["drains"])
         places, heads = [0.0, crack, self.length], [h1, h1, h2]
         at = case["drain_x"]
@@ -251,10 +289,22 @@ class Uplift:
             outlet = max(max(case["drain_level"], tail) - (body.heel[1] + at * body.along[1]), 0.0)
             self.drains = at, outlet
             undrained = float(np.interp(at, places[1:], heads[1:]))
+            if mode == "drained" and case["drain_reference"] == "reservoir":
+                undrained = h1
             places.insert(2, at)
             heads.insert(2, drained_head(case, undrained, outlet))
         weight = case["rho_water"] * case["g"] if mode != "none" else 0.0
         self.s, self.p = np.array(places), weight * np.array(heads)
+        if dry_until > wet_crack:
+            self.dry(wet_crack, dry_until)
+
+    def dry(self, start: float, end: float) -> None:
+        """Take the pressure away between two places [m from the heel]."""
+        s, p = self.s, self.p
+        first, last = np.interp([start, end], s, p)
+        wet = [(s[s < start], p[s < start]), ([start], [first])] if start > 0 else []
+        parts = [*wet, ([start, end], [0.0, 0.0]), ([end], [last]), (s[s > end], p[s > end])]
+        self.s, self.p = (np.concatenate(column) for column in zip(*parts, strict=True))
 
     @property
     def force(self) -> float:
@@ -277,8 +327,11 @@ def drained_head(case: Case, undrained: float, outlet: float) -> float:
 
 
 def sliding_factor(case: Case, normal: float, shear: float, uncracked: float) -> float:
-    """SSF = (mu N' + c (L - a)) / |T|: shear friction factor, cohesion on the uncracked joint."""
-    resistance = case["mu"] * normal + case["adhesion"] * uncracked
+    """SSF = (mu N' + c (L - a)) / |T|: shear friction factor, cohesion on the uncracked joint; with
+    mu and c divided by their partial factors.
+    """
+    mu, cohesion = case["mu"] / case["factor_mu"], case["adhesion"] / case["factor_c"]
+    resistance = mu * normal + cohesion * uncracked
     return resistance / abs(shear) if shear else math.inf
 
 
@@ -291,11 +344,14 @@ def overturning_factor(loads: tuple[Load, ...], uplift_moment: float) -> float:
     return math.fsum(m for m in moments if m > 0) / overturning if overturning else math.inf
 
 
+#: Parts of a joint, with half of their length over the joint's.
+PARTS = {"middle third": 1 / 6, "middle half": 1 / 4, "within base": 1 / 2}
+
+
 def position(x_resultant: float, length: float) -> str:
     """In which part of a joint N meets it."""
     away = abs(x_resultant / length - 1 / 2)
-    parts = (1 / 6, "middle third"), (1 / 4, "middle half"), (1 / 2, "within base")
-    return next((words for share, words in parts if away <= share), "outside")
+    return next((words for words, share in PARTS.items() if away <= share), "outside")
 
 
 @dataclass(frozen=True)
@@ -456,8 +512,12 @@ def at(case: Case, time: float, level: float | None = None, tension: bool = True
     level = case.level_at(time) if level is None else level
     loads = loads_on(case, body, time, level, tail)
 
+    before = crack_before_earthquake(case, time, level, tension)
+
     def state(crack: float) -> GravityMethod:
-        uplift = Uplift(case, body, level, tail, crack)
+        wet = crack if before is None else before
+        dry_until = crack if case["quake_uplift"] == "zero" else 0.0
+        uplift = Uplift(case, body, level, tail, wet, dry_until)
         return GravityMethod(case, body, time, level, tail, loads, crack, uplift)
 
     law = case.law
@@ -469,13 +529,32 @@ def at(case: Case, time: float, level: float | None = None, tension: bool = True
         block, uncracked = state(crack), body.length - crack
         return 2 * block.N * uncracked - 6 * block.M - at_tip * uncracked**2
 
-    arrested = [state(crack) for crack in arrest_lengths(excess, pieces(case, body, level, tail))]
+    spans, degree = pieces(case, body, level, tail), 3
+    if before is not None:
+        ends = sorted({0.0, before, min(case["drain_x"], body.length), body.length})
+        spans, degree = spans_between(ends), 4
+    arrested = [state(crack) for crack in arrest_lengths(excess, spans, degree)]
     standing = [block for block in arrested if block.stands]
     first, *further = standing or arrested[:1] or [state(body.length)]
     behind = float(np.nextafter(case["drain_x"], body.length))
     if first.stands and first.uplift.drains and not further and excess(behind) > 0:
         further = [state(body.length)]  # the crack grows through the joint
     return replace(first, further=tuple(further))
+
+
+def crack_before_earthquake(case: Case, time: float, level: float, tension: bool) -> float | None:
+    """The crack length [m] without the earthquake that acts at a time; None if the water in the
+    joint does not follow from it.
+    """
+    if not remembers(case) or not Loading.at(case, time, level, 0.0).part("quake"):
+        return None
+    still = replace(case, values=case.values | {"k_h": 0.0, "k_v": 0.0})
+    return at(still, time, level, tension).crack_length
+
+
+def spans_between(ends: list[float]) -> list[tuple[float, float]]:
+    """The intervals between numbers in ascending order, open at their starts."""
+    return [(np.nextafter(a, b), b) for a, b in itertools.pairwise(ends) if b > a]
 
 
 def pieces(case: Case, body: RigidBlock, level: float, tail: float) -> list[tuple[float, float]]:
@@ -490,8 +569,7 @@ def pieces(case: Case, body: RigidBlock, level: float, tail: float) -> list[tupl
         ends.append(at)
         if h1 != h2 and (share := (h1 - outlet) / (h1 - h2)) != 1:
             ends.append((at - share * body.length) / (1 - share))
-    ends = sorted(e for e in ends if 0 <= e <= body.length)
-    return [(np.nextafter(a, b), b) for a, b in itertools.pairwise(ends) if b > a]
+    return spans_between(sorted(e for e in ends if 0 <= e <= body.length))
 
 
 #: Relative tolerances: imaginary part of a real root of the cubic, over the length of its span;
@@ -500,18 +578,19 @@ REAL_ROOT, CRACK_TOLERANCE = 1e-6, 1e-12
 
 
 def arrest_lengths(
-    excess: Callable[[float], float], spans: list[tuple[float, float]]
+    excess: Callable[[float], float], spans: list[tuple[float, float]], degree: int = 3
 ) -> list[float]:
     """The crack lengths [m] at which growth stops: the tension at the tip falls to its limit.
 
     excess: of the tension over its limit [N]; times the uncracked length it is a polynomial of
-    degree 3 in the crack length within each of the spans.
+    a degree in the crack length within each of the spans.
     """
     length, lengths = spans[-1][1], []
     for start, end in spans:
-        x = (start + end) / 2 + (end - start) / 2 * np.cos(np.pi * (np.arange(4) + 0.5) / 4)
+        angles = np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1)
+        x = (start + end) / 2 + (end - start) / 2 * np.cos(angles)
         values = [excess(a) * (length - a) for a in x]
-        rough = np.polynomial.Polynomial.fit(x, values, 3, domain=[start, end]).roots()
+        rough = np.polynomial.Polynomial.fit(x, values, degree, domain=[start, end]).roots()
         rough = np.sort(rough.real[np.abs(rough.imag) < REAL_ROOT * (end - start)])
         turns = [a for a in rough if start < a < end]
         # between two roots, and beside the first and the last, the sign is known

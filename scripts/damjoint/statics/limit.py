@@ -14,7 +14,7 @@ import numpy as np
 
 from ..joint.interface import Interface
 from ..laws import UNBREAKABLE
-from ..model.case import Case, flows
+from ..model.case import Case, flows, remembers
 from ..model.results import column_of
 from ..solver.load_stepper import LoadStepper
 
@@ -66,7 +66,8 @@ def mechanism(case: Case, interface: Interface) -> tuple[str, str]:
     Sliding: the shear exceeds the law's `shear_bound`. Overturning: with the tensile strength f
     and the joint's length L, the moment of the tension about the toe is at most f L^2/2.
     """
-    if case["drive"] != "level" or any(map(flows, case.joints)):
+    follows = (flows(joint) or remembers(joint) for joint in case.joints)
+    if case["drive"] != "level" or any(follows):
         return "", ""
     if case.geometry:
         case = case.with_joints(interface.of_joints)

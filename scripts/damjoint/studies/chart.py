@@ -1,10 +1,13 @@
-"""Chart of a sweep: curves over one varied parameter, maps over two, statistics of a sample."""
+"""Chart of a sweep: curves over one varied parameter, maps over two with many values, statistics of
+a sample.
+"""
 
 from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,8 +15,10 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from ..model import parameters
+from ..model.case import Case
 from ..post.drawing import BLUE, ORANGE, RED, write_picture
 from ..post.units import LENGTHS, Units, unit
+from ..statics.gravity import sliding_factor
 from .plan import Plan, Row, column_of, numbers
 
 #: Quantities drawn: label and units.
@@ -22,30 +27,64 @@ DRAWN: dict[str, tuple[str, Units]] = {
     "max_opening": ("largest opening", LENGTHS),
     "crest_ux": ("crest, downstream", LENGTHS),
 }
+#: The safety factor, which is no column of the rows.
+FACTOR, FACTOR_LABEL = "SSF", "safety factor against sliding"
+#: Most values of a parameter that are drawn as single curves or ticks.
+FEW = 5
+#: Height of the crosses of rows that fail over that of their panel, curve by curve.
+EDGE = 0.04
+#: Most labels along an axis of a map.
+LABELS = 10
+#: Colors and markers of curves; markers of verdicts.
+CURVES = [*zip((BLUE, ORANGE, "#2e7d32", "#8e24aa", "#333333"), "os^Dv", strict=True)]
+VERDICTS = "os^DvP*X"
 
 
-def draw(plan: Plan, rows: list[Row], title: str, path: Path) -> str:
-    """Draw the rows of a sweep to path.
+class Table(NamedTuple):
+    """What is drawn: the plan of a sweep, its rows, the case of each."""
+
+    plan: Plan
+    rows: list[Row]
+    cases: list[Case]
+
+    def values(self, column: str) -> np.ndarray:
+        """A column of the rows, or their SSF; nan where there is no value."""
+        if column != FACTOR:
+            return numbers(self.rows, column)
+        sizes = zip(*(numbers(self.rows, n) for n in ("N", "T", "crack_length")), strict=True)
+        factors = [
+            sliding_factor(case, normal, shear, case.joint_length - crack)
+            for case, (normal, shear, crack) in zip(self.cases, sizes, strict=True)
+        ]
+        return np.where(np.isfinite(factors), factors, np.nan)
+
+
+def draw(plan: Plan, rows: list[Row], cases: list[Case], title: str, path: Path) -> str:
+    """Draw the rows of a sweep, each with its case, to path.
 
     Returns a message if there is no chart for what was varied, else an empty text.
     """
     axes = [name for name, values in plan.varied.items() if all(map(is_number, values))]
     others = [name for name in plan.varied if name not in axes]
+    counts = {name: len(set(plan.varied[name])) for name in axes}
     if plan.sampled:
         fits = not others and len(axes) <= 1
         drawing = draw_probability if axes else draw_sample
     else:
-        fits = len(axes) == 1 or (len(axes) == 2 and not others)
-        drawing = draw_curves if len(axes) == 1 else draw_maps
+        fits = len(axes) <= 1 or (len(axes) == 2 and not others)
+        many = len(axes) == 2 and min(counts.values()) > FEW
+        drawing = draw_maps if many else draw_curves
     if not fits:
         return (
             f"no chart of {len(plan.varied)} varied parameters ({', '.join(plan.varied)}): needs "
-            "one or two with numbers as values, beside a sample at most one"
+            "at most two with numbers as values, beside a sample at most one"
         )
-    figure = Figure(figsize=(10, 4.8), layout="constrained")
+    high = not plan.sampled and not plan.critical
+    figure = Figure(figsize=(10, 7 if high else 4.8), layout="constrained")
     FigureCanvasAgg(figure)
     figure.suptitle(textwrap.fill(title, 100), fontsize=11, parse_math=False)
-    drawing(figure, plan, rows, axes)
+    along = sorted(axes, key=lambda name: -counts[name]) if drawing is draw_curves else axes
+    drawing(figure, Table(plan, rows, cases), along or others[:1])
     write_picture(figure, path, 110)
     return ""
 
@@ -73,8 +112,8 @@ def quantity(name: str) -> tuple[str, str]:
 
 
 def label(name: str) -> str:
-    """The label of an axis: name and unit."""
-    words, size = quantity(name)
+    """The label of the axis of a varied or sampled name: name and unit."""
+    words, size = quantity(name) if name == "level" else (name, parameters.parameter(name).unit)
     return f"{words} [{size}]" if size else words
 
 
@@ -90,52 +129,107 @@ def is_marked(plan: Plan, rows: list[Row]) -> np.ndarray:
     return fails(rows)
 
 
-def panels_of(figure: Figure, plan: Plan) -> Iterator[tuple[Axes, tuple[str, tuple[str, Units]]]]:
-    """Create axes side by side for the quantities drawn: DRAWN, or the critical value alone."""
-    drawn = DRAWN
+def panels_of(figure: Figure, table: Table) -> Iterator[tuple[Axes, str, tuple[str, Units]]]:
+    """Create axes for the quantities drawn, with column, label and units: DRAWN and SSF (which a
+    mesh of one's own does not have), or the critical value alone.
+    """
+    plan, drawn = table.plan, dict(DRAWN)
     if plan.critical:
         words, size = quantity(plan.critical)
         drawn = {plan.critical_columns[0]: (f"critical {words}", ((size, 1),))}
-    return zip(figure.subplots(1, len(drawn), squeeze=False)[0], drawn.items(), strict=True)
+    elif not any(case.geometry for case in table.cases):
+        drawn[FACTOR] = FACTOR_LABEL, (("-", 1),)
+    shape = (2, 2) if len(drawn) > 1 else (1, 1)
+    panels = figure.subplots(*shape, squeeze=False).ravel()
+    for unused in panels[len(drawn) :]:
+        unused.remove()
+    return zip(panels, drawn, drawn.values(), strict=False)
 
 
-def draw_curves(figure: Figure, plan: Plan, rows: list[Row], names: list[str]) -> None:
-    """Draw each quantity over the varied parameter, a curve per combination of the other values."""
-    (name,) = names
-    others = [other for other in plan.varied if other != name]
-    curves: dict[str, list[Row]] = {}
-    for row in sorted(rows, key=lambda row: float(row[column_of(name)])):
-        curves.setdefault(", ".join(row[column_of(o)] for o in others), []).append(row)
-    for panel, (column, (words, units)) in panels_of(figure, plan):
-        size, factor = unit([np.nan_to_num(numbers(rows, column))], units)
-        for number, (others_text, curve) in enumerate(curves.items()):
-            x, y = numbers(curve, column_of(name)), numbers(curve, column) * factor
-            bad, color = is_marked(plan, curve), f"C{number}" if others else BLUE
-            values = np.where(bad, np.nan, y)
-            panel.plot(x, values, "o-", markersize=4, color=color, label=others_text)
-            panel.plot(x[bad], y[bad], "x", color=color if others else RED)
-        mark = "black" if others else RED
-        meaning = "not confirmed" if plan.critical else "fails: last state before"
-        panel.plot([], [], "x", color=mark, label=meaning)
+def draw_curves(figure: Figure, table: Table, names: list[str]) -> None:
+    """Draw each quantity over the first name, a curve per combination of the other values."""
+    plan, name = table.plan, names[0]
+    column, others = column_of(name), [other for other in plan.varied if other != name]
+    texts = [row[column] for row in table.rows]
+    categories = None if all(map(is_number, texts)) else list(dict.fromkeys(texts))
+    x = np.array([categories.index(t) if categories else float(t) for t in texts])
+    curves: dict[str, list[int]] = {}
+    for i in np.argsort(x, kind="stable"):
+        key = ", ".join(f"{o} {table.rows[i][column_of(o)]}" for o in others)
+        curves.setdefault(key, []).append(i)
+    bad = is_marked(plan, table.rows)
+    for panel, drawn, (words, units) in panels_of(figure, table):
+        values = table.values(drawn)
+        shown = values if plan.critical else values[~bad]
+        size, factor = unit([np.nan_to_num(shown)], units)
+        for number, (key, own) in enumerate(sorted(curves.items(), key=lambda item: item[1])):
+            color, mark = CURVES[number % len(CURVES)]
+            good = np.where(bad[own], np.nan, values[own] * factor)
+            style = {"color": color, "markersize": 4.5, "linestyle": "none" if categories else "-"}
+            panel.plot(x[own], good, mark, **style, label=key)
+            failing, cross = [i for i in own if bad[i]], color if others else RED
+            if plan.critical:
+                panel.plot(x[failing], values[failing] * factor, "x", color=cross)
+            else:  # at the edge: its last state, at another level, would set the scale
+                edge = {"transform": panel.get_xaxis_transform(), "color": cross}
+                panel.plot(x[failing], np.full(len(failing), EDGE * (1 + number)), "x", **edge)
+        if categories:
+            panel.set_xticks(range(len(categories)), categories)
+            panel.set_xlim(-0.5, len(categories) - 0.5)
+        elif len(set(x)) <= FEW:
+            panel.set_xticks(sorted(set(x)))
         panel.set(xlabel=label(name), ylabel=f"{words} [{size}]")
         panel.grid(alpha=0.3)
-    if is_marked(plan, rows).any() or others:
-        panel.legend(fontsize=8)
+        if not np.nan_to_num(shown).any():
+            panel.set(yticks=[0] if len(shown) else [], ylim=(-1, 1))
+            text = "zero in all rows" if len(shown) == len(x) else "zero in all rows that stand"
+            text = text if len(shown) else "all rows fail"
+            panel.text(0.5, 0.6, text, ha="center", transform=panel.transAxes)
+        if drawn == FACTOR:
+            draw_verdicts(panel, table, x, values)
+    handles, labels = panel.get_legend_handles_labels()
+    named = {text: handle for text, handle in zip(labels, handles, strict=True) if text in curves}
+    if bad.any():
+        meaning = "not confirmed" if plan.critical else "fails"
+        (named[meaning],) = panel.plot([], [], "x", color="black" if others else RED)
+    named.pop("", None)
+    if named:
+        style = {"loc": "outside lower center", "ncols": min(len(named), 4), "fontsize": 8}
+        figure.legend(named.values(), named.keys(), **style)
 
 
-def draw_maps(figure: Figure, plan: Plan, rows: list[Row], names: list[str]) -> None:
+def draw_verdicts(panel: Axes, table: Table, x: np.ndarray, values: np.ndarray) -> None:
+    """Mark each row by its verdict, and the factor that all rows require, if they do."""
+    verdicts = np.array([row["verdict"] for row in table.rows])
+    for mark, verdict in zip(VERDICTS, dict.fromkeys(verdicts.tolist()), strict=False):
+        own = verdicts == verdict
+        style = {"color": "black", "mfc": "white", "markersize": 7, "zorder": 4}
+        panel.plot(x[own], values[own], mark, **style, label=verdict)
+    required = {case["required_SSF"] for case in table.cases}
+    if len(required) == 1 and (least := required.pop()):
+        panel.axhline(least, color="black", linestyle="--", lw=0.9, label=f"required {least:g}")
+    handles, labels = panel.get_legend_handles_labels()
+    shown = [(h, t) for h, t in zip(handles, labels, strict=True) if t in {*verdicts} or "req" in t]
+    panel.legend(*zip(*shown, strict=True), fontsize=8)
+
+
+def draw_maps(figure: Figure, table: Table, names: list[str]) -> None:
     """Draw each quantity over two varied parameters, with crosses where the dam fails."""
+    plan, rows = table.plan, table.rows
     x, y = (numbers(rows, column_of(name)) for name in names)
     (across, i), (up, j) = (np.unique(v, return_inverse=True) for v in (x, y))
     bad = is_marked(plan, rows)
-    for panel, (column, (words, units)) in panels_of(figure, plan):
-        values = np.where(bad, np.nan, numbers(rows, column))
+    for panel, column, (words, units) in panels_of(figure, table):
+        values = np.where(bad, np.nan, table.values(column))
         size, factor = unit([np.nan_to_num(values)], units)
         grid = np.full((len(up), len(across)), np.nan)
         grid[j, i] = values * factor
-        colors = panel.pcolormesh(across, up, grid, shading="nearest", cmap="Blues")
-        panel.plot(x[bad], y[bad], "x", color=RED, markersize=4)
-        figure.colorbar(colors, ax=panel, label=f"{words} [{size}]", location="top", shrink=0.9)
+        colors = panel.pcolormesh(grid, cmap="Blues")
+        panel.plot(i[bad] + 0.5, j[bad] + 0.5, "x", color=RED, markersize=4)
+        figure.colorbar(colors, ax=panel, label=f"{words} [{size}]")
+        for axis, ends in ((panel.xaxis, across), (panel.yaxis, up)):
+            shown = np.arange(0, len(ends), -(-len(ends) // LABELS))
+            axis.set_ticks(shown + 0.5, [f"{v:g}" for v in ends[shown]])
         panel.set(xlabel=label(names[0]), ylabel=label(names[1]))
         panel.label_outer()
     if bad.any():
@@ -143,15 +237,15 @@ def draw_maps(figure: Figure, plan: Plan, rows: list[Row], names: list[str]) -> 
         figure.supxlabel(f"crosses: {meaning}", fontsize=9, color=RED)
 
 
-def draw_probability(figure: Figure, plan: Plan, rows: list[Row], names: list[str]) -> None:
+def draw_probability(figure: Figure, table: Table, names: list[str]) -> None:
     """Draw the probability of failure over the varied parameter, with its interval."""
     from .outcome import probabilities
 
     (name,), axes = names, figure.subplots()
-    table = probabilities(plan, rows)
-    x = np.array([float(row[column_of(name)]) for row in table])
+    shares = probabilities(table.plan, table.rows)
+    x = np.array([float(row[column_of(name)]) for row in shares])
     order = np.argsort(x)
-    share, low, high = (np.array([row[n] for row in table])[order] for n in COLUMNS)
+    share, low, high = (np.array([row[n] for row in shares])[order] for n in COLUMNS)
     axes.fill_between(x[order], low, high, color=BLUE, alpha=0.2, linewidth=0, label="interval")
     axes.plot(x[order], share, "o-", markersize=4, color=BLUE, label="share of the sample")
     axes.set(xlabel=label(name), ylabel="probability of failure [-]", ylim=(-0.02, 1.02))
@@ -163,21 +257,22 @@ def draw_probability(figure: Figure, plan: Plan, rows: list[Row], names: list[st
 COLUMNS = "probability", "low", "high"
 
 
-def draw_sample(figure: Figure, plan: Plan, rows: list[Row], names: list[str]) -> None:
+def draw_sample(figure: Figure, table: Table, names: list[str]) -> None:
     """Draw the sample over its two strongest inputs, and the rank correlations of all inputs."""
     from .outcome import probabilities, sensitivities
 
-    table = sensitivities(plan, rows)
+    plan, rows = table.plan, table.rows
+    inputs = sensitivities(plan, rows)
     outcome = "failed" if 0 < fails(rows).sum() < len(rows) else "max_opening"
-    ranks = np.nan_to_num([row[outcome] for row in table])
-    strongest = [table[i]["input"] for i in np.argsort(-np.abs(ranks))]
+    ranks = np.nan_to_num([row[outcome] for row in inputs])
+    strongest = [inputs[i]["input"] for i in np.argsort(-np.abs(ranks))]
     points, bars = figure.subplots(1, 2, width_ratios=(1.3, 1))
     (row,) = probabilities(plan, rows)
     title = "probability of failure {:.4g} ({:.4g} to {:.4g})".format(*(row[c] for c in COLUMNS))
     points.set_title(title, fontsize=10)
     draw_points(points, rows, strongest[:2])
     bars.barh(
-        [row["input"] for row in table], ranks, color=[ORANGE if r < 0 else BLUE for r in ranks]
+        [row["input"] for row in inputs], ranks, color=[ORANGE if r < 0 else BLUE for r in ranks]
     )
     bars.invert_yaxis()
     bars.axvline(0, color="black", linewidth=0.5)
@@ -196,8 +291,10 @@ def draw_points(axes: Axes, rows: list[Row], names: list[str]) -> None:
         axes.hist(parts, bins=30, stacked=True, color=[BLUE, RED], label=["stands", "fails"])
         axes.set(ylabel="rows [-]")
     else:
-        for rows_shown, color, text in ((~bad, BLUE, "stands"), (bad, RED, "fails")):
-            axes.plot(*(v[rows_shown] for v in inputs), ".", color=color, markersize=4, label=text)
+        for shown, mark, color, text in ((~bad, "o", BLUE, "stands"), (bad, "x", RED, "fails")):
+            if shown.any():
+                places = [v[shown] for v in inputs]
+                axes.plot(*places, mark, color=color, markersize=3.5, label=text)
         axes.set(ylabel=label(names[1]))
         axes.grid(alpha=0.3)
         axes.ticklabel_format(scilimits=(-3, 4))

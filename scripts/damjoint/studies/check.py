@@ -30,7 +30,12 @@ FINITE_ELEMENTS, GRAVITY = "finite elements", "gravity method"
 LONGER = "gravity method, longer crack"
 DIFFERENCE, REQUIRED = "difference", "required"
 #: Verdict if nothing fails and nothing is required; parameters that set requirements.
-UNCHECKED, REQUIREMENTS = "not checked", ("required_SSF", "required_OSF", "f_c")
+UNCHECKED, REQUIREMENTS = (
+    "not checked",
+    ("required_SSF", "required_OSF", "f_c", "required_position"),
+)
+#: Value of a requirement that requires nothing.
+NOTHING = 0.0, "any"
 
 #: Columns of check.csv: a row per scene, joint and method at the last level, and one of
 #: differences.
@@ -56,6 +61,7 @@ CHECK = {
     "required_SSF": ("-", "required factor against sliding; 0: none"),
     "required_OSF": ("-", "required factor against overturning; 0: none"),
     "f_c": ("Pa", "compressive strength at the toe; 0: not checked"),
+    "required_position": ("", "required position of N; any: none"),
     "verdict": ("", "pass or fail; not checked: nothing fails, and nothing is required"),
     "why": ("", "failure, or each requirement that is not met"),
 }
@@ -111,6 +117,8 @@ class MethodResult:
         if case["f_c"] and -numbers["sigma_n_toe"] > case["f_c"]:
             compression = f"compression {-numbers['sigma_n_toe']:.4g} Pa at the toe"
             unmet.append(f"{compression} > f_c = {case['f_c']:g} Pa")
+        if not math.isnan(numbers["x_resultant"]) and not self.position_allowed:
+            unmet.append(f"N {self.position}: must be in {case['required_position']}")
         return [self.statement, *unmet] if self.statement else unmet
 
     @property
@@ -119,9 +127,16 @@ class MethodResult:
         return "fail" if self.failures else "pass" if requires(self.case) else UNCHECKED
 
     @property
-    def length(self) -> float:
-        """Length of the joint [m]."""
-        return self.case.section["joint_length"][0]
+    def position(self) -> str:
+        """In which part of the joint N meets it."""
+        length = self.case.section["joint_length"][0]
+        return gravity.position(self.numbers["x_resultant"], length)
+
+    @property
+    def position_allowed(self) -> bool:
+        """Whether N meets the joint in the required part."""
+        required = self.case["required_position"]
+        return gravity.PARTS.get(self.position, 1.0) <= gravity.PARTS.get(required, 1.0)
 
     @property
     def row(self) -> Row:
@@ -134,7 +149,7 @@ class MethodResult:
             "load": "partial" if self.partial else "full",
             "time": self.time,
             **self.numbers,
-            "position": gravity.position(self.numbers["x_resultant"], self.length),
+            "position": self.position,
             **{name: self.case[name] for name in REQUIREMENTS},
             "verdict": self.verdict,
             "why": "; ".join(self.failures),
@@ -143,7 +158,7 @@ class MethodResult:
 
 def requires(case: Case) -> bool:
     """Whether a case requires a safety factor or limits the compression at the toe."""
-    return any(case[name] for name in REQUIREMENTS)
+    return any(case[name] not in NOTHING for name in REQUIREMENTS)
 
 
 def least_sliding_factor(case: Case) -> float:
@@ -189,10 +204,11 @@ def by_finite_elements(result: Results, statement: str | None = None) -> MethodR
 
 def hand_calculation(result: Results) -> GravityMethod:
     """The gravity method for a joint, the only one of `result`, at a case's last level with all
-    loads; under displacement control at the last state of the run.
+    loads; at the last state of a run under displacement control or beyond the last level, up to a
+    critical one.
     """
     case, last = result.case, result.last
-    if case["drive"] != "level" and last:
+    if last and (case["drive"] != "level" or last["time"] > case.times[-1]):
         return gravity.at(case, last["time"], last["level"])
     return gravity.at(case, case.times[-1])
 
@@ -270,12 +286,14 @@ class SafetyCheck:
     @property
     def printed_rows(self) -> list[Row]:
         """Rows of the printed table: those of check.csv and the required factors."""
-        factors = required_by_case(self.gravity.case)
-        if all(map(math.isnan, factors.values())):
+        case = self.gravity.case
+        factors, where = required_by_case(case), position_by_case(case)
+        if all(map(math.isnan, factors.values())) and not where:
             return self.rows
         scene = {n: self.gravity.row[n] for n in ("case", "joint", "uplift")}
         blank = dict.fromkeys(NUMBERS, math.nan)
-        return [*self.rows, scene | {"answer": REQUIRED} | blank | factors | NO_VERDICT]
+        row = scene | {"answer": REQUIRED} | blank | factors | NO_VERDICT | {"position": where}
+        return [*self.rows, row]
 
     @property
     def why(self) -> str:
@@ -292,6 +310,10 @@ class SafetyCheck:
         if not case.law.limits_shear:
             strength = f"mu = {case['mu']:g}, adhesion = {case['adhesion']:g} Pa"
             notes.append(f"SSF with {strength}, which the law {case['law']} does not have")
+        partial = {n: case[n] for n in ("factor_mu", "factor_c") if case[n] != 1}
+        if partial:
+            listed = ", ".join(f"{name} = {value:g}" for name, value in partial.items())
+            notes.append(f"SSF with the partial factors {listed}")
         if case["uplift"] == "flow":
             notes.append("gravity method: full head in the crack, linear beyond it")
         if case["f_c"]:
@@ -313,6 +335,11 @@ def required_by_case(case: Case) -> dict[str, float]:
     """Required safety factors, without a factor that only the law requires."""
     least = required(case)
     return {n: v if case[f"required_{n}"] else math.nan for n, v in least.items()}
+
+
+def position_by_case(case: Case) -> str:
+    """Required position of N; empty if there is none."""
+    return "" if case["required_position"] in NOTHING else case["required_position"]
 
 
 def difference(first: float, second: float) -> float:
@@ -442,6 +469,8 @@ def picture_table(check: SafetyCheck) -> list[tuple[str, ...]]:
             numbers = (number_cell(v * factor) for v in line)
             head = title if size == "-" else f"{title} [{size}]"
             cells.append((head, *numbers, number_cell(least.get(name, math.nan))))
+    if where := position_by_case(check.gravity.case):
+        cells.append(("N' in", *(result.position for result in check.results), where))
     if check.finite_elements.partial:
         cells.insert(1, ("load", "partial", "full", *("full" for _ in longer), ""))
     return [*cells, ("", *(result.verdict for result in check.results), "")]

@@ -7,7 +7,6 @@ precision. A critical level needs no bisection: it is the highest level of the p
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -18,7 +17,6 @@ from typing import Any
 import numpy as np
 from scipy.optimize import bisect
 from threadpoolctl import threadpool_limits
-from tqdm import tqdm
 
 from .. import InputError
 from ..arrays import Setting, Settings
@@ -31,6 +29,7 @@ from ..model.parameters import parameter
 from ..model.results import Results, column_of, row_of_joint
 from ..post import folder as folders
 from ..post.tables import write_csv
+from ..progress import Progress
 from ..runner import save
 from ..solver.path import PRECISION, ROUGH, SURE, Point
 from ..statics import gravity
@@ -41,6 +40,9 @@ from .failure_path import CRITICAL, FailurePath, Trial, row
 #: Parameters that are divided by the strength reduction factor. The fracture energies are included:
 #: the stresses of the softening curve are scaled, its jumps are not.
 STRENGTH = ("sigma_max", "adhesion", "mu", "G_f", "G_t")
+
+#: Partial factors that divide them beside it.
+PARTIAL = {"mu": "factor_mu", "adhesion": "factor_c", "G_t": "factor_c"}
 
 #: Few iterations for a step of the level: if it fails a displacement is prescribed.
 QUICK = {"smallest_step": 1.0, "max_iterations": 15.0, "burst_iterations": 15.0}
@@ -101,6 +103,9 @@ class CriticalValue:
             lines = [f"{name}: critical {of} {self.value:.6g}{unit}{mode}"]
             lines.append(self.why or f"not confirmed: {self.doubt}")
         lines += self.events
+        if search.of == "strength" and set(search.partial.values()) != {1.0}:
+            mu, cohesion = search.partial["mu"], search.partial["adhesion"]
+            lines.append(f"beyond the partial factors factor_mu = {mu:g}, factor_c = {cohesion:g}")
         laws = self.point.model.equilibrium.laws.laws if self.point else ()
         if any(law.hardens for law in laws) and search.own.hardening_asked:
             lines += filter(None, [statement(last_state(search, self.point))])
@@ -128,19 +133,24 @@ class Search:
         settings: Settings | None = None,
         levels: str | Sequence[float] | None = None,
         tail_levels: str | Sequence[float] | None = None,
-        on_progress: Callable[[str], None] = lambda message: None,
     ) -> None:
         """case, settings, levels, tail_levels: as in model.case.load; of: level, strength, uplift
-        or a parameter; on_progress: called with a message. Raises InputError.
+        or a parameter. Raises InputError.
         """
         self.source = case, levels, tail_levels
         self.of, self.name = of, {"uplift": "drain_effectiveness"}.get(of, of)
         own = load(case, settings, levels, tail_levels)
-        self.settings = QUICK | dict(settings or {}) | {"drive": "level"}
+        #: partial factors of the case; they are part of the reduced strength, not of a check
+        self.partial = {name: own[factor] for name, factor in PARTIAL.items()}
+        full = dict.fromkeys(PARTIAL.values(), 1.0)
+        own = own.with_values(full)
+        self.settings = QUICK | dict(settings or {}) | {"drive": "level"} | full
         for joint in own.joints:
             if joint.law.hardening_parameter and not own.hardening_asked:
                 self.settings[joint.law.hardening_parameter] = 0.0
-        self.own, self.on_progress = own, on_progress
+        self.own = own
+        #: called with a message on the progress
+        self.on_progress: Callable[[str], None] = lambda message: None
         self.trials: list[Trial] = []
         self.check_quantity()
 
@@ -180,8 +190,9 @@ class Search:
         """
         name, levels, tails = self.source
         if self.of == "strength":
+            factors = {n: value * self.partial.get(n, 1.0) for n in STRENGTH}
             joints = self.own.joints
-            changed = {n: of_each([joint[n] / value for joint in joints]) for n in STRENGTH}
+            changed = {n: of_each([joint[n] / factors[n] for joint in joints]) for n in STRENGTH}
             changed["pena_rupture"] = -1.0
         else:
             changed = {self.name: value}
@@ -506,18 +517,18 @@ def critical(
     Returns the result, and its lines of text. An interrupted search writes its trials.
     Raises InputError, RunError.
     """
-    shown = tqdm(bar_format="{desc} {elapsed}", disable=not sys.stderr.isatty(), leave=False)
-    search = Search(case, of, settings, levels, tail_levels, shown.set_description_str)
-    out = out or Path("out") / f"{search.own.name}_critical"
+    search = Search(case, of, settings, levels, tail_levels)
+    name = search.own.name
+    out = out or Path("out") / f"{name}_critical"
     folders.check_writable(out)
     start = time.perf_counter()
-    try:
-        answer = search.run()
-    except KeyboardInterrupt as caught:
-        write(search, search.interrupted(caught), out, time.perf_counter() - start)
-        raise
-    finally:
-        shown.close()
+    with Progress(name, bar_format="{desc} {elapsed}", leave=False) as shown:
+        search.on_progress = lambda message: shown.describe(f"{name}: {message}")
+        try:
+            answer = search.run()
+        except KeyboardInterrupt as caught:
+            write(search, search.interrupted(caught), out, time.perf_counter() - start)
+            raise
     write(search, answer, out, time.perf_counter() - start)
     return answer, answer.lines(search)
 

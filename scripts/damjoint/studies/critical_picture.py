@@ -15,6 +15,9 @@ from ..post.units import LENGTHS, unit
 from ..solver.path import Point
 from .failure_path import FailurePath, Trial
 
+#: Ratio of the largest to the smallest value above which the values have a logarithmic axis.
+WIDE = 30
+
 
 class Content(NamedTuple):
     """Content of the picture: title, varied quantity and its unit, trials, critical value by both
@@ -65,7 +68,11 @@ def draw_trials(axes: Axes, content: Content) -> None:
     ):
         paths = {trial.value: trial.path for trial in content.trials if trial.stands == stands}
         levels = [p.target if stands else p.highest for p in paths.values()]
-        axes.plot(list(paths), levels, mark, color=color, label=label)
+        if paths:
+            axes.plot(list(paths), levels, mark, color=color, label=label)
+    values = [abs(trial.value) for trial in content.trials]
+    if min(values) > 0 and max(values) > WIDE * min(values):
+        axes.set_xscale("log")
     for value, style, label in critical_lines(content):
         axes.axvline(value, color="black", linestyle=style, linewidth=0.9, label=label)
     axes.set(xlabel=f"{content.of} [{content.unit.strip() or '-'}]", ylabel="level [m]")
@@ -88,7 +95,7 @@ def draw_paths(axes: Axes, content: Content) -> None:
         axes.plot(
             [ux * factor for ux in crest],
             [p.level for p in points],
-            "o-",
+            "o-" if trial.stands or len(paths) == 1 else "s--",
             color=GREEN if trial.stands else BLUE,
             markersize=3,
             label="equilibria" if content.of == "level" else label,

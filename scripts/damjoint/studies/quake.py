@@ -6,7 +6,7 @@ import contextlib
 import sys
 import time
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,14 +18,14 @@ from tqdm import tqdm
 from .. import InputError, RunError, __version__
 from ..arrays import Table
 from ..dynamics import checkpoint
-from ..dynamics.history import QuakeHistory, quake_columns
+from ..dynamics.history import QuakeHistory
 from ..dynamics.rigid_block import RigidBlock
 from ..dynamics.stepper import Earthquake
 from ..engines.condensed.solve import about
 from ..fem.bodies import Bodies
 from ..joint.interface import interface_of
 from ..model.case import Case
-from ..model.results import column_of
+from ..model.results import QuakeResult, column_of, quake_columns
 from ..post import folder as folders
 from ..post import tables
 from ..solver.controls import LevelControl
@@ -48,21 +48,6 @@ MEAN_OVER = 1.0
 #: Columns of which the largest size is reported.
 PEAKS = ("ground_ax", "crest_ux", "crest_ax")
 PEAKS_OF_JOINTS = ("heel_opening", "toe_opening", "slip_mean", "open_length")
-
-
-@dataclass(frozen=True, kw_only=True)
-class QuakeResult:
-    """The rows of an earthquake and what they amount to."""
-
-    case: Case
-    rows: Table
-    #: time (rows,), distance from the heel (nodes,), effective normal stress (rows, nodes)
-    stress: Table
-    #: for run.json
-    summary: dict[str, Any]
-    #: whether the dam is in static equilibrium after the earthquake
-    stands: bool
-    statement: str
 
 
 def check(case: Case) -> None:
@@ -122,7 +107,7 @@ def run(case: Case, out: Path, picture: bool = True, progress: bool = True) -> Q
         write_tables(static, history, quake, out)
         write_info(static, out, result.summary, "", result.statement)
         if picture:
-            from .quake_picture import draw
+            from .quake_picture import draw  # matplotlib takes long to load
 
             draw(result, out)
         (out / CHECKPOINT).unlink(missing_ok=True)

@@ -7,9 +7,8 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..model.results import column_of
+from ..model.results import QuakeResult, column_of
 from ..post.drawing import BLUE, DARK, GREEN, ORANGE, RED, figure_of, panels, write_picture
-from .quake import QuakeResult
 
 #: Largest number of rows of the map of the stress.
 MOST_ROWS = 1500

@@ -1,44 +1,75 @@
-"""Report of runs: one HTML page made from the files in their folders."""
+"""Report of runs: an HTML page or a PDF made from the files in their folders."""
 
 from __future__ import annotations
 
 import base64
+import csv
 import io
-import json
+import math
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-import gmsh
 import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from matplotlib.figure import Figure
 
-from .. import ROUND_OFF, InputError, __version__
-from ..arrays import Value
-from ..model.case import Case
+from .. import ROUND_OFF, InputError, RunError, __version__
+from ..model.case import Case, is_name
 from ..model.fields import Solution
-from ..model.parameters import constants, declared, parse
 from ..model.results import Results
 from ..post import pictures, stored
 from ..post.drawing import figure_of
 from ..post.summary import Table, levels_table, table_of
-from ..post.units import FORCES, MOMENTS
-from ..statics.verdict import failed, statement, stiffness_ratio
+from ..post.units import FORCES, MOMENTS, Units, unit
+from ..statics.gravity import GravityMethod, force, resultant_of
+from ..statics.verdict import decisive_joint, failed, statement, stiffness_ratio
 from ..storage import atomic_write
-from .check import UNCHECKED, SafetyCheck, compare_methods, hand_calculation, picture_table
+from . import report_input
+from .check import (
+    REQUIRED,
+    SHOWN,
+    UNCHECKED,
+    MethodResult,
+    SafetyCheck,
+    compare_joints,
+    hand_calculation,
+    required_by_case,
+)
+from .report_input import Entry, by_runs, in_table
 
 #: Resolution of the rasterised parts of a picture.
 DPI = 160
 #: Sizes of the pictures [inches]: half of the page's width; its width; its width, in 3D.
-HALF, WIDE, SOLID = (5.2, 5.8), (10.6, 2.4), (10.6, 4.4)
+HALF, WIDE, SOLID = (5.2, 4.9), (10.6, 2.1), (10.6, 4.4)
 MINUTE = "%Y-%m-%d %H:%M"
+#: A column for `table_of`: heading, values, units.
+Column = tuple[str, np.ndarray, Units]
+METRES: Units = (("m", 1.0),)
+RATIO: Units = (("", 1.0),)
+
+#: Columns of the summary: name, heading, units. A column without values is left out.
+SUMMARY: tuple[tuple[str, str, Units], ...] = (
+    ("level", "level", METRES),
+    ("tail_level", "tailwater", METRES),
+    ("N", "N'", FORCES),
+    ("T", "T", FORCES),
+    ("x_resultant", "N' at x", METRES),
+    ("crack_length", "crack", METRES),
+    ("SSF", "SSF", RATIO),
+    ("SSF_gravity", "SSF gravity", RATIO),
+    ("SSF_required", "SSF required", RATIO),
+    ("OSF", "OSF", RATIO),
+    ("OSF_gravity", "OSF gravity", RATIO),
+    ("OSF_required", "OSF required", RATIO),
+)
 
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture of the page: CSS class of its size, caption, data address."""
+    """A picture of the report: CSS class of its size, caption, data address."""
 
     size: str
     caption: str
@@ -47,11 +78,12 @@ class Picture:
 
 @dataclass(frozen=True)
 class RunSection:
-    """Section of the page on a run."""
+    """A run in the report."""
 
     folder: str
     title: str
     scene: str
+    uplift: str
     #: time of the run
     made: str
     #: pass, fail or not checked
@@ -59,29 +91,69 @@ class RunSection:
     #: verdict of the run itself: stands, sliding, ...
     run_verdict: str
     failures: list[str]
+    #: hints on the result, critical value, discretisation error
     hints: list[str]
     pictures: list[Picture]
     levels: Table
-    #: safety check and loads; None for a user's own geometry
-    check: Table | None
+    #: both methods, loads and formulas of the gravity method; None for a user's own geometry
+    methods: Table | None
     loads: Table | None
+    formulas: list[str]
+    #: notes on the comparison of both methods
     notes: list[str]
-    #: parameter, meaning, value, unit, default
-    differences: list[tuple[str, str, str, str, str]]
-    #: mesh, solver, versions, times: name, value
-    facts: list[tuple[str, str]]
+    #: values of the columns SUMMARY
+    summary: dict[str, float]
+    #: mesh, steps, engine: text by heading
+    computation: dict[str, str]
+    materials: dict[str, Entry]
+    other_input: dict[str, Entry]
+    limits: list[str]
+    #: versions and machine by name
+    versions: dict[str, str]
 
 
 def write(folders: list[Path], to: Path) -> None:
-    """Write the page from the folders of runs, those of their further scenes included.
+    """Write the report on the runs in folders, those of their further scenes included: a PDF if its
+    name ends in .pdf, else HTML.
 
-    Raises InputError if a folder is not that of a run, or the page can not be written.
+    A folder of `damjoint check` has a run per load combination. Raises InputError if a folder is
+    not that of a run, or the file can not be written; RunError if weasyprint is not installed.
     """
-    runs = [run for folder in folders for run in stored.runs_in(folder)]
+    rendered = renderer(to)
+    runs = [run for folder in folders for part in parts_of(folder) for run in stored.runs_in(part)]
     inside = any(run.resolve() in to.resolve().parents for run in runs)
-    if to.is_dir() or (inside and to.suffix != ".html"):
-        raise InputError(f"to = {to}: must be a file; in the folder of a run it must end in .html")
-    sections = [read_section(folder) for folder in runs]
+    if to.is_dir() or (inside and to.suffix.lower() not in (".html", ".pdf")):
+        raise InputError(
+            f"to = {to}: must be a file; in the folder of a run it must end in .html or .pdf"
+        )
+    page = rendered(page_of([read_section(folder) for folder in runs]))
+    try:
+        with atomic_write(to) as path:
+            path.write_bytes(page)
+    except OSError as error:
+        raise InputError(f"to = {to}: must be a writable file ({error.strerror})") from None
+
+
+def renderer(to: Path) -> Callable[[str], bytes]:
+    """Return the function that converts the HTML page to the content of a file.
+
+    Raises RunError if it is a PDF and weasyprint is not installed.
+    """
+    if to.suffix.lower() != ".pdf":
+        return str.encode
+    try:
+        import weasyprint
+    except (ImportError, OSError) as error:  # OSError: without the library Pango
+        reason = str(error).splitlines()[0]
+        raise RunError(
+            f"to = {to}: a PDF needs weasyprint ({reason}): pip install weasyprint, apt install "
+            "libpangoft2-1.0-0; or print the .html page from a browser"
+        ) from None
+    return lambda page: weasyprint.HTML(string=page).write_pdf()
+
+
+def page_of(sections: list[RunSection]) -> str:
+    """Render the page."""
     environment = Environment(
         loader=FileSystemLoader(Path(__file__).parent),
         autoescape=True,
@@ -89,14 +161,51 @@ def write(folders: list[Path], to: Path) -> None:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    page = environment.get_template("report.html.j2").render(
-        runs=sections, version=__version__, now=f"{datetime.now():{MINUTE}}"
+    rows = [(f"{i}", *s.computation.values()) for i, s in enumerate(sections, start=1)]
+    heads = ["run", *sections[0].computation]
+    entries = by_runs([section.other_input for section in sections])
+    listed = {name for name, entry, _ in entries if in_table(name, entry)}
+    return environment.get_template("report.html.j2").render(
+        runs=sections,
+        summary=summary_table(sections),
+        computations=Table(heads, ["" for _ in heads], rows),
+        materials=by_runs([section.materials for section in sections]),
+        other_input=[row for row in entries if row[0] in listed],
+        at_default=[row for row in entries if row[0] not in listed],
+        limits=by_runs([dict.fromkeys(section.limits, "") for section in sections]),
+        versions=by_runs([section.versions for section in sections]),
+        version=__version__,
+        now=f"{datetime.now():{MINUTE}}",
     )
+
+
+def parts_of(folder: Path) -> list[Path]:
+    """List the folders of the runs in a folder of `damjoint check`, in its order; the folder itself
+    if it is another one.
+
+    Raises InputError if its check.csv is damaged.
+    """
+    table = folder / "check.csv"
+    if not table.is_file():
+        return [folder]
     try:
-        with atomic_write(to) as path:
-            path.write_text(page, encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"to = {to}: must be a writable file ({error.strerror})") from None
+        with table.open(newline="", encoding="utf-8") as file:
+            names = dict.fromkeys(row["case"] for row in csv.DictReader(file))
+    except (*stored.DAMAGED, csv.Error) as error:
+        raise InputError(f"out = {folder}: its check.csv is damaged ({error!r})") from None
+    if not all(name and is_name(name) for name in names):
+        raise InputError(f"out = {folder}: its check.csv is damaged (names of cases)")
+    return [folder / name for name in names]
+
+
+def summary_table(sections: list[RunSection]) -> Table:
+    """Tabulate the last state of each run."""
+    columns = []
+    for name, head, units in SUMMARY:
+        values = np.array([section.summary.get(name, math.nan) for section in sections])
+        if np.isfinite(values).any():
+            columns.append((head, values, units))
+    return table_of(columns)
 
 
 def read_section(folder: Path) -> RunSection:
@@ -115,35 +224,57 @@ def run_section(folder: Path, solution: Solution) -> RunSection:
     """Make the section of a run."""
     result = solution.result
     case, info = result.case, result.info
-    check = None if case.geometry else compare_methods(result)  # of a section by parameters
-    failures = failures_of(result, check)
-    verdict = check.finite_elements.verdict if check else UNCHECKED
+    # the gravity method needs a section by parameters
+    checks = [] if case.geometry else compare_joints(result)
+    number = decisive_joint(result)
+    own, check = result.joints[number], checks[number] if checks else None
+    rigid = None if case.geometry else hand_calculation(own)
+    critical = critical_value(info.get("critical"))
+    # requirements do not apply to the last state before a failure
+    failures = [] if critical else failures_of(result, checks)
+    verdict = check.finite_elements.verdict if check and not critical else UNCHECKED
     made = datetime.fromtimestamp((folder / "run.json").stat().st_mtime)
     return RunSection(
         folder=str(folder),
         title=case.title,
         scene=describe_scene(case),
+        uplift=str(case["uplift"]),
         made=f"{made:{MINUTE}}",
         verdict="fail" if failures else verdict,
-        run_verdict=info["verdict"],
+        run_verdict="critical value" if critical else info["verdict"],
         failures=failures,
-        hints=[*info["hints"]],
+        hints=[
+            *filter(None, [which_joint(result), critical, *info["hints"]]),
+            *filter(None, [discretisation_error(result)]),
+        ],
         pictures=pictures_of(solution) if len(result.joint["time"]) else [],
-        levels=levels_table(result),
-        check=check_table(check) if check else None,
-        loads=loads_table(result) if check else None,
+        levels=levels_table(own),
+        methods=methods_table(case, checks, judged=not critical) if checks else None,
+        loads=loads_table(rigid) if rigid else None,
+        formulas=formulas(rigid) if rigid and rigid.stands else [],
         notes=check.notes if check else [],
-        differences=differences(case),
-        facts=facts(result),
+        summary=summary_of(own, check),
+        computation=computation(result),
+        materials=report_input.materials(case),
+        other_input=report_input.other_input(case),
+        limits=[*report_input.limits(case)],
+        versions=versions(info),
     )
 
 
-def failures_of(result: Results, check: SafetyCheck | None) -> list[str]:
+def which_joint(result: Results) -> str:
+    """Which of several joints the curves and the tables of levels and loads are of; else empty."""
+    name = result.case.named((decisive_joint(result),))
+    return f"curves and tables of levels and loads: {name}" if name else ""
+
+
+def failures_of(result: Results, checks: list[SafetyCheck]) -> list[str]:
     """Messages on a run that failed and on requirements that are not met."""
     info = result.info
     messages = [info["statement"]] if info["state"] in ("failed", "interrupted") else []
-    if check:
-        messages += [f"{r.method}: {why}" for r in check.results for why in r.failures]
+    if checks:
+        judged = [r for check in checks for r in check.results]
+        messages += [f"{label(r, result.case)}: {why}" for r in judged for why in r.failures]
     elif failed(result):
         messages.append(statement(result))
     return messages
@@ -158,153 +289,187 @@ def describe_scene(case: Case) -> str:
     return f"{size}; {plane}; joint law {case['law']}; water in the joint: {case['uplift']}"
 
 
-def differences(case: Case) -> list[tuple[str, str, str, str, str]]:
-    """List the parameters that matter in the scene and differ from their default: name, meaning,
-    value, unit, default.
+def summary_of(result: Results, check: SafetyCheck | None) -> dict[str, float]:
+    """Values of the columns SUMMARY in SI units."""
+    if not check:
+        return result.last
+    factors = required_by_case(result.case)
+    values = dict(check.finite_elements.numbers)
+    for name, factor in factors.items():
+        values |= {f"{name}_gravity": check.gravity.numbers[name], f"{name}_required": factor}
+    return values
 
-    The default of an automatic parameter is the value that follows from the others.
+
+def label(result: MethodResult, case: Case) -> str:
+    """Method of a result, and its joint if the case has several."""
+    return f"{result.joint}, {result.method}" if case.of_joints else result.method
+
+
+def methods_table(case: Case, checks: list[SafetyCheck], judged: bool) -> Table:
+    """Tabulate both methods at the last level for each joint, what is required and, if judged, the
+    verdicts.
     """
-    known, values = declared(), case.values
-    own = {n: v for n, v in values.items() if not known[n].automatic}
-    automatic, defaults = parse(stored.parser_input(own, case.levels)), constants()
-    matter = visible(case)
-    rows = []
-    for name, parameter in known.items():
-        default = (automatic if parameter.automatic else defaults)[name][0]
-        if name in matter and not same(values[name], default):
-            texts = cell(values[name]), parameter.unit.strip("-"), cell(default)
-            rows.append((name, parameter.description, *texts))
-    return rows
+    results = [result for check in checks for result in check.results]
+    rows = [(label(r, case), r.numbers, r.verdict if judged else "") for r in results]
+    factors = required_by_case(checks[0].gravity.case)
+    if np.isfinite([*factors.values()]).any():
+        rows.append((REQUIRED, factors, ""))
+    columns = []
+    for units, heads in SHOWN:
+        values = [[numbers.get(n, math.nan) for _, numbers, _ in rows] for n in heads]
+        columns += in_one_unit(heads.values(), np.array(values), units)
+    names, sizes, cells = table_of(columns)
+    table = [(m, *row, verdict) for (m, _, verdict), row in zip(rows, cells, strict=True)]
+    return Table(["", *names, ""], ["", *(s.strip("-") for s in sizes), ""], table)
 
 
-def visible(case: Case) -> set[str]:
-    """Parameters that matter in the scene, by the visibility in their declarations."""
-    parse(stored.parser_input(case.values, case.levels))
-    entry = lambda p: json.loads(gmsh.onelab.get(p.label))
-    return {name for name, p in declared().items() if entry(p).get("visible", True)}
+def in_one_unit(heads: Iterable[str], values: np.ndarray, units: Units) -> Iterator[Column]:
+    """Yield columns for `table_of` that share a unit; values: (columns, rows)."""
+    for head, column in zip(heads, values, strict=True):
+        yield head, column, (unit([values[np.isfinite(values)]], units),)
 
 
-def same(value: Value, default: Value) -> bool:
-    """Whether a parameter has its default value, but for rounding."""
-    if isinstance(value, str) or isinstance(default, str):
-        return value == default
-    return bool(np.isclose(value, default, ROUND_OFF, 0))
+def loads_table(rigid: GravityMethod) -> Table:
+    """Tabulate the loads on the body above the joint, the uplift and their sum: forces, lever arms
+    about the toe, moments.
+    """
+    loads = [*rigid.loads]
+    if rigid.U:
+        (tx, ty), away = rigid.body.along, rigid.uplift.moment / rigid.U
+        loads.append(force("uplift", -ty * rigid.U, tx * rigid.U, (-away * tx, -away * ty)))
+    rows = [*loads, resultant_of("sum", loads)]
+    arms = [(arm(r.moment_of_fx, r.fx), arm(r.moment_of_fy, r.fy)) for r in loads]
+    heights, distances = np.array([*arms, (math.nan, math.nan)]).T
+    forces = np.array([[r.fx for r in rows], [r.fy for r in rows]])
+    downstream, upwards = in_one_unit(["downstream", "upwards"], forces, FORCES)
+    columns = [
+        downstream,
+        ("height above the toe", heights, METRES),
+        upwards,
+        ("distance upstream of the toe", distances, METRES),
+        ("moment about the toe", np.array([r.moment for r in rows]), MOMENTS),
+    ]
+    names, sizes, cells = table_of(columns)
+    table = [(r.name, *row) for r, row in zip(rows, cells, strict=True)]
+    return Table(["load", *names], ["", *sizes], table)
 
 
-def cell(value: Value) -> str:
-    """Format the value of a parameter."""
-    return value if isinstance(value, str) else f"{value:.6g}"
+def arm(moment: float, component: float) -> float:
+    """Lever arm [m] of a component of a force; nan if there is none."""
+    return -moment / component if component else math.nan
 
 
-def loads_table(result: Results) -> Table:
-    """Tabulate the loads on the body above the joint, and the uplift, at the last level."""
-    columns = hand_calculation(result).table()
-    table = table_of(
-        [
-            ("downstream", np.array(columns["Fx"]), FORCES),
-            ("upwards", np.array(columns["Fy"]), FORCES),
-            ("moment about the toe", np.array(columns["moment"]), MOMENTS),
-        ]
-    )
-    rows = [(name, *row) for name, row in zip(columns["load"], table.rows, strict=True)]
-    return Table(["load", *table.names], ["", *table.units], rows)
+def formulas(rigid: GravityMethod) -> list[str]:
+    """The gravity method's eccentricity, stresses and sliding factor in numbers (MN, m, MPa)."""
+    case, length, uncracked = rigid.case, rigid.body.length, rigid.uncracked
+    normal, shear, moment = (v / 1e6 for v in (rigid.N, rigid.T, rigid.M))
+    toe, tip = rigid.sigma_n_eff_toe / 1e6, rigid.tip_stress / 1e6
+    tip = 0.0 if abs(tip) < ROUND_OFF * abs(toe) else tip
+    lines = [
+        f"e = L/2 - M/N' = {length:.4g}/2 - {moment:.4g}/{normal:.4g} = "
+        f"{rigid.eccentricity:.4g} m towards the toe; uncracked B = L - a = {uncracked:.4g} m",
+        f"effective stress, tension > 0: upstream (2 N' B - 6 M)/B² = {tip:.4g} MPa, "
+        f"toe (6 M - 4 N' B)/B² = {toe:.4g} MPa",
+    ]
+    if shear:
+        lines.append(
+            f"SSF = (µ N' + c B)/T = ({factored(case, 'mu', 1)} · {normal:.4g} + "
+            f"{factored(case, 'c', 1e6)} · {uncracked:.4g})/{abs(shear):.4g} = {rigid.SSF:.4g}"
+        )
+    return lines
 
 
-def check_table(check: SafetyCheck) -> Table:
-    """Tabulate both methods and what is required."""
-    heads, *rows = picture_table(check)
-    return Table([*heads], [""] * len(heads), rows)
+def factored(case: Case, strength: str, unit: float) -> str:
+    """mu or c, with the partial factor that divides it."""
+    value, factor = case["mu" if strength == "mu" else "adhesion"], case[f"factor_{strength}"]
+    return f"{value / unit:.4g}" + (f"/{factor:.4g}" if factor != 1 else "")
 
 
 def pictures_of(solution: Solution) -> list[Picture]:
     """Draw the pictures of a run."""
     result = solution.result
-    case, time = result.case, pictures.shown_time(result)
+    time = pictures.shown_time(result)
     at_level = f"at level {result.state(time)['level']:.4g} m"
-    section, joint, history = figure_of(*HALF), figure_of(*HALF), figure_of(*WIDE)
-    pictures.draw_dam(section, solution, time)
-    pictures.draw_joint(joint, result, time)
-    pictures.draw_history(history, result)
+    return [Picture(*words, embedded(figure)) for *words, figure in drawn(solution, time, at_level)]
+
+
+def drawn(solution: Solution, time: float, at_level: str) -> Iterator[tuple[str, str, Figure]]:
+    """Yield the figures of a run: CSS class of the size, caption, figure."""
+    result = solution.result
     colors = "Red: open or broken; violet: softening; orange: slipped."
-    drawn = [
-        ("half", section, f"The dam and its loads {at_level}, deformed."),
-        ("half", joint, f"The joint {at_level}: jumps, normal stress, shear. {colors}"),
-        ("full", history, "All converged steps."),
-    ]
-    if case["dim"] == 3 and solution.fields:
+    has_fields = bool(solution.fields)
+    if has_fields:
+        section = figure_of(*HALF)
+        pictures.draw_dam(section, solution, time)
+        yield "half", f"Section and loads {at_level}, deformed.", section
+    number = decisive_joint(result)
+    own = result.joints[number]
+    joint = figure_of(*(HALF if has_fields else SOLID))
+    pictures.draw_joint(joint, solution.of_joint(number), time)
+    name = own.case.joint_names[0] if result.case.of_joints else "joint"
+    caption = f"{name[0].upper()}{name[1:]} {at_level}. {colors}"
+    yield "half" if has_fields else "full", caption, joint
+    history = figure_of(*WIDE)
+    pictures.draw_history(history, own)
+    yield "full", "", history
+    if result.case["dim"] == 3 and has_fields and not pictures.is_own_solid(result.case):
         solid = figure_of(*SOLID)
         pictures.draw_solid(solid, solution, time)
-        drawn.append(("full", solid, "In 3D: deformed, and the joint unrolled."))
-    if case["drive"] != "level":
-        drawn.append(("half", pictures.draw_curve(result), "Load against opening."))
-    return [Picture(size, caption, embedded(figure)) for size, figure, caption in drawn]
+        yield "full", "In 3D: deformed, and maps of the joint.", solid
+    if result.case["drive"] != "level":
+        yield "half", "Load against opening.", pictures.draw_curve(result)
 
 
 def embedded(figure: Figure) -> str:
-    """Encode a figure as a data address: SVG with rasterised meshes."""
+    """Encode a figure with all its legends as a data address: SVG with rasterised meshes."""
     file = io.BytesIO()
-    figure.savefig(file, format="svg", dpi=DPI, metadata={"Date": None})
+    whole = {"bbox_inches": "tight", "pad_inches": 0.05}
+    figure.savefig(file, format="svg", dpi=DPI, metadata={"Date": None}, **whole)
     return "data:image/svg+xml;base64," + base64.b64encode(file.getvalue()).decode()
 
 
-def facts(result: Results) -> list[tuple[str, str]]:
-    """Describe critical value, mesh, steps, engine, times and versions."""
-    info = result.info
-    engine = filter(None, [info["engine"], info.get("factorisation")])
-    return [
-        *critical_fact(info.get("critical")),
-        ("mesh", mesh_fact(result)),
-        (
-            "stiffness of the joint over that of an element, K_N h/E",
-            f"{stiffness_ratio(result):.3g}",
-        ),
-        ("error of the mesh", error_fact(result)),
-        ("steps", steps_fact(result)),
-        ("engine", ", ".join(engine)),
-        (
-            "seconds",
-            ", ".join(f"{name} {value:.2g}" for name, value in info["wall_seconds"].items()),
-        ),
-        ("versions", ", ".join(f"{name} {number}" for name, number in info["versions"].items())),
-    ]
-
-
-def critical_fact(info: dict[str, Any] | None) -> list[tuple[str, str]]:
+def critical_value(info: dict[str, Any] | None) -> str:
     """Result of `damjoint critical`, if run.json has it."""
     if not info or info["value"] is None:
-        return []
+        return ""
     unit = info["unit"]
     parts = [f"{info['value']:.6g} {unit}".strip(), info["mode"]]
     if info["doubt"]:
         parts.append(f"not confirmed: {info['doubt']}")
     by_hand = {"gravity method": info["gravity_method"]} | info.get("gravity_method_with", {})
     parts += [f"{n} {v:.6g} {unit}".strip() for n, v in by_hand.items() if v is not None]
-    return [(f"critical {info['of']}, and the last state before it", "; ".join(parts))]
+    return f"the last state before failure, critical {info['of']} {'; '.join(parts)}"
 
 
-def mesh_fact(result: Results) -> str:
-    """Size of the mesh."""
-    case, mesh = result.case, result.info["mesh"]
-    return (
-        f"{mesh['nodes']} nodes, {mesh['elements']} elements, {mesh['joint_elements']} in the "
-        f"joint ({case['n_joint']:g} from heel to toe), order {case['order']:g}; "
-        f"{result.info['unknowns']} unknowns"
-    )
-
-
-def error_fact(result: Results) -> str:
+def discretisation_error(result: Results) -> str:
     """Error that --accuracy has estimated; else how to estimate it."""
     if "error_estimate" in result.info:
         return str(result.info["error_estimate"]["statement"])
     own = result.case.geometry and result.case.geometry.suffix != ".geo"
     how = "compare a run on a finer mesh" if own else "damjoint run --accuracy 1% estimates it"
-    return f"not estimated; {how}"
+    return f"error of the mesh: not estimated; {how}"
 
 
-def steps_fact(result: Results) -> str:
-    """Steps, iterations and residual."""
-    history = result.history
-    return (
-        f"{len(history['time'])} converged, {history['iterations'].sum():.0f} iterations; largest "
-        f"residual {history['residual'].max(initial=0):.1g} of the force of the highest water"
-    )
+def computation(result: Results) -> dict[str, str]:
+    """Mesh, steps, engine and time."""
+    case, info, history = result.case, result.info, result.history
+    mesh = info["mesh"]
+    return {
+        "nodes": f"{mesh['nodes']}",
+        "elements": f"{mesh['elements']}",
+        "in the joint": f"{mesh['joint_elements']}",
+        "order": f"{case['order']:g}",
+        "unknowns": f"{info['unknowns']}",
+        "K_N h/E": f"{stiffness_ratio(result):.3g}",
+        "steps": f"{len(history['time'])}",
+        "iterations": f"{history['iterations'].sum():.0f}",
+        "largest residual": f"{history['residual'].max(initial=0):.1g}",
+        "engine": info["engine"],
+        "time [s]": f"{sum(info['wall_seconds'].values()):.2g}",
+    }
+
+
+def versions(info: dict[str, Any]) -> dict[str, str]:
+    """Versions, factorisation and machine of a run; runs of earlier versions lack some."""
+    others = {name: info.get(name) for name in ("commit", "factorisation", "machine")}
+    return info["versions"] | {name: text for name, text in others.items() if text}

@@ -7,9 +7,8 @@ import csv
 import hashlib
 import multiprocessing
 import os
-import sys
 import threading
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, replace
@@ -18,7 +17,6 @@ from pathlib import Path
 from typing import TypeAlias
 
 from threadpoolctl import threadpool_limits
-from tqdm import tqdm
 
 from .. import InputError, RunError, __version__, accuracy
 from ..arrays import Value, Values
@@ -27,6 +25,7 @@ from ..joint.interface import Interface, interface_of
 from ..model.case import Case, first_mesh
 from ..model.results import HISTORY
 from ..post.tables import as_text
+from ..progress import track
 from ..solver.load_stepper import LoadStepper
 from ..statics.limit import mechanism
 from ..statics.verdict import failed, statement, verdict
@@ -286,7 +285,6 @@ def sweep(
     schedule: Schedule = AS_IN_CASE,
     jobs: int | None = None,
     scheduler: str | None = None,
-    progress: Callable[..., Iterable[tuple[str, dict[str, Value]]]] = tqdm,
 ) -> tuple[int, list[Row]]:
     """Compute the rows of a plan that are missing in out (CSV).
 
@@ -320,9 +318,7 @@ def sweep(
         if not file.tell():
             writer.writerow(columns)
         rows = spread(missing, jobs or os.cpu_count() or 1, scheduler) if missing else ()
-        for key, result in progress(
-            rows, total=len(missing), desc=f"sweep {case}", disable=not sys.stderr.isatty()
-        ):
+        for key, result in track(rows, f"sweep {case}", len(missing)):
             cells = *values[key].values(), *(result[c] for c in results)
             writer.writerow([key, *(as_text(in_file(cell)) for cell in cells)])
             file.flush()

@@ -15,7 +15,7 @@ import numpy as np
 
 from ... import InputError, RunError, data
 from ...fem.memory import bulk_size, check_memory
-from ...model.case import Case, flows, has_drains
+from ...model.case import Case, flows, has_drains, remembers
 from ...model.mesh import Mesh, mesh_of
 from .. import OnStep, Outcome
 from . import process, tables
@@ -40,6 +40,11 @@ def check(case: Case) -> None:
     if not (data("pro") / f"law_{case['law']}.pro").is_file():
         raise InputError(
             f"law = {case['law']}: must have a file pro/law_{case['law']}.pro with engine = getdp"
+        )
+    if remembers(case):
+        raise InputError(
+            f"quake_uplift = {case['quake_uplift']}: must be crack with engine = getdp and "
+            f"uplift = {case['uplift']}"
         )
     if flows(case) and has_drains(case):
         raise InputError(f"drains = 1: must be 0 with engine = getdp and uplift = {case['uplift']}")

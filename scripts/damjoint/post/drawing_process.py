@@ -1,0 +1,92 @@
+"""A process that draws pictures. It loads the plotting library while the first process solves."""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import os
+import signal
+from collections.abc import Callable
+from dataclasses import replace
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .. import RunError
+
+if TYPE_CHECKING:  # loading it takes the time that the second process saves
+    from ..model.fields import Solution
+
+#: Forked processes share what is loaded; new interpreters would load it again.
+FORK = multiprocessing.get_context("fork")
+
+
+class DrawingProcess:
+    """Draws the pictures of solutions, each in a fork of its own; ends with its parent."""
+
+    def __init__(self) -> None:
+        self.pipe, other = FORK.Pipe()
+        self.process = FORK.Process(target=serve, args=(other, self.pipe))
+        self.process.start()
+        other.close()
+        self.group = self.process.pid or 0
+        os.setpgid(self.group, self.group)  # Ctrl-C reaches the parent, which ends the group
+
+    def __enter__(self) -> DrawingProcess:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """End the process and its forks, also before they have drawn what was sent."""
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(self.group, signal.SIGKILL)
+        self.process.join()
+
+    def send(self, solution: Solution, folder: Path) -> None:
+        """Have the pictures of a solution drawn into a folder."""
+        from .validation import shown_time
+
+        result = solution.result
+        shown = {t: field for t, field in solution.fields.items() if t == shown_time(result)}
+        with contextlib.suppress(OSError):  # has ended: `wait` raises
+            self.pipe.send((replace(solution, fields=shown), folder))
+
+    def wait(self) -> None:
+        """Wait until the pictures of one of the solutions sent are drawn.
+
+        Raises the error that drawing has raised; RunError if the process has ended.
+        """
+        try:
+            error = self.pipe.recv()
+        except (EOFError, OSError):
+            raise RunError("picture: the process that draws it has ended") from None
+        if error:
+            raise error
+
+
+def serve(pipe: Connection, of_parent: Connection) -> None:
+    """Draw what arrives through a pipe until the parent closes it or ends."""
+    of_parent.close()  # a copy of the parent's end, which would keep the pipe open
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
+    with contextlib.suppress(EOFError, ConnectionError):
+        try:
+            from . import pictures
+
+            pictures.prepare()
+        except Exception as error:
+            pipe.send(error)
+            return
+        while True:
+            FORK.Process(target=answer, args=(pipe, pictures.draw, *pipe.recv())).start()
+
+
+def answer(
+    pipe: Connection, draw: Callable[[Solution, Path], object], solution: Solution, folder: Path
+) -> None:
+    """Draw the pictures of a solution into a folder; send the error that this raises, or None."""
+    error = None
+    try:
+        draw(solution, folder)
+    except Exception as raised:
+        error = raised
+    pipe.send(error)

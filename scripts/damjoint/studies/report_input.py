@@ -1,0 +1,259 @@
+"""Input of runs and limits of their model, as a report states them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Hashable, Iterator, Mapping, Sequence
+from typing import NamedTuple, TypeVar
+
+import gmsh
+import numpy as np
+
+from .. import ROUND_OFF
+from ..arrays import Value
+from ..model.case import Case, equal_steps, has_drains
+from ..model.parameters import Parameter, constants, declared, parse
+from ..post import stored
+from ..post.units import STRESSES, Units, unit
+
+#: Units by the unit in the declarations; other units are printed as they are.
+UNITS: dict[str, Units] = {
+    "Pa": (("GPa", 1e-9), *STRESSES),
+    "Pa per m": (("GPa/m", 1e-9), ("MPa/m", 1e-6), ("Pa/m", 1)),
+    "N per m": (("kN/m", 1e-3), ("N/m", 1)),
+    "kg per m3": (("kg/m³", 1),),
+    "m per s2": (("m/s²", 1),),
+    "-": (("", 1),),
+}
+#: Groups of parameters, and others, whose values need a source.
+MATERIALS = ("Bulk", "Joint", "Water")
+OTHER_MATERIALS = ("expansion_dam", "expansion_found")
+#: Groups of parameters that are in the table of the input even with their default.
+SCENE = ("Scene", "Geometry")
+#: Defaults of the moduli of dam and foundation, which are listed themselves.
+COMMON_MODULI = ("E", "nu")
+
+LAWS = {
+    "rupture": "cohesive law in tension with linear softening; no friction: a closed joint carries "
+    "any shear, and the dam cannot slide",
+    "friction": "Mohr-Coulomb friction with adhesion, without damage; the joint opens at the "
+    "tension c/mu, which the open part still carries",
+    "bond": "coupled cohesive-frictional law: tensile strength and cohesion soften with their "
+    "fracture energies, friction remains",
+}
+UPLIFTS = {
+    "none": "no water pressure",
+    "imposed": "pressure linear from heel to toe, independent of the opening",
+    "drained": "pressure piecewise linear from heel to drains to toe, independent of the opening",
+    "cracked": "full reservoir head in the crack, linear beyond it",
+    "flow": "laminar flow by the cubic law, with the computed opening",
+}
+ADDED_MASS = {1: "Westergaard", 2: "Zangar"}
+QUAKE_UPLIFTS = {
+    "crack": "that of the crack at each moment",
+    "unchanged": "as before the earthquake",
+    "zero": "none in the crack that the earthquake opens",
+}
+#: Loads by the parameters that are 0 without them.
+LOADS = {
+    "silt": ("silt_height",),
+    "ice": ("ice_force",),
+    "post-tensioning": ("anchor_force",),
+    "earthquake": ("k_h", "k_v"),
+    "temperature": ("temperature_dam", "temperature_linear", "temperature_found"),
+}
+NEVER_MODELLED = (
+    "shrinkage, creep, swelling of the concrete, dynamic response, pore pressure and "
+    "seepage in concrete and rock"
+)
+
+K = TypeVar("K", bound=Hashable)
+V = TypeVar("V", bound=Hashable)
+
+
+class Entry(NamedTuple):
+    """A quantity of the input: texts; default: empty if the value is the default."""
+
+    meaning: str
+    value: str
+    unit: str = ""
+    default: str = ""
+
+
+def by_runs(runs: Sequence[Mapping[K, V]]) -> list[tuple[K, V, str]]:
+    """Merge what runs have: key, value, numbers of the runs with this value of the key; empty if
+    all runs have it.
+    """
+    owners: dict[K, dict[V, list[int]]] = {}
+    for number, run in enumerate(runs, start=1):
+        for key, value in run.items():
+            owners.setdefault(key, {}).setdefault(value, []).append(number)
+    return [
+        (key, value, "" if len(numbers) == len(runs) else ranges(numbers))
+        for key, values in owners.items()
+        for value, numbers in values.items()
+    ]
+
+
+def ranges(numbers: list[int]) -> str:
+    """Format increasing numbers: 1, 3 to 5."""
+    groups: list[list[int]] = []
+    for number in numbers:
+        if groups and number == groups[-1][-1] + 1:
+            groups[-1].append(number)
+        else:
+            groups.append([number])
+    long = {True: "{0} to {1}", False: "{0}, {1}"}
+    return ", ".join(
+        f"{g[0]}" if len(g) == 1 else long[len(g) > 2].format(g[0], g[-1]) for g in groups
+    )
+
+
+def materials(case: Case) -> dict[str, Entry]:
+    """List the properties of bodies, joint and water that matter in a case, by parameter."""
+    return {n: e for n, e in parameters(case).items() if is_material(n)}
+
+
+def is_material(name: str) -> bool:
+    """Whether a parameter is a property of bodies, joint or water."""
+    return declared()[name].group in MATERIALS or name in OTHER_MATERIALS
+
+
+def other_input(case: Case) -> dict[str, Entry]:
+    """List the other parameters that matter in a case by name, and its water levels."""
+    entries = loading(case)
+    entries |= {n: e for n, e in parameters(case).items() if not is_material(n)}
+    if case.geometry:  # dimensions of the section do not apply; a .geo may use those that are set
+        entries = {n: e for n, e in entries.items() if e.default or not of_section(n)}
+    return entries
+
+
+def of_section(name: str) -> bool:
+    """Whether an entry is a dimension of the section by parameters."""
+    return name in declared() and declared()[name].group == "Geometry"
+
+
+def in_table(name: str, entry: Entry) -> bool:
+    """Whether the table of the input has an entry; the others have their default, and less space:
+    all parameters but those of the scene, and a detail of its geometry that is 0.
+    """
+    if entry.default or name not in declared():
+        return True
+    return declared()[name].group in SCENE and entry.value != "0"
+
+
+def parameters(case: Case) -> dict[str, Entry]:
+    """List the parameters that matter in a case by name.
+
+    The default of an automatic parameter is the value that follows from the others.
+    """
+    known, values = declared(), case.values
+    own = {n: v for n, v in values.items() if not known[n].automatic}
+    automatic, defaults = parse(stored.parser_input(own, case.levels)), constants()
+    matter = visible(case)
+    return {
+        name: entry(parameter, values[name], (automatic if parameter.automatic else defaults)[name])
+        for name, parameter in known.items()
+        if name in matter and name not in COMMON_MODULI
+    }
+
+
+def visible(case: Case) -> set[str]:
+    """Parameters that matter in the scene, by the visibility in their declarations."""
+    parse(stored.parser_input(case.values, case.levels))
+    shown = lambda p: json.loads(gmsh.onelab.get(p.label)).get("visible", True)
+    return {name for name, p in declared().items() if shown(p)}
+
+
+def entry(parameter: Parameter, value: Value, default: list[Value]) -> Entry:
+    """Format a parameter of a case and, if it differs, its default."""
+    other = None if same(value, default[0]) else default[0]
+    if isinstance(value, str):
+        return Entry(parameter.description, value, "", str(other or ""))
+    numbers = np.array([value] if other is None else [value, other], float)
+    name, factor = unit([numbers], UNITS.get(parameter.unit, ((parameter.unit, 1),)))
+    texts = [f"{v * factor:.6g}" for v in numbers]
+    return Entry(parameter.description, texts[0], name, *texts[1:])
+
+
+def same(value: Value, default: Value) -> bool:
+    """Whether a parameter has its default value, but for rounding."""
+    if isinstance(value, str) or isinstance(default, str):
+        return value == default
+    return bool(np.isclose(value, default, ROUND_OFF, 0))
+
+
+def loading(case: Case) -> dict[str, Entry]:
+    """List geometry file, water levels and load steps of a case."""
+    listed = lambda values: ", ".join(f"{v:.6g}" for v in values)
+    steps = len(case.times) // len(case.levels)
+    equal = np.array_equal(case.times, equal_steps(len(case.levels), steps)) if steps else False
+    entries = {
+        "levels": Entry("Reservoir levels at t = 1, 2, ...", listed(case.levels), "m"),
+        "tail_levels": Entry("Tailwater levels at t = 1, 2, ...", listed(case.tail_levels), "m"),
+        "times": Entry("t at the ends of the load steps", listed(case.times)),
+    }
+    if equal:
+        entries["times"] = Entry("Load steps from level to level", f"{steps}")
+    if case.geometry:
+        entries = {"geometry": Entry("Geometry file", case.geometry.name)} | entries
+    return entries
+
+
+def limits(case: Case) -> Iterator[str]:
+    """Yield what the model of a case includes and what it does not, a sentence each."""
+    yield "Displacements and strains are small: equilibrium is that of the undeformed geometry."
+    yield (
+        "Dam and foundation are homogeneous, isotropic and linear elastic. Only the joint opens, "
+        "cracks and slides; cracks elsewhere and other sliding planes are not modelled."
+    )
+    if case["dim"] == 2:
+        yield (
+            "Plane strain, per metre of thickness: no load is carried to abutments or to "
+            "neighbouring blocks."
+        )
+    elif case.geometry:
+        yield f"Three dimensions; geometry and supports are those of {case.geometry.name}."
+    else:
+        side = "fixed along z" if case["hold_z"] else "free"
+        yield f"Three dimensions: the section over {case['thickness']:g} m, its z faces {side}."
+    if not case.geometry:
+        yield (
+            f"The foundation reaches {case['found_side']:g} m beyond heel and toe and "
+            f"{case['found_depth']:g} m down, with fixed sides and bottom."
+        )
+    law = LAWS.get(case["law"], "a law of the user")
+    yield f"Joint law {case['law']}: {law}."
+    yield f"Water in the joint, uplift = {case['uplift']}: {UPLIFTS[case['uplift']]}."
+    if has_drains(case):
+        yield (
+            f"Drains {case['drain_x']:g} m from the heel with an effectiveness of "
+            f"{case['drain_effectiveness']:g}; their efficiency in service is not verified."
+        )
+    if case["face_load"] == "uniform":
+        yield "The water pressure on the faces is uniform, not hydrostatic."
+    if not case["floor_water"]:
+        yield "No water pressure acts on the reservoir floor and on the tailwater bed."
+    if case["k_h"] or case["k_v"]:
+        pressure = ADDED_MASS.get(case["added_mass"])
+        yield (
+            "The earthquake is pseudo-static: seismic coefficients times the weight"
+            f"{f', added water pressure after {pressure}' if pressure else ''}; uplift: "
+            f"{QUAKE_UPLIFTS[case['quake_uplift']]}."
+        )
+    if any(case[name] for name in LOADS["temperature"]):
+        yield "Changes of temperature are prescribed: no conduction of heat is computed."
+    absent = [load for load, names in LOADS.items() if not any(case[n] for n in names)]
+    yield f"Not modelled: {NEVER_MODELLED}."
+    if absent:
+        yield f"Loads that are zero: {', '.join(absent)}."
+    yield (
+        "Loads follow each other as listed; the result depends on their order, and internal "
+        "variables of the joint are updated once per load step."
+    )
+    if not case.geometry:
+        yield (
+            "The gravity method treats the dam as a rigid block, with stress linear along the "
+            "joint, which cracks from the heel only. The finite elements' stresses at heel and "
+            "toe are those of corners and depend on the mesh."
+        )

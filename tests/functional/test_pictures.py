@@ -1,0 +1,235 @@
+"""Pictures of a run and the process that draws them."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+
+import damjoint as dj
+import numpy as np
+import pytest
+from damjoint import RunError
+from damjoint.model.case import load
+from damjoint.model.mesh import Body
+from damjoint.post import pictures
+from damjoint.post.drawing import runs_of
+from damjoint.post.drawing_process import DrawingProcess
+from damjoint.statics import gravity
+from matplotlib.axes import Axes
+from matplotlib.legend import Legend
+from numpy.testing import assert_allclose
+from PIL import Image
+from scipy.integrate import trapezoid
+
+COARSE = {"n_joint": 10, "h_dam": 12, "h_found": 60}
+#: Cases of different legends: silt, drains, earthquake, tailwater; overturning, softening; closed;
+#: uniform pressure; flow.
+CASES = {
+    "sloping": ("sloping", {**COARSE, "order": 1}),
+    "overturning": ("dam", {**COARSE, "dam_base": 22, "law": "bond"}),
+    "closed": ("dam", {**COARSE, "levels": [12]}),
+    "k": ("k", {"n_joint": 10, "h_dam": 3, "h_found": 4}),
+    "flow": ("e", {"n_joint": 10, "h_dam": 3, "h_found": 4}),
+}
+#: A page A4 across, over its height, with margins.
+PAGE = (297 - 20) / (210 - 20)
+
+
+@pytest.fixture(scope="module")
+def runs():
+    """The run of one of CASES."""
+    done = {}
+
+    def run(name):
+        if name not in done:
+            source, settings = CASES[name]
+            done[name] = dj.run(dj.case(source, **settings))
+        return done[name]
+
+    return run
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_picture_fits_a_page_and_nothing_is_clipped(runs, name):
+    figure = runs(name).plot()
+    width, height = figure.get_size_inches()
+    assert width / height == pytest.approx(PAGE, rel=0.05)
+    assert len(figure.findobj(Axes)) >= 7 and len(figure.findobj(Legend)) >= 5
+    assert_nothing_is_clipped(figure)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_nothing_is_clipped_in_half_a_page(runs, name):
+    """As in a report."""
+    solution = runs(name).solution
+    for draw in (pictures.draw_dam, pictures.draw_joint):
+        figure = pictures.figure_of(5.2, 4.5)
+        draw(figure, solution, pictures.shown_time(solution.result))
+        assert_nothing_is_clipped(figure)
+
+
+def assert_nothing_is_clipped(figure):
+    """Axes with their labels, legends and texts are within the figure."""
+    figure.canvas.draw()
+    texts = [text for part in (figure, *figure.subfigs) for text in part.texts if text.get_text()]
+    for part in (*figure.findobj(Axes), *figure.findobj(Legend), *texts):
+        box = part.get_tightbbox()
+        assert box.x0 >= 0 and box.y0 >= 0, part
+        assert box.x1 <= figure.bbox.x1 + 1 and box.y1 <= figure.bbox.y1 + 1, part
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_lines_of_a_panel_differ_without_colors(runs, name):
+    """In style of the line or marker."""
+    figure = runs(name).plot()
+    for axes in figure.findobj(Axes):
+        lines = [line for line in axes.get_lines() if not line.get_label().startswith("_")]
+        styles = {(line.get_linestyle(), line.get_marker()) for line in lines}
+        assert len(styles) == len(lines)
+
+
+def test_a_picture_in_3d(runs):
+    """It fits a page upright; without fields there are no view and maps."""
+    solution = dj.run(dj.case("d", n_joint=6, h_dam=3, h_found=4, levels=[6])).solution
+    figure = pictures.picture(solution)
+    width, height = figure.get_size_inches()
+    assert 1 / PAGE < width / height < PAGE
+    titles = [axes.get_title(loc="left") for axes in figure.findobj(Axes)]
+    assert sum(title.startswith(("opening", "effective", "shear")) for title in titles) == 3
+    assert_nothing_is_clipped(figure)
+    without = pictures.picture(replace(solution, bodies={}, fields={}))
+    without.canvas.draw()
+    assert without.get_size_inches()[1] < height
+
+
+def test_the_title_is_just_above_the_panels(runs):
+    """Without a message there is no room for one."""
+    heads = {name: runs(name).plot().subfigs[0].bbox.height for name in ("closed", "overturning")}
+    assert heads["closed"] < heads["overturning"]
+
+
+def test_runs_of_equal_values():
+    assert list(runs_of(np.array([3, 3, 0, 3, 1, 1]))) == [
+        (3, 0, 2),
+        (0, 2, 3),
+        (3, 3, 4),
+        (1, 4, 6),
+    ]
+    assert list(runs_of(np.array([], int))) == []
+
+
+def test_the_stress_profile_of_the_gravity_method_carries_the_resultant():
+    """Its integral is -N, its moment about the toe -M, cracked or not; zero in the crack."""
+    for settings, level in (({"dam_base": 34}, 45), ({"dam_base": 26}, 45)):
+        case = load("dam", settings, [level])
+        method = gravity.at(case, 1.0, level)
+        s, stress = pictures.gravity_profile(method)
+        length = method.body.length
+        fine = np.linspace(0, length, 200_001)
+        profile = np.interp(fine, s, stress)
+        assert_allclose(trapezoid(profile, fine), -method.N, rtol=1e-6)
+        assert_allclose(trapezoid(profile * (length - fine), fine), -method.M, rtol=1e-5)
+        assert (np.abs(profile[fine < method.crack_length - 1e-3]) == 0).all()
+    assert method.crack_length > 0
+
+
+def test_a_map_has_the_shape_of_the_joint():
+    """Projected onto the plane in which its area is largest; a valley is no line."""
+    z = np.linspace(-60, 60, 13)
+    points = np.array([(x, 35 * (w / 60) ** 2, w) for w in z for x in (0.0, 30.0)])
+    quads = np.array([(2 * i, 2 * i + 1, 2 * i + 3, 2 * i + 2) for i in range(12)])
+    joint = Body(points, np.arange(26), [("quad", quads)], np.arange(12), ["joint"])
+    names, places = pictures.projected(joint)
+    assert names == ["z", "x"]
+    assert_allclose(places, points[:, [2, 0]].T)
+
+
+def test_extremes_of_a_map_do_not_set_its_scale():
+    values = np.linspace(-1.0, 1.0, 1000)
+    assert pictures.scale_of(values) == (-1.0, 1.0)
+    values[500] = 100.0
+    low, high = pictures.scale_of(values)
+    assert low == -1.0 and 0.9 < high <= 1.0
+
+
+@pytest.mark.parametrize("values", [np.zeros(4), np.array([-2.0, -1.0, 0.0, 5.0]), -np.arange(4.0)])
+def test_a_map_of_any_values(values):
+    """A thick line at zero where the sign changes; one in which nothing is open, too."""
+    figure = pictures.figure_of(4, 3)
+    axes = figure.subplots()
+    x, y = np.array([(0, 0), (1, 0), (1, 1), (0, 1)]).T
+    shape = pictures.Triangulation(x, y, [(0, 1, 2), (0, 2, 3)])
+    pictures.draw_map(axes, shape, values, "opening [mm]")
+    figure.canvas.draw()
+    thick = [c for c in axes.collections if np.max(c.get_linewidth()) > 1.2]
+    assert len(thick) == (values.min() < 0 < values.max())
+
+
+def test_a_view_shows_what_is_nearest_last():
+    """Its axes are orthonormal; the second one points up."""
+    assert_allclose(pictures.VIEW.T @ pictures.VIEW, np.eye(3), atol=1e-12)
+    assert pictures.VIEW[1, 1] > 0.5 and pictures.VIEW[1, 0] == pytest.approx(0, abs=1e-12)
+    assert np.linalg.det(pictures.VIEW) == pytest.approx(1)
+
+
+def test_a_process_draws_the_same_picture(runs, tmp_path):
+    solution = runs("flow").solution
+    for name in ("here", "there", "too"):
+        (tmp_path / name).mkdir()
+    pictures.draw(solution, tmp_path / "here")
+    with DrawingProcess() as drawing:
+        for name in ("there", "too"):
+            drawing.send(solution, tmp_path / name)
+        for _ in range(2):
+            drawing.wait()
+    drawn = [(tmp_path / name / "e.png").read_bytes() for name in ("here", "there", "too")]
+    assert drawn[0] == drawn[1] == drawn[2]
+    assert Image.open(tmp_path / "there" / "e.png").size[0] > 1200
+
+
+def test_an_error_of_the_drawing_process_is_raised(runs, tmp_path):
+    with DrawingProcess() as drawing:
+        drawing.send(runs("flow").solution, tmp_path / "missing")
+        with pytest.raises(FileNotFoundError, match="missing"):
+            drawing.wait()
+        os.killpg(drawing.group, signal.SIGKILL)
+        drawing.send(runs("flow").solution, tmp_path)
+        with pytest.raises(RunError, match="has ended"):
+            drawing.wait()
+
+
+def test_the_drawing_process_ends_with_its_parent():
+    script = """
+import time
+from damjoint.post.drawing_process import DrawingProcess
+with DrawingProcess() as drawing:
+    print(drawing.group, flush=True)
+    time.sleep(600)
+"""
+    command = [sys.executable, "-c", script]
+    with subprocess.Popen(command, stdout=subprocess.PIPE) as process:
+        group = int(process.stdout.readline())
+        process.kill()
+    end = time.monotonic() + 60
+    while is_alive(group):
+        assert time.monotonic() < end
+        time.sleep(0.05)
+
+
+def is_alive(group):
+    """Whether a process of a group runs; ended ones (Z) may be listed until init removes them."""
+    listed = subprocess.run(["ps", "-e", "-o", "pgid=,stat="], capture_output=True, text=True)
+    rows = (line.split() for line in listed.stdout.splitlines())
+    return any(int(number) == group and not state.startswith("Z") for number, state in rows)
+
+
+def test_a_run_loads_neither_meshio_nor_the_plotting_library(tmp_path):
+    """It writes its fields itself; the second process draws."""
+    words = ["run", "c", "--set", "n_joint=10", "--out", str(tmp_path / "out")]
+    tell = f"import sys; from damjoint import cli; cli.main({words})"
+    tell += "; print([m for m in ('meshio', 'matplotlib') if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", tell], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "[]"
+    assert (tmp_path / "out" / "c.png").exists() and (tmp_path / "out/fields/bulk_t1.vtu").exists()

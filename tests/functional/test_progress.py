@@ -1,0 +1,83 @@
+"""Progress in redirected output: lines on stderr, also while the work does not report."""
+
+import io
+import re
+import threading
+from contextlib import redirect_stderr
+
+import pytest
+from damjoint import progress
+from damjoint.progress import Progress, track
+
+SMALL = ("--set", "n_joint=10", "--set", "h_dam=15", "--set", "h_found=60")
+
+
+@pytest.fixture
+def frequent(monkeypatch):
+    """A line every millisecond."""
+    monkeypatch.setattr(progress, "INTERVAL", 1e-3)
+
+
+class Lines(io.StringIO):
+    """Text that is waited for."""
+
+    def __init__(self):
+        super().__init__()
+        self.written = threading.Condition()
+
+    def write(self, text):
+        with self.written:
+            count = super().write(text)
+            self.written.notify_all()
+        return count
+
+    def wait_for(self, pattern):
+        with self.written:
+            assert self.written.wait_for(lambda: re.search(pattern, self.getvalue()), 60)
+
+
+def test_lines_have_title_part_done_and_time(frequent):
+    with redirect_stderr(Lines()) as err, Progress("work", 4) as shown:
+        err.wait_for(r"^work, 0 %, 00:00")
+        shown.update(3)
+        err.wait_for(r"work, 75 %, 00:00")
+        shown.describe("other work")
+        err.wait_for(r"other work, 75 %, 00:0\d, nothing new for 00:0\d\n")
+
+
+def stop_after_a_line(err):
+    with Progress("work"):
+        err.wait_for("work")
+        raise KeyboardInterrupt
+
+
+def test_no_lines_after_the_end(frequent):
+    before = set(threading.enumerate())
+    with redirect_stderr(Lines()) as err, pytest.raises(KeyboardInterrupt):
+        stop_after_a_line(err)
+    for thread in set(threading.enumerate()) - before:
+        thread.join(60)
+        assert not thread.is_alive()
+
+
+def test_no_lines_before_the_interval_or_if_not_wanted(monkeypatch):
+    with redirect_stderr(Lines()) as err:
+        assert list(track("abc", "letters")) == ["a", "b", "c"]
+        monkeypatch.setattr(progress, "INTERVAL", 1e-3)
+        before = threading.active_count()
+        with Progress("work", show=False):
+            assert threading.active_count() <= before
+    assert not err.getvalue()
+
+
+@pytest.mark.parametrize(
+    "words, pattern",
+    [
+        (("run", "dam", *SMALL, "--no-fields", "--no-picture"), r"^dam, \d+ %, \d\d:\d\d"),
+        (("critical", "dam", *SMALL), r"^dam: level [\d.]+ m: level [\d.]+ m, \d\d:\d\d"),
+        (("sweep", "dam", *SMALL, "--vary", "mu=0.5,0.6", "--jobs", "1"), r"^sweep dam, \d+ %, "),
+    ],
+)
+def test_commands_print_lines(command, frequent, words, pattern):
+    code, _, err = command(*words)
+    assert code == 0 and re.search(pattern, err, re.MULTILINE), err
