@@ -1,9 +1,12 @@
 """Time integration of an earthquake: closed forms, balance of momentum, order, both signs."""
 
+import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+from damjoint.dynamics.history import QuakeHistory
 from damjoint.dynamics.scheme import Motion
 from damjoint.dynamics.step import TimeStep
 from damjoint.fem.bodies import Bodies
@@ -222,3 +225,169 @@ def test_free_vibration_decays_as_rayleigh_damping_says(tmp_path):
     peaks = [max(crest[k * 200 - 60 : k * 200 + 60]) for k in (1, 2)]
     expected = np.exp(-2 * np.pi * xi / np.sqrt(1 - xi**2))
     assert peaks[1] / peaks[0] == pytest.approx(expected, rel=2e-3)
+
+
+def test_joint_dashpots_of_a_closed_joint(tmp_path):
+    """A rigid block on springs and dashpots under a vertical record: a damped oscillator."""
+    stiffness, dashpot, mass, length = 1e7, 8.8e4, 2400 * 16.0, 8.0
+    settings = {"K_N": stiffness, "K_T": stiffness, "joint_damping_n": dashpot, "dt": 1e-3}
+    times = np.arange(0, 0.6, 0.01)
+    values = 3 * np.sin(40 * times)
+    record = write_record(tmp_path / "r.csv", times, 0 * times, values)
+    quake = earthquake(record, BLOCK | settings | {"record_rest": 0.3})
+    joint = joint_of(quake)
+    steps = list(quake.steps())
+    opening = np.array([joint.heel @ step.end.state.jump for step in steps])
+    opening -= joint.heel @ quake.problem.static.jump
+
+    def rates(t, y):
+        ground = quake.record.at(t)[1]
+        return [y[1], -length * (stiffness * y[0] + dashpot * y[1]) / mass - ground]
+
+    at = [step.end.time for step in steps]
+    exact = solve_ivp(rates, (0, at[-1]), [0, 0], "DOP853", at, rtol=1e-9, max_step=5e-3).y[0]
+    assert opening == pytest.approx(exact, abs=1e-3 * np.abs(exact).max())
+
+
+@pytest.mark.parametrize("mode, uplift", [("zero", "imposed"), ("unchanged", "cracked")])
+def test_water_in_the_joint_during_an_earthquake(tmp_path, mode, uplift):
+    """zero: less uplift while the joint is open; unchanged: the same at every step; by the crack:
+    more while it is open.
+    """
+    record = smooth_record(tmp_path / "r.csv", 5.0, duration=0.6)
+
+    def uplifts(value):
+        settings = DAM | {"quake_uplift": value, "uplift": uplift, "n_joint": 20.0}
+        quake = earthquake(record, settings, "30")
+        equilibrium = quake.problem.model.equilibrium
+        rows = [joint_row(equilibrium, step.end.state, 0) for step in quake.steps()]
+        return np.array([[row["U"], row["crack_length"]] for row in rows]), quake
+
+    changed, quake = uplifts(mode)
+    static = joint_row(quake.problem.model.equilibrium, quake.problem.static, 0)
+    assert changed[:, 1].max() > 5
+    if mode == "zero":
+        open_before = changed[:-1, 1] > 2
+        assert (changed[1:, 0][open_before] < static["U"] * 0.999).all()
+    else:
+        assert changed[:, 0] == pytest.approx(static["U"])
+        assert uplifts("crack")[0][:, 0].max() > 1.05 * static["U"]
+
+
+# -- the command
+
+
+@pytest.fixture
+def case_file(tmp_path):
+    """A case with a record beside it."""
+    smooth_record(tmp_path / "wave.csv", 5.0, duration=0.5)
+    path = tmp_path / "my.case"
+    settings = {n: v for n, v in DAM.items() if n != "record_unit"}
+    lines = [
+        f'default_{n} = "{v}";' if isinstance(v, str) else f"default_{n} = {v};"
+        for n, v in settings.items()
+    ]
+    path.write_text(
+        "\n".join(
+            [
+                'title = "wave"; record = "wave.csv"; default_record_unit = "m/s2";',
+                "levels() = {30};",
+                *lines,
+                "",
+            ]
+        )
+    )
+    return path
+
+
+def test_the_command_writes_rows_summary_and_picture(command, case_file, tmp_path):
+    code, out, err = command("quake", case_file)
+    assert (code, err) == (0, "")
+    folder = tmp_path / "out" / "my_quake"
+    info = json.loads((folder / "run.json").read_text())
+    found = info["quake"]
+    rows = np.genfromtxt(folder / "quake.csv", delimiter=",", names=True)
+    assert info["state"] == "complete" and "residual slip" in info["statement"]
+    assert len(rows) == found["steps"] and rows["time"][-1] == pytest.approx(0.7)
+    peak = found["peaks"]["crest_ux"]
+    assert abs(peak["value"]) == pytest.approx(np.abs(rows["crest_ux"]).max())
+    assert rows["crest_ux"][rows["time"] == peak["time"]] == pytest.approx(peak["value"])
+    assert found["after"]["equilibrium"] and found["after"]["N"] > 0
+    assert np.abs(rows["residual"]).max() < 1e-6 and rows["dt"].max() == pytest.approx(0.005)
+    # the static rows: the last level, and the state that the earthquake leaves
+    history = np.genfromtxt(folder / "history.csv", delimiter=",", names=True)
+    assert history["time"].tolist() == [1, 2] and history["level"].tolist() == [30, 30]
+    moved = history["crest_ux"][1] - history["crest_ux"][0]
+    assert moved == pytest.approx(rows["slip_mean"][-1], abs=2e-3) and moved > 0.01
+    stress = np.load(folder / "quake_stress.npz")
+    assert stress["sigma_n_eff"].shape == (len(rows), len(stress["s"]))
+    assert (folder / "my_quake.png").stat().st_size > 10_000
+    assert not (folder / "quake_state.npz").exists()
+    assert "residual slip" in out and "rigid block" in out
+
+
+def test_an_interrupted_run_continues_with_the_same_rows(command, case_file, tmp_path, monkeypatch):
+    add, steps = QuakeHistory.add, []
+
+    def interrupted(self, quake, step):
+        add(self, quake, step)
+        steps.append(step)
+        if len(steps) == 60:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(QuakeHistory, "add", interrupted)
+    code, _, err = command("quake", case_file, "--out", "one")
+    assert code == 130 and "interrupted" in err
+    info = json.loads((tmp_path / "one" / "run.json").read_text())
+    assert info["state"] == "interrupted"
+    before = (tmp_path / "one" / "quake.csv").read_text().splitlines()
+    assert len(before) == 61
+    assert command("quake", case_file, "--out", "one")[0] == 0
+    number = len(steps)
+    monkeypatch.setattr(QuakeHistory, "add", add)
+    assert command("quake", case_file, "--out", "two")[0] == 0
+    one, two = ((tmp_path / n / "quake.csv").read_text() for n in ("one", "two"))
+    assert one == two and one.splitlines()[:61] == before
+    assert number == len(two.splitlines()) - 1
+
+
+def test_a_run_under_way_of_another_case_is_not_continued(command, case_file, monkeypatch):
+    add = QuakeHistory.add
+
+    def interrupted(self, quake, step):
+        add(self, quake, step)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(QuakeHistory, "add", interrupted)
+    assert command("quake", case_file, "--out", "one")[0] == 130
+    monkeypatch.setattr(QuakeHistory, "add", add)
+    changed = "quake", case_file, "--set", "mu=0.85"
+    assert command(*changed, "--out", "one")[0] == command(*changed, "--out", "two")[0] == 0
+    one, two = (Path(n, "quake.csv").read_text() for n in ("one", "two"))
+    assert one == two
+
+
+@pytest.mark.parametrize(
+    "options, message",
+    [
+        (["--set", "k_h=0.1"], "k_h = 0.1: must be 0 for damjoint quake"),
+        (["--set", "record_unit=unstated"], "record_unit = unstated: must be m/s2 or g"),
+        (["--set", "record_start=3"], "record_start = 3: must be >= 0 and < 0.5 s"),
+        (["--set", "record_component=vertical"], "must have an acceleration other than zero"),
+        (["--set", "hht_alpha=-0.5"], "hht_alpha = -0.5: must be"),
+        (["--set", "dt=0"], "dt = 0: must be"),
+        (["--set", "drive=crest"], "drive = crest: must be level for damjoint quake"),
+        (["--record", "nothing.csv"], "record = nothing.csv: "),
+        (["--accuracy", "1%"], "accuracy = 1%: must not be set for damjoint quake"),
+    ],
+)
+def test_bad_input_is_one_line_and_writes_nothing(command, case_file, options, message):
+    code, out, err = command("quake", case_file, *options)
+    assert (code, out) == (2, "") and err.count("\n") == 1
+    assert message in err and not Path("out").exists()
+
+
+def test_a_dam_without_static_equilibrium_is_a_failed_run(command, case_file):
+    code, _, err = command("quake", case_file, "--set", "mu=0.2")
+    assert code == 1 and "static loads have no equilibrium" in err
+    assert json.loads(Path("out/my_quake/run.json").read_text())["state"] == "failed"

@@ -19,6 +19,7 @@ from .. import InputError, RunError, __version__
 from ..arrays import Table
 from ..dynamics import checkpoint
 from ..dynamics.history import QuakeHistory
+from ..dynamics.record import Record
 from ..dynamics.rigid_block import RigidBlock
 from ..dynamics.stepper import Earthquake
 from ..engines.condensed.solve import about
@@ -60,8 +61,7 @@ def check(case: Case) -> None:
                 f"{name} = {case[name]:g}: must be 0 for damjoint quake: the record replaces the "
                 "seismic coefficients"
             )
-    if case["dt"] == 0:
-        raise InputError("dt = 0: must be > 0 s, or -1")
+    Record.of(case)
 
 
 def run(case: Case, out: Path, picture: bool = True, progress: bool = True) -> QuakeResult:
