@@ -10,15 +10,38 @@ from damjoint.solver.load_stepper import LoadStepper
 
 #: A rigid block on a rigid ground, with dry friction.
 BLOCK = {
-    "dam_base": 8.0, "dam_crest": 8.0, "dam_height": 2.0, "found_side": 1.0, "found_depth": 1.0,
-    "E": 1e12, "K_N": 1e11, "K_T": 1e11, "law": "friction", "mu": 0.5, "adhesion": 0.0,
-    "pena_tang": 0.0, "uplift": "none", "n_joint": 4.0, "order": 1.0, "h_dam": 1.0,
-    "h_found": 1.0, "damping": 0.0, "record_unit": "m/s2", "record_rest": 0.5,
+    "dam_base": 8.0,
+    "dam_crest": 8.0,
+    "dam_height": 2.0,
+    "found_side": 1.0,
+    "found_depth": 1.0,
+    "E": 1e12,
+    "K_N": 1e11,
+    "K_T": 1e11,
+    "law": "friction",
+    "mu": 0.5,
+    "adhesion": 0.0,
+    "pena_tang": 0.0,
+    "uplift": "none",
+    "n_joint": 4.0,
+    "order": 1.0,
+    "h_dam": 1.0,
+    "h_found": 1.0,
+    "damping": 0.0,
+    "record_unit": "m/s2",
+    "record_rest": 0.5,
 }
 #: A dam of 45 m on a coarse mesh, which slides and rocks.
 DAM = {
-    "law": "friction", "mu": 0.8, "adhesion": 1e4, "pena_tang": 0.0, "uplift": "imposed",
-    "n_joint": 10.0, "order": 1.0, "record_unit": "m/s2", "record_rest": 0.2,
+    "law": "friction",
+    "mu": 0.8,
+    "adhesion": 1e4,
+    "pena_tang": 0.0,
+    "uplift": "imposed",
+    "n_joint": 10.0,
+    "order": 1.0,
+    "record_unit": "m/s2",
+    "record_rest": 0.2,
 }
 
 

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from damjoint.laws import COLUMNS
 from damjoint.model.parameters import declared
-from damjoint.model.results import FLUX, HISTORY, JOINT
+from damjoint.model.results import FLUX, HISTORY, JOINT, QUAKE
 from damjoint.statics.gravity import LOADS
 from damjoint.studies.check import CHECK
 from damjoint.studies.failure_path import CRITICAL
@@ -70,9 +70,9 @@ def parameters_page() -> str:
 
 def results_page() -> str:
     """reference/results.md: the columns of the tables."""
-    joint, history, check, loads, critical = (
+    joint, history, check, loads, critical, quake = (
         markdown([(f"`{n}`", u, m) for n, (u, m) in columns.items()], ("column", "unit", "meaning"))
-        for columns in (JOINT | COLUMNS | FLUX, HISTORY, CHECK, LOADS, CRITICAL)
+        for columns in (JOINT | COLUMNS | FLUX, HISTORY, CHECK, LOADS, CRITICAL, QUAKE)
     )
     parts = [
         "# Results",
@@ -104,6 +104,12 @@ def results_page() -> str:
         "Written by `damjoint critical`: a row per equilibrium of each trial value; if the dam "
         "fails, also those after the highest level, under displacement control.",
         critical,
+        "## quake.csv",
+        "Written by `damjoint quake`: a row per time step. `run.json` has the summary under "
+        "`quake`; the last row of history.csv and the last state in joint.csv are static ones, "
+        "after the earthquake. `quake_stress.npz` (numpy): `time` [s], `s` [m] and `sigma_n_eff` "
+        "[Pa] (rows, nodes) of the first joint.",
+        quake,
         "## CASE_sweep.csv",
         "Written by `damjoint sweep`, a row per combination, in the order of computation: `key`, "
         "by which an interrupted sweep continues; the varied, sampled and tied values (a level as "

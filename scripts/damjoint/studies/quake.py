@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import sys
 import time
 from collections.abc import Iterator
 from dataclasses import asdict, replace
@@ -13,9 +12,8 @@ from typing import Any
 import numpy as np
 from tabulate import tabulate
 from threadpoolctl import threadpool_limits
-from tqdm import tqdm
 
-from .. import InputError, RunError, __version__
+from .. import InputError, RunError
 from ..arrays import Table
 from ..dynamics import checkpoint
 from ..dynamics.history import QuakeHistory
@@ -29,6 +27,7 @@ from ..model.case import Case
 from ..model.results import QuakeResult, column_of, quake_columns
 from ..post import folder as folders
 from ..post import tables
+from ..progress import Progress
 from ..solver.controls import LevelControl
 from ..solver.history import joint_row
 from ..solver.load_stepper import LoadStepper
@@ -36,6 +35,7 @@ from ..solver.model import Model, StepResult
 from ..solver.state import State
 from ..statics.verdict import statement
 from ..storage import atomic_write
+from ..versions import versions
 
 #: Files of an earthquake: rows, stress along the joint in time, the run under way.
 ROWS, STRESS, CHECKPOINT = "quake.csv", "quake_stress.npz", "quake_state.npz"
@@ -45,6 +45,9 @@ BETWEEN_WRITES = 10.0
 
 #: The last part of the rest over which the residual values are a mean [s].
 MEAN_OVER = 1.0
+
+#: Format of the progress bar: seconds of the record.
+BAR = "{desc} {n:.2f} of {total:.2f} s|{bar}| {elapsed}, {remaining} left"
 
 #: Columns of which the largest size is reported.
 PEAKS = ("ground_ax", "crest_ux", "crest_ax")
@@ -133,14 +136,9 @@ def prepared(case: Case) -> tuple[LoadStepper, Earthquake]:
 def follow(quake: Earthquake, history: QuakeHistory, path: Path, key: str, progress: bool) -> None:
     """Compute the steps to the end of the record; writes the run under way into a file."""
     written = time.perf_counter()
-    with tqdm(
-        total=quake.record.duration,
-        initial=quake.now.time,
-        desc=quake.case.name,
-        disable=not progress or not sys.stderr.isatty(),
-        bar_format="{desc} {n:.2f} of {total:.2f} s|{bar}| {elapsed}, {remaining} left",
-        leave=False,
-    ) as bar:
+    options = {"bar_format": BAR, "leave": False}
+    with Progress(quake.case.name, quake.record.duration, progress, **options) as bar:
+        bar.update(quake.now.time)
         for step in whole(quake, history):
             bar.update(step)
             if time.perf_counter() - written > BETWEEN_WRITES:
@@ -302,7 +300,7 @@ def write_info(static: LoadStepper, out: Path, found: dict[str, Any], state: str
     """Write run.json."""
     results = static.results()
     results.info |= about(static.model.equilibrium.bulk)
-    results.info |= {"quake": found, "versions": {"damjoint": __version__}}
+    results.info |= {"quake": found, "versions": versions()}
     folders.write_info(results, out, state, why)
 
 
