@@ -33,62 +33,80 @@ Macro Around
   around() -= flat();
 Return
 
-x0 = heel_x;
-y0 = heel_y;
-x1 = toe_x;
-y1 = toe_y;
-Call Around;
-joint() = {around()};
 left() = Surface In BoundingBox {-far, -far, -far, -found_side + eps, far, far};
 bottom() = Surface In BoundingBox {-far, -far, -far, far, -found_depth + eps, far};
 right() = Surface In BoundingBox {end_x - eps, -far, -far, far, far, far};
 back() = Surface In BoundingBox {-far, -far, -eps, far, far, eps};
 front() = Surface In BoundingBox {-far, -far, thickness - eps, far, far, far};
-heel() = Curve In BoundingBox {heel_x - eps, heel_y - eps, -eps,
-                               heel_x + eps, heel_y + eps, thickness + eps};
-toe() = Curve In BoundingBox {toe_x - eps, toe_y - eps, -eps,
-                              toe_x + eps, toe_y + eps, thickness + eps};
-
-If(!StrCmp(mesh_pattern, "free"))
-  joint_skin() = Boundary { Surface{joint()}; };
-  joint_skin() -= {heel(), toe()};
-  If(drained)
-    x0 = heel_x;
-    y0 = heel_y;
-    x1 = drain_line_x;
-    y1 = drain_line_y;
-    Call Around;
-    drain_line() = Curve In BoundingBox {x1 - eps, y1 - eps, -eps, x1 + eps, y1 + eps,
-                                         thickness + eps};
-    first() = Boundary { Surface{around()}; };
-    first() -= {heel(), drain_line()};
-    joint_skin() -= {first(), drain_line()};
-    Transfinite Curve {first()} = n_first + 1;
-    Transfinite Curve {joint_skin()} = n_rest + 1;
-    Transfinite Curve {drain_line()} = n_layers + 1;
-  Else
-    Transfinite Curve {joint_skin()} = n_joint + 1;
+// Surfaces of joint j: joints() from joint_surface(j) to joint_surface(j + 1) - 1; heels and toes
+// likewise
+joints() = {};
+heels() = {};
+toes() = {};
+joint_surface() = {0};
+heel_curve() = {0};
+toe_curve() = {0};
+For j In {0 : top}
+  x0 = all_heel_x(j);
+  y0 = all_heel_y(j);
+  x1 = all_toe_x(j);
+  y1 = all_toe_y(j);
+  Call Around;
+  joint() = {around()};
+  heel() = Curve In BoundingBox {x0 - eps, y0 - eps, -eps, x0 + eps, y0 + eps, thickness + eps};
+  toe() = Curve In BoundingBox {x1 - eps, y1 - eps, -eps, x1 + eps, y1 + eps, thickness + eps};
+  If(!StrCmp(mesh_pattern, "free"))
+    joint_skin() = Boundary { Surface{joint()}; };
+    joint_skin() -= {heel(), toe()};
+    If(all_rest(j) > 0)
+      x1 = drain_point_x(j);
+      y1 = drain_point_y(j);
+      Call Around;
+      drain_line() = Curve In BoundingBox {x1 - eps, y1 - eps, -eps, x1 + eps, y1 + eps,
+                                           thickness + eps};
+      first() = Boundary { Surface{around()}; };
+      first() -= {heel(), drain_line()};
+      joint_skin() -= {first(), drain_line()};
+      Transfinite Curve {first()} = all_first(j) + 1;
+      Transfinite Curve {joint_skin()} = all_rest(j) + 1;
+      Transfinite Curve {drain_line()} = n_layers + 1;
+    Else
+      Transfinite Curve {joint_skin()} = all_first(j) + 1;
+    EndIf
+    Transfinite Curve {heel(), toe()} = n_layers + 1;
+    Transfinite Surface {joint()};
   EndIf
-  Transfinite Curve {heel(), toe()} = n_layers + 1;
-  Transfinite Surface {joint()};
+  joints() += joint();
+  heels() += heel();
+  toes() += toe();
+  joint_surface() += #joints();
+  heel_curve() += #heels();
+  toe_curve() += #toes();
+EndFor
+If(top > 0)
+  Field[1].SurfacesList = {joints()};
 EndIf
 
 // Volumes, by the plane surface that each was extruded from
 bodies() = Volume In BoundingBox {-far, -far, -far, far, far, far};
 dam_volume() = {};
+dam_joint() = {};  // the joint below each of them
 foundation_volume() = {};
 lower_volume() = {};
 For k In {0 : #bodies() - 1}
   skin() = Boundary { Volume{bodies(k)}; };
   kind = FOUNDATION;
   For j In {0 : #skin() - 1}
-    kind = (Fabs(skin(j)) == dam(0)) ? DAM : kind;
+    For n In {0 : top}
+      kind = (Fabs(skin(j)) == dam(n)) ? DAM + n * LAYER : kind;
+    EndFor
     For n In {1 : #lower()}
       kind = (Fabs(skin(j)) == lower(n - 1)) ? LOWER : kind;
     EndFor
   EndFor
-  If(kind == DAM)
+  If(kind == DAM || kind > LAYER)
     dam_volume() += bodies(k);
+    dam_joint() += (kind - DAM) / LAYER;
   ElseIf(kind == LOWER)
     lower_volume() += bodies(k);
   Else
@@ -96,14 +114,38 @@ For k In {0 : #bodies() - 1}
   EndIf
 EndFor
 
-Physical Volume("dam", DAM) = {dam_volume()};
+For j In {0 : top}
+  suffix = "";
+  If(j > 0)
+    suffix = Sprintf(" %g", j + 1);
+  EndIf
+  own() = {};
+  For k In {0 : #dam_volume() - 1}
+    If(dam_joint(k) == j)
+      own() += dam_volume(k);
+    EndIf
+  EndFor
+  Physical Volume(StrCat("dam", suffix), DAM + j * LAYER) = {own()};
+  own() = {};
+  For k In {joint_surface(j) : joint_surface(j + 1) - 1}
+    own() += joints(k);
+  EndFor
+  Physical Surface(StrCat("joint", suffix), JOINT + j * LAYER) = {own()};
+  own() = {};
+  For k In {heel_curve(j) : heel_curve(j + 1) - 1}
+    own() += heels(k);
+  EndFor
+  Physical Curve(StrCat("heel", suffix), HEEL + j * LAYER) = {own()};
+  own() = {};
+  For k In {toe_curve(j) : toe_curve(j + 1) - 1}
+    own() += toes(k);
+  EndFor
+  Physical Curve(StrCat("toe", suffix), TOE + j * LAYER) = {own()};
+EndFor
 Physical Volume("foundation", FOUNDATION) = {foundation_volume()};
 Physical Volume("lower dam", LOWER) = {lower_volume()};
-Physical Surface("joint", JOINT) = {joint()};
 Physical Surface("fixed", FIXED) = {left(), bottom(), right()};
 Physical Surface("z faces", SIDES) = {back(), front()};
-Physical Curve("heel", HEEL) = {heel()};
-Physical Curve("toe", TOE) = {toe()};
 crest() = Point In BoundingBox {batter - eps, dam_height - eps, -eps,
                                 batter + eps, dam_height + eps, eps};
 Physical Point("crest", CREST) = {crest()};
@@ -113,7 +155,7 @@ For i In {0 : #seg_side() - 1}
   x1 = seg_x1(i);
   y1 = seg_y1(i);
   Call Around;
-  around() -= joint();  // part of it, behind the drains, may lie in the box of a face
+  around() -= joints();  // part of one, behind the drains, may lie in the box of a face
   name = StrCat(Str(side_names(seg_side(i))), Sprintf(" %g", i));
   Physical Surface(Str(name), SEGMENT + i) = {around()};
 EndFor

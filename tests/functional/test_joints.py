@@ -53,6 +53,16 @@ def test_resultants_of_each_joint_are_those_of_statics(uplift):
             )
 
 
+@pytest.mark.parametrize("pattern", ["layers", "free"])
+def test_resultants_of_each_joint_in_3d(pattern):
+    solid = {"dim": 3.0, "mesh_pattern": pattern, "n_joint": 8.0, "thickness": 6.0}
+    results = solved([42], uplift="imposed", **(solid | SLOPES))
+    for own in results.joints:
+        block = gravity.with_crack(own.case, 1.0, 42.0, 0.0)
+        computed = [own.last[name] for name in "NTU"]
+        assert computed == pytest.approx([block.N, block.T, block.U], rel=1e-6)
+
+
 @pytest.mark.parametrize("joint", range(4))
 def test_gravity_method_lift_by_lift(joint):
     """By a quadrature over the outline above the joint; the earthquake acts in full."""

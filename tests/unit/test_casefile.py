@@ -10,7 +10,15 @@ from damjoint.model.case import CASES, load
 from damjoint.post import validation
 
 
-@pytest.mark.parametrize("path", sorted(CASES.rglob("*.case")), ids=lambda path: path.stem)
+#: With a list of texts, one for each joint, which Gmsh writes in another way.
+TEXTS_BY_JOINT = {"monoliths"}
+
+
+@pytest.mark.parametrize(
+    "path",
+    [path for path in sorted(CASES.rglob("*.case")) if path.stem not in TEXTS_BY_JOINT],
+    ids=lambda path: path.stem,
+)
 def test_damjoint_and_gmsh_read_a_case_alike(path):
     """The cases can be opened in Gmsh and GetDP."""
     ours = casefile.read(path)

@@ -15,7 +15,7 @@ from ..fem import elements
 from ..fem.cache import cached, key_of
 from ..fem.condensation import Condensed, CondensedJoint
 from ..model.case import Case, OfJoint
-from ..model.mesh import JointMesh, ends_of, heel_normal
+from ..model.mesh import JointMesh, heel_normal
 from ..model.scene import UP
 from .flow import Flow, JointFields
 from .linear_system import Border, Change, UndamagedSystem
@@ -39,11 +39,14 @@ def frames(normals: Array) -> Array:
 @dataclass(frozen=True, kw_only=True)
 class Chord:
     """The straight line from heel to toe (3D: between the means of both lines), to which resultants
-    refer.
+    refer, in a plane.
     """
 
+    #: unit vectors of the plane (2, 3): x and y, unless the joint faces along z; then those towards
+    #: the toe and along the joint's normal
+    plane: Array
     toe: Array
-    #: unit vectors in the x-y plane: towards the toe, upwards
+    #: unit vectors in the plane: towards the toe, upwards
     along: Array
     normal: Array
     length: float
@@ -51,14 +54,18 @@ class Chord:
     @staticmethod
     def of(joint: JointMesh) -> Chord:
         """The chord of a joint."""
-        heel, toe = (
-            joint.surface.points[nodes][:, :2].mean(axis=0)
-            for nodes in (joint.heel_nodes, joint.toe_nodes)
-        )
+        surface = joint.surface
+        ends = [surface.points[n].mean(axis=0) for n in (joint.heel_nodes, joint.toe_nodes)]
+        plane, faces = np.eye(3)[:2], surface.normals.mean(axis=0)
+        if np.abs(faces[:2]).max() < abs(faces[2]):
+            across = np.cross(faces, ends[1] - ends[0])
+            plane = np.array([np.cross(across, faces), faces])
+            plane /= np.linalg.norm(plane, axis=1)[:, None]
+        heel, toe = (plane @ end for end in ends)
         length = float(np.linalg.norm(toe - heel))
         along = (toe - heel) / length
         normal = np.array([-along[1], along[0]])
-        return Chord(toe=toe, along=along, normal=normal, length=length)
+        return Chord(plane=plane, toe=toe, along=along, normal=normal, length=length)
 
     def resultants(
         self, weights: Array, positions: Array, traction: Array
@@ -66,8 +73,8 @@ class Chord:
         """N (compression > 0), T (downstream > 0) and M (about the toe, holding down > 0) of a
         traction (q, 3) along x, y, z at positions (q, 3).
         """
-        force = weights[:, None] * traction[:, :2]
-        total, arm = force.sum(axis=0), positions[:, :2] - self.toe
+        force = weights[:, None] * (traction @ self.plane.T)
+        total, arm = force.sum(axis=0), positions @ self.plane.T - self.toe
         moment = np.sum(arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0])
         return -total @ self.normal, total @ self.along, float(moment)
 
@@ -160,8 +167,8 @@ class JointInterface:
     @property
     def section(self) -> dict[str, list[float]]:
         """Ends and length of the joint, by the names of pro/section.pro."""
-        heel = self.chord.toe - self.chord.length * self.chord.along
-        return ends_of(heel, self.chord.toe, self.length)
+        ends = self.mesh.ends
+        return ends | {"joint_along": [float(self.length)]}
 
     # -- flow
 

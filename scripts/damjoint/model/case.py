@@ -147,11 +147,12 @@ class Case(ParameterValues):
         return bool(self.above(numbers))
 
     def separating(self, numbers: Sequence[int]) -> tuple[int, ...]:
-        """The first of some joints, by their numbers, that alone holds what is above it; all of
-        them if only together they do; none if other joints hold it, too.
+        """The first of some joints, by their numbers, that alone holds what is above it; or those
+        on the rock, if all of these are among them; else none.
         """
         alone = [(k,) for k in numbers if self.separates((k,))]
-        together = [tuple(numbers)] if self.separates(numbers) else []
+        on_rock = tuple(k for k, own in enumerate(self.of_joints) if own.lower == "foundation")
+        together = [on_rock] if set(on_rock) <= set(numbers) else []
         return next(iter([*alone, *together]), ())
 
     def named(self, numbers: Sequence[int]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import tempfile
 import time
 from collections.abc import Mapping
@@ -57,6 +58,9 @@ OF_JOINTS = ("dam", "joint", "heel", "toe")
 LINES = ("ice", "force", "anchor")
 #: Regions that every geometry has.
 NEEDED = ("dam", "foundation", "joint", "fixed", "heel", "toe", "crest")
+
+#: Extent along z over that along y below which a joint faces along z.
+FLAT = 1e-6
 
 #: Limit of the joint's element tags: six digits in the keys of GetDP's internal variables.
 MOST_TAGS = 1_000_000
@@ -167,8 +171,11 @@ class JointMesh:
 
     @property
     def width(self) -> float:
-        """Extent along z [m]; 1 in the plane."""
-        return float(np.ptp(self.surface.points[:, 2])) if self.dim == 3 else 1.0
+        """Extent along z, or along y if it faces along z [m]; 1 in the plane."""
+        if self.dim == 2:
+            return 1.0
+        _, y, z = np.ptp(self.surface.points, axis=0)
+        return float(z if z > FLAT * y else y)
 
     @property
     def ends(self) -> dict[str, list[float]]:
@@ -314,9 +321,10 @@ class Mesh:
         #: Gmsh's name of it
         self.model = gmsh.model.getFileName()
         self._read()
-        scene, bodies, faces = self._own_regions() if self.own else self._section_regions(case)
+        names, bodies, faces = self._own_regions() if self.own else self._section_regions(case)
         # from the highest: a line force at the end of a joint acts on the body above it
-        solids = dict.fromkeys(n for joint in reversed(scene) for n in (joint.upper, joint.lower))
+        dams = [name for name in bodies if name.split(" ")[0] == "dam"]
+        solids = [*reversed(dams), "foundation"]
         groups = {name: [(name.split(" ")[0], bodies.pop(name))] for name in solids}
         if "lower" in bodies:
             groups["foundation"].append(("lower", bodies.pop("lower")))
@@ -335,12 +343,13 @@ class Mesh:
                 lower=joint.lower,
                 name=joint.name,
             )
-            for joint in scene
+            for joint in (self._own_scene(names) if self.own else stacked(names))
         ]
-        self.faces = {}
+        self.faces: dict[str, Face] = {}
         for i, face in enumerate(faces):
             surface = self._body(self.dim - 1, [(f"face{i}", face.tag)])
-            self.faces[f"face{i}"] = Face(surface, *face[1:])
+            for body, part in self._by_body(surface, face.body):
+                self.faces[f"face{len(self.faces)}"] = Face(part, body, *face[2:])
         self._turn_outwards()
         last = max(joint.surface.element_tags.max() for joint in self.joints)
         if last >= MOST_TAGS:
@@ -356,8 +365,10 @@ class Mesh:
         gmsh = start_gmsh()
         return bool(gmsh.model.getFileName() == self.model)
 
-    def _section_regions(self, case: Case) -> tuple[list[Joint], dict[str, int], list[FaceRegion]]:
-        """The joints; physical groups by region, and those of the faces."""
+    def _section_regions(
+        self, case: Case
+    ) -> tuple[tuple[str, ...], dict[str, int], list[FaceRegion]]:
+        """Names of the joints; physical groups by region, and those of the faces."""
         gmsh = start_gmsh()
         numbers, scene = constants(), stacked(case.joint_names)
         present = {group for _, group in gmsh.model.getPhysicalGroups()}
@@ -381,40 +392,110 @@ class Mesh:
             body = scene[number].upper if number >= 0 else scene[0].lower
             tag = int(numbers["SEGMENT"][0]) + i
             faces.append(FaceRegion(tag, body, SIDES[int(side)], min(ends), max(ends)))
-        return scene, bodies, faces
+        return case.joint_names, bodies, faces
 
-    def _own_regions(self) -> tuple[list[Joint], dict[str, int], list[FaceRegion]]:
+    def _own_regions(self) -> tuple[tuple[str, ...], dict[str, int], list[FaceRegion]]:
         """As `_section_regions`, by the names of the physical groups, which get the numbers of the
         package's own geometries.
         """
         gmsh = start_gmsh()
         numbers, named = constants(), {}
+        #: bodies, joints and their ends of each name after the first word, in the mesh's order
+        parts: dict[str, list[str]] = {region: [] for region in OF_JOINTS}
         for d, tag in gmsh.model.getPhysicalGroups():
             if name := gmsh.model.getPhysicalName(d, tag).strip().lower():
-                if name not in OWN_NAMES | OWN_FACES:
+                region, _, own = name.partition(" ")
+                if name in OWN_NAMES | OWN_FACES and region not in OF_JOINTS:
+                    pass
+                elif region in OF_JOINTS:
+                    parts[region].append(own)
+                else:
                     allowed = ", ".join([*OWN_NAMES, *OWN_FACES])
-                    raise self._bad(f'region "{name}" is not known; allowed: {allowed}')
+                    raise self._bad(
+                        f'region "{name}" is not known; allowed: {allowed}, and with several '
+                        f"joints {', '.join(f'{region} NAME' for region in OF_JOINTS)}"
+                    )
                 named[name] = d, gmsh.model.getEntitiesForPhysicalGroup(d, tag)
+        joints = parts["joint"] or [""]
         needed = [name for name, region in OWN_NAMES.items() if region in NEEDED]
+        needed = [name for name in needed if name not in OF_JOINTS]
+        needed += [f"{n} {own}".strip() for n in ("joint", "heel", "toe") for own in joints]
+        needed += [] if parts["dam"] else ["dam"]
         if missing := [name for name in needed if name not in named]:
             raise self._bad(f"no region {', '.join(missing)}; the names of physical groups count")
         gmsh.model.removePhysicalGroups()
         bodies: dict[str, int] = {}
         faces: list[FaceRegion] = []
+        order = {"dam": parts["dam"], **dict.fromkeys(("joint", "heel", "toe"), joints)}
         for name, (d, entities) in named.items():
-            region = OWN_NAMES.get(name, "joint")  # a face is as large as the joint
+            kind, _, own = name.partition(" ")
+            # a face is as large as the joint
+            region = kind if kind in OF_JOINTS else OWN_NAMES.get(name, "joint")
             if d != dimension(region, self.dim):
                 raise self._bad(
                     f'region "{name}" has dimension {d}: must be {dimension(region, self.dim)} '
                     f"with dim = {self.dim}"
                 )
-            if name in OWN_NAMES:
-                tag = bodies[region] = int(numbers[region.upper()][0])
+            tag = int(numbers[region.upper()][0])
+            if kind in OF_JOINTS:
+                if own not in order[kind]:
+                    raise self._bad(f'region "{name}": there is no joint {own}')
+                number = order[kind].index(own)
+                tag += number * int(numbers["LAYER"][0])
+                bodies[numbered(kind, number)] = tag
+            elif name in OWN_NAMES:
+                bodies[region] = tag
             else:
                 tag = int(numbers["SEGMENT"][0]) + len(faces)
                 faces.append(FaceRegion(tag, *OWN_FACES[name]))
             gmsh.model.addPhysicalGroup(d, entities, tag)
-        return stacked(("joint",)), bodies, faces
+        return tuple(own or "joint" for own in joints), bodies, faces
+
+    def _own_scene(self, names: tuple[str, ...]) -> list[Joint]:
+        """The joints of a user's own geometry, each between the two bodies that share it.
+
+        The lower one is the foundation; of two others, that on the right of the way from heel to
+        toe or, of a joint that faces along z, that of the lower z.
+        """
+        if len(names) == 1 and len(self.solids) == 2:
+            return stacked(names)
+        scene = []
+        for k, name in enumerate(names):
+            surface = self.bodies[numbered("joint", k)]
+            beside = [n for n, solid in self.solids.items() if sides(surface, solid).all()]
+            if len(beside) != 2:
+                listed = " and ".join(beside) or "none"
+                raise self._bad(
+                    f"joint {name}: must lie between two bodies (a conforming mesh); its elements "
+                    f"are sides of {listed}"
+                )
+            upper, lower = beside
+            normals = outward(surface, self.solids[lower])
+            parts = [numbered(part, k) for part in ("joint", "heel", "toe")]
+            ends = [self.bodies[part].points.mean(axis=0) for part in parts[1:]]
+            if lower != "foundation" and normals:
+                mean, (heel, toe) = normals[0].mean(axis=0), ends
+                way = toe - heel
+                if np.abs(mean[:2]).max() < abs(mean[2]):
+                    upwards = mean[2]
+                else:  # the normal from the lower body is on the left of the way
+                    upwards = way[0] * mean[1] - way[1] * mean[0]
+                if upwards < 0:
+                    upper, lower = lower, upper
+            scene.append(Joint(name, upper, lower, *parts))
+        return scene
+
+    def _by_body(self, surface: Body, body: str) -> list[tuple[str, Body]]:
+        """A surface of the bodies of a kind, dam or foundation, divided by the body that it is a
+        side of.
+        """
+        bodies = [name for name in self.solids if name.split(" ")[0] == body]
+        if not self.own or len(bodies) == 1:
+            return [(body, surface)]
+        masks = {name: sides(surface, self.solids[name]) for name in bodies}
+        if not np.any(list(masks.values()), axis=0).all():
+            raise self._bad(f"a face of the {body}: its elements must be sides of its bodies'")
+        return [(n, part_of(surface, mask)) for n, mask in masks.items() if mask.any()]
 
     def _bad(self, why: str) -> InputError:
         """The error of a user's own geometry."""
@@ -467,27 +548,8 @@ class Mesh:
         its body.
         """
         gmsh = start_gmsh()
-        (joint, *_) = self.joints
-        upper, lower = self.solids[joint.upper], self.solids[joint.lower]
         if self.own:
-            shared = np.intersect1d(upper.node_tags, lower.node_tags)
-            apart = np.setdiff1d(shared, joint.surface.node_tags)
-            if len(apart):
-                x, y, z = self._coordinates[self._place[apart[0]]]
-                raise self._bad(
-                    f"dam and foundation also meet beside the joint, at {x:g}, {y:g}, {z:g}"
-                )
-            heel, toe = (joint.ends[name][0] for name in ("heel_x", "toe_x"))
-            if toe < heel:
-                raise self._bad(
-                    f"toe at x = {toe:g}, heel at {heel:g}: x must point downstream (mirror it)"
-                )
-            if np.isin(joint.surface.node_tags, self.bodies["fixed"].node_tags).any():
-                raise self._bad("fixed: must not touch the joint")
-            if outward(joint.surface, upper) is None:
-                raise self._bad(
-                    "joint: its elements must be sides of the dam's (a conforming mesh)"
-                )
+            self._check_joints()
         kinds = {kind: name for name, kind in OWN_FACES.items()}
         surfaces = [("joint", joint.surface, self.solids[joint.lower]) for joint in self.joints]
         for face in self.faces.values():
@@ -500,6 +562,30 @@ class Mesh:
             surface.normals, turned = normals
             if self.own and turned.any():  # for GetDP, which goes by the elements
                 gmsh.model.mesh.reverseElements(surface.element_tags[turned])
+
+    def _check_joints(self) -> None:
+        """Raise InputError if the joints of a user's own geometry are unsuitable."""
+        on_joints = np.concatenate([joint.surface.node_tags for joint in self.joints])
+        for (name, body), (other, solid) in itertools.combinations(self.solids.items(), 2):
+            shared = np.intersect1d(body.node_tags, solid.node_tags)
+            apart = np.setdiff1d(shared, on_joints)
+            if len(apart):
+                x, y, z = self._coordinates[self._place[apart[0]]]
+                raise self._bad(
+                    f"{name} and {other} also meet beside the joint, at {x:g}, {y:g}, {z:g}"
+                )
+        for joint in self.joints:
+            heel, toe = (joint.ends[name][0] for name in ("heel_x", "toe_x"))
+            if toe < heel - 1e-9 * np.ptp(self._coordinates):
+                raise self._bad(
+                    f"toe at x = {toe:g}, heel at {heel:g}: x must point downstream (mirror it)"
+                )
+            if np.isin(joint.surface.node_tags, self.bodies["fixed"].node_tags).any():
+                raise self._bad("fixed: must not touch the joint")
+            if not sides(joint.surface, self.solids[joint.upper]).all():
+                raise self._bad(
+                    "joint: its elements must be sides of the dam's (a conforming mesh)"
+                )
 
     def bearer(self, line: str) -> str:
         """The first body, from the highest, that has all nodes of the crest or of a region of
@@ -567,14 +653,7 @@ def outward(surface: Body, body: Body) -> tuple[Array, BoolArray] | None:
     """Unit normals (elements, 3) of a part of a body's surface, out of the body, and which elements
     are numbered the other way round; None if not all are sides of the body's elements.
     """
-    # the body's cells that hold all nodes of an element
-    size = int(max(surface.node_tags.max(), body.node_tags.max())) + 1
-    rows = [incidence(b, size) for b in (surface, body)]
-    shared = (rows[0] @ rows[1].T).tocoo()
-    corners = np.concatenate([np.full(len(t), t.shape[1]) for _, t in surface.cells])
-    is_side = shared.data == corners[shared.row]
-    inside = np.full(len(corners), -1)
-    inside[shared.row[is_side]] = shared.col[is_side]
+    inside = cells_inside(surface, body)
     if (inside < 0).any():
         return None
     directions = []
@@ -591,6 +670,38 @@ def outward(surface: Body, body: Body) -> tuple[Array, BoolArray] | None:
     normals[inwards] *= -1
     # without the mesh generator's rounding: a level joint's normal is (0, 1, 0)
     return np.round(normals, 12) + 0.0, inwards
+
+
+def cells_inside(surface: Body, body: Body) -> IntArray:
+    """For each element of a surface, the body's cell that has all its nodes; -1: none."""
+    size = int(max(surface.node_tags.max(), body.node_tags.max())) + 1
+    rows = [incidence(b, size) for b in (surface, body)]
+    shared = (rows[0] @ rows[1].T).tocoo()
+    corners = np.concatenate([np.full(len(t), t.shape[1]) for _, t in surface.cells])
+    is_side = shared.data == corners[shared.row]
+    inside = np.full(len(corners), -1)
+    inside[shared.row[is_side]] = shared.col[is_side]
+    return inside
+
+
+def sides(surface: Body, body: Body) -> BoolArray:
+    """Which elements of a surface are sides of the body's elements."""
+    return np.asarray(cells_inside(surface, body) >= 0)
+
+
+def part_of(surface: Body, selected: BoolArray) -> Body:
+    """Some elements of a surface."""
+    ends = np.cumsum([len(table) for _, table in surface.cells])[:-1]
+    chosen = np.split(selected, ends)
+    cells = [(shape, table[own]) for (shape, table), own in zip(surface.cells, chosen, strict=True)]
+    used = np.unique(np.concatenate([table.ravel() for _, table in cells]))
+    return Body(
+        surface.points[used],
+        surface.node_tags[used],
+        [(shape, np.searchsorted(used, table)) for shape, table in cells if len(table)],
+        surface.element_tags[selected],
+        [r for r, (_, table) in zip(surface.regions, cells, strict=True) if len(table)],
+    )
 
 
 def incidence(body: Body, size: int) -> sparse.csr_matrix:

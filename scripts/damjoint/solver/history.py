@@ -54,7 +54,7 @@ def joint_row(equilibrium: Equilibrium, state: State, number: int) -> dict[str, 
         "N": N,
         "T": T,
         "M": M,
-        "U": uplift @ normals[:, :2] @ joint.chord.normal,
+        "U": uplift @ (normals @ joint.chord.plane.T) @ joint.chord.normal,
         "flux": pressure.leakage,
         "heel": joint.heel @ state.jump,
     }

@@ -54,6 +54,10 @@ ROUGH, SURE = 1.5, 4.0
 #: Levels that differ relatively by less are the same.
 PLATEAU = 1e-7
 
+#: A joint takes part in a mechanism if its jumps change by more than this part of the largest
+#: change.
+MOVES = 0.5
+
 #: Points at most that are added where a path ends.
 MOST_REFINED = 30
 
@@ -80,15 +84,15 @@ class Point:
         return self.state.loading.level
 
     @cached_property
-    def sliding(self) -> tuple[int, ...]:
-        """The numbers of joints that alone hold what is above them and, being plane, transmit the
-        shear by their whole strength, which slip cannot raise: a higher level has no equilibrium,
-        it pushes more and presses less. Empty if there are none.
+    def sliding(self) -> int | None:
+        """The number of a joint that alone holds what is above it and, being plane, transmits the
+        shear by its whole strength, which slip cannot raise: a higher level has no equilibrium, it
+        pushes more and presses less. None if there is none.
         """
-        equilibrium, state, used = self.model.equilibrium, self.state, list[int]()
+        equilibrium, state = self.model.equilibrium, self.state
         for k, joint in enumerate(equilibrium.interface.joints):
             law, variables = equilibrium.laws.laws[k], state.variables.joints[k]
-            if law.hardens or not joint.flat:
+            if law.hardens or not joint.flat or not self.model.case.separates((k,)):
                 continue
             jump = joint.jumps(joint.at_points, state.jump)
             traction, _ = law.traction_and_tangent(jump, variables)
@@ -96,13 +100,13 @@ class Point:
             strength = law.shear_strength(traction[:, 0], damage, slip)
             shear, weights = np.linalg.norm(traction[:, 1:], axis=1), joint.points.weights
             if weights @ shear >= (1 - PRECISION / 2) * (weights @ strength):
-                used.append(k)
-        return self.model.case.separating(used)
+                return k
+        return None
 
     @property
     def slides(self) -> bool:
-        """Whether there are such joints."""
-        return bool(self.sliding)
+        """Whether there is such a joint."""
+        return self.sliding is not None
 
     @cached_property
     def compressions(self) -> list[float]:
@@ -245,13 +249,14 @@ class EquilibriumPath:
 
     @property
     def failing(self) -> tuple[int, ...]:
-        """The numbers of the joints at which it fails: that slide, or the one whose jumps change
-        most beyond the limit point; empty if the path does not show it.
+        """The numbers of the joints at which it fails: that slides, or whose jumps change most
+        beyond the limit point; empty if the path does not show it.
         """
-        if self.slides:
-            return self.points[self.top].sliding
-        sizes = [np.abs(moved).max() for moved in self.movements]
-        return (int(np.argmax(sizes)),) if sizes else ()
+        slides = self.points[self.top].sliding if self.points else None
+        if slides is not None:
+            return (slides,)
+        sizes = np.array([np.abs(moved).max() for moved in self.movements])
+        return tuple(np.flatnonzero(sizes > MOVES * sizes.max(initial=0)).tolist())
 
     @property
     def joint(self) -> str:

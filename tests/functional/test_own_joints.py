@@ -1,0 +1,125 @@
+"""Geometries of one's own with several joints: a second joint that is strong, joints that meet."""
+
+import numpy as np
+import pytest
+from blocks import write_blocks
+from damjoint import InputError
+from damjoint.engines.condensed.solve import check
+from damjoint.joint.interface import interface_of
+from damjoint.model.case import load
+from damjoint.solver.load_stepper import LoadStepper
+from damjoint.statics.verdict import verdict
+
+WATER = 9810.0
+#: Weight of a block of 10 m by 10 m [N/m].
+WEIGHT = 100 * 2400 * 9.81
+#: A tower of two blocks on a joint; two blocks side by side.
+TOWER = {"low": (0, 0, 10, 5), "high": (0, 5, 10, 12)}
+BLOCKS = {"left": (0, 0, 10, 10), "right": (10, 0, 20, 10)}
+BASES = {"left base": (0, 0, 10, 0), "right base": (10, 0, 20, 0)}
+CONTRACTION = {"contraction": (10, 0, 10, 10)}
+SETTINGS = {"uplift": "none", "E": 2e10, "order": 1.0}
+FRICTION = {"law": "friction", "adhesion": 0.0, "pena_tang": 0.0}
+
+
+@pytest.fixture
+def solved(tmp_path):
+    """solved(blocks, joints, levels, **settings): the results of blocks on rock."""
+
+    def run(blocks, joints, levels, **settings):
+        write_blocks(tmp_path / "own.msh", blocks, joints)
+        (tmp_path / "own.case").write_text('geometry = "own.msh";')
+        case = load(str(tmp_path / "own.case"), SETTINGS | settings, levels)
+        check(case)
+        return LoadStepper(case, interface_of(case)).run()
+
+    return run
+
+
+def test_a_strong_second_joint_tends_to_the_run_without_it(solved):
+    """On the same mesh, with an error of first order in its compliance."""
+    law = {"sigma_max": 1e4, "law": "bond", "adhesion": 5e4}
+    base, lift = {"base": (0, 0, 10, 0)}, (0, 5, 10, 5)
+    glued = {"a": TOWER["low"], "a/b": TOWER["high"]}
+    one = solved(glued, base | {"_lift": lift}, [8, 10], **law).at()
+    assert one["sigma_n"].min() < -1e5
+    errors = []
+    for stiffness in (1e13, 1e14, 1e15):
+        strong = {"law": ("bond", "friction"), "adhesion": (5e4, 1e30)}
+        strong |= {"K_N": (1e11, stiffness), "K_T": (5e10, stiffness)}
+        results = solved(TOWER, base | {"lift": lift}, [8, 10], **(law | strong))
+        assert results.case.joint_names == ("base", "lift")
+        own = results.joints[0].at()
+        errors.append(
+            max(np.abs(own[n] - one[n]).max() / np.abs(one[n]).max() for n in ("sigma_n", "tau_1"))
+        )
+    assert errors[1] < 1e-6
+    assert np.divide(errors[:-1], errors[1:]) == pytest.approx(10, rel=0.01)
+
+
+def test_an_open_contraction_joint_parts_two_dams(solved):
+    """Each block has its own weight, and the left one all of the thrust."""
+    soft = {"K_N": (1e11, 1e11, 1.0), "K_T": (5e10, 5e10, 1.0)}
+    strong = FRICTION | {"adhesion": 1e30}
+    left, right, between = solved(BLOCKS, BASES | CONTRACTION, [5], **strong, **soft).joints
+    thrust = WATER * 5**2 / 2
+    assert (left.last["N"], left.last["T"]) == pytest.approx((WEIGHT, thrust), rel=1e-6)
+    assert right.last["N"] == pytest.approx(WEIGHT, rel=1e-6)
+    assert abs(right.last["T"]) < 1e-6 * thrust and abs(between.last["N"]) < 1e-6 * thrust
+
+
+def test_a_stiff_contraction_joint_glues_two_blocks(solved):
+    stiff = {"K_N": (1e11, 1e11, 1e16), "K_T": (5e10, 5e10, 1e16), "adhesion": 1e30}
+    two = solved(BLOCKS, BASES | CONTRACTION, [5], **(FRICTION | stiff))
+    glued = {"left": BLOCKS["left"], "left/right": BLOCKS["right"]}
+    joints = BASES | {"_contraction": CONTRACTION["contraction"]}
+    one = solved(glued, joints, [5], **(FRICTION | {"adhesion": 1e30}))
+    assert two.last["crest_ux"] == pytest.approx(one.last["crest_ux"], rel=1e-6)
+    for own, other in zip(two.joints, one.joints, strict=False):
+        assert np.allclose(own.at()["sigma_n"], other.at()["sigma_n"], rtol=0, atol=1)
+
+
+def test_blocks_of_different_friction_share_the_thrust(solved):
+    """A smooth contraction joint transmits thrust only: both slide where it reaches mu_1 W + mu_2 W;
+    the water stands above the crest, on which it does not press here.
+    """
+    smooth = FRICTION | {"mu": (0.3, 0.2, 1e-6)}
+    results = solved(BLOCKS, BASES | CONTRACTION, [20], **smooth)
+    level = (0.5 * WEIGHT / WATER + 50) / 10  # thrust of the water on 10 m of height
+    assert results.last["level"] == pytest.approx(level, rel=1e-4)
+    assert verdict(results) == "sliding on left base and right base"
+    thrust = results.last["T"] + results.joints[1].last["T"]
+    assert thrust == pytest.approx(0.5 * WEIGHT, rel=1e-4)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_monoliths_are_in_equilibrium(dim):
+    """The bases carry the thrust and the weight less the uplift; the contraction joint is inside."""
+    solid = {"n_joint": 6.0, "h_dam": 12.0, "h_found": 40.0} if dim == 3 else {"n_joint": 20.0}
+    case = load("monoliths", solid | {"dim": float(dim)}, [40.0])
+    results = LoadStepper(case, interface_of(case)).run()
+    *bases, contraction = results.joints
+    share = 1 / len(bases) if dim == 3 else 1.0  # per metre of both monoliths
+    area, thrust = (34 + 5) / 2 * 45, WATER * 40**2 / 2
+    weight = 2400 * 9.81 * area
+    total = {n: share * sum(own.last[n] for own in bases) for n in "NTU"}
+    assert total["N"] + total["U"] == pytest.approx(weight, rel=1e-9)
+    assert total["T"] == pytest.approx(thrust, rel=1e-4)  # elements that the waterline cuts
+    assert contraction.last["U"] == 0
+    if dim == 2:  # the downstream block holds what its contraction joint presses
+        assert bases[1].last["T"] == pytest.approx(contraction.last["N"], rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    "joints, settings, words",
+    [
+        (CONTRACTION, {}, "also meet beside the joint"),
+        (BASES | {"inner": (2, 5, 8, 5)}, {}, "joint inner: must lie between two bodies"),
+        (BASES | CONTRACTION, {"mu": (0.5, 0.6)}, "lists of 2 values: must have one for each"),
+        (BASES | CONTRACTION, {"lift_heights": (5.0,)}, "lift_heights: must not be set"),
+    ],
+)
+def test_bad_geometries_of_several_joints(solved, joints, settings, words):
+    with pytest.raises(InputError) as error:
+        solved(BLOCKS, joints, [5], **settings)
+    assert words in str(error.value)
