@@ -33,6 +33,14 @@ class HHT:
     """The scheme for a parameter alpha in [-1/3, 0]."""
 
     alpha: float
+    #: False: Newmark's method with the beta and gamma of alpha and equilibrium at the end of the
+    #: step, which is of first order only
+    weighted: bool = True
+
+    @property
+    def shift(self) -> float:
+        """Alpha in the equilibrium."""
+        return self.alpha if self.weighted else 0.0
 
     @property
     def beta(self) -> float:

@@ -147,7 +147,7 @@ class TimeStep:
         system, scheme, model = problem.system, problem.scheme, problem.model
         velocity, acceleration = scheme.rates(dt)
         #: 1 + alpha
-        self.weight = weight = 1 + scheme.alpha
+        self.weight = weight = 1 + scheme.shift
         matrix = acceleration * system.mass + weight * (
             system.stiffness + velocity * problem.damping
         )
@@ -185,7 +185,7 @@ class TimeStep:
         """
         problem, dt = self.problem, self.dt
         system, scheme, motion = problem.system, problem.scheme, begin.motion
-        alpha, weight, static = scheme.alpha, self.weight, problem.static
+        alpha, weight, static = scheme.shift, self.weight, problem.static
         of_velocity, of_acceleration = scheme.history(motion, dt)
         right = system.mass @ of_acceleration
         if problem.damping.nnz:
