@@ -23,10 +23,18 @@ from damjoint.solver.load_stepper import LoadStepper
 RECORD = Path(__file__).parents[2] / "reference" / "friuli.csv"
 HEIGHT = 9.9
 SCENE = {
-    **{"dam_height": HEIGHT, "mesh_pattern": "free", "h_dam": 0.5, "h_found": 1.0},
-    **{"joint_head_offset": 0.1, "damping": 0.0, "added_mass": 0.0},
-    **{"joint_damping_n": 1e9, "joint_damping_t": 2e9},
-    **{"record_unit": "m/s2", "record_start": 3.01, "record_rest": 0.0},
+    "dam_height": HEIGHT,
+    "mesh_pattern": "free",
+    "h_dam": 0.5,
+    "h_found": 1.0,
+    "joint_head_offset": 0.1,
+    "damping": 0.0,
+    "added_mass": 0.0,
+    "joint_damping_n": 1e9,
+    "joint_damping_t": 2e9,
+    "record_unit": "m/s2",
+    "record_start": 3.01,
+    "record_rest": 0.0,
 }
 
 
