@@ -274,6 +274,89 @@ def test_water_in_the_joint_during_an_earthquake(tmp_path, mode, uplift):
         assert uplifts("crack")[0][:, 0].max() > 1.05 * static["U"]
 
 
+# -- condensation, three dimensions, several joints
+
+
+@pytest.mark.parametrize("alpha", [-0.05, 0.0])
+def test_steps_solve_the_equations_of_all_unknowns(tmp_path, alpha):
+    """Residual of the uncondensed equations at every step, while the dam slides and rocks."""
+    record = smooth_record(tmp_path / "r.csv", 6.0, duration=0.5)
+    quake = earthquake(record, DAM | {"hht_alpha": alpha, "record_rest": 0.0}, "30")
+    problem, system = quake.problem, quake.system
+    interface, laws = problem.model.equilibrium.interface, problem.model.equilibrium.laws
+    at_points = lambda state: interface.jumps(interface.at_points, state.jump)
+
+    def forces(state, motion):
+        traction, _ = laws.evaluate(at_points(state), state.variables)
+        result = system.stiffness @ motion.displacement + problem.damping @ motion.velocity
+        result[system.jumps] += interface.forces(traction)
+        return result
+
+    static = before = forces(problem.static, problem.at_rest.motion)
+    ground_before, largest = np.zeros(2), 0.0
+    for step in quake.steps():
+        state, motion = step.end.state, step.end.motion
+        assert state.jump - problem.static.jump == pytest.approx(
+            motion.displacement[system.jumps], abs=1e-12
+        )
+        now = forces(state, motion)
+        ground = (1 + alpha) * step.ground - alpha * ground_before
+        residual = system.mass @ motion.acceleration + system.inertia @ ground
+        residual += (1 + alpha) * (now - static) - alpha * (before - static)
+        largest = max(largest, np.linalg.norm(residual) / problem.model.reference)
+        before, ground_before = now, step.ground
+    assert abs(mean_slip(quake)) > 0.01
+    assert largest < 1e-8
+
+
+@pytest.mark.parametrize("pattern, order", [("layers", 1.0), ("split", 2.0)])
+def test_a_section_of_any_thickness_moves_as_in_plane_strain(tmp_path, pattern, order):
+    """With both end faces fixed along z, per metre of thickness; the two meshes of the section
+    differ a little.
+    """
+    record = smooth_record(tmp_path / "r.csv", 5.0, duration=0.4)
+    small = {"n_joint": 6.0, "h_dam": 15.0, "h_found": 45.0, "order": order}
+    solid = {"dim": 3.0, "thickness": 7.0, "hold_z": 1.0, "mesh_pattern": pattern}
+    plane, thick = (earthquake(record, DAM | small | more, "30") for more in ({}, solid))
+    assert thick.frequencies == pytest.approx(plane.frequencies, rel=1e-2)
+    for quake in (plane, thick):
+        assert len(run(quake)) >= 80
+    assert mean_slip(thick) == pytest.approx(mean_slip(plane), rel=2e-2)
+    assert abs(mean_slip(plane)) > 0.005
+    masses = [
+        d @ q.system.mass @ d / joint_of(q).width
+        for q in (plane, thick)
+        for d in [q.system.translation(joint_of(q), ["dam"], np.array([1.0, 0]))]
+    ]
+    assert masses[1] == pytest.approx(masses[0], rel=1e-9)
+
+
+def test_momentum_above_each_of_several_joints(tmp_path):
+    """T of each joint: the static one less the inertia of all that is above it; Newmark."""
+    record = smooth_record(tmp_path / "r.csv", 6.0, duration=0.5)
+    settings = DAM | {"lift_heights": (15.0, 30.0), "hht_alpha": 0.0, "added_mass": 0.0}
+    quake = earthquake(record, settings | {"mu": (1.2, 0.7, 0.9)}, "40")
+    equilibrium, system = quake.problem.model.equilibrium, quake.system
+    forces = lambda state: np.array([joint_row(equilibrium, state, k)["T"] for k in range(3)])
+    static, slid = forces(quake.problem.static), np.zeros(3)
+    rigid = [
+        system.translation(joint_of(quake, k), quake.case.above([k]), np.array([1.0, 0]))
+        for k in range(3)
+    ]
+    masses = np.array([d @ system.mass @ d for d in rigid])
+    widths = np.array([34, 34 - 29 * 15 / 45, 34 - 29 * 30 / 45])
+    assert masses == pytest.approx(2400 * (widths + 5) / 2 * [45, 30, 15], rel=1e-9)
+    for step in quake.steps():
+        absolute = step.end.motion.acceleration
+        inertia = [d @ (system.mass @ absolute) for d in rigid] + masses * step.ground[0]
+        assert forces(step.end.state) == pytest.approx(static - inertia, abs=1e-8 * static.max())
+        moved = step.end.state.jump - quake.problem.static.jump
+        for k in range(3):
+            joint = joint_of(quake, k)
+            slid[k] = max(slid[k], np.abs(joint.jumps(joint.at_points, moved)[:, 1]).max())
+    assert slid[1] > 0.01  # the smoothest one
+
+
 # -- the command
 
 

@@ -163,13 +163,15 @@ class TimeStep:
         self.equilibrium = equilibrium
         self.model = copy(model)
         self.model.equilibrium = equilibrium
+        #: nodal forces of the joints in the static state (j,)
+        self.at_static = self.joint_forces(problem.static)
 
-    def joint_forces(self, state: State, pressure: tuple[Pressure, ...]) -> Array:
+    def joint_forces(self, state: State) -> Array:
         """Nodal forces of the joints (j,), without dashpots, at a state."""
         interface = self.equilibrium.interface
         at_points = interface.jumps(interface.at_points, state.jump)
         traction, _ = JointLaws.evaluate(self.equilibrium.laws, at_points, state.variables)
-        return interface.forces(traction) - lift(self.equilibrium, pressure)
+        return interface.forces(traction) - lift(self.equilibrium, state.pressures)
 
     def advance(
         self,
@@ -194,9 +196,9 @@ class TimeStep:
             right += alpha * (system.stiffness @ motion.displacement)
         right -= problem.inertia @ (weight * ground[1] - alpha * ground[0])
         right[system.jumps] += alpha * begin.forces
-        at_static = self.joint_forces(static, static.pressures)
-        loads = self.factors.reduce(right) / weight + self.stiffness @ static.jump + at_static
-        loads += lift(self.equilibrium, pressure)
+        lifted = lift(self.equilibrium, pressure)
+        loads = self.factors.reduce(right) / weight + self.stiffness @ static.jump
+        loads += self.at_static + lifted
 
         equilibrium, interface = self.equilibrium, self.equilibrium.interface
         equilibrium.pressure = pressure
@@ -227,7 +229,7 @@ class TimeStep:
         state = step.state
         at_points = interface.jumps(interface.at_points, state.jump)
         traction, _ = equilibrium.laws.evaluate(at_points, variables)
-        forces = interface.forces(traction) - lift(equilibrium, pressure) - at_static
+        forces = interface.forces(traction) - lifted - self.at_static
         displacement = self.factors.expand(state.jump - static.jump)
         end = Moving(
             time=begin.time + dt,
