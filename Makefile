@@ -1,11 +1,12 @@
-# make setup | run | check | test | test-all | bench | pages | clean; all but clean run setup first.
+# make setup | run | check | test | test-all | bench | pages | docs | clean; all but clean run setup
+# first.
 # PYTHON=python3.12 make setup chooses the interpreter.
 
 BIN = .venv/bin
 # each file of tests in one process, as its tests share computed scenes
 PARALLEL = --numprocesses auto --dist loadfile
 
-.PHONY: setup run check test test-all bench pages clean
+.PHONY: setup run check test test-all bench pages docs clean
 
 # Install GetDP and libraries (Debian packages), and Python packages in .venv
 setup:
@@ -38,6 +39,12 @@ bench: setup
 # tour.md, ssnp142.md
 pages: setup
 	$(BIN)/python -m damjoint_tools.pages all
+
+# Build the site out/site/index.html from the pages, the executed notebooks and the docstrings; a
+# broken link is an error
+docs: setup
+	$(BIN)/sphinx-build -q -W --keep-going -E -c reference/site -d out/doctrees . out/site
+	@echo out/site/index.html
 
 # Remove results and caches
 clean:

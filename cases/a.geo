@@ -1,4 +1,4 @@
 // Mesh of a.case; the differences stand there.
 Include "../pro/units.pro";
 Include "a.case";
-Include "../geo/dam.geo";
+Include "../geo/window.geo";

@@ -1,4 +1,4 @@
 // Mesh of b.case; the differences stand there.
 Include "../pro/units.pro";
 Include "b.case";
-Include "../geo/dam.geo";
+Include "../geo/window.geo";

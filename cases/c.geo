@@ -1,4 +1,4 @@
 // Mesh of c.case; the differences stand there.
 Include "../pro/units.pro";
 Include "c.case";
-Include "../geo/dam.geo";
+Include "../geo/window.geo";

@@ -1,4 +1,4 @@
 // Mesh of d.case; the differences stand there.
 Include "../pro/units.pro";
 Include "d.case";
-Include "../geo/dam.geo";
+Include "../geo/window.geo";

@@ -1,4 +1,4 @@
 // Mesh of dam.case; the differences stand there.
 Include "../pro/units.pro";
 Include "dam.case";
-Include "../geo/dam.geo";
+Include "../geo/window.geo";

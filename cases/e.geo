@@ -1,4 +1,4 @@
 // Mesh of e.case; the differences stand there.
 Include "../pro/units.pro";
 Include "e.case";
-Include "../geo/dam.geo";
+Include "../geo/window.geo";

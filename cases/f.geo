@@ -1,4 +1,4 @@
 // Mesh of f.case; the differences stand there.
 Include "../pro/units.pro";
 Include "f.case";
-Include "../geo/dam.geo";
+Include "../geo/window.geo";

@@ -1,4 +1,4 @@
 // Mesh of g.case; the differences stand there.
 Include "../pro/units.pro";
 Include "g.case";
-Include "../geo/dam.geo";
+Include "../geo/window.geo";

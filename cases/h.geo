@@ -1,4 +1,4 @@
 // Mesh of h.case; the differences stand there.
 Include "../pro/units.pro";
 Include "h.case";
-Include "../geo/dam.geo";
+Include "../geo/window.geo";

@@ -1,4 +1,4 @@
 // Mesh of i.case; the differences stand there.
 Include "../pro/units.pro";
 Include "i.case";
-Include "../geo/dam.geo";
+Include "../geo/window.geo";

@@ -1,4 +1,4 @@
 // Mesh of j.case; the differences stand there.
 Include "../pro/units.pro";
 Include "j.case";
-Include "../geo/dam.geo";
+Include "../geo/window.geo";

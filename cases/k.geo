@@ -1,4 +1,4 @@
 // Mesh of k.case; the differences stand there.
 Include "../pro/units.pro";
 Include "k.case";
-Include "../geo/dam.geo";
+Include "../geo/window.geo";

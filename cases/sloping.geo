@@ -1,4 +1,4 @@
 // Mesh of sloping.case; the differences stand there.
 Include "../pro/units.pro";
 Include "sloping.case";
-Include "../geo/dam.geo";
+Include "../geo/window.geo";

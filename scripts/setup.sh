@@ -80,6 +80,6 @@ if [ ! -x .venv/bin/python ] ||
   # for weasyprint, which writes reports as PDF; not required
   has libpangoft2-1.0.so.0 || install libpangoft2-1.0-0 >/dev/null 2>&1 || true
   [ -x .venv/bin/python ] || "$python" -m venv .venv
-  .venv/bin/pip install -q --disable-pip-version-check -e ".[test,fast]"
+  .venv/bin/pip install -q --disable-pip-version-check -e ".[test,docs,fast]"
   touch .venv/.stamp
 fi

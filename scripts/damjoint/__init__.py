@@ -1,5 +1,13 @@
 """Concrete gravity dams on a thin joint that opens, breaks, slides and lets water in.
 
+    import damjoint as dj
+
+    run = dj.run(dj.case("dam", levels=[30, 40, 45], mu=0.8))
+    print(run.verdict, run.joint.at(level=45).opening.max())  # [m]
+
+`help(dj.case)`, `help(dj.run)`, ... describe the functions, reference/python.md their use.
+The package:
+
 storage.py  atomic writes, locks on files and folders
 progress.py progress of long work, on a terminal and in redirected output
 model/      data: parameters, case, mesh, loads, results
@@ -15,7 +23,7 @@ accuracy.py mesh refinement to a required accuracy, error estimate
 versions.py versions of the code and of what it uses, machine
 runner.py   solves a case and writes its results
 studies/    checks, sweeps, critical values, a law along a path, reports
-library.py  the interface for Python: case, run, check, critical, fill, own laws
+library.py  the interface for Python: case, run, fill, check, critical, sweep, further laws
 gui/        the Gmsh window
 cli.py      the command line; __main__.py prepares its process
 
@@ -29,6 +37,22 @@ TYPE_CHECKING = False  # importing typing takes time in which an interrupt is no
 if TYPE_CHECKING:
     from pathlib import Path
     from typing import Any
+
+    from .library import LAWS as LAWS
+    from .library import Case as Case
+    from .library import Critical as Critical
+    from .library import JointTable as JointTable
+    from .library import Law as Law
+    from .library import Run as Run
+    from .library import Sample as Sample
+    from .library import Step as Step
+    from .library import Sweep as Sweep
+    from .library import case as case
+    from .library import check as check
+    from .library import critical as critical
+    from .library import fill as fill
+    from .library import run as run
+    from .library import sweep as sweep
 
 __version__ = "0.2.0"
 
@@ -67,7 +91,11 @@ def data(folder: str) -> Path:
 
 
 #: What `import damjoint` offers, see library.py; imported when it is used.
-LIBRARY = ("LAWS", "Law", "case", "check", "critical", "fill", "run")
+LIBRARY = (
+    *("case", "run", "fill", "check", "critical", "sweep"),
+    *("Case", "Run", "JointTable", "Step", "Critical", "Sample", "Sweep", "Law", "LAWS"),
+)
+__all__ = [*LIBRARY, "InputError", "RunError"]
 
 
 def __getattr__(name: str) -> Any:

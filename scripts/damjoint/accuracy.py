@@ -151,6 +151,7 @@ def refine_until_accurate(
         if error:
             why = f"n_joint = {meshed['n_joint']:g}: {str(error) or type(error).__name__}"
             if not isinstance(error, Exception):
+                why = f"interrupted on n_joint = {meshed['n_joint']:g}"
                 outcome = replace(outcome, error=error)
             break
         if after.result.info["mesh"] == outcome.result.info["mesh"]:

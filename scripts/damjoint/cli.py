@@ -544,7 +544,8 @@ def add_sweep(commands: Commands) -> None:
 def do_sweep(arguments: argparse.Namespace) -> int:
     """Run damjoint sweep."""
     from .model import parameters
-    from .studies.plan import Schedule, cases_of, plan_of, sample_of
+    from .model.case import load
+    from .studies.plan import cases_of, plan_of, sample_of
     from .studies.sweep import meshed, sweep
 
     out = arguments.out or Path(f"{Path(arguments.case).stem}_sweep.csv")
@@ -554,20 +555,20 @@ def do_sweep(arguments: argparse.Namespace) -> int:
         raise InputError(f"--correlate {arguments.correlate[0]}: needs --sample")
     sample = sample_of(arguments.sample, **options) if arguments.sample else None
     plan = plan_of(arguments.vary, arguments.tie, sample, settings, arguments.critical)
-    schedule = Schedule(
-        levels=arguments.levels,
-        tail_levels=arguments.tail_levels,
-        steps=arguments.steps,
-        accuracy=arguments.accuracy,
+    case = load(
+        arguments.case,
+        settings,
+        arguments.levels,
+        arguments.tail_levels,
+        arguments.steps,
+        arguments.accuracy,
     )
-    if schedule.accuracy:
-        settings, schedule, estimate = meshed(arguments.case, settings, schedule)
+    if case.accuracy:
+        case, estimate = meshed(case)
         print(f"mesh of all rows, refined for the unchanged case: {estimate}")
-    count, rows = sweep(
-        arguments.case, plan, settings, out, schedule, arguments.jobs, arguments.scheduler
-    )
+    count, rows = sweep(case, plan, out, arguments.jobs, arguments.scheduler)
     print(f"{count} rows computed; {out}")
-    loaded = () if plan.sampled else cases_of(arguments.case, plan, settings, schedule)
+    loaded = () if plan.sampled else cases_of(case, plan)
     cases = [row_case for _, row_case in loaded]
     report_sweep(arguments.case, plan, rows, cases, out)
     return 0

@@ -2,7 +2,7 @@
 
     case = dj.case("dam", levels=[30, 40, 45], mu=0.8)
     run = dj.run(case)
-    run.verdict, run.joint.at(level=45).delta_n.max()
+    run.verdict, run.joint.at(level=45).opening.max()
 
 Names and units are those of the parameters and of the tables (reference/parameters.md, results.md).
 Only `Run.save` writes to disk.
@@ -12,31 +12,55 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from html import escape
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from . import ROUND_OFF, InputError, accuracy
-from .arrays import Table, Value
+from .arrays import Array, Table, Value
 from .engines import Outcome, engine_of
 from .laws import LAWS, Law
 from .model.case import Case, load
 from .model.fields import Solution
-from .model.results import Results
+from .model.results import HISTORY, Results, joint_columns
+from .progress import track
 from .solver.load_stepper import LoadStepper
 from .solver.state import State
 from .statics.verdict import hints, statement, verdict
+from .studies.plan import Plan, Sample, column_of, in_file, listed, plan_with
 
 if TYPE_CHECKING:  # loaded when they are used, with what they draw with
+    import pandas
+    import xarray
+    from matplotlib.figure import Figure
+
     from .studies.check import SafetyCheck
     from .studies.critical import CriticalValue, Search
 
-__all__ = ["LAWS", "Critical", "Law", "Run", "Step", "case", "check", "critical", "fill", "run"]
+__all__ = [
+    "LAWS",
+    "Case",
+    "Critical",
+    "JointTable",
+    "Law",
+    "Run",
+    "Sample",
+    "Step",
+    "Sweep",
+    "case",
+    "check",
+    "critical",
+    "fill",
+    "run",
+    "sweep",
+]
 
 
 def case(
-    source: str | Path = "dam",
+    source: Case | str | Path = "dam",
     *,
     levels: Sequence[float] | float | None = None,
     tail_levels: Sequence[float] | float | None = None,
@@ -44,15 +68,31 @@ def case(
     accuracy: str | None = None,
     **parameters: Value,
 ) -> Case:
-    """A case with parameters of one's own.
+    """A case of the package, of a case file, or a variation of another case.
 
-    source: letter or name of a case of the package, or path of a case file; levels, tail_levels:
-    of reservoir and tailwater [m] at t = 1, 2, ...; steps: equal steps between two levels;
-    accuracy: coarse, standard, fine or a percentage, see `damjoint run --help`; parameters: by
-    name, in SI units, or as a text with a unit, "20*GPa". Raises InputError.
+    What is not given is that of the source. `case["mu"]` is the value of a parameter.
+
+    Args:
+        source: letter or name of a case of the package, path of a case file, or a case.
+        levels: of the reservoir [m] at t = 1, 2, ...
+        tail_levels: of the tailwater [m] at t = 1, 2, ..., or the same at all times.
+        steps: equal load steps between two levels.
+        accuracy: coarse, standard, fine or a percentage; mesh and steps are refined for it.
+        parameters: by name, in SI units, as in reference/parameters.md, or as a text with a unit,
+            "20*GPa".
+
+    Raises:
+        InputError: name, value, and what is allowed.
     """
-    heights = as_list(levels), as_list(tail_levels)
-    return load(str(source), parameters, *heights, steps, accuracy)
+    loading = as_list(levels), as_list(tail_levels), steps, accuracy
+    if isinstance(source, Case):
+        return source.varied(parameters, *loading)
+    return load(str(source), parameters, *loading)
+
+
+def as_case(source: Case | str | Path) -> Case:
+    """A case as it is, or that of a name or path."""
+    return source if isinstance(source, Case) else case(source)
 
 
 def as_list(levels: Sequence[float] | float | None) -> list[float] | None:
@@ -61,7 +101,40 @@ def as_list(levels: Sequence[float] | float | None) -> list[float] | None:
 
 
 class JointTable(np.recarray):
-    """Rows of joint.csv as a record array."""
+    """Rows of joint.csv as a record array: a column by its name, and by some names in full.
+
+    Signs: opening, tension and the downstream direction are positive.
+    """
+
+    @property
+    def opening(self) -> Array:
+        """Opening [m]: `delta_n`, or 0 where the joint is compressed."""
+        return np.asarray(np.maximum(self["delta_n"], 0.0))
+
+    @property
+    def tangential_jump(self) -> Array:
+        """Displacement of the dam along x relative to the foundation [m]: `delta_t1`."""
+        return np.asarray(self["delta_t1"])
+
+    @property
+    def normal_stress(self) -> Array:
+        """Effective normal stress [Pa]: `sigma_n_eff`."""
+        return np.asarray(self["sigma_n_eff"])
+
+    @property
+    def shear_stress(self) -> Array:
+        """Shear stress along x [Pa]: `tau_1`."""
+        return np.asarray(self["tau_1"])
+
+    @property
+    def pressure(self) -> Array:
+        """Water pressure in the joint [Pa]: `p`."""
+        return np.asarray(self["p"])
+
+    @property
+    def distance(self) -> Array:
+        """Distance from the heel along the joint [m]: `s`."""
+        return np.asarray(self["s"])
 
     def at(self, *, level: float | None = None, time: float | None = None) -> JointTable:
         """The rows of a requested level [m] (the last time it was reached) or time, from heel to
@@ -78,9 +151,9 @@ class JointTable(np.recarray):
         return rows
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Run:
-    """A scene that has been solved."""
+    """The results of a case, made by `run`."""
 
     outcome: Outcome
 
@@ -116,13 +189,17 @@ class Run:
 
     @property
     def hints(self) -> list[str]:
-        """What to know of the result besides its verdict."""
+        """Remarks on the result."""
         return hints(self.results)
 
-    def plot(self) -> Any:
-        """The picture of the run, a matplotlib Figure."""
+    def plot(self) -> Figure:
+        """The picture of the run, as `damjoint run` writes it."""
+        from matplotlib import pyplot
+
         from .post.pictures import picture
 
+        # loads the backend, by which a notebook shows a figure
+        pyplot.draw_if_interactive()  # type: ignore[no-untyped-call]
         return picture(self.solution)
 
     @property
@@ -140,37 +217,95 @@ class Run:
 
         write_outcomes(self.case, [self.outcome], Path(out))
 
-    def to_pandas(self, table: str = "joint") -> Any:
-        """joint or history as a pandas DataFrame.
+    def to_pandas(self, table: str = "joint") -> pandas.DataFrame:
+        """joint or history as a DataFrame.
 
         Raises ImportError without pandas, InputError for another table.
         """
-        tables = {"joint": self.results.joint, "history": self.results.history}
-        if table not in tables:
-            raise InputError(f"table = {table}: must be one of {', '.join(tables)}")
-        import pandas
+        return optional("pandas").DataFrame(self.table(table))
 
-        return pandas.DataFrame(tables[table])
+    def to_xarray(self, table: str = "joint") -> xarray.Dataset:
+        """joint or history as a Dataset with units: dimensions time and node, or time.
+
+        Raises ImportError without xarray, InputError for another table.
+        """
+        data_set, columns = optional("xarray").Dataset, self.table(table)
+        if table == "history":
+            return data_set({n: ("time", v, attributes(HISTORY[n])) for n, v in columns.items()})
+        times = len(np.unique(columns["time"]))
+        blocks = {name: column.reshape(times, -1) for name, column in columns.items()}
+        placed: dict[str, Any] = {name: (("time", "node"), b) for name, b in blocks.items()}
+        placed |= {name: ("node", blocks[name][0]) for name in ("x", "y", "z", "s")}
+        placed |= {name: ("time", blocks[name][:, 0]) for name in ("time", "level")}
+        described = joint_columns(self.case)
+        variables = {name: (*placed[name], attributes(described[name])) for name in placed}
+        return data_set(variables).set_coords(["x", "y", "z", "s", "level"])
+
+    def table(self, name: str) -> Table:
+        """The table joint or history as {column: array}.
+
+        Raises InputError for another name.
+        """
+        tables = {"joint": self.results.joint, "history": self.results.history}
+        if name not in tables:
+            raise InputError(f"table = {name}: must be one of {', '.join(tables)}")
+        return tables[name]
 
     def __repr__(self) -> str:
         last = self.results.last
         reached = f", level {last['level']:.6g} m" if last else ""
-        return f"<Run of {self.case.name}: {self.verdict}{reached}>"
+        return f"{self.case.name}: {self.verdict}{reached}"
+
+    def _repr_html_(self) -> str:
+        """Verdict and table of the levels, for a notebook."""
+        from tabulate import tabulate
+
+        from .post.summary import levels_table
+
+        levels = levels_table(self.results)
+        table = tabulate(levels.rows, levels.heads, tablefmt="html", disable_numparse=True)
+        return f"<p>{escape(repr(self))}</p>{table}"
 
 
-def records(table: Table) -> np.recarray:
+def records(table: Mapping[str, Any]) -> np.recarray:
     """A table as a record array."""
-    return np.rec.fromarrays(list(table.values()), names=list(table))
+    arrays = {name: np.asarray(column) for name, column in table.items()}
+    return np.rec.fromarrays(arrays.values(), dtype=[(n, a.dtype) for n, a in arrays.items()])
+
+
+def attributes(column: tuple[str, str]) -> dict[str, str]:
+    """Unit and meaning of a column as attributes of a variable of xarray."""
+    unit, meaning = column
+    return {"units": unit, "long_name": meaning}
+
+
+def optional(package: str) -> ModuleType:
+    """A package that damjoint does not require.
+
+    Raises ImportError if it is not installed.
+    """
+    from importlib import import_module
+
+    try:
+        return import_module(package)
+    except ImportError:
+        raise ImportError(f"{package} is not installed: pip install {package}") from None
 
 
 def run(source: Case | str | Path, *, engine: str = "auto") -> Run:
-    """Solve a case; nothing is written. A published case with several uplifts: the first one.
+    """Solve a case; nothing is written. Of a published case with several uplifts: the first.
 
-    engine: condensed (auto), or getdp. Raises InputError, RunError; an interrupted run raises
-    KeyboardInterrupt.
+    A dam that fails is a result, see `Run.verdict`.
+
+    Args:
+        source: a case, or its name or path, see `case`.
+        engine: condensed (auto), or getdp, the reference model.
+
+    Raises:
+        InputError: the engine can not run the case.
+        RunError: the case could not be computed.
     """
-    chosen = source if isinstance(source, Case) else case(source)
-    single = replace(chosen, also_uplift=())
+    single = replace(as_case(source), also_uplift=())
     scenes = accuracy.solve(single, engine_of(single, engine), lambda scene, time: None, True)
     outcome = next(scenes)
     if outcome.error:
@@ -200,32 +335,48 @@ class Step:
 
 
 def fill(source: Case | str | Path) -> Iterator[Step]:
-    """Solve a case step by step in the condensed engine; stop whenever you like.
+    """Solve a case with the condensed engine and yield each converged step.
 
-    Raises InputError, RunError.
+    The computation stops where the loop over the steps ends.
+
+    Args:
+        source: a case, or its name or path, see `case`.
+
+    Raises:
+        InputError: bad input.
+        RunError: a step could not be computed.
     """
-    chosen = source if isinstance(source, Case) else case(source)
-    stepper = LoadStepper(chosen)
+    stepper = LoadStepper(as_case(source))
     for state in stepper.steps():
         yield Step(state, stepper.history.last)
 
 
-def check(cases: Sequence[Case]) -> list[SafetyCheck]:
+def check(cases: Sequence[Case | str | Path]) -> list[SafetyCheck]:
     """Safety factors of load combinations, by the finite elements and by the gravity method.
 
-    `rows` of a check are those of check.csv, `why` is empty if nothing fails, `notes` are what to
-    know. Raises InputError, RunError.
+    Each is computed up to its last level. Of each check, `rows` are those of check.csv, `why` is
+    the reason if it fails, else empty, and `notes` are remarks on the result.
+
+    Args:
+        cases: the load combinations; cases, or their names or paths, see `case`.
+
+    Raises:
+        InputError: bad input, or a case for which there is no gravity method.
+        RunError: a case could not be computed.
     """
     from .studies.check import check_has_section, compare_joints
 
-    for one in cases:
-        check_has_section(one)
-    return [check for one in cases for check in compare_joints(run(one).results)]
+    combinations = [as_case(combination) for combination in cases]
+    for combination in combinations:
+        check_has_section(combination)
+    return [
+        check for combination in combinations for check in compare_joints(run(combination).results)
+    ]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Critical:
-    """A critical value."""
+    """A critical value, made by `critical`."""
 
     answer: CriticalValue
     search: Search
@@ -257,21 +408,150 @@ class Critical:
 
         return records(table(self.search))
 
+    def __repr__(self) -> str:
+        return "\n".join(self.statement)
+
 
 def critical(
-    source: str | Path = "dam",
+    source: Case | str | Path = "dam",
     of: str = "level",
     *,
     levels: Sequence[float] | float | None = None,
     tail_levels: Sequence[float] | float | None = None,
     **parameters: Value,
 ) -> Critical:
-    """The level, strength, uplift or parameter at which no equilibrium is left.
+    """The level, strength, uplift or parameter beyond which there is no equilibrium.
 
-    source, levels, tail_levels, parameters: as of `case`; of: level, strength, uplift or the name
-    of a parameter. Raises InputError, RunError.
+    Args:
+        source: a case, or its name or path, see `case`. If it has an accuracy, the mesh is that
+            which its levels require.
+        of: level [m], strength (the factor that divides mu, adhesion, sigma_max and the fracture
+            energies), uplift (effectiveness of the drains) or the name of a parameter.
+        levels, tail_levels, parameters: changes of the case, see `case`.
+
+    Raises:
+        InputError: bad input, or a case in which there is nothing to vary.
+        RunError: the case could not be computed.
     """
     from .studies.critical import Search
 
-    search = Search(str(source), of, parameters, as_list(levels), as_list(tail_levels))
+    chosen = as_case(source).varied(parameters, as_list(levels), as_list(tail_levels))
+    search = Search(on_fixed_mesh(chosen), of)
     return Critical(search.run(), search)
+
+
+def on_fixed_mesh(chosen: Case) -> Case:
+    """The case without its accuracy, on the mesh that this requires."""
+    from .studies.sweep import meshed
+
+    return meshed(chosen)[0] if chosen.accuracy else chosen
+
+
+@dataclass(frozen=True, repr=False)
+class Sweep:
+    """The rows of a sweep, made by `sweep`."""
+
+    plan: Plan
+    table: Mapping[str, list[Value]]
+
+    @property
+    def rows(self) -> np.recarray:
+        """A row per combination: the varied values (a level as level_asked), the last row of
+        history.csv, failed, verdict, statement, the critical value; nan without an equilibrium.
+        """
+        return records({name: column_array(name, v) for name, v in self.table.items()})
+
+    @property
+    def probability(self) -> np.recarray:
+        """Of a sample: its probability of failure for each combination of the varied values, and
+        the limits of the 95 % interval.
+        """
+        from .studies.outcome import probabilities
+
+        return self.statistics(probabilities(self.plan, self.texts))
+
+    @property
+    def sensitivity(self) -> np.recarray:
+        """Of a sample: rank correlation of each sampled parameter with the outcomes."""
+        from .studies.outcome import sensitivities
+
+        return self.statistics(sensitivities(self.plan, self.texts))
+
+    def statistics(self, rows: Sequence[Mapping[str, Value]]) -> np.recarray:
+        """Rows of statistics, with the varied values as they were before they became texts."""
+        table = by_column(rows)
+        for name, values in self.plan.varied.items():
+            original = {in_file(value): value for value in values}
+            table[column_of(name)] = [original[str(text)] for text in table[column_of(name)]]
+        return records(table)
+
+    @property
+    def texts(self) -> list[dict[str, str]]:
+        """The rows as in a result file of `damjoint sweep`."""
+        columns = ([in_file(value) for value in column] for column in self.table.values())
+        return [dict(zip(self.table, row, strict=True)) for row in zip(*columns, strict=True)]
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """The rows as a DataFrame.
+
+        Raises ImportError without pandas.
+        """
+        return optional("pandas").DataFrame.from_records(self.rows)
+
+    def __repr__(self) -> str:
+        fails = sum(map(bool, self.table["failed"]))
+        return f"sweep of {', '.join(self.plan.names)}: {len(self.rows)} rows, {fails} fail"
+
+
+def column_array(name: str, values: list[Value]) -> np.ndarray:
+    """A column of a sweep; an empty cell of a result that is a number becomes nan."""
+    numeric = name in HISTORY or name.startswith("critical_")
+    return np.array([np.nan if numeric and value == "" else value for value in values])
+
+
+def by_column(rows: Sequence[Mapping[str, Value]]) -> dict[str, list[Value]]:
+    """Rows of the same columns as {column: values}."""
+    return {name: [row[name] for row in rows] for name in rows[0]}
+
+
+def sweep(
+    source: Case | str | Path = "dam",
+    *,
+    sample: Sample | None = None,
+    tie: Mapping[str, str] | None = None,
+    critical: str = "",
+    jobs: int | None = None,
+    progress: bool = False,
+    **values: Sequence[Value] | Value,
+) -> Sweep:
+    """Solve a case with all combinations of listed values, each with the entire sample.
+
+    Nothing is written. A row that could not be computed has the verdict `failed`.
+
+    Args:
+        source: a case, or its name or path, see `case`. If it has an accuracy, the mesh of all
+            rows is that which the case itself requires.
+        sample: random values, such as `Sample(100, {"mu": "normal(0.8,0.1)"})`.
+        tie: parameters computed from the others, such as `{"adhesion": "2e5*mu"}`.
+        critical: also find the critical level, strength, ... of each row, see `critical`.
+        jobs: number of processes (default: one per core).
+        progress: show a bar, or where there is no terminal a line every ten seconds.
+        values: lists of values of parameters, by name; `level` [m] is the last level.
+
+    Raises:
+        InputError: bad input.
+        RunError: the mesh for an accuracy could not be computed, or a process was killed.
+    """
+    from .studies.sweep import check_jobs, compute, planned
+
+    check_jobs(jobs)
+    if not values and not sample:
+        raise InputError("sweep: must have values or a sample, such as mu=[0.8, 1.0]")
+    axes = [(name, listed(name, np.atleast_1d(v).tolist())) for name, v in values.items()]
+    plan = plan_with(axes, list((tie or {}).items()), sample, {}, critical)
+    rows = list(planned(on_fixed_mesh(as_case(source)), plan))
+    tasks = {key: task for key, _, task in rows}
+    computed = compute(tasks, jobs)
+    results = dict(track(computed, "sweep", len(tasks)) if progress else computed)
+    cells = [{column_of(n): v for n, v in row.items()} | results[key] for key, row, _ in rows]
+    return Sweep(plan, by_column(cells))

@@ -22,7 +22,7 @@ UNBONDED = {"law": "bond", "sigma_max": 0.0, "adhesion": 0.0}
 
 
 def found(case, of="level", settings=None, levels=None, tail_levels=None):
-    search = Search(case, of, settings, levels, tail_levels)
+    search = Search(load(case, settings, levels, tail_levels), of)
     return search, search.run()
 
 
@@ -137,7 +137,7 @@ def test_the_gravity_method_without_tension(command, tmp_path):
 def test_the_gravity_method_with_a_crack_past_the_drains():
     """The short crack is in equilibrium up to the drains; mu N = T with the crack past them."""
     drains = {"dam_base": 30.0, "uplift": "cracked", "drains": 1.0, "drain_x": 6.0, "mu": 1.0}
-    search = Search("dam", "level", DAM | UNBONDED | drains, "40,44", "3")
+    search = Search(load("dam", DAM | UNBONDED | drains, "40,44", "3"), "level")
     first, longer = (search.by_gravity(44.4, True, longest) for longest in (False, True))
     method = gravity.at(search.own, 2.0, first - 1e-5)
     assert method.SSF > 1 and method.crack_length == pytest.approx(6, abs=1e-3)

@@ -115,8 +115,8 @@ def solved(case, folder):
     return [result.history[name][-1] for name in SEEN]
 
 
-#: Gmsh's colours of the status in the tree
-GREEN, RED = (127, 218, 127), (255, 72, 63)
+#: Gmsh's colours of the status in the tree; colour of the water
+GREEN, RED, BLUE = (127, 218, 127), (255, 72, 63), (150, 190, 255)
 
 
 @pytest.fixture
@@ -141,9 +141,15 @@ def window(project, tmp_path):
         "HOME": str(tmp_path),  # settings of the user are neither read nor written
         "LIBGL_ALWAYS_SOFTWARE": "1",
     }
-    # xdotool and import would wait for ever for a missing window
-    call = lambda *words: subprocess.run(words, env=environment, check=True, timeout=60)
+    call = lambda *words: subprocess.run(words, env=environment, check=True)
     opened = [screen]
+
+    def wait(condition):
+        """Until a condition is true; without a window it would never be."""
+        while not condition():
+            assert opened[-1].poll() is None
+            time.sleep(0.2)
+
     sizes = {"GraphicsWidth": 1200, "GraphicsHeight": 800, "MenuWidth": 330}
     places = {"GraphicsPositionX": 0, "GraphicsPositionY": 0}
     command = [sys.executable, "-c", GMSH, "-setstring", "Solver.Executable0", find_getdp()]
@@ -154,26 +160,37 @@ def window(project, tmp_path):
         opened.append(
             subprocess.Popen([*command, *arguments, str(project / "a.pro")], env=environment)
         )
-        call("xdotool", "search", "--sync", "--onlyvisible", "--name", "Gmsh")
+        search = ["xdotool", "search", "--onlyvisible", "--name", "Gmsh"]
+        wait(lambda: subprocess.run(search, env=environment, check=False).returncode == 0)
 
         def press(name):
             results = project / "res/a"
             began, ended = results / "clear.geo", results / "status.geo"
             before = [stamp(began), stamp(ended)]
-            pressed, end = 0.0, time.monotonic() + 120
-            while stamp(ended) == before[1]:
-                assert time.monotonic() < end and opened[-1].poll() is None
+            pressed = 0.0
+
+            def finished():
+                nonlocal pressed
+                # a click is lost if the window is not drawn yet
                 if stamp(began) == before[0] and time.monotonic() > pressed + 10:
                     call("xdotool", "mousemove", "250", "818", "click", "1")
                     pressed = time.monotonic()
-                time.sleep(0.2)
-            picture = tmp_path / f"{name}.png"
-            while True:
+                # a run deletes the file of the one before
+                return stamp(ended) not in (0, before[1])
+
+            picture, shown = tmp_path / f"{name}.png", None
+
+            def drawn():
+                """The status is there, and the drawing does not change any more."""
+                nonlocal shown
                 call("import", "-window", "root", str(picture))
-                pixels_of_status = [pixels(imread(picture), colour) for colour in (GREEN, RED)]
-                if max(pixels_of_status) > 500:
-                    return imread(picture)
-                assert time.monotonic() < end
+                shown, last = imread(picture), shown
+                status = max(pixels(shown, colour) for colour in (GREEN, RED))
+                return status > 500 and np.array_equal(shown, last)
+
+            wait(finished)
+            wait(drawn)
+            return imread(picture)
 
         return press
 
@@ -198,13 +215,57 @@ def pixels(picture, colour):
 
 @pytest.mark.heavy
 def test_window_shows_a_complete_run(window, project):
-    """Run twice: the status is green both times, the views of the first run are removed."""
-    press = window()
+    """Run twice: the status is green both times, the views of the first run are removed, the water
+    of each step is drawn.
+    """
+    press, results = window(), project / "res/a"
     for name in ("first", "second"):
         picture = press(name)
         assert pixels(picture, GREEN) > 500 and not pixels(picture, RED) > 500
-    assert "complete" in (project / "res/a/status.geo").read_text()
-    assert len(list((project / "res/a").glob("opening_*.pos"))) == 8
+        assert pixels(picture, BLUE) > 5000
+        assert (results / "status.geo").read_text().count("'complete'") == 2
+        assert (results / "head.geo").read_text().count("Merge") == 1
+    assert len(list(results.glob("opening_*.pos"))) == 8
+    (reservoir,) = results.glob("water_*.pos")
+    assert water_heights(reservoir) == pytest.approx([3, 6, 8, 8.2, 8.4, 8.6, 8.8, 9])
+
+
+def water_heights(file):
+    """Height of the water in each step of a view: the displacement of the upper edge."""
+    steps = file.read_text().split("){")[1].split("}")[0].replace("\n", "").split(",")
+    return [float(height) for height in steps[7::12]]
+
+
+def test_the_window_fits_a_small_screen(project):
+    """A window of Gmsh's default size is enlarged; another size is the user's."""
+    for width, expected in (800, 1180), (1000, 1000):
+        start_gmsh()
+        gmsh.option.setNumber("General.GraphicsWidth", width)
+        gmsh.option.setNumber("General.MenuWidth", 200)
+        gmsh.open(str(project / "a.geo"))
+        assert gmsh.option.getNumber("General.GraphicsWidth") == expected
+
+
+def test_results_of_other_parameters_are_not_called_complete(project):
+    """A changed level takes effect on the status at once, also if its value is refused."""
+    status = "0Results/0Status"
+    start_gmsh()
+    gmsh.onelab.clear()
+    gmsh.open(str(project / "a.geo"))
+    assert gmsh.onelab.getString(status) == ["not run yet"]
+    gmsh.onelab.setNumber("0Results/1Water level [m]", [9.0])  # by a run
+    for level, refused in (15.0, False), (25.0, True):
+        gmsh.onelab.setString(status, ["complete"])
+        gmsh.onelab.setNumber("Parameters/1Water levels/20004Level 4 [m]", [level])
+        gmsh.clear()
+        gmsh.parser.clear()
+        if refused:
+            with pytest.raises(Exception, match="Level 4 = 25 m"):
+                gmsh.open(str(project / "a.geo"))
+        else:
+            gmsh.open(str(project / "a.geo"))
+        assert gmsh.onelab.getString(status) == ["changed: press Run"]
+    gmsh.onelab.clear()
 
 
 @pytest.mark.heavy
@@ -214,4 +275,5 @@ def test_window_shows_the_level_of_a_run_that_stops(window, project):
     words += " -setnumber n_joint 10"  # the sliding level does not depend on the mesh
     picture = window(*words.split())("stopped")
     assert pixels(picture, RED) > 500 and not pixels(picture, GREEN) > 500
+    assert "Error" not in (project / "res/a/status.geo").read_text()  # it opens a dialogue
     assert "stopped_at = 7.4" in (project / "res/a/stopped.geo").read_text()

@@ -80,8 +80,8 @@ def test_a_stiff_contraction_joint_glues_two_blocks(solved):
 
 
 def test_blocks_of_different_friction_share_the_thrust(solved):
-    """A smooth contraction joint transmits thrust only: both slide where it reaches mu_1 W + mu_2 W;
-    the water stands above the crest, on which it does not press here.
+    """A smooth contraction joint transmits thrust only: both slide where it is mu_1 W + mu_2 W; the
+    water stands above the crest, on which it does not press here.
     """
     smooth = FRICTION | {"mu": (0.3, 0.2, 1e-6)}
     results = solved(BLOCKS, BASES | CONTRACTION, [20], **smooth)
@@ -94,7 +94,7 @@ def test_blocks_of_different_friction_share_the_thrust(solved):
 
 @pytest.mark.parametrize("dim", [2, 3])
 def test_monoliths_are_in_equilibrium(dim):
-    """The bases carry the thrust and the weight less the uplift; the contraction joint is inside."""
+    """The bases carry the thrust and the weight less the uplift."""
     solid = {"n_joint": 6.0, "h_dam": 12.0, "h_found": 40.0} if dim == 3 else {"n_joint": 20.0}
     case = load("monoliths", solid | {"dim": float(dim)}, [40.0])
     results = LoadStepper(case, interface_of(case)).run()

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from damjoint.model.case import load
 from damjoint.statics.verdict import hints, statement, verdict
 from damjoint.studies.critical import Search
 
@@ -59,7 +60,7 @@ def test_a_run_stops_at_the_critical_level(solve):
     """Followed over a limit point, it overturns at the level that `critical` finds."""
     levels = "23.275,37.24,41.895,46.55"
     (result,) = solve("dam", levels, weight_first=0, **NEAR_LIMIT)
-    answer = Search("dam", "level", NEAR_LIMIT | {"weight_first": 0.0}, levels).run()
+    answer = Search(load("dam", NEAR_LIMIT | {"weight_first": 0.0}, levels), "level").run()
     assert verdict(result) == "overturning" == answer.mode
     assert result.last["level"] == pytest.approx(answer.value, rel=1e-4)
     assert result.last["level"] == pytest.approx(46.201, rel=1e-3)

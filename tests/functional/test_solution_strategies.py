@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from damjoint.engines.getdp import process
 from damjoint.laws.friction import FrictionVariables
 from damjoint.model.case import load
+from damjoint.model.mesh import mesh_of
 from damjoint.statics.verdict import verdict
 
 #: A dam of realistic stiffness; the shear release of its joint is far shorter than its jumps.
@@ -79,6 +81,25 @@ def test_the_last_level_is_exact_to_the_smallest_step(solve):
     """T = mu N + c L at 7.45784 m dry; between levels 6 and 8 m 1/1024 of a step is 2 mm."""
     (result,) = solve("c", "3,6,8,9", uplift="none", pena_tang=0)
     assert 7.45784 - 2 / 1024 < result.last["level"] < 7.4579
+
+
+def test_a_dam_that_overturns_is_given_up_soon(solve, tmp_path):
+    """The reference GetDP model ends strategies that diverge: 530 corrections, and 1980 where each
+    takes all of its iterations. Its last level is that of the condensed engine.
+    """
+    settings = {"n_joint": 20, "h_dam": 2, "h_found": 4}
+    case, solved = load("a", settings, "15"), []
+    mesh_of(case).write(tmp_path / "scene.msh")
+    process.Runner().execute(
+        process.write_problem(case, None, tmp_path, {"views": 0.0}),
+        ["-msh", "scene.msh", "-solve", "Fill"],
+        on_line=lambda line: "Solve[Equilibrium]" in line and solved.append(line),
+    )
+    assert (tmp_path / "status.txt").read_text() == "1\n"
+    *_, last = (tmp_path / "history.txt").read_text().splitlines()
+    expected = solve("a", "15", **settings)[0].last["level"]
+    assert float(last.split()[2]) == pytest.approx(expected, abs=15 / 1024)
+    assert 0 < len(solved) < 1000
 
 
 @pytest.mark.parametrize("law", ["rupture", "friction"])

@@ -142,8 +142,9 @@ def test_a_scheduler_with_two_workers(tmp_path):
     with LocalCluster(
         n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
     ) as cluster:
-        far = sweep.sweep("c", plan, {}, tmp_path / "far.csv", scheduler=cluster.scheduler_address)
-    near = sweep.sweep("c", plan, {}, tmp_path / "near.csv", jobs=1)
+        address = cluster.scheduler_address
+        far = sweep.sweep(load("c"), plan, tmp_path / "far.csv", scheduler=address)
+    near = sweep.sweep(load("c"), plan, tmp_path / "near.csv", jobs=1)
     assert far[0] == near[0] == len(far[1]) == len(near[1]) == 4
     by_key = lambda name: {row["key"]: row for row in rows(tmp_path / name)}
     far, near = by_key("far.csv"), by_key("near.csv")

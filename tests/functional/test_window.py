@@ -2,20 +2,26 @@
 last test, which presses Run in the window itself.
 """
 
+import itertools
 import json
+import re
 import shutil
 import subprocess
 import sys
-import time
 
 import gmsh
 import numpy as np
 import pytest
-from damjoint.gui import tree
-from damjoint.gui.shapes import Deformed
+from damjoint.gui import tree, views
+from damjoint.gui.graphs import INTERVALS, MARGIN, METRES, Scale, thinned
+from damjoint.gui.layout import ABOVE_AXES, BELOW_AXES, BESIDE_AXES, Layout
 from damjoint.gui.sheet import Request, titles
-from damjoint.gui.views import captions
+from damjoint.gui.views import caption
 from damjoint.gui.window import ACTION, Session
+from damjoint.post.units import LENGTHS
+from damjoint.statics.verdict import hints
+from damjoint.studies.check import compare_methods
+from PIL import Image
 
 SMALL = {"n_joint": 10.0, "h_dam": 3.0, "h_found": 4.0}
 WORDS = [word for name, value in SMALL.items() for word in ("--set", f"{name}={value}")]
@@ -28,10 +34,10 @@ class User:
         self.session = Session(Request(case, settings))
         self.wait()
 
-    def wait(self, until=lambda session: not session.busy, seconds=60):
-        end = time.monotonic() + seconds
+    def wait(self, until=lambda session: not session.busy):
+        """Until a condition is true; nothing changes any more once the engine is idle."""
         while not until(self.session):
-            assert time.monotonic() < end, self.session.status
+            assert self.session.busy, self.session.status
             self.session.turn(0.02)
 
     def press(self, action):
@@ -109,11 +115,12 @@ def test_only_what_matters_shows_and_followers_say_what_they_follow(open_window)
     assert user.entry("mu")["visible"] and not user.entry("sigma_max")["visible"]
     user.type("E", 2e10)
     entry = user.entry("E_dam")
-    assert entry["values"] == [-1] and entry["label"].startswith("E_dam = 2e+10 (-1: E): ")
+    assert entry["values"] == [-1] and "= 2e+10 (-1: E)" in entry["help"]
+    assert entry["label"] == "[Pa] = 2e+10: Young's modulus of the dam"
     assert user.session.tree.sheet.case["E_dam"] == 2e10
     user.type("E_dam", 3e10)
     assert user.session.tree.sheet.case["E_dam"] == 3e10
-    assert user.entry("E_dam")["label"] == "Young's modulus of the dam [Pa]"
+    assert user.entry("E_dam")["label"] == "[Pa] Young's modulus of the dam"
     user.type("E_dam", -1.0)
     assert user.session.tree.sheet.case["E_dam"] == 2e10
 
@@ -144,19 +151,60 @@ def test_results_and_saved_case_are_those_of_the_command(open_window, command, t
             assert one == other
 
 
-def test_results_are_in_the_tree(open_window):
+def numbers_shown(user):
+    """The rows of numbers in the tree: value by label."""
+    entries = [user.entry(name) for name in gmsh.onelab.getNames(f"{tree.NUMBERS}.*")]
+    assert all(entry["readOnly"] and entry["attributes"]["Highlight"] for entry in entries)
+    return {entry["label"]: entry["values"][0] for entry in entries}
+
+
+def test_results_of_the_step_shown_are_in_the_tree_beside_the_gravity_method(open_window):
+    """In units that suit their size; safety factors as those of `damjoint check`."""
     user = open_window("c", **SMALL)
     user.run()
-    result = user.session.scenes[0].result
-    names = {n.rpartition("/")[2].lstrip("0123456789"): n for n in gmsh.onelab.getNames("01Res.*")}
-    for column, name in tree.RESULTS.items():
-        entry = json.loads(gmsh.onelab.get(names[name]))
-        assert entry["readOnly"] and entry["attributes"]["Highlight"]
-        if entry["visible"]:
-            assert np.allclose(entry["choices"], result.history[column], rtol=1e-12)
-            assert entry["values"][0] == pytest.approx(result.last[column], rel=1e-12)
+    (scene,) = user.session.scenes
+    result, shown = scene.result, numbers_shown(user)
+    check = compare_methods(result)
+    both = [method.numbers for method in (check.finite_elements, check.gravity)]
+    for label, column, factor in (
+        ("[kN/m] N'", "N", 1e-3),
+        ("[m] N' at x", "x_resultant", 1),
+        ("SSF with mu, adhesion", "SSF", 1),
+        ("OSF", "OSF", 1),
+    ):
+        values = [float(text) for text in shown[label].split(" | ")]
+        assert values == pytest.approx([n[column] * factor for n in both], rel=5e-3), label
+    assert shown["At t = 4"] == "finite elements | gravity method"
+    assert shown["[m] level"] == "9" and not any("leakage" in label for label in shown)
     assert tree.get_text(tree.VERDICT) == "sliding"
-    assert not json.loads(gmsh.onelab.get(names["Leakage [kg per m s]"]))["visible"]
+    user.session.gallery.set_step(0)  # as Gmsh's arrows do
+    user.session.turn()
+    first = numbers_shown(user)
+    assert first["[m] level"] == "3" and "At t = 1" in first
+    uplift = float(first["[kN/m] uplift U"].partition(" | ")[0])
+    assert 1e3 * uplift == pytest.approx(result.state(1.0)["U"], rel=5e-3)
+
+
+def test_warnings_of_the_command_line_are_shown(open_window):
+    user = open_window("g", **SMALL, mu=0.9)
+    user.run()
+    (scene,) = user.session.scenes
+    notes = [text for label, text in numbers_shown(user).items() if label.startswith("Note")]
+    assert notes == scene.warnings == hints(scene.result) and len(notes) >= 2
+    start = "! the foundation reaches 5 m"
+    assert any(line.startswith(start) for line in shown_results()[2])
+
+
+def test_the_table_shows_all_levels_and_marks_the_one_shown(open_window):
+    user = open_window("c", **SMALL)
+    user.run()
+    user.type(tree.CONTENT, views.TABLE)
+    table, lines = user.session.scenes[0].table, shown_results()[2]
+    assert len(table.rows) == 4 and {"SSF", "OSF", "N' in"} <= set(table.names)
+    assert all(cell in lines for row in table.rows for cell in row)
+    assert [line for line in lines if line == ">"] == [">"]
+    assert user.type(tree.CONTENT, views.SCENE).startswith("sliding")
+    assert any(name.startswith("displacement") for name in user.views)
 
 
 def test_a_softening_joint_has_a_length_and_a_colour(open_window):
@@ -164,27 +212,63 @@ def test_a_softening_joint_has_a_length_and_a_colour(open_window):
     user = open_window("dam", law="bond", sigma_max=3e5, G_f=300.0, **coarse)
     user.type(tree.LEVELS, "40, 48")
     user.run()
-    (entry,) = (user.entry(n) for n in gmsh.onelab.getNames("01Res.*") if "process zone" in n)
-    zone = user.session.scenes[0].result.last["process_zone"]
-    assert entry["visible"] and entry["values"][0] == pytest.approx(zone) and zone > 5
-    assert "softening joint" in user.views
-    tag = gmsh.view.getTags()[user.views.index("softening joint")]
-    assert "violet: joint softening" in str(gmsh.view.getListDataStrings(tag, 2))
-    before, now = captions(Deformed(user.session.scenes[0]))
+    (scene,) = user.session.scenes
+    zone = scene.result.last["process_zone"]
+    assert float(numbers_shown(user)["[m] softening"]) == pytest.approx(zone, rel=5e-3)
+    assert zone > 5 and user.views.count("joint softening") == 1
+    assert "joint softening" in shown_results()[2]
+    before, now = (caption(scene, step)[1] for step in range(2))
     assert "softening" not in before and now.endswith(f"crack 0 m, softening {zone:.3g} m")
+
+
+def test_fields_and_scales_can_be_chosen(open_window):
+    """Vertical stress replaces displacement, on the same deformed bodies; zero is in the middle of
+    its scale; the scales are those of the step shown or of all steps.
+    """
+    user = open_window("a", **SMALL, uplift="none")
+    user.run()
+    option = lambda name: gmsh.view.option.getNumber(tagged(user, "displacement"), name)
+    assert option("ExternalView") == -1 and option("RangeType") == 3  # each step has its range
+    user.type(tree.SCALES, views.OF_ALL)
+    assert option("RangeType") == 1
+    user.type(tree.FIELD, views.STRESS)
+    stress = tagged(user, "vertical stress")
+    assert option("ExternalView") == gmsh.view.getIndex(stress)
+    assert option("CustomMax") == -option("CustomMin") > 0
+    of_all = option("CustomMax")
+    user.type(tree.SCALES, views.OF_LEVEL)
+    user.session.gallery.set_step(0)
+    assert 0 < option("CustomMax") < of_all
+    user.type("dam_crest", 2.0)
+    user.run()  # the choices remain
+    assert tree.display() == views.Display(field=views.STRESS)
+    assert option("ExternalView") == gmsh.view.getIndex(tagged(user, "vertical stress"))
+
+
+def tagged(user, start):
+    """Tag of the first view whose name starts so."""
+    names = zip(gmsh.view.getTags(), user.views, strict=True)
+    return next(tag for tag, name in names if name.startswith(start))
 
 
 def test_views_have_a_step_per_level_and_replace_the_earlier_ones(open_window):
     user = open_window("c", **SMALL)
     user.run()
     views = user.views
-    for name in ("displacement [m]", "water", "open or broken joint", "slipped joint"):
+    for name in ("displacement [µm]", "water", "joint open or broken", "joint slipped"):
         assert name in views
-    for start in ("opening", "slip", "normal stress", "shear stress", "water pressure", "level"):
-        assert any(view.startswith(f"{start} [") for view in views), start
+    for start in (
+        "opening",
+        "slip, jump",
+        "normal stress, total",
+        "shear stress",
+        "water pressure",
+    ):
+        assert start in views
+    assert views.count("level") == 3
     for tag, name in zip(gmsh.view.getTags(), views, strict=True):
         data = gmsh.view.getListData(tag)
-        if name == "displacement [m]":
+        if name == "displacement [µm]":
             corners = {"VQ": 4, "VT": 3}
             for kind, count, values in zip(*data, strict=True):
                 steps = (len(values) / count / corners[kind] - 3) / 3
@@ -194,8 +278,8 @@ def test_views_have_a_step_per_level_and_replace_the_earlier_ones(open_window):
     user.type(tree.KEEP, 1.0)
     user.type("mu", 0.7)
     user.run()
-    assert "run 1: displacement [m]" in user.views and "displacement [m]" in user.views
-    assert "opening, before [nm]" in user.views
+    assert "run 1: displacement [µm]" in user.views and "displacement [µm]" in user.views
+    assert "opening, before" in user.views and "earlier runs" in shown_results()[2]
     user.type(tree.KEEP, 0.0)
     user.run()
     assert not any("run 1" in view for view in user.views)
@@ -207,10 +291,14 @@ def test_the_status_shows_whether_the_results_belong_to_the_parameters(open_wind
     assert user.type(tree.KEEP, 1.0) == done
     assert user.type("dam_crest", 2.0) == "changed since the run: press Run"
     visible = [gmsh.view.option.getNumber(tag, "Visible") for tag in gmsh.view.getTags()]
-    assert sum(visible) == 2  # water beside the new outline, and the heading
+    assert sum(visible) == 4  # water beside the new outline with its level, and the heading
     assert user.type("dam_crest", 1.5) == done
     visible = [gmsh.view.option.getNumber(tag, "Visible") for tag in gmsh.view.getTags()]
-    assert sum(visible) == len(visible) - 2  # all but the water and the stress
+    assert sum(visible) == len(visible) - 2  # all but the water before the run
+
+
+#: Options of a view
+SHOWN = "Visible", "TimeStep", "NbTimeStep"
 
 
 def shown_results():
@@ -218,8 +306,13 @@ def shown_results():
     numbers = [
         n for n in gmsh.onelab.getNames("01Results/.*") if n not in (tree.STATUS, tree.VERDICT)
     ]
-    seen = [t for t in gmsh.view.getTags() if gmsh.view.option.getNumber(t, "Visible")]
-    lines = [line for tag in seen for line in gmsh.view.getListDataStrings(tag, 2)[1]]
+    lines = []
+    for tag in gmsh.view.getTags():
+        option = {n: gmsh.view.option.getNumber(tag, n) for n in SHOWN}
+        if option["Visible"]:  # each text has a line for each step
+            texts = gmsh.view.getListDataStrings(tag, 2)[1]
+            lines += texts[int(option["TimeStep"]) :: int(option["NbTimeStep"])]
+    lines = [line for line in lines if line.strip()]
     return tree.get_text(tree.VERDICT), numbers, lines
 
 
@@ -234,7 +327,7 @@ def test_results_of_other_parameters_are_removed_at_once(open_window):
         ["C: friction, 2D, order 1, quadrangles", C_SCENE],
     )
     user.run()
-    assert user.views.count("displacement [m]") == 1
+    assert user.views.count("displacement [µm]") == 1
     before = verdict, numbers, lines = shown_results()
     assert verdict == "sliding" and len(numbers) > 10 and C_SCENE in lines
     mu, own = user.session.tree.known["mu"].label, user.session.tree.sheet.case["mu"]
@@ -281,7 +374,7 @@ def test_the_drawing_follows_the_geometry_and_can_be_meshed(open_window):
     assert gmsh.model.getBoundingBox(-1, -1)[4] == pytest.approx(10, abs=1e-6)
     user.type("dam_height", 12.0)
     assert gmsh.model.getBoundingBox(-1, -1)[4] == pytest.approx(12, abs=1e-6)
-    assert user.views == ["water", "heading"]
+    assert user.views == ["water", "labels of the loads", "text", "text"]
     gmsh.model.mesh.generate(2)
     assert len(gmsh.model.mesh.getNodes()[0]) > 100
 
@@ -334,12 +427,12 @@ def test_stop_keeps_the_converged_steps(open_window, tmp_path):
     assert gmsh.onelab.getString("ONELAB/Button") == ["Stop", "stop"]
     user.press("stop")
     user.wait()
-    assert user.session.status.startswith("interrupted at level")
+    assert re.match(r"interrupted at level 3\.\d* m of 9 m \(", user.session.status)
     assert gmsh.onelab.getString("ONELAB/Button") == ["Run", "run"]
     scene = user.session.scenes[0]
     history = scene.result.history
     assert len(history["time"]) > 2000 and list(scene.times) == [1.0, history["time"][-1]]
-    assert "displacement [m]" in user.views
+    assert any(name.startswith("displacement [") for name in user.views)
     user.save(tmp_path / "stopped")
     assert json.loads((tmp_path / "stopped/run.json").read_text())["state"] == "interrupted"
     user.press("run")
@@ -420,7 +513,7 @@ def test_other_cases_and_files_can_be_opened(open_window, tmp_path):
     user = open_window("a", **SMALL)
     user.run()
     user.type(tree.CASE, float(list(user.session.tree.titles).index("dam")))
-    assert user.session.tree.sheet.case.name == "dam" and user.views == ["water", "heading"]
+    assert user.session.tree.sheet.case.name == "dam" and user.views[0] == "water"
     assert tree.get_text(tree.LEVELS) == "30, 40, 45"
     assert user.session.tree.sheet.request.overrides == {}
     mine = tmp_path / "mine.case"
@@ -457,9 +550,16 @@ def test_accuracy_refines_the_mesh(open_window):
 def test_the_joint_in_3d_is_shown_as_a_surface(open_window):
     user = open_window("f", n_joint=8.0, h_dam=3.0, h_found=4.0)
     assert user.run().startswith("done in")
-    state = "joint: closed, slipped, softening, open"
-    for start in ("opening of the joint", state, "water pressure"):
-        assert any(view.startswith(start) for view in user.views), start
+    for name in ("opening [µm]", "state: as in the legend", "water pressure [kPa]"):
+        assert name in user.views, name
+    opening = tagged(user, "opening [")
+    ends = [gmsh.view.option.getNumber(opening, f"Custom{end}") for end in ("Min", "Max")]
+    assert ends[0] == -ends[1] < 0  # zero is in the middle of the scale
+    _, counts, values = gmsh.view.getListData(tagged(user, "state"))
+    for count, block in zip(counts, values, strict=True):  # one state an element
+        corners = 4
+        of_element = block.reshape(count, -1)[:, 3 * corners :].reshape(count, -1, corners)
+        assert (np.ptp(of_element, axis=2) == 0).all() and set(of_element.ravel()) <= {0, 1, 2, 3}
 
 
 #: A batter, a neck, an inclined joint or a lift joint; water over the crest and below the dam.
@@ -475,7 +575,7 @@ def test_water_and_loads_are_drawn_for_any_section(open_window, joint):
     user = open_window("e", **SMALL, **SECTION, **joint, **LOADS, uplift="imposed")
     user.type(tree.LEVELS, "6, 10.5")
     user.type(tree.TAIL_LEVELS, "0, 3")
-    assert user.views == ["water", "silt", "forces", "heading"]
+    assert user.views[:4] == ["water", "silt", "forces", "labels of the loads"]
     case = user.session.tree.sheet.case
     base, side, bed = 5.0, case["found_side"], joint.get("joint_slope", 0.0)
     bed = base * np.tan(np.radians(bed))
@@ -503,7 +603,9 @@ def test_water_and_loads_are_drawn_for_any_section(open_window, joint):
         t for t in gmsh.view.getTags() if "shear stress" in gmsh.view.option.getString(t, "Name")
     )
     _, (count,), (values,) = gmsh.view.getListData(graph)
-    assert values.reshape(count, -1)[:, 1].max() == pytest.approx(rows["s"].max(), rel=1e-6)
+    shown = values.reshape(count, -1)[:, 1].max() - MARGIN
+    end = Scale.of(rows["s"], METRES).intervals(rows["s"].max())
+    assert shown == pytest.approx(end, rel=1e-6)
 
 
 def test_a_missing_display_and_bad_input_are_reported_in_one_line(command, monkeypatch):
@@ -517,47 +619,116 @@ def test_a_missing_display_and_bad_input_are_reported_in_one_line(command, monke
         assert code == 1 and "needs a display" in error
 
 
-#: The Run button below the menu, from the window's left and bottom edge [pixels].
-RUN_BUTTON = 476, -42
+@pytest.mark.parametrize("size", [(1040, 880), (794, 608), (500, 600), (300, 200)])
+def test_graphs_do_not_overlap_and_are_fewer_where_it_is_narrow(size):
+    """Drawing areas of screens of 1600x1000 and 1280x720, and smaller ones."""
+    layout = Layout(*size)
+    assert layout.most_graphs == {1040: 8, 794: 4}.get(size[0], 0)
+    width, height = layout.graph_size
+    boxes = []
+    for number in range(layout.most_graphs):
+        x, y = layout.graph_place(number)
+        left = layout.width + x
+        boxes.append((left - BESIDE_AXES, left + width, y - ABOVE_AXES, y + height + BELOW_AXES))
+        assert boxes[-1][0] >= layout.scene_width and boxes[-1][1] <= layout.width
+        assert boxes[-1][2] >= 0 and boxes[-1][3] <= layout.height
+    for (a0, a1, b0, b1), (c0, c1, d0, d1) in itertools.combinations(boxes, 2):
+        assert a1 <= c0 or c1 <= a0 or b1 <= d0 or d1 <= b0
+
+
+@pytest.mark.parametrize(
+    ("values", "low", "interval", "unit"),
+    [
+        ([0, 0, 0], -2, 1, "m"),  # in the middle
+        ([1e-20, 0], -2, 1, "m"),  # round-off
+        ([0, 45], 0, 15, "m"),
+        ([-3e-6, 1.4e-6], -3, 1.5, "µm"),
+        ([-586, -100], -600, 150, "m"),
+        ([-3e-7, 1.17e-3], 0, 0.3, "mm"),  # hardly below zero
+    ],
+)
+def test_a_scale_has_round_ticks_and_covers_its_values_and_zero(values, low, interval, unit):
+    scale = Scale.of(np.array(values, float), LENGTHS)
+    places = scale.intervals(np.array([*values, 0.0]))
+    assert places.min() >= -1e-3 and places.max() <= INTERVALS + 1e-3
+    assert (scale.interval, scale.unit) == (pytest.approx(interval), unit)
+    assert scale.low == pytest.approx(low)
+
+
+def test_dense_curves_are_thinned_but_for_bends():
+    """A spike of one point and a corner remain; points closer than a few pixels go."""
+    x = np.linspace(0, 4, 2001)
+    y = np.where(np.arange(2001) == 700, 3.0, np.maximum(x - 2, 0.0))[None]
+    thin_x, thin_y = thinned(x, y)
+    assert len(thin_x) < 80 and 3.0 in thin_y
+    assert np.abs(np.interp(x, thin_x, thin_y[0]) - y[0]).max() < 0.03  # about a pixel
 
 
 @pytest.mark.heavy
-def test_run_in_the_window_on_a_virtual_screen(tmp_path):
-    """Opened, clicked and finished under Xvfb; the screenshot stays in tmp_path."""
+@pytest.mark.parametrize("screen", [(1600, 1000), (1280, 720)])
+def test_run_in_the_window_on_a_virtual_screen(tmp_path, screen):
+    """Opened no larger than the screen, clicked, finished, exported, resized under Xvfb; the
+    screenshots stay in tmp_path.
+    """
     missing = [n for n in ("Xvfb", "xvfb-run", "xdotool", "import") if not shutil.which(n)]
     if missing:
         pytest.skip(f"needs {', '.join(missing)} (apt: xvfb xdotool imagemagick)")
     script = tmp_path / "press.sh"
-    script.write_text(PRESS.format(python=sys.executable, x=RUN_BUTTON[0], y=RUN_BUTTON[1]))
-    words = ["xvfb-run", "-a", "-s", "-screen 0 1600x1000x24", "sh", str(script)]
-    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=120)
-    assert "done in" in done.stdout, done.stdout + done.stderr
-    assert (tmp_path / "window.png").stat().st_size > 20_000
+    script.write_text(PRESS.format(python=sys.executable))
+    server = f"-screen 0 {screen[0]}x{screen[1]}x24"
+    words = ["xvfb-run", "-a", "-s", server, "sh", str(script)]
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True)
+    output = done.stdout + done.stderr
+    assert done.returncode == 0, output
+    assert "done in" in output and "exported: out/e/window.gif" in output
+    width, height = map(int, re.search(r"window (\d+) x (\d+)", output).groups())
+    assert width <= screen[0] and height <= screen[1]
+    areas = [tuple(map(float, size)) for size in re.findall(r"area (\S+) x (\S+)", output)]
+    assert areas[-1][0] < areas[0][0] and areas[-1][1] < areas[0][1]  # after the resize
+    for name in ("window", "resized"):
+        assert (tmp_path / f"{name}.png").stat().st_size > 20_000
+    with Image.open(tmp_path / "out/e/window.gif") as animation:
+        assert animation.n_frames == 2 and animation.size == areas[0]  # at 8 and 9 m
+    with Image.open(tmp_path / "out/e/window.png") as picture:
+        assert picture.size == areas[0]
 
 
-#: Prints the status of the session; Run is clicked, then a screenshot taken.
+#: Prints the states of the session; Run is clicked, a picture and an animation exported, the window
+#: made smaller. Each wait ends with what it waits for, or with the window.
 PRESS = """
 {python} -u -c '
-from damjoint.gui import window
+from damjoint.gui import tree, window
 from damjoint.gui.sheet import Request
-show_status = window.Session.show_status
+show_status, redraw = window.Session.show_status, window.Session.redraw
+exports = [tree.PICTURE_ACTION, tree.ANIMATION_ACTION]
 def print_status(self, status, color):
     show_status(self, status, color)
     print(status)
-window.Session.show_status = print_status
+    if exports and status.startswith(("done in", "exported")):
+        tree.put(tree.text(window.ACTION, exports.pop(0), visible=False))
+def print_area(self):
+    redraw(self)
+    print(f"area {{self.layout.width}} x {{self.layout.height}}")
+window.Session.show_status, window.Session.redraw = print_status, print_area
 if __name__ == "__main__":
     window.gui(Request("e"))
 ' > status.txt 2>&1 &
-for i in $(seq 100); do grep -q ready status.txt && break; sleep 0.2; done
-window=$(timeout 60 xdotool search --sync --onlyvisible --name Gmsh | tail -1)
+gui=$!
+wait_for() {{ until eval "$1"; do kill -0 $gui || {{ cat status.txt; exit 1; }}; sleep 0.2; done; }}
+wait_for 'grep -q ready status.txt'
+wait_for 'xdotool search --onlyvisible --name Gmsh > windows.txt'
+window=$(tail -1 windows.txt)
+wait_for 'grep -q area status.txt'
 eval $(xdotool getwindowgeometry --shell $window)
-xdotool mousemove $((X + {x})) $((Y + HEIGHT + {y}))
-for i in $(seq 10); do  # a click is lost if the window is not drawn yet
-  xdotool click 1
-  for j in $(seq 10); do grep -q running status.txt && break 2; sleep 0.2; done
-done
-for i in $(seq 100); do grep -q "done in" status.txt && break; sleep 0.2; done
+echo "window $((X + WIDTH)) x $((Y + HEIGHT))"
+menu=$((WIDTH - $(grep area status.txt | tail -1 | sed "s/area \\([0-9]*\\).*/\\1/")))
+xdotool mousemove $((X + menu - 80)) $((Y + HEIGHT - 42))
+wait_for 'xdotool click 1; sleep 1; grep -q running status.txt'
+wait_for 'grep -q window.gif status.txt'
 import -window root window.png
-kill $!
+xdotool windowsize $window $((WIDTH - 150)) $((HEIGHT - 80))
+wait_for 'test $(grep -c area status.txt) -gt 1'
+import -window root resized.png
+kill $gui
 cat status.txt
 """

@@ -9,7 +9,6 @@ from damjoint.model import casefile, parameters
 from damjoint.model.case import CASES, load
 from damjoint.post import validation
 
-
 #: With a list of texts, one for each joint, which Gmsh writes in another way.
 TEXTS_BY_JOINT = {"monoliths"}
 

@@ -28,10 +28,16 @@ from ..model.mesh import Body
 from ..model.results import Results
 from ..model.scene import BED, DOWN, FLOOR, SIDES, TOP, UP
 from ..post.outline import exaggeration, joint_lines, section_of, skin
+from ..post.units import FORCES, with_unit
+from .camera import Camera, result_camera, undeformed_camera
 from .worker import SolvedScene
 
-#: Length of a force's arrow over the dam's size.
-ARROW = 0.12
+#: Length of a force's arrow over the dam's size, and of the resultant's.
+ARROW, RESULTANT = 0.12, 0.25
+#: Distance of the middle third below the joint, over the dam's size; its places along the joint.
+THIRD, MIDDLE = 0.02, np.linspace(1 / 3, 2 / 3, 11)
+#: Points along the joint that are drawn, about: shorter lines are drawn with gaps.
+JOINT_POINTS = 60
 #: Cosine of the angle between faces above which a skin counts as smooth.
 SMOOTH = 0.9
 #: Lines of a section below water: of the reservoir, of water on the crest, of the tailwater.
@@ -54,6 +60,64 @@ class Pieces:
         count = len(self.points)
         places = self.points.transpose(0, 2, 1).reshape(count, -1)
         return np.hstack([places, self.values.transpose(1, 0, 2, 3).reshape(count, -1)])
+
+    def times(self, factor: float) -> Pieces:
+        """The pieces with values multiplied by a factor."""
+        return Pieces(self.points, self.values * factor)
+
+
+@dataclass
+class Label:
+    """Text at a point (3,) of the scene [m], a line per step."""
+
+    point: np.ndarray
+    lines: list[str]
+    align: str = "Left"
+
+
+def force_label(name: str, force: np.ndarray) -> str:
+    """Name and magnitude of a line force (2,) [N/m]; of the earthquake its coefficients."""
+    if name == QUAKE:
+        return ", ".join(f"{n} = {v:.3g}" for n, v in zip(("k_h", "k_v"), force, strict=True) if v)
+    return f"{name} {with_unit(float(np.hypot(*force)), FORCES, 3)}"
+
+
+#: Height of a label over the length of an arrow.
+LINE = 0.8
+#: Name of the earthquake among the forces.
+QUAKE = "earthquake"
+
+
+def arrow_labels(arrows: list[tuple[np.ndarray, list[str]]]) -> list[Label]:
+    """Labels of arrows (3, 2, 3) with their texts: above an arrow that is steep, else beside its
+    tail; those of arrows at the same place above one another.
+    """
+    labels, tails = list[Label](), list[np.ndarray]()
+    for lines, texts in arrows:
+        tail, tip = lines[0]
+        x, y, _ = tip - tail
+        length = np.hypot(x, y)
+        steep = abs(y) > abs(x)
+        number = 0 if steep else sum(np.hypot(*(tail - t)[:2]) < length for t in tails)
+        place = tail + np.array([0.0, LINE * number * length, 0.0])
+        align = "Right" if x > 0 and not steep else "Left"
+        labels.append(Label(place, [f" {text} " for text in texts], align))
+        tails += [] if steep else [tail]
+    return labels
+
+
+def level_labels(levels: list[float], tails: list[float], box: np.ndarray) -> list[Label]:
+    """Labels of both water surfaces, one for each step, at the sides of a box (2, 3) [m]: below the
+    reservoir's surface, as forces have their labels above it; above the tailwater's.
+    """
+    (left, _, _), (right, _, front) = box
+    steps = range(len(levels))
+    return [
+        Label(np.array([x, height, front]), [f" {height:.4g} m " * (i == j) for j in steps], align)
+        for x, heights, align in ((left, levels, "TopLeft"), (right, tails, "Right"))
+        for i, height in enumerate(heights)
+        if height > 0
+    ]
 
 
 def sharp_edges(body: Body, faces: list[np.ndarray]) -> np.ndarray:
@@ -117,13 +181,14 @@ def has_extent(corners: np.ndarray) -> bool:
     return bool(np.ptp(corners, axis=-2).any())
 
 
-def undeformed_loads(case: Case) -> dict[str, Pieces]:
-    """Water, silt and forces of the last level on the undeformed section, of those that act.
+def undeformed_loads(case: Case) -> tuple[dict[str, Pieces], list[Label]]:
+    """Water, silt and forces of the last level on the undeformed section, of those that act, and
+    their labels.
 
     Empty for a user's own geometry, whose faces are known only with its mesh.
     """
     if case.geometry:
-        return {}
+        return {}, []
     section, depth = case.section, case["thickness"] if case["dim"] == 3 else 0.0
     ends = [[section["seg_x0"], section["seg_y0"]], [section["seg_x1"], section["seg_y1"]]]
     edges = np.array(ends).transpose(2, 0, 1)
@@ -132,19 +197,22 @@ def undeformed_loads(case: Case) -> dict[str, Pieces]:
     over = level if case["crest_water"] else -np.inf
     water = (faces(UP, FLOOR), level), (faces(TOP), over), (faces(DOWN, BED), tail)
     silt = fluid_above(faces(UP, FLOOR), case["silt_height"])
-    forces = line_forces(case, Loading.at(case, np.inf, level, tail)).values()
+    forces = line_forces(case, Loading.at(case, np.inf, level, tail))
     tips = [
         np.array([x, y, depth]) for x, y in zip(section["mark_x"], section["mark_y"], strict=True)
     ]
     length = ARROW * case.size
-    arrows = [arrow(tip, np.array(f), length) for tip, f in zip(tips, forces, strict=True)]
+    arrows = [arrow(tip, np.array(f), length) for tip, f in zip(tips, forces.values(), strict=True)]
+    named = zip(arrows, forces.items(), strict=True)
+    labels = arrow_labels([(a, [force_label(name, np.array(f))]) for a, (name, f) in named])
+    labels += level_labels([level], [tail], undeformed_camera(case).box)
     loads = {
         "water": in_space(np.concatenate([fluid_above(*part) for part in water]), depth),
         "silt": in_space(silt, depth),
         "forces": np.concatenate([np.zeros((0, 2, 3)), *arrows]),
     }
     fixed = lambda corners: Pieces(corners, np.ones((1, *corners.shape[:2], 1)))
-    return {name: fixed(corners) for name, corners in loads.items() if has_extent(corners)}
+    return {n: fixed(corners) for n, corners in loads.items() if has_extent(corners)}, labels
 
 
 #: Bodies above and below a single joint.
@@ -182,6 +250,7 @@ class Deformed:
             for name in fields[self.times[0]].displacement
         }
         self.scale = exaggeration(self.moved, case.size)
+        self.camera: Camera = result_camera(case, self.scene.bodies)
         self.skins = {name: skin(self.scene.bodies[name]) for name in self.moved}
         self.depth = self.scene.bodies["dam"].points[:, 2].max()
         joints = self.scene.result.joints
@@ -207,6 +276,8 @@ class Deformed:
         near = joint.points[:, 2] > joint.points[:, 2].max() - ROUND_OFF * s.max()
         row = nearest_rows(joint.points[near], rows[0])
         order = np.argsort(s[row])
+        every = max(1, len(order) // JOINT_POINTS)
+        order = order[np.unique([*range(0, len(order), every), len(order) - 1])]
         of_joints = self.scene.result.case.of_joints
         names = (of_joints[number].upper, of_joints[number].lower) if of_joints else BODIES
         return NearSide(names, joint.node_tags[near][order], row[order], rows)
@@ -219,11 +290,15 @@ class Deformed:
             for faces, _ in self.skins[name]
         ]
 
+    def vertical_stress(self) -> list[np.ndarray]:
+        """Vertical stress of the elements of each body (steps, elements) [Pa]."""
+        fields = [self.scene.fields[time] for time in self.times]
+        return [np.array([field.stress[name][:, 1] for field in fields]) for name in self.moved]
+
     def stress(self) -> list[Pieces]:
         """Undeformed faces of dam and foundation with the vertical stress of the elements [Pa]."""
-        fields, pieces = self.scene.fields, []
-        for name in self.moved:
-            vertical = np.array([fields[time].stress[name][:, 1] for time in self.times])
+        pieces = []
+        for name, vertical in zip(self.moved, self.vertical_stress(), strict=True):
             for faces, owners in self.skins[name]:
                 values = np.repeat(vertical[:, owners, None, None], faces.shape[1], axis=2)
                 pieces.append(Pieces(self.scene.bodies[name].points[faces], values))
@@ -247,17 +322,15 @@ class Deformed:
         index = np.searchsorted(body.node_tags, joint.tags)
         return body.points[index], self.moved[name][:, index]
 
-    @property
-    def softens(self) -> bool:
-        """Whether a joint softens somewhere."""
-        return any((joint.along(state_of) == SOFTENING).any() for joint in self.joints)
+    def occurring(self) -> np.ndarray:
+        """The states of the joints on the near side."""
+        return np.unique(np.concatenate([np.ravel(joint.along(state_of)) for joint in self.joints]))
 
-    def marks(self) -> dict[str, Pieces]:
-        """Both faces of each joint where it is open or broken, softens, or has slipped.
+    def marks(self) -> dict[int, Pieces]:
+        """Both faces of each joint, by state: open or broken, softening, slipped.
 
         A segment that is not in that state at a step collapses to a point.
         """
-        states = {"open": OPEN, "softening": SOFTENING, "slipped": SLIPPED}
         ends, moved, of_segments = [], [], []
         for joint in self.joints:
             state = joint.along(state_of)
@@ -272,26 +345,31 @@ class Deformed:
             values[:, :, 0] - values[:, :, 1] + (segments[:, 0] - segments[:, 1]) / self.scale
         )
         marks = {}
-        for name, number in states.items():
+        for number in (OPEN, SOFTENING, SLIPPED):
             shown, in_state = values.copy(), segment_states == number
             shown[:, :, 1] += np.where(in_state[:, :, None], 0.0, collapse)
-            marks[name] = Pieces(segments, shown)
+            marks[number] = Pieces(segments, shown)
         return marks
 
     def loads(self) -> dict[str, Pieces]:
-        """Water, silt and forces on the deformed dam, of those that act."""
-        loads = {"water": self.water(), "silt": self.silt(), "forces": self.forces()}
+        """Water, silt, water in the crack and forces on the deformed dam, of those that act."""
+        arrows = [lines for _, _, lines in self.forces()]
+        loads = {
+            "water": self.water(),
+            "silt": self.silt(),
+            "water in the crack": np.concatenate([self.crack(j) for j in self.joints], axis=1),
+            "forces": np.concatenate([np.zeros((len(self.times), 0, 2, 3)), *arrows], axis=1),
+        }
         return {
             name: self.placed(corners) for name, corners in loads.items() if has_extent(corners)
         }
 
     def water(self) -> np.ndarray:
-        """Reservoir and tailwater up to their levels, and water in the cracks."""
+        """Reservoir and tailwater up to their levels."""
         level, tail = ([getattr(now, name) for now in self.loadings] for name in ("level", "tail"))
         over = level if self.scene.result.case["crest_water"] else [-np.inf] * len(level)
         parts = (RESERVOIR, level), (OVER, over), (TAIL, tail)
-        cracks = (self.crack(joint) for joint in self.joints)
-        return np.concatenate([*(self.fluid(*part) for part in parts), *cracks], axis=1)
+        return np.concatenate([self.fluid(*part) for part in parts], axis=1)
 
     def silt(self) -> np.ndarray:
         """Silt upstream, once it acts."""
@@ -299,17 +377,60 @@ class Deformed:
         heights = [height if now.part("silt") else -np.inf for now in self.loadings]
         return self.fluid(RESERVOIR, heights)
 
-    def forces(self) -> np.ndarray:
-        """Arrows of forces and earthquake; points for those that do not act yet."""
-        case, steps = self.scene.result.case, []
-        for i, now in enumerate(self.loadings):
-            forces = [(self.tips(name)[i], f) for name, f in line_forces(case, now).items()]
-            if self.undeformed:
-                inertia = now.part("quake") * np.array([case["k_h"], case["k_v"]])
-                forces.append((np.append(self.sections[i].dam.centroid, self.depth), inertia))
-            arrows = [arrow(tip, np.array(f), ARROW * case.size) for tip, f in forces]
-            steps.append(np.concatenate([np.zeros((0, 2, 3)), *arrows]))
-        return np.array(steps)
+    def forces(self) -> list[tuple[str, np.ndarray, np.ndarray]]:
+        """Forces and earthquake that act: name, values (steps, 2), arrows (steps, 3, 2, 3), which
+        are points as long as the force is zero.
+        """
+        case = self.scene.result.case
+        lines = [line_forces(case, now) for now in self.loadings]
+        acting = {name: np.array([step[name] for step in lines]) for name in lines[0]}
+        places = {name: self.tips(name) for name, values in acting.items() if values.any()}
+        if self.undeformed:
+            inertia = np.array([case["k_h"], case["k_v"]])
+            acting[QUAKE] = np.array([now.part("quake") * inertia for now in self.loadings])
+            places[QUAKE] = np.array([(*s.dam.centroid, self.depth) for s in self.sections])
+        length = ARROW * case.size
+        arrows = lambda name, values: np.array(
+            [arrow(tip, force, length) for tip, force in zip(places[name], values, strict=True)]
+        )
+        return [(n, values, arrows(n, values)) for n, values in acting.items() if values.any()]
+
+    def labels(self) -> list[Label]:
+        """Labels of the forces and of the water surfaces."""
+        labels = arrow_labels(
+            [
+                (lines[-1], [force_label(name, f) * bool(f.any()) for f in values])
+                for name, values, lines in self.forces()
+            ]
+        )
+        if self.undeformed:
+            levels = ([getattr(now, name) for now in self.loadings] for name in ("level", "tail"))
+            labels += level_labels(*levels, self.camera.box)
+        return labels
+
+    def resultant(self) -> Pieces:
+        """Resultant of the decisive joint's forces without the water in it, and the joint's middle
+        third.
+        """
+        length, joint = self.scene.own.case.joint_length, self.joints[self.scene.joint]
+        face, displacement = self.joint_face(joint.bodies[1], joint)
+        s = joint.along(distance)[0]
+        steps = []
+        for moved, numbers in zip(
+            face + self.scale * displacement, self.scene.numbers, strict=True
+        ):
+            on_joint = lambda part, moved=moved: np.stack(
+                [np.interp(part * s.max(), s, axis) for axis in moved.T], axis=-1
+            )
+            now = numbers.elements
+            third = on_joint(MIDDLE) - [0, THIRD * self.scene.result.case.size, 0]
+            x, y = (moved[-1] - moved[0])[:2] / np.hypot(*(moved[-1] - moved[0])[:2])
+            force = now["N"] * np.array([y, -x]) + now["T"] * np.array([x, y])
+            at = now["x_resultant"] / length
+            force, at = (force, at) if np.isfinite(at) else (np.zeros(2), 0.0)
+            lines = arrow(on_joint(at), force, RESULTANT * self.scene.result.case.size)
+            steps.append(np.concatenate([np.stack([third[:-1], third[1:]], axis=1), lines]))
+        return self.placed(np.array(steps))
 
     def tips(self, name: str) -> np.ndarray:
         """Displaced points of application of a line force on the near side, (steps, 3)."""

@@ -16,7 +16,7 @@ from .. import InputError
 from ..accuracy import REFINED
 from ..model import casefile
 from ..model.case import CASES, Case, case_file, first_mesh, load
-from ..model.parameters import declared
+from ..model.parameters import INCLUDE, assignments, declared, listing, parse_by_gmsh
 
 
 @dataclass(frozen=True)
@@ -80,15 +80,25 @@ def check_request(request: Request) -> Sheet:
     Raises InputError.
     """
     path = case_file(request.case)
-    declared()
-    replace(request, overrides={}, levels=None, tail_levels=None, steps=None).load()
+    unchanged = replace(request, overrides={}, levels=None, tail_levels=None, steps=None)
+    fill_database(unchanged, unchanged.load())
     own = {name: gmsh_value(declared()[name].label) for name in declared()}
     changes = {n: v for n, v in request.overrides.items() if v != own[n]}
     request = replace(request, overrides=changes)
     case = request.load()
+    fill_database(request, case)
     # one by one: Gmsh does not escape quotes, which may occur in paths among its own entries
     entries = [json.loads(gmsh.onelab.get(known.label)) for known in declared().values()]
     return Sheet(request, case, entries, str(path))
+
+
+def fill_database(request: Request, case: Case) -> None:
+    """Put the parameters of a request, which gives a case, into the ONELAB database."""
+    file = casefile.read(case_file(request.case))
+    changes = {name: declared()[name].check(value) for name, value in request.overrides.items()}
+    mesh = first_mesh(case) if request.accuracy else {}
+    lists = listing("levels", case.levels) + listing("times", case.times)
+    parse_by_gmsh(assignments(file.defaults | mesh | changes) + lists + INCLUDE)
 
 
 def gmsh_value(label: str) -> float | str:

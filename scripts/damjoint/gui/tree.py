@@ -13,13 +13,15 @@ from pathlib import Path
 from typing import Any
 
 import gmsh
-import numpy as np
 
 from .. import InputError
 from ..model.case import ACCURACIES, Case
 from ..model.parameters import AUTOMATIC, Parameter, levels_of
 from ..statics.verdict import verdict
+from . import views
+from .numbers import BESIDE
 from .sheet import Request, Sheet
+from .views import CONTENTS, FIELDS, Display
 from .worker import SolvedScene
 
 # Names in the tree. Digits order it and are not shown; Gmsh's own "0Modules" follows the results.
@@ -27,20 +29,33 @@ CASE = "00Case/0Case"
 FILE = "00Case/1Case file"
 STATUS = "01Results/00Status"
 VERDICT = "01Results/01Verdict"
-SCENE = "01Results/02Scene shown"
-LEVELS = "Parameters/1Water levels/0Levels, reached at t = 1, 2, ... [m]"
-TAIL_LEVELS = "Parameters/1Water levels/1Tailwater, one or as many [m]"
+NUMBERS = "01Results/1"
+LEVELS = "Parameters/1Water levels/0[m] Levels at t = 1, 2, ..."
+TAIL_LEVELS = "Parameters/1Water levels/1[m] Tailwater"
 STEPS = "Parameters/1Water levels/2Steps between two levels"
-TIMES = "Parameters/1Water levels/3Converged steps at t"
+TIMES = "Parameters/1Water levels/3Steps at t"
 #: Entries on the water levels.
 OF_LEVELS = (LEVELS, TAIL_LEVELS, STEPS, TIMES)
 ACCURACY = "Parameters/3Mesh/0Accuracy"
-FOLDER = "Parameters/8Output/0Folder"
-KEEP = "Parameters/8Output/1Keep the last views for comparison"
-SAVE = "Parameters/8Output/2Save tables, fields, picture and case file"
+FIELD = "02Display/0Color of the bodies"
+SCALES = "02Display/1Scales"
+CONTENT = "02Display/2Show"
+SCENE = "02Display/3Water in the joint"
+KEEP = "02Display/4Keep the last curves"
+FOLDER = "03Output/0Folder"
+SAVE = "03Output/1Save"
+PICTURE = "03Output/2Export picture"
+ANIMATION = "03Output/3Export animation"
 
-#: Action of its button; "save" is Gmsh's own, for the database.
-SAVE_ACTION = "save results"
+#: Actions of the buttons; "save" is Gmsh's own, for the database.
+SAVE_ACTION, PICTURE_ACTION, ANIMATION_ACTION = "save results", "export picture", "export animation"
+BUTTONS = (
+    (SAVE, SAVE_ACTION, "tables, fields, picture and case file, into the folder"),
+    (PICTURE, PICTURE_ACTION, "the drawing area as window.png, into the folder"),
+    (ANIMATION, ANIMATION_ACTION, "all levels as window.gif, into the folder"),
+)
+#: Attributes of a button.
+BUTTON = {"Macro": "Action", "Aspect": "Button"}
 #: Choices: the case's own value; a case file of the user.
 OWN, OPEN = "as the case", "open a case file ..."
 
@@ -49,23 +64,6 @@ NOT_RUN = "not run yet"
 
 #: Colors of the status line.
 CALM, GOOD, WARN, BAD = "LightSteelBlue1", "DarkSeaGreen1", "Orange", "LightCoral"
-
-#: Results by column of history.csv: name in the tree.
-RESULTS = {
-    "level": "Water level [m]",
-    "tail_level": "Tailwater level [m]",
-    "max_opening": "Largest opening [m]",
-    "crack_length": "Crack length [m]",
-    "process_zone": "Fracture process zone, softening [m]",
-    "slip_length": "Slipped length [m]",
-    "crest_ux": "Crest movement, downstream > 0 [m]",
-    "N": "Normal force N, effective [N per m]",
-    "T": "Shear force T [N per m]",
-    "M": "Moment M about the toe [N m per m]",
-    "U": "Uplift U [N per m]",
-    "x_resultant": "Resultant from the heel [m]",
-    "flux": "Leakage [kg per m s]",
-}
 
 
 def put(*entries: dict[str, Any]) -> None:
@@ -120,6 +118,7 @@ class Tree:
 
     def __init__(self, titles: Mapping[str, str], known: Mapping[str, Parameter]) -> None:
         self.titles, self.known = titles, known
+        self.short = short_labels(known)
         #: value of each parameter when it was last set: only what differs is a change of the user
         self.shown: dict[str, float | str] = {}
         self.sheet: Sheet | None = None
@@ -132,8 +131,11 @@ class Tree:
         if new_case:
             put(
                 text(FOLDER, str(Path("out") / sheet.case.name), help="folder that Save writes"),
-                number(KEEP, 0, choices=[0, 1], help="views of the last run stay beside the new"),
-                text(SAVE, SAVE_ACTION, attributes={"Macro": "Action", "Aspect": "Button"}),
+                *display_entries(),
+                *(
+                    text(name, action, help=note, attributes=BUTTON)
+                    for name, action, note in BUTTONS
+                ),
             )
         # read back, since the database may round a number
         self.shown = {e["name"]: value_of(e["name"]) for e in sheet.entries} | {
@@ -202,8 +204,9 @@ class Tree:
         entry = {k: declared[k] for k in copied if k in declared}
         allowed = f"{parameter.name}: {parameter.allowed()}"
         note = declared.get("help", "") if not parameter.automatic else ""
-        entry["help"] = f"{allowed}. {note}" if note else allowed
-        entry["label"] = parameter.meaning
+        entry["help"] = ". ".join(filter(None, [allowed, parameter.meaning, note]))
+        unit = f"[{parameter.unit}] " if parameter.unit not in ("", "-") else ""
+        entry["label"] = unit + self.short[parameter.name]
         if parameter.text:
             return entry
         choices = declared.get("choices", [])
@@ -217,9 +220,8 @@ class Tree:
         }
         if parameter.automatic and declared["values"][0] == AUTOMATIC:
             value = self.sheet.case[parameter.name]
-            entry["label"] = (
-                f"{parameter.name} = {value:.6g} ({parameter.help}): {parameter.meaning}"
-            )
+            entry["label"] = f"{unit}= {value:.6g}: {self.short[parameter.name]}"
+            entry["help"] = f"{entry['help']} = {value:.6g} ({parameter.help})"
         return entry
 
     def request(self) -> Request:
@@ -262,6 +264,13 @@ class Tree:
         return before if same else now
 
 
+def short_labels(known: Mapping[str, Parameter]) -> dict[str, str]:
+    """Labels of parameters: their descriptions up to the first comma, unless two have the same."""
+    short = {name: p.description.split(",")[0] for name, p in known.items()}
+    labels = list(short.values())
+    return {n: s if labels.count(s) == 1 else known[n].description for n, s in short.items()}
+
+
 def value_of(name: str) -> float | str:
     """Read a parameter from the tree, a number or a text."""
     values = gmsh.onelab.getNumber(name)
@@ -278,44 +287,64 @@ def show_verdict(name: str, color: str, why: str) -> None:
     put(text(VERDICT, name, readOnly=True, help=why, attributes={"Highlight": color}))
 
 
-def show_results(scenes: list[SolvedScene], shown: int) -> None:
-    """Show the results of a scene: values of the last step, those of all steps as choices."""
+def display_entries() -> list[dict[str, Any]]:
+    """Entries of what is shown, each with its first choice."""
+    choices = {
+        FIELD: (FIELDS, "field of dam and foundation"),
+        SCALES: (views.SCALES, "scales of curves and colors"),
+        CONTENT: (CONTENTS, "drawing area"),
+    }
+    entries = [
+        text(name, own[0], choices=list(own), help=note) for name, (own, note) in choices.items()
+    ]
+    help_of_keep = "curves of the last run stay in grey, its views in Modules / Post-processing"
+    entries.append(number(KEEP, 0, choices=[0, 1], help=help_of_keep))
+    return [{**entry, "visible": False} for entry in entries]
+
+
+def show_display(visible: bool) -> None:
+    """Show or hide the entries of what is shown; they keep their values."""
+    for name in gmsh.onelab.getNames("02Display/.*"):
+        gmsh.onelab.set(json.dumps({**json.loads(gmsh.onelab.get(name)), "visible": visible}))
+
+
+def display() -> Display:
+    """What the user has chosen to see."""
+    return Display(*(get_text(name) for name in (FIELD, SCALES, CONTENT)))
+
+
+def show_results(scenes: list[SolvedScene], shown: int, step: int) -> None:
+    """Show the results of a scene at a step: finite elements beside the gravity method."""
     scene = scenes[shown]
-    result, history = scene.result, scene.result.history
     color = WARN if scene.failed or scene.message else GOOD
     modes = [s.result.case["uplift"] for s in scenes]
-    show_verdict(scene.end_state or verdict(result), color, scene.message or "the dam stands")
-    put(
-        text(
-            SCENE,
-            modes[shown],
-            choices=modes,
-            visible=len(modes) > 1,
-            label="Water in the joint: scene shown",
-        ),
-    )
-    for i, (column, name) in enumerate(RESULTS.items()):
-        values = history[column]
-        has_value = len(values) > 0 and bool(np.isfinite(values[-1]))
-        if column in ("tail_level", "U", "flux", "process_zone"):  # not of every scene
-            has_value = has_value and bool(np.any(values != 0))
-        put(
-            number(
-                f"01Results/{10 + i}{name}",
-                values[-1] if has_value else 0,
-                choices=[float(v) for v in values] if has_value else [],
-                readOnly=True,
-                visible=has_value,
-                attributes={"Highlight": "LightYellow", "NumberFormat": "%.6g"},
-            )
-        )
+    show_verdict(scene.end_state or verdict(scene.result), color, scene.message or "the dam stands")
+    show_display(True)
+    put(text(SCENE, modes[shown], choices=modes, visible=len(modes) > 1))
+    clear_numbers()
+    if not scene.numbers:
+        return
+    numbers = scene.numbers[step]
+    head = BESIDE.join(["finite elements", "gravity method"][: 1 + bool(numbers.rigid)])
+    note = "the level that the drawing area shows"
+    rows = [(f"At t = {scene.times[step]:.4g}", head, note), *numbers.rows()]
+    entries = [(*row, "LightYellow") for row in rows]
+    entries += [(f"Note {i + 1}", w, w, WARN) for i, w in enumerate(scene.warnings)]
+    for i, (label, value, note, highlight) in enumerate(entries):
+        more = {"help": note, "attributes": {"Highlight": highlight}}
+        put(text(f"{NUMBERS}{i:02d}", value, label=label, readOnly=True, **more))
+
+
+def clear_numbers() -> None:
+    """Remove the numbers of a step from the tree."""
+    for name in gmsh.onelab.getNames(f"{NUMBERS}.*"):
+        gmsh.onelab.clear(name)
 
 
 def hide_results() -> None:
     """Remove the results from the tree: they are not those of its parameters."""
-    for name in gmsh.onelab.getNames("01Results/.*"):
-        if name not in (STATUS, VERDICT):
-            gmsh.onelab.clear(name)
+    clear_numbers()
+    show_display(False)
     show_verdict(NOT_RUN, CALM, "press Run")
 
 

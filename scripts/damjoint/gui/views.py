@@ -6,144 +6,115 @@ Works on the current Gmsh session, with or without a window.
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
+from textwrap import wrap
 
 import gmsh
 import numpy as np
 
-from .. import ROUND_OFF
 from ..model.case import Case
-from ..model.fields import CLOSED, OPEN, along, distance, joint_body, row_of_nodes, state_of
-from ..post.units import LENGTHS, STRESSES, Units, unit, with_unit
-from ..statics.verdict import decisive_joint
-from .camera import CLIPPED, MAPS, clip, frame
-from .shapes import Deformed, Pieces, is_extruded, undeformed_loads
+from ..model.fields import (
+    CLOSED,
+    OPEN,
+    SLIPPED,
+    SOFTENING,
+    distance,
+    joint_body,
+    row_of_nodes,
+    state_of,
+)
+from ..post.units import LENGTHS, STRESSES, unit, with_unit
+from . import layout as places
+from .camera import CLIPPED
+from .gallery import (
+    BALANCED,
+    DARK,
+    GREEN,
+    GREY,
+    LAKE,
+    ORANGE,
+    RED,
+    SILT,
+    STONE,
+    VIOLET,
+    WATER,
+    Color,
+    Gallery,
+)
+from .graphs import Graphs, show_graphs
+from .layout import LEFT, Layout
+from .numbers import three_digits
+from .shapes import Deformed, Label, Pieces, undeformed_loads
 from .worker import SolvedScene
 
-Color = tuple[int, int, int, int]
-
-BLUE: Color = (11, 83, 148, 255)
-ORANGE: Color = (214, 120, 0, 255)
-RED: Color = (200, 20, 20, 255)
-VIOLET: Color = (142, 36, 170, 255)
-GREEN: Color = (46, 125, 50, 255)
-DARK: Color = (60, 60, 60, 255)
-GREY: Color = (150, 150, 150, 255)
-LAKE: Color = (61, 155, 224, 255)
-WATER: Color = (*LAKE[:3], 130)
-SILT: Color = (140, 110, 70, 150)
-#: Color scales: from small to large displacement, and from compression to tension.
-STONE = ((226, 222, 212), (168, 187, 205), (88, 137, 186), (11, 60, 120))
-FIRE = ((11, 60, 120), (88, 137, 186), (226, 222, 212), (200, 60, 30))
-
-#: Pixels: size of a graph, pitch of the graphs, width of both columns.
-GRAPH_SIZE, GRAPH_PITCH = (175, 118), (268, 218)
-GRAPHS_WIDTH = 2 * GRAPH_PITCH[0]
-#: Pixels: left edge of the text; lines of title, scene, state, legend of the joint, notes, message.
-LEFT, TITLE, SCENE, STATE, LEGEND, NOTES, MESSAGE = 20, 28, 50, 74, 97, 118, 144
 #: Offset of a layer along z over the dam's size: lines and faces in one plane hide one another.
 LAYER = 5e-4
-#: Maps of a 3D joint: largest stretch along the joint; least depth over the length drawn.
-STRETCH, MAP_DEPTH = 2.5, 0.25
+#: Fields that color the bodies: displacement is the default.
+FIELDS = DISPLACEMENT, STRESS = "displacement", "vertical stress"
+#: Scales of curves and colors.
+SCALES = OF_LEVEL, OF_ALL = "of the level shown", "of all levels"
+#: What the drawing area shows.
+CONTENTS = SCENE, TABLE = "scene and curves", "table of all levels"
 
 
-class Gallery:
-    """The views of one run; `close` removes them."""
+@dataclass(frozen=True)
+class Display:
+    """The user's choices of what is shown."""
 
-    def __init__(self) -> None:
-        self.tags: list[int] = []
-        #: those that are hidden until the user ticks them
-        self.hidden: list[int] = []
+    field: str = DISPLACEMENT
+    scales: str = OF_LEVEL
+    content: str = SCENE
 
-    def add(
-        self, name: str, pieces: list[Pieces], colors: Sequence[tuple[int, ...]], **numbers: float
-    ) -> int:
-        """Add a view of pieces in one color or a color scale; numbers: its options.
-
-        Returns its tag.
-        """
-        tag = gmsh.view.add(name)
-        self.tags.append(tag)
-        blocks: dict[str, list[np.ndarray]] = {}
-        for piece in pieces:
-            blocks.setdefault(piece.kind(), []).append(piece.list_data())
-        for kind, parts in blocks.items():  # a second call with a kind would replace the first
-            data = np.vstack(parts)
-            gmsh.view.addListData(tag, kind, len(data), data.ravel())
-        steps = max((piece.values.shape[0] for piece in pieces), default=1)
-        for option, value in {"TimeStep": steps - 1, "ShowTime": 0, **numbers}.items():
-            gmsh.view.option.setNumber(tag, option, value)
-        gmsh.view.option.setColor(tag, "Text2D", *colors[0])
-        paint(tag, colors)
-        return tag
-
-    def write(self, x: float, y: float, lines: list[str], color: Color, size: int) -> int:
-        """Write text at pixels from the top left (negative x: from the right), a line per step."""
-        tag = gmsh.view.add("text")
-        self.tags.append(tag)
-        label(tag, x, y, lines, size)
-        gmsh.view.option.setColor(tag, "Text2D", *color)
-        gmsh.view.option.setNumber(tag, "TimeStep", len(lines) - 1)
-        return tag
-
-    def archive(self, prefix: str) -> None:
-        """Hide all views and prefix their names, for the user to tick."""
-        for tag in set(self.tags) & set(gmsh.view.getTags()):
-            name = gmsh.view.option.getString(tag, "Name")
-            gmsh.view.option.setString(tag, "Name", f"{prefix} {name}")
-            gmsh.view.option.setNumber(tag, "Visible", 0)
-
-    def show(self, shown: bool) -> None:
-        """Show or hide all views."""
-        for tag in set(self.tags) & set(gmsh.view.getTags()):
-            gmsh.view.option.setNumber(tag, "Visible", shown and tag not in self.hidden)
-
-    def close(self) -> None:
-        """Remove the views that the user has not removed."""
-        for tag in set(self.tags) & set(gmsh.view.getTags()):
-            gmsh.view.remove(tag)
-        self.tags = []
+    @property
+    def common(self) -> bool:
+        """Whether all levels have the same scale."""
+        return self.scales == OF_ALL
 
 
-def label(tag: int, x: float, y: float, lines: list[str], size: int) -> None:
-    """Add text to a view, at pixels."""
-    style = ["Align", "Left", "Font", "Helvetica", "FontSize", str(size)]
-    gmsh.view.addListDataString(tag, [x, y], lines, style)
-
-
-def paint(tag: int, colors: Sequence[tuple[int, ...]]) -> None:
-    """Set the color table of a view: one color, or interpolated between several."""
-    table = np.array([(*color, 255)[:4] for color in colors], float)
-    at = np.linspace(0, len(table) - 1, 64)
-    shades = np.column_stack([np.interp(at, range(len(table)), c) for c in table.T]).round()
-    text = ", ".join("{" + ", ".join(f"{part:.0f}" for part in shade) + "}" for shade in shades)
-    with tempfile.NamedTemporaryFile("w", suffix=".geo") as file:
-        file.write(f"View[{gmsh.view.getIndex(tag)}].ColorTable = {{ {text} }};\n")
-        file.flush()
-        gmsh.parser.parse(file.name)
-    gmsh.parser.clear()
-
-
+#: Entry of the legend: color and text.
+Entry = tuple[Color, str]
+#: States of the joint that are marked, with their legend.
+STATES: dict[int, Entry] = {
+    OPEN: (RED, "joint open or broken"),
+    SOFTENING: (VIOLET, "joint softening"),
+    SLIPPED: (ORANGE, "joint slipped"),
+}
 #: Color and layer of the loads. Water is behind the bodies: it reaches under an overhang.
-LOAD_STYLES = {"water": (WATER, -2), "silt": (SILT, -1), "forces": (DARK, 3)}
+LOAD_STYLES = {
+    "water": (WATER, -2),
+    "silt": (SILT, -1),
+    "water in the crack": (LAKE, 3),
+    "forces": (DARK, 4),
+}
+#: Text sizes: title, law and uplift, state, legend and warnings.
+SIZES = 17, 13, 14, 12
 
 
 def show_undeformed_loads(case: Case) -> Gallery:
     """Show the loads of the last level on the undeformed dam, before a run."""
     gallery = Gallery()
-    show_loads(gallery, case, undeformed_loads(case), {"ShowScale": 0, "Light": 0})
+    loads, labels = undeformed_loads(case)
+    show_loads(gallery, case, loads, labels, {"ShowScale": 0, "Light": 0})
     return gallery
 
 
 def show_loads(
-    gallery: Gallery, case: Case, loads: dict[str, Pieces], options: dict[str, float]
+    gallery: Gallery,
+    case: Case,
+    loads: dict[str, Pieces],
+    labels: list[Label],
+    options: dict[str, float],
 ) -> None:
-    """Show water, silt and forces, each in its layer."""
+    """Show water, silt and forces, each in its layer, with their levels and magnitudes."""
     for name, pieces in loads.items():
         color, number = LOAD_STYLES[name]
         gallery.add(name, [pieces], [color], **options, **layer(case, number), LineWidth=3)
+    if labels:
+        tag = gallery.write(0, 0, [" "] * len(labels[0].lines), DARK, SIZES[3])
+        gmsh.view.option.setString(tag, "Name", "labels of the loads")
+        for label in labels:
+            gallery.label_point(tag, label.point, label.lines, SIZES[3], label.align)
 
 
 def layer(case: Case, number: int) -> dict[str, float]:
@@ -151,258 +122,204 @@ def layer(case: Case, number: int) -> dict[str, float]:
     return {"OffsetZ": number * LAYER * case.size}
 
 
-def show_heading(gallery: Gallery, heading: tuple[str, str]) -> None:
+def show_heading(gallery: Gallery, heading: tuple[str, str], layout: Layout) -> None:
     """Show two lines: title of the case; joint law and uplift."""
     title, scene = heading
-    tag = gallery.write(LEFT, TITLE, [title], DARK, 18)
-    label(tag, LEFT, SCENE, [scene], 14)
-    gmsh.view.option.setString(tag, "Name", "heading")
+    shortened = layout.shortened(title, SIZES[0])
+    gallery.write(LEFT, places.TITLE, [shortened], DARK, SIZES[0])
+    gallery.write(LEFT, places.LAW, [scene], DARK, SIZES[1])
 
 
-def show(scene: SolvedScene, title: str, before: Sequence[SolvedScene] = ()) -> Gallery:
+def show(
+    scene: SolvedScene,
+    title: str,
+    layout: Layout,
+    display: Display,
+    before: Sequence[SolvedScene] = (),
+    step: int | None = None,
+) -> Gallery:
     """Show all views of a scene; heading and history alone if no requested level was reached.
 
-    title: of the case; before: earlier runs, whose last curves are drawn in grey for comparison.
+    title: of the case; before: earlier runs, whose last curves are drawn in grey for comparison;
+    step: that is shown first, by default the last.
     """
-    gallery = Gallery()
-    graphs = Graphs(gallery)
-    if scene.times.size:
-        deformed = Deformed(scene)
-        show_deformed(gallery, deformed)
-        if scene.result.case["dim"] == 3:
-            show_maps(gallery, deformed)
-        if is_extruded(scene.result.case):
-            show_curves(graphs, scene, [other for other in before if other.times.size])
-        gallery.write(LEFT, STATE, captions(deformed), DARK, 15)
-    if len(scene.result.history["time"]):
-        show_history(graphs, scene, before)
-    if before:
-        gallery.write(180, NOTES, ["grey curves: earlier runs"], GREY, 13)
-    case = scene.result.case
-    show_heading(gallery, (title, f"law {case['law']}, uplift {case['uplift']}"))
+    gallery, case, legend = Gallery(step), scene.result.case, list[Entry]()
+    if display.content == TABLE:
+        show_table(gallery, scene, layout)
+    else:
+        if scene.times.size:
+            deformed = Deformed(scene)
+            legend = show_deformed(gallery, deformed, display)
+            if case["dim"] == 3:
+                show_strips(gallery, deformed, display)
+            captions = [caption(scene, step) for step in range(len(scene.times))]
+            for y, lines in zip(places.STATE, zip(*captions, strict=True), strict=True):
+                gallery.write(LEFT, y, list(lines), DARK, SIZES[2])
+        show_graphs(Graphs(gallery, layout, display.common), scene, before)
+        legend += [(GREY, "earlier runs")] if before else []
+        for place, (color, words) in zip(layout.legend, legend, strict=False):
+            gallery.write(*place, [words], color, SIZES[3])
+        show_warnings(gallery, scene.warnings, layout)
+    show_heading(gallery, (title, f"law {case['law']}, uplift {case['uplift']}"), layout)
+    gallery.balance(gallery.step)
     return gallery
 
 
-def captions(deformed: Deformed) -> list[str]:
-    """Describe each step in a line: level, opening, crack, fracture process zone of the decisive
-    joint.
-    """
-    number, lines = decisive_joint(deformed.scene.result), []
-    result, name = deformed.scene.result.joints[number], deformed.scene.result.case.named((number,))
-    for time in deformed.times:
-        now = result.state(time)
-        tail = f", tailwater {now['tail_level']:.4g} m" if now["tail_level"] > 0 else ""
-        opening = now["max_opening"]
-        line = f"opening {with_unit(opening, LENGTHS, 3)}" if opening > 0 else "closed"
-        line += f", crack {now['crack_length']:.3g} m"
-        if now["process_zone"] > 0:
-            line += f", softening {now['process_zone']:.3g} m"
-        lines.append(f"level {now['level']:.4g} m{tail}: {name and f'{name}: '}{line}")
-    return lines
-
-
-def show_deformed(gallery: Gallery, deformed: Deformed) -> None:
-    """Show dam and foundation, outline, loads, crack and slip, all displaced by one factor."""
-    case = deformed.scene.result.case
-    clip(case)
-    moves = {"VectorType": 5, "DisplacementFactor": deformed.scale, "Clip": CLIPPED}
-    scale = scale_at(0)
-    gallery.add("displacement [m]", deformed.bodies(), STONE, **moves, **scale, Light=0)
-    options = {**scale, "Clip": CLIPPED, "Light": 0, "Visible": 0}
-    gallery.hidden.append(gallery.add("vertical stress [Pa]", deformed.stress(), FIRE, **options))
-    flat = {**moves, "ShowScale": 0, "Light": 0}
-    show_loads(gallery, case, deformed.loads(), flat)
-    gallery.add("outline", [deformed.outline()], [DARK], **flat, **layer(case, 1), LineWidth=1.5)
-    marks = deformed.marks()
-    above = {**flat, **layer(case, 2), "LineWidth": 3}
-    slipped = gallery.add("slipped joint", [marks["slipped"]], [ORANGE], **above)
-    broken = gallery.add("open or broken joint", [marks["open"]], [RED], **above)
-    label(broken, LEFT, LEGEND, ["red: joint open or broken"], 13)
-    label(slipped, 210, LEGEND, ["orange: joint slipped"], 13)
-    if deformed.softens:
-        softening = gallery.add("softening joint", [marks["softening"]], [VIOLET], **above)
-        label(softening, 370, LEGEND, ["violet: joint softening"], 13)
-    gallery.write(LEFT, NOTES, [f"displacement x {deformed.scale:g}"], DARK, 13)
-
-
-def scale_at(place: int) -> dict[str, float]:
-    """Options of a color scale at one of four places, bottom left."""
-    x, y = 40 + 240 * (place % 2), -60 - 70 * (place // 2)
-    return {"AutoPosition": 0, "PositionX": x, "PositionY": y, "Width": 180, "Height": 12}
-
-
-def show_maps(gallery: Gallery, deformed: Deformed) -> None:
-    """Show maps of the unrolled 3D joint below the foundation: opening, state, pressure."""
-    scene, number = deformed.scene, decisive_joint(deformed.scene.result)
-    case, rows = scene.result.joints[number].case, deformed.joints[number].rows
-    joint = joint_body(scene.bodies, number)
-    nearest = row_of_nodes(joint, rows[0])
-    length, per_m = unit([r["delta_n"] for r in rows], LENGTHS)
-    stress, per_pa = unit([r["p"] for r in rows], STRESSES)
-    state = [state_of(r) for r in rows]
-    shown = [
-        (f"opening of the joint [{length}]", [r["delta_n"] * per_m for r in rows], STONE),
-        ("joint: closed, slipped, softening, open", state, (STONE[0], ORANGE, VIOLET, RED)),
-    ]
-    if case["uplift"] != "none":
-        shown.append((f"water pressure [{stress}]", [r["p"] * per_pa for r in rows], STONE))
-    # as wide as the foundation, and deep enough to be visible
-    s, depth = distance(rows[0])[nearest], joint.points[:, 2].max()
-    unrolled, base = np.column_stack([s, 0 * s, joint.points[:, 2]]), s.max()
-    (left, bottom, _), (right, *_) = frame(case)
-    wider = 1.0 if case.geometry else min(STRETCH, (right - left) / base)
-    stretch = np.array([wider, 1.0, max(wider, MAP_DEPTH * wider * base / depth)])
-    for i, (name, values, colors) in enumerate(shown):
-        below = np.array([0, bottom - (i + 1) * MAPS * case.size, 0])
-        below += (1 - stretch) * np.array([base / 2, 0, depth])
-        points = unrolled * stretch + below
-        pieces = [
-            Pieces(points[table], np.array(values)[:, nearest][:, table, None])
-            for _, table in joint.cells
-        ]
-        limits = {"RangeType": 2, "CustomMin": CLOSED, "CustomMax": OPEN} if values is state else {}
-        gallery.add(name, pieces, colors, **scale_at(i + 1), **limits, Light=0)
-
-
-#: Name of the curves of earlier runs.
-BEFORE = "before"
-
-
-@dataclass
-class Curve:
-    """Curve of a graph: x (n,), y (steps, n)."""
-
-    name: str
-    x: np.ndarray
-    y: np.ndarray
-    color: Color
-
-
-def show_curves(graphs: Graphs, scene: SolvedScene, before: Sequence[SolvedScene]) -> None:
-    """Show opening, slip, stresses and pressure along the joint (means over z in 3D)."""
-    number = decisive_joint(scene.result)
-    own = scene.result.joints[number]
-    rows = [along(own.at(time)) for time in scene.times]
-    same = [other.result.joints for other in before if len(other.result.joints) > number]
-    earlier = [along(joints[number].at()) for joints in same]
-    wet = own.case["uplift"] != "none"
-    shown: list[tuple[str, Units, list[tuple[str, str, Color]]]] = [
-        ("opening", LENGTHS, [("", "delta_n", BLUE)]),
-        ("slip", LENGTHS, [("jump", "delta_t1", ORANGE), ("slip", "slip", DARK)]),
-        ("normal stress", STRESSES, [("total", "sigma_n", BLUE)]),
-        ("shear stress", STRESSES, [("", "tau_1", ORANGE)]),
-    ]
-    if wet:
-        shown[2][2].append(("effective", "sigma_n_eff", GREEN))
-        shown.append(("water pressure", STRESSES, [("", "p", LAKE)]))
-    for title, units, parts in shown:
-        first = parts[0][1]
-        curves = [
-            Curve(name, rows[0]["s"], np.array([r[column] for r in rows]), color)
-            for name, column, color in parts
-        ]
-        curves += [Curve(BEFORE, other["s"], other[first][None], GREY) for other in earlier]
-        graphs.add(title, units, "s [m], heel to toe", curves)
-
-
-def show_history(graphs: Graphs, scene: SolvedScene, before: Sequence[SolvedScene]) -> None:
-    """Show the level over opening, crest displacement and crack length of the decisive joint, all
-    converged steps.
-    """
-    driven, number = scene.result.case["drive"] != "level", decisive_joint(scene.result)
-    shown = (
-        ("heel opening" if driven else "largest opening", "max_opening", LENGTHS, BLUE),
-        ("crest movement", "crest_ux", LENGTHS, BLUE),
-        ("crack length", "crack_length", (("m", 1),), RED),
+def caption(scene: SolvedScene, step: int) -> tuple[str, str, str]:
+    """Describe a step in three lines: level; opening, crack, softening; safety factors."""
+    now, time = scene.numbers[step].elements, scene.times[step]
+    tail = f", tailwater {now['tail_level']:.4g} m" if now["tail_level"] > 0 else ""
+    opening = now["max_opening"]
+    state = f"opening {with_unit(opening, LENGTHS, 3)}" if opening > 0 else "closed"
+    state += f", crack {now['crack_length']:.3g} m"
+    if now["process_zone"] > 0:
+        state += f", softening {now['process_zone']:.3g} m"
+    resultant = f"N' at {three_digits(now['x_resultant'])} m"
+    known = "SSF" if scene.result.case.law.limits_shear else "", "OSF"
+    factors = [f"{n} {three_digits(now[n])}" for n in known if n in now]
+    where = scene.numbers[step].positions[0]
+    last = scene.result.case.times[-1]
+    name = scene.result.case.named((scene.joint,))
+    return (
+        f"level {now['level']:.4g} m{tail} (t = {time:.4g} of {last:g})",
+        f"{name}: {state}" if name else state,
+        ", ".join([*factors, f"{resultant}: {where}"]),
     )
-    for title, column, units, color in shown:
-        curves = []
-        for other in (scene, *before):
-            joints = other.result.joints
-            history = joints[min(number, len(joints) - 1)].history
-            x = other.result.heel if driven and column == "max_opening" else history[column]
-            if len(x):
-                name, kind = ("", color) if other is scene else (BEFORE, GREY)
-                curves.append(Curve(name, x, history["level"][None], kind))
-        length, factor = unit([curve.x for curve in curves], units)
-        for curve in curves:
-            curve.x = curve.x * factor
-        graphs.add("level", (("m", 1),), f"{title} [{length}]", curves, points=True)
 
 
-class Graphs:
-    """Graphs on the right of the window, in two columns from the top left."""
-
-    def __init__(self, gallery: Gallery) -> None:
-        self.gallery, self.count = gallery, 0
-
-    def add(
-        self, title: str, units: Units, x_label: str, curves: list[Curve], points: bool = False
-    ) -> None:
-        """Add a graph with curves on common axes, which include zero.
-
-        units: of the values; points: whether to mark them on the curves.
-        """
-        name, factor = unit([curve.y for curve in curves], units)
-        x_range, y_range = (
-            span(np.concatenate([getattr(curve, axis).ravel() for curve in curves]))
-            for axis in "xy"
-        )
-        low, high = (value * factor for value in y_range)
-        x = -GRAPH_PITCH[0] * (2 - self.count % 2) + 70
-        y = 40 + GRAPH_PITCH[1] * (self.count // 2)
-        self.count += 1
-        main = curves[0]
-        curves = sorted(curves, key=lambda curve: curve.name != BEFORE)  # drawn below the others
-        for curve in curves:
-            tag = self.gallery.add(
-                f"{title} [{name}]" if curve is main else f"{title}, {curve.name} [{name}]",
-                [pieces_of(curve, factor, x_range, 2 * high - low + 1)],
-                [curve.color],
-                Type=4,
-                AutoPosition=0,
-                PositionX=x,
-                PositionY=y,
-                Width=GRAPH_SIZE[0],
-                Height=GRAPH_SIZE[1],
-                RangeType=2,
-                CustomMin=low,
-                CustomMax=high,
-                NbIso=4,
-                Axes=3 if curve is main else 0,
-                LineWidth=2,
-                IntervalsType=3 if points else 2,
-                AxesTicsX=3,
-            )
-            gmsh.view.option.setColor(tag, "Background2D", 255, 255, 255, 0)
-            gmsh.view.option.setString(tag, "Format", "%.3g")
-            gmsh.view.option.setString(tag, "AxesFormatX", "%.3g")
-            gmsh.view.option.setString(tag, "AxesLabelX", x_label)
-        named = [i for i, curve in enumerate(curves) if curve.name not in ("", BEFORE)]
-        for line, i in enumerate(named if len(named) > 1 else ()):
-            place = x + GRAPH_SIZE[0] - 60, y - 22 + 14 * line
-            label(self.gallery.tags[i - len(curves)], *place, [curves[i].name], 12)
-
-
-def span(values: np.ndarray) -> tuple[float, float]:
-    """Range of values and zero; never empty."""
-    ends = np.array([min(0.0, values.min()), max(0.0, values.max())])
-    ends[np.abs(ends) < ROUND_OFF * np.abs(ends).max()] = 0
-    return (ends[0], ends[1]) if ends[1] > ends[0] else (0.0, 1.0)
-
-
-def pieces_of(curve: Curve, factor: float, x_range: tuple[float, float], beyond: float) -> Pieces:
-    """Convert a curve to lines along x.
-
-    Gmsh takes the range of x from the curve. For a common range, each curve gets a line over all of
-    it with a value beyond the range of y, which is not drawn.
+def show_deformed(gallery: Gallery, deformed: Deformed, display: Display) -> list[Entry]:
+    """Show dam and foundation, outline, loads, crack and slip, all displaced by one factor; returns
+    their legend.
     """
-    x = np.zeros((max(len(curve.x), 2), 3))  # a single point is doubled
-    x[:, 0] = curve.x
-    y = np.broadcast_to(curve.y, (len(curve.y), len(x))) * factor
-    ends = np.zeros((1, 2, 3))
-    ends[0, :, 0] = x_range
-    lines = np.concatenate([ends, np.stack([x[:-1], x[1:]], axis=1)])
-    values = np.stack([y[:, :-1], y[:, 1:]], axis=2)
-    values = np.concatenate([np.full((len(y), 1, 2), beyond), values], axis=1)
-    return Pieces(lines, values[..., None])
+    case = deformed.scene.result.case
+    deformed.camera.clip(case.size)
+    moves = {"VectorType": 5, "Clip": CLIPPED, "DisplacementFactor": deformed.scale}
+    scale = {**color_bar(0), "Light": 0, "RangeType": 1 if display.common else 3}
+    bodies, options = deformed.bodies(), {}
+    if display.field == STRESS:
+        name, factor = unit(deformed.vertical_stress(), STRESSES)
+        stress = [pieces.times(factor) for pieces in deformed.stress()]
+        scale["RangeType"] = 2
+        tag = gallery.add(f"{STRESS} [{name}]", stress, BALANCED, **scale, Visible=0)
+        gallery.hidden.append(tag)
+        largest = np.max([np.abs(p.values).max(axis=(1, 2, 3)) for p in stress], axis=0)
+        options = {"ExternalView": gmsh.view.getIndex(tag)}
+    name, factor = unit(list(deformed.moved.values()), LENGTHS)
+    shown = [pieces.times(factor) for pieces in bodies]
+    factors = {**moves, "DisplacementFactor": deformed.scale / factor}
+    colors = BALANCED if display.field == STRESS else STONE
+    tag = gallery.add(f"{DISPLACEMENT} [{name}]", shown, colors, **factors, **scale, **options)
+    if display.field == STRESS:
+        gallery.balance_about_zero(tag, largest, display.common)
+    flat = {**moves, "ShowScale": 0, "Light": 0}
+    show_loads(gallery, case, deformed.loads(), deformed.labels(), flat)
+    gallery.add("outline", [deformed.outline()], [DARK], **flat, **layer(case, 1), LineWidth=1.5)
+    legend = [(DARK, f"displacement x {deformed.scale:g}")]
+    occurring = deformed.occurring()
+    for state, pieces in deformed.marks().items():
+        if state in occurring:
+            color, text = STATES[state]
+            gallery.add(text, [pieces], [color], **flat, **layer(case, 2), LineWidth=2)
+            legend.append((color, text))
+    if deformed.undeformed:
+        above = {**flat, **layer(case, 5), "LineWidth": 2.5}
+        gallery.add("resultant", [deformed.resultant()], [GREEN], **above)
+        legend.append((GREEN, "resultant, middle third"))
+    return legend
+
+
+def color_bar(number: int) -> dict[str, float]:
+    """Options of a color scale at one of the places at the bottom left."""
+    x, y = places.BARS[number]
+    return {"AutoPosition": 0, "PositionX": x, "PositionY": y, "Width": 130, "Height": 10}
+
+
+def show_strips(gallery: Gallery, deformed: Deformed, display: Display) -> None:
+    """Show the joint of a 3D scene as strips below it: opening, state, pressure.
+
+    From heel to toe to the right; of a user's own geometry upwards, as seen from upstream.
+    """
+    scene = deformed.scene
+    case, rows = scene.own.case, deformed.joints[scene.joint].rows
+    joint = joint_body(scene.bodies, scene.joint)
+    nearest = row_of_nodes(joint, rows[0])
+    s, z = distance(rows[0])[nearest], joint.points[:, 2]
+    axes = (z, s) if case.geometry else (s, -z)
+    shares = np.column_stack([(v - v.min()) / (np.ptp(v) or 1.0) for v in axes])
+
+    def add(number: int, name: str, pieces: list[np.ndarray], *style: object) -> int:
+        low, high = deformed.camera.strip(number)
+        points = deformed.camera.place(low + shares * (high - low))
+        faces = [
+            Pieces(points[table], values)
+            for (_, table), values in zip(joint.cells, pieces, strict=True)
+        ]
+        colors, options = style
+        tag = gallery.add(name, faces, colors, **options, Light=0)
+        head = low + [0, 1.12] * (high - low)
+        gallery.label_point(tag, deformed.camera.place(head[None])[0], [name], SIZES[3])
+        gmsh.view.option.setColor(tag, "Text3D", *DARK[:3])
+        return tag
+
+    def at_nodes(column: str, factor: float) -> list[np.ndarray]:
+        values = np.array([r[column] for r in rows])[:, nearest] * factor
+        return [values[:, table, None] for _, table in joint.cells]
+
+    name, factor = unit([r["delta_n"] for r in rows], LENGTHS)
+    opening = at_nodes("delta_n", factor)
+    tag = add(0, f"opening [{name}]", opening, BALANCED, {**color_bar(1), "RangeType": 2})
+    largest = np.max([np.abs(values).max(axis=(1, 2, 3)) for values in opening], axis=0)
+    gallery.balance_about_zero(tag, largest, display.common)
+    states = np.array([state_of(r) for r in rows], float)[:, nearest]
+    # one state an element: between nodes of different states others would appear
+    of_elements = [
+        np.repeat(states[:, table].min(axis=2, keepdims=True), table.shape[1], axis=2)[..., None]
+        for _, table in joint.cells
+    ]
+    discrete = {"RangeType": 2, "CustomMin": CLOSED, "CustomMax": OPEN, "IntervalsType": 3}
+    colors = (STONE[0], ORANGE, VIOLET, RED)
+    add(1, "state: as in the legend", of_elements, colors, {**discrete, "ShowScale": 0})
+    if case["uplift"] != "none":
+        name, factor = unit([r["p"] for r in rows], STRESSES)
+        by_level = {"RangeType": 1 if display.common else 3}
+        pressure = at_nodes("p", factor)
+        add(2, f"water pressure [{name}]", pressure, STONE, {**color_bar(2), **by_level})
+
+
+def show_warnings(gallery: Gallery, warnings: list[str], layout: Layout) -> None:
+    """Show warnings at the bottom of the scene, as many lines as there is space for."""
+    lines = [line for warning in warnings for line in layout.wrapped(f"! {warning}", SIZES[3])]
+    lines = lines[: places.WARNINGS]
+    for number, line in enumerate(lines):
+        y = -places.LINE * (len(lines) - number) + 8
+        gallery.write(LEFT, y, [line], ORANGE, SIZES[3])
+
+
+#: Table: top; height of a row; characters in a heading; smallest and largest size of its font.
+TABLE_TOP, ROW, HEADING, FONT = 80, 17, 9, (8, 13)
+
+
+def show_table(gallery: Gallery, scene: SolvedScene, layout: Layout) -> None:
+    """Show the table of all levels, the level shown marked; some levels if there are too many."""
+    table = scene.table
+    names = [
+        [*wrap(name, HEADING), f"[{size}]" if size else ""]
+        for name, size in zip(table.names, table.units, strict=True)
+    ]
+    top = TABLE_TOP + places.LINE * max(map(len, names)) + ROW / 2
+    count = min(int((layout.height - top) // ROW), len(table.rows))
+    rows = np.unique(np.linspace(0, len(table.rows) - 1, count).round().astype(int)).tolist()
+    columns = zip(names, zip(*table.rows, strict=True), strict=True)
+    widths = [max(map(len, [*words, *cells])) + 3 for words, cells in columns]
+    room = (layout.width - 2 * LEFT) / places.CHARACTER / sum(widths)
+    size = int(np.clip(room, *FONT))
+    rights = LEFT + np.cumsum(widths) * size * places.CHARACTER
+    tag = gallery.write(LEFT, 0, [" "], DARK, size)
+    for right, words, cells in zip(rights, names, zip(*table.rows, strict=True), strict=True):
+        for line, word in enumerate(words):
+            gallery.label(tag, right, TABLE_TOP + places.LINE * line, [word], size, "Right")
+        for line, row in enumerate(rows):
+            gallery.label(tag, right, top + ROW * line, [cells[row]], size, "Right")
+    for line, row in enumerate(rows if scene.times.size else []):
+        marks = [">" if row == step else " " for step in range(len(scene.times))]
+        gallery.write(LEFT / 2, top + ROW * line, marks, RED, size)

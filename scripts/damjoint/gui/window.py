@@ -19,7 +19,10 @@ from .. import InputError, RunError, data
 from ..model.case import Case
 from ..model.mesh import shares
 from ..model.parameters import assignments, listing, start_gmsh
-from . import camera, tree, views
+from . import export, tree, views
+from .camera import result_camera, undeformed_camera
+from .gallery import RED, Gallery
+from .layout import MESSAGE, Layout, open_window
 from .sheet import Request, Sheet
 from .worker import EngineProcess, SolvedScene
 
@@ -27,9 +30,9 @@ from .worker import EngineProcess, SolvedScene
 CHANGES = "check", "load", "reset"
 ACTION, BUTTON = "ONELAB/Action", "ONELAB/Button"
 RUN, STOP = ("Run", "run"), ("Stop", "stop")
-#: Seconds: for the engine's process to start; a turn of the event loop; between progress messages,
-#: as drawing costs more than a step.
-START, TURN, PROGRESS = 60.0, 0.02, 0.2
+#: Seconds: a turn of the event loop; between progress messages, as drawing costs more than a step;
+#: between looks at the size of the drawing area.
+TURN, PROGRESS, LOOK = 0.02, 0.2, 0.4
 
 
 class Session:
@@ -39,7 +42,8 @@ class Session:
     """
 
     def __init__(self, request: Request, windowed: bool = False) -> None:
-        prepare()
+        if not windowed:
+            prepare()
         self.windowed = windowed
         self.engine = EngineProcess()
         self.folder = tempfile.TemporaryDirectory(prefix="damjoint_")
@@ -54,20 +58,23 @@ class Session:
         self.last_status = "", tree.CALM
         self.title = ""
         #: views of the last run, runs for comparison, loads before a run
-        self.gallery: views.Gallery | None = None
+        self.gallery: Gallery | None = None
         self.scene_shown = 0
-        self.earlier: list[tuple[SolvedScene, views.Gallery]] = []
-        self.loads: views.Gallery | None = None
+        self.earlier: list[tuple[SolvedScene, Gallery]] = []
+        self.loads: Gallery | None = None
         #: views of the heading before a run and of an error message
-        self.heading = views.Gallery()
-        self.message = views.Gallery()
+        self.heading = Gallery()
+        self.message = Gallery()
         #: keys of the current drawing and view, to detect changes
         self.drawn: tuple[Any, ...] = ()
         self.fitted: tuple[Any, ...] = ()
-        self.started = self.next_progress = 0.0
+        self.started = self.next_progress = self.next_look = 0.0
+        self.layout = Layout()
+        #: what the user has chosen to see, and the step shown, at the last turn
+        self.display, self.step = views.Display(), 0
         tree.put(tree.text(ACTION, "", visible=False), button(RUN))
         self.show_status("starting ...", tree.CALM)
-        kind, *content = next(self.engine.messages(START), ("late",))
+        kind, *content = next(self.engine.messages(None))
         if kind != "ready":
             raise RunError(f"gui: the engine's process has not started ({kind}); try again")
         self.tree = tree.Tree(*content)
@@ -92,14 +99,31 @@ class Session:
             self.act(action)
         for kind, *content in self.engine.messages(wait):
             getattr(self, f"on_{kind}")(*content)
+        self.follow_window()
+        self.follow_step()
+
+    def follow_window(self) -> None:
+        """Adapt the layout to the drawing area, if its size has changed; looks now and then."""
+        if not self.windowed or time.perf_counter() < self.next_look:
+            return
+        self.next_look = time.perf_counter() + LOOK
+        layout = Layout.of_window(Path(self.folder.name) / "window.opt")
+        if layout != self.layout:
+            self.layout = layout
+            self.redraw()
+
+    def follow_step(self) -> None:
+        """Show the numbers of the step that Gmsh shows."""
+        if self.shows_results and self.gallery and self.gallery.step != self.step:
+            self.step = self.gallery.step
+            self.gallery.set_step(self.step)
+            tree.show_results(self.scenes, self.scene_shown, self.step)
+            self.update()
 
     def act(self, action: str) -> None:
         """Do an action."""
         if action == STOP[1]:
-            self.engine.stop()
-            self.show_status(
-                "stopping after this step; Stop again: at once, without results", tree.WARN
-            )
+            self.stop()
         elif action == RUN[1] and (self.busy == "saving" or not self.tree.sheet):
             self.pending = "run"
         elif action == RUN[1] and self.busy != "running":
@@ -108,19 +132,48 @@ class Session:
             self.busy = "saving"
             self.show_status("saving ...", tree.CALM)
             self.engine.send("save", tree.get_text(tree.FOLDER))
+        elif action in (tree.PICTURE_ACTION, tree.ANIMATION_ACTION) and not self.busy:
+            self.export(action)
         elif action in CHANGES and self.busy:
             self.pending = self.pending or "check"
         elif action == "reset" or not tree.get_text(tree.SAVE):  # the database has been emptied
             self.check(Request(self.tree.sheet.request.case))
-        elif action in CHANGES and not self.other_scene():
+        elif action in CHANGES and not self.other_display():
             self.check()
 
-    def other_scene(self) -> bool:
-        """Show the scene of the last run that the user has chosen; whether it is another."""
-        if not tree.get_text(tree.SCENE) or tree.chosen_scene(self.scenes) == self.scene_shown:
+    def stop(self) -> None:
+        """Stop a run after its current step; the second time at once."""
+        if self.busy == "running":
+            self.engine.stop()
+            self.show_status(
+                "stopping after this step; Stop again: at once, without results", tree.WARN
+            )
+
+    def other_display(self) -> bool:
+        """Show what the user has chosen to see of the last run; whether that has changed."""
+        before = self.display, self.scene_shown
+        self.display = tree.display()
+        scene = tree.chosen_scene(self.scenes) if self.scenes else self.scene_shown
+        if (self.display, scene) == before:
             return False
-        self.show(tree.chosen_scene(self.scenes))
+        if self.shows_results:
+            self.show(scene)
         return True
+
+    def export(self, action: str) -> None:
+        """Write the drawing area as a picture, or all levels as an animation."""
+        folder, gallery = tree.get_text(tree.FOLDER), self.gallery
+        try:
+            if not self.windowed or not self.shows_results or not gallery:
+                raise InputError("nothing to export: press Run in the window first")
+            if action == tree.PICTURE_ACTION:
+                file = export.picture(folder)
+            else:
+                file = export.animation(folder, gallery, len(self.scenes[self.scene_shown].times))
+        except (InputError, OSError) as error:
+            self.show_status(str(error), tree.BAD)
+        else:
+            self.show_status(f"exported: {file}", tree.GOOD)
 
     def check(self, request: Request | None = None) -> None:
         """Let the engine check a request, by default that of the tree."""
@@ -169,7 +222,7 @@ class Session:
             self.tree.show(sheet)  # opening the geometry has declared the parameters again
         if sheet.request != self.last_request:
             self.hide_results()
-            views.show_heading(self.heading, sheet.heading)
+            views.show_heading(self.heading, sheet.heading, self.layout)
         if self.busy == "running":
             self.update()
             return
@@ -180,9 +233,7 @@ class Session:
         elif sheet.request != self.last_request:
             self.free("changed since the run: press Run", tree.CALM)
         else:  # unchanged, or changed back
-            self.outline(False)
-            self.fit_view(sheet.case, True)
-            tree.show_results(self.scenes, self.scene_shown)
+            self.show(self.scene_shown)
             self.free(*self.last_status)
 
     def on_rejected(self, message: str) -> None:
@@ -197,24 +248,25 @@ class Session:
         """The engine's process has ended, by a second Stop or by itself."""
         self.free(message, tree.BAD)
 
-    def on_step(self, at: tuple[int, float]) -> None:
+    def on_step(self, at: tuple[int, int, float]) -> None:
         """A step has converged: show it, a few times a second."""
         if time.perf_counter() < self.next_progress or self.engine.interrupted:
             return
         self.next_progress = time.perf_counter() + PROGRESS
         case = self.tree.sheet.case
-        scene, now = at
+        scene, number, now = at
         several = f"uplift {case.scenes()[scene]['uplift']}, " if case.also_uplift else ""
-        last = case.times[-1]
+        several += f"pass {number}, " if case.accuracy else ""
+        levels = f"level {case.level_at(now):.3g} m of {case.levels[-1]:.4g} m"
         self.show_status(
-            f"running: {several}level {case.level_at(now):.3g} m, t = {now:.3g} of {last:g}",
-            tree.CALM,
+            f"running: {several}{levels}, t = {now:.3g} of {case.times[-1]:g}", tree.CALM
         )
 
     def on_done(self, scenes: list[SolvedScene]) -> None:
         """A run has ended, at its last level or before: show its results."""
         self.keep_or_drop()
         self.scenes, self.title = scenes, self.tree.sheet.heading[0]
+        self.step = max(len(scenes[0].times) - 1, 0)
         self.show(0)
         took = f"{time.perf_counter() - self.started:.2f} s"
         problems = [scene.message for scene in scenes if scene.message]
@@ -245,10 +297,16 @@ class Session:
         tree.show_status(status, color)
         self.message.close()
         if color == tree.BAD:
-            self.message.write(views.LEFT, views.MESSAGE, [status], views.RED, 15)
+            self.show_message(status)
         self.update()
         if self.windowed:
             gmsh.fltk.setStatusMessage(status)
+
+    def show_message(self, message: str) -> None:
+        """Show an error in the drawing area."""
+        for i, line in enumerate(self.layout.wrapped(message, MESSAGE.size)):
+            y = MESSAGE.y + i * MESSAGE.pitch
+            self.message.write(MESSAGE.x, y, [line], RED, MESSAGE.size)
 
     def update(self) -> None:
         """Redraw the window."""
@@ -271,8 +329,7 @@ class Session:
             self.loads.close()
         self.loads = views.show_undeformed_loads(case)
         self.outline(True)
-        camera.rotate(case["dim"] == 3)
-        self.fit_view(case, False)
+        self.fit_view()
 
     def outline(self, shown: bool) -> None:
         """Show the undeformed outline with its loads, or the results."""
@@ -281,33 +338,58 @@ class Session:
             self.loads.show(shown)
         if self.gallery:
             self.gallery.show(not shown)
-        if not shown:
-            self.heading.close()
 
-    def fit_view(self, case: Case, beside_graphs: bool) -> None:
-        """Position the scene in the window if it has changed; else keep the user's view."""
-        key = beside_graphs, camera.frame(case, not beside_graphs).tolist()
+    @property
+    def shows_results(self) -> bool:
+        """Whether the drawing area shows the results of the tree's request."""
+        return bool(self.scenes) and tree.get_text(tree.VERDICT) != tree.NOT_RUN
+
+    def fit_view(self) -> None:
+        """Position what is shown in the drawing area if either has changed; else keep the user's
+        view.
+        """
+        if self.shows_results:
+            scene = self.scenes[self.scene_shown]
+            camera = result_camera(scene.result.case, scene.bodies)
+            width = self.layout.scene_width
+        else:
+            camera, width = undeformed_camera(self.tree.sheet.case), self.layout.width
+        key = camera.box.tolist(), camera.turn, self.layout, width
         if self.fitted != key:
+            if not self.fitted or self.fitted[1] != camera.turn:
+                camera.rotate()  # else keeps a rotation by the user
             self.fitted = key
             gmsh.graphics.draw()  # updates the bounding box
-            camera.fit(case, views.GRAPHS_WIDTH if beside_graphs else 0)
+            camera.fit(self.layout, width)
+
+    def redraw(self) -> None:
+        """Draw again what is shown, in the current layout."""
+        if self.shows_results:
+            self.show(self.scene_shown)
+        elif self.tree.sheet:
+            self.heading.close()
+            views.show_heading(self.heading, self.tree.sheet.heading, self.layout)
+            self.fit_view()
+            self.update()
 
     def show(self, scene: int) -> None:
-        """Replace the views by those of a scene of the last run."""
-        if self.gallery:
-            self.gallery.close()
-        self.scene_shown = scene
+        """Replace the views by those of a scene of the last run, at the same step."""
+        # views that would be removed later, too, would change the indices of those of the gallery
+        for gallery in (self.gallery, self.heading, self.message):
+            if gallery:
+                gallery.close()
+        self.scene_shown, shown = scene, self.scenes[scene]
+        self.step = min(self.step, max(len(shown.times) - 1, 0))
         before = [earlier for earlier, _ in self.earlier]
-        self.gallery = views.show(self.scenes[scene], self.title, before)
+        self.gallery = views.show(shown, self.title, self.layout, self.display, before, self.step)
         gmsh.model.mesh.clear()  # a mesh drawn by the user may differ from that of the run
         self.outline(False)
-        self.fit_view(self.scenes[scene].result.case, True)
-        tree.show_results(self.scenes, scene)
+        tree.show_results(self.scenes, scene, self.step)
+        self.fit_view()
         self.update()
 
     def keep_or_drop(self) -> None:
         """Archive the current results for comparison, or remove them."""
-        self.drop_graphs()
         if not tree.get_number(tree.KEEP):
             self.drop_results()
         elif self.gallery:
@@ -315,20 +397,13 @@ class Session:
             self.earlier.append((self.scenes[self.scene_shown], self.gallery))
             self.gallery = None
 
-    def drop_graphs(self) -> None:
-        """Remove Gmsh's own graphs of results, which do not update."""
-        for tag in gmsh.view.getTags():
-            if gmsh.view.option.getString(tag, "Name") in tree.RESULTS.values():
-                gmsh.view.remove(tag)
-
     def hide_results(self) -> None:
         """Show the undeformed outline without results, as none are of the tree's request."""
         tree.hide_results()
-        self.drop_graphs()
         self.heading.close()
         self.outline(True)
         if self.tree.sheet:
-            self.fit_view(self.tree.sheet.case, False)
+            self.fit_view()
         self.update()
 
     def drop_results(self) -> None:
@@ -348,9 +423,6 @@ OPTIONS = {
     "Solver.AutoCheck": 1,
     "General.Verbosity": 3,
     "General.Terminal": 0,
-    "General.MenuWidth": 560,
-    "General.GraphicsWidth": 1600,
-    "General.GraphicsHeight": 900,
     "General.SmallAxes": 0,
     "General.Antialiasing": 1,
     "General.BackgroundGradient": 0,
@@ -395,7 +467,7 @@ def gui(request: Request) -> None:
     ):
         raise RunError("gui: needs a display; set DISPLAY, or use damjoint run")
     prepare()
-    gmsh.fltk.initialize()
+    open_window()
     session = Session(request, windowed=True)
     try:
         while gmsh.fltk.isAvailable():

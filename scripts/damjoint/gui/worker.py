@@ -26,9 +26,11 @@ from ..model.fields import Field
 from ..model.mesh import Body
 from ..model.parameters import declared
 from ..model.results import Results
+from ..post.summary import Table
 from ..runner import early_end, write_outcomes
-from ..statics.verdict import failed, statement
+from ..statics.verdict import decisive_joint, failed, statement
 from ..storage import atomic_write
+from .numbers import Numbers, table_of_levels, warnings
 from .sheet import Request, Sheet, case_text, check_request, titles
 
 #: First line of case files that Save may replace.
@@ -48,16 +50,21 @@ class SolvedScene:
     #: why it ended or failed; empty if the dam stands
     message: str
     failed: bool
+    #: at each of `times`
+    numbers: list[Numbers]
+    table: Table
+    warnings: list[str]
 
     @staticmethod
     def of(outcome: Outcome) -> SolvedScene:
         """Convert an outcome; computes the bodies' fields."""
         result, (state, _) = outcome.result, early_end(outcome)
+        own = result.joints[decisive_joint(result)]
         message = statement(result)
         if state and isinstance(outcome.error, (InputError, RunError)):
             message = str(outcome.error)
         elif state:
-            message = f"{state} at level {result.last['level']:.4g} m" if result.last else state
+            message = reached(state, result)
         return SolvedScene(
             result,
             outcome.mesh().bodies,
@@ -65,12 +72,41 @@ class SolvedScene:
             end_state=state,
             message=message,
             failed=bool(state) or failed(result),
+            numbers=[Numbers.at(own, time) for time in np.unique(result.joint["time"])],
+            table=table_of_levels(own),
+            warnings=warnings(result),
         )
+
+    @property
+    def joint(self) -> int:
+        """The number of the joint whose curves and numbers are shown."""
+        return decisive_joint(self.result)
+
+    @property
+    def own(self) -> Results:
+        """The results of that joint."""
+        return self.result.joints[self.joint]
 
     @property
     def times(self) -> np.ndarray:
         """Requested times that were reached: the steps of every view."""
         return np.unique(self.result.joint["time"])
+
+
+def reached(state: str, result: Results) -> str:
+    """What a run has reached before it was interrupted, or failed: level, mesh, estimated error."""
+    case, estimate = result.case, result.info.get("error_estimate")
+    if not result.last:
+        return state
+    words = f"{state} at level {result.last['level']:.4g} m of {case.levels[-1]:.4g} m"
+    if estimate:
+        meshes = estimate["n_joint"]
+        errors = [q["relative"] for q in estimate["quantities"].values() if q["used"]]
+        words += f" on mesh {len(meshes)} (n_joint = {meshes[-1]})"
+        if errors:
+            words += f"; estimated errors up to {accuracy.percent(max(errors))}"
+            words += f" of {accuracy.percent(estimate['accuracy'])} required"
+    return words
 
 
 class Stop:
@@ -101,7 +137,7 @@ def serve(pipe: Connection) -> None:
     """Process the messages of the window until it closes.
 
     In: ("check", Request), ("run", Request), ("save", folder). Out: ("ready", titles, parameters),
-    ("checked", Sheet), ("rejected", message), ("step", (number of the scene, time)),
+    ("checked", Sheet), ("rejected", message), ("step", (number of the scene, pass, time)),
     ("done", [SolvedScene]), ("failed", message), ("saved", folder).
     """
     stop = Stop()
@@ -132,14 +168,19 @@ def serve(pipe: Connection) -> None:
 
 
 def run_case(sheet: Sheet, pipe: Connection, stop: Stop) -> list[Outcome]:
-    """Solve the scenes of a case; sends a message after each converged step.
+    """Solve the scenes of a case; sends a message after each converged step, with the number of the
+    pass through the levels: an accuracy takes several, with smaller steps and elements.
 
     Raises an error before the first step; a later error is in the outcome.
     """
     outcomes = []
+    last = [0, 1, 0.0]
 
     def on_step(scene: int, time: float) -> None:
-        pipe.send(("step", (scene, time)))
+        before, number, reached_time = last
+        number = 1 if scene != before else number + (time <= reached_time)
+        last[:] = scene, number, time
+        pipe.send(("step", (scene, number, time)))
         stop.after_step()
 
     stop.requested, stop.at_once = False, True
@@ -197,8 +238,8 @@ class EngineProcess:
         with contextlib.suppress(OSError):  # `messages` reports a dead process
             self.pipe.send((kind, argument))
 
-    def messages(self, wait: float = 0.0) -> Iterator[tuple[Any, ...]]:
-        """Receive messages; wait: longest time for the first one [s].
+    def messages(self, wait: float | None = 0.0) -> Iterator[tuple[Any, ...]]:
+        """Receive messages; wait: longest time for the first one [s], None: until it comes.
 
         If the process has died: ("died", message), and a new process is started.
         """

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import RUN_GEO, InputError, data
-from ..arrays import Settings, Value, Values
+from ..arrays import Setting, Settings, Value, Values
 from ..laws import LAWS, Law
 from . import casefile
 from .arithmetic import number
@@ -61,6 +61,25 @@ SECTION = (
 )
 
 
+@dataclass(frozen=True)
+class Source:
+    """What a case is made from: the statements of a case file, and what differs from them; all but
+    the first two as in `load`.
+    """
+
+    path: Path
+    text: casefile.CaseText
+    overrides: dict[str, Setting]
+    levels: str | Sequence[float] | None = None
+    tail_levels: str | Sequence[float] | None = None
+    steps: int | None = None
+    accuracy: str | None = None
+
+    def with_overrides(self, overrides: Settings) -> Source:
+        """The source with further overrides, which win."""
+        return replace(self, overrides={**self.overrides, **overrides})
+
+
 @dataclass(frozen=True, kw_only=True)
 class OfJoint:
     """What a joint of several has for itself: the values that differ from the case's, and SECTION
@@ -100,6 +119,8 @@ class Case(ParameterValues):
     geometry: Path | None = None
     #: file of the ground's acceleration, for `damjoint quake`
     record: Path | None = None
+    #: what it is made from; None for a case of stored results, which can not be varied
+    source: Source | None = field(default=None, compare=False, repr=False)
     #: SHARED of pro/parameters.pro
     shared: dict[str, list[float]] = field(default_factory=dict, compare=False, repr=False)
     #: SECTION of pro/section.pro
@@ -252,16 +273,38 @@ class Case(ParameterValues):
         checked = {name: declared()[name].check(value) for name, value in values.items()}
         if not checked.keys() <= independent():
             raise KeyError(*checked.keys() - independent())
-        result = replace(self.with_values(checked), published=False)
+        source = self.source and self.source.with_overrides(checked)
+        result = replace(self.with_values(checked), source=source, published=False)
         check_joints(result)
         return result
 
+    def varied(
+        self,
+        overrides: Settings | None = None,
+        levels: str | Sequence[float] | None = None,
+        tail_levels: str | Sequence[float] | None = None,
+        steps: int | None = None,
+        accuracy: str | None = None,
+    ) -> Case:
+        """The case with other values of any parameters, and with another loading or accuracy where
+        they are not None; arguments as in `load`. The parameters that follow others follow them.
+
+        Raises InputError.
+        """
+        if self.source is None:
+            raise InputError(f"case {self.name}: of stored results; must be a case that was loaded")
+        given = {"levels": levels, "tail_levels": tail_levels, "steps": steps, "accuracy": accuracy}
+        changes: dict[str, Any] = {n: value for n, value in given.items() if value is not None}
+        return resolve(replace(self.source.with_overrides(overrides or {}), **changes))
+
     def scenes(self) -> list[Case]:
         """The case itself, then with its further uplift modes."""
-        others = (
-            replace(self.with_values({"uplift": mode}), also_uplift=()) for mode in self.also_uplift
-        )
-        return [self, *others]
+        return [self, *(self.with_uplift(mode) for mode in self.also_uplift)]
+
+    def with_uplift(self, mode: str) -> Case:
+        """The case with another uplift, and no further uplift modes."""
+        source = self.source and self.source.with_overrides({"uplift": mode})
+        return replace(self.with_values({"uplift": mode}), source=source, also_uplift=())
 
 
 def between(levels: tuple[float, ...], time: float) -> float:
@@ -364,20 +407,32 @@ def load(
     """Read a case file, apply overrides, resolve the parameters that follow others, check all.
 
     case: letter, name or path; overrides: {name: value, or a value for each joint}, also
-    lift_heights [m]; levels, tail_levels: [m] at t = 1, 2, 3,
-    also as a text 'a,b,c'; steps: equal steps between two levels; accuracy: coarse, standard, fine
-    or a percentage, chooses order, first mesh (overrides win) and one step per level; record: file
-    of the ground's acceleration. Raises InputError.
+    lift_heights [m]; levels, tail_levels: [m] at t = 1, 2, 3, also as a text 'a,b,c'; steps: equal
+    steps between two levels; accuracy: coarse, standard, fine or a percentage, chooses order, first
+    mesh (overrides win) and one step per level; record: file of the ground's acceleration. Raises
+    InputError.
     """
-    path, overrides = case_file(case), dict(overrides or {})
-    error = None
+    path = case_file(case)
+    text = casefile.read(path)
+    if record:
+        text.texts["record"] = str(record)
+    return resolve(Source(path, text, dict(overrides or {}), levels, tail_levels, steps, accuracy))
+
+
+def resolve(source: Source) -> Case:
+    """The case of a source, see `load`.
+
+    Raises InputError.
+    """
+    path, file, overrides = source.path, source.text, source.overrides
+    levels, tail_levels = source.levels, source.tail_levels
+    steps, accuracy, error = source.steps, source.accuracy, None
     if accuracy is not None:
-        error, plain = relative_error(accuracy), load(case, overrides)
-        overrides = first_mesh(plain) | overrides
+        error, plain = relative_error(accuracy), resolve(Source(path, file, overrides))
+        overrides = {**first_mesh(plain), **overrides}
         steps = steps or (1 if plain["drive"] == "level" else None)
     if steps is not None:
         check_steps(steps)
-    file = casefile.read(path)
     lists = {name: tuple(values) for name, values in file.lists.items()}
     if levels is not None:
         lists["levels"] = levels_of("levels", levels)
@@ -413,7 +468,8 @@ def load(
         hardening_asked=bool(variables["hardening_asked"][0]),
         accuracy=error,
         geometry=geometry,
-        record=record or (Path(file.texts["record"]) if "record" in file.texts else None),
+        record=Path(file.texts["record"]) if "record" in file.texts else None,
+        source=source,
         shared={n: variables[n] for n in SHARED},
         section={n: variables[n] for n in SECTION},
         lift_heights=lifts,

@@ -62,9 +62,7 @@ def levels_table(result: Results) -> Table:
     at the end of the run.
     """
     history, case = result.history, result.case
-    rows = np.flatnonzero([np.isclose(case.requested, t).any() for t in history["time"]])
-    if len(history["time"]):
-        rows = np.union1d(rows, len(history["time"]) - 1)
+    rows = requested_rows(result)
     # a joint that is closed everywhere has its "largest opening" below 0
     history = history | {"max_opening": np.maximum(history["max_opening"], 0)}
     names, sizes, cells = table_of(
@@ -78,6 +76,13 @@ def levels_table(result: Results) -> Table:
     thirds = (gravity.position(x, case.joint_length) for x in history["x_resultant"][rows])
     cells = [(*row, third) for row, third in zip(cells, thirds, strict=True)]
     return Table([*names, "N' in"], [*sizes, ""], cells)
+
+
+def requested_rows(result: Results) -> np.ndarray:
+    """Indices in the history of the requested levels that were reached, and of its last row."""
+    times = result.history["time"]
+    rows = np.flatnonzero([np.isclose(result.case.requested, t).any() for t in times])
+    return np.union1d(rows, len(times) - 1) if len(times) else rows
 
 
 def text(result: Results) -> str:

@@ -126,25 +126,22 @@ class CriticalValue:
 class Search:
     """The search for a critical value."""
 
-    def __init__(
-        self,
-        case: str,
-        of: str,
-        settings: Settings | None = None,
-        levels: str | Sequence[float] | None = None,
-        tail_levels: str | Sequence[float] | None = None,
-    ) -> None:
-        """case, settings, levels, tail_levels: as in model.case.load; of: level, strength, uplift
-        or a parameter. Raises InputError.
+    def __init__(self, own: Case, of: str) -> None:
+        """own: the case, of model.case.load; of: level, strength, uplift or a parameter.
+
+        Raises InputError.
         """
-        self.source = case, levels, tail_levels
         self.of, self.name = of, {"uplift": "drain_effectiveness"}.get(of, of)
-        own = load(case, settings, levels, tail_levels)
         #: partial factors of the case; they are part of the reduced strength, not of a check
         self.partial = {name: own[factor] for name, factor in PARTIAL.items()}
         full = dict.fromkeys(PARTIAL.values(), 1.0)
+        self.settings: dict[str, Setting] = {
+            **QUICK,
+            **own.source.overrides,
+            "drive": "level",
+            **full,
+        }
         own = own.with_values(full)
-        self.settings = QUICK | dict(settings or {}) | {"drive": "level"} | full
         for joint in own.joints:
             if joint.law.hardening_parameter and not own.hardening_asked:
                 self.settings[joint.law.hardening_parameter] = 0.0
@@ -188,7 +185,6 @@ class Search:
 
         Raises InputError.
         """
-        name, levels, tails = self.source
         if self.of == "strength":
             factors = {n: value * self.partial.get(n, 1.0) for n in STRENGTH}
             joints = self.own.joints
@@ -196,7 +192,7 @@ class Search:
             changed["pena_rupture"] = -1.0
         else:
             changed = {self.name: value}
-        return load(name, self.settings | changed, levels, tails)
+        return self.own.varied(self.settings | changed)
 
     def path(self, value: float, case: Case, target: float | None = None) -> FailurePath:
         """The equilibrium path of a case, followed to a first estimate; adds a trial."""
@@ -225,9 +221,9 @@ class Search:
 
     def level(self) -> CriticalValue:
         """The highest level of the path, beyond the case's highest level."""
-        name, *_ = self.source
         last = int(np.argmax(self.own.levels)) + 1
-        case = load(name, self.settings, self.own.levels[:last], self.own.tail_levels[:last])
+        levels, tails = self.own.levels[:last], self.own.tail_levels[:last]
+        case = self.own.varied(self.settings, levels, tails)
         path = self.path(max(case.levels), case, case.highest_level)
         path.follow(SURE)
         path.refine()
@@ -517,7 +513,7 @@ def critical(
     Returns the result, and its lines of text. An interrupted search writes its trials.
     Raises InputError, RunError.
     """
-    search = Search(case, of, settings, levels, tail_levels)
+    search = Search(load(case, settings, levels, tail_levels), of)
     name = search.own.name
     out = out or Path("out") / f"{name}_critical"
     folders.check_writable(out)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -15,7 +15,7 @@ from .. import InputError
 from ..arrays import Array, Value, Values
 from ..model import parameters
 from ..model.arithmetic import arithmetic_value, explained, quantity
-from ..model.case import Case, load
+from ..model.case import Case
 
 #: A row of a result file: texts by column.
 Row: TypeAlias = dict[str, str]
@@ -23,43 +23,32 @@ Row: TypeAlias = dict[str, str]
 #: Limit of the number of rows.
 MOST_ROWS = 1_000_000
 
+#: Designs of a sample: Latin hypercube, independent random rows.
+DESIGNS = ("latin", "monte-carlo")
+
 #: Significant digits of the values, which are those of a result file.
 DIGITS = 12
 
 
 @dataclass(frozen=True)
-class Schedule:
-    """Levels, steps and accuracy, as `load` takes them; None: those of the case."""
-
-    levels: str | Sequence[float] | None = None
-    tail_levels: str | Sequence[float] | None = None
-    steps: int | None = None
-    accuracy: str | None = None
-
-    def load(self, case: str, settings: Values) -> Case:
-        """The case with some settings.
-
-        Raises InputError.
-        """
-        return load(
-            case, settings, self.levels, self.tail_levels, self.steps, accuracy=self.accuracy
-        )
-
-
-#: Levels, steps and mesh of the case.
-AS_IN_CASE = Schedule()
-
-
-@dataclass(frozen=True)
 class Sample:
-    """Distributions by name, as texts; number of values, design and seed of the sample."""
+    """A random sample: number of values, and distributions of scipy.stats by parameter, as texts.
+
+    Sample(100, {"mu": "normal(0.8,0.1)"}); design: latin (hypercube) or monte-carlo; correlate:
+    rank correlations, "A,B=R" each. Raises InputError.
+    """
 
     number: int
     distributions: dict[str, str]
     design: str = "latin"
     seed: int = 0
-    #: rank correlations, 'A,B=R' each
-    correlate: list[str] = field(default_factory=list)
+    correlate: Sequence[str] = ()
+
+    def __post_init__(self) -> None:
+        if self.number not in range(1, MOST_ROWS + 1):
+            raise InputError(f"number = {self.number}: must be an integer from 1 to {MOST_ROWS}")
+        if self.design not in DESIGNS:
+            raise InputError(f"design = {self.design}: must be one of {', '.join(DESIGNS)}")
 
     def values(self) -> dict[str, list[Value]]:
         """The values by name.
@@ -69,7 +58,7 @@ class Sample:
         from . import sampling
 
         drawn = sampling.draw(
-            self.number, self.distributions, self.design, self.seed, self.correlate
+            int(self.number), self.distributions, self.design, self.seed, list(self.correlate)
         )
         values = {}
         for name, numbers in drawn.items():
@@ -108,6 +97,14 @@ def rounded(number: float) -> float:
 def in_file(value: Value) -> str:
     """A value as a result file has it."""
     return value if isinstance(value, str) else f"{value:.{DIGITS}g}"
+
+
+def listed(name: str, values: Sequence[Value]) -> list[Value]:
+    """Values of a parameter or of level, checked and rounded as a result file has them.
+
+    Raises InputError.
+    """
+    return [checked(name, v if isinstance(v, str) else rounded(v)) for v in values]
 
 
 def values_of(text: str) -> tuple[str, list[Value]]:
@@ -163,7 +160,7 @@ def sample_of(
         if name in distributions:
             raise InputError(f"--sample {name}: must be given once")
         distributions[name] = distribution
-    return Sample(int(number), distributions, design, seed, list(correlate))
+    return Sample(int(number), distributions, design, seed, correlate)
 
 
 @dataclass(frozen=True)
@@ -252,6 +249,20 @@ def plan_of(
         if not expression:
             raise InputError(f"--tie {text}: must be NAME=EXPRESSION, such as adhesion=2e5*mu")
         ties.append((name, expression))
+    return plan_with(axes, ties, sample, settings, critical)
+
+
+def plan_with(
+    axes: Sequence[tuple[str, list[Value]]],
+    ties: Sequence[tuple[str, str]],
+    sample: Sample | None,
+    settings: Values,
+    critical: str,
+) -> Plan:
+    """The plan of checked values by name, expressions by name and a sample; the rest as `plan_of`.
+
+    Raises InputError.
+    """
     sampled = [*sample.distributions] if sample else []
     names = [("--vary", n) for n, _ in axes] + [("--sample", n) for n in sampled]
     names += [("--tie", n) for n, _ in ties]
@@ -271,24 +282,21 @@ def plan_of(
     return Plan(dict(axes), sample.values() if sample else {}, dict(ties), critical)
 
 
-def cases_of(
-    case: str, plan: Plan, settings: Values, schedule: Schedule
-) -> Iterator[tuple[dict[str, Value], Case]]:
+def cases_of(base: Case, plan: Plan) -> Iterator[tuple[dict[str, Value], Case]]:
     """The values of each row, and the case with them.
 
-    level: the last level, after the levels of the case (or the schedule) below it. Raises
-    InputError.
+    level: the last level, after the levels of the case below it. Raises InputError.
     """
-    base, independent = schedule.load(case, settings), parameters.independent()
+    independent = parameters.independent()
     # Gmsh's parser resolves a case once for all rows that differ in independent parameters only
     resolved: dict[tuple[Value, ...], Case] = {}
     for row in plan.rows():
         alone = {n: v for n, v in row.items() if n in independent}
         key = tuple(v for n, v in row.items() if n not in alone)
         if key not in resolved:
-            changed = {**settings, **{n: v for n, v in row.items() if n != "level"}}
-            own = replace(schedule, **up_to(base, row["level"])) if "level" in row else schedule
-            resolved[key] = own.load(case, changed)
+            changed = {n: v for n, v in row.items() if n != "level"}
+            loading = up_to(base, row["level"]) if "level" in row else {}
+            resolved[key] = base.varied(changed, **loading)
         yield row, resolved[key].changed(alone)
 
 

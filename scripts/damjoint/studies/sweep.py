@@ -22,8 +22,8 @@ from .. import InputError, RunError, __version__, accuracy
 from ..arrays import Value, Values
 from ..engines import engine_of
 from ..joint.interface import Interface, interface_of
-from ..model.case import Case, first_mesh
-from ..model.results import HISTORY
+from ..model.case import Case, first_mesh, resolve
+from ..model.results import history_columns
 from ..post.tables import as_text
 from ..progress import track
 from ..solver.load_stepper import LoadStepper
@@ -31,12 +31,14 @@ from ..statics.limit import mechanism
 from ..statics.verdict import failed, statement, verdict
 from ..storage import lock
 from .critical import Search
-from .plan import AS_IN_CASE, Plan, Row, Schedule, cases_of, column_of, in_file
+from .plan import Plan, Row, cases_of, column_of, in_file
 
 
 def key_of(case: Case) -> str:
     """The key of a scene and its loading in a result file."""
-    identity = sorted(case.values.items()), case.levels, case.tail_levels, case.times, __version__
+    of_joints = ((own.name, sorted(own.values.items())) for own in case.of_joints)
+    loading = case.levels, case.tail_levels, case.times
+    identity = sorted(case.values.items()), *loading, __version__, *of_joints
     return hashlib.sha256(repr(identity).encode()).hexdigest()[:16]
 
 
@@ -95,7 +97,7 @@ def last_rows(tasks: list[Task]) -> list[dict[str, Value]]:
 
 def last_row(task: Task, solved: Solved) -> dict[str, Value]:
     """The row of a case; an error is an outcome, and the sweep continues."""
-    row: dict[str, Value] = dict.fromkeys(HISTORY, "")
+    row: dict[str, Value] = dict.fromkeys(history_columns(task.case), "")
     try:
         interface = interface_of(task.case)
         mode, why = mechanism(task.case, interface) if task.quick else ("", "")
@@ -127,13 +129,20 @@ def critical_value(task: Task) -> dict[str, Value]:
     return dict(zip(task.columns, cells, strict=True))
 
 
-def task_of(case: str, plan: Plan, settings: Values, row: Values, loaded: Case) -> Task:
-    """The task of a row: its values, and the case with them."""
-    search = None
-    if plan.critical:
-        changed = {**settings, **{n: loaded[n] for n in row if n != "level"}}
-        search = partial(Search, case, plan.critical, changed, loaded.levels, loaded.tail_levels)
-    return Task(loaded, bool(plan.sampled), search, plan.critical_columns)
+def planned(case: Case, plan: Plan) -> Iterator[tuple[str, Values, Task]]:
+    """Key, values and task of each row of a plan.
+
+    Raises InputError.
+    """
+    for row, varied in cases_of(case, plan):
+        search = partial(search_of, varied, plan.critical) if plan.critical else None
+        yield key_of(varied), row, Task(varied, bool(plan.sampled), search, plan.critical_columns)
+
+
+def search_of(case: Case, quantity: str) -> Search:
+    """The search of a row's critical value, with one step per level."""
+    levels = {"levels": case.levels, "tail_levels": case.tail_levels}
+    return Search(resolve(replace(case.source, **levels, steps=None)), quantity)
 
 
 def bundles(tasks: dict[str, Task]) -> list[list[str]]:
@@ -256,33 +265,51 @@ def spread(
                 ) from None
 
 
-def meshed(
-    case: str, settings: Values, schedule: Schedule
-) -> tuple[dict[str, Value], Schedule, str]:
-    """Settings and schedule of a sweep on the mesh that the schedule's accuracy requires of the
-    case before anything is varied; the estimated errors, as a sentence.
+def compute(
+    tasks: dict[str, Task], jobs: int | None, scheduler: str | None = None
+) -> Iterator[tuple[str, dict[str, Value]]]:
+    """(key, row) of each finished task, in `jobs` processes (default: one per core) or by a
+    scheduler.
+
+    Raises InputError before the first row, RunError.
+    """
+    if not tasks:
+        return iter(())
+    first = next(iter(tasks.values()))
+    if first.search:
+        first.search()  # checks the quantity
+    interface_of(first.case)  # condensed before the processes start, which read it
+    return spread(tasks, jobs or os.cpu_count() or 1, scheduler)
+
+
+def meshed(case: Case) -> tuple[Case, str]:
+    """The case on the mesh that its accuracy requires before anything is varied; the estimated
+    errors, as a sentence.
 
     Raises InputError, RunError.
     """
-    base = schedule.load(case, settings)
     (outcome, *_) = accuracy.solve(
-        replace(base, also_uplift=()), engine_of(base, "auto"), lambda *_: None, False
+        replace(case, also_uplift=()), engine_of(case, "auto"), lambda *_: None, False
     )
     if outcome.error:
         raise outcome.error
     refined = {n: outcome.result.case[n] for n in accuracy.REFINED}
-    steps = schedule.steps or (1 if base["drive"] == "level" else None)
     estimate = outcome.result.info["error_estimate"]["statement"]
-    mesh = {**first_mesh(base), **settings, **refined}
-    return mesh, replace(schedule, steps=steps, accuracy=None), estimate
+    steps = case.source.steps or (1 if case["drive"] == "level" else None)
+    mesh = {**first_mesh(case), **case.source.overrides, **refined}
+    return resolve(replace(case.source, overrides=mesh, steps=steps, accuracy=None)), estimate
+
+
+def check_jobs(jobs: int | None) -> None:
+    """Raise InputError if a number of processes is not positive."""
+    if jobs is not None and jobs < 1:
+        raise InputError(f"jobs = {jobs}: must be an integer >= 1")
 
 
 def sweep(
-    case: str,
+    case: Case,
     plan: Plan,
-    settings: Values,
     out: Path,
-    schedule: Schedule = AS_IN_CASE,
     jobs: int | None = None,
     scheduler: str | None = None,
 ) -> tuple[int, list[Row]]:
@@ -292,35 +319,25 @@ def sweep(
     level_asked), the columns of history.csv, OUTCOME, the critical value. Each finished row is
     written at once, so that an interrupted sweep can be continued. Raises InputError, RunError.
     """
-    if jobs is not None and jobs < 1:
-        raise InputError(f"jobs = {jobs}: must be an integer >= 1")
+    check_jobs(jobs)
     if not out.parent.is_dir():
         raise InputError(f"out = {out}: must be a file in an existing folder")
-    values: dict[str, Values] = {}
-    tasks: dict[str, Task] = {}
-    keys = []
-    for row, loaded in cases_of(case, plan, settings, schedule):
-        keys.append(key_of(loaded))
-        values[keys[-1]] = row
-        tasks[keys[-1]] = task_of(case, plan, settings, row, loaded)
-    results = [*HISTORY, *OUTCOME, *plan.critical_columns]
+    rows = list(planned(case, plan))
+    values = {key: row for key, row, _ in rows}
+    of_steps = list(history_columns(case))
+    results = [*of_steps, *OUTCOME, *plan.critical_columns]
     columns = ["key", *map(column_of, plan.names), *results]
-    done = read_done(out, columns, (*HISTORY, "failed"))
-    missing = {key: task for key, task in tasks.items() if key not in done}
-    if missing:
-        first = next(iter(missing.values()))
-        if first.search:
-            first.search()  # checks the quantity
-        interface_of(first.case)  # condensed before the processes start, which read it
+    done = read_done(out, columns, (*of_steps, "failed"))
+    missing = {key: task for key, _, task in rows if key not in done}
+    computed = compute(missing, jobs, scheduler)
     with out.open("a", newline="") as file:
         lock(file.fileno(), out)
         writer = csv.writer(file, lineterminator="\n")
         if not file.tell():
             writer.writerow(columns)
-        rows = spread(missing, jobs or os.cpu_count() or 1, scheduler) if missing else ()
-        for key, result in track(rows, f"sweep {case}", len(missing)):
+        for key, result in track(computed, f"sweep {case.name}", len(missing)):
             cells = *values[key].values(), *(result[c] for c in results)
             writer.writerow([key, *(as_text(in_file(cell)) for cell in cells)])
             file.flush()
     done = read_done(out, columns, ())
-    return len(missing), [done[key] for key in keys]
+    return len(missing), [done[key] for key, *_ in rows]

@@ -1,0 +1,57 @@
+"""Pictures and animations of the drawing area; needs a window."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+import gmsh
+from PIL import Image
+
+from .. import InputError
+from .gallery import Gallery
+
+#: Seconds for which an animation shows a level, and its last level.
+LEVEL, LAST = 0.6, 2.0
+
+
+def picture(folder: str) -> Path:
+    """Write the drawing area into a folder as window.png.
+
+    Raises InputError, OSError.
+    """
+    file = target(folder, "window.png")
+    gmsh.graphics.draw()
+    gmsh.write(str(file))
+    return file
+
+
+def animation(folder: str, gallery: Gallery, steps: int) -> Path:
+    """Write all steps of a gallery into a folder as window.gif; shows the same step as before.
+
+    Raises InputError, OSError.
+    """
+    file, before = target(folder, "window.gif"), gallery.step
+    with tempfile.TemporaryDirectory(prefix="damjoint_") as scratch:
+        frames = []
+        for step in range(steps):
+            gallery.set_step(step)
+            with Image.open(picture(scratch)) as frame:
+                frames.append(frame.convert("RGB"))
+    gallery.set_step(before)
+    if not frames:
+        raise InputError("nothing to export: no level was reached")
+    milliseconds = [1000 * LEVEL] * (steps - 1) + [1000 * LAST]
+    frames[0].save(file, save_all=True, append_images=frames[1:], duration=milliseconds, loop=0)
+    return file
+
+
+def target(folder: str, name: str) -> Path:
+    """A file in a folder, which is created.
+
+    Raises InputError if there is no folder.
+    """
+    if not folder.strip():
+        raise InputError("out: name a folder")
+    Path(folder).mkdir(parents=True, exist_ok=True)
+    return Path(folder) / name
