@@ -20,7 +20,7 @@ from ..arrays import Array
 from ..fem.cache import key_of, sources
 from ..model.case import Case
 from ..storage import atomic_write
-from .history import QuakeHistory
+from .history import Peak, QuakeHistory
 from .scheme import Motion
 from .step import Moving
 from .stepper import Earthquake
@@ -73,6 +73,9 @@ def write(path: Path, key: str, quake: Earthquake, history: QuakeHistory) -> Non
         "columns": np.array(list(history.rows)),
         "rows": np.array(list(history.rows.values())),
         "stress": np.array(history.stress),
+        "peaks": np.array(list(history.peaks)),
+        "peak_values": np.array([[peak.value, peak.time] for peak in history.peaks.values()]),
+        "peak_states": np.array([peak.displacement for peak in history.peaks.values()]),
     }
     content |= {f"variable_{i}": leaf for i, leaf in enumerate(leaves(variables))}
     with atomic_write(path) as part, part.open("wb") as file:
@@ -98,7 +101,10 @@ def read(path: Path, key: str, quake: Earthquake) -> QuakeHistory | None:
             node_variables=replace(static.node_variables, joints=nodes),
         )
         rows = dict(zip(stored["columns"].tolist(), stored["rows"].tolist(), strict=True))
-        history = QuakeHistory(rows, list(stored["stress"]))
+        names = stored["peaks"].tolist()
+        values = zip(stored["peak_values"].tolist(), stored["peak_states"], strict=True)
+        peaks = {n: Peak(v[0], v[1], w) for n, (v, w) in zip(names, values, strict=True)}
+        history = QuakeHistory(rows, list(stored["stress"]), peaks)
         quake.now = Moving(
             time=float(stored["time"]),
             state=state,

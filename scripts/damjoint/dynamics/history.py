@@ -55,6 +55,25 @@ def stress_at_nodes(quake: Earthquake, state: State) -> Array:
     return joint.mean_at_nodes(traction[:, 0])[np.argsort(joint.xi)]
 
 
+#: States whose displacement is stored: column of quake.csv and sign.
+PEAK_STATES = {
+    "crest downstream": ("crest_ux", 1),
+    "crest upstream": ("crest_ux", -1),
+    "heel open": ("heel_opening", 1),
+    "toe open": ("toe_opening", 1),
+}
+
+
+@dataclass(frozen=True)
+class Peak:
+    """A state in which a quantity is largest."""
+
+    value: float
+    time: float
+    #: displacement since the static state (n,)
+    displacement: Array
+
+
 @dataclass
 class QuakeHistory:
     """Rows of an earthquake so far."""
@@ -63,6 +82,8 @@ class QuakeHistory:
     rows: dict[str, list[float]]
     #: effective normal stress at the first joint's nodes, from heel to toe, of each row [Pa]
     stress: list[Array] = field(default_factory=list)
+    #: by PEAK_STATES
+    peaks: dict[str, Peak] = field(default_factory=dict)
 
     @staticmethod
     def of(case: Case) -> QuakeHistory:
@@ -97,3 +118,7 @@ class QuakeHistory:
         for name, value in row.items():
             self.rows[name].append(float(value))
         self.stress.append(stress)
+        for name, (column, sign) in PEAK_STATES.items():
+            value = sign * float(row[column])
+            if name not in self.peaks or value > self.peaks[name].value:
+                self.peaks[name] = Peak(value, step.end.time, motion.displacement)

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..arrays import Array, Table
 from .case import Case
+from .mesh import Body
 
 #: Columns of joint.csv: a row per joint node and requested level.
 JOINT = {
@@ -137,6 +138,10 @@ class QuakeResult:
     rows: Table
     #: time (rows,), distance from the heel (nodes,), effective normal stress (rows, nodes)
     stress: Table
+    #: states with the largest displacements, in 2D: name, time [s], and the displacement since the
+    #: static state (nodes, 2) of each body [m]
+    shapes: list[tuple[str, float, dict[str, Array]]]
+    bodies: dict[str, Body]
     #: for run.json
     summary: dict[str, Any]
     #: whether the dam is in static equilibrium after the earthquake

@@ -187,6 +187,8 @@ def finished(
         case=quake.case,
         rows=history.table,
         stress=stress_table(quake, history),
+        shapes=shapes(quake, history),
+        bodies={name: space.body for name, space in quake.system.spaces.items()},
         summary=found,
         stands=after is not None,
         statement=words,
@@ -210,6 +212,24 @@ def with_full_uplift(quake: Earthquake) -> bool | None:
     cracked = case.with_values({"uplift": "cracked", "drains": 0.0})
     model = Model(cracked, quake.problem.model.equilibrium.interface)
     return static_state_after(model, quake.now.state) is not None
+
+
+def shapes(
+    quake: Earthquake, history: QuakeHistory
+) -> list[tuple[str, float, dict[str, np.ndarray]]]:
+    """The states with the largest displacements, see `QuakeResult`."""
+    system, result = quake.system, []
+    if quake.case["dim"] == 3:
+        return result
+    for name, peak in history.peaks.items():
+        moved = {
+            body: (matrix @ peak.displacement).reshape(-1, 2)[
+                : len(system.spaces[body].body.points)
+            ]
+            for body, matrix in system.motion.items()
+        }
+        result.append((name, peak.time, moved))
+    return result
 
 
 def stress_table(quake: Earthquake, history: QuakeHistory) -> Table:

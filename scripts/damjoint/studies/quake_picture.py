@@ -5,11 +5,29 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
 from ..model.results import QuakeResult, column_of
-from ..post.drawing import BLUE, DARK, GREEN, ORANGE, RED, figure_of, panels, write_picture
+from ..post.drawing import (
+    BLUE,
+    CONCRETE,
+    DARK,
+    GREEN,
+    GREY,
+    ORANGE,
+    RED,
+    ROCK,
+    figure_of,
+    panels,
+    write_picture,
+)
+from ..post.outline import exaggeration
 
+#: Height of the curves, and of the deformed dams below them [inches].
+CURVES, SHAPES = 10.5, 2.6
+#: Part of the stresses within the colors of the map [%].
+SHOWN = 99
 #: Largest number of rows of the map of the stress.
 MOST_ROWS = 1500
 
@@ -24,9 +42,10 @@ def draw(result: QuakeResult, folder: Path) -> Path:
 def figure(result: QuakeResult) -> Figure:
     """The figure."""
     case, rows, stress = result.case, result.rows, result.stress
-    picture = figure_of(9.0, 11.0)
-    picture.text(0.05, 0.985, f"{case.title}: {result.statement}", va="top", fontsize=10)
-    axes = panels(picture, 6, left=0.9, right=1.1, top=0.55, down=0.2)[:, 0]
+    shapes = SHAPES if result.shapes else 0.0
+    picture = figure_of(9.0, CURVES + shapes)
+    picture.text(0.05, 0.988, f"{case.title}: {result.statement}", va="top", fontsize=10)
+    axes = panels(picture, 6, left=0.9, right=1.1, top=0.45, bottom=0.5 + shapes, down=0.2)[:, 0]
     time, joints = rows["time"], range(len(case.joints))
     curves = [
         ("ground [m/s$^2$]", [("along x", rows["ground_ax"], DARK)]),
@@ -54,11 +73,12 @@ def figure(result: QuakeResult) -> Figure:
     if np.isfinite(block):
         axes[4].axhline(1e3 * block, color=DARK, lw=0.8, ls="--", label="rigid block, at the end")
     for ax in axes[:5]:
-        ax.legend(fontsize=7, loc="upper right")
+        ax.legend(fontsize=7, loc="center right")
         ax.tick_params(labelbottom=False, labelsize=8)
     step = max(1, len(time) // MOST_ROWS)
     values = stress["sigma_n_eff"][::step].T / 1e6
-    bound = float(np.abs(values).max()) or 1.0
+    # the stress of the corner elements is singular
+    bound = float(np.percentile(np.abs(values), SHOWN)) or 1.0
     mesh = axes[5].pcolormesh(
         stress["time"][::step],
         stress["s"],
@@ -75,6 +95,32 @@ def figure(result: QuakeResult) -> Figure:
     axes[5].tick_params(labelsize=8)
     box = axes[5].get_position()
     bar = picture.add_axes((box.x1 + 0.02, box.y0, 0.015, box.height))
-    picture.colorbar(mesh, cax=bar).set_label("$\\sigma_n'$ [MPa]", fontsize=8)
+    picture.colorbar(mesh, cax=bar, extend="both").set_label("$\\sigma_n'$ [MPa]", fontsize=8)
     bar.tick_params(labelsize=7)
+    draw_shapes(picture, result)
     return picture
+
+
+def draw_shapes(picture: Figure, result: QuakeResult) -> None:
+    """Draw the dam in the states with the largest displacements."""
+    height = picture.get_size_inches()[1]
+    for i, (name, time, moved) in enumerate(result.shapes):
+        width = 0.94 / len(result.shapes)
+        box = (0.03 + i * width, 0.1 / height, 0.96 * width, (SHAPES - 0.5) / height)
+        axes = picture.add_axes(box)
+        scale = exaggeration(moved, result.case.size)
+        for body, displacement in moved.items():
+            solid = result.bodies[body]
+            points = solid.points[:, :2]
+            color = ROCK if body == "foundation" else CONCRETE
+            for _, table in solid.cells:
+                cells = PolyCollection((points + scale * displacement)[table], facecolor=color)
+                cells.set(edgecolor=GREY, linewidth=0.15, rasterized=True)
+                axes.add_collection(cells)
+        dams = np.vstack([b.points for n, b in result.bodies.items() if n != "foundation"])
+        low, high = dams.min(axis=0), dams.max(axis=0)
+        room = 0.2 * result.case.size
+        axes.set(xlim=(low[0] - room, high[0] + room), ylim=(low[1] - room / 2, high[1] + room / 2))
+        axes.set_aspect("equal")
+        axes.set_axis_off()
+        axes.set_title(f"{name}, t = {time:.3f} s\nx {scale:g}", fontsize=8)
