@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import io
 import os
 import sys
@@ -55,6 +56,19 @@ def integer(name: str, text: str, least: int) -> int:
     if not text.strip().isdecimal() or int(text) < least:
         raise InputError(f"{name} = {text}: must be an integer >= {least}")
     return int(text)
+
+
+def slip(name: str, text: str) -> float:
+    """Return an argument as a length [m]. Raises InputError."""
+    from .model.arithmetic import number
+
+    try:
+        value = number(text)
+    except ValueError:
+        value = 0.0
+    if not value > 0:
+        raise InputError(f"--{name} {text}: must be a slip > 0 m")
+    return value
 
 
 def path(name: str, text: str) -> Path:
@@ -532,6 +546,14 @@ def add_sweep(commands: Commands) -> None:
         help="add the critical value of each row: level (default), strength, ... as --of of "
         "damjoint critical",
     )
+    command.add_argument(
+        "--quake",
+        metavar="SLIP",
+        action=Checked,
+        convert=slip,
+        help="each row is the earthquake of the case's record; it fails if the residual slip "
+        "exceeds SLIP [m]: with --vary record_scale=... and --sample a fragility (default: none)",
+    )
     command.add_integer("--jobs", 1, help=JOBS)
     command.add_argument(
         "--scheduler",
@@ -555,6 +577,7 @@ def do_sweep(arguments: argparse.Namespace) -> int:
         raise InputError(f"--correlate {arguments.correlate[0]}: needs --sample")
     sample = sample_of(arguments.sample, **options) if arguments.sample else None
     plan = plan_of(arguments.vary, arguments.tie, sample, settings, arguments.critical)
+    plan = dataclasses.replace(plan, slip_limit=arguments.quake)
     case = load(
         arguments.case,
         settings,

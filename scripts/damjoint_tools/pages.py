@@ -116,7 +116,8 @@ def results_page() -> str:
         "`level_asked`); the last row of "
         "history.csv; `failed` (1 where `damjoint run` ends with exit code 1), `verdict`, "
         "`statement`; with `--critical` the critical value, its `mode`, whether it is `confirmed` "
-        "and by what. In a sample, a row whose loads exceed the largest possible strength of the "
+        "and by what; with `--quake` `peak_ground_ax` [m/s2], `residual_slip` [m], `residual_tilt`, "
+        "`rigid_block_slip` [m]. In a sample, a row whose loads exceed the largest possible strength of the "
         "joint is not computed; its `statement` gives this reason. Further files:",
         "- `_probability.csv`: probability of failure with the interval of Clopper and Pearson. "
         "Rows without a result are `undecided`; they count as failures, except for the lower "

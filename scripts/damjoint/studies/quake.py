@@ -117,6 +117,20 @@ def run(case: Case, out: Path, picture: bool = True, progress: bool = True) -> Q
     return result
 
 
+def outcome_of(case: Case) -> tuple[LoadStepper, bool, dict[str, Any]]:
+    """The earthquake of a case without files: static loading, whether there is an equilibrium after
+    the earthquake, summary.
+
+    Raises RunError.
+    """
+    static, quake = prepared(case)
+    history = QuakeHistory.of(case)
+    for _ in whole(quake, history):
+        pass
+    after = static_state_after(static.model, quake.now.state)
+    return static, after is not None, summary(quake, history)
+
+
 def prepared(case: Case) -> tuple[LoadStepper, Earthquake]:
     """The static loading of a case, and its earthquake before the first step.
 
@@ -320,7 +334,11 @@ def write_info(static: LoadStepper, out: Path, found: dict[str, Any], state: str
     """Write run.json."""
     results = static.results()
     results.info |= about(static.model.equilibrium.bulk)
-    results.info |= {"quake": found, "versions": versions()}
+    seconds = {n: v for n, v in found.get("seconds", {}).items() if n != "steps"}
+    results.info |= {"quake": found, "versions": versions(), "wall_seconds": seconds}
+    if "after" in found:  # a joint that has slipped everywhere is no failure here
+        stands = found["after"]["equilibrium"]
+        results.info["verdict"] = "stands" if stands else "no equilibrium"
     folders.write_info(results, out, state, why)
 
 
