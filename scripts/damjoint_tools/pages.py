@@ -45,6 +45,10 @@ def parameters_page() -> str:
         "(`--levels`) [m above the base's heel], from 0 at t = 0, level number i reached at t = i; "
         "`tail_levels()` (`--tail-levels`) likewise, one value for all levels or one per level; "
         "`times()` (`--steps` between two levels) are the times at the end of the load steps. "
+        "`lift_heights()` (`--set lift_heights=12,25`): heights of lift joints above the first "
+        "joint; then the parameters of a joint may have a list with a value for each joint, "
+        "`mu() = {0.9, 1, 1};` (`--set mu=0.9,1,1`): those of the group Joint, law, uplift, slope, "
+        "aperture, drains, grouting and sawing. "
         "Default levels: two thirds and eight ninths of the height, and the crest. In the Gmsh "
         "window they are in the group Water levels.",
     ]
@@ -80,21 +84,23 @@ def results_page() -> str:
         "[theory](theory.md#1-conventions); terms and symbols: [glossary](glossary.md). Made by "
         "`make pages`.",
         "## joint.csv",
-        "A row per joint node and requested level, sorted by level, x and z; with order 2 the "
-        "midpoints of edges and rectangles, too. Stresses are those of the joint law at the node, "
-        "with internal variables of its own. `lambda` is written with law = friction only, `flux` "
-        "with uplift = flow only.",
+        "A row per joint node and requested level, sorted by level, joint, x and z; with order 2 "
+        "the midpoints of edges and rectangles, too. Stresses are those of the joint law at the "
+        "node, with internal variables of its own. `lambda` is written with law = friction only, "
+        "`flux` with uplift = flow only; of several joints, those without it have nan.",
         joint,
         "## history.csv",
-        "A row per converged step. Forces are per metre of thickness, in 3D too.",
+        "A row per converged step. Forces are per metre of thickness, in 3D too. Of several "
+        "joints, the columns of lengths, openings and resultants are those of joint 1; those of "
+        "joint 2, 3, ... follow with its number: `N_2`, `T_2`, ...",
         history,
         "## curve.csv",
         "Written by a run under displacement control: `time`, `level` [m], `pressure` [Pa] at the "
         "foot of the face, `heel_opening` [m], `crest_ux` [m] of each converged step.",
         "## check.csv",
-        "Written by `damjoint check`: for each scene a row by the finite elements, a row by the "
-        "gravity method, and, where both have the same load, a row with their difference (first "
-        "minus second).",
+        "Written by `damjoint check`: for each joint of a scene a row by the finite elements, a "
+        "row by the gravity method, and, where both have the same load, a row with their "
+        "difference (first minus second).",
         check,
         "## gravity.csv",
         "Written by `damjoint check`: the resultants of the gravity method, a row per load, the "
@@ -116,9 +122,10 @@ def results_page() -> str:
         "`level_asked`); the last row of "
         "history.csv; `failed` (1 where `damjoint run` ends with exit code 1), `verdict`, "
         "`statement`; with `--critical` the critical value, its `mode`, whether it is `confirmed` "
-        "and by what; with `--quake` `peak_ground_ax` [m/s2], `residual_slip` [m], `residual_tilt`, "
-        "`rigid_block_slip` [m]. In a sample, a row whose loads exceed the largest possible strength of the "
-        "joint is not computed; its `statement` gives this reason. Further files:",
+        "and by what; with `--quake` `peak_ground_ax` [m/s2], `residual_slip` [m], "
+        "`residual_tilt`, `rigid_block_slip` [m]. In a sample, a row whose loads exceed the "
+        "largest possible strength of the joint is not computed; its `statement` gives this "
+        "reason. Further files:",
         "- `_probability.csv`: probability of failure with the interval of Clopper and Pearson. "
         "Rows without a result are `undecided`; they count as failures, except for the lower "
         "limit.\n"

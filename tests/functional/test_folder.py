@@ -139,7 +139,7 @@ def test_an_interrupted_run_writes_its_converged_steps(tmp_path, monkeypatch, en
         if now > 1:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(runner.Progress, "step", interrupt)
+    monkeypatch.setattr(runner.RunProgress, "step", interrupt)
     case = load("c", {"n_joint": 10.0, "h_dam": 3.0, "h_found": 4.0})
     with pytest.raises(KeyboardInterrupt):
         runner.run(case, tmp_path / "out", False, False, False, engine)

@@ -265,7 +265,7 @@ def test_results_of_other_parameters_are_not_called_complete(project):
         else:
             gmsh.open(str(project / "a.geo"))
         assert gmsh.onelab.getString(status) == ["changed: press Run"]
-    gmsh.onelab.clear()
+    gmsh.finalize()  # else it remains busy with the file that it could not read
 
 
 @pytest.mark.heavy

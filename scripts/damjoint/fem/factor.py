@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 import scipy
 from scipy import sparse
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from ..arrays import Array, IntArray, Sparse
 from ..storage import atomic_write, cache_folder
@@ -107,6 +108,14 @@ def pointer(values: Array | IntArray) -> ctypes.c_void_p:
     return ctypes.c_void_p(values.ctypes.data)
 
 
+def as_other_libraries() -> threadpool_limits:
+    """Limit the threads of MUMPS's own BLAS to those of the others: a limit that was set before it
+    was loaded has not reached it.
+    """
+    pools = (pool for pool in threadpool_info() if pool["user_api"] == "blas")
+    return threadpool_limits(min(pool["num_threads"] for pool in pools), "blas")
+
+
 class MumpsFactors:
     """MUMPS's factors of a symmetric matrix (n, n) with the unknowns `keep` (k,) not eliminated.
 
@@ -130,14 +139,15 @@ class MumpsFactors:
         needed, error = ctypes.c_double(), ctypes.c_int()
         row, column = ((i + 1).astype(np.int32) for i in (upper.row, upper.col))
         mumps.damjoint_factorise.restype = ctypes.c_void_p
-        factors = mumps.damjoint_factorise(
-            *(self.size, ctypes.c_longlong(upper.nnz)),
-            *(pointer(row), pointer(column), pointer(upper.data)),
-            None if order is None else pointer(order),
-            *(len(keep), pointer(self.keep), pointer(self.lower)),
-            *(ctypes.c_double((available() - beside) / 1e6), ctypes.byref(needed)),
-            ctypes.byref(error),
-        )
+        with as_other_libraries():
+            factors = mumps.damjoint_factorise(
+                *(self.size, ctypes.c_longlong(upper.nnz)),
+                *(pointer(row), pointer(column), pointer(upper.data)),
+                None if order is None else pointer(order),
+                *(len(keep), pointer(self.keep), pointer(self.lower)),
+                *(ctypes.c_double((available() - beside) / 1e6), ctypes.byref(needed)),
+                ctypes.byref(error),
+            )
         if error.value == TOO_LARGE:
             check_memory(beside + 1e6 * needed.value, what)
         if error.value in (TOO_LARGE, NO_MEMORY):
@@ -155,7 +165,8 @@ class MumpsFactors:
     def solve(self, right: Array) -> Array:
         """Solution (n, m) with the unknowns `keep` zero."""
         solution = np.array(right, float, order="F")
-        self._run(solution, 0, None)
+        with as_other_libraries():
+            self._run(solution, 0, None)
         return solution
 
     def reduce(self, right: Array) -> Array:

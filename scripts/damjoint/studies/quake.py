@@ -21,6 +21,7 @@ from ..dynamics.record import Record
 from ..dynamics.rigid_block import RigidBlock
 from ..dynamics.stepper import Earthquake
 from ..engines.condensed.solve import about
+from ..fem import factor
 from ..fem.bodies import Bodies
 from ..joint.interface import interface_of
 from ..model.case import Case
@@ -77,7 +78,7 @@ def run(case: Case, out: Path, picture: bool = True, progress: bool = True) -> Q
     folders.check_writable(out)
     key = checkpoint.fingerprint(case)
     resumed = (out / CHECKPOINT).is_file()
-    with threadpool_limits(1), folders.claim_output_folder(case, out, keep=resumed):
+    with single_thread(), folders.claim_output_folder(case, out, keep=resumed):
         try:
             static, quake = prepared(case)
         except BaseException as error:
@@ -117,17 +118,26 @@ def run(case: Case, out: Path, picture: bool = True, progress: bool = True) -> Q
     return result
 
 
+@contextlib.contextmanager
+def single_thread() -> Iterator[None]:
+    """Compute with a single thread, also in MUMPS: the matrices of a step are small."""
+    factor.library()  # a limit reaches only libraries that are loaded
+    with threadpool_limits(1):
+        yield
+
+
 def outcome_of(case: Case) -> tuple[LoadStepper, bool, dict[str, Any]]:
     """The earthquake of a case without files: static loading, whether there is an equilibrium after
     the earthquake, summary.
 
     Raises RunError.
     """
-    static, quake = prepared(case)
-    history = QuakeHistory.of(case)
-    for _ in whole(quake, history):
-        pass
-    after = static_state_after(static.model, quake.now.state)
+    with single_thread():
+        static, quake = prepared(case)
+        history = QuakeHistory.of(case)
+        for _ in whole(quake, history):
+            pass
+        after = static_state_after(static.model, quake.now.state)
     return static, after is not None, summary(quake, history)
 
 

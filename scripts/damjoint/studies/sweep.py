@@ -191,9 +191,10 @@ def bundles(tasks: dict[str, Task]) -> list[list[str]]:
     """Keys of cases that differ in levels only; at most MOST_TOGETHER, so that rows are written
     in time.
     """
-    groups: dict[tuple[tuple[str, Value], ...], list[str]] = {}
+    groups: dict[str, list[str]] = {}
     for key, task in tasks.items():
-        groups.setdefault(tuple(sorted(task.case.values.items())), []).append(key)
+        same = replace(task.case, levels=(), tail_levels=(), times=())
+        groups.setdefault(key_of(same), []).append(key)
     return [
         keys[i : i + MOST_TOGETHER]
         for keys in groups.values()

@@ -21,7 +21,7 @@ from ...solver.load_stepper import LoadStepper
 from .. import OnStep, Outcome
 
 #: Number of jump unknowns from which on several threads of the linear algebra are faster than one.
-THREADED_UNKNOWNS = 3000
+THREADED_UNKNOWNS = 2000
 
 
 def check(case: Case) -> None:
