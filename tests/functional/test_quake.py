@@ -7,9 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from damjoint import RunError
+from damjoint.dynamics import step as step_module
 from damjoint.dynamics.history import QuakeHistory
 from damjoint.dynamics.scheme import Motion
 from damjoint.dynamics.step import TimeStep
+from damjoint.fem import factor
 from damjoint.fem.bodies import Bodies
 from damjoint.solver.history import joint_row
 from quakes import BLOCK, DAM, earthquake, joint_of, mean_slip, smooth_record, write_record
@@ -310,6 +313,24 @@ def test_steps_solve_the_equations_of_all_unknowns(tmp_path, alpha):
     assert largest < 1e-8
 
 
+@pytest.mark.parametrize("other", ["Woodbury", "SuperLU"])
+def test_linear_solvers_agree(tmp_path, monkeypatch, other):
+    """Dense matrices of small joints against the formula for large ones; MUMPS against SuperLU."""
+    record = smooth_record(tmp_path / "r.csv", 6.0, duration=0.4)
+    settings = DAM | {"dt": 0.0025, "mu": 0.75}  # no step is halved
+    quakes = [earthquake(record, settings, "30")]
+    run(quakes[0])
+    if other == "SuperLU":
+        monkeypatch.setattr(factor, "library", lambda: None)
+    else:
+        monkeypatch.setattr(step_module, "MOST_UNKNOWNS", 0)
+    quakes.append(earthquake(record, settings, "30"))
+    run(quakes[1])
+    slips = [mean_slip(quake) for quake in quakes]
+    assert abs(slips[0]) > 0.01 and [quake.halvings for quake in quakes] == [0, 0]
+    assert slips[1] == pytest.approx(slips[0], rel=1e-6)
+
+
 @pytest.mark.parametrize("pattern, order", [("layers", 1.0), ("split", 2.0)])
 def test_a_section_of_any_thickness_moves_as_in_plane_strain(tmp_path, pattern, order):
     """With both end faces fixed along z, per metre of thickness; the two meshes of the section
@@ -356,6 +377,44 @@ def test_momentum_above_each_of_several_joints(tmp_path):
             joint = joint_of(quake, k)
             slid[k] = max(slid[k], np.abs(joint.jumps(joint.at_points, moved)[:, 1]).max())
     assert slid[1] > 0.01  # the smoothest one
+
+
+# -- halving
+
+
+def test_a_step_that_does_not_converge_is_halved(tmp_path, monkeypatch):
+    """Around 0.1 s only steps of an eighth converge, here by force; then the full one again. A run
+    that is interrupted there continues with the same steps.
+    """
+    record = smooth_record(tmp_path / "r.csv", 4.0, duration=0.2)
+    advance, dt = TimeStep.advance, 0.005
+
+    def limited(self, begin, *rest):
+        wrong = abs(begin.time - 0.1) < 0.004 and self.dt > dt / 8 * 1.01
+        return None if wrong else advance(self, begin, *rest)
+
+    monkeypatch.setattr(TimeStep, "advance", limited)
+    settings = DAM | {"record_rest": 0.1, "dt": dt}
+    quake = earthquake(record, settings, "30")
+    steps = run(quake)
+    times = np.array([step.end.time for step in steps])
+    lengths = np.array([step.dt for step in steps])
+    assert np.diff([0, *times]) == pytest.approx(lengths) and times[-1] == pytest.approx(0.3)
+    assert {1, 0.125} <= set(np.round(lengths / dt, 6)) and quake.halvings == 3
+    assert lengths[np.abs(times - lengths - 0.1) < 0.004].max() == pytest.approx(dt / 8)
+    assert (lengths[times > 0.111] == dt).all() and (lengths[times < 0.094] == dt).all()
+    number = int(np.argmax(lengths < dt)) + 3
+    other = earthquake(record, settings, "30")
+    first = [step for _, step in zip(range(number), other.steps(), strict=False)]
+    rest = run(other)
+    assert [step.end.time for step in first + rest] == times.tolist()
+
+
+def test_a_step_that_never_converges_ends_the_run(tmp_path, monkeypatch):
+    monkeypatch.setattr(TimeStep, "advance", lambda *_: None)
+    quake = earthquake(smooth_record(tmp_path / "r.csv", 1.0), DAM)
+    with pytest.raises(RunError, match="no equilibrium after t = 0 s"):
+        run(quake)
 
 
 # -- the command

@@ -28,13 +28,13 @@ class RigidBlock:
     shear_by_ground: Array
     normal_by_ground: Array
 
-    def slip(self, record: Record) -> float:
-        """The slip [m] at the end of a record, downstream > 0; nan without a static equilibrium.
+    def slip(self, record: Record) -> float | None:
+        """The slip [m] at the end of a record, downstream > 0; None if the static loads move it.
 
         Piecewise constant forces; friction implicit, so that the block stops without oscillating.
         """
         if abs(self.shear) > self.friction * self.normal + self.cohesion:
-            return float("nan")
+            return None
         dt = record.interval / REFINEMENT
         times = np.arange(dt / 2, record.duration, dt)
         ground = np.column_stack(

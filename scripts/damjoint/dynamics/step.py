@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import Array, Sparse
+from ..fem.condensation import Condensed
 from ..fem.factor import partial_factors
 from ..joint.equilibrium import Equilibrium
 from ..joint.interface import Interface
@@ -27,6 +28,7 @@ from ..solver.controls import LevelControl
 from ..solver.model import Model, StepResult
 from ..solver.state import State
 from .scheme import HHT, Motion
+from .small_joints import MOST_UNKNOWNS, SmallInterface
 from .system import System
 
 
@@ -81,7 +83,9 @@ class DynamicEquilibrium(Equilibrium):
         """stiffness: S (j, j)."""
         vars(self).update(vars(static))
         bulk = replace(static.bulk, stiffness=stiffness)
-        self.interface, self.bulk = with_bulk(static.interface, bulk), bulk
+        small = len(stiffness) <= MOST_UNKNOWNS
+        around = SmallInterface if small else with_bulk
+        self.interface, self.bulk = around(static.interface, bulk), bulk
         self.flowing = ()
         self.loads = lambda _loading: np.zeros(len(stiffness))  # type: ignore[assignment]
         #: of the step under way
@@ -98,7 +102,7 @@ class DynamicEquilibrium(Equilibrium):
         return self.pressure
 
 
-def with_bulk(interface: Interface, bulk: object) -> Interface:
+def with_bulk(interface: Interface, bulk: Condensed) -> Interface:
     """The same joints with other bodies around them."""
     other = copy(interface)
     vars(other).update(bulk=bulk, _undamaged=None)
@@ -215,12 +219,14 @@ class TimeStep:
             return float(np.linalg.norm(value))
 
         guess = min(now.jump, ahead, key=size)
-        strategies = self.model.strategies
+        first = self.model.strategies[0]
+        # where points stick and slip one after the other, only a descent of the residual ends
+        quick = first, replace(first, growth=1.0)
         step = self.model.advance(
             now,
             now.time,
             LevelControl(now.loading.level),
-            strategies=strategies if persist else strategies[:1],
+            strategies=self.model.strategies if persist else quick,
             guess=(guess, now.loading.level),
             frozen_lift=loads,
         )

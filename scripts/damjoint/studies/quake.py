@@ -299,7 +299,9 @@ def summary(quake: Earthquake, history: QuakeHistory) -> dict[str, Any]:
         )
         residual[column_of("slip", k)] = slip
         residual[column_of("tilt", k)] = (heel - toe) / case.joints[k].joint_along
-        residual[column_of("rigid_block", k)] = rigid_block(quake, k).slip(record)
+        if case.joints[k].law.limits_shear:
+            block = rigid_block(quake, k).slip(record)
+            residual |= {} if block is None else {column_of("rigid_block", k): block}
     return result
 
 
@@ -325,7 +327,7 @@ def rigid_block(quake: Earthquake, number: int) -> RigidBlock:
         normal=row["N"],
         shear=row["T"],
         friction=law.mu,
-        cohesion=cohesion if law.limits_shear else np.inf,
+        cohesion=cohesion,
         mass=float(along @ system.mass @ along) / joint.width,
         shear_by_ground=along @ system.inertia / joint.width,
         normal_by_ground=across @ system.inertia / joint.width,

@@ -63,14 +63,14 @@ def figure(result: QuakeResult) -> Figure:
             opening = 1e3 * np.maximum(rows[column_of(f"{end}_opening", k)], 0)
             curves[3][1].append((f"{end}{name}", opening, color))
         curves[4][1].append((f"mean{name}", 1e3 * rows[column_of("slip_mean", k)], style[0]))
-    block = result.summary["residual"]["rigid_block"]
+    block = result.summary["residual"].get("rigid_block")
     for ax, (label, lines) in zip(axes, curves, strict=False):
         for name, values, color in lines:
             ax.plot(time, values, color=color, lw=0.8, label=name)
         ax.set_ylabel(label, fontsize=8)
         ax.grid(alpha=0.3)
         ax.set_xlim(0, time[-1])
-    if np.isfinite(block):
+    if block is not None:
         axes[4].axhline(1e3 * block, color=DARK, lw=0.8, ls="--", label="rigid block, at the end")
     for ax in axes[:5]:
         ax.legend(fontsize=7, loc="center right")

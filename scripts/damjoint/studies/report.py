@@ -452,10 +452,11 @@ def earthquake(info: dict[str, Any]) -> str:
     if not found or "peaks" not in found:
         return ""
     ground, crest = (abs(found["peaks"][name]["value"]) for name in ("ground_ax", "crest_ax"))
-    block, frequency = 1e3 * found["residual"]["rigid_block"], found["frequencies"][0]
+    block, frequency = found["residual"].get("rigid_block"), found["frequencies"][0]
+    by_block = "" if block is None else f"slip of the rigid block {1e3 * block:.3g} mm; "
     return (
         f"earthquake {Path(found['record']).name}, {ground:.3g} m/s2: {info['statement']}; largest "
-        f"acceleration of the crest {crest:.3g} m/s2; slip of the rigid block {block:.3g} mm; "
+        f"acceleration of the crest {crest:.3g} m/s2; {by_block}"
         f"first natural frequency {frequency:.3g} Hz; N', T and the verdict are those of the "
         "static state after it"
     )

@@ -137,7 +137,7 @@ def quake_row(task: Task) -> dict[str, Value]:
     residual = found["residual"]
     suffixes = [name.removeprefix("slip") for name in residual if name.startswith("slip")]
     worst = max(suffixes, key=lambda suffix: abs(residual[f"slip{suffix}"]))
-    values = (residual[f"{name}{worst}"] for name in ("slip", "tilt", "rigid_block"))
+    values = (residual.get(f"{name}{worst}", "") for name in ("slip", "tilt", "rigid_block"))
     peak = abs(found["peaks"]["ground_ax"]["value"])
     row |= static.results().last | dict(zip(QUAKE_COLUMNS, (peak, *values), strict=True))
     slip = abs(residual[f"slip{worst}"])
