@@ -15,12 +15,14 @@ def write_blocks(
     blocks: dict[str, tuple[float, float, float, float]],
     joints: dict[str, tuple[float, float, float, float]],
     size: float = 1.0,
+    fine: dict[str, float] | None = None,
 ) -> Path:
     """Write the mesh of rectangular blocks on rock.
 
     blocks: corners by name; blocks of one name are glued. joints: ends (heel, toe) by name. Faces:
-    the left side of the leftmost block is upstream. A joint whose name begins with _ is a line of
-    the mesh, but glued. size: of the elements [m].
+    the left side of the leftmost block is upstream, the right side of the last one, if it stands on
+    the rock, downstream. A joint whose name begins with _ is a line of the mesh, but glued. size:
+    of the elements [m]; fine: of those at joints, by name.
     """
     gmsh = start_gmsh()
     gmsh.clear()
@@ -70,7 +72,14 @@ def write_blocks(
     top = max(corners[3] for corners in blocks.values())
     group(1, inside(1, x, 0, x, top), "upstream")
     group(0, inside(0, x, top, x, top), "crest")
+    *_, (_, bottom_of_last, right_of_last, top_of_last) = blocks.values()
+    if bottom_of_last == 0:
+        group(1, inside(1, right_of_last, 0, right_of_last, top_of_last), "downstream")
     gmsh.option.setNumber("Mesh.MeshSizeMax", size)
+    for name, own in (fine or {}).items():
+        x0, y0, x1, y1 = joints[name]
+        for x_end, y_end in ((x0, y0), (x1, y1)):
+            gmsh.model.mesh.setSize([(0, p) for p in inside(0, x_end, y_end, x_end, y_end)], own)
     gmsh.model.mesh.generate(2)
     gmsh.option.setNumber("Mesh.MshFileVersion", 2.2)
     gmsh.option.setNumber("Mesh.Binary", 0)

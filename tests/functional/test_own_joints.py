@@ -26,10 +26,11 @@ FRICTION = {"law": "friction", "adhesion": 0.0, "pena_tang": 0.0}
 def solved(tmp_path):
     """solved(blocks, joints, levels, **settings): the results of blocks on rock."""
 
-    def run(blocks, joints, levels, **settings):
-        write_blocks(tmp_path / "own.msh", blocks, joints)
+    def run(blocks, joints, levels, fine=None, **settings):
+        write_blocks(tmp_path / "own.msh", blocks, joints, fine=fine)
         (tmp_path / "own.case").write_text('geometry = "own.msh";')
-        case = load(str(tmp_path / "own.case"), SETTINGS | settings, levels)
+        tails = levels if settings.pop("both_sides", False) else None
+        case = load(str(tmp_path / "own.case"), SETTINGS | settings, levels, tails)
         check(case)
         return LoadStepper(case, interface_of(case)).run()
 
@@ -92,6 +93,39 @@ def test_blocks_of_different_friction_share_the_thrust(solved):
     assert thrust == pytest.approx(0.5 * WEIGHT, rel=1e-4)
 
 
+def test_slip_of_an_inclined_crack_inside_a_body(solved):
+    """Under 100 MPa along x, at 20 degrees to it, with a friction of 30 degrees: 4 (1 - nu^2) tau b
+    sqrt(1 - (x/b)^2) / E, with tau the shear stress less the friction, b half of the length.
+    """
+    angle, stress = np.radians(20), 1e8
+    along = np.array([np.cos(angle), np.sin(angle)])
+    ends = (*(12 - along), *(12 + along))
+    joints = {"base": (0, 0, 24, 0), "crack": ends}
+    soft = {"K_N": (1e4, 1e13), "K_T": (1e4, 1e13), "adhesion": (1e30, 0.0)}
+    body = {"rho_dam": 0.0, "E": 25e9, "nu": 0.25, "face_load": "uniform", "order": 2.0}
+    friction = {"law": "friction", "mu": np.tan(np.pi / 6), "pena_tang": 0.0}
+    level = stress / WATER
+    results = solved(
+        {"body": (0, 0, 24, 24)},
+        joints,
+        [level],
+        {"crack": 0.1},
+        both_sides=True,
+        **(soft | body | friction),
+    )
+    assert not results.stopped
+    rows = results.joints[1].at()
+    normal = stress * np.sin(angle) ** 2
+    tau = stress * np.sin(angle) * np.cos(angle) - normal * np.tan(np.pi / 6)
+    middle = np.abs(rows["s"] - 1) < 0.3
+    assert -rows["sigma_n"][middle] == pytest.approx(normal, rel=0.02)
+    slip = 4 * (1 - 0.25**2) * tau / 25e9 * np.sqrt(1 - (rows["s"][middle] - 1) ** 2)
+    assert slip.max() == pytest.approx(3.8078e-3, rel=1e-3)
+    assert np.abs(rows["delta_t1"][middle]) == pytest.approx(slip, rel=0.02)
+    tips = np.abs(rows["s"] - 1) > 1 - 1e-9
+    assert np.all(rows["delta_t1"][tips] == 0) and tips.sum() == 2
+
+
 @pytest.mark.parametrize("dim", [2, 3])
 def test_monoliths_are_in_equilibrium(dim):
     """The bases carry the thrust and the weight less the uplift."""
@@ -114,7 +148,8 @@ def test_monoliths_are_in_equilibrium(dim):
     "joints, settings, words",
     [
         (CONTRACTION, {}, "also meet beside the joint"),
-        (BASES | {"inner": (2, 5, 8, 5)}, {}, "joint inner: must lie between two bodies"),
+        (BASES | CONTRACTION | {"free": (0, 8, 0, 2)}, {}, "joint free: must lie between two"),
+        (BASES | CONTRACTION | {"edge": (0, 5, 5, 5)}, {}, "inside a body it must not touch"),
         (BASES | CONTRACTION, {"mu": (0.5, 0.6)}, "lists of 2 values: must have one for each"),
         (BASES | CONTRACTION, {"lift_heights": (5.0,)}, "lift_heights: must not be set"),
     ],

@@ -91,7 +91,7 @@ def mesh():
 
 #: Exponents of length, stress and acceleration in each unit.
 DIMENSIONS = {
-    **dict.fromkeys(["-", "degrees"], (0, 0, 0)),
+    **dict.fromkeys(["-", "degrees", "K", "per K", "1/K"], (0, 0, 0)),
     "m": (1, 0, 0),
     "Pa": (0, 1, 0),
     "Pa per m": (-1, 1, 0),

@@ -50,10 +50,10 @@ class ElasticBody:
     unit_loads: dict[str, Array]
     #: thermal strains of those of unit_loads at the middle of each element (elements,)
     unit_strains: dict[str, Array]
-    #: degrees of freedom: zero; on each of its joints, by number, in the joint's order; of each wet
-    #: face, in its order
+    #: degrees of freedom: zero; on each of its joints, by number and whether the body is above it,
+    #: in the joint's order; of each wet face, in its order
     fixed_dofs: IntArray
-    joint_dofs: dict[int, IntArray]
+    joint_dofs: dict[tuple[int, bool], IntArray]
     face_dofs: dict[str, IntArray]
 
     @staticmethod
@@ -80,9 +80,10 @@ class ElasticBody:
             unit_strains={n: at_middles(space, *strain) for n, strain in strains.items()},
             fixed_dofs=np.unique(np.concatenate(fixed)),
             joint_dofs={
-                number: dofs(joint.surface)
+                (number, above): dofs(joint.face(above))
                 for number, joint in enumerate(mesh.joints)
-                if name in (joint.upper, joint.lower)
+                for above, owner in ((True, joint.upper), (False, joint.lower))
+                if name == owner
             },
             face_dofs={
                 n: dofs(face.surface)

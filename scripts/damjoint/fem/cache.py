@@ -62,7 +62,8 @@ def fingerprint(mesh: Mesh) -> str:
 def sources() -> str:
     """Hash of the files that condensed bodies of a case are computed by: meshes and elements."""
     package = Path(__file__).parents[1]
-    code = package / "model" / "mesh.py", *sorted((package / "fem").glob("*.py"))
+    meshes = (package / "model" / name for name in ("cut.py", "mesh.py"))
+    code = *meshes, *sorted((package / "fem").glob("*.py"))
     shapes = data("pro") / "section.pro", *sorted(data("geo").glob("*.geo"))
     texts = [path.read_bytes() for path in (*shapes, *code)]
     return hashlib.sha256(b"".join(texts)).hexdigest()

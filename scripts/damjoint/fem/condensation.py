@@ -24,6 +24,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy import linalg
@@ -144,6 +145,15 @@ def loaded_dofs(bodies: Bodies, body: ElasticBody) -> IntArray:
     return np.concatenate(dofs)
 
 
+def add_at(total: Array, places: Any, values: Array) -> None:
+    """Add values at places of an array, which may be repeated."""
+    rows = np.ravel(places[0] if isinstance(places, tuple) else places)
+    if len(np.unique(rows)) == len(rows):
+        total[places] += values  # several times faster
+    else:
+        np.add.at(total, places, values)
+
+
 class JointElimination:
     """Displacements of the glued bodies on the joints eliminated."""
 
@@ -154,10 +164,11 @@ class JointElimination:
         by_jumps = np.zeros((gluing.unknowns, gluing.unknowns))
         for name, own in gluing.bodies.items():
             stiffness, jumps = reduced[name].stiffness, own.jumps
-            glued[np.ix_(own.node, own.node)] += stiffness
+            # (a body that a joint is inside of has several degrees of freedom of a node)
+            add_at(glued, np.ix_(own.node, own.node), stiffness)
             if jumps.nnz:
                 carried = stiffness @ jumps
-                coupling[:, own.node] += carried.T
+                add_at(coupling.T, own.node, carried)
                 by_jumps += jumps.T @ carried
         #: C^T
         self.coupling = coupling
@@ -170,7 +181,7 @@ class JointElimination:
     def on_nodes(self, own: BodyDofs, forces: Array) -> Array:
         """Forces (n, ...) on the degrees of freedom of a body as forces on the glued ones."""
         total = np.zeros((self.gluing.nodes, *forces.shape[1:]))
-        total[own.node] = forces
+        add_at(total, own.node, forces)
         return total
 
     def transmitted(self, own: BodyDofs, forces: Array) -> Array:

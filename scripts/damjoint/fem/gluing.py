@@ -60,18 +60,23 @@ class Gluing:
 
     @staticmethod
     def of(bodies: Bodies) -> Gluing:
-        """Glue bodies; jumps that are fixed in the body above are no unknowns."""
+        """Glue bodies; jumps that are fixed in the body above, or at a tip inside a body, are no
+        unknowns.
+        """
         names = list(bodies.by_name)
         sizes = [body.stiffness.shape[0] for body in bodies.by_name.values()]
         first = dict(zip(names, np.cumsum([0, *sizes[:-1]]), strict=True))
         number, row, above, below = [], [], [], []
         for k, joint in enumerate(bodies.mesh.joints):
             upper, lower = bodies.by_name[joint.upper], bodies.by_name[joint.lower]
-            free = np.flatnonzero(~np.isin(upper.joint_dofs[k], upper.fixed_dofs))
+            on_upper = first[joint.upper] + upper.joint_dofs[k, True]
+            on_lower = first[joint.lower] + lower.joint_dofs[k, False]
+            fixed = np.isin(upper.joint_dofs[k, True], upper.fixed_dofs)
+            free = np.flatnonzero(~fixed & (on_upper != on_lower))  # not at a tip
             number.append(np.full(len(free), k))
             row.append(free)
-            above.append(first[joint.upper] + upper.joint_dofs[k][free])
-            below.append(first[joint.lower] + lower.joint_dofs[k][free])
+            above.append(on_upper[free])
+            below.append(on_lower[free])
         of_joint, rows, up, low = map(np.concatenate, (number, row, above, below))
 
         roots, carried, independent = trees(up, low, sum(sizes))

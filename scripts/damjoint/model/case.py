@@ -172,7 +172,9 @@ class Case(ParameterValues):
         on the rock, if all of these are among them; else none.
         """
         alone = [(k,) for k in numbers if self.separates((k,))]
-        on_rock = tuple(k for k, own in enumerate(self.of_joints) if own.lower == "foundation")
+        on_rock = tuple(
+            k for k, own in enumerate(self.of_joints) if own.lower == "foundation" != own.upper
+        )
         together = [on_rock] if set(on_rock) <= set(numbers) else []
         return next(iter([*alone, *together]), ())
 

@@ -6,7 +6,7 @@ import itertools
 import tempfile
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -16,7 +16,9 @@ import numpy as np
 from .. import InputError, RunError, data
 from ..arrays import Array, BoolArray, IntArray, Setting
 from ..storage import check_end
+from .body import Body as Body
 from .case import Case, OfJoint, has_drains
+from .cut import cut
 from .parameters import assignments, constants, listing, start_gmsh
 from .scene import BED, DOWN, FLOOR, SIDES, TOP, UP, Joint, numbered, stacked
 
@@ -107,26 +109,6 @@ def dimension(region: str, dim: int) -> int:
 
 
 @dataclass
-class Body:
-    """One or several regions of the mesh: points (n, 3) [m], their node tags (n,), cells by shape
-    as indices of points, element tags in that order.
-    """
-
-    points: Array
-    node_tags: IntArray
-    cells: list[tuple[str, IntArray]]
-    element_tags: IntArray
-    #: the region of each block of cells
-    regions: list[str] = field(default_factory=list)
-    #: of a surface: unit normals (elements, 3), out of the body it belongs to
-    normals: Array = field(default_factory=lambda: np.zeros((0, 3)))
-
-    def middles(self) -> Array:
-        """The middle of each element (elements, 3)."""
-        return np.concatenate([self.points[table].mean(axis=1) for _, table in self.cells])
-
-
-@dataclass
 class Face:
     """A face that water can press on: its surface, normals outwards; the name of its body; its side
     (one of SIDES); lowest and highest y [m] of a straight face (nan for any other).
@@ -158,6 +140,12 @@ class JointMesh:
     lower: str
     #: for messages
     name: str
+    #: tags of the surface's nodes in the upper body; in the lower one they are the surface's
+    upper_tags: IntArray
+
+    def face(self, above: bool) -> Body:
+        """The surface as a part of the body above or below it."""
+        return replace(self.surface, node_tags=self.upper_tags) if above else self.surface
 
     @property
     def heel_nodes(self) -> IntArray:
@@ -342,6 +330,7 @@ class Mesh:
                 upper=joint.upper,
                 lower=joint.lower,
                 name=joint.name,
+                upper_tags=self._cut(joint),
             )
             for joint in (self._own_scene(names) if self.own else stacked(names))
         ]
@@ -463,17 +452,19 @@ class Mesh:
         for k, name in enumerate(names):
             surface = self.bodies[numbered("joint", k)]
             beside = [n for n, solid in self.solids.items() if sides(surface, solid).all()]
+            if len(beside) == 1 and is_inside(surface, self.solids[beside[0]]):
+                beside *= 2
             if len(beside) != 2:
                 listed = " and ".join(beside) or "none"
                 raise self._bad(
-                    f"joint {name}: must lie between two bodies (a conforming mesh); its elements "
-                    f"are sides of {listed}"
+                    f"joint {name}: must lie between two bodies, or inside one (a conforming mesh);"
+                    f" its elements are sides of {listed}"
                 )
             upper, lower = beside
             normals = outward(surface, self.solids[lower])
             parts = [numbered(part, k) for part in ("joint", "heel", "toe")]
             ends = [self.bodies[part].points.mean(axis=0) for part in parts[1:]]
-            if lower != "foundation" and normals:
+            if lower not in ("foundation", upper) and normals:
                 mean, (heel, toe) = normals[0].mean(axis=0), ends
                 way = toe - heel
                 if np.abs(mean[:2]).max() < abs(mean[2]):
@@ -484,6 +475,36 @@ class Mesh:
                     upper, lower = lower, upper
             scene.append(Joint(name, upper, lower, *parts))
         return scene
+
+    def _cut(self, joint: Joint) -> IntArray:
+        """Tags of a joint's nodes in the body above it, after a body that it is inside of is cut.
+
+        Above is then the left of the way from heel to toe; in 3D larger y or, of a joint that faces
+        along x or z, larger x or z.
+        """
+        surface = self.bodies[joint.region]
+        if joint.upper != joint.lower:
+            return surface.node_tags.copy()
+        for name, other in self.bodies.items():
+            same = name in (joint.upper, joint.region, joint.heel, joint.toe)
+            if not same and np.isin(surface.node_tags, other.node_tags).any():
+                raise self._bad(f"joint {joint.name}: inside a body it must not touch {name}")
+        normals = normals_of(surface)
+        heel, toe = (self.bodies[name].points.mean(axis=0) for name in (joint.heel, joint.toe))
+        if self.dim == 2:
+            way = toe - heel
+            signs = np.sign(normals @ [-way[1], way[0], 0.0])
+        else:
+            largest = np.abs(normals.mean(axis=0)).argmax()
+            signs = np.sign(normals[:, largest])
+        last = max(body.node_tags.max() for body in self.solids.values())
+        body, tags = cut(self.solids[joint.upper], surface, normals * signs[:, None], int(last) + 1)
+        ends = np.concatenate([self.bodies[n].node_tags for n in (joint.heel, joint.toe)])
+        at_ends = np.isin(surface.node_tags, ends)
+        if (tags[at_ends] != surface.node_tags[at_ends]).any():
+            raise self._bad(f"joint {joint.name}: inside a body it must not touch its surface")
+        self.bodies[joint.upper] = self.solids[joint.upper] = body
+        return tags
 
     def _by_body(self, surface: Body, body: str) -> list[tuple[str, Body]]:
         """A surface of the bodies of a kind, dam or foundation, divided by the body that it is a
@@ -656,6 +677,16 @@ def outward(surface: Body, body: Body) -> tuple[Array, BoolArray] | None:
     inside = cells_inside(surface, body)
     if (inside < 0).any():
         return None
+    normals = normals_of(surface)
+    from_body = surface.middles() - body.middles()[inside]
+    inwards = np.einsum("ij,ij->i", normals, from_body) < 0
+    normals[inwards] *= -1
+    # without the mesh generator's rounding: a level joint's normal is (0, 1, 0)
+    return np.round(normals, 12) + 0.0, inwards
+
+
+def normals_of(surface: Body) -> Array:
+    """Unit normals (elements, 3) of a surface, by the order of its nodes."""
     directions = []
     for _, table in surface.cells:
         edges = surface.points[table[:, 1:3]] - surface.points[table[:, :1]]
@@ -664,12 +695,16 @@ def outward(surface: Body, body: Body) -> tuple[Array, BoolArray] | None:
         else:
             across = np.cross(edges[:, 0], edges[:, 1])
         directions.append(across / np.linalg.norm(across, axis=1)[:, None])
-    normals = np.concatenate(directions)
-    from_body = surface.middles() - body.middles()[inside]
-    inwards = np.einsum("ij,ij->i", normals, from_body) < 0
-    normals[inwards] *= -1
-    # without the mesh generator's rounding: a level joint's normal is (0, 1, 0)
-    return np.round(normals, 12) + 0.0, inwards
+    return np.concatenate(directions)
+
+
+def is_inside(surface: Body, body: Body) -> bool:
+    """Whether each element of a surface is a side of two elements of a body."""
+    size = int(max(surface.node_tags.max(), body.node_tags.max())) + 1
+    shared = incidence(surface, size) @ incidence(body, size).T
+    corners = np.concatenate([np.full(len(t), t.shape[1]) for _, t in surface.cells])
+    beside = np.bincount(shared.tocoo().row[shared.data == corners[shared.tocoo().row]])
+    return len(beside) == len(corners) and bool((beside == 2).all())
 
 
 def cells_inside(surface: Body, body: Body) -> IntArray:

@@ -1,0 +1,29 @@
+"""A part of a mesh: points, elements and their normals."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..arrays import Array, IntArray
+
+
+@dataclass
+class Body:
+    """One or several regions of the mesh: points (n, 3) [m], their node tags (n,), cells by shape
+    as indices of points, element tags in that order.
+    """
+
+    points: Array
+    node_tags: IntArray
+    cells: list[tuple[str, IntArray]]
+    element_tags: IntArray
+    #: the region of each block of cells
+    regions: list[str] = field(default_factory=list)
+    #: of a surface: unit normals (elements, 3), out of the body it belongs to
+    normals: Array = field(default_factory=lambda: np.zeros((0, 3)))
+
+    def middles(self) -> Array:
+        """The middle of each element (elements, 3)."""
+        return np.concatenate([self.points[table].mean(axis=1) for _, table in self.cells])
