@@ -12,7 +12,7 @@ from .. import ROUND_OFF, RunError
 from ..arrays import Array
 from ..fem.bodies import Bodies
 from ..model.case import Case
-from ..solver.model import Model
+from ..solver.model import LARGEST_JUMP, Model
 from ..solver.newton import Diverged
 from ..solver.state import State
 from .record import Record
@@ -136,10 +136,13 @@ class Earthquake:
     def _halves(self, end: float, halvings: int) -> Iterator[Converged]:
         """Two steps of half the length up to a time, or their rest."""
         if halvings == MOST_HALVINGS:
-            raise RunError(
-                f"earthquake: no equilibrium after t = {self.now.time:.6g} s with a time step of "
-                f"{self.dt / 2**halvings:.3g} s"
+            largest, limit = np.abs(self.now.state.jump).max(), LARGEST_JUMP * self.case.size
+            reason = (
+                f"no equilibrium with a time step of {self.dt / 2**halvings:.3g} s"
+                if largest < 0.9 * limit
+                else f"the displacement jump reaches {limit:.3g} m, beyond small displacements"
             )
+            raise RunError(f"earthquake: after t = {self.now.time:.6g} s {reason}")
         middle = end - self.dt / 2 ** (halvings + 1)
         for target in (middle, end):
             if self.now.time < target - ROUND_OFF * self.dt:
