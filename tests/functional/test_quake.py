@@ -486,10 +486,12 @@ def test_an_interrupted_run_continues_with_the_same_rows(command, case_file, tmp
     add, steps = QuakeHistory.add, []
 
     def interrupted(self, quake, step):
+        if len(steps) == 60:
+            steps.append(None)
+            self.rows["time"].append(0.0)  # in the middle of a row
+            raise KeyboardInterrupt
         add(self, quake, step)
         steps.append(step)
-        if len(steps) == 60:
-            raise KeyboardInterrupt
 
     monkeypatch.setattr(QuakeHistory, "add", interrupted)
     code, _, err = command("quake", case_file, "--out", "one")
@@ -499,7 +501,7 @@ def test_an_interrupted_run_continues_with_the_same_rows(command, case_file, tmp
     before = (tmp_path / "one" / "quake.csv").read_text().splitlines()
     assert len(before) == 61
     assert command("quake", case_file, "--out", "one")[0] == 0
-    number = len(steps)
+    number = len(steps) - 1
     monkeypatch.setattr(QuakeHistory, "add", add)
     assert command("quake", case_file, "--out", "two")[0] == 0
     one, two = ((tmp_path / n / "quake.csv").read_text() for n in ("one", "two"))

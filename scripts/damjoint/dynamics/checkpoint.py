@@ -104,13 +104,14 @@ def read(path: Path, key: str, quake: Earthquake) -> QuakeHistory | None:
         names = stored["peaks"].tolist()
         values = zip(stored["peak_values"].tolist(), stored["peak_states"], strict=True)
         peaks = {n: Peak(v[0], v[1], w) for n, (v, w) in zip(names, values, strict=True)}
-        history = QuakeHistory(rows, list(stored["stress"]), peaks)
-        quake.now = Moving(
+        now = Moving(
             time=float(stored["time"]),
             state=state,
             motion=Motion(*stored["motion"]),
             forces=stored["forces"],
         )
+        history = QuakeHistory(rows, list(stored["stress"]), peaks, (len(stored["stress"]), now))
     except Exception:  # a damaged byte can make numpy and zipfile raise anything
         return None
+    quake.now = now
     return history

@@ -11,6 +11,7 @@ from ..model.case import Case
 from ..model.results import column_of, quake_columns
 from ..solver.history import joint_row
 from ..solver.state import State
+from .step import Moving
 from .stepper import Converged, Earthquake
 
 
@@ -84,6 +85,8 @@ class QuakeHistory:
     stress: list[Array] = field(default_factory=list)
     #: by PEAK_STATES
     peaks: dict[str, Peak] = field(default_factory=dict)
+    #: number of complete rows and the state of the last one: an interruption can come at any time
+    complete: tuple[int, Moving | None] = (0, None)
 
     @staticmethod
     def of(case: Case) -> QuakeHistory:
@@ -97,6 +100,13 @@ class QuakeHistory:
     def table(self) -> Table:
         """The rows by column."""
         return {name: np.array(values) for name, values in self.rows.items()}
+
+    def end_at_complete_row(self, quake: Earthquake) -> None:
+        """Remove a row that an interruption has left incomplete, and its step."""
+        number, last = self.complete
+        self.rows = {name: values[:number] for name, values in self.rows.items()}
+        self.stress = self.stress[:number]
+        quake.now = last or quake.problem.at_rest
 
     def add(self, quake: Earthquake, step: Converged) -> None:
         """The row of a converged step."""
@@ -122,3 +132,4 @@ class QuakeHistory:
             value = sign * float(row[column])
             if name not in self.peaks or value > self.peaks[name].value:
                 self.peaks[name] = Peak(value, step.end.time, motion.displacement)
+        self.complete = len(self.stress), step.end

@@ -94,6 +94,7 @@ def run(case: Case, out: Path, picture: bool = True, progress: bool = True) -> Q
         try:
             follow(quake, history, out / CHECKPOINT, key, progress)
         except BaseException as error:
+            history.end_at_complete_row(quake)
             state = "failed" if isinstance(error, Exception) else "interrupted"
             reached = f"{state} after t = {quake.now.time:.6g} s of the record"
             why = f"{reached}: {error}" if str(error) else reached
