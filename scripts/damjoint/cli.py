@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import io
 import os
 import sys
@@ -55,6 +56,19 @@ def integer(name: str, text: str, least: int) -> int:
     if not text.strip().isdecimal() or int(text) < least:
         raise InputError(f"{name} = {text}: must be an integer >= {least}")
     return int(text)
+
+
+def slip(name: str, text: str) -> float:
+    """Return an argument as a length [m]. Raises InputError."""
+    from .model.arithmetic import number
+
+    try:
+        value = number(text)
+    except ValueError:
+        value = 0.0
+    if not value > 0:
+        raise InputError(f"--{name} {text}: must be a slip > 0 m")
+    return value
 
 
 def path(name: str, text: str) -> Path:
@@ -177,6 +191,7 @@ def parser() -> Parser:
     add_new(commands)
     add_validate(commands)
     add_critical(commands)
+    add_quake(commands)
     add_sweep(commands)
     add_stress(commands)
     add_bench(commands)
@@ -443,6 +458,49 @@ def do_critical(arguments: argparse.Namespace) -> int:
     return int(not answer.confirmed)
 
 
+def add_quake(commands: Commands) -> None:
+    """Add damjoint quake."""
+    summary = (
+        "the dam through a recorded earthquake, after its static loads; continues if it was "
+        "interrupted; exit code 1 if the dam does not stand after it"
+    )
+    command = add_command(commands, do_quake, summary, settings_options(), loading_options())
+    command.add_argument("case", metavar="CASE", help=CASE)
+    command.add_path(
+        "--record",
+        "FILE",
+        help="CSV of the ground's acceleration: time [s], horizontal and, if any, vertical, in "
+        "record_unit (default: that of the case)",
+    )
+    command.add_path("--out", "FOLDER", help="output folder (default: out/CASE_quake)")
+    command.add_argument("--no-picture", action="store_true", help="draw no PNG")
+
+
+def do_quake(arguments: argparse.Namespace) -> int:
+    """Run damjoint quake; 1 if there is no static equilibrium after the earthquake."""
+    from .model import parameters
+    from .model.case import load
+    from .studies import quake
+
+    if arguments.accuracy:
+        raise InputError(f"accuracy = {arguments.accuracy}: must not be set for damjoint quake")
+    case = load(
+        arguments.case,
+        parameters.settings(arguments.settings),
+        arguments.levels,
+        arguments.tail_levels,
+        arguments.steps,
+        record=arguments.record,
+    )
+    if case["dim"] == 3:
+        warn_if_slow()
+    out = arguments.out or Path("out") / f"{case.name}_quake"
+    result = quake.run(case, out, not arguments.no_picture)
+    print(f"{case.name}: {result.statement}; {len(result.rows['time'])} steps; {out}\n")
+    print(quake.text(result))
+    return int(not result.stands)
+
+
 def add_sweep(commands: Commands) -> None:
     """Add damjoint sweep."""
     summary = "run a case with many values of its parameters, listed or random; CSV and chart"
@@ -490,6 +548,14 @@ def add_sweep(commands: Commands) -> None:
         help="add the critical value of each row: level (default), strength, ... as --of of "
         "damjoint critical",
     )
+    command.add_argument(
+        "--quake",
+        metavar="SLIP",
+        action=Checked,
+        convert=slip,
+        help="each row is the earthquake of the case's record; it fails if the residual slip "
+        "exceeds SLIP [m]: with --vary record_scale=... and --sample a fragility (default: none)",
+    )
     command.add_integer("--jobs", 1, help=JOBS)
     command.add_argument(
         "--scheduler",
@@ -513,6 +579,7 @@ def do_sweep(arguments: argparse.Namespace) -> int:
         raise InputError(f"--correlate {arguments.correlate[0]}: needs --sample")
     sample = sample_of(arguments.sample, **options) if arguments.sample else None
     plan = plan_of(arguments.vary, arguments.tie, sample, settings, arguments.critical)
+    plan = dataclasses.replace(plan, slip_limit=arguments.quake)
     case = load(
         arguments.case,
         settings,

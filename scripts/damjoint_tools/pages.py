@@ -16,7 +16,7 @@ from pathlib import Path
 
 from damjoint.laws import COLUMNS
 from damjoint.model.parameters import declared
-from damjoint.model.results import FLUX, HISTORY, JOINT
+from damjoint.model.results import FLUX, HISTORY, JOINT, QUAKE
 from damjoint.statics.gravity import LOADS
 from damjoint.studies.check import CHECK
 from damjoint.studies.failure_path import CRITICAL
@@ -77,9 +77,9 @@ def parameters_page() -> str:
 
 def results_page() -> str:
     """reference/results.md: the columns of the tables."""
-    joint, history, check, loads, critical = (
+    joint, history, check, loads, critical, quake = (
         markdown([(f"`{n}`", u, m) for n, (u, m) in columns.items()], ("column", "unit", "meaning"))
-        for columns in (JOINT | COLUMNS | FLUX, HISTORY, CHECK, LOADS, CRITICAL)
+        for columns in (JOINT | COLUMNS | FLUX, HISTORY, CHECK, LOADS, CRITICAL, QUAKE)
     )
     parts = [
         "# Results",
@@ -113,14 +113,22 @@ def results_page() -> str:
         "Written by `damjoint critical`: a row per equilibrium of each trial value; if the dam "
         "fails, also those after the highest level, under displacement control.",
         critical,
+        "## quake.csv",
+        "Written by `damjoint quake`: a row per time step. `run.json` has the summary under "
+        "`quake`; the last row of history.csv and the last state in joint.csv are static ones, "
+        "after the earthquake. `quake_stress.npz` (numpy): `time` [s], `s` [m] and `sigma_n_eff` "
+        "[Pa] (rows, nodes) of the first joint.",
+        quake,
         "## CASE_sweep.csv",
         "Written by `damjoint sweep`, a row per combination, in the order of computation: `key`, "
         "by which an interrupted sweep continues; the varied, sampled and tied values (a level as "
         "`level_asked`); the last row of "
         "history.csv; `failed` (1 where `damjoint run` ends with exit code 1), `verdict`, "
         "`statement`; with `--critical` the critical value, its `mode`, whether it is `confirmed` "
-        "and by what. In a sample, a row whose loads exceed the largest possible strength of the "
-        "joint is not computed; its `statement` gives this reason. Further files:",
+        "and by what; with `--quake` `peak_ground_ax` [m/s2], `residual_slip` [m], "
+        "`residual_tilt`, `rigid_block_slip` [m]. In a sample, a row whose loads exceed the "
+        "largest possible strength of the joint is not computed; its `statement` gives this "
+        "reason. Further files:",
         "- `_probability.csv`: probability of failure with the interval of Clopper and Pearson. "
         "Rows without a result are `undecided`; they count as failures, except for the lower "
         "limit.\n"
