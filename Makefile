@@ -36,7 +36,7 @@ bench: setup
 	$(BIN)/python -m damjoint_tools.pages bench out/bench
 
 # Make the pages in reference/ that come from the code or from runs: parameters.md, results.md,
-# tour.md, ssnp142.md
+# tour.md, ssnp142.md, published.md
 pages: setup
 	$(BIN)/python -m damjoint_tools.pages all
 

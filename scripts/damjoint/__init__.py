@@ -15,6 +15,7 @@ laws/       the joint laws, one file each
 fem/        finite elements of the bodies, condensed onto the joint
 joint/      the joint between them: interpolation, water, residual and tangent
 solver/     load stepping, Newton's method, equilibrium path
+dynamics/   time integration of an earthquake
 engines/    the engines: condensed/ from the parts above, getdp/ by the problem definition
 statics/    gravity method, limit analysis, verdict
 post/       tables, pictures, fields and folders of results

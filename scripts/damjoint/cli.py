@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import io
 import os
 import sys
@@ -55,6 +56,19 @@ def integer(name: str, text: str, least: int) -> int:
     if not text.strip().isdecimal() or int(text) < least:
         raise InputError(f"{name} = {text}: must be an integer >= {least}")
     return int(text)
+
+
+def slip(name: str, text: str) -> float:
+    """Return an argument as a length [m]. Raises InputError."""
+    from .model.arithmetic import number
+
+    try:
+        value = number(text)
+    except ValueError:
+        value = 0.0
+    if not value > 0:
+        raise InputError(f"--{name} {text}: must be a slip > 0 m")
+    return value
 
 
 def path(name: str, text: str) -> Path:
@@ -177,6 +191,7 @@ def parser() -> Parser:
     add_new(commands)
     add_validate(commands)
     add_critical(commands)
+    add_quake(commands)
     add_sweep(commands)
     add_stress(commands)
     add_bench(commands)
@@ -365,9 +380,16 @@ def do_new(arguments: argparse.Namespace) -> int:
 
 def add_validate(commands: Commands) -> None:
     """Add damjoint validate."""
-    summary = "compare with the published numbers of SSNP142; exit code 1 if a row fails"
+    summary = "compare with the published numbers; exit code 1 if a row fails"
     command = add_command(commands, do_validate, summary)
-    command.add_argument("cases", nargs="*", metavar="CASE", help="letters a to k (default: all)")
+    command.add_argument(
+        "tests",
+        nargs="*",
+        metavar="FAMILY|CASE",
+        default=["ssnp142"],
+        help="families of tests (ssnp142, ssnp143, ssnp162, ssnp164, ssnv503; all) or cases, such "
+        "as the modelings a to k of SSNP142 (default: ssnp142)",
+    )
     command.add_path(
         "--out",
         "FOLDER",
@@ -379,25 +401,20 @@ def add_validate(commands: Commands) -> None:
 
 def do_validate(arguments: argparse.Namespace) -> int:
     """Run damjoint validate; 1 if a row fails."""
-    from .model.case import load
     from .post import validation
-    from .runner import run
-    from .statics.verdict import statement
+    from .studies import validate
 
-    cases = [load(name) for name in arguments.cases or validation.modelings()]
-    for case in cases:
-        if not validation.references(case):
-            allowed = ", ".join(validation.modelings())
-            raise InputError(f"case {case.name}: has no reference values; must be one of {allowed}")
-    comparisons = []
-    for case in cases:
-        out = arguments.out / case.name
-        for result in run(case, out, fields=False, engine=arguments.engine):
-            if result.stopped:
-                raise RunError(f"{case.name}: {statement(result)}")
-            comparisons += validation.compare(result)
-    print(validation.report(comparisons))
-    return int(any(c.verdict == "fail" for c in comparisons))
+    families, failed = validate.chosen(arguments.tests), False
+    summaries = []
+    for family, names in families.items():
+        comparisons = list(validate.compare(family, names, arguments.out, arguments.engine))
+        print(f"{family.upper()}: {validation.FAMILIES[family]}\n")
+        print(validation.report(comparisons), end="\n\n" if len(families) > 1 else "\n")
+        summaries.append(f"{family}: {validation.summary(comparisons)}")
+        failed |= any(c.verdict == "fail" for c in comparisons)
+    if len(families) > 1:
+        print("\n".join(summaries))
+    return int(failed)
 
 
 def add_critical(commands: Commands) -> None:
@@ -439,6 +456,49 @@ def do_critical(arguments: argparse.Namespace) -> int:
     )
     print("\n".join(lines))
     return int(not answer.confirmed)
+
+
+def add_quake(commands: Commands) -> None:
+    """Add damjoint quake."""
+    summary = (
+        "the dam through a recorded earthquake, after its static loads; continues if it was "
+        "interrupted; exit code 1 if the dam does not stand after it"
+    )
+    command = add_command(commands, do_quake, summary, settings_options(), loading_options())
+    command.add_argument("case", metavar="CASE", help=CASE)
+    command.add_path(
+        "--record",
+        "FILE",
+        help="CSV of the ground's acceleration: time [s], horizontal and, if any, vertical, in "
+        "record_unit (default: that of the case)",
+    )
+    command.add_path("--out", "FOLDER", help="output folder (default: out/CASE_quake)")
+    command.add_argument("--no-picture", action="store_true", help="draw no PNG")
+
+
+def do_quake(arguments: argparse.Namespace) -> int:
+    """Run damjoint quake; 1 if there is no static equilibrium after the earthquake."""
+    from .model import parameters
+    from .model.case import load
+    from .studies import quake
+
+    if arguments.accuracy:
+        raise InputError(f"accuracy = {arguments.accuracy}: must not be set for damjoint quake")
+    case = load(
+        arguments.case,
+        parameters.settings(arguments.settings),
+        arguments.levels,
+        arguments.tail_levels,
+        arguments.steps,
+        record=arguments.record,
+    )
+    if case["dim"] == 3:
+        warn_if_slow()
+    out = arguments.out or Path("out") / f"{case.name}_quake"
+    result = quake.run(case, out, not arguments.no_picture)
+    print(f"{case.name}: {result.statement}; {len(result.rows['time'])} steps; {out}\n")
+    print(quake.text(result))
+    return int(not result.stands)
 
 
 def add_sweep(commands: Commands) -> None:
@@ -488,6 +548,14 @@ def add_sweep(commands: Commands) -> None:
         help="add the critical value of each row: level (default), strength, ... as --of of "
         "damjoint critical",
     )
+    command.add_argument(
+        "--quake",
+        metavar="SLIP",
+        action=Checked,
+        convert=slip,
+        help="each row is the earthquake of the case's record; it fails if the residual slip "
+        "exceeds SLIP [m]: with --vary record_scale=... and --sample a fragility (default: none)",
+    )
     command.add_integer("--jobs", 1, help=JOBS)
     command.add_argument(
         "--scheduler",
@@ -511,6 +579,7 @@ def do_sweep(arguments: argparse.Namespace) -> int:
         raise InputError(f"--correlate {arguments.correlate[0]}: needs --sample")
     sample = sample_of(arguments.sample, **options) if arguments.sample else None
     plan = plan_of(arguments.vary, arguments.tie, sample, settings, arguments.critical)
+    plan = dataclasses.replace(plan, slip_limit=arguments.quake)
     case = load(
         arguments.case,
         settings,
@@ -607,7 +676,7 @@ def add_law(commands: Commands) -> None:
     """Add damjoint law."""
     summary = "evaluate a joint law along a path of displacement jumps"
     command = add_command(commands, do_law, summary, settings_options())
-    command.add_argument("law", metavar="LAW", help="rupture, friction or bond")
+    command.add_argument("law", metavar="LAW", help="rupture, friction, bond or endo")
     command.add_path(
         "--path",
         "FILE",

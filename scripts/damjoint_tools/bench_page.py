@@ -17,7 +17,7 @@ from damjoint.storage import locked_folder
 from tabulate import tabulate
 from threadpoolctl import threadpool_limits
 
-from . import bench_accuracy, bench_cost
+from . import bench_accuracy, bench_commands, bench_cost
 from .bench_scenes import PARTS, QUANTITIES, SCENES
 from .bench_table import Measurements, Table
 from .provenance import provenance, source_line
@@ -168,13 +168,16 @@ def page(
         "The published code is code_aster 15.2 on a machine of 2 cores, the complete job without "
         "meshing. Times have two digits; the second one varies from run to run.",
         *of_cases(tables["cases"], short),
+        *of_commands(tables),
         *of_accuracy(tables),
         *of_estimates(tables["estimates"]),
+        *of_critical(tables["critical"]),
         *of_costs(tables["switches"], tables["sweeps"]),
         "## Growth with size",
         "; ".join(bench_cost.exponents(tables["growth"])) + ". Uniform refinement, cold start. "
         f"A mesh beyond the memory ends with the message: `{beyond}`",
         as_text(tables["growth"]),
+        *of_orders(tables["orders"]),
         "## Precision on a fine mesh",
         "; ".join(precise) + ".",
         *of_joints(tables["joints"]),
@@ -203,6 +206,56 @@ def of_cases(cases: Table, short: bool) -> list[str]:
         "table has total seconds and those of each phase, peak memory in MB, and seconds of the "
         "published code and of the reference GetDP model, with the ratios.",
         as_text(cases, columns),
+    ]
+
+
+def of_commands(tables: dict[str, Table]) -> list[str]:
+    """Start, fields and pictures."""
+    begin, files = tables["start"], tables["pictures"]
+    *_, cold, cached = begin["times interpreter and numpy"]
+    worst = max(range(len(files["case"])), key=lambda i: files["both over tables"][i])
+    faster = sum(
+        seconds < published
+        for seconds, published in zip(files["with both"], files["published"], strict=True)
+    )
+    return [
+        "## Start",
+        f"Tables of C take {cold:.1f} times as long as the interpreter with numpy without a cache, "
+        f"{cached:.1f} times with its mesh and condensed bodies in the cache. Seconds in a new "
+        "process, the smallest of several.",
+        as_text(begin),
+        "## Fields and picture",
+        "With fields and picture, the default, a plane modeling takes at most "
+        f"{files['both over tables'][worst]:.1f} times as long as with tables only "
+        f"({files['case'][worst].upper()}); {faster} of {len(files['case'])} are faster so than "
+        "the published code, which draws nothing. Cold start, seconds.",
+        as_text(files),
+    ]
+
+
+def of_critical(searches: Table) -> list[str]:
+    """Critical values."""
+    slowest = max(range(len(searches["search"])), key=lambda i: searches["seconds"][i])
+    return [
+        "## Critical values",
+        f"A search takes {min(searches['seconds']):.1f} to {searches['seconds'][slowest]:.1f} s "
+        f"({searches['search'][slowest]}) and computes at most {max(searches['dams'])} dams; "
+        f"{searches['confirmed'].count('yes')} of {len(searches['search'])} values are confirmed. "
+        "Case `dam` with the parameters of the first column, in one process.",
+        as_text(searches, digits=4),
+    ]
+
+
+def of_orders(orders: Table) -> list[str]:
+    """METIS's order of the unknowns beside MUMPS's own."""
+    by_metis, by_mumps = orders["METIS"][-1], orders["MUMPS's own"][-1]
+    return [
+        "## Order of elimination in 3D",
+        f"Bodies of {orders['unknowns'][-1]} unknowns are condensed in "
+        f"{by_metis:.2g} s in METIS's order and in {by_mumps:.2g} s in MUMPS's own; the stiffness "
+        "differs by "
+        f"{max(orders['difference']):.0e} of its largest entry. Seconds on one thread.",
+        as_text(orders),
     ]
 
 
@@ -313,10 +366,9 @@ def bench(out: Path, short: bool) -> None:
 def measure(measurements: Measurements) -> tuple[dict[str, Table], list[str]]:
     """Measure all tables, {name: table}, and the errors of balances."""
     tables = [cases := bench_cost.cases(measurements)]
-    studies = (
-        *(bench_cost.switches, bench_cost.sweeps, bench_cost.growth),
-        *(bench_cost.joints, bench_cost.stress),
-    )
+    studies = bench_cost.switches, bench_cost.sweeps, bench_cost.growth, bench_cost.stress
+    studies += bench_commands.start, bench_commands.pictures, bench_commands.critical
+    studies += bench_commands.orders, bench_cost.joints
     tables += [study(measurements) for study in studies]
     tables.append(modelings(measurements, cases))
     with threadpool_limits(1):

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -49,26 +50,41 @@ PARTS = ("start", "mesh", "assembly", "condensation", "newton", "post")
 PART_OF_RUN = {"newton": "solve"}
 
 
-def run_cold(arguments: list[str]) -> tuple[float, dict]:
-    """Run damjoint in a new process with an empty cache, without fields and picture.
+def time_process(arguments: Sequence[str], cache: str = "") -> float:
+    """Run Python with arguments in a new process; wall seconds.
+
+    cache: folder of the cache, empty for none. Raises RunError if the process fails.
+    """
+    start = time.perf_counter()
+    done = subprocess.run(
+        [sys.executable, *arguments],
+        env={**os.environ, "DAMJOINT_CACHE": cache},
+        stdout=subprocess.DEVNULL,
+        check=False,
+    )
+    wall = time.perf_counter() - start
+    if done.returncode:
+        words = " ".join(arguments)
+        raise RunError(f"bench: python {words} ended with exit code {done.returncode}")
+    return wall
+
+
+#: Options of a run that writes tables only.
+TABLES_ONLY = "--no-fields", "--no-picture"
+
+
+def run_cold(
+    arguments: Sequence[str], options: Sequence[str] = TABLES_ONLY, cache: str = ""
+) -> tuple[float, dict]:
+    """Run a case in a new process, without a cache by default.
 
     Returns wall seconds and run.json, whose seconds are summed over the scenes of the case. Raises
     RunError if the run fails.
     """
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder, "out")
-        options = ["--no-fields", "--no-picture", "--out", str(out)]
-        start = time.perf_counter()
-        done = subprocess.run(
-            [sys.executable, "-m", "damjoint.cli", "run", *arguments, *options],
-            env={**os.environ, "DAMJOINT_CACHE": ""},
-            stdout=subprocess.DEVNULL,
-            check=False,
-        )
-        wall = time.perf_counter() - start
-        if done.returncode:
-            words = " ".join(arguments)
-            raise RunError(f"bench: damjoint run {words} ended with exit code {done.returncode}")
+        words = "-m", "damjoint.cli", "run", *arguments, *options, "--out", str(out)
+        wall = time_process(words, cache)
         record = json.loads((out / "run.json").read_text())
         for further in out.glob("*/run.json"):
             seconds = json.loads(further.read_text())["wall_seconds"]

@@ -241,7 +241,7 @@ def heads(run: RunFiles) -> Iterator[str]:
         time = rows["time"][0]
         row = run.row(time)
         heel, toe = (case.section[name][0] for name in ("heel_y", "toe_y"))
-        ends = max(row["level"], heel), max(row["tail_level"], toe)
+        ends = max(row["level"] + case["joint_head_offset"], heel), max(row["tail_level"], toe)
         highest, lowest = max(ends), min(ends)
         if has_drains(case):  # their outlet may be as low as the tailwater or the joint
             lowest = min(lowest, max(row["tail_level"], min(heel, toe)))

@@ -114,6 +114,41 @@ def test_critical_earthquake():
     assert answer.value == pytest.approx(answer.gravity, rel=1e-3)
 
 
+def test_a_level_before_the_earthquake_acts_in_full_does_not_count():
+    """On the way to the last level a lower coefficient acts, and higher levels have an equilibrium:
+    they end neither the path of a dam that stands nor are the critical level.
+    """
+    search = Search(load("dam", DAM), "k_h")
+    path_of_dam = search.trial(0.2).path
+    assert path_of_dam.reached and path_of_dam.points[path_of_dam.arrival].control == "crest"
+    levels = [point.level for point in path_of_dam.points]
+    assert path_of_dam.levels[0] == -np.inf < levels[0]
+    search, answer = found("dam", settings=DAM | {"k_h": 0.45})
+    (trial,) = search.trials
+    earlier = [p.level for p in trial.path.points if p.state.loading.part("quake") < 1]
+    assert answer.value < max(earlier) and answer.point.state.loading.part("quake") == 1
+
+
+@pytest.mark.heavy
+def test_a_wrong_first_estimate_is_followed_by_a_wider_search(monkeypatch):
+    """Paths given up where the level can be prescribed no more, far from the critical value."""
+    _, expected = found("dam", "k_h", DAM)
+    follow = FailurePath.follow
+    monkeypatch.setattr(FailurePath, "follow", lambda p, far: far < path.SURE or follow(p, far))
+    search, answer = found("dam", "k_h", DAM)
+    first_estimate = next(t for t in search.trials if t.stands and t.path.points[-1].imposed)
+    assert first_estimate.value < 0.8 * answer.value and search.factor == path.SURE
+    assert answer.value == pytest.approx(expected.value, rel=2 * path.PRECISION)
+    assert answer.mode == expected.mode and len(search.trials) < 30
+
+
+def test_the_search_begins_beside_the_value_of_the_gravity_method():
+    search, answer = found("dam", "mu", DAM | UNBONDED, tail_levels="3")
+    _, beyond, before, *_ = [trial.value for trial in search.trials]
+    assert beyond < answer.gravity < before and before / beyond < 1.03
+    assert answer.value == pytest.approx(answer.gravity, rel=2e-4)
+
+
 @pytest.mark.heavy
 def test_critical_value_of_a_parameter_that_must_not_be_less():
     """T = mu N at 45 m: no equilibrium with less."""

@@ -1,6 +1,6 @@
 """Both engines against each other: laws point by point, and complete runs."""
 
-from dataclasses import fields, replace
+from dataclasses import fields
 
 import numpy as np
 import pytest
@@ -20,11 +20,15 @@ def random_path(law_name: str, seed: int, case: Case) -> np.ndarray:
         "rupture": case["sigma_max"] / case["K_N"],
         "friction": case["adhesion"] / (case["mu"] * case["K_N"]),
         "bond": case["G_f"] / case["sigma_max"],
+        "endo": case["G_f"] / case["sigma_max"],
     }[law_name]
     walk = np.cumsum(rng.normal(size=(200, 3)), axis=0) * 0.3 * size
     walk[:, 1:] *= 5
     return walk
 
+
+#: Parameters of a law that the others' tests do not admit.
+OWN = {"endo": {"adhesion": 1.2 * 0.35 * 1e4}}  # between mu sigma_max and 1.41 mu sigma_max
 
 #: Grouted in three of the path's 200 steps, sawn later, grouted again.
 GROUTED = {"grout_pressure": 5e3, "grout_t": 50.0}
@@ -43,6 +47,11 @@ def test_grouted_and_sawn_laws_agree_point_by_point(works):
     laws_agree("rupture", 1, WORKS[works])
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_a_sawn_friction_law_agrees_point_by_point(seed):
+    laws_agree("friction", seed, WORKS["sawn"])
+
+
 @pytest.mark.parametrize("law_name", LAWS)
 @pytest.mark.parametrize("seed", range(3))
 def test_laws_agree_point_by_point(law_name, seed):
@@ -51,19 +60,23 @@ def test_laws_agree_point_by_point(law_name, seed):
 
 
 def laws_agree(law_name, seed, works):
-    changed = works | {
-        "K_N": 1e12,
-        "K_T": 5e11,
-        "mu": 0.35,
-        "adhesion": 1000,
-        "sigma_max": 1e4,
-        "G_f": 2e-4,
-        "G_t": 1e-5,
-        "alpha": [0.0, 1.0, 1.5][seed],
-        "pena_contact": 2.0,
-        "pena_tang": 1e11,
-    }
-    changed["pena_rupture"] = -1.0
+    changed = (
+        works
+        | {
+            "K_N": 1e12,
+            "K_T": 5e11,
+            "mu": 0.35,
+            "adhesion": 1000,
+            "sigma_max": 1e4,
+            "G_f": 2e-4,
+            "G_t": 1e-5,
+            "alpha": [0.0, 1.0, 1.5][seed],
+            "pena_contact": 2.0,
+            "pena_tang": 1e11,
+            "pena_rupture": -1.0,
+        }
+        | OWN.get(law_name, {})
+    )
     case = load("ssnp142", changed | {"law": law_name})
     jumps = random_path(law_name, seed, case)
     expected = law.evaluate(law_name, jumps, settings=changed)
@@ -85,23 +98,30 @@ def laws_agree(law_name, seed, works):
 
 @pytest.mark.parametrize(
     "law_name, works",
-    [*((name, {}) for name in LAWS), *(("rupture", works) for works in WORKS.values() if works)],
+    [
+        *((name, {}) for name in LAWS),
+        *(("rupture", works) for works in WORKS.values() if works),
+        ("friction", WORKS["sawn"]),
+    ],
 )
 def test_the_tangent_is_the_derivative(law_name, works):
     """Central differences, away from kinks of the law."""
-    settings = works | {
-        "sigma_max": 1e4,
-        "pena_tang": 1e11,
-        "pena_rupture": -1.0,
-        "G_f": 2e-4,
-        "G_t": 1e-5,
-    }
+    settings = (
+        works
+        | {
+            "sigma_max": 1e4,
+            "pena_tang": 1e11,
+            "pena_rupture": -1.0,
+            "G_f": 2e-4,
+            "G_t": 1e-5,
+        }
+        | OWN.get(law_name, {})
+    )
     case = load("ssnp142", settings | {"law": law_name})
     model = case.law
     jumps = random_path(law_name, 7, case)
-    variables = model.initial(len(jumps))
-    tangential = fields(variables)[1].name
-    variables = replace(variables, **{tangential: 0.1 * jumps[:, 1:]})
+    before = 0.1 * jumps * [-1, 1, 1]
+    variables = model.update_internal_variables(before, model.initial(len(jumps)))
     variables = model.begin_step(variables, 49.5, 49.8)
     step = 1e-6 * np.abs(jumps).max()
     _, tangent = model.traction_and_tangent(jumps, variables)
@@ -139,6 +159,7 @@ SCENES = {
     # the crack grouted and the level lowered; the bond removed by sawing
     "a grouted": {"grout_pressure": 1e4, "grout_t": 3.5, "levels": "3,6,9,9,2"},
     "a sawn": {"saw_thickness": 1e-6, "saw_t": 2.0, "levels": "3,6,6,8"},
+    "c sawn": {"saw_thickness": 1e-7, "saw_t": 3.0, "levels": "3,9,6"},
     "g weak": {"mu": 0.06, "adhesion": 0.0, "pena_tang": 0.0, "nu": 0.3, "E": 1e10, "levels": "2"},
     "c stiff, no hardening": {"K_T": 9e14, "mu": 0.06, "pena_tang": 0.0, "levels": "1,2"},
     "i soft, no strength": {"E": 1e10, "sigma_max": 0.0, "K_N": 1e11, "K_T": 5e10, "nu": 0.2},
@@ -163,6 +184,8 @@ SECTIONS = {
     "Zangar, lift": (SHAPE | HEAVY_SILT | {"joint_height": 8.0}, "20,41,47", "0"),
     "cracked": ({"uplift": "cracked", "sigma_max": 1e5}, "20,40,45", "0,0,5"),
     "cracked bond": ({"uplift": "cracked", "law": "bond", "joint_slope": 2.0}, "20,40,46", "0"),
+    "endo, flow": ({"law": "endo", "uplift": "flow"}, "30,41", "2"),
+    "endo, cracked": ({"law": "endo", "uplift": "cracked", "G_f": 20.0}, "30,41", "0"),
     "flow driven": ({"uplift": "flow", "drive": "crest", "drive_by": 1e-3}, "20,40", "0"),
     "solid": (SOLID | SHAPE | {"joint_slope": 4.0, "silt_height": 12.0, "k_h": 0.1}, "20,41", "0"),
     "temperature": (SHAPE | WARM | {"joint_slope": 3.0, "k_h": 0.05}, "20,41", "0"),

@@ -124,6 +124,22 @@ def test_resultants_with_drains(tmp_path, engine, level, tail, effectiveness, ou
     assert last["M"] == pytest.approx(dry_m - moment, rel=1e-6)
 
 
+@pytest.mark.parametrize("engine", ["condensed", "getdp"])
+def test_the_head_at_the_heel_is_above_the_reservoir_by_the_offset(tmp_path, engine):
+    """As in a published mesh whose joint is 0.1 m thick: p = rho g h (1 - x/5) with h = 9 m, a face
+    under 8.9 m of water.
+    """
+    case = load("c", {"joint_head_offset": 0.1, "n_joint": 20.0, "uplift": "imposed"}, "8.9")
+    (result,) = runner.run(case, tmp_path, False, False, False, engine)
+    x, p = result.at()["x"], result.at()["p"]
+    assert_allclose(p, 9 * WATER * (1 - x / 5), rtol=1e-9, atol=1e-6)
+    assert result.last["N"] == pytest.approx(
+        resultants(8.9, 0, False)[0] - 9 * WATER * 5 / 2, rel=1e-6
+    )
+    uplift = gravity.Uplift(case, gravity.RigidBlock(case), 8.9, 0, 0)
+    assert uplift.force == pytest.approx(9 * WATER * 5 / 2)
+
+
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize(
     "engine, uplift, settings",

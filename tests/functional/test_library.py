@@ -142,7 +142,7 @@ def test_a_case_of_stored_results_can_not_be_varied(run, tmp_path):
 def test_bad_input_is_one_line():
     for words, message in (
         ({"mu": -1}, "mu = -1: must be"),
-        ({"law": "glue"}, "law = glue: must be one of rupture, friction, bond"),
+        ({"law": "glue"}, "law = glue: must be one of rupture, friction, bond, endo"),
         ({"levels": [-3]}, "levels = -3: must be"),
         ({"colour": 3}, "colour: unknown parameter"),
     ):

@@ -58,7 +58,8 @@ def test_a_toy_law_needs_nothing_else(result):
 SPRINGS = """
 law_variables = "unused unused_1 unused_2";
 law_column = "";
-law_has_works = 0;
+law_has_grouting = 0;
+law_has_sawing = 0;
 law_has_release = 0;
 Function {
   law_tangent[] = TensorDiag[K_T, K_N, K_T];

@@ -149,7 +149,7 @@ def test_report_has_results_and_parameters(command, folder, tmp_path):
     assert "not estimated; damjoint run --accuracy 1% estimates it" in mine
     words = words_of(common)
     assert "K_N Normal stiffness K_N 1 20 GPa/m 100" in words
-    assert "sigma_max Tensile strength sigma_max, rupture and bond 2, 3" in words
+    assert "sigma_max Tensile strength sigma_max, not friction 2, 3" in words
     assert "levels Reservoir levels at t = 1, 2, ... 1 8, 10 m" in words
     assert "E_dam Young's modulus of the dam 1 25 GPa" in words
     record = json.loads((folder / "run.json").read_text())

@@ -28,6 +28,7 @@ def test_a_slender_dam_fills_to_its_crest(command, uplift, n_joint):
     assert violations(files) == []
 
 
+@pytest.mark.heavy
 def test_the_state_after_unstable_crack_growth_hardly_depends_on_the_steps(solve):
     levels = [",".join(f"{40 * (k + 1) / n:g}" for k in range(n)) for n in (1, 4, 16)]
     found = [solve("ssnp142", path, uplift="flow", **SLENDER)[0] for path in levels]

@@ -1,7 +1,10 @@
 """The eleven modelings of SSNP142 against the published numbers; numbers of iterations."""
 
+import numpy as np
 import pytest
+from damjoint.model.case import load
 from damjoint.post import validation
+from damjoint.studies import validate
 
 #: at most so many Newton iterations: in one step, in all of them (both uplifts of a, b, i counted
 #: apart)
@@ -17,9 +20,13 @@ ITERATIONS = {
     "i": (6, None),
     "j": (5, None),
     "k": (None, 120),
+    "c_file": (5, None),
+    "d_file": (5, None),
+    "j_file": (5, None),
 }
 MODELINGS = [
-    pytest.param(name, marks=pytest.mark.heavy) if name in "bdfh" else name for name in ITERATIONS
+    pytest.param(name, marks=pytest.mark.heavy) if name[0] in "bdfh" else name
+    for name in ITERATIONS
 ]
 
 
@@ -54,8 +61,40 @@ def test_validate_exits_with_1_if_a_row_fails(command, monkeypatch):
     """With the references of the first case changed by 10 %."""
     from dataclasses import replace
 
-    rows = [replace(r, value=1.1 * r.value) for r in validation.table() if r.tolerance]
-    monkeypatch.setattr(validation, "table", lambda: rows)
+    rows = [replace(r, value=1.1 * r.value) for r in validation.table("ssnp142") if r.tolerance]
+    monkeypatch.setattr(validation, "table", lambda family: rows)
     code, out, _ = command("validate", "c")
     assert code == 1
     assert " 0 failed" not in out.splitlines()[-1]
+
+
+@pytest.mark.parametrize("family", [f for f in validation.FAMILIES if f != "ssnp142"])
+def test_published_tests_beside_ssnp142(family, tmp_path):
+    """Every row of the table has its test, and is within its tolerance."""
+    comparisons = list(validate.compare(family, validate.tests_of(family), tmp_path, "auto"))
+    assert {c.reference for c in comparisons} == set(validation.table(family))
+    assert {c.verdict for c in comparisons} == {"pass"}, "\n" + validation.report(comparisons)
+
+
+def test_validate_takes_families_and_cases(command):
+    code, out, _ = command("validate", "ssnp162", "ssnv503")
+    assert code == 0
+    assert out.splitlines()[-2].startswith("ssnp162: 21 passed, 0 failed")
+    assert out.splitlines()[-1].startswith("ssnv503: 7 passed, 0 failed")
+
+
+@pytest.mark.parametrize("name, points", [("c_file", 2), ("j_file", 4)])
+def test_the_line_force_is_the_error_of_the_published_integration(name, points):
+    """Force and moment of the pressure on ten sides of the face, water at 9 m, against the exact
+    ones.
+    """
+    sides = [0.1, 0.245, 0.448, 0.731, 1.126, 1.676, 2.444, 3.515, 5.009, 7.093, 10]
+    x, weights = np.polynomial.legendre.leggauss(points)
+    half, middle = np.diff(sides)[:, None] / 2, (np.array(sides[1:]) + sides[:-1])[:, None] / 2
+    y = middle + half * x
+    pressure = half * weights * np.maximum(9 - y, 0)
+    depth, case = 8.9, load(name)
+    error = pressure.sum() - depth**2 / 2
+    assert case["force_x"] == pytest.approx(9810 * error, rel=1e-9)
+    moment = (pressure * (y - 0.1)).sum() - depth**3 / 6
+    assert case["force_at"] == pytest.approx(moment / error, rel=1e-9)

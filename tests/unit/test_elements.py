@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from damjoint.fem.elasticity import at_middles, body_force, elasticity, stress, thermal_load
+from damjoint.fem.elasticity import at_middles, body_force, elasticity, mass, stress, thermal_load
 from damjoint.fem.elements import CORNERS, Space, basis, corners_of
 from damjoint.model.mesh import Body
 from scipy.sparse.linalg import spsolve
@@ -151,3 +151,22 @@ def test_free_thermal_expansion_has_no_stress(shape, order):
         if dim == 2:
             prevented[:, 2] = -YOUNG * thermal[0]
         assert computed == pytest.approx(prevented, abs=1e-11 * YOUNG)
+
+
+@pytest.mark.parametrize("shape", CELLS)
+def test_the_mass_matrix_is_the_integral_of_products(shape):
+    """rho integral of (x y)(1 + y), of the functions of order 2, on a grid of parallel sides."""
+    body, dim = grid(shape, shake=0.0)
+    space = Space(body, 2)
+    matrix = mass(space, dim, {"dam": 3.0})
+
+    def function(field):
+        """Coefficients of a quadratic field along x, from its values at the locations."""
+        values = field(space.locations)
+        solution = np.linalg.lstsq(space.interpolation(2).toarray(), values, rcond=None)[0]
+        return np.kron(solution, np.eye(dim)[0])
+
+    one = function(lambda p: p[:, 0] * p[:, 1])
+    other = function(lambda p: 1 + p[:, 1])
+    exact = 2 * (2 + 8 / 3) * (2 if dim == 3 else 1)  # int x int (y + y^2), sides of 2
+    assert one @ matrix @ other == pytest.approx(3 * exact)

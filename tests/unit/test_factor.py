@@ -40,6 +40,20 @@ def test_schur_complement(system, method):
     assert reduced == pytest.approx(loads[keep] - through @ loads[inside], rel=1e-12, abs=1e-13)
 
 
+def test_factors_that_are_stored(system, method):
+    """Two right-hand sides, one after the other; two sets of factors at once."""
+    matrix, loads = system
+    keep = np.array([7, 3, 250, 100, 101])
+    factors = factor.partial_factors(matrix, keep)
+    others = factor.partial_factors(4 * matrix, keep)
+    for right in loads.T:
+        reduced = factors.reduce(right)
+        others.reduce(right)
+        solution = factors.expand(np.linalg.solve(factors.schur, reduced))
+        assert matrix @ solution == pytest.approx(right, rel=1e-11, abs=1e-12)
+    assert others.schur == pytest.approx(4 * factors.schur, rel=1e-12)
+
+
 def test_solution(system, method):
     matrix, loads = system
     solution = factor.solve_symmetric(matrix, loads)

@@ -10,7 +10,7 @@ import pytest
 from damjoint import cli
 from damjoint.laws import COLUMNS, LAWS
 from damjoint.model.parameters import declared
-from damjoint.model.results import FLUX, HISTORY, JOINT
+from damjoint.model.results import FLUX, HISTORY, JOINT, QUAKE
 from damjoint.studies.check import CHECK
 from damjoint.studies.failure_path import CRITICAL
 
@@ -58,7 +58,7 @@ def names_in(*pages):
     "names, pages",
     [
         (JOINT | COLUMNS | FLUX | HISTORY, ["glossary"]),
-        (CHECK | CRITICAL, ["glossary", "results"]),
+        (CHECK | CRITICAL | QUAKE, ["glossary", "results"]),
         (LAWS, ["glossary"]),
         (declared()["uplift"].choices, ["glossary"]),
         (declared()["quadrature"].choices, ["glossary"]),

@@ -129,3 +129,20 @@ def test_random_path_against_the_closed_form(hardening):
         ("sigma_n", "tau_1", "tau_2", "lambda"), expected.T, (1e4, 1e4, 1e4, 1e-8), strict=True
     ):
         assert_allclose(answer[name], column, rtol=1e-9, atol=1e-9 * scale, err_msg=name)
+
+
+def test_sawing_takes_off_what_was_open():
+    """A saw of 3e-8 m at t = 2, half of it at 1.5. Contact begins where the saw has left off: at
+    -3e-8 m where the joint was closed, at -2e-8 m where it was open by 1e-8 m; beyond, the tension
+    is K_N times the distance up to c/mu. The shear strength is that of the new normal stress.
+    """
+    saw = {"saw_thickness": 3e-8, "saw_t": 2.0}
+    closed = along([(-1e-8, 0, 0), (-4e-8, 1e-8, 0), (-2.9e-8, 1e-8, 0), (0, 1e-8, 0)], **saw)
+    assert_allclose(closed["sigma_n"], [-1e4, -1e4, 1e3, C / MU], rtol=1e-9)
+    assert_allclose(closed["tau_1"][1], YIELD, rtol=1e-9)
+    assert_allclose(closed["open"], [0, 0, 0, 1])
+    opened = along([(1e-8, 0, 0), (-4e-8, 0, 0), (-1.9e-8, 0, 0)], **saw)
+    assert_allclose(opened["sigma_n"], [C / MU, -2e4, 1e3], rtol=1e-9)
+    assert_allclose(opened["gap"], 1e-8)
+    halfway = along([(-4e-8, 0, 0)] * 3, saw_thickness=3e-8, saw_t=2.5)
+    assert_allclose(halfway["sigma_n"], -1e4 * np.array([4, 2.5, 1]), rtol=1e-9)

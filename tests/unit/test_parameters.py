@@ -227,7 +227,8 @@ def test_an_independent_parameter_changes_nothing_else():
     base = load("dam", common)
     for name in independent():
         known, own = parameters.parameter(name), base[name]
-        values = known.choices or ([own + 1] if known.integer else [own / 2, (own + 1) / 2])
+        other = 1.0 if own == parameters.AUTOMATIC else own
+        values = known.choices or ([own + 1] if known.integer else [other / 2, (other + 1) / 2])
         value = next(v for v in values if v != own)
         if name in ("grout_pressure", "saw_thickness"):  # not with law = bond: refused in both ways
             for way in (lambda v: load("dam", common | v), base.changed):
@@ -268,7 +269,7 @@ def test_groups_have_all_values_of_a_case():
     """Each parameter is an attribute of one group; those declared as texts are the texts."""
     case, known = load("dam"), parameters.declared()
     names = ("scene", "dimensions", "mesh", "material", "joint", "water", "loads", "solver")
-    groups = [getattr(case, name) for name in (*names, "checks")]
+    groups = [getattr(case, name) for name in (*names, "earthquake", "checks")]
     assert sorted(n for group in groups for n in vars(group)) == sorted(known)
     assert all(vars(group)[n] == case[n] for group in groups for n in vars(group))
     texts = {n for n, parameter in known.items() if parameter.text}

@@ -11,18 +11,19 @@ from damjoint.post import validation
 from damjoint.statics.verdict import failed, statement, verdict
 
 REFERENCE = validation.Reference(
-    "A", "imposed", "delta_n", 1.3, 2e-7, "m", 0.01, "test", "", "node"
+    "ssnp142", "A", "imposed", "delta_n", "x", 1.3, 2e-7, "m", 0.01, "test", "", "node"
 )
 
 
 def test_units_quantities_and_tolerances_of_the_reference_table():
-    rows = validation.table()
-    assert {r.modeling for r in rows} == set("ABCDEFGHIJK")
+    rows = validation.table("ssnp142")
+    on_files = {"C_FILE", "D_FILE", "J_FILE"}
+    assert {r.modeling for r in rows} == set("ABCDEFGHIJK") | on_files
     assert {r.quantity for r in rows} <= {*JOINT, "flux"}
     assert {r.unit for r in rows} <= {"m", "Pa", "kg/m/s"}
-    assert all(0 <= r.x <= 5 and r.value != 0 and r.source for r in rows)
+    assert all(0 <= r.at <= 5 and r.value != 0 and r.source for r in rows)
     assert all(0 < r.tolerance <= 0.15 for r in rows if r.tolerance is not None)
-    assert validation.modelings() == list("abcdefghijk")
+    assert validation.modelings("ssnp142") == sorted([*"abcdefghijk", "c_file", "d_file", "j_file"])
 
 
 @pytest.mark.parametrize("name", "abcdefghijk")
@@ -59,7 +60,7 @@ def test_the_report_counts_the_verdicts():
         validation.Comparison(replace(REFERENCE, tolerance=None), 1.0),
     ]
     text = validation.report(rows)
-    assert text.endswith("1 passed, 1 failed, 1 for information only")
+    assert "1 passed, 1 failed, 1 for information only; the worst uses 5000%" in text
     assert "+50.00 %" in text
 
 
@@ -76,7 +77,7 @@ def test_computed_values_are_means_over_z_at_the_nearest_nodes_of_the_last_level
         [(3, 1.3, 0, 9), (4, 1.2, 0, 9), (4, 1.3, 0, 1e-7), (4, 1.3, 1, 3e-7), (4, 1.4, 0, 9)]
     )
     found = validation.compare(Results(case, {}, table, table))
-    at = [c.computed for c in found if c.reference.x == 1.3 and c.reference.quantity == "delta_n"]
+    at = [c.computed for c in found if c.reference.at == 1.3 and c.reference.quantity == "delta_n"]
     assert at and at == pytest.approx([2e-7] * len(at))
 
 

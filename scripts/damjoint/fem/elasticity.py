@@ -12,7 +12,7 @@ import numpy as np
 from scipy import sparse
 
 from ..arrays import Array, BoolArray, IntArray, Sparse
-from .elements import BULK, Space, basis, corners_of, geometry, nodal, points_of, tabulated
+from .elements import BULK, MASS, Space, basis, corners_of, geometry, nodal, points_of, tabulated
 
 #: Young's modulus [Pa] and Poisson's ratio [-] by region.
 Material = dict[str, tuple[float, float]]
@@ -93,6 +93,30 @@ def body_force(space: Space, dim: int, component: int, region: str | None = None
     load = np.zeros((len(space.locations), dim))
     load[:, component] = points.values.T @ (points.weights * inside(space, region)[points.elements])
     return load.ravel()
+
+
+def mass(space: Space, dim: int, densities: dict[str, float]) -> Sparse:
+    """Assemble the consistent mass matrix [kg] of a body with a density [kg/m3] in some of its
+    regions; degree of freedom dim * function + component.
+    """
+    points, rows, columns, values = space.body.points[:, :dim], [], [], []
+    for (shape, table), region in zip(space.connectivity, space.body.regions, strict=True):
+        if not densities.get(region):
+            continue
+        functions, _, dn, weights = tabulated(shape, space.order, MASS[space.order][shape])
+        cells = table[:, : dn.shape[1]]
+        measures = np.array([geometry(points, cells, d)[0] for d in dn])
+        density = densities[region] * weights[:, None] * measures
+        blocks = np.einsum("qe,qa,qb->eab", density, functions, functions, optimize=True)
+        rows.append(np.repeat(table, table.shape[1], axis=1).ravel())
+        columns.append(np.tile(table, (1, table.shape[1])).ravel())
+        values.append(blocks.ravel())
+    size = len(space.locations)
+    scalar = sparse.csr_matrix((size, size))
+    if values:
+        places = np.concatenate(rows), np.concatenate(columns)
+        scalar = sparse.coo_matrix((np.concatenate(values), places), (size, size)).tocsr()
+    return sparse.kron(scalar, sparse.eye(dim), format="csr")
 
 
 def thermal_modulus(young: float, poisson: float) -> float:

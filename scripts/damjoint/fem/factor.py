@@ -12,6 +12,7 @@ import ctypes
 import hashlib
 import subprocess
 import tempfile
+import weakref
 from functools import cache
 from pathlib import Path
 from types import ModuleType
@@ -102,42 +103,131 @@ def elimination_order(matrix: Sparse, keep: IntArray) -> IntArray | None:
     return order
 
 
-def solve_by_mumps(
-    mumps: ctypes.CDLL, matrix: Sparse, right: Array, keep: IntArray, what: str
-) -> tuple[Array, Array]:
-    """Solution (n, m) of a symmetric system with the unknowns `keep` (k,) zero, and the lower
-    triangle of their Schur complement (k, k). No pivoting: the rest must be positive definite.
+def pointer(values: Array | IntArray) -> ctypes.c_void_p:
+    """The address of an array, for a C function."""
+    return ctypes.c_void_p(values.ctypes.data)
 
-    what: the unknowns, for the message. Raises RunError if the estimated memory is not available,
-    MemoryError if an allocation fails.
+
+def as_other_libraries() -> threadpool_limits:
+    """Limit the threads of MUMPS's own BLAS to those of the others: a limit that was set before it
+    was loaded has not reached it.
     """
-    upper = sparse.triu(matrix, format="coo")
-    order, schur = elimination_order(matrix, keep), np.zeros((len(keep), len(keep)))
-    solution, needed = np.array(right, order="F"), ctypes.c_double()
-    beside = float(schur.nbytes + solution.nbytes)
+    pools = (pool for pool in threadpool_info() if pool["user_api"] == "blas")
+    return threadpool_limits(min(pool["num_threads"] for pool in pools), "blas")
 
-    def pointer(values: Array | IntArray) -> ctypes.c_void_p:
-        return ctypes.c_void_p(values.ctypes.data)
 
-    # MUMPS has a BLAS of its own, which a limit does not reach that was set before it was loaded
-    threads = min(pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas")
-    row, column, indices = ((i + 1).astype(np.int32) for i in (upper.row, upper.col, keep))
-    with threadpool_limits(threads, "blas"):
-        error = mumps.damjoint_solve(
-            *(matrix.shape[0], ctypes.c_longlong(upper.nnz)),
-            *(pointer(row), pointer(column), pointer(upper.data)),
-            None if order is None else pointer(order),
-            *(len(keep), pointer(indices), pointer(schur)),
-            *(solution.shape[1], pointer(solution)),
-            *(ctypes.c_double((available() - beside) / 1e6), ctypes.byref(needed)),
-        )
-    if error == TOO_LARGE:
-        check_memory(beside + 1e6 * needed.value, what)
-    if error in (TOO_LARGE, NO_MEMORY):
-        raise MemoryError(f"MUMPS, {what}")
-    if error:
-        raise RuntimeError(f"MUMPS, error {error}")
-    return solution, schur
+class MumpsFactors:
+    """MUMPS's factors of a symmetric matrix (n, n) with the unknowns `keep` (k,) not eliminated.
+
+    No pivoting: the rest must be positive definite.
+    """
+
+    def __init__(
+        self, mumps: ctypes.CDLL, matrix: Sparse, keep: IntArray, what: str, beside: float = 0.0
+    ) -> None:
+        """what: the unknowns, for the message; beside: further memory [bytes] that is needed.
+
+        Raises RunError if the estimated memory is not available, MemoryError if an allocation
+        fails.
+        """
+        self.mumps, self.keep = mumps, (keep + 1).astype(np.int32)
+        upper = sparse.triu(matrix, format="coo")
+        order, self.size = elimination_order(matrix, keep), matrix.shape[0]
+        #: lower triangle of the Schur complement of `keep` (k, k)
+        self.lower = np.zeros((len(keep), len(keep)))
+        beside += float(self.lower.nbytes)
+        needed, error = ctypes.c_double(), ctypes.c_int()
+        row, column = ((i + 1).astype(np.int32) for i in (upper.row, upper.col))
+        mumps.damjoint_factorise.restype = ctypes.c_void_p
+        with as_other_libraries():
+            factors = mumps.damjoint_factorise(
+                *(self.size, ctypes.c_longlong(upper.nnz)),
+                *(pointer(row), pointer(column), pointer(upper.data)),
+                None if order is None else pointer(order),
+                *(len(keep), pointer(self.keep), pointer(self.lower)),
+                *(ctypes.c_double((available() - beside) / 1e6), ctypes.byref(needed)),
+                ctypes.byref(error),
+            )
+        if error.value == TOO_LARGE:
+            check_memory(beside + 1e6 * needed.value, what)
+        if error.value in (TOO_LARGE, NO_MEMORY):
+            raise MemoryError(f"MUMPS, {what}")
+        if error.value:
+            raise RuntimeError(f"MUMPS, error {error.value}")
+        self.factors = ctypes.c_void_p(factors)
+        weakref.finalize(self, mumps.damjoint_release, self.factors)
+
+    @property
+    def schur(self) -> Array:
+        """The Schur complement of `keep` (k, k)."""
+        return np.tril(self.lower) + np.tril(self.lower, -1).T
+
+    def solve(self, right: Array) -> Array:
+        """Solution (n, m) with the unknowns `keep` zero."""
+        solution = np.array(right, float, order="F")
+        with as_other_libraries():
+            self._run(solution, 0, None)
+        return solution
+
+    def reduce(self, right: Array) -> Array:
+        """Right-hand side (k,) of the Schur complement, from that (n,) of the matrix."""
+        self._partial, reduced = np.array(right, float), np.zeros(len(self.keep))
+        self._run(self._partial, 1, reduced)
+        return reduced
+
+    def expand(self, solution: Array) -> Array:
+        """The solution (n,) for the right-hand side last reduced, from that (k,) of `keep`."""
+        self._run(self._partial, 2, np.array(solution, float))
+        return self._partial
+
+    def _run(self, right: Array, part: int, reduced: Array | None) -> None:
+        """See damjoint_solve."""
+        count = right.shape[1] if right.ndim > 1 else 1
+        own = None if reduced is None else pointer(reduced)
+        error = self.mumps.damjoint_solve(self.factors, count, pointer(right), part, own)
+        if error:
+            raise RuntimeError(f"MUMPS, error {error}")
+
+
+class SuperLUFactors:
+    """The same by SuperLU: `schur`, `reduce` and `expand` of `MumpsFactors`."""
+
+    def __init__(self, matrix: Sparse, keep: IntArray) -> None:
+        self.keep, self.inside = keep, np.setdiff1d(np.arange(matrix.shape[0]), keep)
+        self.factors = superlu(matrix[self.inside][:, self.inside].tocsc(), "MMD_AT_PLUS_A")
+        self.coupling = matrix[keep][:, self.inside].tocsr()
+        self.schur, _ = schur_by_superlu(matrix, keep, np.zeros((matrix.shape[0], 0)))
+
+    def reduce(self, right: Array) -> Array:
+        """See `MumpsFactors`."""
+        self._partial = self.factors.solve(right[self.inside])
+        return right[self.keep] - self.coupling @ self._partial
+
+    def expand(self, solution: Array) -> Array:
+        """See `MumpsFactors`."""
+        result = np.zeros(len(self.inside) + len(self.keep))
+        result[self.inside] = self._partial - self.factors.solve(self.coupling.T @ solution)
+        result[self.keep] = solution
+        return result
+
+
+def unknowns_text(matrix: Sparse, keep: IntArray) -> str:
+    """The unknowns of a matrix, for messages on memory."""
+    return f"{matrix.shape[0]} unknowns, {len(keep)} of them on the joint and the wet faces,"
+
+
+def partial_factors(matrix: Sparse, keep: IntArray) -> MumpsFactors | SuperLUFactors:
+    """Factors of a symmetric matrix for many right-hand sides, one after the other, with the
+    unknowns `keep` not eliminated; the rest must be positive definite.
+
+    Raises RunError if the estimated memory is not available, MemoryError if an allocation fails.
+    """
+    what = unknowns_text(matrix, keep)
+    check_memory(dense_memory(len(keep)), what)
+    mumps = library()
+    return (
+        SuperLUFactors(matrix, keep) if mumps is None else MumpsFactors(mumps, matrix, keep, what)
+    )
 
 
 def schur_complement(matrix: Sparse, keep: IntArray, loads: Array) -> tuple[Array, Array]:
@@ -146,13 +236,13 @@ def schur_complement(matrix: Sparse, keep: IntArray, loads: Array) -> tuple[Arra
 
     Raises RunError if the estimated memory is not available, MemoryError if an allocation fails.
     """
-    what = f"{matrix.shape[0]} unknowns, {len(keep)} of them on the joint and the wet faces,"
+    what = unknowns_text(matrix, keep)
     check_memory(dense_memory(len(keep)), what)
     mumps = library()
     if mumps is None:
         return schur_by_superlu(matrix, keep, loads)
-    inside, lower = solve_by_mumps(mumps, matrix, loads, keep, what)
-    return np.tril(lower) + np.tril(lower, -1).T, loads[keep] - matrix[keep] @ inside
+    factors = MumpsFactors(mumps, matrix, keep, what, loads.nbytes)
+    return factors.schur, loads[keep] - matrix[keep] @ factors.solve(loads)
 
 
 def superlu(matrix: Sparse, ordering: Literal["NATURAL", "MMD_AT_PLUS_A"]) -> SuperLU:
@@ -197,5 +287,5 @@ def solve_symmetric(matrix: Sparse, right: Array) -> Array:
     mumps = library()
     if mumps is None:
         return superlu(matrix.tocsc(), "MMD_AT_PLUS_A").solve(right)
-    none = np.zeros(0, int)
-    return solve_by_mumps(mumps, matrix, right, none, f"{matrix.shape[0]} unknowns")[0]
+    what = f"{matrix.shape[0]} unknowns"
+    return MumpsFactors(mumps, matrix, np.zeros(0, int), what, right.nbytes).solve(right)

@@ -254,5 +254,5 @@ class Equilibrium:
 
     def crest_rate(self, loading: Loading) -> float:
         """Its derivative with the level."""
-        forces = self.rate(lambda other: self._external_forces(other)[0], loading)
+        forces = self.rate(lambda other: self.external_forces(other)[0], loading)
         return float(self.bulk.crest_pressure @ forces)

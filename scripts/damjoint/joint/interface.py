@@ -87,7 +87,7 @@ class JointInterface:
         self.mesh, self.surface = joint.mesh, joint.mesh.surface
         space = self.space = elements.Space(self.surface, bulk.order)
         #: jump of the space's functions from the unknowns, dim rows each
-        self._unknowns = joint.dofs.matrix(self.dim * len(space.locations), len(bulk.stiffness))
+        self.unknowns = joint.dofs.matrix(self.dim * len(space.locations), len(bulk.stiffness))
         #: number of Gauss points of the law, by shape
         self.rule = elements.JOINT[quadrature][bulk.order]
         self.points = elements.points_of(space, self.rule)
@@ -135,7 +135,7 @@ class JointInterface:
         """The first `most` components in frames (q, 3, 3) of the jump, interpolated by values (q,
         functions): point by point, from the unknowns.
         """
-        parts = [values @ self._unknowns[c :: self.dim] for c in range(self.dim)]
+        parts = [values @ self.unknowns[c :: self.dim] for c in range(self.dim)]
         number = min(self.dim, most)
         stacked = sparse.vstack(
             [
@@ -162,7 +162,7 @@ class JointInterface:
         normal = heel_normal(self.surface, heel.body)
         weights = np.zeros(len(self.space.locations))
         weights[functions] = points.values.T @ points.weights / points.weights.sum()
-        return np.asarray(self._unknowns.T @ np.outer(weights, normal[: self.dim]).ravel())
+        return np.asarray(self.unknowns.T @ np.outer(weights, normal[: self.dim]).ravel())
 
     @property
     def section(self) -> dict[str, list[float]]:

@@ -61,8 +61,8 @@ class JointWater:
     def head(self, loading: Loading, matrix: Sparse | None = None) -> Array:
         """Head [m] in a joint of uniform transmissivity, at the joint's nodes or at the places that
         an interpolation matrix of `JointFields` leads to: linear along the joint between the levels
-        of reservoir and tailwater; a dry end has its own height, or the head of the other end if
-        that is lower.
+        of reservoir (plus joint_head_offset) and tailwater; a dry end has its own height, or the
+        head of the other end if that is lower.
 
         Drains reduce the head above their outlet, the tailwater or their own height, by their
         effectiveness (EM 1110-2-2200); USBR counts the reduction from the reservoir's head.
@@ -71,7 +71,7 @@ class JointWater:
         fields = along.heel_y, along.toe_y, along.xi
         heel, toe, xi = fields if matrix is None else (matrix @ field for field in fields)
         level, tail = loading.level, loading.tail
-        first = np.maximum(level, np.minimum(heel, tail))
+        first = np.maximum(level + case["joint_head_offset"], np.minimum(heel, tail))
         last = np.maximum(tail, np.minimum(toe, level))
         if case["uplift"] != "drained":
             return first + (last - first) * xi

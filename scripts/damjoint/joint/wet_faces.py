@@ -31,6 +31,7 @@ class WetFace:
         self.surface, self.space = surface, elements.Space(surface, order)
         self.points = elements.points_of(self.space, elements.WATER)
         self.normals = surface.normals[self.points.elements][:, :dim]
+        self.to_functions = self.points.values.T
         self.y, self.tilt = self.points.positions[:, 1], np.abs(self.normals[:, 0])
         self.straight = self.high > self.low
         self.flat = np.ptp(surface.points[:, 1]) < 1e-9 * np.abs(surface.points).max()
@@ -42,7 +43,7 @@ class WetFace:
 
     def spread(self, traction: Array) -> Array:
         """Nodal forces of a traction (q, dim) [Pa]."""
-        return np.ravel(self.points.values.T @ (self.points.weights[:, None] * traction))
+        return np.ravel(self.to_functions @ (self.points.weights[:, None] * traction))
 
     def press(self, level: float, height: Height, column: Column) -> Array:
         """Nodal forces [m x area] of a height of pressure on the face."""

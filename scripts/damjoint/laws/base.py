@@ -49,8 +49,8 @@ class Law(Generic[V]):
     hardening_parameter = ""
     #: whether slip raises the shear strength
     hardens = False
-    #: whether it includes grouting and sawing
-    has_works = False
+    #: grouting and sawing that it includes, by their parameters
+    works: tuple[str, ...] = ()
     #: whether a dam stands after all of its joint has slipped, without hardening
     stands_slipped = False
     #: coefficient of friction
@@ -70,6 +70,11 @@ class Law(Generic[V]):
         parameter of the fracture energy that must be larger.
         """
         return {}
+
+    @classmethod
+    def violations(cls, parameters: Mapping[str, Any]) -> Iterator[str]:
+        """Conditions of the law between parameters that their values violate, as messages."""
+        yield from ()
 
     # -- internal variables
 

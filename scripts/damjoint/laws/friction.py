@@ -1,12 +1,13 @@
 """Mohr-Coulomb friction with hardening (JOINT_MECA_FROT, code_aster R7.01.25), implicit return.
 
-Internal variables: lambda, the accumulated plastic slip [m], and the plastic slip.
+Internal variables: lambda, the accumulated plastic slip [m], the plastic slip, and the opening
+before sawing.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -31,6 +32,9 @@ class FrictionVariables:
     accumulated: Array
     #: (q, 2) [m]
     plastic: Array
+    #: (q,) [m], and the thickness of the saw in the step under way
+    gap: Array
+    sawn: float = 0.0
 
 
 class Trial(NamedTuple):
@@ -46,11 +50,12 @@ class Trial(NamedTuple):
 class Friction(Law[FrictionVariables]):
     """Contact that transmits tension up to c/mu, and shear up to c - mu sigma_n + H lambda."""
 
-    variable_names = ("lambda", "slip_1", "slip_2")
+    variable_names = ("lambda", "slip_1", "slip_2", "gap")
     columns: Mapping[str, tuple[str, str]] = {
         "lambda": ("m", "friction: cumulated plastic slip, which hardens")
     }
     hardening_parameter = "pena_tang"
+    works = ("saw_thickness",)
 
     def __init__(self, parameters: Mapping[str, Any]) -> None:
         p = parameters
@@ -59,12 +64,21 @@ class Friction(Law[FrictionVariables]):
         self.hardens = bool(self.H)
         self.tensile_strength = self.open_tension = self.adhesion / self.mu
         self.cap_opening = self.adhesion / (self.mu * self.K_N)
+        self.saw, self.saw_t = p["saw_thickness"], p["saw_t"]
 
     # -- internal variables
 
     def initial(self, points: int) -> FrictionVariables:
         """See `Law`."""
-        return FrictionVariables(np.zeros(points), np.zeros((points, 2)))
+        return FrictionVariables(np.zeros(points), np.zeros((points, 2)), np.zeros(points))
+
+    def begin_step(
+        self, variables: FrictionVariables, begin: float, end: float
+    ) -> FrictionVariables:
+        """See `Law`; sawn_at of pro/law.pro."""
+        if not self.saw:
+            return variables
+        return replace(variables, sawn=self.saw * min(max(end - self.saw_t + 1, 0), 1))
 
     def update_internal_variables(
         self, jump: Array, variables: FrictionVariables
@@ -74,13 +88,19 @@ class Friction(Law[FrictionVariables]):
         return FrictionVariables(
             variables.accumulated + trial.slip,
             variables.plastic + trial.slip[:, None] * trial.direction,
+            np.maximum(jump[:, 0], 0) if self.saw and not variables.sawn else variables.gap,
+            variables.sawn,
         )
 
     # -- response
 
+    def opening(self, jump: Array, variables: FrictionVariables) -> Array:
+        """The opening beyond what the saw has removed, its thickness less the opening before."""
+        return np.asarray(jump[:, 0] + np.maximum(variables.sawn - variables.gap, 0))
+
     def trial(self, jump: Array, variables: FrictionVariables) -> Trial:
         """The elastic predictor and the slip that returns it to the yield surface."""
-        normal = self.K_N * np.minimum(jump[:, 0], self.cap_opening)
+        normal = self.K_N * np.minimum(self.opening(jump, variables), self.cap_opening)
         shear = self.K_T * (jump[:, 1:] - variables.plastic)
         size = np.linalg.norm(shear, axis=1)
         excess = size + self.mu * normal - self.H * variables.accumulated - self.adhesion
@@ -93,9 +113,9 @@ class Friction(Law[FrictionVariables]):
         """See `Law`; the tangent is not symmetric."""
         normal, size, n, slip = self.trial(jump, variables)
         traction = np.column_stack([normal, (size - self.K_T * slip)[:, None] * n])
-        closed, slides = jump[:, 0] <= self.cap_opening, slip > 0
+        closed, slides = ~self.is_open(jump, variables), slip > 0
         tangent = np.zeros((len(jump), 3, 3))
-        tangent[:, 0, 0] = self.normal_stiffness(jump)
+        tangent[:, 0, 0] = self.normal_stiffness(jump, variables)
         across = np.where(slides, 1 - self.K_T * slip / np.maximum(size, 1e-300), 1.0)
         along = np.where(slides, self.H / (self.K_T + self.H), 1.0)
         outer, eye = n[:, :, None] * n[:, None, :], np.eye(2)
@@ -114,19 +134,19 @@ class Friction(Law[FrictionVariables]):
         _, size, _, slip = self.trial(jump, variables)
         matrix = np.zeros((len(jump), 3, 3))
         share = np.where(slip > 0, 1 - self.K_T * slip / np.maximum(size, 1e-300), 1.0)
-        matrix[:, 0, 0] = self.normal_stiffness(jump)
+        matrix[:, 0, 0] = self.normal_stiffness(jump, variables)
         matrix[:, 1, 1] = matrix[:, 2, 2] = self.K_T * np.maximum(share, self.artificial)
         return matrix
 
-    def normal_stiffness(self, jump: Array) -> Array:
+    def normal_stiffness(self, jump: Array, variables: FrictionVariables) -> Array:
         """K_N, next to nothing where the point is open (q,)."""
-        return np.where(jump[:, 0] <= self.cap_opening, self.K_N, self.artificial * self.K_N)
+        return np.where(self.is_open(jump, variables), self.artificial * self.K_N, self.K_N)
 
     # -- meaning
 
     def is_open(self, jump: Array, variables: FrictionVariables) -> BoolArray:
         """See `Law`: beyond the opening at which the tension reaches c/mu."""
-        return jump[:, 0] > self.cap_opening
+        return self.opening(jump, variables) > self.cap_opening
 
     def opening_of_crack(self, variables: FrictionVariables, points: int) -> Array:
         """See `Law`."""

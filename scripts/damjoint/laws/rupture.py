@@ -1,8 +1,8 @@
 """Cohesive rupture (JOINT_MECA_RUPT, code_aster R7.01.25), with grouting and sawing.
 
 Internal variables: kappa, the largest opening so far [m]; the tangential jump at which the shear
-was released; the thickness of grout that has set. Openings here are those beyond the thickness that
-grout and saw leave.
+was released; the thickness of grout that has set, or the opening before sawing. Openings here are
+those beyond the thickness that grout and saw leave.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ class RuptureVariables:
     kappa: Array
     #: (q, 2) [m]
     released: Array
-    #: (q,) [m]
+    #: (q,) [m]: of the grout; in a joint that is sawn and not grouted, its opening before
     thickness: Array | float = 0.0
-    #: thickness sawn away [m], and the largest opening that liquid grout leaves [m]
+    #: thickness of the saw [m], and the largest opening that liquid grout leaves [m]
     sawn: float = 0.0
     largest: float = np.inf
 
@@ -38,7 +38,8 @@ class Rupture(Law[RuptureVariables]):
 
     variable_names = ("kappa", "released_1", "released_2", "thickness")
     slip_name = "released slip"
-    softens = has_works = True
+    softens = True
+    works = ("grout_pressure", "saw_thickness")
     limits_shear = False
 
     def __init__(self, parameters: Mapping[str, Any]) -> None:
@@ -85,20 +86,34 @@ class Rupture(Law[RuptureVariables]):
         """See `Law`."""
         v, opening = variables, self.opening(jump, variables)
         free = self.shear_share(opening) <= 0
-        grouted = np.maximum(jump[:, 0] - v.thickness + v.sawn - v.largest, 0)
         return replace(
             v,
             kappa=np.maximum(v.kappa, opening),
             released=np.where(free[:, None], jump[:, 1:], v.released),
-            thickness=v.thickness + grouted,
+            thickness=self.new_thickness(jump, v),
         )
+
+    def new_thickness(self, jump: Array, variables: RuptureVariables) -> Array | float:
+        """Thickness of the grout after a step; without grouting, the opening before sawing."""
+        v = variables
+        if self.grout:
+            return v.thickness + np.maximum(self.gap(jump, v) - v.largest, 0)
+        return np.maximum(jump[:, 0], 0) if self.saw and not v.sawn else v.thickness
 
     # -- response
 
+    def gap(self, jump: Array, variables: RuptureVariables) -> Array:
+        """The opening beyond the thickness that grout and saw leave, before grout enters (q,) [m];
+        a joint that is only sawn loses the thickness of the saw less its opening before.
+        """
+        v = variables
+        if self.grout:
+            return np.asarray(jump[:, 0] - v.thickness + v.sawn)
+        return np.asarray(jump[:, 0] + np.maximum(v.sawn - v.thickness, 0))
+
     def opening(self, jump: Array, variables: RuptureVariables) -> Array:
         """The opening beyond the thickness that grout and saw leave (q,) [m]."""
-        v = variables
-        return np.minimum(jump[:, 0] - v.thickness + v.sawn, v.largest)
+        return np.minimum(self.gap(jump, variables), variables.largest)
 
     def is_broken(self, opening: Array, variables: RuptureVariables) -> BoolArray:
         """Whether a point has lost its tensile strength."""

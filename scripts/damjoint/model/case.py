@@ -119,6 +119,8 @@ class Case(ParameterValues):
     accuracy: float | None = None
     #: the user's own geometry instead of the section by parameters
     geometry: Path | None = None
+    #: file of the ground's acceleration, for `damjoint quake`
+    record: Path | None = None
     #: what it is made from; None for a case of stored results, which can not be varied
     source: Source | None = field(default=None, compare=False, repr=False)
     #: SHARED of pro/parameters.pro
@@ -152,17 +154,21 @@ class Case(ParameterValues):
         """Names of the joints, for messages."""
         return tuple(own.name for own in self.of_joints) or (joint_name(self["joint_height"]),)
 
-    def separates(self, numbers: Collection[int]) -> bool:
-        """Whether without the joints of these numbers a body has no connection to the rock."""
+    def above(self, numbers: Collection[int]) -> set[str]:
+        """The bodies that without the joints of these numbers have no connection to the rock."""
         if not self.of_joints:
-            return bool(numbers)
+            return {"dam"} if numbers else set()
         pairs = [(own.lower, own.upper) for own in self.of_joints]
         rest = [pair for k, pair in enumerate(pairs) if k not in numbers]
         reached, before = {"foundation"}, set[str]()
         while reached != before:
             before = set(reached)
             reached |= {name for pair in rest if reached & set(pair) for name in pair}
-        return any(not reached.issuperset(pair) for pair in pairs)
+        return {name for pair in pairs for name in pair} - reached
+
+    def separates(self, numbers: Collection[int]) -> bool:
+        """Whether without the joints of these numbers a body has no connection to the rock."""
+        return bool(self.above(numbers))
 
     def separating(self, numbers: Sequence[int]) -> tuple[int, ...]:
         """The first of some joints, by their numbers, that alone holds what is above it; or those
@@ -402,16 +408,20 @@ def load(
     tail_levels: str | Sequence[float] | None = None,
     steps: int | None = None,
     accuracy: str | None = None,
+    record: Path | None = None,
 ) -> Case:
     """Read a case file, apply overrides, resolve the parameters that follow others, check all.
 
     case: letter, name or path; overrides: {name: value, or a value for each joint}, also
     lift_heights [m]; levels, tail_levels: [m] at t = 1, 2, 3, also as a text 'a,b,c'; steps: equal
     steps between two levels; accuracy: coarse, standard, fine or a percentage, chooses order, first
-    mesh (overrides win) and one step per level. Raises InputError.
+    mesh (overrides win) and one step per level; record: file of the ground's acceleration. Raises
+    InputError.
     """
     path = case_file(case)
     text = casefile.read(path)
+    if record:
+        text.texts["record"] = str(record)
     return resolve(Source(path, text, dict(overrides or {}), levels, tail_levels, steps, accuracy))
 
 
@@ -464,6 +474,7 @@ def resolve(source: Source) -> Case:
         hardening_asked=bool(variables["hardening_asked"][0]),
         accuracy=error,
         geometry=geometry,
+        record=Path(file.texts["record"]) if "record" in file.texts else None,
         source=source,
         shared={n: variables[n] for n in SHARED},
         section={n: variables[n] for n in SECTION},

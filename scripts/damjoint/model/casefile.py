@@ -7,6 +7,7 @@ A case is a list of statements, in any layout, with // and /* */ comments:
     title = "words";
     also_uplift = "none";            further uplift modes the case is published with
     geometry = "own.msh";            your own mesh or .geo, beside this file
+    record = "quake.csv";            accelerations of the ground, beside this file
     default_<parameter> = value;     a text; arithmetic with + - * / ^ ( ), Pi, the units of
                                      pro/units.pro and defaults set before
     levels() = {value, ...};         tail_levels(), times() and lift_heights() likewise
@@ -30,7 +31,7 @@ from .arithmetic import arithmetic_value, explained
 from .parameters import assignments, checked, declared, parameter
 
 LISTS = ("levels", "tail_levels", "times", "lift_heights")
-TEXTS = ("title", "also_uplift", "geometry")
+TEXTS = ("title", "also_uplift", "geometry", "record")
 #: Limits: bytes of a case file, files of a case.
 LONGEST, MOST_FILES = 1_000_000, 50
 
@@ -150,7 +151,7 @@ def add_statement(case: CaseText, statement: list[Token], path: Path, where: str
         if kinds[2:] != ("text",):
             raise InputError(f'{where}: must be {name} = "words"')
         words = tokens[2][1:-1]
-        if name == "geometry":  # a path beside this file
+        if name in ("geometry", "record"):  # a path beside this file
             words = str((path.parent / words).absolute())
         case.texts[name] = words
     elif name.startswith("default_") and tokens[1:2] == ("=",):
@@ -172,7 +173,8 @@ def add_statement(case: CaseText, statement: list[Token], path: Path, where: str
         raise InputError(
             f"{where}: not a statement of a case; allowed: "
             + (f"{near[0]} (did you mean that?), " if near else "")
-            + 'Include "file.case", title, also_uplift, geometry, default_<parameter> = value, '
+            + 'Include "file.case", title, also_uplift, geometry, record, '
+            + "default_<parameter> = value, "
             + ", ".join(f"{n}() = {{...}}" for n in LISTS)
             + ", <parameter of a joint>() = {...}"
         )

@@ -43,6 +43,8 @@ def check_values(
             "added_mass = 2: must be 0 or 1 with a geometry of one's own (Zangar's pressure needs "
             "the angle of the section's upstream face)"
         )
+    for violation in LAWS[case["law"]].violations(case.values):
+        raise InputError(violation)
 
 
 def check_energies(case: ParameterValues) -> None:
@@ -138,10 +140,10 @@ def check_drains(case: ParameterValues, length: float) -> None:
 
 def check_works(case: ParameterValues) -> None:
     """Grouting and sawing: of laws and uplifts that include them."""
-    included = LAWS[case["law"]].has_works and not flows(case)
+    included = () if flows(case) else LAWS[case["law"]].works
     for name in ("grout_pressure", "saw_thickness"):
-        if case[name] > 0 and not included:
-            laws = " or ".join(name for name, law in LAWS.items() if law.has_works)
+        if case[name] > 0 and name not in included:
+            laws = " or ".join(law for law, rules in LAWS.items() if name in rules.works)
             raise InputError(
                 f"{name} = {case[name]:g}: must be 0 with law = {case['law']}, uplift = "
                 f"{case['uplift']} (only law = {laws} includes it, with uplift = none, imposed "

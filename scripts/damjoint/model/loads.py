@@ -7,7 +7,7 @@ Coordinates: y = 0 at the heel of the base. A column is the resultant of a press
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -186,10 +186,15 @@ class AddedPressure:
     @staticmethod
     def of(case: Case, loading: Loading, floor: float) -> AddedPressure:
         """That of a case at a loading; size 0 without an earthquake."""
+        full = AddedPressure.unit(case, loading.level, floor)
+        return replace(full, size=full.size * case["k_h"] * loading.part("quake"))
+
+    @staticmethod
+    def unit(case: Case, level: float, floor: float) -> AddedPressure:
+        """That of a case for k_h = 1: the depth of water that moves with the face."""
         zangar = case["added_mass"] == ZANGAR
-        factor = zangar_share(case, loading.level) / 2 if zangar else 7 / 8
-        size = factor * case["k_h"] * loading.part("quake")
-        return AddedPressure(size if case["added_mass"] else 0.0, floor, zangar)
+        factor = zangar_share(case, level) / 2 if zangar else 7 / 8
+        return AddedPressure(factor if case["added_mass"] else 0.0, floor, zangar)
 
     def height(self, level: float, y: Array, tilt: Array) -> Array:
         """Heights of pressure at heights y [m] where the normal has the horizontal part tilt."""

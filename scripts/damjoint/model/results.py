@@ -12,6 +12,7 @@ import numpy as np
 
 from ..arrays import Array, Table
 from .case import Case
+from .mesh import Body
 
 #: Columns of joint.csv: a row per joint node and requested level.
 JOINT = {
@@ -28,7 +29,7 @@ JOINT = {
     "tau_1": ("Pa", "shear stress along x, with the sign of the slip that it causes"),
     "tau_2": ("Pa", "shear stress along z"),
     "p": ("Pa", "water pressure in the joint"),
-    "damage": ("-", "rupture, bond: progress of the softening, 1 broken; friction: 1 where open"),
+    "damage": ("-", "progress of the softening, 1 broken (endo: alpha); friction: 1 where open"),
     "slip": ("m", "plastic slip; rupture: tangential jump where K_t was last zero"),
     "s": ("m", "distance from the heel along the joint"),
     "sigma_n_eff": ("Pa", "effective normal stress, sigma_n + p"),
@@ -47,9 +48,9 @@ HISTORY = {
         "-",
         "norm of the out-of-balance forces over that of the loads at the highest water",
     ),
-    "crack_length": ("m", "length of joint broken (rupture) or open (friction, bond)"),
+    "crack_length": ("m", "length of joint broken (rupture) or open (other laws)"),
     "process_zone": ("m", "length of softening joint: 0 < damage < 1, not open; friction: 0"),
-    "slip_length": ("m", "length of joint with released shear (rupture) or slip (friction, bond)"),
+    "slip_length": ("m", "length of joint with released shear (rupture) or slip (other laws)"),
     "max_opening": ("m", "largest opening of a node"),
     "crest_ux": ("m", "displacement of the upstream edge of the crest along x"),
     "N": ("N/m", "effective normal force on the joint, compression > 0"),
@@ -97,6 +98,65 @@ def with_all_joints(columns: Columns, case: Case) -> Columns:
 def history_columns(case: Case) -> Columns:
     """The columns of a case's history.csv: unit and meaning."""
     return with_all_joints(HISTORY, case)
+
+
+#: Columns of quake.csv: unit and meaning. Displacements are relative to the ground.
+QUAKE = {
+    "time": ("s", "time from the start of the computation"),
+    "ground_ax": ("m/s2", "acceleration of the ground, downstream > 0"),
+    "ground_ay": ("m/s2", "acceleration of the ground, upwards > 0"),
+    "crest_ux": ("m", "displacement of the crest along x since the static state"),
+    "crest_ax": ("m/s2", "absolute acceleration of the crest along x"),
+    "heel_opening": ("m", "opening of the joint at the heel"),
+    "toe_opening": ("m", "opening of the joint at the toe"),
+    "slip_mean": ("m", "mean tangential jump since the static state, downstream > 0"),
+    "slip_heel": ("m", "the same at the heel"),
+    "slip_toe": ("m", "the same at the toe"),
+    "N": ("N/m", "effective normal force on the joint, compression > 0"),
+    "T": ("N/m", "shear force on the joint, downstream > 0"),
+    "M": ("N m/m", "moment of N about the toe, stabilising > 0"),
+    "U": ("N/m", "uplift: resultant of the water pressure in the joint"),
+    "shear_reserve": ("N/m", "largest shear force that the joint transmits, mu N + c L, minus |T|"),
+    "open_length": ("m", "length of joint that is open or broken"),
+    "iterations": ("-", "Newton iterations of the step"),
+    "dt": ("s", "length of the step"),
+    "residual": ("-", "norm of the out-of-balance forces over that of the static loads"),
+}
+#: Those of a joint. With several joints: of the first one; of joint 2, 3, ... by `column_of`.
+QUAKE_OF_JOINTS = (
+    *("heel_opening", "toe_opening", "slip_mean", "slip_heel", "slip_toe"),
+    *("N", "T", "M", "U", "shear_reserve", "open_length"),
+)
+
+
+def quake_columns(case: Case) -> dict[str, tuple[str, str]]:
+    """The columns of a case's quake.csv: unit and meaning."""
+    others = {
+        column_of(name, k): (QUAKE[name][0], f"{joint}: {QUAKE[name][1]}")
+        for k, joint in enumerate(case.joint_names)
+        if k
+        for name in QUAKE_OF_JOINTS
+    }
+    return QUAKE | others
+
+
+@dataclass(frozen=True, kw_only=True)
+class QuakeResult:
+    """The rows of an earthquake and what they amount to."""
+
+    case: Case
+    rows: Table
+    #: time (rows,), distance from the heel (nodes,), effective normal stress (rows, nodes)
+    stress: Table
+    #: states with the largest displacements, in 2D: name, time [s], and the displacement since the
+    #: static state (nodes, 2) of each body [m]
+    shapes: list[tuple[str, float, dict[str, Array]]]
+    bodies: dict[str, Body]
+    #: for run.json
+    summary: dict[str, Any]
+    #: whether the dam is in static equilibrium after the earthquake
+    stands: bool
+    statement: str
 
 
 @dataclass

@@ -20,6 +20,8 @@ TextName: TypeAlias = Literal[
     "drain_reference",
     "quake_uplift",
     "required_position",
+    "record_unit",
+    "record_component",
 ]
 
 
@@ -74,6 +76,13 @@ class CheckGroup(Group):
     required_position: str
 
 
+class EarthquakeGroup(Group):
+    """Record of the ground, time integration, damping."""
+
+    record_unit: str
+    record_component: str
+
+
 class ParameterValues:
     """The values of all parameters, those that follow others resolved."""
 
@@ -126,6 +135,11 @@ class ParameterValues:
     def loads(self) -> LoadGroup:
         """Loads besides the water, works on the joint."""
         return LoadGroup(self._group("Loads"))
+
+    @cached_property
+    def earthquake(self) -> EarthquakeGroup:
+        """Record of the ground, time integration, damping."""
+        return EarthquakeGroup(self._group("Earthquake"))
 
     @cached_property
     def solver(self) -> Group:

@@ -23,7 +23,8 @@ from ..storage import PART, atomic_write, locked_folder
 
 #: Files of a run: tables, pictures CASE....png, fields.
 TABLES = ("joint.csv", "history.csv", "curve.csv", "gravity.csv", "critical.csv", "run.json")
-PICTURES = ("", "_curve", "_check", "_critical")
+TABLES += ("quake.csv", "quake_stress.npz", "quake_state.npz")
+PICTURES = ("", "_curve", "_check", "_critical", "_quake")
 FIELDS = re.compile(r"(bulk|joint)(_t[\w.+-]+\.vtu|\.msh)|fields\.pvd")
 
 
@@ -51,15 +52,17 @@ def check_writable(folder: Path) -> None:
 
 
 @contextlib.contextmanager
-def claim_output_folder(case: Case, folder: Path) -> Iterator[None]:
-    """Create and lock the output folder of a run, and remove an earlier run's results.
+def claim_output_folder(case: Case, folder: Path, keep: bool = False) -> Iterator[None]:
+    """Create and lock the output folder of a run, and remove an earlier run's results; keep: not
+    those of a run that is to be continued.
 
     Raises InputError if the folder can not be written or is locked; an earlier run stays then.
     """
     check_writable(folder)
     folder.mkdir(parents=True, exist_ok=True)
     with locked_folder(folder):
-        clear(folder)
+        if not keep:
+            clear(folder)
         write_state(case, folder, "running")
         yield
 

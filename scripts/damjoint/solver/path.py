@@ -203,9 +203,16 @@ class EquilibriumPath:
         return self.points
 
     @property
+    def levels(self) -> Array:
+        """The level of each point [m]; -inf where loads that do not depend on it differ from those
+        of the path's end.
+        """
+        return np.array([p.level for p in self.points])
+
+    @property
     def top(self) -> int:
         """The number of the point with the highest level; of a plateau, the first."""
-        levels = np.array([p.level for p in self.admissible])
+        levels = self.levels[: len(self.admissible)]
         return int(np.argmax(levels >= (1 - PLATEAU) * levels.max())) if len(levels) else 0
 
     @property
@@ -216,8 +223,7 @@ class EquilibriumPath:
     @property
     def limit_point(self) -> int:
         """The number of the point from which on the level rises by less than the precision."""
-        levels = np.array([p.level for p in self.points])
-        return int(np.argmax(levels >= (1 - PRECISION / 2) * self.highest))
+        return int(np.argmax(self.levels >= (1 - PRECISION / 2) * self.highest))
 
     @property
     def slides(self) -> bool:
@@ -229,7 +235,8 @@ class EquilibriumPath:
         recover from a fall.
         """
         far = self.points[-1].imposed / factor
-        early = [p.level for p in self.points if self.imposed(p) <= far]
+        by_point = zip(self.levels, self.points, strict=True)
+        early = [level for level, p in by_point if self.imposed(p) <= far]
         if not early or self.points[-1].level > early[-1] * (1 + PRECISION / 2):
             return False
         return self.points[self.top].level <= max(early) * (1 + PRECISION / 2)

@@ -277,7 +277,8 @@ class Uplift:
         pressure.
         """
         self.length, mode = body.length, case["uplift"]
-        self.h1, self.h2 = h1, h2 = max(level - body.heel[1], 0.0), max(tail - body.toe[1], 0.0)
+        head = level + case["joint_head_offset"]
+        self.h1, self.h2 = h1, h2 = max(head - body.heel[1], 0.0), max(tail - body.toe[1], 0.0)
         #: distance from the heel and head of the outlet [m] of drains that the crack has not passed
         self.drains: tuple[float, float] | None = None
         wet_crack, crack = crack, crack if mode in ("cracked", "flow") else 0.0

@@ -59,6 +59,13 @@ NEAR_BOUND = 0.02
 #: The smallest value of a parameter that has to be positive.
 TINY = 1e-30
 
+#: Relative distance from the gravity method's critical value at which the search begins, and the
+#: precision of that value.
+BESIDE_GRAVITY, GUESS_PRECISION = 0.01, 1e-3
+
+#: How often a step of the search is doubled at most.
+MOST_DOUBLED = 20
+
 #: Relative distances from a value at which the gravity method's critical value is sought.
 DISTANCES = (0.02, 0.05, 0.1, 0.2, 0.5, 0.9)
 
@@ -151,6 +158,10 @@ class Search:
         #: called with a message on the progress
         self.on_progress: Callable[[str], None] = lambda message: None
         self.trials: list[Trial] = []
+        #: how far paths are followed, see `FailurePath.follow`
+        self.factor = ROUGH
+        #: values on both sides of the gravity method's critical value
+        self.guesses: list[float] = []
         self.check_quantity()
 
     def check_quantity(self) -> None:
@@ -205,7 +216,7 @@ class Search:
         interface = interface_of(replace(case, levels=(*case.levels[:-1], highest)))
         path = FailurePath(case, interface, target, report)
         self.trials.append(Trial(value, path))
-        path.follow(ROUGH)
+        path.follow(self.factor)
         return path
 
     def trial(self, value: float) -> Trial:
@@ -240,21 +251,45 @@ class Search:
     def value(self) -> CriticalValue:
         """Search outwards from the case's own value for a stand and a failure, then bisect."""
         first = self.trial(1.0 if self.of == "strength" else self.own[self.name])
-        other = self.change(first)
-        if other is None:
+        self.guesses = self.by_guess(first)
+        ends = self.change(first)
+        if ends is None:
             return self.no_change(first)
-        stands, fails = (first, other) if first.stands else (other, first)
+        stands, fails = ends
         while True:
             stands, fails = self.bisect(stands, fails)
             fails.path.follow(SURE)
             fails.path.refine()
             if not fails.stands:
                 return self.result(stands.value, fails.path, point_at_target(stands))
-            step = fails.value - stands.value  # the refined path stands: continue from it
-            stands = fails
-            while fails.stands:
-                step *= 2
-                fails = self.trial(stands.value + step)
+            self.factor = SURE  # the first estimate is wrong for this dam
+            ends = self.beyond(fails, fails.value - stands.value)
+            if ends is None:
+                return self.no_change(fails)
+            stands, fails = ends
+
+    def beyond(self, stands: Trial, step: float) -> tuple[Trial, Trial] | None:
+        """The last stand and the first failure beyond a trial that stands: of the trials that
+        failed by their first estimate, now followed further; else at distances doubled from a step
+        on. None if all values that the case allows stand.
+        """
+        ahead = lambda trial: (trial.value - stands.value) * np.sign(step)
+        known = sorted((t for t in self.trials if not t.stands and ahead(t) > 0), key=ahead)
+        for trial in known:
+            trial.path.follow(SURE)
+            if not trial.stands:
+                return stands, trial
+            stands, step = trial, trial.value - stands.value
+        for _ in range(MOST_DOUBLED):
+            step *= 2
+            try:
+                trial = self.trial(stands.value + step)
+            except InputError:  # the case allows no such value
+                break
+            if not trial.stands:
+                return stands, trial
+            stands = trial
+        return None
 
     def no_change(self, first: Trial) -> CriticalValue:
         """The result if all trials stand, or all fail."""
@@ -264,16 +299,37 @@ class Search:
         point = point_at_target(first) if first.stands else None
         return CriticalValue(None, first.path.mode, "", doubt, point)
 
-    def change(self, first: Trial) -> Trial | None:
-        """The nearest tried value with the other result than the first; None if there is none."""
-        for value in self.outwards(first):
+    def change(self, first: Trial) -> tuple[Trial, Trial] | None:
+        """The nearest tried values of which one stands and the other fails; None if all trials have
+        the first one's result.
+        """
+        for value in chain(self.guesses[:1], self.outwards(first)):
+            distance, tried = value - first.value, [t.value - first.value for t in self.trials]
+            if any(d * distance > 0 and abs(d) >= abs(distance) for d in tried):
+                continue  # nearer than a trial with the same result
             try:
                 trial = self.trial(value)
             except InputError:  # the case allows no such value
                 continue
             if trial.stands != first.stands:
-                return trial
+                near = min(self.trials[:-1], key=lambda t: abs(t.value - value))
+                return (near, trial) if near.stands else (trial, near)
         return None
+
+    def by_guess(self, first: Trial) -> list[float]:
+        """Values beside the gravity method's critical value, the farther from the first trial
+        first; empty if the gravity method has none, or another result for the first trial.
+        """
+        stands = lambda value: self.rigid_block_stands(value, True, False)
+        if stands(first.value) != first.stands:
+            return []
+        for value in self.outwards(first):
+            if stands(value) == (not first.stands):
+                sign = lambda v: 1.0 if stands(v) == first.stands else -1.0
+                guess = float(bisect(sign, first.value, value, rtol=GUESS_PRECISION))
+                margin = BESIDE_GRAVITY * abs(guess) * np.sign(value - first.value)
+                return [guess + margin, guess - margin]
+        return []
 
     def outwards(self, first: Trial) -> Iterator[float]:
         """Values at increasing distance from the first: towards failure if it stands, else away
@@ -290,27 +346,36 @@ class Search:
         return worse if first.stands else (down if worse is up else up)
 
     def bisect(self, stands: Trial, fails: Trial) -> tuple[Trial, Trial]:
-        """Narrow an interval to the precision, by secants and at least every third time by half."""
+        """Narrow an interval to the precision: at the guesses in it, by secants and at least every
+        third time by half.
+        """
         ends, turn = (stands.value, fails.value), 0
         while abs(ends[0] - ends[1]) > PRECISION * max(map(abs, ends)):
-            value = self.extrapolate(*ends) if turn % 3 else None
-            trial = self.trial(middle(*ends) if value is None else value)
+            inside = [v for v in self.guesses if min(ends) < v < max(ends)]
+            if inside:
+                value = inside[0]
+            else:
+                secant = self.extrapolate(stands, fails) if turn % 3 else None
+                value, turn = middle(*ends) if secant is None else secant, turn + 1
+            trial = self.trial(value)
             stands, fails = (trial, fails) if trial.stands else (stands, trial)
-            ends, turn = (stands.value, fails.value), turn + 1
+            ends = stands.value, fails.value
         return stands, fails
 
-    def extrapolate(self, stands: float, fails: float) -> float | None:
-        """The value at which the highest level reaches the target, by the secant of the last two
-        trials that failed; shifted by less than the precision, to bracket it. None if outside.
+    def extrapolate(self, stands: Trial, fails: Trial) -> float | None:
+        """The value at which the highest level reaches the target, by the secant of the two
+        failures nearest to a stand; shifted by less than the precision, to bracket it. None if
+        outside.
         """
-        known = [t for t in self.trials if not t.stands and t.path.points][-2:]
+        known = [t for t in self.trials if not t.stands and t.path.points]
+        known = sorted(known, key=lambda t: -abs(t.value - stands.value))[-2:]
         values = [t.value for t in known]
         missing = [t.path.target - t.path.highest for t in known]
         if len(set(missing)) < 2:
             return None
         root = values[1] - missing[1] * np.diff(values)[0] / np.diff(missing)[0]
-        shift = np.sign(fails - stands) * 0.4 * PRECISION * abs(root)
-        low, high = sorted((stands, fails))
+        shift = np.sign(fails.value - stands.value) * 0.4 * PRECISION * abs(root)
+        low, high = sorted((stands.value, fails.value))
         return next((v for v in (root - shift, root + shift) if low < v < high), None)
 
     def interrupted(self, error: BaseException) -> CriticalValue:

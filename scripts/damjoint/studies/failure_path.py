@@ -11,8 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..arrays import Array
 from ..joint.interface import Interface
 from ..model.case import Case
+from ..model.loads import Loading
 from ..model.results import HISTORY, Columns, with_all_joints
 from ..solver.load_stepper import LoadStepper
 from ..solver.path import EquilibriumPath, Point
@@ -71,6 +73,8 @@ class FailurePath(EquilibriumPath):
         self.case, self.on_step = case, on_step
         self.points: list[Point] = []
         stepper = LoadStepper(case, interface, lambda _: self.add(point_of(stepper)))
+        #: whether the loads of a time are those of the last one, but for the level
+        self.stepper, self.same_loads = stepper, dict[float, bool]()
         # after a step of the weight alone steps can be halved; else the first includes the weight
         if not (case["weight_first"] and stepper.weigh()):
             stepper.advance_to(case.times[0])
@@ -102,10 +106,39 @@ class FailurePath(EquilibriumPath):
     def arrival(self) -> int | None:
         """The number of the first point at the target or above it; None if there is none."""
         for number, point in enumerate(self.admissible):
-            complete = point.control != "level" or point.state.time == self.case.times[-1]
-            if complete and point.level >= self.target:
+            if self.complete(point) and point.level >= self.target:
                 return number
         return None
+
+    @property
+    def levels(self) -> Array:
+        """See `EquilibriumPath.levels`; of all points, as long as none has the last loads in full.
+
+        An earthquake, for example, acts in full only at the last time: a level that is reached
+        before counts no more once the path has gone on under all loads.
+        """
+        levels = super().levels
+        if any(map(self.complete, self.points)):
+            levels[[not self.on_path(point) for point in self.points]] = -np.inf
+        return levels
+
+    def complete(self, point: Point) -> bool:
+        """Whether a point has the loads of the last time."""
+        return point.control != "level" or point.state.time == self.case.times[-1]
+
+    def on_path(self, point: Point) -> bool:
+        """Whether a point differs from the path under the last loads in nothing but its level."""
+        return self.complete(point) or self.has_last_loads(point.state.time)
+
+    def has_last_loads(self, time: float) -> bool:
+        """Whether the loads of a time are those of the last one, but for the level."""
+        if time not in self.same_loads:
+            one, last = (
+                Loading.at(self.case, t, 0.0, self.case.tail_at(t))
+                for t in (time, self.case.times[-1])
+            )
+            self.same_loads[time] = self.stepper.same_but_for_level(one, last)
+        return self.same_loads[time]
 
     @property
     def reached(self) -> bool:

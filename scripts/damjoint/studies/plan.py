@@ -173,6 +173,8 @@ class Plan:
     tied: dict[str, str]
     #: quantity whose critical value is computed: level, strength, uplift, a parameter; empty: none
     critical: str = ""
+    #: residual slip [m] beyond which a row fails, each row an earthquake; None: no earthquake
+    slip_limit: float | None = None
 
     @property
     def critical_columns(self) -> list[str]:

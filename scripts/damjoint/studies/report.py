@@ -230,9 +230,11 @@ def run_section(folder: Path, solution: Solution) -> RunSection:
     own, check = result.joints[number], checks[number] if checks else None
     rigid = None if case.geometry else hand_calculation(own)
     critical = critical_value(info.get("critical"))
-    # requirements do not apply to the last state before a failure
-    failures = [] if critical else failures_of(result, checks)
-    verdict = check.finite_elements.verdict if check and not critical else UNCHECKED
+    # requirements do not apply to the last state before a failure, nor to that after an earthquake,
+    # in which the whole joint has slipped
+    judged = not (critical or "quake" in info)
+    failures = failures_of(result, checks) if judged else []
+    verdict = check.finite_elements.verdict if check and judged else UNCHECKED
     made = datetime.fromtimestamp((folder / "run.json").stat().st_mtime)
     return RunSection(
         folder=str(folder),
@@ -244,12 +246,15 @@ def run_section(folder: Path, solution: Solution) -> RunSection:
         run_verdict="critical value" if critical else info["verdict"],
         failures=failures,
         hints=[
-            *filter(None, [which_joint(result), critical, *info["hints"]]),
+            *filter(None, [which_joint(result), critical, earthquake(info), *info["hints"]]),
             *filter(None, [discretisation_error(result)]),
         ],
-        pictures=pictures_of(solution) if len(result.joint["time"]) else [],
+        pictures=[
+            *(pictures_of(solution) if len(result.joint["time"]) else []),
+            *earthquake_picture(folder, info),
+        ],
         levels=levels_table(own),
-        methods=methods_table(case, checks, judged=not critical) if checks else None,
+        methods=methods_table(case, checks, judged=judged) if checks else None,
         loads=loads_table(rigid) if rigid else None,
         formulas=formulas(rigid) if rigid and rigid.stands else [],
         notes=check.notes if check else [],
@@ -439,6 +444,31 @@ def critical_value(info: dict[str, Any] | None) -> str:
     by_hand = {"gravity method": info["gravity_method"]} | info.get("gravity_method_with", {})
     parts += [f"{n} {v:.6g} {unit}".strip() for n, v in by_hand.items() if v is not None]
     return f"the last state before failure, critical {info['of']} {'; '.join(parts)}"
+
+
+def earthquake(info: dict[str, Any]) -> str:
+    """Statement and peaks of `damjoint quake`, if run.json has them."""
+    found = info.get("quake")
+    if not found or "peaks" not in found:
+        return ""
+    ground, crest = (abs(found["peaks"][name]["value"]) for name in ("ground_ax", "crest_ax"))
+    block, frequency = found["residual"].get("rigid_block"), found["frequencies"][0]
+    by_block = "" if block is None else f"slip of the rigid block {1e3 * block:.3g} mm; "
+    return (
+        f"earthquake {Path(found['record']).name}, {ground:.3g} m/s2: {info['statement']}; largest "
+        f"acceleration of the crest {crest:.3g} m/s2; {by_block}"
+        f"first natural frequency {frequency:.3g} Hz; N', T and the verdict are those of the "
+        "static state after it"
+    )
+
+
+def earthquake_picture(folder: Path, info: dict[str, Any]) -> Iterator[Picture]:
+    """The picture of `damjoint quake`, if there is one in the folder."""
+    path = folder / f"{info['case']}_quake.png"
+    if info.get("quake") and path.is_file():
+        address = "data:image/png;base64," + base64.b64encode(path.read_bytes()).decode()
+        caption = "Earthquake: relative to the ground, since the static state before it."
+        yield Picture("full", caption, address)
 
 
 def discretisation_error(result: Results) -> str:

@@ -38,6 +38,8 @@ LAWS = {
     "any shear, and the dam cannot slide",
     "friction": "Mohr-Coulomb friction with adhesion, without damage; the joint opens at the "
     "tension c/mu, which the open part still carries",
+    "endo": "coupled damage and plasticity: tensile strength and cohesion soften with one fracture "
+    "energy; friction remains, and slip opens the joint by mu",
     "bond": "coupled cohesive-frictional law: tensile strength and cohesion soften with their "
     "fracture energies, friction remains",
 }

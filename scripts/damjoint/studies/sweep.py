@@ -13,6 +13,7 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import TypeAlias
 
@@ -30,15 +31,18 @@ from ..solver.load_stepper import LoadStepper
 from ..statics.limit import mechanism
 from ..statics.verdict import failed, statement, verdict
 from ..storage import lock
+from . import quake
 from .critical import Search
 from .plan import Plan, Row, cases_of, column_of, in_file
 
 
-def key_of(case: Case) -> str:
-    """The key of a scene and its loading in a result file."""
+def key_of(case: Case, slip_limit: float | None = None) -> str:
+    """The key of a scene and its loading in a result file; slip_limit: as in Plan."""
     of_joints = ((own.name, sorted(own.values.items())) for own in case.of_joints)
     loading = case.levels, case.tail_levels, case.times
     identity = sorted(case.values.items()), *loading, __version__, *of_joints
+    if slip_limit is not None and case.record:
+        identity += slip_limit, case.record.read_bytes()
     return hashlib.sha256(repr(identity).encode()).hexdigest()[:16]
 
 
@@ -54,6 +58,9 @@ UNDECIDED = (ERROR, "not converged", "interrupted")
 
 #: Limit of the rows that are computed together: they share the steps up to their common level.
 MOST_TOGETHER = 8
+
+#: Bundles in a task of a scheduler: at most, and so few that each of its threads has some tasks.
+MOST_IN_TASK, TASKS_PER_THREAD = 50, 10
 
 #: Solved cases that differ in levels only, by levels, tailwater and times.
 Solved: TypeAlias = dict[tuple[tuple[float, ...], ...], LoadStepper]
@@ -84,6 +91,8 @@ class Task:
     #: the search of its critical value, if there is one, and its columns
     search: Callable[[], Search] | None = None
     columns: Sequence[str] = ()
+    #: as in Plan
+    slip_limit: float | None = None
 
 
 def last_rows(tasks: list[Task]) -> list[dict[str, Value]]:
@@ -92,7 +101,16 @@ def last_rows(tasks: list[Task]) -> list[dict[str, Value]]:
     """
     solved: Solved = {}
     with threadpool_limits(1):
-        return [last_row(task, solved) | critical_value(task) for task in tasks]
+        return [
+            (last_row(task, solved) if task.slip_limit is None else quake_row(task))
+            | critical_value(task)
+            for task in tasks
+        ]
+
+
+def rows_of_bundles(bundles: list[list[Task]]) -> list[dict[str, Value]]:
+    """The rows of several bundles, see `last_rows`."""
+    return [row for tasks in bundles for row in last_rows(tasks)]
 
 
 def last_row(task: Task, solved: Solved) -> dict[str, Value]:
@@ -108,6 +126,35 @@ def last_row(task: Task, solved: Solved) -> dict[str, Value]:
         return row | dict(zip(OUTCOME, (1.0, ERROR, message_of(error)), strict=True))
     outcome = float(failed(result)), verdict(result), statement(result)
     return row | result.last | dict(zip(OUTCOME, outcome, strict=True))
+
+
+#: Columns of an earthquake in a row: largest ground acceleration along x [m/s2]; of the joint with
+#: the largest residual slip: slip [m], tilt, slip of the rigid block [m].
+QUAKE_COLUMNS = ("peak_ground_ax", "residual_slip", "residual_tilt", "rigid_block_slip")
+
+
+def quake_row(task: Task) -> dict[str, Value]:
+    """The row of a case whose last level is followed by an earthquake: it fails if the residual
+    slip exceeds the limit, or if there is no static equilibrium after it.
+    """
+    case = task.case
+    row: dict[str, Value] = dict.fromkeys([*history_columns(case), *QUAKE_COLUMNS], "")
+    try:
+        static, after, found = quake.outcome_of(case)
+    except Exception as error:
+        return row | dict(zip(OUTCOME, (1.0, ERROR, message_of(error)), strict=True))
+    residual = found["residual"]
+    suffixes = [name.removeprefix("slip") for name in residual if name.startswith("slip")]
+    worst = max(suffixes, key=lambda suffix: abs(residual[f"slip{suffix}"]))
+    values = (residual.get(f"{name}{worst}", "") for name in ("slip", "tilt", "rigid_block"))
+    peak = abs(found["peaks"]["ground_ax"]["value"])
+    row |= static.results().last | dict(zip(QUAKE_COLUMNS, (peak, *values), strict=True))
+    slip = abs(residual[f"slip{worst}"])
+    verdict = "stands" if after else "no equilibrium"
+    if after and slip > task.slip_limit:
+        verdict = "residual slip"
+    words = f"residual slip {1e3 * slip:.3g} mm, limit {1e3 * task.slip_limit:.3g} mm"
+    return row | dict(zip(OUTCOME, (float(verdict != "stands"), verdict, words), strict=True))
 
 
 def message_of(error: Exception) -> str:
@@ -136,7 +183,11 @@ def planned(case: Case, plan: Plan) -> Iterator[tuple[str, Values, Task]]:
     """
     for row, varied in cases_of(case, plan):
         search = partial(search_of, varied, plan.critical) if plan.critical else None
-        yield key_of(varied), row, Task(varied, bool(plan.sampled), search, plan.critical_columns)
+        limit = plan.slip_limit
+        if limit is not None:
+            quake.check(varied)
+        task = Task(varied, bool(plan.sampled), search, plan.critical_columns, limit)
+        yield key_of(varied, limit), row, task
 
 
 def search_of(case: Case, quantity: str) -> Search:
@@ -242,10 +293,13 @@ def spread(
                 f"--scheduler {scheduler}: no scheduler answers at this address ({error})"
             ) from None
         with client:
-            futures = {
-                client.submit(last_rows, some, key=f"damjoint-{'-'.join(keys)}"): keys
-                for keys, some in zip(work, chosen, strict=True)
-            }
+            threads = max(sum(client.nthreads().values()), 1)
+            size = min(max(len(work) // (TASKS_PER_THREAD * threads), 1), MOST_IN_TASK)
+            futures = {}
+            for i in range(0, len(work), size):
+                keys = list(chain.from_iterable(work[i : i + size]))
+                name = f"damjoint-{hashlib.sha256(' '.join(keys).encode()).hexdigest()[:32]}"
+                futures[client.submit(rows_of_bundles, chosen[i : i + size], key=name)] = keys
             for future in as_finished(futures):
                 yield from zip(futures[future], future.result(), strict=True)
     elif jobs == 1 or len(work) == 1:
@@ -317,8 +371,9 @@ def sweep(
     """Compute the rows of a plan that are missing in out (CSV).
 
     Returns their number, and all rows of the plan. Columns: key, the plan's names (level as
-    level_asked), the columns of history.csv, OUTCOME, the critical value. Each finished row is
-    written at once, so that an interrupted sweep can be continued. Raises InputError, RunError.
+    level_asked), the columns of history.csv, of an earthquake, OUTCOME, the critical value. Each
+    finished row is written at once, so that an interrupted sweep can be continued. Raises
+    InputError, RunError.
     """
     check_jobs(jobs)
     if not out.parent.is_dir():
@@ -326,7 +381,8 @@ def sweep(
     rows = list(planned(case, plan))
     values = {key: row for key, row, _ in rows}
     of_steps = list(history_columns(case))
-    results = [*of_steps, *OUTCOME, *plan.critical_columns]
+    of_quake = QUAKE_COLUMNS if plan.slip_limit is not None else ()
+    results = [*of_steps, *of_quake, *OUTCOME, *plan.critical_columns]
     columns = ["key", *map(column_of, plan.names), *results]
     done = read_done(out, columns, (*of_steps, "failed"))
     missing = {key: task for key, _, task in rows if key not in done}

@@ -1,0 +1,117 @@
+"""An earthquake under way on disk, from which an interrupted run continues.
+
+numpy's npz: arrays and a header, nothing that could be executed.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import json
+from collections.abc import Iterator
+from dataclasses import fields, is_dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import __version__
+from ..arrays import Array
+from ..fem.cache import key_of, sources
+from ..model.case import Case
+from ..storage import atomic_write
+from .history import Peak, QuakeHistory
+from .scheme import Motion
+from .step import Moving
+from .stepper import Earthquake
+
+
+def fingerprint(case: Case) -> str:
+    """Hash of all that an earthquake depends on."""
+    record = case.record.read_bytes() if case.record else b""
+    values = [own.values for own in case.joints]
+    loading = case.levels, case.tail_levels, case.times
+    scene = json.dumps([__version__, sources(), key_of(case), values, loading], default=str)
+    return hashlib.sha256(scene.encode() + record).hexdigest()
+
+
+def leaves(value: Any) -> Iterator[Array]:
+    """The arrays and numbers in a tree of dataclasses and tuples."""
+    if is_dataclass(value) and not isinstance(value, type):
+        for part in fields(value):
+            yield from leaves(getattr(value, part.name))
+    elif isinstance(value, (tuple, list)):
+        for item in value:
+            yield from leaves(item)
+    elif value is not None:
+        yield np.asarray(value, float)
+
+
+def with_leaves(value: Any, arrays: Iterator[Array]) -> Any:
+    """A tree of the same form with other arrays and numbers."""
+    if is_dataclass(value) and not isinstance(value, type):
+        parts = {f.name: with_leaves(getattr(value, f.name), arrays) for f in fields(value)}
+        return replace(value, **parts)
+    if isinstance(value, (tuple, list)):
+        return type(value)(with_leaves(item, arrays) for item in value)
+    if value is None:
+        return None
+    array = next(arrays)
+    return float(array) if array.ndim == 0 else array
+
+
+def write(path: Path, key: str, quake: Earthquake, history: QuakeHistory) -> None:
+    """Write the last converged step and all rows; key: fingerprint of the case."""
+    now = quake.now
+    variables = now.state.variables.joints, now.state.node_variables.joints
+    content: dict[str, Any] = {
+        "key": np.array(key),
+        "time": np.array(now.time),
+        "jump": now.state.jump,
+        "motion": np.array(list(leaves(now.motion))),
+        "forces": now.forces,
+        "columns": np.array(list(history.rows)),
+        "rows": np.array(list(history.rows.values())),
+        "stress": np.array(history.stress),
+        "peaks": np.array(list(history.peaks)),
+        "peak_values": np.array([[peak.value, peak.time] for peak in history.peaks.values()]),
+        "peak_states": np.array([peak.displacement for peak in history.peaks.values()]),
+    }
+    content |= {f"variable_{i}": leaf for i, leaf in enumerate(leaves(variables))}
+    with atomic_write(path) as part, part.open("wb") as file:
+        np.savez(file, **content)
+
+
+def read(path: Path, key: str, quake: Earthquake) -> QuakeHistory | None:
+    """Continue an earthquake from a file: its rows; None if it is missing, damaged or of another
+    case.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            if str(file["key"]) != key:
+                return None
+            stored = dict(file)
+        static = quake.problem.static
+        arrays = (stored[f"variable_{i}"] for i in itertools.count())
+        points, nodes = with_leaves((static.variables.joints, static.node_variables.joints), arrays)
+        state = replace(
+            static,
+            jump=stored["jump"],
+            variables=replace(static.variables, joints=points),
+            node_variables=replace(static.node_variables, joints=nodes),
+        )
+        rows = dict(zip(stored["columns"].tolist(), stored["rows"].tolist(), strict=True))
+        names = stored["peaks"].tolist()
+        values = zip(stored["peak_values"].tolist(), stored["peak_states"], strict=True)
+        peaks = {n: Peak(v[0], v[1], w) for n, (v, w) in zip(names, values, strict=True)}
+        now = Moving(
+            time=float(stored["time"]),
+            state=state,
+            motion=Motion(*stored["motion"]),
+            forces=stored["forces"],
+        )
+        history = QuakeHistory(rows, list(stored["stress"]), peaks, (len(stored["stress"]), now))
+    except Exception:  # a damaged byte can make numpy and zipfile raise anything
+        return None
+    quake.now = now
+    return history

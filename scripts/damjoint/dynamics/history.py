@@ -1,0 +1,135 @@
+"""What is recorded of an earthquake: a row per time step, and the stress along the joints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..arrays import Array, Table
+from ..model.case import Case
+from ..model.results import column_of, quake_columns
+from ..solver.history import joint_row
+from ..solver.state import State
+from .step import Moving
+from .stepper import Converged, Earthquake
+
+
+def at_ends(quake: Earthquake, state: State, number: int) -> tuple[Array, Array]:
+    """delta_n and delta_t1 of a joint, by its number, at its heel and at its toe (2,)."""
+    joint = quake.problem.model.equilibrium.interface.joints[number]
+    nodes = joint.mean_at_nodes(joint.jumps(joint.at_nodes, state.jump))
+    heel, toe = (nodes[n].mean(axis=0)[:2] for n in (joint.mesh.heel_nodes, joint.mesh.toe_nodes))
+    return heel, toe
+
+
+def row_of_joint(quake: Earthquake, state: State, number: int) -> dict[str, float]:
+    """QUAKE_OF_JOINTS of a joint, by its number, at a state."""
+    equilibrium, static = quake.problem.model.equilibrium, quake.problem.static
+    joint, law = equilibrium.interface.joints[number], equilibrium.laws.laws[number]
+    row = joint_row(equilibrium, state, number)
+    heel, toe = at_ends(quake, state, number)
+    heel_before, toe_before = at_ends(quake, static, number)
+    jump, before = (joint.jumps(joint.at_points, s.jump) for s in (state, static))
+    variables, weights = state.variables.joints[number], joint.points.weights
+    traction, _ = law.traction_and_tangent(jump, variables)
+    damage, slip = law.damage(jump, variables), law.slip(variables, len(jump))
+    strength = weights @ law.shear_strength(traction[:, 0], damage, slip) / joint.width
+    return {
+        "heel_opening": heel[0],
+        "toe_opening": toe[0],
+        "slip_mean": weights @ (jump - before)[:, 1] / weights.sum(),
+        "slip_heel": heel[1] - heel_before[1],
+        "slip_toe": toe[1] - toe_before[1],
+        **{name: row[name] for name in ("N", "T", "M", "U")},
+        "shear_reserve": strength - abs(row["T"]),
+        "open_length": row["crack_length"],
+    }
+
+
+def stress_at_nodes(quake: Earthquake, state: State) -> Array:
+    """Effective normal stress (nodes,) [Pa] at the nodes of the first joint, from heel to toe."""
+    equilibrium = quake.problem.model.equilibrium
+    joint, law = equilibrium.interface.joints[0], equilibrium.laws.laws[0]
+    jump = joint.jumps(joint.at_nodes, state.jump)
+    traction, _ = law.traction_and_tangent(jump, state.node_variables.joints[0])
+    return joint.mean_at_nodes(traction[:, 0])[np.argsort(joint.xi)]
+
+
+#: States whose displacement is stored: column of quake.csv and sign.
+PEAK_STATES = {
+    "crest downstream": ("crest_ux", 1),
+    "crest upstream": ("crest_ux", -1),
+    "heel open": ("heel_opening", 1),
+    "toe open": ("toe_opening", 1),
+}
+
+
+@dataclass(frozen=True)
+class Peak:
+    """A state in which a quantity is largest."""
+
+    value: float
+    time: float
+    #: displacement since the static state (n,)
+    displacement: Array
+
+
+@dataclass
+class QuakeHistory:
+    """Rows of an earthquake so far."""
+
+    #: columns of quake.csv
+    rows: dict[str, list[float]]
+    #: effective normal stress at the first joint's nodes, from heel to toe, of each row [Pa]
+    stress: list[Array] = field(default_factory=list)
+    #: by PEAK_STATES
+    peaks: dict[str, Peak] = field(default_factory=dict)
+    #: number of complete rows and the state of the last one: an interruption can come at any time
+    complete: tuple[int, Moving | None] = (0, None)
+
+    @staticmethod
+    def of(case: Case) -> QuakeHistory:
+        """No rows."""
+        return QuakeHistory({name: [] for name in quake_columns(case)})
+
+    def __len__(self) -> int:
+        return len(self.rows["time"])
+
+    @property
+    def table(self) -> Table:
+        """The rows by column."""
+        return {name: np.array(values) for name, values in self.rows.items()}
+
+    def end_at_complete_row(self, quake: Earthquake) -> None:
+        """Remove a row that an interruption has left incomplete, and its step."""
+        number, last = self.complete
+        self.rows = {name: values[:number] for name, values in self.rows.items()}
+        self.stress = self.stress[:number]
+        quake.now = last or quake.problem.at_rest
+
+    def add(self, quake: Earthquake, step: Converged) -> None:
+        """The row of a converged step."""
+        motion, state, crest = step.end.motion, step.end.state, quake.system.crest
+        row = {
+            "time": step.end.time,
+            "ground_ax": step.ground[0],
+            "ground_ay": step.ground[1],
+            "crest_ux": float((crest @ motion.displacement)[0]),
+            "crest_ax": float((crest @ motion.acceleration)[0]) + step.ground[0],
+            "iterations": step.iterations,
+            "dt": step.dt,
+            "residual": step.residual,
+        }
+        for k in range(len(quake.case.joints)):
+            of_joint = row_of_joint(quake, state, k)
+            row |= {column_of(name, k): value for name, value in of_joint.items()}
+        stress = stress_at_nodes(quake, state)
+        for name, value in row.items():
+            self.rows[name].append(float(value))
+        self.stress.append(stress)
+        for name, (column, sign) in PEAK_STATES.items():
+            value = sign * float(row[column])
+            if name not in self.peaks or value > self.peaks[name].value:
+                self.peaks[name] = Peak(value, step.end.time, motion.displacement)
+        self.complete = len(self.stress), step.end

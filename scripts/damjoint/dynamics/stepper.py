@@ -1,0 +1,166 @@
+"""The dam through a record: steps of the prescribed length, halved where they do not converge."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from .. import ROUND_OFF, RunError
+from ..arrays import Array
+from ..fem.bodies import Bodies
+from ..model.case import Case
+from ..solver.model import LARGEST_JUMP, Model
+from ..solver.newton import Diverged
+from ..solver.state import State
+from .record import Record
+from .scheme import HHT
+from .step import Moving, Problem, TimeStep
+from .system import System
+from .uplift import pressures_in_motion
+
+#: How often a step can be halved.
+MOST_HALVINGS = 10
+
+
+@dataclass(frozen=True)
+class Damping:
+    """Rayleigh's damping a0 M + a1 K of the bodies, a0 = 0 without its mass part."""
+
+    #: the two frequencies [Hz], and the coefficients [1/s], [s]
+    first: float
+    second: float
+    a0: float
+    a1: float
+
+    @staticmethod
+    def of(case: Case, frequencies: Array) -> Damping:
+        """The damping of a case, by default at the first and third natural frequency."""
+        ends = (case["damping_f1"], frequencies[0]), (case["damping_f2"], frequencies[-1])
+        f1, f2 = (float(own if given == -1 else given) for given, own in ends)
+        w1, w2 = 2 * math.pi * f1, 2 * math.pi * f2
+        a1 = 2 * case["damping"] / (w1 + w2)
+        return Damping(f1, f2, a1 * w1 * w2 * case["damping_mass"], a1)
+
+    def ratio(self, frequency: float) -> float:
+        """Damping ratio at a frequency [Hz]."""
+        w = 2 * math.pi * frequency
+        return self.a0 / (2 * w) + self.a1 * w / 2
+
+
+@dataclass(frozen=True)
+class Converged:
+    """A converged time step."""
+
+    end: Moving
+    #: acceleration of the ground (2,) at its end [m/s2]
+    ground: Array
+    dt: float
+    iterations: int
+    #: norm of the out-of-balance forces over that of the static loads
+    residual: float
+
+
+#: Number of natural frequencies that are computed.
+FREQUENCIES = 3
+
+
+class Earthquake:
+    """The time steps of a case from a static state on."""
+
+    def __init__(self, case: Case, model: Model, static: State, bodies: Bodies) -> None:
+        """model, static: of the static loads, and their last state; bodies: of the case.
+
+        Raises InputError.
+        """
+        self.case, self.record = case, Record.of(case)
+        interface = model.equilibrium.interface
+        self.system = system = System.of(case, bodies, interface)
+        undamaged = model.equilibrium.undamaged
+        of_joints = interface.stiffness(undamaged, np.arange(len(interface.weights)))
+        #: natural frequencies [Hz] with undamaged joints and the water's mass
+        self.frequencies = system.frequencies(of_joints, FREQUENCIES)[0]
+        self.damping = Damping.of(case, self.frequencies)
+        normal, tangential = case["joint_damping_n"], case["joint_damping_t"]
+        self.problem = Problem(
+            model=model,
+            static=static,
+            system=system,
+            scheme=HHT(case["hht_alpha"]),
+            damping=self.damping.a0 * system.mass + self.damping.a1 * system.stiffness,
+            dashpots=np.array([normal, tangential, tangential]),
+            inertia=system.inertia,
+        )
+        given = case["dt"]
+        #: longest step [s]
+        self.dt = self.record.interval / 2 if given == -1 else given
+        self.now = self.problem.at_rest
+        self.steps_of_length: dict[int, TimeStep] = {}
+
+    @property
+    def finished(self) -> bool:
+        """Whether the record has ended."""
+        return self.now.time >= self.record.duration - ROUND_OFF * self.dt
+
+    @property
+    def halvings(self) -> int:
+        """How often the shortest step so far was halved."""
+        return max(self.steps_of_length, default=0)
+
+    def steps(self) -> Iterator[Converged]:
+        """Follow the record from the last state to its end, and yield each converged step.
+
+        Raises RunError where none converges, however short.
+        """
+        while not self.finished:
+            # a whole number of steps from the start: an interrupted run has the same ones
+            number = math.floor(self.now.time / self.dt + ROUND_OFF) + 1
+            yield from self._steps_to(number * self.dt, 0)
+
+    def _steps_to(self, end: float, halvings: int) -> Iterator[Converged]:
+        """The steps up to a time, of the length dt / 2^halvings or shorter."""
+        length = self.dt / 2**halvings
+        if self.now.time > end - length * (1 - ROUND_OFF):  # the rest of an interrupted step
+            if self.now.time < end - ROUND_OFF * length:
+                yield from self._halves(end, halvings)
+            return
+        step = self._step(length, halvings)
+        if step:
+            self.now = step.end
+            yield step
+        else:
+            yield from self._halves(end, halvings)
+
+    def _halves(self, end: float, halvings: int) -> Iterator[Converged]:
+        """Two steps of half the length up to a time, or their rest."""
+        if halvings == MOST_HALVINGS:
+            largest, limit = np.abs(self.now.state.jump).max(), LARGEST_JUMP * self.case.size
+            reason = (
+                f"no equilibrium with a time step of {self.dt / 2**halvings:.3g} s"
+                if largest < 0.9 * limit
+                else f"the displacement jump reaches {limit:.3g} m, beyond small displacements"
+            )
+            raise RunError(f"earthquake: after t = {self.now.time:.6g} s {reason}")
+        middle = end - self.dt / 2 ** (halvings + 1)
+        for target in (middle, end):
+            if self.now.time < target - ROUND_OFF * self.dt:
+                yield from self._steps_to(target, halvings + 1)
+
+    def _step(self, length: float, halvings: int) -> Converged | None:
+        """A step of a length; None if it does not converge."""
+        if halvings not in self.steps_of_length:
+            self.steps_of_length[halvings] = TimeStep(self.problem, length)
+        now = self.now
+        ground = self.record.at(now.time), self.record.at(now.time + length)
+        pressure = pressures_in_motion(self.case, self.problem, now.state)
+        persist = halvings == MOST_HALVINGS
+        try:
+            found = self.steps_of_length[halvings].advance(now, ground, pressure, persist)
+        except Diverged:
+            found = None
+        if found is None:
+            return None
+        end, step = found
+        return Converged(end, ground[1], length, step.iterations, step.residual)

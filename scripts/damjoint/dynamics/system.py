@@ -1,0 +1,182 @@
+"""Mass, damping and stiffness of the glued bodies and of the jumps that part them.
+
+Unknowns w = (v, d), relative to the ground and to the static state: displacement v of the glued
+bodies, jumps d of the joints (see fem/gluing.py). A body moves by u_b = T_b w, so that a jump
+carries the mass of all that is above it: M = sum T_b^T M_b T_b, likewise K.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import LinearOperator, eigsh
+
+from ..arrays import Array, IntArray, Sparse
+from ..fem.bodies import Bodies, ElasticBody
+from ..fem.elasticity import mass
+from ..fem.elements import Space
+from ..fem.factor import partial_factors
+from ..fem.glued_bodies import GluedBodies
+from ..fem.gluing import Gluing
+from ..joint.interface import Interface, JointInterface
+from ..joint.wet_faces import WetFace
+from ..model.case import Case
+from ..model.loads import AddedPressure
+from ..model.parameters import TINY
+from ..model.scene import UP
+
+#: Regions that have mass, and the parameter of their density.
+MASSIVE = {"dam": "rho_dam", "lower": "rho_dam"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class System:
+    """The matrices over w (n,), of which the last ones, `jumps`, are those of the joints."""
+
+    mass: Sparse
+    stiffness: Sparse
+    #: T_b (degrees of freedom, n) and function space of each body
+    motion: dict[str, Sparse]
+    spaces: dict[str, Space]
+    #: mass times a unit acceleration of the ground along x and y (n, 2)
+    inertia: Array
+    #: displacement of the crest along x and y (2, n)
+    crest: Sparse
+    jumps: IntArray
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return int(self.mass.shape[0])
+
+    @staticmethod
+    def of(case: Case, bodies: Bodies, interface: Interface) -> System:
+        """Assemble the bodies of a case, with the added mass of the reservoir at its last level."""
+        gluing = Gluing.of(bodies)
+        glued = GluedBodies.of(bodies.by_name, gluing)
+        dim, size = bodies.mesh.dim, len(glued.free) + gluing.unknowns
+        stiffness: Sparse = sparse.csr_matrix((size, size))
+        of_mass, inertia = stiffness, np.zeros((size, 2))
+        motion: dict[str, Sparse] = {}
+        densities = {region: case[name] for region, name in MASSIVE.items()}
+        for name, body in bodies.by_name.items():
+            of_body, own = gluing.bodies[name], body.stiffness.shape[0]
+            ones = np.ones(len(of_body.dofs))
+            places = of_body.dofs, np.arange(len(of_body.dofs))
+            carried = sparse.csr_matrix((ones, places), (own, len(of_body.dofs))) @ of_body.jumps
+            moved = sparse.hstack([glued.numbers[name][:, glued.free], carried], format="csr")
+            of_solid = mass(body.space, dim, densities)
+            of_water = added_mass(case, interface, body)
+            stiffness = stiffness + moved.T @ body.stiffness @ moved
+            of_mass = of_mass + moved.T @ (of_solid + of_water) @ moved
+            x, y = (translation(body.space, dim, axis) for axis in np.eye(2))
+            # the water follows a vertical motion of the ground
+            inertia += moved.T @ np.column_stack([(of_solid + of_water) @ x, of_solid @ y])
+            motion[name] = moved
+        return System(
+            mass=of_mass.tocsr(),
+            stiffness=stiffness.tocsr(),
+            motion=motion,
+            spaces={name: body.space for name, body in bodies.by_name.items()},
+            inertia=inertia,
+            crest=crest_rows(bodies, motion),
+            jumps=np.arange(len(glued.free), size),
+        )
+
+    def translation(self, joint: JointInterface, above: Collection[str], along: Array) -> Array:
+        """The unknowns (n,) of a unit translation along x and y (2,) of the bodies of these names,
+        which a joint separates from the others.
+        """
+        result = np.zeros(self.size)
+        moving = sorted(self.motion, key=lambda name: name not in above)
+        for (
+            name
+        ) in moving:  # the others last: shared degrees of freedom are those of the lower body
+            value = translation(self.spaces[name], joint.dim, along) * (name in above)
+            of_body = self.motion[name][:, : self.jumps[0]]
+            touched = np.unique(of_body.indices)
+            result[touched] = (of_body.T @ value)[touched]
+        jumps, value = joint.unknowns, translation(joint.space, joint.dim, along)
+        result[self.jumps] = (jumps.T @ value) / np.maximum(np.ravel(abs(jumps).sum(axis=0)), 1)
+        return result
+
+    def frequencies(self, of_joints: Sparse, number: int) -> tuple[Array, Array]:
+        """The lowest natural frequencies (number,) [Hz] with a stiffness of the joints (j, j), and
+        their modes (n, number), undamped.
+        """
+        n, j = self.size, len(self.jumps)
+        joint = sparse.block_diag([sparse.csr_matrix((n - j, n - j)), of_joints], format="csr")
+        matrix = (self.stiffness + joint).tocsr()
+        factors = partial_factors(matrix, self.jumps)
+        inverse = np.linalg.inv(factors.schur)
+        solve = lambda right: factors.expand(inverse @ factors.reduce(np.ravel(right)))
+        squares, modes = eigsh(
+            matrix,
+            k=number,
+            M=self.mass,
+            sigma=0.0,
+            OPinv=LinearOperator((n, n), matvec=solve),
+            v0=np.ones(n),
+        )
+        order = np.argsort(squares)
+        return np.sqrt(squares[order]) / (2 * math.pi), modes[:, order]
+
+
+def translation(space: Space, dim: int, along: Array) -> Array:
+    """The displacement (degrees of freedom,) of a unit translation along x and y (2,)."""
+    result = np.zeros((len(space.locations), dim))
+    result[: len(space.body.points), :2] = along
+    return result.ravel()
+
+
+def crest_rows(bodies: Bodies, motion: dict[str, Sparse]) -> Sparse:
+    """Displacement of the crest along x and y (2, n)."""
+    mesh = bodies.mesh
+    name = mesh.bearer("crest")
+    functions = bodies.by_name[name].space.find(Space(mesh.bodies["crest"], 1))
+    first = mesh.dim * int(functions[0])
+    return motion[name][[first, first + 1]]
+
+
+def added_mass(case: Case, interface: Interface, body: ElasticBody) -> Sparse:
+    """Mass matrix of the water in front of the upstream faces of a body (degrees of freedom, ...).
+
+    The mass per area whose inertia is the pressure of a horizontal acceleration (Westergaard 1933,
+    Zangar 1952), normal to the face; on an inclined face it follows the normal component (Kuo
+    1982). Zero with added_mass = 0.
+    """
+    size = body.stiffness.shape[0]
+    result = sparse.csr_matrix((size, size))
+    level = case.levels[-1]
+    for name, dofs in body.face_dofs.items():
+        face = interface.faces[name]
+        if face.side != UP or not case["added_mass"] or level <= face.y.min():
+            continue
+        density = case["rho_water"] * water_depths(case, face, level, interface.floor)
+        normal = sparse.hstack(
+            [face.points.values.multiply(face.normals[:, [axis]]) for axis in range(face.dim)]
+        ).tocsr()
+        weighted = normal.T @ sparse.diags(face.points.weights * density) @ normal
+        number = dofs.reshape(-1, face.dim).T.ravel()
+        places = sparse.csr_matrix(
+            (np.ones(len(number)), (number, np.arange(len(number)))), (size, len(number))
+        )
+        result += places @ weighted @ places.T
+    return result
+
+
+def water_depths(case: Case, face: WetFace, level: float, floor: float) -> Array:
+    """Depth of water (q,) [m] that moves with the points of a face, along its normal; on a straight
+    face with exact resultant and moment.
+    """
+    added = AddedPressure.unit(case, level, floor)
+    if face.straight and not face.flat:
+        column = lambda surface, low, high: added.column(surface, low, high, face.tilt[0])
+        heights = face.corrected(level, added.height, column)
+    else:
+        heights = added.height(level, face.y, face.tilt)
+    return heights / np.maximum(face.tilt, TINY)

@@ -1,0 +1,126 @@
+"""Picture of an earthquake: record, crest, openings, slip and joint stress over one time axis."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
+
+from ..model.results import QuakeResult, column_of
+from ..post.drawing import (
+    BLUE,
+    CONCRETE,
+    DARK,
+    GREEN,
+    GREY,
+    ORANGE,
+    RED,
+    ROCK,
+    figure_of,
+    panels,
+    write_picture,
+)
+from ..post.outline import exaggeration
+
+#: Height of the curves, and of the deformed dams below them [inches].
+CURVES, SHAPES = 10.5, 2.6
+#: Part of the stresses within the colors of the map [%].
+SHOWN = 99
+#: Largest number of rows of the map of the stress.
+MOST_ROWS = 1500
+
+
+def draw(result: QuakeResult, folder: Path) -> Path:
+    """Draw the picture of an earthquake into its folder; its path."""
+    path = folder / f"{result.case.name}_quake.png"
+    write_picture(figure(result), path, dpi=130)
+    return path
+
+
+def figure(result: QuakeResult) -> Figure:
+    """The figure."""
+    case, rows, stress = result.case, result.rows, result.stress
+    shapes = SHAPES if result.shapes else 0.0
+    picture = figure_of(9.0, CURVES + shapes)
+    picture.text(0.05, 0.988, f"{case.title}: {result.statement}", va="top", fontsize=10)
+    axes = panels(picture, 6, left=0.9, right=1.1, top=0.45, bottom=0.5 + shapes, down=0.2)[:, 0]
+    time, joints = rows["time"], range(len(case.joints))
+    curves = [
+        ("ground [m/s$^2$]", [("along x", rows["ground_ax"], DARK)]),
+        ("crest $u_x$ [mm]", [("relative to the ground", 1e3 * rows["crest_ux"], BLUE)]),
+        ("crest $a_x$ [m/s$^2$]", [("absolute", rows["crest_ax"], BLUE)]),
+        ("opening [mm]", []),
+        ("slip [mm]", []),
+    ]
+    if rows["ground_ay"].any():
+        curves[0][1].append(("along y", rows["ground_ay"], ORANGE))
+    for k in joints:
+        name = f", {case.joint_names[k]}" if len(case.joints) > 1 else ""
+        style = (RED, GREEN) if k == 0 else (ORANGE, BLUE)
+        for end, color in zip(("heel", "toe"), style, strict=True):
+            opening = 1e3 * np.maximum(rows[column_of(f"{end}_opening", k)], 0)
+            curves[3][1].append((f"{end}{name}", opening, color))
+        curves[4][1].append((f"mean{name}", 1e3 * rows[column_of("slip_mean", k)], style[0]))
+    block = result.summary["residual"].get("rigid_block")
+    for ax, (label, lines) in zip(axes, curves, strict=False):
+        for name, values, color in lines:
+            ax.plot(time, values, color=color, lw=0.8, label=name)
+        ax.set_ylabel(label, fontsize=8)
+        ax.grid(alpha=0.3)
+        ax.set_xlim(0, time[-1])
+    if block is not None:
+        axes[4].axhline(1e3 * block, color=DARK, lw=0.8, ls="--", label="rigid block, at the end")
+    for ax in axes[:5]:
+        ax.legend(fontsize=7, loc="center right")
+        ax.tick_params(labelbottom=False, labelsize=8)
+    step = max(1, len(time) // MOST_ROWS)
+    values = stress["sigma_n_eff"][::step].T / 1e6
+    # the stress of the corner elements is singular
+    bound = float(np.percentile(np.abs(values), SHOWN)) or 1.0
+    mesh = axes[5].pcolormesh(
+        stress["time"][::step],
+        stress["s"],
+        values,
+        cmap="RdBu_r",
+        vmin=-bound,
+        vmax=bound,
+        shading="nearest",
+        rasterized=True,
+    )
+    axes[5].set_xlim(0, time[-1])
+    axes[5].set_ylabel("s from heel [m]", fontsize=8)
+    axes[5].set_xlabel("t [s]", fontsize=8)
+    axes[5].tick_params(labelsize=8)
+    box = axes[5].get_position()
+    bar = picture.add_axes((box.x1 + 0.02, box.y0, 0.015, box.height))
+    picture.colorbar(mesh, cax=bar, extend="both").set_label("$\\sigma_n'$ [MPa]", fontsize=8)
+    bar.tick_params(labelsize=7)
+    draw_shapes(picture, result)
+    return picture
+
+
+def draw_shapes(picture: Figure, result: QuakeResult) -> None:
+    """Draw the dam in the states with the largest displacements."""
+    height = picture.get_size_inches()[1]
+    for i, (name, time, moved) in enumerate(result.shapes):
+        width = 0.94 / len(result.shapes)
+        box = (0.03 + i * width, 0.1 / height, 0.96 * width, (SHAPES - 0.5) / height)
+        axes = picture.add_axes(box)
+        scale = exaggeration(moved, result.case.size)
+        for body, displacement in moved.items():
+            solid = result.bodies[body]
+            points = solid.points[:, :2]
+            color = ROCK if body == "foundation" else CONCRETE
+            for _, table in solid.cells:
+                cells = PolyCollection((points + scale * displacement)[table], facecolor=color)
+                cells.set(edgecolor=GREY, linewidth=0.15, rasterized=True)
+                axes.add_collection(cells)
+        dams = np.vstack([b.points for n, b in result.bodies.items() if n != "foundation"])
+        low, high = dams.min(axis=0), dams.max(axis=0)
+        room = 0.2 * result.case.size
+        axes.set(xlim=(low[0] - room, high[0] + room), ylim=(low[1] - room / 2, high[1] + room / 2))
+        axes.set_aspect("equal")
+        axes.set_axis_off()
+        axes.set_title(f"{name}, t = {time:.3f} s\nx {scale:g}", fontsize=8)

@@ -1,0 +1,126 @@
+"""What a user waits for: start, pictures and fields of runs, critical values; and the order in
+which large 3D bodies are condensed.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from functools import partial
+from unittest import mock
+
+import numpy as np
+from damjoint.fem import factor
+from damjoint.fem.bodies import Bodies
+from damjoint.fem.condensation import condense
+from damjoint.model.case import load
+from damjoint.progress import track
+from damjoint.studies.critical import Search
+from threadpoolctl import threadpool_limits
+
+from .bench_scenes import PUBLISHED, TABLES_ONLY, run_cold, time_process
+from .bench_table import Measurements, Table
+
+#: What `start` compares with.
+NUMPY = "interpreter and numpy"
+
+#: Searches of a critical value: quantity and settings of the case `dam`.
+SEARCHES = {
+    "level": ("level", {}),
+    "k_h": ("k_h", {}),
+    "strength, law bond": ("strength", {"law": "bond"}),
+    "strength, bond, flow": ("strength", {"law": "bond", "uplift": "flow"}),
+    "level, bond, cracked": ("level", {"law": "bond", "uplift": "cracked"}),
+    "level, 20 elements": ("level", {"n_joint": 20.0}),
+}
+
+
+def start(measurements: Measurements) -> Table:
+    """Measure the seconds of short commands in new processes, the best of five: tables of modeling
+    C without a cache and from a cache that has its mesh and condensed bodies.
+    """
+    repetitions = 1 if measurements.short else 5
+    table = Table("start", "command", "seconds", "times interpreter and numpy")
+    seconds = {}
+    with tempfile.TemporaryDirectory() as cache:
+        calls = {
+            NUMPY: partial(time_process, ["-c", "import numpy"]),
+            "damjoint --version": partial(time_process, ["-m", "damjoint", "--version"]),
+            "damjoint --help": partial(time_process, ["-m", "damjoint", "--help"]),
+            "run c, tables, no cache": lambda: run_cold("c")[0],
+            "run c, tables, cache": lambda: run_cold("c", cache=cache)[0],
+        }
+        for command, call in track(calls.items(), "start"):
+            best = lambda call=call: min(call() for _ in range(repetitions + 1))
+            seconds[command] = measurements.get((table.name, command), best)
+            table.add(command, seconds[command], seconds[command] / seconds[NUMPY])
+    return table
+
+
+def pictures(measurements: Measurements) -> Table:
+    """Measure the seconds of plane modelings in new processes without a cache: tables only, with
+    fields, with the picture, with both (the default).
+    """
+    files = {
+        "tables": TABLES_ONLY,
+        "with fields": TABLES_ONLY[1:],
+        "with picture": TABLES_ONLY[:1],
+        "with both": (),
+    }
+    table = Table("pictures", "case", *files, "both over tables", "published")
+
+    def measure(name: str) -> tuple:
+        spent = [run_cold([name], options)[0] for options in files.values()]
+        return *spent, spent[-1] / spent[0], PUBLISHED[name]
+
+    plane = [name for name in PUBLISHED if load(name)["dim"] == 2]
+    for name in track("c" if measurements.short else plane, "pictures"):
+        table.add_measured(measurements, (name,), partial(measure, name))
+    return table
+
+
+def orders(measurements: Measurements) -> Table:
+    """Measure the seconds in which 3D bodies are condensed, in METIS's order and in MUMPS's own,
+    one thread; and the largest difference of the condensed stiffness over its largest entry.
+    """
+    heads = "unknowns", "METIS", "MUMPS's own", "ratio", "difference"
+    table = Table("orders", "n_joint", *heads)
+
+    def measure(n: int) -> tuple:
+        size = {"dim": 3.0, "order": 1.0, "n_joint": n, "n_layers": max(1, n // 5)}
+        case = load("a", size | {"h_dam": 20 / n, "h_found": 40 / n}, "9")
+        bodies = Bodies.of(case)
+        with threadpool_limits(1):
+            first = condense(case, bodies)
+            with mock.patch.object(factor, "metis", return_value=None):
+                second = condense(case, bodies)
+        spent = [bulk.seconds["condensation"] for bulk in (first, second)]
+        difference = np.abs(first.stiffness - second.stiffness).max()
+        ratio, relative = spent[1] / spent[0], difference / np.abs(first.stiffness).max()
+        return first.unknowns, *spent, ratio, relative
+
+    for n in track((60,) if measurements.short else (60, 90), "orders"):
+        table.add_measured(measurements, (n,), partial(measure, n))
+    return table
+
+
+def critical(measurements: Measurements) -> Table:
+    """Measure searches of critical values of the case `dam` in this process: seconds, meshing and
+    condensation included, dams and equilibria computed, the value, and whether it is confirmed.
+    """
+    heads = "seconds", "dams", "equilibria", "value", "gravity method", "mode", "confirmed"
+    table = Table("critical", "search", *heads)
+
+    def measure(of: str, settings: dict) -> tuple:
+        coarse = {"n_joint": 20.0} if measurements.short else {}
+        search = Search(load("dam", coarse | settings), of)
+        begin = time.perf_counter()
+        answer = search.run()
+        spent = time.perf_counter() - begin
+        equilibria = sum(len(trial.path.points) for trial in search.trials)
+        values = answer.value, answer.gravity, answer.mode, "yes" if answer.confirmed else "no"
+        return spent, len(search.trials), equilibria, *values
+
+    for name in track(SEARCHES, "critical"):
+        table.add_measured(measurements, (name,), partial(measure, *SEARCHES[name]))
+    return table

@@ -1,0 +1,571 @@
+"""Time integration of an earthquake: closed forms, balance of momentum, order, both signs."""
+
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from damjoint import RunError
+from damjoint.dynamics import step as step_module
+from damjoint.dynamics.history import QuakeHistory
+from damjoint.dynamics.scheme import Motion
+from damjoint.dynamics.step import TimeStep
+from damjoint.fem import factor
+from damjoint.fem.bodies import Bodies
+from damjoint.solver.history import joint_row
+from quakes import BLOCK, DAM, earthquake, joint_of, mean_slip, smooth_record, write_record
+from scipy.integrate import solve_ivp
+from scipy.linalg import eigh
+
+G = 9.81
+
+
+def run(quake):
+    """All steps."""
+    return list(quake.steps())
+
+
+# -- closed forms
+
+
+def rectangle_slip(peak, mu, duration):
+    """Slip of a rigid block under a rectangle of acceleration (Newmark 1965)."""
+    return (peak - mu * G) * peak * duration**2 / (2 * mu * G)
+
+
+def half_sine_slip(peak, mu, duration):
+    """Slip of a rigid block under a half sine that ends while it slides."""
+    omega = np.pi / duration
+    start = np.arcsin(mu * G / peak) / omega
+    rest = duration - start
+    velocity = peak / omega * (np.cos(omega * start) + 1) - mu * G * rest
+    way = peak / omega * (np.cos(omega * start) * rest + np.sin(omega * start) / omega)
+    return way - mu * G * rest**2 / 2 + velocity**2 / (2 * mu * G)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("dt, error", [(0.01, 1e-3), (0.0025, 1e-4)])
+def test_a_block_under_a_rectangle_of_acceleration(tmp_path, dt, error, sign):
+    """The ground moves downstream: the block is left behind, upstream."""
+    times, values = [0, dt, 0.2, 0.2 + dt], [0, 8 * sign, 8 * sign, 0]
+    quake = earthquake(write_record(tmp_path / "r.csv", times, values), BLOCK | {"dt": dt})
+    run(quake)
+    assert rectangle_slip(8, 0.5, 0.2) == pytest.approx(0.10095821, rel=1e-6)
+    assert mean_slip(quake) == pytest.approx(-sign * rectangle_slip(8, 0.5, 0.2), rel=error)
+
+
+def test_a_block_under_a_half_sine(tmp_path):
+    times = np.arange(0, 0.3025, 0.0025)
+    values = np.maximum(8 * np.sin(np.pi * times / 0.3), 0)
+    quake = earthquake(write_record(tmp_path / "r.csv", times, values), BLOCK | {"dt": 0.0025})
+    run(quake)
+    assert half_sine_slip(8, 0.5, 0.3) == pytest.approx(0.054306889, rel=1e-6)
+    assert mean_slip(quake) == pytest.approx(-half_sine_slip(8, 0.5, 0.3), rel=5e-4)
+
+
+def test_a_rocking_block_against_its_equations_of_motion(tmp_path):
+    """A rigid block on unilateral springs at the joint's Gauss points, by scipy's Radau."""
+    dt, peak, end, stiffness = 0.001, 6.0, 0.1, 1e9
+    narrow = {"dam_base": 1.0, "dam_crest": 1.0, "dam_height": 4.0, "E": 1e14, "mu": 1e5}
+    narrow |= {"K_N": stiffness, "K_T": stiffness, "n_joint": 10.0, "dt": dt, "record_rest": 0.4}
+    times, values = [0, dt, end, end + dt], [0, peak, peak, 0]
+    record = write_record(tmp_path / "r.csv", times, values)
+    quake = earthquake(record, BLOCK | narrow)
+    joint = joint_of(quake)
+    x, weights = joint.points.positions[:, 0] - 0.5, joint.points.weights
+    opening, at = [], []
+    for step in quake.steps():
+        jump = joint.jumps(joint.at_nodes, step.end.state.jump)
+        opening.append(jump[joint.mesh.toe_nodes[0], 0])
+        at.append(step.end.time)
+    mass = 2400 * 4.0
+    inertia = mass * (1 + 16) / 12
+
+    def rates(t, y):
+        up, v, turn, spin, right, u = y
+        stress = stiffness * np.minimum(up + x * turn, 0)
+        shear = -stiffness * (right + 2 * turn)  # the base's centre is 2 m below the block's
+        moment = -weights @ (stress * x) + 2 * shear
+        ground = np.interp(t, times, values)
+        return [v, -weights @ stress / mass - G, spin, moment / inertia, u, shear / mass - ground]
+
+    begin = [-mass * G / stiffness, 0, 0, 0, 0, 0]
+    exact = solve_ivp(rates, (0, at[-1]), begin, "Radau", at, rtol=1e-8, atol=1e-12, max_step=dt).y
+    toe = exact[0] + 0.5 * exact[2]
+    assert toe.max() > 0.02
+    assert max(opening) == pytest.approx(toe.max(), rel=2e-3)
+    swing = slice(np.argmax(toe))
+    assert opening[swing] == pytest.approx(toe[swing], abs=1e-2 * toe.max())
+
+
+# -- exact at every step
+
+
+def body_inertia(quake, bodies):
+    """Functions of an acceleration (n,): inertia forces of the dam along x, y (2,), and their
+    moment about the toe; by the load vectors of a body force, without the mass matrix.
+    """
+    body = bodies.by_name["dam"]
+    toe = joint_of(quake).chord.toe
+    density = quake.case["rho_dam"]
+    forces = [density * body.unit_loads[f"dam_{axis}"] for axis in "xy"]
+    moved = quake.system.motion["dam"]
+
+    def resultant(acceleration):
+        u = moved @ acceleration
+        return np.array([force @ u for force in forces])
+
+    return resultant, toe
+
+
+@pytest.mark.parametrize("alpha", [-0.05, -0.3, 0.0])
+@pytest.mark.parametrize("vertical", [False, True])
+def test_momentum_is_balanced_at_every_step(tmp_path, alpha, vertical):
+    """(1 + alpha) T1 - alpha T0 = static load - inertia, likewise N, while the dam slides and
+    rocks; damping by the stiffness and the static loads have no further part in it.
+    """
+    times = np.arange(0, 1.0, 0.01)
+    wave = 5 * np.sin(np.pi * times) ** 2 * np.sin(6 * np.pi * times)
+    columns = [wave, -0.7 * wave] if vertical else [wave]
+    record = write_record(tmp_path / "r.csv", times, *columns)
+    quake = earthquake(record, DAM | {"hht_alpha": alpha, "added_mass": 0.0}, "40")
+    resultant, _ = body_inertia(quake, Bodies.of(quake.case))
+    equilibrium = quake.problem.model.equilibrium
+    forces = lambda state: np.array([joint_row(equilibrium, state, 0)[n] for n in "TN"])
+    ones = resultant(quake.system.translation(joint_of(quake), ["dam"], np.array([1.0, 0])))[0]
+    static = before = forces(quake.problem.static)
+    ground_before, worst, slid = np.zeros(2), 0.0, 0.0
+    for step in quake.steps():
+        now = forces(step.end.state)
+        ground = (1 + alpha) * step.ground - alpha * ground_before
+        inertia = resultant(step.end.motion.acceleration) + ones * ground
+        expected = static + inertia * [-1, 1]
+        worst = max(worst, np.abs((1 + alpha) * now - alpha * before - expected).max())
+        before, ground_before = now, step.ground
+        slid = max(slid, abs(mean_slip(quake)))
+    assert slid > 1e-3
+    assert worst < 1e-9 * np.abs(static).max()
+
+
+def test_the_added_mass_is_westergaards(tmp_path):
+    """7/12 rho H^2 in front of a vertical face, in the mass and in the load along x only."""
+    record = smooth_record(tmp_path / "r.csv", 1.0)
+    wet, dry = (
+        earthquake(record, DAM | {"added_mass": flag, "n_joint": 30.0}, "40") for flag in (1.0, 0.0)
+    )
+    along, up = (wet.system.translation(joint_of(wet), ["dam"], d) for d in np.eye(2))
+    concrete = 2400 * (34 + 5) / 2 * 45
+    mass = lambda quake, d: d @ quake.system.mass @ d
+    assert mass(dry, along) == pytest.approx(concrete)
+    assert mass(wet, along) - mass(dry, along) == pytest.approx(7 / 12 * 1000 * 40**2)
+    assert mass(wet, up) == pytest.approx(concrete)
+    assert along @ wet.system.inertia[:, 0] == pytest.approx(mass(wet, along))
+    assert up @ wet.system.inertia[:, 1] == pytest.approx(concrete)
+
+
+# -- order, frequencies, damping
+
+#: The dam on a joint that stays elastic.
+ELASTIC = DAM | {"adhesion": 1e12}
+
+
+@pytest.mark.parametrize("alpha", [-0.05, 0.0])
+def test_the_error_falls_with_the_square_of_the_step(tmp_path, alpha):
+    record = smooth_record(tmp_path / "r.csv", 2.0, duration=0.64, interval=0.00125)
+    ends = []
+    for dt in (0.01, 0.005, 0.0025, 0.00125):
+        settings = ELASTIC | {"dt": dt, "hht_alpha": alpha, "record_rest": 0.0}
+        quake = earthquake(record, settings, "40")
+        history = {round(s.end.time, 6): s.end.motion.displacement for s in quake.steps()}
+        ends.append([(quake.system.crest @ history[t])[0] for t in (0.32, 0.48, 0.64)])
+    changes = np.linalg.norm(np.diff(ends, axis=0), axis=1)
+    orders = np.log2(changes[:-1] / changes[1:])
+    assert orders == pytest.approx(2, abs=0.25)
+    assert orders[-1] == pytest.approx(2, abs=0.06)
+
+
+def test_frequencies_against_a_dense_eigenvalue_solution(tmp_path):
+    quake = earthquake(smooth_record(tmp_path / "r.csv", 1.0), ELASTIC, "40")
+    problem, system = quake.problem, quake.system
+    interface = problem.model.equilibrium.interface
+    of_joints = interface.stiffness(
+        problem.model.equilibrium.undamaged, np.arange(len(interface.weights))
+    )
+    stiffness = system.stiffness.toarray()
+    stiffness[np.ix_(system.jumps, system.jumps)] += of_joints.toarray()
+    largest = eigh(system.mass.toarray(), stiffness, eigvals_only=True)[::-1]
+    expected = 1 / np.sqrt(largest[:3]) / (2 * np.pi)
+    assert quake.frequencies == pytest.approx(expected, rel=1e-7)
+
+
+def test_free_vibration_decays_as_rayleigh_damping_says(tmp_path):
+    """In the first mode, at the damping's first frequency: amplitude exp(-xi omega t)."""
+    settings = ELASTIC | {"damping": 0.05, "damping_mass": 1.0, "hht_alpha": 0.0}
+    quake = earthquake(smooth_record(tmp_path / "r.csv", 1.0), settings, "40")
+    assert [quake.damping.ratio(f) for f in quake.frequencies[[0, 2]]] == pytest.approx([0.05] * 2)
+    problem, system = quake.problem, quake.system
+    interface = problem.model.equilibrium.interface
+    points = np.arange(len(interface.weights))
+    of_joints = interface.stiffness(problem.model.equilibrium.undamaged, points)
+    frequencies, modes = system.frequencies(of_joints, 1)
+    omega, mode = 2 * np.pi * frequencies[0], modes[:, 0]
+    mode = 1e-3 * mode / (system.crest @ mode)[0]
+    # the joint's stiffness is not damped: the part of K of the bodies in this mode
+    share = mode @ system.stiffness @ mode / (omega**2 * (mode @ system.mass @ mode))
+    xi = quake.damping.a0 / (2 * omega) + quake.damping.a1 * omega / 2 * share
+    dt = 2 * np.pi / omega / 200
+    start = Motion(mode, np.zeros(len(mode)), -(omega**2) * mode)
+    forces = of_joints @ mode[system.jumps]
+    static = problem.static
+    moved = replace(static, jump=static.jump + mode[system.jumps])
+    state = replace(problem.at_rest, state=moved, motion=start, forces=forces)
+    step, crest = TimeStep(problem, dt), []
+    nothing = (np.zeros(2), np.zeros(2))
+    for _ in range(600):
+        state, _ = step.advance(state, nothing, static.pressures, True)
+        crest.append((system.crest @ state.motion.displacement)[0])
+    peaks = [max(crest[k * 200 - 60 : k * 200 + 60]) for k in (1, 2)]
+    expected = np.exp(-2 * np.pi * xi / np.sqrt(1 - xi**2))
+    assert peaks[1] / peaks[0] == pytest.approx(expected, rel=2e-3)
+
+
+def test_joint_dashpots_of_a_closed_joint(tmp_path):
+    """A rigid block on springs and dashpots under a vertical record: a damped oscillator."""
+    stiffness, dashpot, mass, length = 1e7, 8.8e4, 2400 * 16.0, 8.0
+    settings = {"K_N": stiffness, "K_T": stiffness, "joint_damping_n": dashpot, "dt": 1e-3}
+    times = np.arange(0, 0.6, 0.01)
+    values = 3 * np.sin(40 * times)
+    record = write_record(tmp_path / "r.csv", times, 0 * times, values)
+    quake = earthquake(record, BLOCK | settings | {"record_rest": 0.3})
+    joint = joint_of(quake)
+    steps = list(quake.steps())
+    opening = np.array([joint.heel @ step.end.state.jump for step in steps])
+    opening -= joint.heel @ quake.problem.static.jump
+
+    def rates(t, y):
+        ground = quake.record.at(t)[1]
+        return [y[1], -length * (stiffness * y[0] + dashpot * y[1]) / mass - ground]
+
+    at = [step.end.time for step in steps]
+    exact = solve_ivp(rates, (0, at[-1]), [0, 0], "DOP853", at, rtol=1e-9, max_step=5e-3).y[0]
+    assert opening == pytest.approx(exact, abs=1e-3 * np.abs(exact).max())
+
+
+@pytest.mark.parametrize("mode, uplift", [("zero", "imposed"), ("unchanged", "cracked")])
+def test_water_in_the_joint_during_an_earthquake(tmp_path, mode, uplift):
+    """zero: less uplift while the joint is open; unchanged: the same at every step; by the crack:
+    more while it is open.
+    """
+    record = smooth_record(tmp_path / "r.csv", 5.0, duration=0.6)
+
+    def uplifts(value):
+        settings = DAM | {"quake_uplift": value, "uplift": uplift, "n_joint": 20.0}
+        quake = earthquake(record, settings, "30")
+        equilibrium = quake.problem.model.equilibrium
+        rows = [joint_row(equilibrium, step.end.state, 0) for step in quake.steps()]
+        return np.array([[row["U"], row["crack_length"]] for row in rows]), quake
+
+    changed, quake = uplifts(mode)
+    static = joint_row(quake.problem.model.equilibrium, quake.problem.static, 0)
+    assert changed[:, 1].max() > 5
+    if mode == "zero":
+        open_before = changed[:-1, 1] > 2
+        assert (changed[1:, 0][open_before] < static["U"] * 0.999).all()
+    else:
+        assert changed[:, 0] == pytest.approx(static["U"])
+        assert uplifts("crack")[0][:, 0].max() > 1.05 * static["U"]
+
+
+# -- condensation, three dimensions, several joints
+
+
+@pytest.mark.parametrize("alpha", [-0.05, 0.0])
+def test_steps_solve_the_equations_of_all_unknowns(tmp_path, alpha):
+    """Residual of the uncondensed equations at every step, while the dam slides and rocks."""
+    record = smooth_record(tmp_path / "r.csv", 6.0, duration=0.5)
+    quake = earthquake(record, DAM | {"hht_alpha": alpha, "record_rest": 0.0}, "30")
+    problem, system = quake.problem, quake.system
+    interface, laws = problem.model.equilibrium.interface, problem.model.equilibrium.laws
+    at_points = lambda state: interface.jumps(interface.at_points, state.jump)
+
+    def forces(state, motion):
+        traction, _ = laws.evaluate(at_points(state), state.variables)
+        result = system.stiffness @ motion.displacement + problem.damping @ motion.velocity
+        result[system.jumps] += interface.forces(traction)
+        return result
+
+    static = before = forces(problem.static, problem.at_rest.motion)
+    ground_before, largest = np.zeros(2), 0.0
+    for step in quake.steps():
+        state, motion = step.end.state, step.end.motion
+        assert state.jump - problem.static.jump == pytest.approx(
+            motion.displacement[system.jumps], abs=1e-12
+        )
+        now = forces(state, motion)
+        ground = (1 + alpha) * step.ground - alpha * ground_before
+        residual = system.mass @ motion.acceleration + system.inertia @ ground
+        residual += (1 + alpha) * (now - static) - alpha * (before - static)
+        largest = max(largest, np.linalg.norm(residual) / problem.model.reference)
+        before, ground_before = now, step.ground
+    assert abs(mean_slip(quake)) > 0.01
+    assert largest < 1e-8
+
+
+@pytest.mark.parametrize("other", ["Woodbury", "SuperLU"])
+def test_linear_solvers_agree(tmp_path, monkeypatch, other):
+    """Dense matrices of small joints against the formula for large ones; MUMPS against SuperLU."""
+    record = smooth_record(tmp_path / "r.csv", 6.0, duration=0.4)
+    settings = DAM | {"dt": 0.0025, "mu": 0.75}  # no step is halved
+    quakes = [earthquake(record, settings, "30")]
+    run(quakes[0])
+    if other == "SuperLU":
+        monkeypatch.setattr(factor, "library", lambda: None)
+    else:
+        monkeypatch.setattr(step_module, "MOST_UNKNOWNS", 0)
+    quakes.append(earthquake(record, settings, "30"))
+    run(quakes[1])
+    slips = [mean_slip(quake) for quake in quakes]
+    assert abs(slips[0]) > 0.01 and [quake.halvings for quake in quakes] == [0, 0]
+    assert slips[1] == pytest.approx(slips[0], rel=1e-6)
+
+
+@pytest.mark.parametrize("pattern, order", [("layers", 1.0), ("split", 2.0)])
+def test_a_section_of_any_thickness_moves_as_in_plane_strain(tmp_path, pattern, order):
+    """With both end faces fixed along z, per metre of thickness; the two meshes of the section
+    differ a little.
+    """
+    record = smooth_record(tmp_path / "r.csv", 5.0, duration=0.4)
+    small = {"n_joint": 6.0, "h_dam": 15.0, "h_found": 45.0, "order": order}
+    solid = {"dim": 3.0, "thickness": 7.0, "hold_z": 1.0, "mesh_pattern": pattern}
+    plane, thick = (earthquake(record, DAM | small | more, "30") for more in ({}, solid))
+    assert thick.frequencies == pytest.approx(plane.frequencies, rel=1e-2)
+    for quake in (plane, thick):
+        assert len(run(quake)) >= 80
+    assert mean_slip(thick) == pytest.approx(mean_slip(plane), rel=2e-2)
+    assert abs(mean_slip(plane)) > 0.005
+    masses = [
+        d @ q.system.mass @ d / joint_of(q).width
+        for q in (plane, thick)
+        for d in [q.system.translation(joint_of(q), ["dam"], np.array([1.0, 0]))]
+    ]
+    assert masses[1] == pytest.approx(masses[0], rel=1e-9)
+
+
+def test_momentum_above_each_of_several_joints(tmp_path):
+    """T of each joint: the static one less the inertia of all that is above it; Newmark."""
+    record = smooth_record(tmp_path / "r.csv", 6.0, duration=0.5)
+    settings = DAM | {"lift_heights": (15.0, 30.0), "hht_alpha": 0.0, "added_mass": 0.0}
+    quake = earthquake(record, settings | {"mu": (1.2, 0.7, 0.9)}, "40")
+    equilibrium, system = quake.problem.model.equilibrium, quake.system
+    forces = lambda state: np.array([joint_row(equilibrium, state, k)["T"] for k in range(3)])
+    static, slid = forces(quake.problem.static), np.zeros(3)
+    rigid = [
+        system.translation(joint_of(quake, k), quake.case.above([k]), np.array([1.0, 0]))
+        for k in range(3)
+    ]
+    masses = np.array([d @ system.mass @ d for d in rigid])
+    widths = np.array([34, 34 - 29 * 15 / 45, 34 - 29 * 30 / 45])
+    assert masses == pytest.approx(2400 * (widths + 5) / 2 * [45, 30, 15], rel=1e-9)
+    for step in quake.steps():
+        absolute = step.end.motion.acceleration
+        inertia = [d @ (system.mass @ absolute) for d in rigid] + masses * step.ground[0]
+        assert forces(step.end.state) == pytest.approx(static - inertia, abs=1e-8 * static.max())
+        moved = step.end.state.jump - quake.problem.static.jump
+        for k in range(3):
+            joint = joint_of(quake, k)
+            slid[k] = max(slid[k], np.abs(joint.jumps(joint.at_points, moved)[:, 1]).max())
+    assert slid[1] > 0.01  # the smoothest one
+
+
+# -- halving
+
+
+def test_a_step_that_does_not_converge_is_halved(tmp_path, monkeypatch):
+    """Around 0.1 s only steps of an eighth converge, here by force; then the full one again. A run
+    that is interrupted there continues with the same steps.
+    """
+    record = smooth_record(tmp_path / "r.csv", 4.0, duration=0.2)
+    advance, dt = TimeStep.advance, 0.005
+
+    def limited(self, begin, *rest):
+        wrong = abs(begin.time - 0.1) < 0.004 and self.dt > dt / 8 * 1.01
+        return None if wrong else advance(self, begin, *rest)
+
+    monkeypatch.setattr(TimeStep, "advance", limited)
+    settings = DAM | {"record_rest": 0.1, "dt": dt}
+    quake = earthquake(record, settings, "30")
+    steps = run(quake)
+    times = np.array([step.end.time for step in steps])
+    lengths = np.array([step.dt for step in steps])
+    assert np.diff([0, *times]) == pytest.approx(lengths) and times[-1] == pytest.approx(0.3)
+    assert {1, 0.125} <= set(np.round(lengths / dt, 6)) and quake.halvings == 3
+    assert lengths[np.abs(times - lengths - 0.1) < 0.004].max() == pytest.approx(dt / 8)
+    assert (lengths[times > 0.111] == dt).all() and (lengths[times < 0.094] == dt).all()
+    number = int(np.argmax(lengths < dt)) + 3
+    other = earthquake(record, settings, "30")
+    first = [step for _, step in zip(range(number), other.steps(), strict=False)]
+    rest = run(other)
+    assert [step.end.time for step in first + rest] == times.tolist()
+
+
+def test_a_step_that_never_converges_ends_the_run(tmp_path, monkeypatch):
+    monkeypatch.setattr(TimeStep, "advance", lambda *_: None)
+    quake = earthquake(smooth_record(tmp_path / "r.csv", 1.0), DAM)
+    with pytest.raises(RunError, match="after t = 0 s no equilibrium"):
+        run(quake)
+
+
+def test_a_slip_beyond_small_displacements_ends_the_run(tmp_path):
+    flat = BLOCK | {"dam_height": 0.5, "dam_base": 2.0, "dam_crest": 2.0, "dt": 0.005}
+    times, values = [0, 0.005, 0.2, 0.205], [0, 8, 8, 0]
+    quake = earthquake(write_record(tmp_path / "r.csv", times, values), flat)
+    with pytest.raises(RunError, match="displacement jump reaches"):
+        run(quake)
+    assert 0.045 < abs(mean_slip(quake)) < 0.05
+
+
+# -- the command
+
+
+@pytest.fixture
+def case_file(tmp_path):
+    """A case with a record beside it."""
+    smooth_record(tmp_path / "wave.csv", 5.0, duration=0.5)
+    path = tmp_path / "my.case"
+    settings = {n: v for n, v in DAM.items() if n != "record_unit"}
+    lines = [
+        f'default_{n} = "{v}";' if isinstance(v, str) else f"default_{n} = {v};"
+        for n, v in settings.items()
+    ]
+    path.write_text(
+        "\n".join(
+            [
+                'title = "wave"; record = "wave.csv"; default_record_unit = "m/s2";',
+                "levels() = {30};",
+                *lines,
+                "",
+            ]
+        )
+    )
+    return path
+
+
+def test_the_command_writes_rows_summary_and_picture(command, case_file, tmp_path):
+    code, out, _ = command("quake", case_file)
+    assert code == 0
+    folder = tmp_path / "out" / "my_quake"
+    info = json.loads((folder / "run.json").read_text())
+    found = info["quake"]
+    rows = np.genfromtxt(folder / "quake.csv", delimiter=",", names=True)
+    assert (info["state"], info["verdict"]) == ("complete", "stands")
+    assert "residual slip" in info["statement"]
+    assert len(rows) == found["steps"] and rows["time"][-1] == pytest.approx(0.7)
+    peak = found["peaks"]["crest_ux"]
+    assert abs(peak["value"]) == pytest.approx(np.abs(rows["crest_ux"]).max())
+    assert rows["crest_ux"][rows["time"] == peak["time"]] == pytest.approx(peak["value"])
+    assert found["after"]["equilibrium"] and found["after"]["N"] > 0
+    assert np.abs(rows["residual"]).max() < 1e-6 and rows["dt"].max() == pytest.approx(0.005)
+    # the static rows: the last level, and the state that the earthquake leaves
+    history = np.genfromtxt(folder / "history.csv", delimiter=",", names=True)
+    assert history["time"].tolist() == [1, 2] and history["level"].tolist() == [30, 30]
+    moved = history["crest_ux"][1] - history["crest_ux"][0]
+    assert moved == pytest.approx(rows["slip_mean"][-1], abs=2e-3) and moved > 0.01
+    stress = np.load(folder / "quake_stress.npz")
+    assert stress["sigma_n_eff"].shape == (len(rows), len(stress["s"]))
+    assert (folder / "my_quake.png").stat().st_size > 10_000
+    assert not (folder / "quake_state.npz").exists()
+    assert "residual slip" in out and "rigid block" in out
+    assert command("report", folder)[0] == 0
+    page = Path("report.html").read_text()
+    assert "earthquake wave.csv, " in page and "data:image/png" in page
+
+
+def test_an_interrupted_run_continues_with_the_same_rows(command, case_file, tmp_path, monkeypatch):
+    add, steps = QuakeHistory.add, []
+
+    def interrupted(self, quake, step):
+        if len(steps) == 60:
+            steps.append(None)
+            self.rows["time"].append(0.0)  # in the middle of a row
+            raise KeyboardInterrupt
+        add(self, quake, step)
+        steps.append(step)
+
+    monkeypatch.setattr(QuakeHistory, "add", interrupted)
+    code, _, err = command("quake", case_file, "--out", "one")
+    assert code == 130 and "interrupted" in err
+    info = json.loads((tmp_path / "one" / "run.json").read_text())
+    assert info["state"] == "interrupted"
+    before = (tmp_path / "one" / "quake.csv").read_text().splitlines()
+    assert len(before) == 61
+    assert command("quake", case_file, "--out", "one")[0] == 0
+    number = len(steps) - 1
+    monkeypatch.setattr(QuakeHistory, "add", add)
+    assert command("quake", case_file, "--out", "two")[0] == 0
+    one, two = ((tmp_path / n / "quake.csv").read_text() for n in ("one", "two"))
+    assert one == two and one.splitlines()[:61] == before
+    assert number == len(two.splitlines()) - 1
+
+
+def test_a_run_under_way_of_another_case_is_not_continued(command, case_file, monkeypatch):
+    add = QuakeHistory.add
+
+    def interrupted(self, quake, step):
+        add(self, quake, step)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(QuakeHistory, "add", interrupted)
+    assert command("quake", case_file, "--out", "one")[0] == 130
+    monkeypatch.setattr(QuakeHistory, "add", add)
+    changed = "quake", case_file, "--set", "mu=0.85"
+    assert command(*changed, "--out", "one")[0] == command(*changed, "--out", "two")[0] == 0
+    one, two = (Path(n, "quake.csv").read_text() for n in ("one", "two"))
+    assert one == two
+
+
+def test_a_sweep_of_earthquakes(command, case_file, tmp_path):
+    """A row fails by its residual slip, that of the single run; rows are not computed again."""
+    words = "sweep", case_file, "--vary", "record_scale=0.2,1", "--jobs", 1
+    code, out, _ = command(*words, "--quake", "0.005")
+    assert code == 0 and "2 rows computed" in out
+    rows = list(csv.DictReader(Path("my_sweep.csv").read_text().splitlines()))
+    small, large = sorted(rows, key=lambda row: float(row["record_scale"]))
+    assert (small["verdict"], small["failed"]) == ("stands", "0")
+    assert (large["verdict"], large["failed"]) == ("residual slip", "1")
+    assert command("quake", case_file)[0] == 0
+    found = json.loads(Path("out/my_quake/run.json").read_text())["quake"]
+    assert float(large["residual_slip"]) == pytest.approx(found["residual"]["slip"], rel=1e-9)
+    peaks = [float(row["peak_ground_ax"]) for row in (small, large)]
+    assert peaks[0] == pytest.approx(0.2 * peaks[1])
+    assert "0 rows computed" in command(*words, "--quake", "0.005")[1]
+    assert "2 rows computed" in command(*words, "--quake", "0.5")[1]
+    code, _, err = command(*words, "--quake", "0")
+    assert code == 2 and "--quake 0: must be a slip > 0 m" in err
+
+
+@pytest.mark.parametrize(
+    "options, message",
+    [
+        (["--set", "k_h=0.1"], "k_h = 0.1: must be 0 for damjoint quake"),
+        (["--set", "record_unit=unstated"], "record_unit = unstated: must be m/s2 or g"),
+        (["--set", "record_start=3"], "record_start = 3: must be >= 0 and < 0.5 s"),
+        (["--set", "record_component=vertical"], "must have an acceleration other than zero"),
+        (["--set", "hht_alpha=-0.5"], "hht_alpha = -0.5: must be"),
+        (["--set", "dt=0"], "dt = 0: must be"),
+        (["--set", "drive=crest"], "drive = crest: must be level for damjoint quake"),
+        (["--record", "nothing.csv"], "record = nothing.csv: "),
+        (["--accuracy", "1%"], "accuracy = 1%: must not be set for damjoint quake"),
+    ],
+)
+def test_bad_input_is_one_line_and_writes_nothing(command, case_file, options, message):
+    code, out, err = command("quake", case_file, *options)
+    assert (code, out) == (2, "") and err.count("\n") == 1
+    assert message in err and not Path("out").exists()
+
+
+def test_a_dam_without_static_equilibrium_is_a_failed_run(command, case_file):
+    code, _, err = command("quake", case_file, "--set", "mu=0.2")
+    assert code == 1 and "static loads have no equilibrium" in err
+    assert json.loads(Path("out/my_quake/run.json").read_text())["state"] == "failed"
