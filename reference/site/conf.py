@@ -65,7 +65,12 @@ CONTENTS = {
         *("reference/theory", "reference/parameters", "reference/results"),
         *("reference/site/library", "reference/glossary"),
     ),
-    "Verification": ("reference/ssnp142", "reference/trust", "reference/benchmarks"),
+    "Verification": (
+        "reference/ssnp142",
+        "reference/published",
+        "reference/trust",
+        "reference/benchmarks",
+    ),
     "Project": ("CONTRIBUTING", "CHANGELOG"),
 }
 

@@ -288,9 +288,14 @@ def test_a_memory_error_is_one_line(command, monkeypatch):
 @pytest.mark.skipif(factor.is_slow(), reason="MUMPS")
 def test_mumps_out_of_memory_is_one_line(monkeypatch):
     matrix, none = sparse.eye(3, format="csr"), np.zeros(0, int)
-    full = types.SimpleNamespace(damjoint_solve=lambda *_: factor.NO_MEMORY)
+
+    def full(*words):
+        words[-1]._obj.value = factor.NO_MEMORY
+
     with pytest.raises(MemoryError, match="3 unknowns"):
-        factor.solve_by_mumps(full, matrix, np.ones((3, 1)), none, "3 unknowns")
+        factor.MumpsFactors(
+            types.SimpleNamespace(damjoint_factorise=full), matrix, none, "3 unknowns"
+        )
     for module in factor, memory:
         monkeypatch.setattr(module, "available", lambda: 0.0)
     with pytest.raises(RunError, match="3 unknowns need about"):

@@ -11,7 +11,7 @@ import pytest
 from damjoint import InputError, runner
 from damjoint.laws import COLUMNS
 from damjoint.model.case import load
-from damjoint.model.parameters import declared
+from damjoint.model.parameters import AUTOMATIC, declared
 from damjoint.model.results import FLUX, HISTORY, JOINT
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
@@ -99,7 +99,10 @@ DIMENSIONS = {
     "N m/m": (2, 1, 0),
     "m per s2": (0, 0, 1),
     "kg per m3": (-1, 1, -1),
+    "s": (0.5, 0, -0.5),
+    "Hz": (-0.5, 0, 0.5),
     "Pa s": (0.5, 1, -0.5),
+    "Pa s per m": (-0.5, 1, -0.5),
     "kg/(m s)": (0.5, 1, -0.5),
 }
 #: All kinds of loads.
@@ -110,7 +113,9 @@ def in_units(case, units):
     """A case whose units of length, stress and acceleration are smaller by these factors."""
     factor = lambda unit: float(np.prod(np.power(units, DIMENSIONS[unit])))
     values = {
-        name: case[name] * factor(re.search(r"\[(.*)\]$", p.label)[1]) if not p.text else case[name]
+        name: case[name]
+        if p.text or (p.automatic and case[name] == AUTOMATIC)
+        else case[name] * factor(re.search(r"\[(.*)\]$", p.label)[1])
         for name, p in declared().items()
         if name != "pena_rupture"  # follows G_f
     }

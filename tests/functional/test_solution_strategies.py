@@ -6,6 +6,7 @@ from damjoint.engines.getdp import process
 from damjoint.laws.friction import FrictionVariables
 from damjoint.model.case import load
 from damjoint.model.mesh import mesh_of
+from damjoint.solver.load_stepper import LoadStepper
 from damjoint.statics.verdict import verdict
 
 #: A dam of realistic stiffness; the shear release of its joint is far shorter than its jumps.
@@ -42,7 +43,7 @@ def test_secant_of_friction_is_stress_over_jump():
     law = load("ssnp142", {"law": "friction", "K_T": 9e14}).law
     rng = np.random.default_rng(1)
     jump = rng.normal(0, [1e-8, 2e-11, 2e-11], (200, 3)) - [5e-8, 0, 0]
-    variables = FrictionVariables(np.zeros(200), rng.normal(0, 2e-11, (200, 2)))
+    variables = FrictionVariables(np.zeros(200), rng.normal(0, 2e-11, (200, 2)), np.zeros(200))
     traction, _ = law.traction_and_tangent(jump, variables)
     secant = law.secant_stiffness(jump, variables)
     slid = law.trial(jump, variables).slip > 0
@@ -66,15 +67,25 @@ def test_the_line_of_the_shear_release_is_the_law_within_it_and_extended_outside
     np.testing.assert_array_equal(line[0], law.traction_and_tangent(jump, variables)[0][0])
 
 
-def test_if_the_first_step_fails_the_weight_is_applied_first(solve):
+def test_if_the_first_step_fails_the_weight_is_applied_first(monkeypatch):
     """The weight alone gives no row; its cut of the step is counted."""
-    stiff = {"E": 1.79e10, "K_N": 6.73e14, "K_T": 1.47e14, "law": "friction", "uplift": "flow"}
-    shape = {"dam_height": 132, "dam_base": 92, "dam_crest": 19.9, "nu": 0.136, "n_joint": 30}
-    joint = {"mu": 0.8, "adhesion": 26300, "aperture_min": 1.27e-8}
-    few = {"quadrature": "published"}  # with more points the first step converges at once
-    (result,) = solve("dam", "35,41", **shape, **stiff, **joint, **few)
-    assert verdict(result) == "stands"
-    assert result.history["time"][0] > 0 and result.history["cuts"][0] > 0
+    direct_step, weigh, order = LoadStepper.direct_step, LoadStepper.weigh, []
+
+    def failing_once(self, time, smallest):
+        order.append("step")
+        return direct_step(self, time, smallest) if len(order) > 1 else None
+
+    def weighing(self):
+        order.append("weight")
+        return weigh(self)
+
+    monkeypatch.setattr(LoadStepper, "direct_step", failing_once)
+    monkeypatch.setattr(LoadStepper, "weigh", weighing)
+    stepper = LoadStepper(load("dam", {"n_joint": 10, "weight_first": 0}, "30,40"))
+    stepper.run()
+    result = stepper.results()
+    assert verdict(result) == "stands" and order == ["step", "weight", "step", "step"]
+    assert result.history["time"].tolist() == [1, 2] and result.history["cuts"].tolist() == [1, 0]
 
 
 def test_the_last_level_is_exact_to_the_smallest_step(solve):

@@ -435,6 +435,7 @@ OPTIONS = {
 def prepare() -> None:
     """Start Gmsh with the options of the window, before it opens."""
     start_gmsh()
+    gmsh.onelab.clear()
     gmsh.option.setString("General.GraphicsFontEngine", "StringTexture")
     for name, value in OPTIONS.items():
         gmsh.option.setNumber(name, value)

@@ -7,6 +7,7 @@ import csv
 import hashlib
 import multiprocessing
 import os
+import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -262,7 +263,8 @@ def pool_of(jobs: int) -> Iterator[ProcessPoolExecutor]:
 
 
 def end_with_parent() -> None:
-    """End this process when its parent ends."""
+    """End this process when its parent ends, and at once and without words if it is interrupted."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
     def wait() -> None:
         if parent := multiprocessing.parent_process():
