@@ -49,10 +49,7 @@ class Numbers:
         if case.geometry:
             return Numbers(state, {}, case.joint_length)
         method = gravity.at(case, state["time"], state["level"])
-        uncracked = method.body.length - state["crack_length"]
-        state["SSF"] = gravity.sliding_factor(case, state["N"], state["T"], uncracked)
-        uplift_moment = method.resultant.moment - state["M"]
-        state["OSF"] = gravity.overturning_factor(method.loads, uplift_moment)
+        state |= gravity.factors_of_state(method, state)
         rigid = {name: float(getattr(method, name)) for name in BY_GRAVITY}
         return Numbers(state, rigid, case.joint_length)
 

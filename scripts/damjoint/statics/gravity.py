@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -492,6 +492,18 @@ class GravityMethod:
         rows.append(resultant_of("sum", rows))
         cells = [(row.name, row.fx, row.fy, row.moment) for row in rows]
         return dict(zip(LOADS, map(list, zip(*cells, strict=True)), strict=True))
+
+
+def factors_of_state(method: GravityMethod, state: Mapping[str, float]) -> dict[str, float]:
+    """SSF and OSF of a state of the finite elements, a row of the history: with its resultants and
+    crack, and the loads of the gravity method.
+    """
+    uncracked = method.body.length - state["crack_length"]
+    uplift_moment = method.resultant.moment - state["M"]
+    return {
+        "SSF": sliding_factor(method.case, state["N"], state["T"], uncracked),
+        "OSF": overturning_factor(method.loads, uplift_moment),
+    }
 
 
 def with_crack(case: Case, time: float, level: float, crack: float) -> GravityMethod:

@@ -194,10 +194,7 @@ def by_finite_elements(result: Results, statement: str | None = None) -> MethodR
     numbers = {name: last[name] for name in NUMBERS if name in last}
     for name in ("sigma_n", "sigma_n_eff"):
         numbers |= {f"{name}_heel": rows[name][0], f"{name}_toe": rows[name][-1]}
-    uncracked = method.body.length - last["crack_length"]
-    numbers["SSF"] = gravity.sliding_factor(case, last["N"], last["T"], uncracked)
-    uplift_moment = method.resultant.moment - last["M"]
-    numbers["OSF"] = gravity.overturning_factor(method.loads, uplift_moment)
+    numbers |= gravity.factors_of_state(method, last)
     numbers = {name: float(numbers[name]) for name in NUMBERS}
     return MethodResult(case, joint, FINITE_ELEMENTS, last["time"], numbers, statement, partial)
 
