@@ -47,10 +47,14 @@ class Table(NamedTuple):
 
 
 def table_of(columns: list[tuple[str, np.ndarray, Units]]) -> Table:
-    """Format columns (name, values, units) in units that suit their size."""
+    """Format columns (name, values, units) in units that suit their size; what is below 1e-9 of a
+    column's largest value is rounding and shown as 0.
+    """
     names, sizes, cells = [], [], []
     for name, values, units in columns:
         size, factor = unit([np.nan_to_num(values)], units)
+        rounding = 1e-9 * np.abs(np.nan_to_num(values)).max(initial=0)
+        values = np.where(np.abs(values) < rounding, 0.0, values)
         names.append(name)
         sizes.append(size)
         cells.append([f"{v * factor + 0.0:.4g}" if np.isfinite(v) else "-" for v in values])
