@@ -379,32 +379,34 @@ def test_the_drawing_follows_the_geometry_and_can_be_meshed(open_window):
     assert len(gmsh.model.mesh.getNodes()[0]) > 100
 
 
-@pytest.mark.parametrize(
-    ("name", "value", "why"),
-    [
-        (tree.LEVELS, "3, 60", "levels = 60: must be between 0 and 20 m"),
-        (tree.LEVELS, "high", "levels = high: must be a list of levels in metres"),
-        (tree.TAIL_LEVELS, "1, 2", "tail_levels = 1,2: must be one level or as many"),
-        (tree.STEPS, "0", "steps = 0: must be an integer >= 1"),
-        (tree.STEPS, "two", "steps = two: must be an integer >= 1"),
-        (tree.ACCURACY, "best", "accuracy = best: must be one of coarse, standard, fine"),
-        (tree.FILE, "nowhere.case", "case nowhere.case: unknown"),
-        (tree.CASE, float(len(titles())), "case file: choose it"),
-        ("nu", 0.6, "nu = 0.6: must be"),
-        ("n_joint", 10.5, "n_joint = 10.5: must be an integer"),
-        ("law", "glue", "law = glue: must be one of rupture, friction"),
-    ],
-)
-def test_a_bad_value_is_reported_in_one_line_and_not_run(open_window, name, value, why):
+BAD_VALUES = [
+    (tree.LEVELS, "3, 60", "levels = 60: must be between 0 and 20 m"),
+    (tree.LEVELS, "high", "levels = high: must be a list of levels in metres"),
+    (tree.TAIL_LEVELS, "1, 2", "tail_levels = 1,2: must be one level or as many"),
+    (tree.STEPS, "0", "steps = 0: must be an integer >= 1"),
+    (tree.STEPS, "two", "steps = two: must be an integer >= 1"),
+    (tree.ACCURACY, "best", "accuracy = best: must be one of coarse, standard, fine"),
+    (tree.FILE, "nowhere.case", "case nowhere.case: unknown"),
+    (tree.CASE, float(len(titles())), "case file: choose it"),
+    ("nu", 0.6, "nu = 0.6: must be"),
+    ("n_joint", 10.5, "n_joint = 10.5: must be an integer"),
+    ("law", "glue", "law = glue: must be one of rupture, friction"),
+]
+
+
+def test_a_bad_value_is_reported_in_one_line_and_not_run(open_window):
+    """One after the other in one window; with the value of before the case runs again."""
     user = open_window("e", **SMALL)
-    before = gmsh.onelab.getNumber(name) if isinstance(value, float) and "/" in name else None
-    was = tree.value_of(name) if "/" in name else user.session.tree.sheet.case[name]
-    assert user.type(name, value).startswith(why)
-    assert "\n" not in user.session.status
-    assert user.run().startswith(why) and not user.session.scenes
-    assert user.entry(tree.STATUS)["attributes"]["Highlight"] == tree.BAD
-    user.type(name, before[0] if before is not None else was)
-    assert user.run().startswith("done in")
+    for name, value, why in BAD_VALUES:
+        before = gmsh.onelab.getNumber(name) if isinstance(value, float) and "/" in name else None
+        was = tree.value_of(name) if "/" in name else user.session.tree.sheet.case[name]
+        assert user.type(name, value).startswith(why)
+        assert "\n" not in user.session.status
+        scenes = user.session.scenes
+        assert user.run().startswith(why) and user.session.scenes is scenes
+        assert user.entry(tree.STATUS)["attributes"]["Highlight"] == tree.BAD
+        user.type(name, before[0] if before is not None else was)
+        assert user.run().startswith("done in"), name
 
 
 def test_buttons_pressed_during_a_run_act_after_it(open_window, tmp_path):
