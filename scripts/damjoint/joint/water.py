@@ -10,7 +10,7 @@ import numpy as np
 from ..arrays import Array, Sparse
 from ..laws import Law
 from ..model.case import Case, flows, has_drains, remembers
-from ..model.loads import Loading
+from ..model.loads import Loading, heads_at_ends
 from .flow import FlowDerivative, FlowSolution
 from .interface import JointInterface
 from .joint_laws import JointVariables
@@ -60,9 +60,8 @@ class JointWater:
 
     def head(self, loading: Loading, matrix: Sparse | None = None) -> Array:
         """Head [m] in a joint of uniform transmissivity, at the joint's nodes or at the places that
-        an interpolation matrix of `JointFields` leads to: linear along the joint between the levels
-        of reservoir (plus joint_head_offset) and tailwater; a dry end has its own height, or the
-        head of the other end if that is lower.
+        an interpolation matrix of `JointFields` leads to: linear along the joint between the heads
+        of `heads_at_ends`.
 
         Drains reduce the head above their outlet, the tailwater or their own height, by their
         effectiveness (EM 1110-2-2200); USBR counts the reduction from the reservoir's head.
@@ -70,9 +69,7 @@ class JointWater:
         case, along = self.case, self.joint.fields
         fields = along.heel_y, along.toe_y, along.xi
         heel, toe, xi = fields if matrix is None else (matrix @ field for field in fields)
-        level, tail = loading.level, loading.tail
-        first = np.maximum(level + case["joint_head_offset"], np.minimum(heel, tail))
-        last = np.maximum(tail, np.minimum(toe, level))
+        first, last = heads_at_ends(case, loading.level, loading.tail, heel, toe)
         if case["uplift"] != "drained":
             return first + (last - first) * xi
         at = case["drain_x"] / self.joint.length
