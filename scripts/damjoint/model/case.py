@@ -48,9 +48,12 @@ CASES = data("cases")
 #: Constants of pro/parameters.pro that both engines use.
 SHARED = (
     *("strategy_growth", "strategy_secant", "strategy_release", "strategy_iterations", "cut"),
-    *("round_off", "coarsest", "artificial", "release_length", "crack_aperture", "crack_most"),
-    *("zangar_angle", "zangar_cm"),
+    *("round_off", "coarsest", "artificial", "yield_tolerance", "release_length"),
+    *("crack_aperture", "crack_most", "zangar_angle", "zangar_cm"),
 )
+
+#: Those of them that the laws use.
+SOLVER = "artificial", "yield_tolerance", "release_length"
 
 #: Variables of pro/section.pro: the joint's ends, the segments of the faces, the marks of line
 #: forces.
@@ -215,7 +218,7 @@ class Case(ParameterValues):
     @cached_property
     def law(self) -> Law[Any]:
         """The joint's law with its parameters."""
-        solver = {name: self.shared[name][0] for name in ("artificial", "release_length")}
+        solver = {name: self.shared[name][0] for name in SOLVER}
         return LAWS[self["law"]](self.values | solver)
 
     @property
