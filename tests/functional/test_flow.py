@@ -81,6 +81,18 @@ def test_the_flux_is_the_cube_of_the_aperture(solve):
     assert q[1] / q[0] == pytest.approx(27, rel=1e-6)
 
 
+@pytest.mark.parametrize("slope", [0.0, 6.0])
+def test_water_up_to_a_waterstop(solve, slope):
+    """In a lift joint, within an element: U as in the gravity method."""
+    section = {"n_joint": 12, "joint_height": 20, "joint_slope": slope}
+    (result,) = solve("dam", "45", uplift="waterstop", waterstop=1.2, **section)
+    rows, U = result.at(), result.history["U"][-1]
+    assert U == pytest.approx(gravity.at(result.case, 1).U, rel=1e-9)
+    head = 45 - 20 - 1.2 * np.sin(np.radians(slope)) / 2
+    assert U == pytest.approx(WATER * head * 1.2, rel=1e-9)
+    assert not rows["p"][rows["s"] > 1.2].any()
+
+
 @pytest.mark.parametrize("engine", ["condensed", "getdp"])
 @pytest.mark.parametrize("slope, level, tail", [(4, 5.3, 0), (4, 5.3, 5.35), (-4, 4.9, 4.8)])
 def test_no_water_enters_at_a_dry_end(tmp_path, engine, slope, level, tail):

@@ -144,6 +144,35 @@ def test_monoliths_are_in_equilibrium(dim):
         assert bases[1].last["T"] == pytest.approx(contraction.last["N"], rel=1e-6)
 
 
+@pytest.mark.parametrize("order", [1.0, 2.0])
+@pytest.mark.parametrize("waterstop", [0.0, 0.7, 3.0])
+def test_water_in_a_contraction_joint_up_to_its_waterstop(waterstop, order):
+    """rho g b H^2/2 on either face, also where the waterstop cuts elements; each monolith carries
+    it, less the contact with the other one, to its base.
+    """
+    solid = {"n_joint": 6.0, "h_dam": 12.0, "h_found": 40.0, "dim": 3.0, "order": order}
+    water = {"uplift": ("imposed", "imposed", "waterstop"), "waterstop": waterstop}
+    case = load("monoliths", solid | water, [45.0])
+    stepper = LoadStepper(case, interface_of(case))
+    results = stepper.run()
+    own, rows = results.joints[-1].last, results.joints[-1].at()
+    pressure = WATER * waterstop * 45**2 / 2
+    assert own["U"] * 45 == pytest.approx(pressure, rel=1e-9)
+    beyond = rows["x"] > waterstop
+    assert not rows["p"][beyond].any()
+    if waterstop:
+        assert rows["p"][~beyond] == pytest.approx(WATER * (45 - rows["y"][~beyond]), rel=1e-9)
+    equilibrium, state = stepper.model.equilibrium, stepper.state
+    across = []
+    for k, joint in enumerate(equilibrium.interface.joints[:2]):
+        jump = joint.jumps(joint.at_points, state.jump)
+        traction, _ = equilibrium.laws.laws[k].traction_and_tangent(jump, state.variables.joints[k])
+        frames = joint.frames[joint.points.elements]
+        across.append(joint.points.weights @ np.einsum("qk,qk->q", traction, frames[:, :, 2]))
+    pushed = pressure + 45 * own["N"]
+    assert np.array(across) == pytest.approx([-pushed, pushed], rel=1e-6, abs=1e-6 * own["U"] + 1)
+
+
 @pytest.mark.parametrize(
     "joints, settings, words",
     [
@@ -152,6 +181,11 @@ def test_monoliths_are_in_equilibrium(dim):
         (BASES | CONTRACTION | {"edge": (0, 5, 5, 5)}, {}, "inside a body it must not touch"),
         (BASES | CONTRACTION, {"mu": (0.5, 0.6)}, "lists of 2 values: must have one for each"),
         (BASES | CONTRACTION, {"lift_heights": (5.0,)}, "lift_heights: must not be set"),
+        (
+            BASES | CONTRACTION,
+            {"uplift": ("none", "none", "waterstop"), "waterstop": 10.5},
+            "waterstop = 10.5: must be < the joint's length (10 m)",
+        ),
     ],
 )
 def test_bad_geometries_of_several_joints(solved, joints, settings, words):

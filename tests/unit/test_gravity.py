@@ -374,7 +374,7 @@ def test_heads_are_measured_from_the_joint():
     assert found.p[-1] == pytest.approx(WATER * (3 + 34 * math.tan(math.radians(5))))
 
 
-DRAINS = {"drain_x": 4.0, "drain_effectiveness": 0.5, "drain_level": 6.0}
+DRAINS = {"waterstop": 1.5, "drain_x": 4.0, "drain_effectiveness": 0.5, "drain_level": 6.0}
 
 
 @pytest.mark.parametrize(
@@ -386,6 +386,7 @@ DRAINS = {"drain_x": 4.0, "drain_effectiveness": 0.5, "drain_level": 6.0}
         ("cracked", 5.0, (0, 5, 34), (45, 45, 3)),
         ("flow", 2.0, (0, 2, 34), (45, 45, 3)),
         ("imposed", 2.0, (0, 0, 34), (45, 45, 3)),
+        ("waterstop", 2.0, (0, 0, 1.5, 1.5, 34), (45, 45, 45, 0, 0)),
         ("none", 2.0, (0, 0, 34), (0, 0, 0)),
     ],
 )
@@ -395,7 +396,7 @@ def test_uplift_rules(mode, crack, places, heads):
     assert_allclose(found.s, places)
     assert_allclose(found.p, np.array(heads) * WATER)
     pressure = lambda s: np.interp(s, found.s, found.p)
-    kinks = [2, 4, 5]
+    kinks = [1.5, 2, 4, 5]
     assert found.force == pytest.approx(quad(pressure, 0, 34, points=kinks)[0])
     moment = quad(lambda s: pressure(s) * (34 - s), 0, 34, points=kinks)[0]
     assert found.moment == pytest.approx(moment)

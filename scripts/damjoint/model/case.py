@@ -17,6 +17,7 @@ from . import casefile
 from .arithmetic import number
 from .constraints import (
     check_also_uplift,
+    check_distances,
     check_drive,
     check_levels,
     check_lifts,
@@ -199,7 +200,8 @@ class Case(ParameterValues):
     def with_joints(self, joints: Sequence[OfJoint]) -> Case:
         """The case of a user's own geometry, with the names and ends of its joints.
 
-        Raises InputError if the case has lists of another length.
+        Raises InputError if the case has lists of another length, or drains or a waterstop beyond
+        the end of a joint.
         """
         same = [replace(joint, hardening_asked=self.hardening_asked) for joint in joints]
         known = self.of_joints or same
@@ -213,7 +215,11 @@ class Case(ParameterValues):
             replace(joint, values=own.values, section=section, hardening_asked=own.hardening_asked)
             for own, joint, section in zip(known, joints, ends, strict=True)
         )
-        return replace(self, section=ends[0], of_joints=tuple(of_joints) if len(joints) > 1 else ())
+        several = tuple(of_joints) if len(joints) > 1 else ()
+        case = replace(self, section=ends[0], of_joints=several)
+        for own in case.joints:
+            check_distances(own, own.section["joint_along"][0])
+        return case
 
     @cached_property
     def law(self) -> Law[Any]:

@@ -261,7 +261,8 @@ class Uplift:
     Heads as in `heads_at_ends`. By `uplift`: none; imposed: linear from heel to toe; drained:
     reduced at the drains; cracked: that of the heel in the crack, beyond it as imposed or, with
     drains beyond the crack, as drained [USACE EM 1110-2-2200]; flow: as cracked without drains, the
-    limit of the cubic law for a narrow closed joint. The pressure is not below zero.
+    limit of the cubic law for a narrow closed joint; waterstop: the reservoir's up to it, none
+    behind it. The pressure is not below zero.
     """
 
     def __init__(
@@ -284,6 +285,8 @@ class Uplift:
         self.drains: tuple[float, float] | None = None
         wet_crack, crack = crack, crack if mode in ("cracked", "flow") else 0.0
         drained = mode == "drained" or (mode == "cracked" and case["drains"])
+        if mode == "waterstop":
+            first = last = level + case["joint_head_offset"]
         places, heads = [0.0, crack, self.length], [first, first, last]
         at = case["drain_x"]
         if drained and crack <= at < self.length:
@@ -299,6 +302,8 @@ class Uplift:
         weight = case["rho_water"] * case["g"] if mode != "none" else 0.0
         self.p = weight * (np.array(heads) - height)
         self.cut_off_suction()
+        if mode == "waterstop":
+            self.stop(min(case["waterstop"], self.length))
         if dry_until > wet_crack:
             self.dry(wet_crack, dry_until)
 
@@ -310,6 +315,13 @@ class Uplift:
         zeros = s[crossings] + share * (s[crossings + 1] - s[crossings])
         self.s = np.insert(s, crossings + 1, zeros)
         self.p = np.maximum(np.insert(p, crossings + 1, 0.0), 0.0)
+
+    def stop(self, at: float) -> None:
+        """Take the pressure away behind a waterstop [m from the heel]."""
+        before = self.s < at
+        pressure = np.interp(at, self.s, self.p) if at else 0.0
+        self.s = np.concatenate([self.s[before], [at, at, self.length]])
+        self.p = np.concatenate([self.p[before], [pressure, 0.0, 0.0]])
 
     def dry(self, start: float, end: float) -> None:
         """Take the pressure away between two places [m from the heel]."""

@@ -48,6 +48,8 @@ def check(case: Case) -> None:
         )
     if flows(case) and has_drains(case):
         raise InputError(f"drains = 1: must be 0 with engine = getdp and uplift = {case['uplift']}")
+    if case["uplift"] == "waterstop":
+        raise InputError("uplift = waterstop: must be another one with engine = getdp")
     if case.geometry:
         check_own(mesh_of(case), case)
 
