@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
-from ..model.results import QuakeResult, column_of
+from ..model.results import column_of
 from ..post.drawing import (
     BLUE,
     CONCRETE,
@@ -23,6 +23,7 @@ from ..post.drawing import (
     write_picture,
 )
 from ..post.outline import exaggeration
+from .quake import QuakeResult
 
 #: Height of the curves, and of the deformed dams below them [inches].
 CURVES, SHAPES = 10.5, 2.6
@@ -46,7 +47,7 @@ def figure(result: QuakeResult) -> Figure:
     picture = figure_of(9.0, CURVES + shapes)
     picture.text(0.05, 0.988, f"{case.title}: {result.statement}", va="top", fontsize=10)
     axes = panels(picture, 6, left=0.9, right=1.1, top=0.45, bottom=0.5 + shapes, down=0.2)[:, 0]
-    time, joints = rows["time"], range(len(case.joints))
+    time, joints = rows["time"], result.joints
     curves = [
         ("ground [m/s$^2$]", [("along x", rows["ground_ax"], DARK)]),
         ("crest $u_x$ [mm]", [("relative to the ground", 1e3 * rows["crest_ux"], BLUE)]),
@@ -110,14 +111,16 @@ def draw_shapes(picture: Figure, result: QuakeResult) -> None:
         axes = picture.add_axes(box)
         scale = exaggeration(moved, result.case.size)
         for body, displacement in moved.items():
-            solid = result.bodies[body]
+            solid = result.mesh.bodies[body]
             points = solid.points[:, :2]
             color = ROCK if body == "foundation" else CONCRETE
             for _, table in solid.cells:
                 cells = PolyCollection((points + scale * displacement)[table], facecolor=color)
                 cells.set(edgecolor=GREY, linewidth=0.15, rasterized=True)
                 axes.add_collection(cells)
-        dams = np.vstack([b.points for n, b in result.bodies.items() if n != "foundation"])
+        dams = np.vstack(
+            [result.mesh.bodies[name].points for name in moved if name != "foundation"]
+        )
         low, high = dams.min(axis=0), dams.max(axis=0)
         room = 0.2 * result.case.size
         axes.set(xlim=(low[0] - room, high[0] + room), ylim=(low[1] - room / 2, high[1] + room / 2))
