@@ -638,6 +638,7 @@ def add_stress(commands: Commands) -> None:
         "count", 1, nargs="?", default=500, help="number of random dams (default: 500)"
     )
     command.add_integer("--seed", 1, default=1, help="seed of the random numbers (default: 1)")
+    command.add_argument("--quake", action="store_true", help="random earthquakes instead")
     command.add_integer("--jobs", 1, help=JOBS)
     command.add_path(
         "--out", "FILE", default=Path("stress.csv"), help=f"{RESUMED} (default: stress.csv)"
@@ -647,7 +648,8 @@ def add_stress(commands: Commands) -> None:
 def do_stress(arguments: argparse.Namespace) -> int:
     """Run damjoint stress; 1 if a run is a defect."""
     stress = tool("stress")
-    rows = stress.stress(arguments.count, arguments.seed, arguments.out, arguments.jobs)
+    options = arguments.seed, arguments.out, arguments.jobs, arguments.quake
+    rows = stress.stress(arguments.count, *options)
     for row in rows:
         if row["class"] == stress.DEFECT:
             print(f"{row['scene']}: {row['findings']}\n  {row['command']}")

@@ -332,7 +332,7 @@ def graphs_over_time(rows: Table, earlier: list[Table]) -> list[Graph]:
         curves = [
             Curve(name, *envelope(rows, column), color)
             for name, column, color in parts
-            if column != "ground_ay" or rows[column].any()
+            if column in rows and (column != "ground_ay" or rows[column].any())
         ]
         last = parts[-1][1]
         curves += [Curve(BEFORE, *envelope(other, last), GREY) for other in earlier]

@@ -147,7 +147,8 @@ class QuakeNumbers(Numbers):
         shown = "the time that the drawing area shows"
         rows = [(f"At t = {self.elements['time']:.4g} s", "earthquake", shown)]
         for name, head, units in QUAKE_SHOWN:
-            rows.append((head, with_unit(self.quake[name], units, 3), QUAKE[name][1]))
+            if name in self.quake:
+                rows.append((head, with_unit(self.quake[name], units, 3), QUAKE[name][1]))
         return [*rows, *self.peaks]
 
 
@@ -158,9 +159,12 @@ def shown_rows(found: QuakeResult) -> Columns:
     rows = {
         name: np.where(np.abs(column) > ROUND_OFF * np.abs(column).max(), column, 0.0)
         for name, column in found.rows_of(found.joint).items()
+        if np.isfinite(column).all()  # a law may not limit shear
     }
     rows |= {name: np.maximum(rows[name], 0.0) for name in ("heel_opening", "toe_opening")}
-    return rows | {"strength": np.sign(rows["T"]) * (rows["shear_reserve"] + np.abs(rows["T"]))}
+    if "shear_reserve" in rows:
+        rows["strength"] = np.sign(rows["T"]) * (rows["shear_reserve"] + np.abs(rows["T"]))
+    return rows
 
 
 def table_of_frames(numbers: list[QuakeNumbers]) -> Table:
@@ -170,6 +174,7 @@ def table_of_frames(numbers: list[QuakeNumbers]) -> Table:
         [
             (head, np.array([row.quake[name] for row in numbers]), units)
             for name, head, units in columns
+            if name in numbers[0].quake
         ]
     )
 

@@ -13,8 +13,9 @@ import numpy as np
 from tabulate import tabulate
 from threadpoolctl import threadpool_limits
 
-from .. import InputError, RunError
-from ..arrays import Array, Table
+from .. import ROUND_OFF, InputError, RunError
+from ..arrays import Array
+from ..arrays import Table as Columns
 from ..dynamics import checkpoint
 from ..dynamics.frames import at_nodes
 from ..dynamics.history import QuakeHistory
@@ -33,6 +34,7 @@ from ..model.results import QUAKE, QUAKE_OF_JOINTS, Results, column_of, quake_co
 from ..post import folder as folders
 from ..post import tables
 from ..post.field_files import write_fields
+from ..post.summary import Table
 from ..progress import Progress
 from ..solver.controls import LevelControl
 from ..solver.history import joint_row
@@ -99,9 +101,9 @@ class QuakeResult:
     """The rows of an earthquake and what they amount to."""
 
     case: Case
-    rows: Table
+    rows: Columns
     #: time (rows,), distance from the heel (nodes,), effective normal stress (rows, nodes)
-    stress: Table
+    stress: Columns
     #: the tables of the static loads; and with the state after the earthquake as a further row
     before: Results
     static: Results
@@ -133,7 +135,7 @@ class QuakeResult:
         """Numbers of the joints."""
         return range(len(self.case.joints))
 
-    def rows_of(self, joint: int) -> Table:
+    def rows_of(self, joint: int) -> Columns:
         """The rows of a joint, by its number, with the columns of QUAKE."""
         own = {name: column_of(name, joint) for name in QUAKE_OF_JOINTS}
         return {name: self.rows[own.get(name, name)] for name in QUAKE}
@@ -270,7 +272,7 @@ class QuakeRun:
             for name, peak in self.history.peaks.items()
         ]
 
-    def stress_table(self) -> Table:
+    def stress_table(self) -> Columns:
         """Effective normal stress along the first joint in time."""
         joint = self.quake.problem.model.equilibrium.interface.joints[0]
         return {
@@ -384,7 +386,7 @@ def summary(quake: Earthquake, history: QuakeHistory) -> dict[str, Any]:
     for name in names:
         row = int(np.argmax(np.abs(rows[name])))
         result["peaks"][name] = {"value": rows[name][row], "time": rows["time"][row]}
-    last = rows["time"] > rows["time"][-1] - MEAN_OVER
+    last = rows["time"] > rows["time"][-1] - MEAN_OVER * (1 - ROUND_OFF)
     residual = result["residual"] = {}
     for k in joints:
         heel, toe, slip = (
@@ -449,27 +451,45 @@ def write_tables(result: QuakeResult, out: Path) -> None:
     folders.write_info(result.static, out, result.state, result.statement)
 
 
+def peaks_table(found: dict[str, Any], case: Case) -> Table:
+    """Tabulate the peaks of a summary."""
+    columns = quake_columns(case)
+    rows = [
+        (name, columns[name][0], f"{peak['value']:.4g}", f"{peak['time']:.3f}")
+        for name, peak in found["peaks"].items()
+    ]
+    return Table(["peak of", "unit", "value", "at t"], ["", "", "", "s"], rows)
+
+
+#: Residual values of a summary: meaning, unit.
+RESIDUAL = {
+    "slip": ("residual slip", "m"),
+    "tilt": ("residual tilt", "-"),
+    "rigid_block": ("rigid block, slip", "m"),
+}
+
+
+def residual_table(found: dict[str, Any]) -> Table:
+    """Tabulate the residual values of a summary."""
+    rows = [
+        (name.replace(base, meaning), unit, f"{value:.4g}")
+        for name, value in found["residual"].items()
+        for base, (meaning, unit) in RESIDUAL.items()
+        if name.startswith(base)
+    ]
+    return Table(["at rest", "unit", "value"], ["", "", ""], rows)
+
+
+def modes(found: dict[str, Any]) -> str:
+    """Natural frequencies and damping ratios of a summary."""
+    frequencies = ", ".join(f"{f:.3g}" for f in found["frequencies"])
+    ratios = ", ".join(f"{r:.1%}" for r in found["damping"]["ratios"])
+    return f"natural frequencies, joint closed, with the water: {frequencies} Hz; damping {ratios}"
+
+
 def text(result: QuakeResult) -> str:
     """Peaks and residual values as printed tables."""
     found = result.summary
-    units = {"slip": "m", "tilt": "-", "rigid_block": "m"}
-    meaning = {"slip": "residual slip", "tilt": "residual tilt", "rigid_block": "rigid block, slip"}
-    columns = quake_columns(result.case)
-    peaks = [
-        (name, columns[name][0], f"{p['value']:.4g}", f"{p['time']:.3f}")
-        for name, p in found["peaks"].items()
-    ]
-    rest = [
-        (name.replace(base, meaning[base]), units[base], f"{value:.4g}")
-        for name, value in found["residual"].items()
-        for base in units
-        if name.startswith(base)
-    ]
-    frequencies = ", ".join(f"{f:.3g}" for f in found["frequencies"])
-    ratios = ", ".join(f"{r:.1%}" for r in found["damping"]["ratios"])
-    lines = [
-        f"natural frequencies, joint closed, with the water: {frequencies} Hz; damping {ratios}",
-        tabulate(peaks, ("peak of", "unit", "value", "at t [s]"), disable_numparse=True),
-        tabulate(rest, ("at rest", "unit", "value"), disable_numparse=True),
-    ]
-    return "\n\n".join(lines)
+    tables = peaks_table(found, result.case), residual_table(found)
+    parts = [tabulate(table.rows, table.heads, disable_numparse=True) for table in tables]
+    return "\n\n".join([modes(found), *parts])
