@@ -23,7 +23,7 @@ import scipy
 from scipy import sparse
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from ..arrays import Array, IntArray, Sparse
+from ..arrays import Array, IntArray, Sparse, mirror
 from ..storage import atomic_write, cache_folder
 from .memory import available, check_memory, dense_memory
 
@@ -94,11 +94,19 @@ def elimination_order(matrix: Sparse, keep: IntArray) -> IntArray | None:
         return None
     inside = np.setdiff1d(np.arange(size), keep)
     graph = matrix[inside][:, inside].tocsr()
+    graph.data[:] = 1.0
+    # unknowns of a node follow each other and have the same neighbours: a vertex of the graph
+    neighbours = graph @ np.random.default_rng(0).random(len(inside))
+    vertex = np.cumsum(np.diff(neighbours, prepend=-1.0) != 0) - 1
+    first = np.flatnonzero(np.diff(vertex, prepend=-1))
+    graph = graph[first][:, first]
     graph.setdiag(0)
     graph.eliminate_zeros()
     _, position = pymetis.nested_dissection(pymetis.CSRAdjacency(graph.indptr, graph.indices))
     order = np.empty(size, np.int32)
-    order[inside] = 1 + np.asarray(position)
+    order[inside[np.argsort(np.asarray(position)[vertex], kind="stable")]] = 1 + np.arange(
+        len(inside)
+    )
     order[keep] = 1 + np.arange(len(inside), size)
     return order
 
@@ -123,9 +131,16 @@ class MumpsFactors:
     """
 
     def __init__(
-        self, mumps: ctypes.CDLL, matrix: Sparse, keep: IntArray, what: str, beside: float = 0.0
+        self,
+        mumps: ctypes.CDLL,
+        matrix: Sparse,
+        keep: IntArray,
+        what: str,
+        beside: float = 0.0,
+        store: bool = True,
     ) -> None:
-        """what: the unknowns, for the message; beside: further memory [bytes] that is needed.
+        """what: the unknowns, for the message; beside: further memory [bytes] that is needed;
+        store: whether to store the factors: only then `solve`, `reduce` and `expand` work.
 
         Raises RunError if the estimated memory is not available, MemoryError if an allocation
         fails.
@@ -144,7 +159,7 @@ class MumpsFactors:
                 *(self.size, ctypes.c_longlong(upper.nnz)),
                 *(pointer(row), pointer(column), pointer(upper.data)),
                 None if order is None else pointer(order),
-                *(len(keep), pointer(self.keep), pointer(self.lower)),
+                *(len(keep), pointer(self.keep), pointer(self.lower), int(store)),
                 *(ctypes.c_double((available() - beside) / 1e6), ctypes.byref(needed)),
                 ctypes.byref(error),
             )
@@ -160,7 +175,7 @@ class MumpsFactors:
     @property
     def schur(self) -> Array:
         """The Schur complement of `keep` (k, k)."""
-        return np.tril(self.lower) + np.tril(self.lower, -1).T
+        return mirror(self.lower)
 
     def solve(self, right: Array) -> Array:
         """Solution (n, m) with the unknowns `keep` zero."""
@@ -196,7 +211,7 @@ class SuperLUFactors:
         self.keep, self.inside = keep, np.setdiff1d(np.arange(matrix.shape[0]), keep)
         self.factors = superlu(matrix[self.inside][:, self.inside].tocsc(), "MMD_AT_PLUS_A")
         self.coupling = matrix[keep][:, self.inside].tocsr()
-        self.schur, _ = schur_by_superlu(matrix, keep, np.zeros((matrix.shape[0], 0)))
+        self.schur = schur_by_superlu(matrix, keep)
 
     def reduce(self, right: Array) -> Array:
         """See `MumpsFactors`."""
@@ -236,13 +251,34 @@ def schur_complement(matrix: Sparse, keep: IntArray, loads: Array) -> tuple[Arra
 
     Raises RunError if the estimated memory is not available, MemoryError if an allocation fails.
     """
+    mumps = library()
+    if mumps is None:
+        return condense_with_loads(matrix, keep, sparse.csr_matrix(loads))[:2]
     what = unknowns_text(matrix, keep)
+    check_memory(dense_memory(len(keep)), what)
+    factors = MumpsFactors(mumps, matrix, keep, what, loads.nbytes)
+    return factors.schur, loads[keep] - matrix[keep] @ factors.solve(loads)
+
+
+def condense_with_loads(
+    matrix: Sparse, keep: IntArray, loads: Sparse
+) -> tuple[Array, Array, Array]:
+    """As `schur_complement`, and (m, m) the work of each load on the displacements of each other
+    one with `keep` fixed.
+
+    Loads are a border of the matrix, so that no factors are stored.
+    """
+    what = unknowns_text(matrix, keep)
+    size, k = matrix.shape[0], len(keep)
+    bordered: Sparse = sparse.bmat([[matrix, loads], [loads.T, None]], format="csr")
+    keep = np.append(keep, np.arange(size, bordered.shape[0]))
     check_memory(dense_memory(len(keep)), what)
     mumps = library()
     if mumps is None:
-        return schur_by_superlu(matrix, keep, loads)
-    factors = MumpsFactors(mumps, matrix, keep, what, loads.nbytes)
-    return factors.schur, loads[keep] - matrix[keep] @ factors.solve(loads)
+        schur = schur_by_superlu(bordered, keep)
+    else:
+        schur = MumpsFactors(mumps, bordered, keep, what, store=False).schur
+    return schur[:k, :k].copy(), schur[:k, k:].copy(), -schur[k:, k:]
 
 
 def superlu(matrix: Sparse, ordering: Literal["NATURAL", "MMD_AT_PLUS_A"]) -> SuperLU:
@@ -252,31 +288,28 @@ def superlu(matrix: Sparse, ordering: Literal["NATURAL", "MMD_AT_PLUS_A"]) -> Su
     return splu(matrix, permc_spec=ordering, diag_pivot_thresh=0.0, options={"SymmetricMode": True})
 
 
-def schur_by_superlu(matrix: Sparse, keep: IntArray, loads: Array) -> tuple[Array, Array]:
-    """The same by SuperLU: the last block of the factors of the matrix with `keep`, then the loads
-    as its columns, ordered last.
+def schur_by_superlu(matrix: Sparse, keep: IntArray) -> Array:
+    """Schur complement (k, k) by SuperLU: the last block of the factors of the matrix with `keep`
+    ordered last.
 
     Five to ten times faster than one solve per kept unknown. The complement itself may be singular
-    (a floating body): its diagonal is raised, which elimination leaves unchanged, and subtracted at
-    the end.
+    (a floating body): its diagonal is raised, that of a border of loads lowered, which elimination
+    leaves unchanged, and subtracted at the end.
     """
-    n, k = matrix.shape[0], len(keep)
-    border: Sparse = sparse.csr_matrix(loads)
-    matrix = sparse.bmat([[matrix, border], [border.T, None]], format="csc")
-    keep = np.append(keep, np.arange(n, matrix.shape[0]))
     inside = np.setdiff1d(np.arange(matrix.shape[0]), keep)
     order = np.empty_like(inside)
-    order[superlu(matrix[inside][:, inside], "MMD_AT_PLUS_A").perm_c] = inside
-    order = np.append(order, keep)
-    raised = matrix.diagonal()[keep]
+    order[superlu(matrix[inside][:, inside].tocsc(), "MMD_AT_PLUS_A").perm_c] = inside
+    diagonal = matrix.diagonal()
+    lowered = matrix[keep][:, inside].power(2) @ (1 / diagonal[inside])
+    raised = np.where(diagonal[keep] > 0, diagonal[keep], -lowered)
     added = sparse.diags(np.append(np.zeros(len(inside)), raised))
+    order = np.append(order, keep)
     factors = superlu((matrix[order][:, order] + added).tocsc(), "NATURAL")
     rows, columns = factors.perm_r[len(inside) :], factors.perm_c[len(inside) :]
     lower: Sparse = factors.L.tocsr()
     upper: Sparse = factors.U.tocsr()
-    reduced = lower[rows][:, columns].toarray() @ upper[columns][:, columns].toarray()
-    reduced -= np.diag(raised)
-    return reduced[:k, :k], reduced[:k, k:]
+    schur: Array = lower[rows][:, columns].toarray() @ upper[columns][:, columns].toarray()
+    return schur - np.diag(raised)
 
 
 def solve_symmetric(matrix: Sparse, right: Array) -> Array:
