@@ -152,7 +152,9 @@ class MumpsFactors:
         self.lower = np.zeros((len(keep), len(keep)))
         beside += float(self.lower.nbytes)
         needed, error = ctypes.c_double(), ctypes.c_int()
-        row, column = ((i + 1).astype(np.int32) for i in (upper.row, upper.col))
+        row, column = (i.astype(np.int32, copy=False) for i in (upper.row, upper.col))
+        for index in row, column:
+            index += 1
         mumps.damjoint_factorise.restype = ctypes.c_void_p
         with as_other_libraries():
             factors = mumps.damjoint_factorise(
@@ -253,32 +255,36 @@ def schur_complement(matrix: Sparse, keep: IntArray, loads: Array) -> tuple[Arra
     """
     mumps = library()
     if mumps is None:
-        return condense_with_loads(matrix, keep, sparse.csr_matrix(loads))[:2]
+        size, k = matrix.shape[0], len(keep)
+        keep = np.append(keep, np.arange(size, size + loads.shape[1]))
+        schur = schur_by_superlu(bordered(matrix, sparse.csr_matrix(loads)), keep)
+        return schur[:k, :k], schur[:k, k:]
     what = unknowns_text(matrix, keep)
     check_memory(dense_memory(len(keep)), what)
     factors = MumpsFactors(mumps, matrix, keep, what, loads.nbytes)
     return factors.schur, loads[keep] - matrix[keep] @ factors.solve(loads)
 
 
-def condense_with_loads(
-    matrix: Sparse, keep: IntArray, loads: Sparse
-) -> tuple[Array, Array, Array]:
-    """As `schur_complement`, and (m, m) the work of each load on the displacements of each other
-    one with `keep` fixed.
+def dense_schur(matrix: Sparse, keep: IntArray) -> Array:
+    """Dense Schur complement (k, k) of a symmetric matrix on the k unknowns `keep`; the rest must
+    be positive definite. No factors are stored.
 
-    Loads are a border of the matrix, so that no factors are stored.
+    Raises RunError if the estimated memory is not available, MemoryError if an allocation fails.
     """
     what = unknowns_text(matrix, keep)
-    size, k = matrix.shape[0], len(keep)
-    bordered: Sparse = sparse.bmat([[matrix, loads], [loads.T, None]], format="csr")
-    keep = np.append(keep, np.arange(size, bordered.shape[0]))
     check_memory(dense_memory(len(keep)), what)
     mumps = library()
     if mumps is None:
-        schur = schur_by_superlu(bordered, keep)
-    else:
-        schur = MumpsFactors(mumps, bordered, keep, what, store=False).schur
-    return schur[:k, :k].copy(), schur[:k, k:].copy(), -schur[k:, k:]
+        return schur_by_superlu(matrix, keep)
+    return MumpsFactors(mumps, matrix, keep, what, store=False).schur
+
+
+def bordered(matrix: Sparse, loads: Sparse) -> Sparse:
+    """A symmetric matrix (n, n) with a border of loads (n, m). Its Schur complement on unknowns of
+    the matrix and the border has the loads reduced to those unknowns and, negative, the work of
+    each load on the displacements by each other one.
+    """
+    return sparse.bmat([[matrix, loads], [loads.T, None]], format="csr")
 
 
 def superlu(matrix: Sparse, ordering: Literal["NATURAL", "MMD_AT_PLUS_A"]) -> SuperLU:

@@ -14,7 +14,7 @@ from scipy import sparse
 
 from ..arrays import Array, IntArray, Sparse
 from .bodies import Bodies
-from .factor import condense_with_loads
+from .factor import bordered, dense_schur
 from .glued_bodies import GluedBodies
 from .gluing import Gluing
 from .responses import Responses
@@ -38,14 +38,16 @@ def responses_at_once(bodies: Bodies, gluing: Gluing) -> Responses:
         loaded.append(motion[name][dofs])
         dof_of_face |= {face: column[of_face] for face, of_face in body.face_dofs.items()}
     crest_body, crest = bodies.crest
-    rows = [*loaded, *unit_loads.values(), motion[crest_body][crest]]
-    stiffness = sum(m.T @ bodies.by_name[name].stiffness @ m for name, m in motion.items())
-    jumps = np.arange(len(glued.free), stiffness.shape[0])
+    rows: list[Sparse] = [*loaded, *unit_loads.values(), motion[crest_body][crest]]
     loads = sparse.vstack(rows, format="csr").T
-    joints, forces, moved = condense_with_loads(stiffness, jumps, loads)
-    at_crest = moved[-1]
+    stiffness = sum(m.T @ bodies.by_name[name].stiffness @ m for name, m in motion.items())
+    matrix = bordered(stiffness, loads)
+    del stiffness
+    schur = dense_schur(matrix, np.arange(len(glued.free), matrix.shape[0]))
+    joints, border = slice(0, gluing.unknowns), slice(gluing.unknowns, None)
+    forces, at_crest = schur[joints, border].copy(), -schur[-1, border]
     return Responses(
-        stiffness=joints,
+        stiffness=schur[joints, joints].copy(),
         units=dict(zip(unit_loads, forces[:, count:-1].T, strict=True)),
         pressure=forces[:, :count],
         dof_of_face=dof_of_face,
