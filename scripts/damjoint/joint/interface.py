@@ -281,7 +281,9 @@ class Interface:
         """Linear system of the undamaged joints for a tangent (q, 3, 3); the last one is kept."""
         if self._undamaged is None or not np.array_equal(tangent, self._undamaged.tangent):
             points = np.arange(len(self.weights))
-            matrix = self.bulk.stiffness + self.stiffness(tangent, points).toarray()
+            of_joints = self.stiffness(tangent, points).tocoo()
+            matrix = self.bulk.stiffness.copy()
+            matrix[of_joints.row, of_joints.col] += of_joints.data
             self._undamaged = UndamagedSystem(tangent, matrix)
         return self._undamaged
 
