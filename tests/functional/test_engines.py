@@ -178,6 +178,7 @@ SECTIONS = {
     "all loads": (SHAPE | STAGED, "20,41", "0"),
     "lift, all loads": (SHAPE | STAGED | {"joint_height": 10.0, "law": "bond"}, "20,41", "0"),
     "falling base": ({"joint_slope": -4.0, "law": "friction", "adhesion": 4e5}, "30,44", "2"),
+    "bed below the heel": ({"joint_slope": -4.0, "floor_water": 1.0}, "30,44", "0,5"),
     "sloping lift": ({"joint_height": 20.0, "joint_slope": 3.0} | SHAPE, "30,46.5", "0,24"),
     "drains, overtopped": ({"uplift": "drained", "joint_slope": 3.0}, "20,46.5", "0,5"),
     "drains, USBR": ({"uplift": "drained", "drain_reference": "reservoir"}, "20,45", "0,5"),
