@@ -62,6 +62,8 @@ def check_own(mesh: Mesh, case: Case) -> None:
     shapes = {shape for solid in mesh.solids.values() for shape, _ in solid.cells}
     if mesh.dim == 3 and shapes != {"tetra"}:
         raise InputError(f"geometry = {case.geometry}: must have tetrahedra with engine = getdp")
+    if mesh.divided:
+        mesh.face_entities()
     for joint, own in zip(mesh.joints, case.joints, strict=True):
         if joint.upper == joint.lower:
             raise InputError(
