@@ -230,7 +230,9 @@ class Session:
             return
         if before and before.path != sheet.path:
             self.drop_results()
-        if not self.scenes:
+        if sheet.problem:
+            self.free(sheet.problem, tree.BAD)
+        elif not self.scenes:
             self.free("ready: press Run", tree.CALM)
         elif sheet.request != self.last_request:
             self.free("changed since the run: press Run", tree.CALM)
