@@ -380,6 +380,14 @@ def test_the_drawing_follows_the_geometry_and_can_be_meshed(open_window):
     assert len(gmsh.model.mesh.getNodes()[0]) > 100
 
 
+def test_lift_joints_are_drawn(open_window, tmp_path):
+    mine = tmp_path / "mine.case"
+    mine.write_text("lift_heights() = {20}; levels() = {30};")
+    open_window(str(mine))
+    heights = [gmsh.model.getBoundingBox(*curve)[4] for curve in gmsh.model.getEntities(1)]
+    assert pytest.approx(20, abs=1e-6) in heights
+
+
 BAD_VALUES = [
     (tree.LEVELS, "3, 60", "levels = 60: must be between 0 and 20 m"),
     (tree.LEVELS, "high", "levels = high: must be a list of levels in metres"),
