@@ -13,7 +13,8 @@ import gmsh
 import numpy as np
 import pytest
 from damjoint.gui import tree, views
-from damjoint.gui.graphs import INTERVALS, MARGIN, METRES, Scale, thinned
+from damjoint.gui.curves import METRES
+from damjoint.gui.graphs import INTERVALS, MARGIN, Scale, thinned
 from damjoint.gui.layout import ABOVE_AXES, BELOW_AXES, BESIDE_AXES, Layout
 from damjoint.gui.sheet import Request, titles
 from damjoint.gui.views import caption

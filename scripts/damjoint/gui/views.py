@@ -27,6 +27,7 @@ from ..model.fields import (
 from ..post.units import LENGTHS, STRESSES, unit, with_unit
 from . import layout as places
 from .camera import CLIPPED
+from .curves import show_graphs
 from .gallery import (
     BALANCED,
     DARK,
@@ -42,7 +43,7 @@ from .gallery import (
     Color,
     Gallery,
 )
-from .graphs import Graphs, show_graphs
+from .graphs import Graphs
 from .layout import LEFT, Layout
 from .numbers import three_digits
 from .scene import SolvedScene

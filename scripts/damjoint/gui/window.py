@@ -192,7 +192,7 @@ class Session:
             request = self.tree.request()
         except InputError as error:
             self.hide_results()
-            self.on_rejected(str(error))
+            self.on_failed(str(error))
             return None
         if request != self.last_request:
             self.hide_results()
@@ -240,16 +240,8 @@ class Session:
             self.show(self.scene_shown)
             self.free(*self.last_status)
 
-    def on_rejected(self, message: str) -> None:
-        """A value is bad: only show the message."""
-        self.free(message, tree.BAD)
-
     def on_failed(self, message: str) -> None:
-        """A run, check or save has failed."""
-        self.free(message, tree.BAD)
-
-    def on_died(self, message: str) -> None:
-        """The engine's process has ended, by a second Stop or by itself."""
+        """A value is bad; a run, check or save has failed; or the engine's process has ended."""
         self.free(message, tree.BAD)
 
     def on_step(self, reached: str) -> None:
