@@ -498,6 +498,7 @@ def do_quake(arguments: argparse.Namespace) -> int:
     from .model import parameters
     from .model.case import load
     from .studies import quake
+    from .studies.quake_result import text
 
     case = load(
         arguments.case,
@@ -514,7 +515,7 @@ def do_quake(arguments: argparse.Namespace) -> int:
     fields = arguments.fields is not None
     result = quake.run(case, out, arguments.fields, fields, not arguments.no_picture)
     print(f"{case.name}: {result.statement}; {len(result.rows['time'])} steps; {out}\n")
-    print(quake.text(result))
+    print(text(result))
     return int(not result.stands)
 
 
