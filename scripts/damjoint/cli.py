@@ -473,14 +473,17 @@ def add_quake(commands: Commands) -> None:
         "record_unit (default: that of the case)",
     )
     command.add_path("--out", "FOLDER", help="output folder (default: out/CASE_quake)")
+    help_engine = f"{ENGINE}: tables only, and an interrupted run starts again"
+    command.add_argument("--engine", default="auto", metavar="NAME", help=help_engine)
     command.add_argument("--no-picture", action="store_true", help="draw no PNG")
 
 
 def do_quake(arguments: argparse.Namespace) -> int:
     """Run damjoint quake; 1 if there is no static equilibrium after the earthquake."""
+    from .engines import engine_of
     from .model import parameters
     from .model.case import load
-    from .studies import quake
+    from .studies import quake, quake_getdp
 
     if arguments.accuracy:
         raise InputError(f"accuracy = {arguments.accuracy}: must not be set for damjoint quake")
@@ -492,12 +495,17 @@ def do_quake(arguments: argparse.Namespace) -> int:
         arguments.steps,
         record=arguments.record,
     )
-    if case["dim"] == 3:
+    engine_of(case, arguments.engine)
+    if case["dim"] == 3 and arguments.engine != "getdp":
         warn_if_slow()
     out = arguments.out or Path("out") / f"{case.name}_quake"
-    result = quake.run(case, out, not arguments.no_picture)
+    result: quake.QuakeResult | quake_getdp.GetdpQuakeResult
+    if arguments.engine == "getdp":
+        result = quake_getdp.run(case, out)
+    else:
+        result = quake.run(case, out, not arguments.no_picture)
     print(f"{case.name}: {result.statement}; {len(result.rows['time'])} steps; {out}\n")
-    print(quake.text(result))
+    print(quake.text(result.case, result.summary))
     return int(not result.stands)
 
 

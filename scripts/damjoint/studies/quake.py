@@ -198,16 +198,6 @@ def finished(
     full = with_full_uplift(quake)
     if full is not None:
         found["after"]["equilibrium_with_full_uplift_in_the_crack"] = full
-    slips = [
-        f"{1e3 * found['residual'][column_of('slip', k)]:.3g} mm"
-        for k in range(len(quake.case.joints))
-    ]
-    words = f"residual slip {', '.join(slips)}; "
-    words += (
-        "the dam stands after the earthquake"
-        if after is not None
-        else "no static equilibrium is found after the earthquake"
-    )
     return QuakeResult(
         case=quake.case,
         rows=history.table,
@@ -216,7 +206,7 @@ def finished(
         bodies={name: space.body for name, space in quake.system.spaces.items()},
         summary=found,
         stands=after is not None,
-        statement=words,
+        statement=statement_of(quake.case, found),
     )
 
 
@@ -270,8 +260,6 @@ def stress_table(quake: Earthquake, history: QuakeHistory) -> Table:
 def summary(quake: Earthquake, history: QuakeHistory) -> dict[str, Any]:
     """Peaks with their times, residual values, frequencies, damping and the rigid block."""
     case, rows, record = quake.case, history.table, quake.record
-    joints = range(len(case.joints))
-    names = [*PEAKS, *(column_of(name, k) for k in joints for name in PEAKS_OF_JOINTS)]
     result: dict[str, Any] = {
         "record": str(case.record),
         "duration": record.duration,
@@ -287,12 +275,23 @@ def summary(quake: Earthquake, history: QuakeHistory) -> dict[str, Any]:
     }
     if not len(history):
         return result
-    result["peaks"] = {}
-    for name in names:
+    result |= peaks_and_rest(case, rows)
+    for k, joint in enumerate(case.joints):
+        block = rigid_block(quake, k).slip(record) if joint.law.limits_shear else None
+        if block is not None:
+            result["residual"][column_of("rigid_block", k)] = block
+    return result
+
+
+def peaks_and_rest(case: Case, rows: Table) -> dict[str, Any]:
+    """Largest values with their times, and residual slip and tilt, from the rows of quake.csv."""
+    joints = range(len(case.joints))
+    peaks = {}
+    for name in (*PEAKS, *(column_of(name, k) for k in joints for name in PEAKS_OF_JOINTS)):
         row = int(np.argmax(np.abs(rows[name])))
-        result["peaks"][name] = {"value": rows[name][row], "time": rows["time"][row]}
+        peaks[name] = {"value": rows[name][row], "time": rows["time"][row]}
     last = rows["time"] > rows["time"][-1] - MEAN_OVER
-    residual = result["residual"] = {}
+    residual = {}
     for k in joints:
         heel, toe, slip = (
             rows[column_of(name, k)][last].mean()
@@ -300,10 +299,20 @@ def summary(quake: Earthquake, history: QuakeHistory) -> dict[str, Any]:
         )
         residual[column_of("slip", k)] = slip
         residual[column_of("tilt", k)] = (heel - toe) / case.joints[k].joint_along
-        if case.joints[k].law.limits_shear:
-            block = rigid_block(quake, k).slip(record)
-            residual |= {} if block is None else {column_of("rigid_block", k): block}
-    return result
+    return {"peaks": peaks, "residual": residual}
+
+
+def statement_of(case: Case, found: dict[str, Any]) -> str:
+    """What a summary says of the end of an earthquake."""
+    slips = [
+        f"{1e3 * found['residual'][column_of('slip', k)]:.3g} mm" for k in range(len(case.joints))
+    ]
+    end = (
+        "the dam stands after the earthquake"
+        if found["after"]["equilibrium"]
+        else "no static equilibrium is found after the earthquake"
+    )
+    return f"residual slip {', '.join(slips)}; {end}"
 
 
 def rigid_block(quake: Earthquake, number: int) -> RigidBlock:
@@ -355,12 +364,11 @@ def write_info(static: LoadStepper, out: Path, found: dict[str, Any], state: str
     folders.write_info(results, out, state, why)
 
 
-def text(result: QuakeResult) -> str:
-    """Peaks and residual values as printed tables."""
-    found = result.summary
+def text(case: Case, found: dict[str, Any]) -> str:
+    """Peaks and residual values of a summary as printed tables."""
     units = {"slip": "m", "tilt": "-", "rigid_block": "m"}
     meaning = {"slip": "residual slip", "tilt": "residual tilt", "rigid_block": "rigid block, slip"}
-    columns = quake_columns(result.case)
+    columns = quake_columns(case)
     peaks = [
         (name, columns[name][0], f"{p['value']:.4g}", f"{p['time']:.3f}")
         for name, p in found["peaks"].items()

@@ -107,11 +107,15 @@ def own_lists(mesh: Mesh) -> dict[str, list[float]]:
 
 
 def write_problem(
-    case: Case, mesh: Mesh | None, folder: Path, options: dict[str, float] | None = None
+    case: Case,
+    mesh: Mesh | None,
+    folder: Path,
+    options: dict[str, float] | None = None,
+    more_lists: dict[str, list[float]] | None = None,
 ) -> Path:
     """Write the problem file of a case, scene.pro, into the folder of its results.
 
-    mesh: of a user's own geometry; options: further constants of pro/*.pro.
+    mesh: of a user's own geometry; options, more_lists: further constants and lists of pro/*.pro.
     """
     lists: dict[str, Sequence[float]] = {
         "levels": case.levels,
@@ -121,6 +125,7 @@ def write_problem(
     }
     if case.geometry and mesh:
         lists |= own_lists(mesh)
+    lists |= more_lists or {}
     path = folder / "scene.pro"
     path.write_text(
         assignments(case.values)
