@@ -35,6 +35,11 @@ MORE = {
     "halved": {"dt": 0.02, "damping": 0.0, "sigma_max": 2e5, "G_f": 20.0, "G_t": 50.0}
     | {"law": "bond", "adhesion": 2e5, "record_component": "horizontal"},
     "solid": SOLID,
+    "three joints": {
+        "lift_heights": (15.0, 30.0),
+        "mu": (1.2, 0.7, 0.9),
+        "law": ("bond", "friction", "rupture"),
+    },
 }
 
 
@@ -131,7 +136,6 @@ def test_the_command_writes_the_tables_of_both_engines(command, case_file):
     [
         (["--set", "quake_uplift=zero"], "quake_uplift = zero: must be crack or unchanged with"),
         (["--set", "face_load=uniform"], "face_load = uniform: must be hydrostatic with engine"),
-        (["--set", "lift_heights=15"], "a dam with several joints (2)"),
         (["--set", "k_h=0.1"], "k_h = 0.1: must be 0 for damjoint quake"),
         (["--engine", "fast"], "engine = fast: must be one of auto, condensed, getdp"),
     ],

@@ -323,11 +323,12 @@ def levels_of(name: str, levels: Any) -> tuple[float, ...]:
 
 def assignments(values: Mapping[str, Value]) -> str:
     """Lines default_name = value; in the common language of Gmsh and GetDP."""
-    lines = (
-        f'default_{n} = "{v}";\n' if isinstance(v, str) else f"default_{n} = {v!r};\n"
-        for n, v in values.items()
-    )
-    return "".join(lines)
+    return "".join(f"default_{name} = {quoted(value)};\n" for name, value in values.items())
+
+
+def quoted(value: Value) -> str:
+    """A value in that language."""
+    return f'"{value}"' if isinstance(value, str) else repr(value)
 
 
 def listing(name: str, values: Iterable[float]) -> str:

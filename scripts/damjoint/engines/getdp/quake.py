@@ -19,21 +19,21 @@ from ...dynamics.record import Record
 from ...dynamics.stepper import Damping
 from ...model.case import Case
 from ...model.mesh import mesh_of
-from ...model.results import Results, quake_columns
+from ...model.results import Results, column_of, quake_columns
 from . import process, tables
 from .solve import check as check_static
 from .solve import check_sizes
 
-#: Columns of quake.txt (pro/quake.pro), after the word "motion": those of quake.csv, but
-#: displacements and jumps count from the undeformed dam, slip_mean is an integral over the joint,
-#: and shear_reserve is the largest shear force.
-ROWS = [
-    *("time", "ground_ax", "ground_ay", "crest_ux", "crest_ax"),
+#: Columns of quake.txt (pro/quake.pro), after the word "motion", and of quake_joints.txt, after
+#: "joint": those of quake.csv, but displacements and jumps count from the undeformed dam, slip_mean
+#: is an integral over the joint, and shear_reserve is the largest shear force.
+ROWS = ["time", "ground_ax", "ground_ay", "crest_ux", "crest_ax", "iterations", "dt", "residual"]
+ROWS_OF_JOINTS = [
     *("heel_opening", "toe_opening", "slip_mean", "slip_heel", "slip_toe"),
-    *("N", "T", "M", "U", "shear_reserve", "open_length", "iterations", "dt", "residual"),
+    *("N", "T", "M", "U", "shear_reserve", "open_length"),
 ]
 #: Those that count from the static state, the first row.
-FROM_STATIC = "crest_ux", "slip_mean", "slip_heel", "slip_toe"
+FROM_STATIC = "slip_mean", "slip_heel", "slip_toe"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,11 +55,6 @@ class GetdpQuake:
 def check(case: Case) -> None:
     """Raise InputError if GetDP can not compute the earthquake of a case."""
     check_static(case)
-    if len(case.joints) > 1:
-        raise InputError(
-            "engine = getdp: must be condensed for the earthquake of a dam with several joints "
-            f"({len(case.joints)})"
-        )
     if case.geometry:
         raise InputError(
             f"geometry = {case.geometry}: must be a section by parameters for an earthquake with "
@@ -114,7 +109,7 @@ def solve(
             stands = (folder / "after.txt").read_text() == "1\n"
         try:
             static = tables.read(with_state_after(case) if stands else case, folder)[0]
-            rows = read_rows(case, folder / "quake.txt")
+            rows = read_rows(case, folder)
         except (OSError, ValueError, IndexError) as damage:
             raise error or RunError(f"GetDP: its tables can not be read: {damage}") from None
     if stands is None and not static.stopped and not error:
@@ -141,17 +136,22 @@ def with_state_after(case: Case) -> Case:
     )
 
 
-def read_rows(case: Case, path: Path) -> Table:
-    """The complete rows of quake.txt, as those of quake.csv.
+def read_rows(case: Case, folder: Path) -> Table:
+    """The complete rows of quake.txt and quake_joints.txt, as those of quake.csv.
 
-    Raises OSError, ValueError if the file is damaged.
+    Raises OSError, ValueError if a file is damaged.
     """
-    lines = path.read_text().split("\n")[:-1] if path.exists() else []
-    steps = np.array([line.split()[1:] for line in lines], float).reshape(-1, len(ROWS))
+    steps = tables.complete_rows(folder / "quake.txt", ROWS)
+    of_joints = tables.complete_rows(folder / "quake_joints.txt", ROWS_OF_JOINTS)
+    number = len(case.joints)
     rows = dict(zip(ROWS, steps.T, strict=True))
-    for name in FROM_STATIC:
-        rows[name] = rows[name] - rows[name][:1]
-    rows["slip_mean"] /= case.joint_length
-    strength = rows["shear_reserve"] if case.law.limits_shear else np.inf
-    rows["shear_reserve"] = strength - np.abs(rows["T"])
+    rows["crest_ux"] = rows["crest_ux"] - rows["crest_ux"][:1]
+    for k, joint in enumerate(case.joints):
+        own = dict(zip(ROWS_OF_JOINTS, of_joints[k::number][: len(steps)].T, strict=True))
+        for name in FROM_STATIC:
+            own[name] = own[name] - own[name][:1]
+        own["slip_mean"] /= joint.joint_length
+        strength = own["shear_reserve"] if joint.law.limits_shear else np.inf
+        own["shear_reserve"] = strength - np.abs(own["T"])
+        rows |= {column_of(name, k): values for name, values in own.items()}
     return {name: rows[name][1:] for name in quake_columns(case)}
