@@ -28,6 +28,10 @@ MORE = {
     "dry": {"uplift": "none", "added_mass": 0.0},
     "flow": {"uplift": "flow"},
     "flow, unchanged": {"uplift": "flow", "quake_uplift": "unchanged"},
+    "no uplift in the crack": {"quake_uplift": "zero"},
+    "flow, none in the crack": {"uplift": "flow", "quake_uplift": "zero"},
+    "dashpots": {"joint_damping_n": 1e8, "joint_damping_t": 5e7},
+    "dashpots, rupture": {"law": "rupture", "sigma_max": 2e5, "joint_damping_n": 1e8},
     "cracked bond": {"uplift": "cracked"} | BOND,
     "Rayleigh, Newmark": {"damping_mass": 1.0, "hht_alpha": 0.0},
     "Zangar, batter": {"added_mass": 2.0, "hht_alpha": -0.3} | BATTER,
@@ -134,8 +138,10 @@ def test_the_command_writes_the_tables_of_both_engines(command, case_file):
 @pytest.mark.parametrize(
     "options, message",
     [
-        (["--set", "quake_uplift=zero"], "quake_uplift = zero: must be crack or unchanged with"),
-        (["--set", "face_load=uniform"], "face_load = uniform: must be hydrostatic with engine"),
+        (
+            ["--set", "face_load=uniform"],
+            "face_load = uniform: must be hydrostatic for an earthquake",
+        ),
         (["--set", "k_h=0.1"], "k_h = 0.1: must be 0 for damjoint quake"),
         (["--engine", "fast"], "engine = fast: must be one of auto, condensed, getdp"),
     ],
