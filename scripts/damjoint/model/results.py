@@ -239,12 +239,13 @@ def rows_of(table: Table, number: int, columns: Collection[str]) -> Table:
 
 def rows_at(table: Table, time: float | None = None) -> Table:
     """The rows of one time (the last one by default), sorted joint by joint, from heel to toe, then
-    by z.
+    by z, y and x.
     """
     time = table["time"].max() if time is None else time
     rows = np.flatnonzero(np.isclose(table["time"], time))
-    s, z = (np.round(table[n][rows] / (np.abs(table["s"]).max() or 1.0), 9) for n in "sz")
-    rows = rows[np.lexsort((z, s, table["joint"][rows]))]
+    scale = np.abs(table["s"]).max() or 1.0
+    x, y, z, s = (np.round(table[n][rows] / scale, 9) for n in "xyzs")
+    rows = rows[np.lexsort((x, y, z, s, table["joint"][rows]))]
     return {name: column[rows] for name, column in table.items()}
 
 

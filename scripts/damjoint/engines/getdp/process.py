@@ -258,10 +258,12 @@ class Runner:
         Raises RunError, OSError (a full disk, which GetDP itself does not notice).
         """
         problem = write_problem(case, mesh, folder, {"views": 0.0, "fields": float(fields)})
-        steps = []
+        steps, of_joints = [], []
 
         def watch(line: str) -> None:
-            if match := re.match(rf"step {NUMBER} ", line):
+            if line.startswith("joint "):
+                of_joints.append(line)
+            elif match := re.match(rf"step {NUMBER} ", line):
                 steps.append(line)
                 on_step(float(match[1]))
 
@@ -270,6 +272,7 @@ class Runner:
         if (numbering := problem.with_suffix(".pre")).exists():  # GetDP reads it, too
             check_end(numbering, *(f"$End{block}\n" for block in LAST_BLOCKS))
         if steps:
+            check_end(folder / "joints.txt", "".join(of_joints))
             check_end(folder / "history.txt", "".join(steps))
         status = folder / "status.txt"
         if not status.exists():
