@@ -133,7 +133,8 @@ def with_state_after(case: Case) -> Case:
 
 
 def read_rows(case: Case, folder: Path) -> Table:
-    """The complete rows of quake.txt and quake_joints.txt, as those of quake.csv.
+    """The complete rows of quake.txt and quake_joints.txt, as those of quake.csv that GetDP
+    computes.
 
     Raises OSError, ValueError if a file is damaged.
     """
@@ -150,4 +151,4 @@ def read_rows(case: Case, folder: Path) -> Table:
         strength = own["shear_reserve"] if joint.law.limits_shear else np.inf
         own["shear_reserve"] = strength - np.abs(own["T"])
         rows |= {column_of(name, k): values for name, values in own.items()}
-    return {name: rows[name][1:] for name in quake_columns(case)}
+    return {name: rows[name][1:] for name in quake_columns(case) if name in rows}
