@@ -177,7 +177,7 @@ def measure_quake(settings: dict, span: float) -> tuple:
         quake.steps_of_length[0] = TimeStep(quake.problem, quake.dt)
         set_up = time.perf_counter() - begin
         quake.record = first_part(quake.record, span)
-        history = QuakeHistory.of(quake.case)
+        history = QuakeHistory.of(quake)
         begin = time.perf_counter()
         for step in quake.steps():
             history.add(quake, step)

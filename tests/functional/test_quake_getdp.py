@@ -53,7 +53,7 @@ def both(tmp_path, settings, levels="30"):
     wave = 5 * np.sin(np.pi * times / 0.2) ** 2 * np.sin(10 * np.pi * times)
     record = write_record(tmp_path / "r.csv", times, wave, -0.7 * wave)
     quake = earthquake(record, SHORT | settings, levels)
-    history = QuakeHistory.of(quake.case)
+    history = QuakeHistory.of(quake)
     for step in quake.steps():
         history.add(quake, step)
     found = engine.solve(quake.case, quake.record, quake.damping, quake.dt, lambda _: None)

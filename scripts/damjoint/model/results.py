@@ -12,7 +12,6 @@ import numpy as np
 
 from ..arrays import Array, Table
 from .case import Case
-from .mesh import Body
 
 #: Columns of joint.csv: a row per joint node and requested level.
 JOINT = {
@@ -116,6 +115,9 @@ QUAKE = {
     "T": ("N/m", "shear force on the joint, downstream > 0"),
     "M": ("N m/m", "moment of N about the toe, stabilising > 0"),
     "U": ("N/m", "uplift: resultant of the water pressure in the joint"),
+    "T_inertia": ("N/m", "part of T: inertia of all that is above the joint, with its water"),
+    "N_inertia": ("N/m", "the same part of N"),
+    "M_inertia": ("N m/m", "the same part of M"),
     "shear_reserve": ("N/m", "largest shear force that the joint transmits, mu N + c L, minus |T|"),
     "open_length": ("m", "length of joint that is open or broken"),
     "iterations": ("-", "Newton iterations of the step"),
@@ -125,7 +127,7 @@ QUAKE = {
 #: Those of a joint. With several joints: of the first one; of joint 2, 3, ... by `column_of`.
 QUAKE_OF_JOINTS = (
     *("heel_opening", "toe_opening", "slip_mean", "slip_heel", "slip_toe"),
-    *("N", "T", "M", "U", "shear_reserve", "open_length"),
+    *("N", "T", "M", "U", "T_inertia", "N_inertia", "M_inertia", "shear_reserve", "open_length"),
 )
 
 
@@ -138,25 +140,6 @@ def quake_columns(case: Case) -> dict[str, tuple[str, str]]:
         for name in QUAKE_OF_JOINTS
     }
     return QUAKE | others
-
-
-@dataclass(frozen=True, kw_only=True)
-class QuakeResult:
-    """The rows of an earthquake and what they amount to."""
-
-    case: Case
-    rows: Table
-    #: time (rows,), distance from the heel (nodes,), effective normal stress (rows, nodes)
-    stress: Table
-    #: states with the largest displacements, in 2D: name, time [s], and the displacement since the
-    #: static state (nodes, 2) of each body [m]
-    shapes: list[tuple[str, float, dict[str, Array]]]
-    bodies: dict[str, Body]
-    #: for run.json
-    summary: dict[str, Any]
-    #: whether the dam is in static equilibrium after the earthquake
-    stands: bool
-    statement: str
 
 
 @dataclass
