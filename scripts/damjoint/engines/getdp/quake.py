@@ -142,7 +142,7 @@ def with_state_after(case: Case) -> Case:
 
 
 def read_rows(case: Case, path: Path) -> Table:
-    """The complete rows of quake.txt, as those of quake.csv.
+    """The complete rows of quake.txt, as those of quake.csv that GetDP computes.
 
     Raises OSError, ValueError if the file is damaged.
     """
@@ -154,4 +154,4 @@ def read_rows(case: Case, path: Path) -> Table:
     rows["slip_mean"] /= case.joint_length
     strength = rows["shear_reserve"] if case.law.limits_shear else np.inf
     rows["shear_reserve"] = strength - np.abs(rows["T"])
-    return {name: rows[name][1:] for name in quake_columns(case)}
+    return {name: rows[name][1:] for name in quake_columns(case) if name in rows}
