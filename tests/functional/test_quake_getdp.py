@@ -133,6 +133,8 @@ def test_the_command_writes_the_tables_of_both_engines(command, case_file):
     for name in "frequencies", "damping", "duration", "dt", "steps", "halvings":
         assert found[name] == wanted[name]
     assert found["residual"]["slip"] == pytest.approx(wanted["residual"]["slip"], rel=1e-5)
+    assert command("report", "getdp")[0] == 0
+    assert "earthquake wave.csv, " in Path("report.html").read_text()
 
 
 @pytest.mark.parametrize(

@@ -123,12 +123,11 @@ def write(result: GetdpQuakeResult, found: engine.GetdpQuake, out: Path, state: 
     static = found.static
     tables.write(static, out)
     tables.write_csv(out / quake.ROWS, result.rows)
+    getdp = static.info.pop("getdp")
     static.info |= {
-        "engine": "getdp",
-        "unknowns": found.usage.unknowns,
         "quake": result.summary,
-        "versions": versions() | {"getdp": found.usage.version or ""},
-        "wall_seconds": found.seconds,
+        "versions": versions() | {"getdp": getdp["version"] or ""},
+        "peak_memory_mb": getdp["peak_memory_mb"],
     }
     if not state:  # a joint that has slipped everywhere is no failure here
         static.info["verdict"] = "stands" if result.stands else "no equilibrium"

@@ -46,7 +46,6 @@ class GetdpQuake:
     rows: Table
     #: whether there is a static equilibrium after the earthquake; None: its end was not reached
     stands: bool | None
-    usage: process.Usage
     #: wall seconds of the static loads and of the time steps
     seconds: dict[str, float]
     error: BaseException | None = None
@@ -112,12 +111,19 @@ def solve(
         last = rows["time"][-1] if len(rows["time"]) else 0.0
         error = RunError(f"earthquake: after t = {last:.6g} s no equilibrium with any time step")
     ends = (shaking[:1] or [time.perf_counter()])[0], (shaking[-1:] or [time.perf_counter()])[0]
+    seconds = {"static": ends[0] - began, "earthquake": ends[1] - ends[0]}
+    info = {
+        "engine": "getdp",
+        "mesh": mesh.counts,
+        "unknowns": usage.unknowns,
+        "wall_seconds": seconds,
+        "getdp": {"version": usage.version, "peak_memory_mb": usage.memory},
+    }
     return GetdpQuake(
-        static=replace(static, case=case),
+        static=replace(static, case=case, info=info),
         rows=rows,
         stands=stands,
-        usage=usage,
-        seconds={"static": ends[0] - began, "earthquake": ends[1] - ends[0]},
+        seconds=seconds,
         error=error,
     )
 
