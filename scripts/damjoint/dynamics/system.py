@@ -64,14 +64,10 @@ class System:
         dim, size = bodies.mesh.dim, len(glued.free) + gluing.unknowns
         stiffness: Sparse = sparse.csr_matrix((size, size))
         of_mass, inertia = stiffness, np.zeros((size, 2))
-        motion: dict[str, Sparse] = {}
+        motion = glued.motion(gluing)
         densities = {region: case[name] for region, name in MASSIVE.items()}
         for name, body in bodies.by_name.items():
-            of_body, own = gluing.bodies[name], body.stiffness.shape[0]
-            ones = np.ones(len(of_body.dofs))
-            places = of_body.dofs, np.arange(len(of_body.dofs))
-            carried = sparse.csr_matrix((ones, places), (own, len(of_body.dofs))) @ of_body.jumps
-            moved = sparse.hstack([glued.numbers[name][:, glued.free], carried], format="csr")
+            moved = motion[name]
             of_solid = mass(body.space, dim, densities)
             of_water = added_mass(case, interface, body)
             stiffness = stiffness + moved.T @ body.stiffness @ moved
@@ -79,7 +75,6 @@ class System:
             x, y = (nodal(body.space, dim, uniform(axis)) for axis in np.eye(3)[:2])
             # the water follows a vertical motion of the ground
             inertia += moved.T @ np.column_stack([(of_solid + of_water) @ x, of_solid @ y])
-            motion[name] = moved
         return System(
             mass=of_mass.tocsr(),
             stiffness=stiffness.tocsr(),

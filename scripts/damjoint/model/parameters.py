@@ -32,7 +32,7 @@ AUTOMATIC = -1.0
 OF_JOINTS = (
     *("law", "uplift", "joint_slope", "aperture_min"),
     *("drains", "drain_x", "drain_effectiveness", "drain_level"),
-    "drain_reference",
+    *("drain_reference", "waterstop"),
     *("grout_pressure", "grout_t", "saw_thickness", "saw_t"),
 )
 #: Limits that mean > 0 and < 0.5 in the declarations; limit of ONELAB that means none.

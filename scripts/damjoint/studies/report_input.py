@@ -49,6 +49,7 @@ UPLIFTS = {
     "drained": "pressure piecewise linear from heel to drains to toe, independent of the opening",
     "cracked": "full reservoir head in the crack, linear beyond it",
     "flow": "laminar flow by the cubic law, with the computed opening",
+    "waterstop": "reservoir pressure from the heel to the waterstop, none behind it",
 }
 ADDED_MASS = {1: "Westergaard", 2: "Zangar"}
 QUAKE_UPLIFTS = {
