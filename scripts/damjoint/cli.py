@@ -501,6 +501,7 @@ def do_quake(arguments: argparse.Namespace) -> int:
     from .model import parameters
     from .model.case import load
     from .studies import quake, quake_getdp
+    from .studies.quake_result import QuakeResult, text
 
     case = load(
         arguments.case,
@@ -512,17 +513,19 @@ def do_quake(arguments: argparse.Namespace) -> int:
         record=arguments.record,
     )
     engine_of(case, arguments.engine)
+    if arguments.engine == "getdp" and arguments.fields:
+        raise InputError("--fields: must not be given with --engine getdp")
     if case["dim"] == 3 and arguments.engine != "getdp":
         warn_if_slow()
     out = arguments.out or Path("out") / f"{case.name}_quake"
-    result: quake.QuakeResult | quake_getdp.GetdpQuakeResult
+    result: QuakeResult | quake_getdp.GetdpQuakeResult
     if arguments.engine == "getdp":
         result = quake_getdp.run(case, out)
     else:
         fields = arguments.fields is not None
         result = quake.run(case, out, arguments.fields, fields, not arguments.no_picture)
     print(f"{case.name}: {result.statement}; {len(result.rows['time'])} steps; {out}\n")
-    print(quake.text(result.case, result.summary))
+    print(text(result.case, result.summary))
     return int(not result.stands)
 
 

@@ -145,6 +145,7 @@ def test_the_command_writes_the_tables_of_both_engines(command, case_file):
             "face_load = uniform: must be hydrostatic for an earthquake",
         ),
         (["--set", "k_h=0.1"], "k_h = 0.1: must be 0 for damjoint quake"),
+        (["--fields"], "--fields: must not be given with --engine getdp"),
         (["--engine", "fast"], "engine = fast: must be one of auto, condensed, getdp"),
     ],
 )

@@ -318,7 +318,7 @@ def show_table(gallery: Gallery, scene: SolvedScene, layout: Layout) -> None:
     """Show the table of all levels, the level shown marked; some levels if there are too many."""
     table = scene.table
     names = [
-        [*wrap(name, HEADING), f"[{size}]" if size else ""]
+        [*wrap(name, HEADING, break_long_words=False), f"[{size}]" if size else ""]
         for name, size in zip(table.names, table.units, strict=True)
     ]
     top = TABLE_TOP + places.LINE * max(map(len, names)) + ROW / 2

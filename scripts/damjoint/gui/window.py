@@ -17,8 +17,8 @@ import gmsh
 
 from .. import InputError, RunError, data
 from ..model.case import Case
-from ..model.mesh import shares
-from ..model.parameters import assignments, listing, start_gmsh
+from ..model.mesh import as_text, shares
+from ..model.parameters import listing, start_gmsh
 from . import export, tree, views
 from .camera import result_camera, undeformed_camera
 from .gallery import RED, Gallery
@@ -230,7 +230,9 @@ class Session:
             return
         if before and before.path != sheet.path:
             self.drop_results()
-        if not self.scenes:
+        if sheet.problem:
+            self.free(sheet.problem, tree.BAD)
+        elif not self.scenes:
             self.free("ready: press Run", tree.CALM)
         elif sheet.request != self.last_request:
             self.free("changed since the run: press Run", tree.CALM)
@@ -315,7 +317,7 @@ class Session:
         source = drawing = case.geometry or data("geo") / "dam.geo"
         if drawing.suffix == ".geo":  # may use parameters of the case
             values = case.values if case.geometry else shares(case)
-            text = assignments(values) + listing("levels", case.levels)
+            text = as_text(values) + listing("levels", case.levels)
             drawing = Path(self.folder.name) / f"{case.name}.geo"
             drawing.write_text(f'{text}Include "{source}";\n')
         gmsh.model.remove()

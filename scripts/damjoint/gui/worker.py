@@ -87,6 +87,8 @@ def serve(pipe: Connection) -> None:
             sheet = check_request(argument)
             pipe.send(("checked", sheet))
             if kind == "run":
+                if sheet.problem:
+                    raise InputError(sheet.problem)
                 run = run_quake if sheet.request.quake else run_case
                 scenes, write = run(sheet, pipe, stop)
                 pipe.send(("done", scenes))
