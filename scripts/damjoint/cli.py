@@ -480,6 +480,8 @@ def add_quake(commands: Commands) -> None:
         "record_unit (default: that of the case)",
     )
     command.add_path("--out", "FOLDER", help="output folder (default: out/CASE_quake)")
+    help_engine = f"{ENGINE}: tables only, and an interrupted run starts again"
+    command.add_argument("--engine", default="auto", metavar="NAME", help=help_engine)
     command.add_argument(
         "--fields",
         nargs="?",
@@ -495,10 +497,11 @@ def add_quake(commands: Commands) -> None:
 
 def do_quake(arguments: argparse.Namespace) -> int:
     """Run damjoint quake; 1 if there is no static equilibrium after the earthquake."""
+    from .engines import engine_of
     from .model import parameters
     from .model.case import load
-    from .studies import quake
-    from .studies.quake_result import text
+    from .studies import quake, quake_getdp
+    from .studies.quake_result import QuakeResult, text
 
     case = load(
         arguments.case,
@@ -509,13 +512,20 @@ def do_quake(arguments: argparse.Namespace) -> int:
         arguments.accuracy,
         record=arguments.record,
     )
-    if case["dim"] == 3:
+    engine_of(case, arguments.engine)
+    if arguments.engine == "getdp" and arguments.fields:
+        raise InputError("--fields: must not be given with --engine getdp")
+    if case["dim"] == 3 and arguments.engine != "getdp":
         warn_if_slow()
     out = arguments.out or Path("out") / f"{case.name}_quake"
-    fields = arguments.fields is not None
-    result = quake.run(case, out, arguments.fields, fields, not arguments.no_picture)
+    result: QuakeResult | quake_getdp.GetdpQuakeResult
+    if arguments.engine == "getdp":
+        result = quake_getdp.run(case, out)
+    else:
+        fields = arguments.fields is not None
+        result = quake.run(case, out, arguments.fields, fields, not arguments.no_picture)
     print(f"{case.name}: {result.statement}; {len(result.rows['time'])} steps; {out}\n")
-    print(text(result))
+    print(text(result.case, result.summary))
     return int(not result.stands)
 
 

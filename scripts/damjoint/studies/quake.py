@@ -144,16 +144,7 @@ class QuakeRun:
         full = self.stands_with_full_uplift()
         if full is not None:
             found["after"]["equilibrium_with_full_uplift_in_the_crack"] = full
-        slips = [
-            f"{1e3 * found['residual'][column_of('slip', k)]:.3g} mm"
-            for k in range(len(quake.case.joints))
-        ]
-        words = f"residual slip {', '.join(slips)}; "
-        words += (
-            "the dam stands after the earthquake"
-            if after is not None
-            else "no static equilibrium is found after the earthquake"
-        )
+        words = statement_of(quake.case, found)
         return self._result_of(found, after is not None, "", words)
 
     def result_so_far(self, error: BaseException) -> QuakeResult:
@@ -317,8 +308,6 @@ def follow(under_way: QuakeRun, path: Path, key: str, progress: bool) -> None:
 def summary(quake: Earthquake, history: QuakeHistory) -> dict[str, Any]:
     """Peaks with their times, residual values, frequencies, damping and the rigid block."""
     case, rows, record = quake.case, history.table, quake.record
-    joints = range(len(case.joints))
-    names = [*PEAKS, *(column_of(name, k) for k in joints for name in PEAKS_OF_JOINTS)]
     result: dict[str, Any] = {
         "record": str(case.record),
         "duration": record.duration,
@@ -334,12 +323,23 @@ def summary(quake: Earthquake, history: QuakeHistory) -> dict[str, Any]:
     }
     if not len(history):
         return result
-    result["peaks"] = {}
-    for name in names:
+    result |= peaks_and_rest(case, rows)
+    for k, joint in enumerate(case.joints):
+        block = rigid_block(quake, k).slip(record) if joint.law.limits_shear else None
+        if block is not None:
+            result["residual"][column_of("rigid_block", k)] = block
+    return result
+
+
+def peaks_and_rest(case: Case, rows: Table) -> dict[str, Any]:
+    """Largest values with their times, and residual slip and tilt, from the rows of quake.csv."""
+    joints = range(len(case.joints))
+    peaks = {}
+    for name in (*PEAKS, *(column_of(name, k) for k in joints for name in PEAKS_OF_JOINTS)):
         row = int(np.argmax(np.abs(rows[name])))
-        result["peaks"][name] = {"value": rows[name][row], "time": rows["time"][row]}
+        peaks[name] = {"value": rows[name][row], "time": rows["time"][row]}
     last = rows["time"] > rows["time"][-1] - MEAN_OVER * (1 - ROUND_OFF)
-    residual = result["residual"] = {}
+    residual = {}
     for k in joints:
         heel, toe, slip = (
             rows[column_of(name, k)][last].mean()
@@ -347,10 +347,20 @@ def summary(quake: Earthquake, history: QuakeHistory) -> dict[str, Any]:
         )
         residual[column_of("slip", k)] = slip
         residual[column_of("tilt", k)] = (heel - toe) / case.joints[k].joint_along
-        if case.joints[k].law.limits_shear:
-            block = rigid_block(quake, k).slip(record)
-            residual |= {} if block is None else {column_of("rigid_block", k): block}
-    return result
+    return {"peaks": peaks, "residual": residual}
+
+
+def statement_of(case: Case, found: dict[str, Any]) -> str:
+    """What a summary says of the end of an earthquake."""
+    slips = [
+        f"{1e3 * found['residual'][column_of('slip', k)]:.3g} mm" for k in range(len(case.joints))
+    ]
+    end = (
+        "the dam stands after the earthquake"
+        if found["after"]["equilibrium"]
+        else "no static equilibrium is found after the earthquake"
+    )
+    return f"residual slip {', '.join(slips)}; {end}"
 
 
 def rigid_block(quake: Earthquake, number: int) -> RigidBlock:

@@ -99,9 +99,8 @@ def modes(found: dict[str, Any]) -> str:
     return f"natural frequencies, joint closed, with the water: {frequencies} Hz; damping {ratios}"
 
 
-def text(result: QuakeResult) -> str:
-    """Peaks and residual values as printed tables."""
-    found = result.summary
-    tables = peaks_table(found, result.case), residual_table(found)
+def text(case: Case, found: dict[str, Any]) -> str:
+    """Peaks and residual values of a summary as printed tables."""
+    tables = peaks_table(found, case), residual_table(found)
     parts = [tabulate(table.rows, table.heads, disable_numparse=True) for table in tables]
     return "\n\n".join([modes(found), *parts])
