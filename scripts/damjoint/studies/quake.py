@@ -11,7 +11,6 @@ from typing import Any, TypeAlias
 
 import numpy as np
 from tabulate import tabulate
-from threadpoolctl import threadpool_limits
 
 from .. import ROUND_OFF, InputError, RunError
 from ..arrays import Array
@@ -43,6 +42,7 @@ from ..solver.model import Model, StepResult
 from ..solver.state import State
 from ..statics.verdict import statement
 from ..storage import atomic_write
+from ..threads import limited_threads
 from ..versions import versions
 
 #: Files of an earthquake: rows, tables of the joints in the frames, stress along the first joint in
@@ -331,7 +331,7 @@ def run(
 def single_thread() -> Iterator[None]:
     """Compute with a single thread, also in MUMPS: the matrices of a step are small."""
     factor.library()  # a limit reaches only libraries that are loaded
-    with threadpool_limits(1):
+    with limited_threads(1):
         yield
 
 
