@@ -181,8 +181,10 @@ def add_command(commands: Commands, call: Callable, summary: str, *options: Pars
     return command
 
 
-def parser() -> Parser:
-    """Return the parser of the command."""
+def parser(word: str = "") -> Parser:
+    """Return the parser of the command: of all commands, or of the one that the first word of the
+    command line names.
+    """
     top = Parser(
         prog="damjoint",
         description="Concrete gravity dams on a thin joint: opening, cracking, sliding and uplift.",
@@ -190,19 +192,13 @@ def parser() -> Parser:
     )
     top.add_argument("--version", action="version", version=__version__)
     commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True)
-    add_run(commands)
-    add_check(commands)
-    add_plot(commands)
-    add_report(commands)
-    add_gui(commands)
-    add_new(commands)
-    add_validate(commands)
-    add_critical(commands)
-    add_quake(commands)
-    add_sweep(commands)
-    add_stress(commands)
-    add_bench(commands)
-    add_law(commands)
+    adders = (
+        *(add_run, add_check, add_plot, add_report, add_gui, add_new, add_validate, add_critical),
+        *(add_quake, add_sweep, add_stress, add_bench, add_law),
+    )
+    named = [add for add in adders if add.__name__ == f"add_{word}"]
+    for add in named or adders:
+        add(commands)
     return top
 
 
@@ -765,7 +761,7 @@ def main(argv: list[str] | None = None) -> int:
     try:
         for word in words:
             check_encoding(word)
-        arguments = parser().parse_args(with_negative_lists(words))
+        arguments = parser(*words[:1]).parse_args(with_negative_lists(words))
         if getattr(arguments, "run_geo", False):
             os.environ[RUN_GEO] = "1"  # an environment variable, for the processes of a sweep
         return arguments.call(arguments)

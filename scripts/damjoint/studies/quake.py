@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from .. import ROUND_OFF, InputError, RunError
 from ..arrays import Array, Table
@@ -39,6 +38,7 @@ from ..solver.model import Model, StepResult
 from ..solver.state import State
 from ..statics.verdict import statement
 from ..storage import atomic_write
+from ..threads import limited_threads
 from ..versions import versions
 from .quake_result import QuakeResult
 
@@ -274,7 +274,7 @@ def run(
 def single_thread() -> Iterator[None]:
     """Compute with a single thread, also in MUMPS: the matrices of a step are small."""
     factor.library()  # a limit reaches only libraries that are loaded
-    with threadpool_limits(1):
+    with limited_threads(1):
         yield
 
 
