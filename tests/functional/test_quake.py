@@ -124,9 +124,11 @@ def body_inertia(quake, bodies):
     return resultant, toe
 
 
-@pytest.mark.parametrize("alpha", [-0.05, -0.3, 0.0])
-@pytest.mark.parametrize("vertical", [False, True])
-def test_momentum_is_balanced_at_every_step(tmp_path, alpha, vertical):
+@pytest.mark.parametrize(
+    "alpha, vertical, rock_mass",
+    [(-0.05, False, 0), (-0.3, True, 0), (0.0, False, 0), (-0.05, True, 1)],
+)
+def test_momentum_is_balanced_at_every_step(tmp_path, alpha, vertical, rock_mass):
     """(1 + alpha) T1 - alpha T0 = static load - inertia, likewise N, while the dam slides and
     rocks; damping by the stiffness and the static loads have no further part in it.
     """
@@ -134,7 +136,8 @@ def test_momentum_is_balanced_at_every_step(tmp_path, alpha, vertical):
     wave = 5 * np.sin(np.pi * times) ** 2 * np.sin(6 * np.pi * times)
     columns = [wave, -0.7 * wave] if vertical else [wave]
     record = write_record(tmp_path / "r.csv", times, *columns)
-    quake = earthquake(record, DAM | {"hht_alpha": alpha, "added_mass": 0.0}, "40")
+    settings = {"hht_alpha": alpha, "added_mass": 0.0, "rock_mass": rock_mass, "rho_found": 2600.0}
+    quake = earthquake(record, DAM | settings, "40")
     resultant, _ = body_inertia(quake, Bodies.of(quake.case))
     equilibrium = quake.problem.model.equilibrium
     forces = lambda state: np.array([joint_row(equilibrium, state, 0)[n] for n in "TN"])
@@ -226,7 +229,7 @@ def test_free_vibration_decays_as_rayleigh_damping_says(tmp_path):
     moved = replace(static, jump=static.jump + mode[system.jumps])
     state = replace(problem.at_rest, state=moved, motion=start, forces=forces)
     step, crest = TimeStep(problem, dt), []
-    nothing = (np.zeros(2), np.zeros(2))
+    nothing = np.zeros((2, system.size))
     for _ in range(600):
         state, _ = step.advance(state, nothing, static.pressures, True)
         crest.append((system.crest @ state.motion.displacement)[0])
@@ -615,6 +618,12 @@ def test_a_sweep_of_earthquakes(command, case_file, tmp_path):
         (["--set", "record_component=vertical"], "must have an acceleration other than zero"),
         (["--set", "hht_alpha=-0.5"], "hht_alpha = -0.5: must be"),
         (["--set", "dt=0"], "dt = 0: must be"),
+        (["--set", "rock_mass=1"], "rho_found = 0: must be > 0 with rock_mass = 1"),
+        (["--set", "rock_mass=2"], "rock_mass = 2: must be one of 0, 1"),
+        (
+            ["--set", "rock_mass=1", "--set", "rho_found=2600", "--set", "dim=3"],
+            "hold_z = 0: must be 1 with rock_mass = 1",
+        ),
         (["--set", "drive=crest"], "drive = crest: must be level for damjoint quake"),
         (["--record", "nothing.csv"], "record = nothing.csv: "),
         (["--accuracy", "1%"], "accuracy = 1%: must not be set for damjoint quake"),

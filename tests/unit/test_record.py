@@ -33,6 +33,17 @@ def test_a_record_that_does_not_start_at_zero_is_preceded_by_it(tmp_path):
     assert own.acceleration[:, 0] == pytest.approx([0, 1.5, 2, 3])
 
 
+def test_the_velocity_is_the_integral_of_the_acceleration(tmp_path):
+    path = write_record(tmp_path / "r.csv", [0, 0.1, 0.3], [0, 2, 1], [0, -4, 0])
+    own = record(path, record_rest=0.0).delayed(0.5)
+    assert own.times == pytest.approx([0, 0.5, 0.6, 0.8])
+    times = np.array([-1, 0.5, 0.55, 0.6, 0.7, 0.8, 0.9])
+    expected = np.array(
+        [[0, 0, 0.025, 0.1, 0.275, 0.4, 0.5], [0, 0, -0.05, -0.2, -0.5, -0.6, -0.6]]
+    )
+    assert own.velocity(times) == pytest.approx(expected.T, abs=1e-15)
+
+
 @pytest.mark.parametrize(
     "text, message",
     [

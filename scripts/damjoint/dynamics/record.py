@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import csv
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -91,10 +92,31 @@ class Record:
         """Acceleration along x and y (2,) [m/s2] at a time."""
         return at(self.times, self.acceleration, time)
 
+    def velocity(self, times: Array) -> Array:
+        """Velocity along x and y (n, 2) [m/s] at times (n,): the integral of the acceleration, zero
+        before the record.
+        """
+        row = np.clip(np.searchsorted(self.times, times, "right") - 1, 0, None)
+        since = np.maximum(times - self.times[row], 0)[:, None]
+        mean = (self.acceleration[row] + at(self.times, self.acceleration, times)) / 2
+        return self._velocities[row] + since * mean
 
-def at(times: Array, values: Array, time: float) -> Array:
-    """Rows of values (n, 2) at times (n,), linear between them."""
-    return np.array([np.interp(time, times, column) for column in values.T])
+    @cached_property
+    def _velocities(self) -> Array:
+        """Velocity at the times (n, 2)."""
+        means = (self.acceleration[1:] + self.acceleration[:-1]) / 2
+        return np.vstack([np.zeros(2), np.cumsum(np.diff(self.times)[:, None] * means, axis=0)])
+
+    def delayed(self, time: float) -> Record:
+        """The record later by a time [s], after rest."""
+        return Record(
+            np.append(0.0, self.times + time), np.vstack([np.zeros(2), self.acceleration])
+        )
+
+
+def at(times: Array, values: Array, time: float | Array) -> Array:
+    """Values (n, 2) at times (n,), linear between them, at a time (2,) or at times (m, 2)."""
+    return np.stack([np.interp(time, times, column) for column in values.T], axis=-1)
 
 
 def read(path: Path) -> Array:

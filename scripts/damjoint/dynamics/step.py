@@ -131,8 +131,6 @@ class Problem:
     damping: Sparse
     #: of the joints' dashpots, normal and tangential (3,) [Pa s/m]
     dashpots: Array
-    #: external load of a ground acceleration along x and y (n, 2)
-    inertia: Array
 
     @property
     def at_rest(self) -> Moving:
@@ -180,13 +178,13 @@ class TimeStep:
     def advance(
         self,
         begin: Moving,
-        ground: tuple[Array, Array],
+        loads: tuple[Array, Array],
         pressure: tuple[Pressure, ...],
         persist: bool,
     ) -> tuple[Moving, StepResult] | None:
         """A step from a state, None if it does not converge.
 
-        ground: acceleration of the ground (2,) at begin and end [m/s2]; pressure: in the joints,
+        loads: of the earthquake on the unknowns (n,) at begin and end; pressure: in the joints,
         constant in the step; persist: whether further strategies follow the first. Raises Diverged.
         """
         problem, dt = self.problem, self.dt
@@ -198,11 +196,11 @@ class TimeStep:
             right += problem.damping @ (weight * of_velocity + alpha * motion.velocity)
         if alpha:
             right += alpha * (system.stiffness @ motion.displacement)
-        right -= problem.inertia @ (weight * ground[1] - alpha * ground[0])
+        right += weight * loads[1] - alpha * loads[0]
         right[system.jumps] += alpha * begin.forces
         lifted = lift(self.equilibrium, pressure)
-        loads = self.factors.reduce(right) / weight + self.stiffness @ static.jump
-        loads += self.at_static + lifted
+        on_jumps = self.factors.reduce(right) / weight + self.stiffness @ static.jump
+        on_jumps += self.at_static + lifted
 
         equilibrium, interface = self.equilibrium, self.equilibrium.interface
         equilibrium.pressure = pressure
@@ -215,7 +213,7 @@ class TimeStep:
         variables = now.begin_step(equilibrium.laws, now.time).variables
 
         def size(jump: Array) -> float:
-            value = equilibrium.residual(jump, variables, now.loading, frozen_lift=loads).value
+            value = equilibrium.residual(jump, variables, now.loading, frozen_lift=on_jumps).value
             return float(np.linalg.norm(value))
 
         guess = min(now.jump, ahead, key=size)
@@ -228,7 +226,7 @@ class TimeStep:
             LevelControl(now.loading.level),
             strategies=self.model.strategies if persist else quick,
             guess=(guess, now.loading.level),
-            frozen_lift=loads,
+            frozen_lift=on_jumps,
         )
         if step is None:
             return None

@@ -15,6 +15,8 @@ from ..model.case import Case
 from ..solver.model import LARGEST_JUMP, Model
 from ..solver.newton import Diverged
 from ..solver.state import State
+from . import absorbing
+from .absorbing import AbsorbingRock, travel_time
 from .record import Record
 from .scheme import HHT
 from .step import Moving, Problem, TimeStep
@@ -75,23 +77,34 @@ class Earthquake:
 
         Raises InputError.
         """
+        absorbing.check(case)
         self.case, self.bodies, self.record = case, bodies, Record.of(case)
         interface = model.equilibrium.interface
-        self.system = system = System.of(case, bodies, interface)
+        massless = case.with_values({"rock_mass": 0.0})
+        self.system = system = System.of(massless, bodies, interface)
         undamaged = model.equilibrium.undamaged
         of_joints = interface.stiffness(undamaged, np.arange(len(interface.weights)))
-        #: natural frequencies [Hz] with undamaged joints and the water's mass
+        #: natural frequencies [Hz] with undamaged joints, the water's mass and massless rock
         self.frequencies = system.frequencies(of_joints, FREQUENCIES)[0]
         self.damping = Damping.of(case, self.frequencies)
         normal, tangential = case["joint_damping_n"], case["joint_damping_t"]
+        a0, a1 = self.damping.a0, self.damping.a1
+        damping = a0 * system.mass + a1 * system.stiffness
+        #: the rock, if it has mass
+        self.rock: AbsorbingRock | None = None
+        if case["rock_mass"]:
+            self.record = self.record.delayed(travel_time(case, self.record.interval))
+            self.system = system = System.of(case, bodies, interface)
+            self.rock = rock = AbsorbingRock.of(case, bodies, system.motion, self.record)
+            damping = a0 * (system.mass - rock.mass) + a1 * (system.stiffness - rock.stiffness)
+            damping += rock.dashpots
         self.problem = Problem(
             model=model,
             static=static,
             system=system,
             scheme=HHT(case["hht_alpha"]),
-            damping=self.damping.a0 * system.mass + self.damping.a1 * system.stiffness,
+            damping=damping,
             dashpots=np.array([normal, tangential, tangential]),
-            inertia=system.inertia,
         )
         given = case["dt"]
         #: longest step [s]
@@ -108,6 +121,11 @@ class Earthquake:
     def halvings(self) -> int:
         """How often the shortest step so far was halved."""
         return max(self.steps_of_length, default=0)
+
+    def load(self, time: float) -> Array:
+        """External forces of the earthquake (n,) at a time."""
+        load: Array = -self.system.inertia @ self.record.at(time)
+        return load + self.rock.load(time) if self.rock else load
 
     def steps(self) -> Iterator[Converged]:
         """Follow the record from the last state to its end, and yield each converged step.
@@ -153,14 +171,15 @@ class Earthquake:
         if halvings not in self.steps_of_length:
             self.steps_of_length[halvings] = TimeStep(self.problem, length)
         now = self.now
-        ground = self.record.at(now.time), self.record.at(now.time + length)
+        loads = self.load(now.time), self.load(now.time + length)
         pressure = pressures_in_motion(self.case, self.problem, now.state)
         persist = halvings == MOST_HALVINGS
         try:
-            found = self.steps_of_length[halvings].advance(now, ground, pressure, persist)
+            found = self.steps_of_length[halvings].advance(now, loads, pressure, persist)
         except Diverged:
             found = None
         if found is None:
             return None
         end, step = found
-        return Converged(end, ground[1], length, step.iterations, step.residual)
+        ground = self.record.at(now.time + length)
+        return Converged(end, ground, length, step.iterations, step.residual)

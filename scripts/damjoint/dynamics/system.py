@@ -33,7 +33,10 @@ from ..model.scene import UP
 #: Displacement (n, 3) of points (n, 3) in a rigid motion.
 Motion = Callable[[Array], Array]
 
-#: Regions that have mass, and the parameter of their density.
+#: The body and the region of the rock.
+ROCK = "foundation"
+
+#: Regions that always have mass, and the parameter of their density.
 MASSIVE = {"dam": "rho_dam", "lower": "rho_dam"}
 
 
@@ -59,14 +62,18 @@ class System:
 
     @staticmethod
     def of(case: Case, bodies: Bodies, interface: Interface) -> System:
-        """Assemble the bodies of a case, with the added mass of the reservoir at its last level."""
+        """Assemble the bodies of a case, with the added mass of the reservoir at its last level;
+        with rock_mass without the supports.
+        """
+        densities = {region: case[name] for region, name in MASSIVE.items()}
+        if case["rock_mass"]:
+            bodies, densities = bodies.without_supports, densities | {ROCK: case["rho_found"]}
         gluing = Gluing.of(bodies)
         glued = GluedBodies.of(bodies.by_name, gluing)
         dim, size = bodies.mesh.dim, len(glued.free) + gluing.unknowns
         stiffness: Sparse = sparse.csr_matrix((size, size))
         of_mass, inertia = stiffness, np.zeros((size, 2))
         motion = glued.motion(gluing)
-        densities = {region: case[name] for region, name in MASSIVE.items()}
         for name, body in bodies.by_name.items():
             moved = motion[name]
             of_solid = mass(body.space, dim, densities)

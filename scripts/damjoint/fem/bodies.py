@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -44,9 +44,11 @@ class ElasticBody:
     unit_loads: dict[str, Array]
     #: thermal strains of those of unit_loads at the middle of each element (elements,)
     unit_strains: dict[str, Array]
-    #: degrees of freedom: zero; on each of its joints, by number and whether the body is above it,
-    #: in the joint's order; of each wet face, in its order
+    #: degrees of freedom: zero, and those of them along z on the end faces; on each of its joints,
+    #: by number and whether the body is above it, in the joint's order; of each wet face, in its
+    #: order
     fixed_dofs: IntArray
+    fixed_along_z: IntArray
     joint_dofs: dict[tuple[int, bool], IntArray]
     face_dofs: dict[str, IntArray]
 
@@ -64,15 +66,16 @@ class ElasticBody:
         material = material_of(case)
         strains = {n: s for n, s in unit_strains(case).items() if s[0] in body.regions}
         thermal = {n: thermal_load(space, dim, material, *s) for n, s in strains.items()}
-        fixed = [dofs(within(mesh.bodies["fixed"], body))]
+        along_z = np.zeros(0, int)
         if dim == 3 and case["hold_z"]:
-            fixed.append(dofs(within(mesh.bodies["sides"], body), [2]))
+            along_z = np.unique(dofs(within(mesh.bodies["sides"], body), [2]))
         return ElasticBody(
             space=space,
             stiffness=elasticity(space, dim, material),
             unit_loads=dict(unit_loads(space, mesh, name)) | thermal,
             unit_strains={n: at_middles(space, *strain) for n, strain in strains.items()},
-            fixed_dofs=np.unique(np.concatenate(fixed)),
+            fixed_dofs=np.union1d(dofs(within(mesh.bodies["fixed"], body)), along_z),
+            fixed_along_z=along_z,
             joint_dofs={
                 (number, above): dofs(joint.face(above))
                 for number, joint in enumerate(mesh.joints)
@@ -165,3 +168,9 @@ class Bodies:
         name, mesh = self.mesh.bearer("crest"), self.mesh
         functions = self.by_name[name].space.find(Space(mesh.bodies["crest"], 1))
         return name, int(functions[0]) * mesh.dim
+
+    @property
+    def without_supports(self) -> Bodies:
+        """The same bodies, fixed along z on the end faces only."""
+        free = {n: replace(b, fixed_dofs=b.fixed_along_z) for n, b in self.by_name.items()}
+        return replace(self, by_name=free)

@@ -13,7 +13,7 @@ import numpy as np
 
 from .. import ROUND_OFF, InputError, RunError
 from ..arrays import Array, Table
-from ..dynamics import checkpoint
+from ..dynamics import absorbing, checkpoint
 from ..dynamics.frames import at_nodes
 from ..dynamics.history import QuakeHistory
 from ..dynamics.record import Record
@@ -85,6 +85,7 @@ def check(case: Case, span: Span = None) -> None:
                 f"{name} = {case[name]:g}: must be 0 for damjoint quake: the record replaces the "
                 "seismic coefficients"
             )
+    absorbing.check(case)
     duration = Record.of(case).duration
     if span and span[0] >= duration:
         raise InputError(
