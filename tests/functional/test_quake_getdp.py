@@ -144,6 +144,14 @@ def test_the_command_writes_the_tables_of_both_engines(command, case_file):
             ["--set", "face_load=uniform"],
             "face_load = uniform: must be hydrostatic for an earthquake",
         ),
+        (
+            ["--set", "rock_mass=1", "--set", "rho_found=2600"],
+            "rock_mass = 1: must be 0 for an earthquake with engine = getdp",
+        ),
+        (
+            ["--set", "time_integration=published"],
+            "time_integration = published: must be HHT for an earthquake with engine = getdp",
+        ),
         (["--set", "k_h=0.1"], "k_h = 0.1: must be 0 for damjoint quake"),
         (["--fields"], "--fields: must not be given with --engine getdp"),
         (["--engine", "fast"], "engine = fast: must be one of auto, condensed, getdp"),

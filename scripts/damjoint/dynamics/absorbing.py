@@ -110,7 +110,7 @@ class AbsorbingRock:
         assert of_elements is not None  # a section's boundary has sides of elements
         normals = of_elements[0][points.elements][:, :dim]
         places = np.ravel(dim * space.find(part)[:, None] + np.arange(dim))
-        values = sparse.kron(points.values, sparse.eye(dim)) @ moved[places]
+        values = sparse.kron(points.values.scipy(), sparse.eye(dim)) @ moved[places]
         weighted = values.T @ sparse.diags(np.repeat(points.weights, dim))
         along = normals[:, :, None] * normals[:, None, :]
         impedance = density * (speeds[1] * along + speeds[0] * (np.eye(dim) - along))

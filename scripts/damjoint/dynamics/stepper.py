@@ -17,6 +17,7 @@ from ..solver.newton import Diverged
 from ..solver.state import State
 from . import absorbing
 from .absorbing import AbsorbingRock, travel_time
+from .published import with_corner_dashpots
 from .record import Record
 from .scheme import HHT
 from .step import Moving, Problem, TimeStep
@@ -79,6 +80,7 @@ class Earthquake:
         """
         absorbing.check(case)
         self.case, self.bodies, self.record = case, bodies, Record.of(case)
+        self.published = case["time_integration"] == "published"
         interface = model.equilibrium.interface
         massless = case.with_values({"rock_mass": 0.0})
         self.system = system = System.of(massless, bodies, interface)
@@ -102,7 +104,7 @@ class Earthquake:
             model=model,
             static=static,
             system=system,
-            scheme=HHT(case["hht_alpha"]),
+            scheme=HHT(case["hht_alpha"], weighted=not self.published),
             damping=damping,
             dashpots=np.array([normal, tangential, tangential]),
         )
@@ -168,9 +170,12 @@ class Earthquake:
 
     def _step(self, length: float, halvings: int) -> Converged | None:
         """A step of a length; None if it does not converge."""
-        if halvings not in self.steps_of_length:
-            self.steps_of_length[halvings] = TimeStep(self.problem, length)
         now = self.now
+        if self.published:
+            problem = with_corner_dashpots(self.problem, now.state)
+            self.steps_of_length[halvings] = TimeStep(problem, length)
+        elif halvings not in self.steps_of_length:
+            self.steps_of_length[halvings] = TimeStep(self.problem, length)
         loads = self.load(now.time), self.load(now.time + length)
         pressure = pressures_in_motion(self.case, self.problem, now.state)
         persist = halvings == MOST_HALVINGS

@@ -95,11 +95,11 @@ class JointInterface:
         #: whether the joint is a plane, up to rounding of its nodes
         self.flat = np.allclose(self.frames, self.frames[0], rtol=0, atol=1e-9)
         #: jump at the Gauss points from the unknowns, dim rows each: normal, tangent 1, tangent 2
-        self.at_points = self._components(self.points.values, self.frames[self.points.elements])
+        self.at_points = self.components(self.points.values, self.frames[self.points.elements])
         #: jump at the nodes likewise, dim rows for each of `rows`, indices of locations; where the
         #: joint bends, a node has rows in the frame of each of its elements
         self.rows, node_frames = self._node_frames()
-        self.at_nodes = self._components(space.interpolation(bulk.order)[self.rows], node_frames)
+        self.at_nodes = self.components(space.interpolation(bulk.order)[self.rows], node_frames)
         self.heel = self._heel_row()
         self.chord = Chord.of(self.mesh)
         #: extent along z [m], 1 in 2D
@@ -126,7 +126,7 @@ class JointInterface:
         means = [np.bincount(self.rows, column) / count for column in columns.T]
         return np.column_stack(means) if values.ndim > 1 else means[0]
 
-    def _components(self, values: CsrMatrix, frames: Array, most: int = 3) -> CsrMatrix:
+    def components(self, values: CsrMatrix, frames: Array, most: int = 3) -> CsrMatrix:
         """The first `most` components in frames (q, 3, 3) of the jump, interpolated by values (q,
         functions): point by point, from the unknowns.
         """
@@ -177,7 +177,7 @@ class JointInterface:
         return self._wetted(points, fields.values)
 
     def _wetted(self, points: elements.Points, fields: CsrMatrix) -> Wetted:
-        opening = self._components(points.values, self.frames[points.elements], 1)
+        opening = self.components(points.values, self.frames[points.elements], 1)
         return Wetted(points=points, opening=opening, fields=fields)
 
     @cached_property

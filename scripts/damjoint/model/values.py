@@ -22,6 +22,7 @@ TextName: TypeAlias = Literal[
     "required_position",
     "record_unit",
     "record_component",
+    "time_integration",
 ]
 
 
@@ -81,6 +82,7 @@ class EarthquakeGroup(Group):
 
     record_unit: str
     record_component: str
+    time_integration: str
 
 
 class ParameterValues:

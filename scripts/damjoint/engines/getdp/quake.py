@@ -59,11 +59,14 @@ def check(case: Case) -> None:
             f"geometry = {case.geometry}: must be a section by parameters for an earthquake with "
             "engine = getdp"
         )
-    if case["face_load"] != "hydrostatic":
-        raise InputError(
-            f"face_load = {case['face_load']}: must be hydrostatic for an earthquake with "
-            "engine = getdp"
-        )
+    needed = {"face_load": "hydrostatic", "rock_mass": 0, "time_integration": "HHT"}
+    for name, value in needed.items():
+        if case[name] != value:
+            given = case.values[name]
+            shown = given if isinstance(given, str) else f"{given:g}"
+            raise InputError(
+                f"{name} = {shown}: must be {value} for an earthquake with engine = getdp"
+            )
 
 
 def solve(
