@@ -199,7 +199,7 @@ def test_an_invalid_file_of_getdp_is_reported(command, tmp_path, fake_getdp, lef
     "name",
     [
         *("scene.pre", "history.txt", "status.txt", "jump_1.txt", "traction_2.txt", "path_2.txt"),
-        *("mean_jump_1.txt", "lambda_2.txt", "u_dam_1.txt", "stress_2.txt"),
+        *("mean_jump_0_1.txt", "lambda_2.txt", "u_dam_1.txt", "stress_2.txt"),
     ],
 )
 def test_a_truncated_file_of_getdp_is_reported(command, tmp_path, fake_getdp, name, size):

@@ -170,8 +170,8 @@ class Results:
     history: Table
     #: a row per joint node and requested level, columns `joint_columns`
     joint: Table
-    #: the same rows with jumps and stresses extrapolated from element means, as published codes
-    #: print them
+    #: the same rows with jumps and stresses extrapolated from the Gauss points of each element, as
+    #: published codes print them
     extrapolated: Table
     #: whether the run ended before its last level
     stopped: bool = False
@@ -207,7 +207,7 @@ class Results:
         return rows_at(self.joint, time)
 
     def at_extrapolated(self, time: float | None = None) -> Table:
-        """As `at`, with jump and stress extrapolated from the integration points."""
+        """As `at`, with jump and stress extrapolated from the Gauss points."""
         return rows_at(self.extrapolated, time)
 
     def state(self, time: float) -> dict[str, float]:
