@@ -16,7 +16,7 @@ from pathlib import Path
 
 from damjoint.laws import COLUMNS
 from damjoint.model.parameters import declared
-from damjoint.model.results import FLUX, HISTORY, JOINT, QUAKE
+from damjoint.model.results import FLUX, HISTORY, JOINT, QUAKE, THICKNESS
 from damjoint.post.validation import Comparison
 from damjoint.statics.gravity import LOADS
 from damjoint.studies.check import CHECK
@@ -80,7 +80,7 @@ def results_page() -> str:
     """reference/results.md: the columns of the tables."""
     joint, history, check, loads, critical, quake = (
         markdown([(f"`{n}`", u, m) for n, (u, m) in columns.items()], ("column", "unit", "meaning"))
-        for columns in (JOINT | COLUMNS | FLUX, HISTORY, CHECK, LOADS, CRITICAL, QUAKE)
+        for columns in (JOINT | COLUMNS | FLUX | THICKNESS, HISTORY, CHECK, LOADS, CRITICAL, QUAKE)
     )
     parts = [
         "# Results",
@@ -200,7 +200,7 @@ def face_integrations(published: list[Comparison]) -> str:
         (
             c.reference.modeling,
             c.reference.quantity,
-            f"{c.reference.at:g}",
+            f"{c.reference.x:g}",
             *(f"{value:.6g}" for value in (c.reference.value, c.computed)),
             f"{100 * c.difference:+.3f} %",
             f"{exact[c.reference].computed:.6g}",

@@ -37,6 +37,9 @@ JOINT = {
 #: Additional column where water flows.
 FLUX = {"flux": ("kg/(m s)", "mass flux towards the toe, mean of the elements around the node")}
 
+#: Additional column where the joint is grouted or sawn.
+THICKNESS = {"joint_thickness": ("m", "thickness that grout adds and the saw takes off (< 0)")}
+
 #: Columns of history.csv: a row per converged step. Forces are per metre of thickness, in 3D too.
 HISTORY = {
     "time": ("-", "t of the step"),
@@ -252,7 +255,9 @@ def joint_columns(case: Case) -> Columns:
     """The columns of a case's joint.csv: unit and meaning."""
     of_laws = [dict(joint.law.columns) for joint in case.joints]
     flow = FLUX if any(joint["uplift"] == "flow" for joint in case.joints) else {}
-    return functools.reduce(operator.or_, [JOINT, *of_laws, flow])
+    worked = any(joint["grout_pressure"] or joint["saw_thickness"] for joint in case.joints)
+    works = THICKNESS if worked else {}
+    return functools.reduce(operator.or_, [JOINT, *of_laws, flow, works])
 
 
 def joint_table(case: Case, blocks: list[Array]) -> Table:

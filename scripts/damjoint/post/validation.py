@@ -43,9 +43,11 @@ class Reference:
     modeling: str
     uplift: str
     quantity: str
-    #: the coordinate of the place: x or y [m], or t, the step of a test of one point
-    coordinate: str
-    at: float
+    #: the place [m], a mean over the coordinates that are None; and t, None: `reference_time`
+    x: float | None
+    y: float | None
+    z: float | None
+    t: float | None
     value: float
     unit: str
     #: relative
@@ -85,21 +87,23 @@ def table(family: str) -> list[Reference]:
 
 def reference(family: str, row: Mapping[str, str]) -> Reference:
     """A row of a table; columns that a family does not have are empty."""
-    coordinate = next(name for name in ("x", "y", "t") if row.get(name))
+    number = lambda name: float(row[name]) if row.get(name) else None
     return Reference(
         family=family,
         modeling=row["modeling"],
         uplift=row.get("uplift", ""),
         quantity=row["quantity"],
-        coordinate=coordinate,
-        at=float(row[coordinate]),
+        x=number("x"),
+        y=number("y"),
+        z=number("z"),
+        t=number("t"),
         value=float(row["value"]),
         unit=row["unit"],
         tolerance=float(row["rel_tolerance"]),
         source=row["source"],
         note=row["note"],
         read_as=row.get("read_as", NODE),
-        code=float(row["code"]) if row.get("code") else None,
+        code=number("code"),
     )
 
 
@@ -129,18 +133,17 @@ def modelings(family: str) -> list[str]:
 
 
 def compare(result: Results) -> list[Comparison]:
-    """Compare a scene with its published numbers at the nodes of the same place (mean over z), at
-    `reference_time`.
-    """
+    """Compare a scene with its published numbers at the nodes of the same place."""
     comparisons = []
     case = result.case
-    time = reference_time(case)
     for reference in references(case):
+        time = reference_time(case) if reference.t is None else reference.t
         rows = result.at(time) if reference.read_as == NODE else result.at_extrapolated(time)
         values = rows[reference.quantity]
         if reference.read_as == SLIP_TWICE:
             values = values + rows["slip"] - result.at(case.requested[-2])["slip"]
-        away = np.abs(rows[reference.coordinate] - reference.at)
+        place = {c: value for c in "xyz" if (value := getattr(reference, c)) is not None}
+        away = np.sum([np.abs(rows[c] - value) for c, value in place.items()], axis=0)
         computed = values[away < away.min() + SAME_NODE].mean()
         comparisons.append(Comparison(reference, float(computed)))
     return comparisons
@@ -149,9 +152,9 @@ def compare(result: Results) -> list[Comparison]:
 def compare_point(family: str, modeling: str, columns: Mapping[str, Array]) -> list[Comparison]:
     """Compare the steps of a test of one point, columns by name, with its published numbers."""
     return [
-        Comparison(r, float(columns[r.quantity][np.abs(columns["t"] - r.at).argmin()]))
+        Comparison(r, float(columns[r.quantity][np.abs(columns["t"] - r.t).argmin()]))
         for r in table(family)
-        if r.modeling == modeling
+        if r.modeling == modeling and r.t is not None
     ]
 
 
@@ -164,15 +167,15 @@ def report(comparisons: list[Comparison], style: str = "simple") -> str:
     """Format the comparisons as a table and a summary line; style: a format of tabulate."""
     from tabulate import tabulate
 
-    place = "/".join(dict.fromkeys(c.reference.coordinate for c in comparisons))
+    shown = lambda value: "" if value is None else f"{value:.6g}"
     rows = [
         (
             c.reference.modeling,
             c.reference.uplift,
             c.reference.quantity,
-            f"{c.reference.at:g}",
+            *(shown(getattr(c.reference, name)) for name in "xyzt"),
             f"{c.reference.value:.6g}",
-            "" if c.reference.code is None else f"{c.reference.code:.6g}",
+            shown(c.reference.code),
             f"{c.computed:.6g}",
             c.reference.unit,
             f"{100 * c.difference:+.2f} %",
@@ -187,7 +190,7 @@ def report(comparisons: list[Comparison], style: str = "simple") -> str:
         "case",
         "uplift",
         "quantity",
-        place,
+        *"xyzt",
         "reference",
         "published code",
         "computed",

@@ -14,6 +14,7 @@ from ..joint.interface import JointInterface
 from ..model.case import Case
 from ..model.results import (
     HISTORY_OF_JOINTS,
+    THICKNESS,
     Results,
     column_of,
     history_table,
@@ -170,6 +171,9 @@ def joint_rows(equilibrium: Equilibrium, state: State, number: int) -> tuple[Arr
         "slip": nodes[:, 7],
         "s": joint.xi * joint.length,
     }
+    if THICKNESS.keys() & joint_columns(equilibrium.case).keys():
+        added = law.added_thickness(variables, len(jump))
+        columns |= dict.fromkeys(THICKNESS, joint.mean_at_nodes(added))
     of_law = law.column_values(variables)
     columns |= {name: joint.mean_at_nodes(of_law[name]) for name in law.columns}
     if pressure.flux is not None:

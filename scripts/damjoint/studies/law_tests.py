@@ -100,21 +100,6 @@ def ramp(times: Sequence[float], values: Sequence[float]) -> Iterator[tuple[floa
         yield float(t), float(np.interp(t, times, values))
 
 
-def ssnp143() -> dict[str, LawTest]:
-    """C: two blocks of 10 m in all and their joint in series, pressed by a displacement of 3e-6 m;
-    the joint is sawn at t = 2. All points are alike, also in 3D (D).
-    """
-    settings: Values = {"K_N": 1e12, "K_T": 2e12, "saw_thickness": 1e-6, "saw_t": 2.0}
-    rupture: Values = {"sigma_max": 3e6, "pena_rupture": 0.2, "pena_contact": 0.8}
-    friction: Values = {"mu": 0.35, "adhesion": 1000.0, "pena_tang": 2e11}
-    spring = 3e12 / 10
-    steps = [(t, Loaded(-spring * 3e-6, spring), 0.0, 0.0) for t in (1.0, 2.0, 3.0)]
-    return {
-        "C rupture": LawTest("rupture", settings | rupture, steps),
-        "C friction": LawTest("friction", settings | friction, steps),
-    }
-
-
 def ssnp162() -> dict[str, LawTest]:
     """A cube of 1 m and a joint in series, pulled by a displacement; the joint alone in shear."""
     tests, quarters = {}, (0, 15, 30, 45, 60)
@@ -194,4 +179,4 @@ def ssnv503() -> dict[str, LawTest]:
     }
 
 
-FAMILIES = {"ssnp143": ssnp143, "ssnp162": ssnp162, "ssnp164": ssnp164, "ssnv503": ssnv503}
+FAMILIES = {"ssnp162": ssnp162, "ssnp164": ssnp164, "ssnv503": ssnv503}
