@@ -163,8 +163,10 @@ def worst(comparisons: list[Comparison]) -> float:
     return max(abs(c.difference) / c.reference.tolerance for c in comparisons)
 
 
-def report(comparisons: list[Comparison], style: str = "simple") -> str:
-    """Format the comparisons as a table and a summary line; style: a format of tabulate."""
+def report(comparisons: list[Comparison], style: str = "simple", notes: bool = False) -> str:
+    """Format the comparisons as a table and a summary line; style: a format of tabulate; notes:
+    with what the rows show.
+    """
     from tabulate import tabulate
 
     shown = lambda value: "" if value is None else f"{value:.6g}"
@@ -183,6 +185,7 @@ def report(comparisons: list[Comparison], style: str = "simple") -> str:
             c.verdict,
             c.reference.source,
             EVALUATIONS[c.reference.read_as],
+            c.reference.note if notes else "",
         )
         for c in comparisons
     ]
@@ -200,6 +203,7 @@ def report(comparisons: list[Comparison], style: str = "simple") -> str:
         "verdict",
         "source",
         "evaluation",
+        "note",
     )
     used = [k for k, head in enumerate(heads) if any(row[k] for row in rows) or head == "verdict"]
     chosen = [[row[k] for k in used] for row in rows]

@@ -101,7 +101,11 @@ def ramp(times: Sequence[float], values: Sequence[float]) -> Iterator[tuple[floa
 
 
 def ssnp162() -> dict[str, LawTest]:
-    """A cube of 1 m and a joint in series, pulled by a displacement; the joint alone in shear."""
+    """A cube of 1 m and a joint in series, pulled by a displacement; the joint alone in shear.
+
+    Other modelings are these on other elements: B, C, M, N, O that of A; F, Q, R of E; H, I of G; P
+    of D; K, L of J.
+    """
     tests, quarters = {}, (0, 15, 30, 45, 60)
     rupture: Values = {"K_N": 1e12, "K_T": 2e12, "sigma_max": 1e5, "alpha": 1.5}
     rupture |= {"pena_rupture": 0.5, "pena_contact": 3.0}
@@ -114,6 +118,12 @@ def ssnp162() -> dict[str, LawTest]:
     sheared = dict(ramp(quarters, (0, 0, broken, broken, 0)))
     tests["A II"] = LawTest(
         "rupture", rupture, [(t, n, sheared[t], 0.0) for t, n in ramp(quarters, normal)]
+    )
+    # in 3D, sheared along z
+    normal = (0, 1.1e-7, 1.1e-7, 1.1e-7 / 9, 1.1e-7 / 9)
+    sheared = dict(ramp((0, 30, 60), (0, -broken, broken)))
+    tests["B III"] = LawTest(
+        "rupture", rupture, [(t, n, 0.0, sheared[t]) for t, n in ramp(quarters, normal)]
     )
     # with water of 500 Pa in the joint
     p = 500.0
@@ -134,6 +144,13 @@ def ssnp162() -> dict[str, LawTest]:
     tests["D II"] = LawTest(
         "friction", friction, [(t, n, sheared[t], 0.0) for t, n in ramp(quarters, normal)]
     )
+    # with water of 50 kPa in the joint
+    wet: Values = {"K_N": 1e7, "K_T": 2e7, "mu": 0.5, "adhesion": 1e5, "pena_tang": 20.0}
+    p = 5e4
+    elastic = 2e5 / 1e7 + (2e5 - p) / E
+    pulled = (0, elastic, 2 * elastic, -((2e5 / 3 - p) / 1e7 + 2e5 / 3 / E))
+    steps = [(t, Loaded(E * u + p, E), 0.0, 0.0) for t, u in ramp(quarters[:-1], pulled)]
+    tests["J I"] = LawTest("friction", wet, steps, p)
     # in 3D: sheared to and fro while it slips across
     soft: Values = {"K_N": 0.1, "K_T": 0.15, "mu": 0.2, "adhesion": 0.1, "pena_tang": 1e-7}
     quarters = (0, 15, 30, 45, 60)
