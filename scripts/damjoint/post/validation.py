@@ -20,7 +20,7 @@ FAMILIES = {
     "the critical load",
     "ssnp143": "two blocks on a vertical joint: grouted, sawn; rupture and friction, 2D and 3D",
     "ssnp162": "the laws rupture and friction at one point: to and fro in tension and shear",
-    "ssnp164": "the law endo at one point: tension, shear, both, and opened by water",
+    "ssnp164": "the law endo at one point: tension, shear, both, opened and lifted by water",
     "ssnv503": "a slider on a plane of 30 degrees: sticks at 99 %, slips at 101 % of the friction",
 }
 #: How a published number was read, column `read_as`: at a node; there from the Gauss points, as the

@@ -170,6 +170,8 @@ def ssnp164() -> dict[str, LawTest]:
     pulled = [*ramp((0, 20, 40, 60, 80), (0, 6e-6, 1e-4, 5e-4, 4.9999e-4))]
     sheared = ramp((0, 10, 20, 30, 40, 50), (0, 0, 5e-7, 3e-5, 9e-5, 5e-4))
     pressed = ramp((0, 10, 20, 30, 40), (0, 1e5, 1e6, 1e7, 1e8))
+    to_and_fro = (0, 0, 5e-7, 3e-5, 2.9995e-5, 9e-5, 5e-4)
+    lifted = ramp((0, 10, 20, 30, 40, 50, 60), to_and_fro)
     return {
         "A": LawTest("endo", endo, [(t, Loaded(E * u, E), 0.0, 0.0) for t, u in pulled]),
         "B": LawTest("endo", endo, [(t, Loaded(-1e4), jump, 0.0) for t, jump in sheared]),
@@ -177,6 +179,10 @@ def ssnp164() -> dict[str, LawTest]:
         "C": LawTest("endo", endo, [(t, Loaded(E * u, E), 0.0, -1e-6) for t, u in pulled]),
         # water presses the cube against a wall
         "D": LawTest("endo", endo, [(t, Loaded(p, E), 0.0, 0.0) for t, p in pressed]),
+        # as B, while water lifts the cube up to two thirds of the pressure on it
+        "E": LawTest(
+            "endo", endo, [(t, Loaded(-1e4 * (1 - t / 90)), jump, 0.0) for t, jump in lifted]
+        ),
     }
 
 
