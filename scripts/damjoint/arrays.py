@@ -1,4 +1,4 @@
-"""Types of arrays and of the values of parameters."""
+"""Types of arrays and of the values of parameters; symmetric matrices in place."""
 
 from __future__ import annotations
 
@@ -26,3 +26,16 @@ Setting: TypeAlias = Value | tuple[Value, ...]
 Settings: TypeAlias = Mapping[str, Setting]
 #: Values by the names of pro/parameters.pro.
 Values: TypeAlias = Mapping[str, Value]
+
+#: Size of the blocks that are transposed.
+BLOCK = 128
+
+
+def mirror(lower: Array) -> Array:
+    """The symmetric matrix (n, n) of a lower triangle, in place."""
+    for first in range(0, len(lower), BLOCK):
+        rows, below = slice(first, first + BLOCK), slice(first + BLOCK, None)
+        lower[rows, below] = lower[below, rows].T
+        diagonal = lower[rows, rows]
+        diagonal[:] = np.tril(diagonal) + np.tril(diagonal, -1).T
+    return lower

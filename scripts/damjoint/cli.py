@@ -71,6 +71,13 @@ def slip(name: str, text: str) -> float:
     return value
 
 
+def time_span(name: str, text: str) -> tuple[float, float]:
+    """Return an argument FIRST:LAST as two times [s]. Raises InputError."""
+    from .studies.quake import span_of
+
+    return span_of(f"--{name}", text)
+
+
 def path(name: str, text: str) -> Path:
     """Return an argument as a path. Raises InputError if it is empty: the current folder."""
     if not text.strip():
@@ -473,6 +480,16 @@ def add_quake(commands: Commands) -> None:
         "record_unit (default: that of the case)",
     )
     command.add_path("--out", "FOLDER", help="output folder (default: out/CASE_quake)")
+    command.add_argument(
+        "--fields",
+        nargs="?",
+        const="0:inf",
+        action=Checked,
+        convert=time_span,
+        metavar="FIRST:LAST",
+        help="write files of displacement and stress at up to 200 times between two times [s] "
+        "(default: none; --fields alone: the whole record)",
+    )
     command.add_argument("--no-picture", action="store_true", help="draw no PNG")
 
 
@@ -482,20 +499,20 @@ def do_quake(arguments: argparse.Namespace) -> int:
     from .model.case import load
     from .studies import quake
 
-    if arguments.accuracy:
-        raise InputError(f"accuracy = {arguments.accuracy}: must not be set for damjoint quake")
     case = load(
         arguments.case,
         parameters.settings(arguments.settings),
         arguments.levels,
         arguments.tail_levels,
         arguments.steps,
+        arguments.accuracy,
         record=arguments.record,
     )
     if case["dim"] == 3:
         warn_if_slow()
     out = arguments.out or Path("out") / f"{case.name}_quake"
-    result = quake.run(case, out, not arguments.no_picture)
+    fields = arguments.fields is not None
+    result = quake.run(case, out, arguments.fields, fields, not arguments.no_picture)
     print(f"{case.name}: {result.statement}; {len(result.rows['time'])} steps; {out}\n")
     print(quake.text(result))
     return int(not result.stands)
@@ -621,6 +638,7 @@ def add_stress(commands: Commands) -> None:
         "count", 1, nargs="?", default=500, help="number of random dams (default: 500)"
     )
     command.add_integer("--seed", 1, default=1, help="seed of the random numbers (default: 1)")
+    command.add_argument("--quake", action="store_true", help="random earthquakes instead")
     command.add_integer("--jobs", 1, help=JOBS)
     command.add_path(
         "--out", "FILE", default=Path("stress.csv"), help=f"{RESUMED} (default: stress.csv)"
@@ -630,7 +648,8 @@ def add_stress(commands: Commands) -> None:
 def do_stress(arguments: argparse.Namespace) -> int:
     """Run damjoint stress; 1 if a run is a defect."""
     stress = tool("stress")
-    rows = stress.stress(arguments.count, arguments.seed, arguments.out, arguments.jobs)
+    options = arguments.seed, arguments.out, arguments.jobs, arguments.quake
+    rows = stress.stress(arguments.count, *options)
     for row in rows:
         if row["class"] == stress.DEFECT:
             print(f"{row['scene']}: {row['findings']}\n  {row['command']}")

@@ -14,6 +14,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+from damjoint.dynamics.frames import MOST_FRAMES
 from damjoint.laws import COLUMNS
 from damjoint.model.parameters import declared
 from damjoint.model.results import FLUX, HISTORY, JOINT, QUAKE, THICKNESS
@@ -118,8 +119,9 @@ def results_page() -> str:
         "## quake.csv",
         "Written by `damjoint quake`: a row per time step. `run.json` has the summary under "
         "`quake`; the last row of history.csv and the last state in joint.csv are static ones, "
-        "after the earthquake. `quake_stress.npz` (numpy): `time` [s], `s` [m] and `sigma_n_eff` "
-        "[Pa] (rows, nodes) of the first joint.",
+        "after the earthquake. `quake_joint.csv` has the columns of joint.csv at up to "
+        f"{MOST_FRAMES} times [s], from 0, the static state. `quake_stress.npz` (numpy): `time` "
+        "[s], `s` [m] and `sigma_n_eff` [Pa] (rows, nodes) of the first joint.",
         quake,
         "## CASE_sweep.csv",
         "Written by `damjoint sweep`, a row per combination, in the order of computation: `key`, "

@@ -13,7 +13,7 @@ import tempfile
 import time
 from collections.abc import Iterator
 from concurrent.futures import as_completed
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +26,7 @@ from damjoint.storage import lock
 from damjoint.studies.sweep import pool_of, read_done
 
 from .provenance import RECORDED, provenance
+from .quake_verification import QuakeFiles, judge_quake, quake_violations
 from .verification import RunFiles, judge_stop, violations
 
 #: Columns of the result file.
@@ -43,8 +44,8 @@ CLASSES = VERIFIED, JUSTIFIED, UNDECIDED, DEFECT = (
 #: Time limit of a scene [s].
 TIME_LIMIT = 300
 
-#: Third number of the seed of the lift joints, which are drawn apart.
-LIFT_DRAWS = 1
+#: Third number of the seed of the lift joints and of earthquakes, which are drawn apart.
+LIFT_DRAWS, QUAKE_DRAWS = 1, 2
 #: Parameters that are drawn for each joint, but for the place of its drains.
 OF_JOINTS = (
     *("law", "K_N", "K_T", "sigma_max", "adhesion", "mu", "pena_rupture", "alpha", "pena_tang"),
@@ -81,6 +82,27 @@ class RandomScene:
     def case(self) -> Case:
         """The case as the command loads it."""
         return load("dam", self.settings, self.levels, self.tail_levels, self.steps)
+
+
+@dataclass(frozen=True)
+class RandomQuake(RandomScene):
+    """Random dam with a random record, that is written into a file of the scene's name."""
+
+    #: rows of time [s], horizontal and vertical acceleration [m/s2]
+    record: np.ndarray = field(compare=False)
+    file: Path
+
+    @property
+    def words(self) -> list[str]:
+        """Arguments of the command `damjoint`."""
+        return ["quake", *super().words[1:], "--record", str(self.file)]
+
+    @property
+    def case(self) -> Case:
+        """The case as the command loads it; writes the record."""
+        self.file.parent.mkdir(exist_ok=True)
+        np.savetxt(self.file, self.record, "%.6g", ",")
+        return replace(super().case, record=self.file)
 
 
 def as_text(value: Setting) -> str:
@@ -190,6 +212,74 @@ def with_lifts(scene: RandomScene, rng: RandomNumbers) -> RandomScene:
     lengths = [joint.joint_length for joint in dry.joints]
     settings["drain_x"] = tuple(rng.uniform(0.05 * length, 0.4 * length) for length in lengths)
     return replace(scene, settings=settings)
+
+
+def random_quake(seed: int, number: int, folder: Path) -> RandomQuake:
+    """Draw earthquake `number` of a seed, with its record in a folder: a dam that stands before it,
+    of any law, uplift and damping, with one to three joints.
+    """
+    rng = RandomNumbers(seed, number, QUAKE_DRAWS)
+    height, solid = rng.log_uniform(8, 120), rng.event(0.1)
+    base = rng.uniform(0.75 * height, 1.0 * height)
+    settings = mesh(rng, height, solid, plain=False) | {
+        "n_joint": 10.0 if solid else rng.choice(10, 20),
+        "dam_base": base,
+        "dam_crest": rng.uniform(0.08 * base, 0.2 * base),
+        "E": rng.log_uniform(5e9, 1e11),
+        "nu": rng.uniform(0, 0.35),
+        "found_side": height,
+        "found_depth": height,
+    }
+    settings["h_dam"], settings["h_found"] = height / 4, height / 2
+    drawn = joint(rng)
+    while not 1e9 <= drawn["K_N"] <= 1e13:
+        drawn = joint(rng)
+    settings |= drawn | {"mu": rng.uniform(0.75, 1.2)}
+    if not solid and rng.event(0.3):
+        settings["batter"] = rng.uniform(0.02 * base, 0.1 * base)
+        settings["batter_height"] = rng.uniform(0.3 * height, 0.9 * height)
+    if not solid and rng.event(0.2):
+        settings["joint_slope"] = rng.uniform(-3, 5)
+    settings["uplift"] = rng.choice("none", "imposed", "drained", "cracked", "flow")
+    settings |= {
+        "quake_uplift": rng.choice("crack", "unchanged", "zero"),
+        "added_mass": rng.choice(0, 1, 2),
+        "damping": rng.uniform(0.01, 0.1),
+        "hht_alpha": rng.choice(-0.05, -0.05, 0, -0.2),
+        "record_unit": rng.choice("m/s2", "g"),
+        "record_component": rng.choice("both", "both", "horizontal"),
+        "record_rest": rng.uniform(0.3, 1.2),
+    }
+    settings["record_scale"] = rng.choice(-1, 1) / (
+        9.80665 if settings["record_unit"] == "g" else 1
+    )
+    level = f"{rng.uniform(0.3 * height, 0.85 * height):g}"
+    record, file = random_record(rng), folder / f"{seed}-{number}.csv"
+    scene = RandomQuake(settings, level, "0", 1, record, file)
+    if not solid and rng.event(0.3):
+        count = int(rng.choice(1, 2))
+        heights = tuple(float(f"{height * (k + 1) / (count + 1.5):.4g}") for k in range(count))
+        return replace(scene, settings=settings | {"lift_heights": heights})
+    return scene
+
+
+def random_record(rng: RandomNumbers) -> np.ndarray:
+    """Draw a record: three waves that begin and end smoothly, up to 0.7 g, the vertical component
+    smaller.
+    """
+    times = np.arange(0, rng.uniform(0.8, 1.6), 0.01)
+    window = np.sin(np.pi * times / times[-1]) ** 2
+    waves = [
+        sum(
+            rng.uniform(0.2, 1)
+            * np.sin(2 * np.pi * (rng.log_uniform(1, 9) * times + rng.uniform(0, 1)))
+            for _ in range(3)
+        )
+        for _ in range(2)
+    ]
+    peak = rng.log_uniform(0.7, 7)
+    along, up = (peak * window * wave / np.abs(wave).max() for wave in waves)
+    return np.column_stack([times, along, 0.6 * up])
 
 
 def slender_dam(rng: RandomNumbers, height: float) -> dict[str, float | str]:
@@ -318,7 +408,9 @@ def loads(rng: RandomNumbers, height: float) -> dict[str, float | str]:
 def run_and_verify(scene: RandomScene, folder: Path) -> dict[str, object]:
     """Run a scene by the command and verify its files; returns its row without the number."""
     case, start = scene.case, time.perf_counter()
-    words = [*scene.words, "--no-fields", "--no-picture", "--out", str(folder / "out")]
+    quake = isinstance(scene, RandomQuake)
+    words = [*scene.words, *(() if quake else ("--no-fields",)), "--no-picture"]
+    words += ["--out", str(folder / "out")]
     environment = os.environ | ONE_THREAD | {"DAMJOINT_CACHE": str(folder / "cache")}
     row = {
         "command": " ".join(["damjoint", *scene.words]),
@@ -339,7 +431,7 @@ def run_and_verify(scene: RandomScene, folder: Path) -> dict[str, object]:
         finding = f"not finished after {TIME_LIMIT} s"
         return row | {"class": DEFECT, "findings": finding, "seconds": TIME_LIMIT}
     row["seconds"] = f"{time.perf_counter() - start:.2f}"
-    run = RunFiles(case, folder / "out", done.returncode)
+    run = (QuakeFiles if quake else RunFiles)(case, folder / "out", done.returncode)
     try:
         row["verdict"] = run.record["verdict"]
     except (OSError, KeyError):
@@ -350,8 +442,9 @@ def run_and_verify(scene: RandomScene, folder: Path) -> dict[str, object]:
 
 def verified(run: RunFiles) -> dict[str, object]:
     """Verify a run; returns its class, findings and size."""
-    broken = violations(run)
-    wrong, remark = judge_stop(run) if run.stopped else (False, "")
+    quake = isinstance(run, QuakeFiles)
+    broken = (quake_violations if quake else violations)(run)
+    wrong, remark = (judge_quake if quake else judge_stop)(run) if run.stopped else (False, "")
     fine = UNDECIDED if remark else JUSTIFIED if run.stopped else VERIFIED
     history = run.history
     return {
@@ -360,30 +453,36 @@ def verified(run: RunFiles) -> dict[str, object]:
         "level": f"{history['level'].max(initial=0):.6g}",
         "steps": len(history["time"]),
         "iterations": int(history["iterations"].sum()),
-        "cuts": int(history["cuts"].sum()),
+        "cuts": int(history["cuts"].sum()) if not quake else run.record["quake"]["halvings"],
     }
 
 
-def row_of(seed: int, number: int) -> dict[str, object]:
-    """Return the row of a scene."""
+def row_of(seed: int, number: int, records: Path | None) -> dict[str, object]:
+    """Return the row of a scene; records: folder of the records of earthquakes."""
+    scene = random_quake(seed, number, records) if records else random_scene(seed, number)
     with tempfile.TemporaryDirectory() as folder:
-        row = run_and_verify(random_scene(seed, number), Path(folder))
+        row = run_and_verify(scene, Path(folder))
     return {"scene": f"{seed}-{number}"} | row
 
 
-def rows_as_completed(seed: int, numbers: list[int], jobs: int) -> Iterator[dict[str, object]]:
+def rows_as_completed(
+    seed: int, numbers: list[int], jobs: int, records: Path | None
+) -> Iterator[dict[str, object]]:
     """Compute the rows of scenes in parallel, in the order in which they are finished."""
     with pool_of(jobs) as pool:
-        waiting = [pool.submit(row_of, seed, number) for number in numbers]
+        waiting = [pool.submit(row_of, seed, number, records) for number in numbers]
         yield from (future.result() for future in as_completed(waiting))
 
 
-def stress(count: int, seed: int, out: Path, jobs: int | None = None) -> list[dict[str, str]]:
+def stress(
+    count: int, seed: int, out: Path, jobs: int | None = None, quake: bool = False
+) -> list[dict[str, str]]:
     """Run those of the scenes 0 .. count - 1 of a seed that are not in the result file yet; returns
     the rows of all.
 
-    out: CSV of COLUMNS; a row is written when its scene is finished. Raises InputError, also if the
-    rows in the file were computed by other code.
+    out: CSV of COLUMNS; a row is written when its scene is finished. quake: earthquakes, with their
+    records in a folder beside the file. Raises InputError, also if the rows in the file were
+    computed by other code.
     """
     if not out.parent.is_dir():
         raise InputError(f"out = {out}: must be a file in an existing folder")
@@ -402,7 +501,8 @@ def stress(count: int, seed: int, out: Path, jobs: int | None = None) -> list[di
         writer = csv.DictWriter(file, COLUMNS, restval="", lineterminator="\n")
         if not file.tell():
             writer.writeheader()
-        rows = rows_as_completed(seed, missing, jobs or os.cpu_count() or 1)
+        records = out.resolve().with_name(f"{out.stem}_records") if quake else None
+        rows = rows_as_completed(seed, missing, jobs or os.cpu_count() or 1, records)
         for row in track(rows, "stress", len(missing)):
             writer.writerow(row | now)
             file.flush()

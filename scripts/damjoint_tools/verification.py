@@ -79,14 +79,21 @@ class RunFiles:
     @cached_property
     def history(self) -> dict[str, np.ndarray]:
         """Columns of history.csv, those of the joint without suffix."""
-        table = read_table(self.folder / "history.csv")
+        return self.without_suffix(read_table(self.folder / "history.csv"))
+
+    def without_suffix(self, table: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Return a table with the columns of the joint without suffix."""
         suffix = f"_{self.number + 1}" if self.number else ""
         return table | {n: table[n + suffix] for n in table if suffix and n + suffix in table}
 
     @cached_property
     def joint(self) -> list[dict[str, np.ndarray]]:
         """Columns of joint.csv at the joint, a table for each time."""
-        table = read_table(self.folder / "joint.csv")
+        return self.tables("joint.csv")
+
+    def tables(self, name: str) -> list[dict[str, np.ndarray]]:
+        """Return the tables of a file at the joint, one for each time."""
+        table = read_table(self.folder / name)
         rows = table["joint"] == self.number + 1
         table = {name: column[rows] for name, column in table.items()}
         times = dict.fromkeys(table["time"])
@@ -252,7 +259,7 @@ def heads(run: RunFiles) -> Iterator[str]:
             yield f"pressure above the reservoir's head at t = {time:g}"
         if (head[wet] < lowest - room).any():
             yield f"pressure below the tailwater's head at t = {time:g}"
-        if case["uplift"] == "flow" and case["dim"] == 2:
+        if "flux" in row and case["uplift"] == "flow" and case["dim"] == 2:
             yield from flux(run, rows, row["flux"])
 
 
@@ -332,7 +339,7 @@ def irreversibility(run: RunFiles) -> Iterator[str]:
     """Check that damage, cumulated slip, crack and slipped length do not decrease."""
     case, history = run.case, run.history
     lengths = ["slip_length", *(["crack_length"] if case["law"] == "rupture" else [])]
-    for name in lengths:
+    for name in set(lengths) & set(history):
         if (np.diff(history[name]) < -DIGITS_TOLERANCE * run.length).any():
             yield f"{name} falls"
     name = "lambda" if case["law"] == "friction" else "damage"

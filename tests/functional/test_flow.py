@@ -3,6 +3,9 @@
 import numpy as np
 import pytest
 from closed_forms import BASE, WATER, differences
+from damjoint import runner
+from damjoint.model.case import load
+from damjoint.statics import gravity
 from numpy.testing import assert_allclose
 
 
@@ -76,3 +79,41 @@ def test_the_flux_is_the_cube_of_the_aperture(solve):
     """Closed joint."""
     q = [solve("e", "2", aperture_min=w)[0].history["flux"][-1] for w in (1e-8, 3e-8)]
     assert q[1] / q[0] == pytest.approx(27, rel=1e-6)
+
+
+@pytest.mark.parametrize("slope", [0.0, 6.0])
+def test_water_up_to_a_waterstop(solve, slope):
+    """In a lift joint, within an element: U as in the gravity method."""
+    section = {"n_joint": 12, "joint_height": 20, "joint_slope": slope}
+    (result,) = solve("dam", "45", uplift="waterstop", waterstop=1.2, **section)
+    rows, U = result.at(), result.history["U"][-1]
+    assert U == pytest.approx(gravity.at(result.case, 1).U, rel=1e-9)
+    head = 45 - 20 - 1.2 * np.sin(np.radians(slope)) / 2
+    assert U == pytest.approx(WATER * head * 1.2, rel=1e-9)
+    assert not rows["p"][rows["s"] > 1.2].any()
+
+
+@pytest.mark.parametrize("engine", ["condensed", "getdp"])
+@pytest.mark.parametrize("slope, level, tail", [(4, 5.3, 0), (4, 5.3, 5.35), (-4, 4.9, 4.8)])
+def test_no_water_enters_at_a_dry_end(tmp_path, engine, slope, level, tail):
+    """A lift joint from 5 m at the heel to 5.4 m or 4.6 m at the toe, one of them above the water:
+    at rest if the flow is computed, else linear to a pressure of zero there.
+    """
+    section = {"dam_height": 13, "dam_base": 8, "dam_crest": 1.5, "joint_height": 5}
+    for uplift in ("imposed", "flow"):
+        settings = section | {"joint_slope": slope, "uplift": uplift, "n_joint": 13}
+        case = load("dam", settings, [level], [tail])
+        (result,) = runner.run(case, tmp_path, False, False, False, engine)
+        ends, rows = case.section, result.at()
+        heel, toe = ends["heel_y"][0], ends["toe_y"][0]
+        p = WATER * np.maximum([level - heel, tail - toe], 0)
+        if uplift == "imposed":
+            exact = p[0] + (p[1] - p[0]) * rows["s"] / ends["joint_length"][0]
+        else:
+            exact = WATER * np.maximum((level if p[0] else tail) - rows["y"], 0)
+            assert result.history["flux"][-1] == 0
+        assert max(p) > 0 and min(p) == 0
+        assert_allclose(rows["p"], exact, atol=1e-6)
+        assert result.history["U"][-1] == pytest.approx(
+            gravity.at(case, 1).U, rel=1e-9 if uplift == "imposed" else 1e-3
+        )

@@ -180,9 +180,13 @@ def test_invalid_output_of_getdp_is_reported(command, tmp_path, fake_getdp, prin
     [
         ("true", "ended without writing status.txt"),
         ("echo 0 > status.txt; touch history.txt", "no step at t = 4"),
-        ("echo 0 > status.txt; echo step 1 3 x y z 1 1 1 1 1 1 1 1 1 1 1 > history.txt", "'x'"),
+        ("echo 0 > status.txt; echo step 1 3 x y z 1 1 > history.txt", "'x'"),
         ("echo 0 > status.txt; head -c 900 /dev/urandom > history.txt", "tables can not be read"),
-        ("echo 1 > status.txt; echo step 1 3 1 1 1 1 1 1 1 1 1 1 1 1 1 1 > history.txt", "jump_1"),
+        (
+            "echo 1 > status.txt; echo step 1 3 1 1 1 1 1 > history.txt; "
+            "echo joint 1 1 1 1 1 1 1 1 1 > joints.txt",
+            "jump_0_1",
+        ),
         ("head -c 3000000 /dev/zero", "ended without writing status.txt"),
     ],
 )
@@ -198,8 +202,9 @@ def test_an_invalid_file_of_getdp_is_reported(command, tmp_path, fake_getdp, lef
 @pytest.mark.parametrize(
     "name",
     [
-        *("scene.pre", "history.txt", "status.txt", "jump_1.txt", "traction_2.txt", "path_2.txt"),
-        *("mean_jump_0_1.txt", "lambda_2.txt", "u_dam_1.txt", "stress_2.txt"),
+        *("scene.pre", "history.txt", "joints.txt", "status.txt", "jump_0_1.txt"),
+        *("traction_0_2.txt", "path_0_2.txt", "mean_jump_0_0_1.txt", "law_scalar_0_2.txt"),
+        *("u_1_1.txt", "stress_2.txt"),
     ],
 )
 def test_a_truncated_file_of_getdp_is_reported(command, tmp_path, fake_getdp, name, size):

@@ -7,6 +7,7 @@ from damjoint import InputError
 from damjoint.engines.condensed.solve import check
 from damjoint.joint.interface import interface_of
 from damjoint.model.case import load
+from damjoint.model.mesh import mesh_of
 from damjoint.solver.load_stepper import LoadStepper
 from damjoint.statics.verdict import verdict
 
@@ -144,6 +145,78 @@ def test_monoliths_are_in_equilibrium(dim):
         assert bases[1].last["T"] == pytest.approx(contraction.last["N"], rel=1e-6)
 
 
+def test_each_block_of_a_dam_across_a_valley_is_in_equilibrium():
+    """Weight and reservoir by the mesh; base and contraction joints by contact and water. In the
+    latter the water's resultant is rho g b H^2/2.
+    """
+    coarse = {"n_joint": 4.0, "h_dam": 16.0, "h_found": 50.0}
+    case = load("valley_blocks", coarse, [45.0])
+    stepper = LoadStepper(case, interface_of(case))
+    results = stepper.run()
+    assert not results.stopped and verdict(results) == "stands"
+    equilibrium, state, mesh = stepper.model.equilibrium, stepper.state, mesh_of(case)
+    total = {name: np.zeros(3) for name in mesh.solids}
+    for name, body in mesh.solids.items():
+        (_, table), *_ = body.cells
+        corners = body.points[table]
+        volume = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])).sum() / 6
+        total[name] += [0, -2400 * 9.81 * volume, 0]
+    weight = -total["dam"][1]
+    for face in mesh.faces.values():
+        if face.side == "up":
+            (_, table), *_ = face.surface.cells
+            a, b, c = (face.surface.points[table[:, i]] for i in range(3))
+            depth = 45 - ((a + b + c) / 3)[:, 1]
+            area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+            total[face.body] -= (WATER * depth * area) @ face.surface.normals
+    parts = zip(equilibrium.interface.joints, equilibrium.laws.laws, equilibrium.water, strict=True)
+    for k, (joint, law, water) in enumerate(parts):
+        jump = joint.jumps(joint.at_points, state.jump)
+        traction, _ = law.traction_and_tangent(jump, state.variables.joints[k])
+        frames = joint.frames[joint.points.elements]
+        force = -joint.points.weights @ np.einsum("qk,qkc->qc", traction, frames)
+        wet = water.wetted.points
+        pressure = wet.weights * state.pressures[k].water_points
+        force += pressure @ joint.surface.normals[wet.elements]
+        total[joint.mesh.upper] += force
+        total[joint.mesh.lower] -= force
+        if joint.mesh.name.startswith("contraction"):
+            height = 45 - joint.surface.points[:, 1].min()
+            assert pressure.sum() == pytest.approx(WATER * 1.5 * height**2 / 2, rel=1e-9)
+    assert len(total) == 9
+    for name in total:
+        assert name == "foundation" or np.abs(total[name]).max() < 1e-6 * weight
+
+
+@pytest.mark.parametrize("order", [1.0, 2.0])
+@pytest.mark.parametrize("waterstop", [0.0, 0.7, 3.0])
+def test_water_in_a_contraction_joint_up_to_its_waterstop(waterstop, order):
+    """rho g b H^2/2 on either face, also where the waterstop cuts elements; each monolith carries
+    it, less the contact with the other one, to its base.
+    """
+    solid = {"n_joint": 6.0, "h_dam": 12.0, "h_found": 40.0, "dim": 3.0, "order": order}
+    water = {"uplift": ("imposed", "imposed", "waterstop"), "waterstop": waterstop}
+    case = load("monoliths", solid | water, [45.0])
+    stepper = LoadStepper(case, interface_of(case))
+    results = stepper.run()
+    own, rows = results.joints[-1].last, results.joints[-1].at()
+    pressure = WATER * waterstop * 45**2 / 2
+    assert own["U"] * 45 == pytest.approx(pressure, rel=1e-9)
+    beyond = rows["x"] > waterstop
+    assert not rows["p"][beyond].any()
+    if waterstop:
+        assert rows["p"][~beyond] == pytest.approx(WATER * (45 - rows["y"][~beyond]), rel=1e-9)
+    equilibrium, state = stepper.model.equilibrium, stepper.state
+    across = []
+    for k, joint in enumerate(equilibrium.interface.joints[:2]):
+        jump = joint.jumps(joint.at_points, state.jump)
+        traction, _ = equilibrium.laws.laws[k].traction_and_tangent(jump, state.variables.joints[k])
+        frames = joint.frames[joint.points.elements]
+        across.append(joint.points.weights @ np.einsum("qk,qk->q", traction, frames[:, :, 2]))
+    pushed = pressure + 45 * own["N"]
+    assert np.array(across) == pytest.approx([-pushed, pushed], rel=1e-6, abs=1e-6 * own["U"] + 1)
+
+
 @pytest.mark.parametrize(
     "joints, settings, words",
     [
@@ -152,6 +225,11 @@ def test_monoliths_are_in_equilibrium(dim):
         (BASES | CONTRACTION | {"edge": (0, 5, 5, 5)}, {}, "inside a body it must not touch"),
         (BASES | CONTRACTION, {"mu": (0.5, 0.6)}, "lists of 2 values: must have one for each"),
         (BASES | CONTRACTION, {"lift_heights": (5.0,)}, "lift_heights: must not be set"),
+        (
+            BASES | CONTRACTION,
+            {"uplift": ("none", "none", "waterstop"), "waterstop": 10.5},
+            "waterstop = 10.5: must be < the joint's length (10 m)",
+        ),
     ],
 )
 def test_bad_geometries_of_several_joints(solved, joints, settings, words):

@@ -144,6 +144,11 @@ def test_a_map_has_the_shape_of_the_joint():
     names, places = pictures.projected(joint)
     assert names == ["z", "x"]
     assert_allclose(places, points[:, [2, 0]].T)
+    upright = points[:, [1, 2, 0]]  # a contraction joint, y upwards
+    joint = Body(upright, np.arange(26), [("quad", quads)], np.arange(12), ["joint"])
+    names, places = pictures.projected(joint)
+    assert names[1] == "y"
+    assert_allclose(places[1], upright[:, 1])
 
 
 def test_extremes_of_a_map_do_not_set_its_scale():
@@ -161,7 +166,7 @@ def test_a_map_of_any_values(values):
     axes = figure.subplots()
     x, y = np.array([(0, 0), (1, 0), (1, 1), (0, 1)]).T
     shape = pictures.Triangulation(x, y, [(0, 1, 2), (0, 2, 3)])
-    pictures.draw_map(axes, shape, values, "opening [mm]")
+    pictures.draw_map(axes, shape, values, "opening [mm]", True)
     figure.canvas.draw()
     thick = [c for c in axes.collections if np.max(c.get_linewidth()) > 1.2]
     assert len(thick) == (values.min() < 0 < values.max())

@@ -107,6 +107,8 @@ DIMENSIONS = {
 }
 #: All kinds of loads.
 LOADS = {"silt_height": 10.0, "ice_force": 1e5, "anchor_force": 1e5, "k_h": 0.05, "force_x": 1e4}
+#: In the first step the joint slips at heel and toe: the next ones start on the yield surface.
+LOADS |= {"temperature_dam": -5.0}
 
 
 def in_units(case, units):

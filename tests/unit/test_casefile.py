@@ -10,7 +10,11 @@ from damjoint.model.case import CASES, load
 from damjoint.post import validation
 
 #: With a list of texts, one for each joint, which Gmsh writes in another way.
-TEXTS_BY_JOINT = {"monoliths", *(path.stem for path in CASES.glob("ssnp143*.case"))}
+TEXTS_BY_JOINT = {
+    "monoliths",
+    "valley_blocks",
+    *(path.stem for path in CASES.glob("ssnp143*.case")),
+}
 
 
 @pytest.mark.parametrize(

@@ -40,6 +40,23 @@ def test_schur_complement(system, method):
     assert reduced == pytest.approx(loads[keep] - through @ loads[inside], rel=1e-12, abs=1e-13)
 
 
+def test_loads_as_a_border(system, method):
+    """Also a load on one unknown, the same twice, and one on a kept unknown only."""
+    matrix, loads = system
+    keep, size = np.array([7, 3, 250, 100, 101]), len(loads)
+    unit = np.eye(size)[:, [40, 40, 3]]
+    loads = np.hstack([loads, unit])
+    expected, reduced = factor.schur_complement(matrix, keep, loads)
+    with_loads = factor.bordered(matrix, sparse.csr_matrix(loads))
+    schur = factor.dense_schur(with_loads, np.append(keep, np.arange(size, with_loads.shape[0])))
+    assert schur[:5, :5] == pytest.approx(expected, rel=1e-12, abs=1e-13)
+    assert schur[:5, 5:] == pytest.approx(reduced, rel=1e-12, abs=1e-13)
+    assert np.array_equal(schur, schur.T) or factor.is_slow()
+    inside = np.setdiff1d(np.arange(size), keep)
+    moved = np.linalg.solve(matrix.toarray()[np.ix_(inside, inside)], loads[inside])
+    assert -schur[5:, 5:] == pytest.approx(loads[inside].T @ moved, rel=1e-12, abs=1e-13)
+
+
 def test_factors_that_are_stored(system, method):
     """Two right-hand sides, one after the other; two sets of factors at once."""
     matrix, loads = system

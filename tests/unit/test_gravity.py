@@ -374,7 +374,7 @@ def test_heads_are_measured_from_the_joint():
     assert found.p[-1] == pytest.approx(WATER * (3 + 34 * math.tan(math.radians(5))))
 
 
-DRAINS = {"drain_x": 4.0, "drain_effectiveness": 0.5, "drain_level": 6.0}
+DRAINS = {"waterstop": 1.5, "drain_x": 4.0, "drain_effectiveness": 0.5, "drain_level": 6.0}
 
 
 @pytest.mark.parametrize(
@@ -386,6 +386,7 @@ DRAINS = {"drain_x": 4.0, "drain_effectiveness": 0.5, "drain_level": 6.0}
         ("cracked", 5.0, (0, 5, 34), (45, 45, 3)),
         ("flow", 2.0, (0, 2, 34), (45, 45, 3)),
         ("imposed", 2.0, (0, 0, 34), (45, 45, 3)),
+        ("waterstop", 2.0, (0, 0, 1.5, 1.5, 34), (45, 45, 45, 0, 0)),
         ("none", 2.0, (0, 0, 34), (0, 0, 0)),
     ],
 )
@@ -395,10 +396,60 @@ def test_uplift_rules(mode, crack, places, heads):
     assert_allclose(found.s, places)
     assert_allclose(found.p, np.array(heads) * WATER)
     pressure = lambda s: np.interp(s, found.s, found.p)
-    kinks = [2, 4, 5]
+    kinks = [1.5, 2, 4, 5]
     assert found.force == pytest.approx(quad(pressure, 0, 34, points=kinks)[0])
     moment = quad(lambda s: pressure(s) * (34 - s), 0, 34, points=kinks)[0]
     assert found.moment == pytest.approx(moment)
+
+
+@pytest.mark.parametrize("slope", [-8.0, 12.0])
+@pytest.mark.parametrize("mode", ["cracked", "flow"])
+def test_head_in_an_inclined_crack(mode, slope):
+    """The reservoir's, at each height; beyond the tip linear to the toe's."""
+    case = large({"uplift": mode, "joint_slope": slope})
+    body = gravity.RigidBlock(case)
+    found = gravity.Uplift(case, body, 45, 3, 9.0)
+    assert_allclose(found.s, [0, 9, body.length])
+    heights = 9 * math.sin(math.radians(slope)), 34 * math.tan(math.radians(slope))
+    heads = [45, 45 - heights[0], max(3 - heights[1], 0)]
+    assert_allclose(found.p, np.array(heads) * WATER)
+
+
+#: A lift joint from 5 m at the heel to about 5.4 m or 4.6 m at the toe; level, tailwater.
+DRY_ENDS = [
+    (4.0, 5.3, 0.0),
+    (4.0, 5.3, 5.35),
+    (4.0, 5.6, 0.0),
+    (4.0, 4.0, 3.0),
+    (-4.0, 4.9, 4.8),
+    (-4.0, 4.9, 4.4),
+    (-4.0, 4.5, 5.2),
+    (-4.0, 5.2, 0.0),
+]
+
+
+@pytest.mark.parametrize("slope, level, tail", DRY_ENDS)
+@pytest.mark.parametrize("mode", ["imposed", "drained", "cracked", "flow"])
+def test_uplift_between_dry_ends(mode, slope, level, tail):
+    """imposed, drained without effect: linear between the pressures at heel and toe, zero where
+    these are dry. cracked, flow: the head lies between those of the water that touches the joint
+    and the exits below it; no water rises above these.
+    """
+    settings = {"joint_height": 5.0, "joint_slope": slope, "uplift": mode}
+    case = large(settings | {"drain_effectiveness": 0.0})
+    body = gravity.RigidBlock(case)
+    (_, heel), (_, toe), length = body.heel, body.toe, body.length
+    wet = [w for w, y in ((level, heel), (tail, toe)) if w > y]
+    if mode in ("imposed", "drained") or not wet:
+        p = [max(level - heel, 0), max(tail - toe, 0)]
+        exact = lambda s: p[0] + (p[1] - p[0]) * s / length
+    else:
+        heads = [w if w > y else min(y, *wet) for w, y in ((level, heel), (tail, toe))]
+        head = lambda s: heads[0] + (heads[1] - heads[0]) * s / length
+        exact = lambda s: max(head(s) - heel - (toe - heel) * s / length, 0)
+    found = gravity.Uplift(case, body, level, tail, 0.0)
+    s = np.linspace(0, length, 50)
+    assert_allclose(np.interp(s, found.s, found.p) / WATER, [exact(x) for x in s], atol=1e-9)
 
 
 def test_drains_have_no_effect_if_the_crack_passes_them():
@@ -435,7 +486,7 @@ def test_two_cracks_in_equilibrium():
     assert longer.crack_length == pytest.approx(without.crack_length, rel=1e-9)
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", range(60))
 def test_all_crack_lengths_in_equilibrium_are_found(seed):
     """Against a scan of the tension at the tip."""
     dice = np.random.default_rng(seed)
@@ -450,6 +501,7 @@ def test_all_crack_lengths_in_equilibrium_are_found(seed):
         "drain_x": dice.uniform(0.5, 20),
         "drain_effectiveness": dice.uniform(0, 1),
         "drain_level": dice.uniform(0, 25),
+        "joint_slope": 0.0 if seed < 40 else seed - 49.5,
     }
     case = load("dam", settings, str(dice.uniform(38, 52)), str(dice.uniform(0, 15)))
     first = gravity.at(case, 1)

@@ -117,3 +117,17 @@ def test_fracture_energy_of_the_rupture_law():
     assert load("dam", {"pena_rupture": 249.0})["G_f"] == pytest.approx(50)
     assert load("a")["G_f"] == pytest.approx(100**2 * 1.2 / 2e12)
     assert load("dam", {"sigma_max": 0.0})["G_f"] == 100
+
+
+@pytest.mark.parametrize("law_name", ["bond", "friction"])
+def test_a_point_that_has_slipped_sticks_at_first(law_name):
+    """On the yield surface up to rounding: no slip, and the elastic tangent."""
+    case = load("dam", BASE | {"law": law_name})
+    slipped = np.column_stack([np.full(50, -3e-6), np.linspace(2e-5, 2e-3, 50), np.zeros(50)])
+    point = case.law.update_internal_variables(slipped, case.law.initial(50))
+    assert (case.law.slip(point, 50) > 0).all()
+    for jump in slipped * (1 + np.array([-1, 0, 1, 2, 5]) * 1e-16)[:, None, None]:
+        again = case.law.update_internal_variables(jump, point)
+        assert np.array_equal(again.plastic, point.plastic)
+        _, tangent = case.law.traction_and_tangent(jump, point)
+        assert_allclose(tangent, np.diag([K_N, K_T, K_T])[None].repeat(50, 0), rtol=1e-7)

@@ -59,6 +59,7 @@ def test_sliding_of_a_bond_by_its_undamaged_cohesion():
             "time": np.ones(2),
             "joint": np.ones(2),
             "x": np.array([0, length]),
+            "y": np.zeros(2),
             "s": np.array([0, length]),
         }
         result.joint.update(

@@ -26,12 +26,12 @@ from .step import Moving
 from .stepper import Earthquake
 
 
-def fingerprint(case: Case) -> str:
-    """Hash of all that an earthquake depends on."""
+def fingerprint(case: Case, span: tuple[float, float] | None) -> str:
+    """Hash of all that an earthquake depends on; span: of its frames."""
     record = case.record.read_bytes() if case.record else b""
     values = [own.values for own in case.joints]
     loading = case.levels, case.tail_levels, case.times
-    scene = json.dumps([__version__, sources(), key_of(case), values, loading], default=str)
+    scene = json.dumps([__version__, sources(), key_of(case), values, loading, span], default=str)
     return hashlib.sha256(scene.encode() + record).hexdigest()
 
 
@@ -73,6 +73,9 @@ def write(path: Path, key: str, quake: Earthquake, history: QuakeHistory) -> Non
         "columns": np.array(list(history.rows)),
         "rows": np.array(list(history.rows.values())),
         "stress": np.array(history.stress),
+        "frames": np.array(history.frames.displacement),
+        "frame_rows": np.array(list(history.frames.history.rows.values())),
+        "frame_tables": np.array(history.frames.history.tables),
         "peaks": np.array(list(history.peaks)),
         "peak_values": np.array([[peak.value, peak.time] for peak in history.peaks.values()]),
         "peak_states": np.array([peak.displacement for peak in history.peaks.values()]),
@@ -82,14 +85,14 @@ def write(path: Path, key: str, quake: Earthquake, history: QuakeHistory) -> Non
         np.savez(file, **content)
 
 
-def read(path: Path, key: str, quake: Earthquake) -> QuakeHistory | None:
-    """Continue an earthquake from a file: its rows; None if it is missing, damaged or of another
-    case.
+def read(path: Path, key: str, quake: Earthquake, history: QuakeHistory) -> bool:
+    """Continue an earthquake from a file, with its rows; False if it is missing, damaged or of
+    another case.
     """
     try:
         with np.load(path, allow_pickle=False) as file:
             if str(file["key"]) != key:
-                return None
+                return False
             stored = dict(file)
         static = quake.problem.static
         arrays = (stored[f"variable_{i}"] for i in itertools.count())
@@ -101,6 +104,17 @@ def read(path: Path, key: str, quake: Earthquake) -> QuakeHistory | None:
             node_variables=replace(static.node_variables, joints=nodes),
         )
         rows = dict(zip(stored["columns"].tolist(), stored["rows"].tolist(), strict=True))
+        frame_rows = zip(history.frames.history.rows, stored["frame_rows"].tolist(), strict=True)
+        frames = replace(
+            history.frames,
+            history=replace(
+                history.frames.history,
+                rows=dict(frame_rows),
+                tables=[(table, extrapolated) for table, extrapolated in stored["frame_tables"]],
+            ),
+            displacement=list(stored["frames"]),
+        )
+        stress = list(stored["stress"])
         names = stored["peaks"].tolist()
         values = zip(stored["peak_values"].tolist(), stored["peak_states"], strict=True)
         peaks = {n: Peak(v[0], v[1], w) for n, (v, w) in zip(names, values, strict=True)}
@@ -110,8 +124,9 @@ def read(path: Path, key: str, quake: Earthquake) -> QuakeHistory | None:
             motion=Motion(*stored["motion"]),
             forces=stored["forces"],
         )
-        history = QuakeHistory(rows, list(stored["stress"]), peaks, (len(stored["stress"]), now))
     except Exception:  # a damaged byte can make numpy and zipfile raise anything
-        return None
+        return False
+    history.rows, history.frames, history.stress, history.peaks = rows, frames, stress, peaks
+    history.complete = len(stress), len(frames), now
     quake.now = now
-    return history
+    return True

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..arrays import Array, Table
-from ..model.case import Case
 from ..model.results import column_of, quake_columns
 from ..solver.history import joint_row
 from ..solver.state import State
+from .frames import Frames
 from .step import Moving
 from .stepper import Converged, Earthquake
 
@@ -77,21 +77,30 @@ class Peak:
 
 @dataclass
 class QuakeHistory:
-    """Rows of an earthquake so far."""
+    """Rows and frames of an earthquake so far."""
 
     #: columns of quake.csv
     rows: dict[str, list[float]]
+    frames: Frames
+    #: see `System.resultants`, of each joint
+    inertia: list[Array]
     #: effective normal stress at the first joint's nodes, from heel to toe, of each row [Pa]
     stress: list[Array] = field(default_factory=list)
     #: by PEAK_STATES
     peaks: dict[str, Peak] = field(default_factory=dict)
-    #: number of complete rows and the state of the last one: an interruption can come at any time
-    complete: tuple[int, Moving | None] = (0, None)
+    #: numbers of complete rows and of their frames, and the state of the last row: an interruption
+    #: can come at any time
+    complete: tuple[int, int, Moving | None] = (0, 1, None)
 
     @staticmethod
-    def of(case: Case) -> QuakeHistory:
-        """No rows."""
-        return QuakeHistory({name: [] for name in quake_columns(case)})
+    def of(quake: Earthquake, span: tuple[float, float] | None = None) -> QuakeHistory:
+        """No rows, and the frame of the static state; span: as in `Frames`."""
+        joints = quake.problem.model.equilibrium.interface.joints
+        return QuakeHistory(
+            {name: [] for name in quake_columns(quake.case)},
+            Frames.of(quake, span),
+            [quake.system.resultants(j, quake.case.above([k])) for k, j in enumerate(joints)],
+        )
 
     def __len__(self) -> int:
         return len(self.rows["time"])
@@ -103,9 +112,10 @@ class QuakeHistory:
 
     def end_at_complete_row(self, quake: Earthquake) -> None:
         """Remove a row that an interruption has left incomplete, and its step."""
-        number, last = self.complete
+        number, frames, last = self.complete
         self.rows = {name: values[:number] for name, values in self.rows.items()}
         self.stress = self.stress[:number]
+        self.frames.cut(frames)
         quake.now = last or quake.problem.at_rest
 
     def add(self, quake: Earthquake, step: Converged) -> None:
@@ -123,6 +133,8 @@ class QuakeHistory:
         }
         for k in range(len(quake.case.joints)):
             of_joint = row_of_joint(quake, state, k)
+            forces = self.inertia[k] @ np.concatenate([motion.acceleration, step.ground])
+            of_joint |= dict(zip(("T_inertia", "N_inertia", "M_inertia"), forces, strict=True))
             row |= {column_of(name, k): value for name, value in of_joint.items()}
         stress = stress_at_nodes(quake, state)
         for name, value in row.items():
@@ -132,4 +144,6 @@ class QuakeHistory:
             value = sign * float(row[column])
             if name not in self.peaks or value > self.peaks[name].value:
                 self.peaks[name] = Peak(value, step.end.time, motion.displacement)
-        self.complete = len(self.stress), step.end
+        if self.frames.wanted(quake, step.end.time):
+            self.frames.add(quake, step.end, step.iterations, step.residual)
+        self.complete = len(self.stress), len(self.frames), step.end

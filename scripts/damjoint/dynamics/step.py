@@ -248,9 +248,8 @@ class TimeStep:
 
 def lift(equilibrium: Equilibrium, pressure: tuple[Pressure, ...]) -> Array:
     """Nodal forces (j,) of the water pressure in the joints."""
-    joints = equilibrium.interface.joints
     parts = (
-        joint.opening_at_water.T @ (joint.water_points.weights * own.water_points)
-        for joint, own in zip(joints, pressure, strict=True)
+        water.force(own.water_points)
+        for water, own in zip(equilibrium.water, pressure, strict=True)
     )
     return sum(parts, np.zeros(len(equilibrium.bulk.stiffness)))

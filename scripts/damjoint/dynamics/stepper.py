@@ -75,7 +75,7 @@ class Earthquake:
 
         Raises InputError.
         """
-        self.case, self.record = case, Record.of(case)
+        self.case, self.bodies, self.record = case, bodies, Record.of(case)
         interface = model.equilibrium.interface
         self.system = system = System.of(case, bodies, interface)
         undamaged = model.equilibrium.undamaged

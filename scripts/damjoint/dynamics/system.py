@@ -8,7 +8,7 @@ carries the mass of all that is above it: M = sum T_b^T M_b T_b, likewise K.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,6 +28,9 @@ from ..model.case import Case
 from ..model.loads import AddedPressure
 from ..model.parameters import TINY
 from ..model.scene import UP
+
+#: Displacement (n, 3) of points (n, 3) in a rigid motion.
+Motion = Callable[[Array], Array]
 
 #: Regions that have mass, and the parameter of their density.
 MASSIVE = {"dam": "rho_dam", "lower": "rho_dam"}
@@ -61,22 +64,17 @@ class System:
         dim, size = bodies.mesh.dim, len(glued.free) + gluing.unknowns
         stiffness: Sparse = sparse.csr_matrix((size, size))
         of_mass, inertia = stiffness, np.zeros((size, 2))
-        motion: dict[str, Sparse] = {}
+        motion = glued.motion(gluing)
         densities = {region: case[name] for region, name in MASSIVE.items()}
         for name, body in bodies.by_name.items():
-            of_body, own = gluing.bodies[name], body.stiffness.shape[0]
-            ones = np.ones(len(of_body.dofs))
-            places = of_body.dofs, np.arange(len(of_body.dofs))
-            carried = sparse.csr_matrix((ones, places), (own, len(of_body.dofs))) @ of_body.jumps
-            moved = sparse.hstack([glued.numbers[name][:, glued.free], carried], format="csr")
+            moved = motion[name]
             of_solid = mass(body.space, dim, densities)
             of_water = added_mass(case, interface, body)
             stiffness = stiffness + moved.T @ body.stiffness @ moved
             of_mass = of_mass + moved.T @ (of_solid + of_water) @ moved
-            x, y = (translation(body.space, dim, axis) for axis in np.eye(2))
+            x, y = (nodal(body.space, dim, uniform(axis)) for axis in np.eye(3)[:2])
             # the water follows a vertical motion of the ground
             inertia += moved.T @ np.column_stack([(of_solid + of_water) @ x, of_solid @ y])
-            motion[name] = moved
         return System(
             mass=of_mass.tocsr(),
             stiffness=stiffness.tocsr(),
@@ -91,18 +89,43 @@ class System:
         """The unknowns (n,) of a unit translation along x and y (2,) of the bodies of these names,
         which a joint separates from the others.
         """
+        return self.rigid_motion(joint, above, uniform(np.array([*along, 0.0])))
+
+    def rigid_motion(self, joint: JointInterface, above: Collection[str], motion: Motion) -> Array:
+        """The unknowns (n,) of a rigid motion of the bodies of these names, which a joint separates
+        from the others.
+        """
         result = np.zeros(self.size)
         moving = sorted(self.motion, key=lambda name: name not in above)
         for (
             name
         ) in moving:  # the others last: shared degrees of freedom are those of the lower body
-            value = translation(self.spaces[name], joint.dim, along) * (name in above)
+            value = nodal(self.spaces[name], joint.dim, motion) * (name in above)
             of_body = self.motion[name][:, : self.jumps[0]]
             touched = np.unique(of_body.indices)
             result[touched] = (of_body.T @ value)[touched]
-        jumps, value = joint.unknowns, translation(joint.space, joint.dim, along)
+        jumps, value = joint.unknowns, nodal(joint.space, joint.dim, motion)
         result[self.jumps] = (jumps.T @ value) / np.maximum(np.ravel(abs(jumps).sum(axis=0)), 1)
         return result
+
+    def resultants(self, joint: JointInterface, above: Collection[str]) -> Array:
+        """The parts of T, N and M of a joint, per metre, that are inertia of the bodies above it
+        (3, n + 2): from the acceleration relative to the ground and that of the ground along x
+        and y.
+        """
+        chord = joint.chord
+
+        def turned(points: Array) -> Array:
+            arm = points @ chord.plane.T - chord.toe
+            return arm[:, ::-1] * [1, -1] @ chord.plane
+
+        of_forces = (
+            uniform(-chord.along @ chord.plane),
+            uniform(chord.normal @ chord.plane),
+            turned,
+        )
+        motions = np.array([self.rigid_motion(joint, above, motion) for motion in of_forces])
+        return np.hstack([(self.mass @ motions.T).T, motions @ self.inertia]) / joint.width
 
     def frequencies(self, of_joints: Sparse, number: int) -> tuple[Array, Array]:
         """The lowest natural frequencies (number,) [Hz] with a stiffness of the joints (j, j), and
@@ -126,10 +149,15 @@ class System:
         return np.sqrt(squares[order]) / (2 * math.pi), modes[:, order]
 
 
-def translation(space: Space, dim: int, along: Array) -> Array:
-    """The displacement (degrees of freedom,) of a unit translation along x and y (2,)."""
+def uniform(displacement: Array) -> Motion:
+    """The translation by a displacement (3,)."""
+    return lambda points: np.tile(displacement, (len(points), 1))
+
+
+def nodal(space: Space, dim: int, motion: Motion) -> Array:
+    """The displacement (degrees of freedom,) of a rigid motion."""
     result = np.zeros((len(space.locations), dim))
-    result[: len(space.body.points), :2] = along
+    result[: len(space.body.points)] = motion(space.body.points)[:, :dim]
     return result.ravel()
 
 

@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays import Array, BoolArray
-from ..joint.interface import JointInterface
-from ..joint.water import Pressure
+from ..joint.water import JointWater, Pressure
 from ..model.case import Case
 from ..solver.state import State
 from .step import Problem
@@ -30,7 +29,7 @@ def pressures_in_motion(case: Case, problem: Problem, state: State) -> tuple[Pre
             strict=True,
         )
         return tuple(
-            without(pressure, water.joint, water.law.is_open(jump, variables))
+            without(pressure, water, water.law.is_open(jump, variables))
             for water, pressure, jump, variables in parts
         )
     if mode == "crack" and equilibrium.flowing:
@@ -38,9 +37,10 @@ def pressures_in_motion(case: Case, problem: Problem, state: State) -> tuple[Pre
     return static
 
 
-def without(pressure: Pressure, joint: JointInterface, is_open: BoolArray) -> Pressure:
+def without(pressure: Pressure, water: JointWater, is_open: BoolArray) -> Pressure:
     """A pressure, and none in the elements whose points (q,) are open, nor at their nodes."""
-    points, starts = joint.points.elements, 0
+    joint, starts = water.joint, 0
+    points = joint.points.elements
     elements = np.bincount(points, is_open) == np.bincount(points)
     nodes = np.zeros(len(joint.space.locations), bool)
     for _, table in joint.space.connectivity:
@@ -53,6 +53,6 @@ def without(pressure: Pressure, joint: JointInterface, is_open: BoolArray) -> Pr
     return replace(
         pressure,
         points=rest(pressure.points, elements[points]),
-        water_points=rest(pressure.water_points, elements[joint.water_points.elements]),
+        water_points=rest(pressure.water_points, elements[water.wetted.points.elements]),
         nodes=rest(pressure.nodes, nodes),
     )

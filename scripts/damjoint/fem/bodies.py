@@ -153,3 +153,21 @@ class Bodies:
         start = time.perf_counter()
         by_name = {name: ElasticBody.of(case, mesh, name) for name in mesh.solids}
         return Bodies(mesh=mesh, by_name=by_name, seconds=time.perf_counter() - start)
+
+    def loaded_dofs(self, name: str) -> IntArray:
+        """Degrees of freedom of the wet faces of a body that a pressure loads: none along an axis
+        that every normal of the face is perpendicular to, and no fixed ones.
+        """
+        body, dim, dofs = self.by_name[name], self.mesh.dim, [np.zeros(0, int)]
+        for face, of_face in body.face_dofs.items():
+            normals = self.mesh.faces[face].surface.normals[:, :dim]
+            loaded = np.abs(normals).max(axis=0) > 1e-9
+            dofs.append(of_face.reshape(-1, dim)[:, loaded].ravel())
+        return np.setdiff1d(np.concatenate(dofs), body.fixed_dofs)
+
+    @property
+    def crest(self) -> tuple[str, int]:
+        """The body that bears the crest, and the crest's degree of freedom along x."""
+        name, mesh = self.mesh.bearer("crest"), self.mesh
+        functions = self.by_name[name].space.find(Space(mesh.bodies["crest"], 1))
+        return name, int(functions[0]) * mesh.dim

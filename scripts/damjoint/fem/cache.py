@@ -112,10 +112,14 @@ def read(path: Path, header: str) -> Condensed | None:
 
 
 def write(condensed: Condensed, header: str, path: Path) -> None:
-    """Write condensed bodies to a file, whole or not at all; an OSError only costs the entry."""
+    """Write condensed bodies to a file, whole or not at all, and none above the limit of the cache;
+    an OSError only costs the entry.
+    """
     part = path.with_suffix(f".{os.getpid()}")
     arrays: dict[str, Array] = {}
     tree = json.dumps(pack(condensed, "bodies", arrays))
+    if sum(array.nbytes for array in arrays.values()) > LIMIT:
+        return
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         part.unlink(missing_ok=True)

@@ -13,7 +13,8 @@ With v eliminated, too, the joints' nodal forces t, which work on the jumps, are
     S = sum J_b^T S_b J_b - C^T K^-1 C,    t_0 = sum J_b^T f_b - C^T K^-1 sum R_b^T f_b.
 
 S is symmetric; the motions of the bodies that the joints alone hold are its null space. With a
-single joint, v is the displacement of its lower face, K = S_u + S_l and C = S_u.
+single joint, v is the displacement of its lower face, K = S_u + S_l and C = S_u. That is how 2D is
+computed; glued_elimination.py computes the same S and t_0 in 3D.
 
 GetDP is not used for the
 bodies: its start alone takes as long as all steps of a 2D scene, and an independent assembly checks
@@ -34,8 +35,9 @@ from ..model.case import Case
 from ..model.mesh import Face, JointMesh
 from . import factor
 from .bodies import Bodies, ElasticBody
-from .elements import Space
+from .glued_elimination import responses_at_once
 from .gluing import BodyDofs, Gluing, JointDofs
+from .responses import Responses
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,10 +49,8 @@ class CondensedJoint:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Condensed:
-    """The condensed bodies: stiffness of the free jump unknowns (j of them) and the responses to
-    loads, with m degrees of freedom on which forces act.
-    """
+class Condensed(Responses):
+    """The condensed bodies of a case."""
 
     dim: int
     order: int
@@ -62,18 +62,6 @@ class Condensed:
     joints: list[CondensedJoint]
     #: the wet faces
     faces: dict[str, Face]
-    #: S (j, j), see above
-    stiffness: Array
-    #: t_0 of unit loads (j,), see ElasticBody.unit_loads
-    units: dict[str, Array]
-    #: t_0 of unit forces on the loaded degrees of freedom (j, m), and the column of each degree of
-    #: freedom of a face (functions * dim,); -1: none, it is fixed or never loaded
-    pressure: Array
-    dof_of_face: dict[str, IntArray]
-    #: displacement of the crest along x: per jump (j,), by unit loads, by unit forces (m,)
-    crest_jump: Array
-    crest_units: dict[str, float]
-    crest_pressure: Array
     #: library that eliminated them, with its version
     factorisation: str
     #: wall seconds of mesh, assembly and condensation
@@ -133,18 +121,6 @@ class ReducedBody:
         )
 
 
-def loaded_dofs(bodies: Bodies, body: ElasticBody) -> IntArray:
-    """Degrees of freedom of the wet faces that a pressure loads: none along an axis that every
-    normal of the face is perpendicular to.
-    """
-    dim, dofs = bodies.mesh.dim, [np.zeros(0, int)]
-    for name, of_face in body.face_dofs.items():
-        normals = bodies.mesh.faces[name].surface.normals[:, :dim]
-        loaded = np.abs(normals).max(axis=0) > 1e-9
-        dofs.append(of_face.reshape(-1, dim)[:, loaded].ravel())
-    return np.concatenate(dofs)
-
-
 def add_at(total: Array, places: Any, values: Array) -> None:
     """Add values at places of an array, which may be repeated."""
     rows = np.ravel(places[0] if isinstance(places, tuple) else places)
@@ -191,14 +167,12 @@ class JointElimination:
         return own.jumps.T @ forces - through
 
 
-def condense(case: Case, bodies: Bodies) -> Condensed:
-    """Eliminate the bodies of a case."""
-    start, mesh = time.perf_counter(), bodies.mesh
-    gluing = Gluing.of(bodies)
-    crest_body = mesh.bearer("crest")
-    space = bodies.by_name[crest_body].space
-    crest = space.find(Space(mesh.bodies["crest"], 1))[:1] * mesh.dim
-    loaded = {name: loaded_dofs(bodies, body) for name, body in bodies.by_name.items()}
+def responses_body_by_body(bodies: Bodies, gluing: Gluing) -> Responses:
+    """Eliminate each body, then the displacements of the glued ones on the joints, dense: fastest
+    where the joints have few unknowns.
+    """
+    crest_body, crest = bodies.crest
+    loaded = {name: bodies.loaded_dofs(name) for name in bodies.by_name}
     loaded[crest_body] = np.append(loaded[crest_body], crest)
     reduced = {
         name: ReducedBody.of(body, gluing.bodies[name].dofs, loaded[name])
@@ -210,9 +184,9 @@ def condense(case: Case, bodies: Bodies) -> Condensed:
     # u_c = R_c v + J_c d with v = K^-1 (sum R_b^T f_b - C d)
     above, own_dofs = reduced[crest_body], gluing.bodies[crest_body]
     size = len(above.loaded_stiffness)
-    at_crest = 1.0 * (above.dofs[:size] == crest[0])
+    at_crest = 1.0 * (above.dofs[:size] == crest)
     row = linalg.solve(above.loaded_stiffness, at_crest, assume_a="pos")
-    crest_face = 1.0 * (own_dofs.dofs == crest[0]) - above.coupling @ row
+    crest_face = 1.0 * (own_dofs.dofs == crest) - above.coupling @ row
     crest_nodes = joints.on_nodes(own_dofs, crest_face)
     crest_both = linalg.cho_solve((joints.factor, True), crest_nodes)
 
@@ -240,7 +214,25 @@ def condense(case: Case, bodies: Bodies) -> Condensed:
             units[load] = units.get(load, 0) + by_load[:, i]
             crest_units[load] = crest_units.get(load, 0) + float(moved[i])
 
+    return Responses(
+        stiffness=joints.stiffness,
+        units=units,
+        pressure=np.hstack(pressure),
+        dof_of_face=dof_of_face,
+        crest_jump=own_dofs.jumps.T @ crest_face - joints.coupling @ crest_both,
+        crest_units=crest_units,
+        crest_pressure=np.concatenate(crest_pressure),
+    )
+
+
+def condense(case: Case, bodies: Bodies) -> Condensed:
+    """Eliminate the bodies of a case."""
+    start, mesh = time.perf_counter(), bodies.mesh
+    gluing = Gluing.of(bodies)
+    eliminate = responses_at_once if mesh.dim == 3 else responses_body_by_body
+    responses = eliminate(bodies, gluing)
     return Condensed(
+        **vars(responses),
         dim=mesh.dim,
         order=int(case["order"]),
         width=mesh.joints[0].width,
@@ -250,14 +242,7 @@ def condense(case: Case, bodies: Bodies) -> Condensed:
             CondensedJoint(mesh=joint, dofs=dofs)
             for joint, dofs in zip(mesh.joints, gluing.joints, strict=True)
         ],
-        faces={name: face for name, face in mesh.faces.items() if name in dof_of_face},
-        stiffness=joints.stiffness,
-        units=units,
-        pressure=np.hstack(pressure),
-        dof_of_face=dof_of_face,
-        crest_jump=own_dofs.jumps.T @ crest_face - joints.coupling @ crest_both,
-        crest_units=crest_units,
-        crest_pressure=np.concatenate(crest_pressure),
+        faces={n: face for n, face in mesh.faces.items() if n in responses.dof_of_face},
         factorisation=factor.name(),
         seconds={
             "mesh": mesh.seconds,

@@ -5,7 +5,9 @@ Plane strain in 2D.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import operator
+from collections.abc import Callable, Iterator
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -25,46 +27,66 @@ def lame(young: float, poisson: float) -> tuple[float, float]:
     return young * poisson / ((1 + poisson) * (1 - 2 * poisson)), young / (2 * (1 + poisson))
 
 
+#: Numbers of elements computed and of entries assembled at a time.
+MOST_ELEMENTS, MOST_ENTRIES = 50_000, 5_000_000
+
+
 def elasticity(space: Space, dim: int, material: Material) -> Sparse:
     """Assemble the stiffness matrix [N/m] of an isotropic body, plane strain in 2D; degree of
     freedom dim * function + component.
     """
-    points, rows, columns, values = space.body.points[:, :dim], [], [], []
-    for (shape, table), region in zip(space.connectivity, space.body.regions, strict=True):
-        lam, mu = lame(*material[region])
-        _, gradients, nodal_gradients, weights = tabulated(
-            shape, space.order, BULK[space.order][shape]
+    size, parts = dim * len(space.locations), list[tuple[Array, IntArray, IntArray]]()
+
+    def assembled() -> Sparse:
+        values, rows, columns = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+        return sparse.coo_matrix((values, (rows, columns)), (size, size)).tocsr()
+
+    def batches() -> Iterator[Sparse]:
+        for (shape, table), region in zip(space.connectivity, space.body.regions, strict=True):
+            for first in range(0, len(table), MOST_ELEMENTS):
+                elements = table[first : first + MOST_ELEMENTS]
+                block = element_stiffness(space, dim, shape, elements, *lame(*material[region]))
+                dofs = (dim * elements[:, :, None] + np.arange(dim)).astype(np.int32)
+                dofs, n = dofs.reshape(len(elements), -1), block.shape[1]
+                rows, columns = np.repeat(dofs, n, axis=1), np.tile(dofs, n)
+                parts.append((block.ravel(), rows.ravel(), columns.ravel()))
+                if sum(len(values) for values, _, _ in parts) > MOST_ENTRIES:
+                    yield assembled()
+                    parts.clear()
+        if parts:
+            yield assembled()
+
+    return reduce(operator.add, batches())
+
+
+def element_stiffness(
+    space: Space, dim: int, shape: str, table: IntArray, lam: float, mu: float
+) -> Array:
+    """Stiffness (elements, n, n) of elements with these functions (elements, n / dim)."""
+    points = space.body.points[:, :dim]
+    rule = BULK[space.order][shape]
+    _, gradients, nodal_gradients, weights = tabulated(shape, space.order, rule)
+    cells = table[:, : nodal_gradients.shape[1]]
+    n = table.shape[1]
+    products = np.einsum("q,qak,qbl->qabkl", weights, gradients, gradients).reshape(
+        len(weights), n * n, dim * dim
+    )
+    if affine(points, cells, nodal_gradients):  # one Jacobian serves all points
+        products, nodal_gradients = products.sum(axis=0, keepdims=True), nodal_gradients[:1]
+    block = np.zeros((n * n, len(table) * dim * dim))
+    for product, dn in zip(products, nodal_gradients, strict=True):
+        measure, inverse = geometry(points, cells, dn)
+        inverse = np.moveaxis(inverse, 1, 0)
+        # lambda div div + mu (grad : grad + grad : grad^T), from reference gradients (k, l) to
+        # real ones (i, j); axes k, l, e, i, j
+        outer = (measure[:, None] * inverse)[:, None, :, :, None] * inverse[None, :, :, None, :]
+        laplace = np.einsum("kleii->kle", outer)
+        hooke = (
+            lam * outer + mu * outer.swapaxes(3, 4) + mu * laplace[..., None, None] * np.eye(dim)
         )
-        cells = table[:, : nodal_gradients.shape[1]]
-        n = table.shape[1]
-        products = np.einsum("q,qak,qbl->qabkl", weights, gradients, gradients).reshape(
-            len(weights), n * n, dim * dim
-        )
-        if affine(points, cells, nodal_gradients):  # one Jacobian serves all points
-            products, nodal_gradients = products.sum(axis=0, keepdims=True), nodal_gradients[:1]
-        block = np.zeros((n * n, len(table) * dim * dim))
-        for product, dn in zip(products, nodal_gradients, strict=True):
-            measure, inverse = geometry(points, cells, dn)
-            inverse = np.moveaxis(inverse, 1, 0)
-            # lambda div div + mu (grad : grad + grad : grad^T), from reference gradients (k, l) to
-            # real ones (i, j); axes k, l, e, i, j
-            outer = (measure[:, None] * inverse)[:, None, :, :, None] * inverse[None, :, :, None, :]
-            laplace = np.einsum("kleii->kle", outer)
-            hooke = (
-                lam * outer
-                + mu * outer.swapaxes(3, 4)
-                + mu * laplace[..., None, None] * np.eye(dim)
-            )
-            block += product @ hooke.reshape(dim * dim, -1)
-        block = block.reshape(n, n, len(table), dim, dim).transpose(2, 0, 3, 1, 4)
-        dofs = (dim * table[:, :, None] + np.arange(dim)).reshape(len(table), -1)
-        rows.append(np.repeat(dofs, n * dim, axis=1).ravel())
-        columns.append(np.tile(dofs, (1, n * dim)).ravel())
-        values.append(block.ravel())
-    size = dim * len(space.locations)
-    return sparse.coo_matrix(
-        (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), (size, size)
-    ).tocsr()
+        block += product @ hooke.reshape(dim * dim, -1)
+    block = block.reshape(n, n, len(table), dim, dim).transpose(2, 0, 3, 1, 4)
+    return block.reshape(len(table), n * dim, n * dim)
 
 
 #: Distortion up to which an element counts as affine, relative to its size: rounding of Gmsh's

@@ -23,7 +23,7 @@ import scipy
 from scipy import sparse
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from ..arrays import Array, IntArray, Sparse
+from ..arrays import Array, IntArray, Sparse, mirror
 from ..storage import atomic_write, cache_folder
 from .memory import available, check_memory, dense_memory
 
@@ -94,11 +94,19 @@ def elimination_order(matrix: Sparse, keep: IntArray) -> IntArray | None:
         return None
     inside = np.setdiff1d(np.arange(size), keep)
     graph = matrix[inside][:, inside].tocsr()
+    graph.data[:] = 1.0
+    # unknowns of a node follow each other and have the same neighbours: a vertex of the graph
+    neighbours = graph @ np.random.default_rng(0).random(len(inside))
+    vertex = np.cumsum(np.diff(neighbours, prepend=-1.0) != 0) - 1
+    first = np.flatnonzero(np.diff(vertex, prepend=-1))
+    graph = graph[first][:, first]
     graph.setdiag(0)
     graph.eliminate_zeros()
     _, position = pymetis.nested_dissection(pymetis.CSRAdjacency(graph.indptr, graph.indices))
     order = np.empty(size, np.int32)
-    order[inside] = 1 + np.asarray(position)
+    order[inside[np.argsort(np.asarray(position)[vertex], kind="stable")]] = 1 + np.arange(
+        len(inside)
+    )
     order[keep] = 1 + np.arange(len(inside), size)
     return order
 
@@ -123,9 +131,16 @@ class MumpsFactors:
     """
 
     def __init__(
-        self, mumps: ctypes.CDLL, matrix: Sparse, keep: IntArray, what: str, beside: float = 0.0
+        self,
+        mumps: ctypes.CDLL,
+        matrix: Sparse,
+        keep: IntArray,
+        what: str,
+        beside: float = 0.0,
+        store: bool = True,
     ) -> None:
-        """what: the unknowns, for the message; beside: further memory [bytes] that is needed.
+        """what: the unknowns, for the message; beside: further memory [bytes] that is needed;
+        store: whether to store the factors: only then `solve`, `reduce` and `expand` work.
 
         Raises RunError if the estimated memory is not available, MemoryError if an allocation
         fails.
@@ -137,14 +152,16 @@ class MumpsFactors:
         self.lower = np.zeros((len(keep), len(keep)))
         beside += float(self.lower.nbytes)
         needed, error = ctypes.c_double(), ctypes.c_int()
-        row, column = ((i + 1).astype(np.int32) for i in (upper.row, upper.col))
+        row, column = (i.astype(np.int32, copy=False) for i in (upper.row, upper.col))
+        for index in row, column:
+            index += 1
         mumps.damjoint_factorise.restype = ctypes.c_void_p
         with as_other_libraries():
             factors = mumps.damjoint_factorise(
                 *(self.size, ctypes.c_longlong(upper.nnz)),
                 *(pointer(row), pointer(column), pointer(upper.data)),
                 None if order is None else pointer(order),
-                *(len(keep), pointer(self.keep), pointer(self.lower)),
+                *(len(keep), pointer(self.keep), pointer(self.lower), int(store)),
                 *(ctypes.c_double((available() - beside) / 1e6), ctypes.byref(needed)),
                 ctypes.byref(error),
             )
@@ -160,7 +177,7 @@ class MumpsFactors:
     @property
     def schur(self) -> Array:
         """The Schur complement of `keep` (k, k)."""
-        return np.tril(self.lower) + np.tril(self.lower, -1).T
+        return mirror(self.lower)
 
     def solve(self, right: Array) -> Array:
         """Solution (n, m) with the unknowns `keep` zero."""
@@ -196,7 +213,7 @@ class SuperLUFactors:
         self.keep, self.inside = keep, np.setdiff1d(np.arange(matrix.shape[0]), keep)
         self.factors = superlu(matrix[self.inside][:, self.inside].tocsc(), "MMD_AT_PLUS_A")
         self.coupling = matrix[keep][:, self.inside].tocsr()
-        self.schur, _ = schur_by_superlu(matrix, keep, np.zeros((matrix.shape[0], 0)))
+        self.schur = schur_by_superlu(matrix, keep)
 
     def reduce(self, right: Array) -> Array:
         """See `MumpsFactors`."""
@@ -236,13 +253,38 @@ def schur_complement(matrix: Sparse, keep: IntArray, loads: Array) -> tuple[Arra
 
     Raises RunError if the estimated memory is not available, MemoryError if an allocation fails.
     """
+    mumps = library()
+    if mumps is None:
+        size, k = matrix.shape[0], len(keep)
+        keep = np.append(keep, np.arange(size, size + loads.shape[1]))
+        schur = schur_by_superlu(bordered(matrix, sparse.csr_matrix(loads)), keep)
+        return schur[:k, :k], schur[:k, k:]
+    what = unknowns_text(matrix, keep)
+    check_memory(dense_memory(len(keep)), what)
+    factors = MumpsFactors(mumps, matrix, keep, what, loads.nbytes)
+    return factors.schur, loads[keep] - matrix[keep] @ factors.solve(loads)
+
+
+def dense_schur(matrix: Sparse, keep: IntArray) -> Array:
+    """Dense Schur complement (k, k) of a symmetric matrix on the k unknowns `keep`; the rest must
+    be positive definite. No factors are stored.
+
+    Raises RunError if the estimated memory is not available, MemoryError if an allocation fails.
+    """
     what = unknowns_text(matrix, keep)
     check_memory(dense_memory(len(keep)), what)
     mumps = library()
     if mumps is None:
-        return schur_by_superlu(matrix, keep, loads)
-    factors = MumpsFactors(mumps, matrix, keep, what, loads.nbytes)
-    return factors.schur, loads[keep] - matrix[keep] @ factors.solve(loads)
+        return schur_by_superlu(matrix, keep)
+    return MumpsFactors(mumps, matrix, keep, what, store=False).schur
+
+
+def bordered(matrix: Sparse, loads: Sparse) -> Sparse:
+    """A symmetric matrix (n, n) with a border of loads (n, m). Its Schur complement on unknowns of
+    the matrix and the border has the loads reduced to those unknowns and, negative, the work of
+    each load on the displacements by each other one.
+    """
+    return sparse.bmat([[matrix, loads], [loads.T, None]], format="csr")
 
 
 def superlu(matrix: Sparse, ordering: Literal["NATURAL", "MMD_AT_PLUS_A"]) -> SuperLU:
@@ -252,31 +294,28 @@ def superlu(matrix: Sparse, ordering: Literal["NATURAL", "MMD_AT_PLUS_A"]) -> Su
     return splu(matrix, permc_spec=ordering, diag_pivot_thresh=0.0, options={"SymmetricMode": True})
 
 
-def schur_by_superlu(matrix: Sparse, keep: IntArray, loads: Array) -> tuple[Array, Array]:
-    """The same by SuperLU: the last block of the factors of the matrix with `keep`, then the loads
-    as its columns, ordered last.
+def schur_by_superlu(matrix: Sparse, keep: IntArray) -> Array:
+    """Schur complement (k, k) by SuperLU: the last block of the factors of the matrix with `keep`
+    ordered last.
 
     Five to ten times faster than one solve per kept unknown. The complement itself may be singular
-    (a floating body): its diagonal is raised, which elimination leaves unchanged, and subtracted at
-    the end.
+    (a floating body): its diagonal is raised, that of a border of loads lowered, which elimination
+    leaves unchanged, and subtracted at the end.
     """
-    n, k = matrix.shape[0], len(keep)
-    border: Sparse = sparse.csr_matrix(loads)
-    matrix = sparse.bmat([[matrix, border], [border.T, None]], format="csc")
-    keep = np.append(keep, np.arange(n, matrix.shape[0]))
     inside = np.setdiff1d(np.arange(matrix.shape[0]), keep)
     order = np.empty_like(inside)
-    order[superlu(matrix[inside][:, inside], "MMD_AT_PLUS_A").perm_c] = inside
-    order = np.append(order, keep)
-    raised = matrix.diagonal()[keep]
+    order[superlu(matrix[inside][:, inside].tocsc(), "MMD_AT_PLUS_A").perm_c] = inside
+    diagonal = matrix.diagonal()
+    lowered = matrix[keep][:, inside].power(2) @ (1 / diagonal[inside])
+    raised = np.where(diagonal[keep] > 0, diagonal[keep], -lowered)
     added = sparse.diags(np.append(np.zeros(len(inside)), raised))
+    order = np.append(order, keep)
     factors = superlu((matrix[order][:, order] + added).tocsc(), "NATURAL")
     rows, columns = factors.perm_r[len(inside) :], factors.perm_c[len(inside) :]
     lower: Sparse = factors.L.tocsr()
     upper: Sparse = factors.U.tocsr()
-    reduced = lower[rows][:, columns].toarray() @ upper[columns][:, columns].toarray()
-    reduced -= np.diag(raised)
-    return reduced[:k, :k], reduced[:k, k:]
+    schur: Array = lower[rows][:, columns].toarray() @ upper[columns][:, columns].toarray()
+    return schur - np.diag(raised)
 
 
 def solve_symmetric(matrix: Sparse, right: Array) -> Array:

@@ -46,6 +46,18 @@ class GluedBodies:
         free = np.setdiff1d(np.arange(size), np.concatenate(fixed))
         return GluedBodies(stiffness=stiffness.tocsr(), free=free, numbers=matrices)
 
+    def motion(self, gluing: Gluing) -> dict[str, Sparse]:
+        """By body b: T_b (degrees of freedom, n) of u_b = T_b w; w: the free displacements of the
+        glued bodies, then the jumps that part them.
+        """
+        motion = {}
+        for name, own in gluing.bodies.items():
+            numbers, places = self.numbers[name], (own.dofs, np.arange(len(own.dofs)))
+            shape = numbers.shape[0], len(own.dofs)
+            carried = sparse.csr_matrix((np.ones(len(own.dofs)), places), shape) @ own.jumps
+            motion[name] = sparse.hstack([numbers[:, self.free], carried], format="csr")
+        return motion
+
     def solve(self, loads: Array) -> Array:
         """Displacements (n, m) under loads (n, m)."""
         solution = np.zeros(loads.shape)

@@ -40,8 +40,8 @@ def joint_size(case: Case) -> int:
 
 
 def dense_memory(unknowns: int) -> float:
-    """Memory [bytes] of a Schur complement of so many unknowns, its factors and products."""
-    return 8.0 * unknowns**2 * 6
+    """Memory [bytes] of a Schur complement of so many unknowns and of the last fronts before it."""
+    return 8.0 * unknowns**2 * 3
 
 
 def check_size(case: Case) -> None:

@@ -10,9 +10,10 @@ from PIL import Image
 
 from .. import InputError
 from .gallery import Gallery
+from .scene import SolvedScene
 
-#: Seconds for which an animation shows a level, and its last level.
-LEVEL, LAST = 0.6, 2.0
+#: Seconds for which an animation shows a level, a frame of an earthquake, and its last step.
+LEVEL, FRAME, LAST = 0.6, 0.05, 2.0
 
 
 def picture(folder: str) -> Path:
@@ -26,22 +27,23 @@ def picture(folder: str) -> Path:
     return file
 
 
-def animation(folder: str, gallery: Gallery, steps: int) -> Path:
-    """Write all steps of a gallery into a folder as window.gif; shows the same step as before.
+def animation(folder: str, gallery: Gallery, scene: SolvedScene) -> Path:
+    """Write all steps of a scene into a folder as window.gif; shows the same step as before.
 
     Raises InputError, OSError.
     """
     file, before = target(folder, "window.gif"), gallery.step
     with tempfile.TemporaryDirectory(prefix="damjoint_") as scratch:
         frames = []
-        for step in range(steps):
+        for step in range(len(scene.times)):
             gallery.set_step(step)
             with Image.open(picture(scratch)) as frame:
                 frames.append(frame.convert("RGB"))
     gallery.set_step(before)
     if not frames:
         raise InputError("nothing to export: no level was reached")
-    milliseconds = [1000 * LEVEL] * (steps - 1) + [1000 * LAST]
+    each = LEVEL if scene.quake is None else FRAME
+    milliseconds = [1000 * each] * (len(frames) - 1) + [1000 * LAST]
     frames[0].save(file, save_all=True, append_images=frames[1:], duration=milliseconds, loop=0)
     return file
 

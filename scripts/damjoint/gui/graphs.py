@@ -11,14 +11,17 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import gmsh
 import numpy as np
 
+from ..arrays import Table
 from ..model.fields import along
-from ..post.units import LENGTHS, STRESSES, Units, unit
+from ..post.units import FORCES, LENGTHS, STRESSES, Units, unit
 from .gallery import BLUE, DARK, GREEN, GREY, LAKE, ORANGE, RED, Color, Gallery
 from .layout import Layout
+from .numbers import ACCELERATIONS, SECONDS
+from .scene import SolvedScene
 from .shapes import Pieces, is_extruded
-from .worker import SolvedScene
 
 #: Intervals between the ticks of an axis; margin around them, in intervals.
 INTERVALS, MARGIN = 4, 0.2
@@ -84,6 +87,8 @@ class Curve:
 
 #: Title and units of both axes, y first; curves.
 Graph = tuple[tuple[str, Units], tuple[str, Units], list[Curve]]
+#: Parts of the time of an earthquake of which the smallest and the largest value are drawn.
+PARTS = 300
 
 
 class Graphs:
@@ -98,9 +103,15 @@ class Graphs:
         self.names: list[tuple[str, float, float, Color]] = []
 
     def add(
-        self, y_axis: tuple[str, Units], x_axis: tuple[str, Units], curves: list[Curve]
+        self,
+        y_axis: tuple[str, Units],
+        x_axis: tuple[str, Units],
+        curves: list[Curve],
+        now: np.ndarray | None = None,
     ) -> None:
-        """Add a graph, axes by title and units, if there is space for it."""
+        """Add a graph, axes by title and units, if there is space for it; now: a place on the x
+        axis for each step, marked by a line.
+        """
         if self.count >= self.layout.most_graphs:
             return
         x, y = self.layout.graph_place(self.count)
@@ -112,6 +123,9 @@ class Graphs:
         steps = [self.values_at(curves, step) for step in range(count)]
         scales = [Scale.of(values, y_axis[1]) for values in steps]
         self.frame((x, y), (y_axis[0], x_axis[0]), (along_x, x_range), scales)
+        if now is not None:
+            tag = self.line("now", (x, y), marks(along_x.intervals(now), x_range), DARK)
+            gmsh.view.option.setNumber(tag, "LineWidth", 1)
         named = [curve for curve in curves if curve.name not in ("", BEFORE)]
         for curve in sorted(curves, key=lambda curve: curve.name != BEFORE):  # drawn below others
             name = f"{y_axis[0]}, {curve.name}" if curve.name else y_axis[0]
@@ -120,7 +134,8 @@ class Graphs:
             at_x = along_x.intervals(curve.x)
             if not curve.points:
                 at_x, lines = thinned(at_x, lines)
-            self.line(name, (x, y), (at_x, x_range), lines, curve.color, curve.points)
+            pieces = pieces_of(at_x, lines, x_range)
+            self.line(name, (x, y), pieces, curve.color, curve.points)
             if curve in named and len(named) > 1:
                 place = x + self.layout.graph_size[0], y - 15 + 13 * named.index(curve)
                 self.names.append((curve.name, *place, curve.color))
@@ -153,11 +168,13 @@ class Graphs:
         # one line from side to side, along the sides between ticks
         over_rows, over_columns = fro(rows, left, right), fro(columns[::-1], low, high)
         grid = np.concatenate([over_rows, [(right, low)], over_columns[:, ::-1]])
-        self.line(f"{titles[0]}, grid", place, (grid[:, 0], (left, right)), grid[None, :, 1], GRID)
+        pieces = pieces_of(grid[:, 0], grid[None, :, 1], (left, right))
+        self.line(f"{titles[0]}, grid", place, pieces, GRID)
         box = np.array([(left, low), (right, low), (right, high), (left, high), (left, low)])
         at_x = np.concatenate([box[:, 0], [left, right]])
         zeros = np.array([np.append(box[:, 1], s.intervals(np.zeros(2))) for s in scales])
-        tag = self.line(f"{titles[0]}, zero", place, (at_x, (left, right)), zeros, GREY)
+        pieces = pieces_of(at_x, zeros, (left, right))
+        tag = self.line(f"{titles[0]}, zero", place, pieces, GREY)
         self.gallery.color_texts(tag, DARK)
         text = lambda at_x, at_y, lines, align: self.gallery.label(
             tag, at_x, at_y, lines, TEXT, align
@@ -176,19 +193,15 @@ class Graphs:
         self,
         name: str,
         place: tuple[float, float],
-        x_axis: tuple[np.ndarray, tuple[float, float]],
-        y: np.ndarray,
+        pieces: Pieces,
         color: Color,
         points: bool = False,
     ) -> int:
-        """Draw a line in intervals; returns the tag of its view.
-
-        x_axis: places (n,) and the range shown; y: values (steps, n).
-        """
+        """Draw pieces in intervals in a graph; returns the tag of its view."""
         low, high = extent(np.array([0.0, INTERVALS]))
         tag = self.gallery.add(
             name,
-            [pieces_of(x_axis[0], y, x_axis[1])],
+            [pieces],
             [color],
             Type=4,
             AutoPosition=0,
@@ -239,6 +252,13 @@ def pieces_of(x: np.ndarray, y: np.ndarray, x_range: tuple[float, float]) -> Pie
     return Pieces(points, values[..., None])
 
 
+def marks(x: np.ndarray, x_range: tuple[float, float]) -> Pieces:
+    """Vertical lines over a graph, at each step at the place of its x (steps,)."""
+    values = np.full((len(x), len(x), 4), BEYOND)
+    values[np.arange(len(x)), np.arange(len(x)), 1:3] = extent(np.array([0.0, INTERVALS]))
+    return pieces_of(x.repeat(4), values.reshape(len(x), -1), x_range)
+
+
 #: In intervals: pitch of points below which one is left out, where the curve bends less than this.
 PITCH, BEND = 0.06, 0.02
 
@@ -282,11 +302,63 @@ def show_graphs(graphs: Graphs, scene: SolvedScene, before: Sequence[SolvedScene
     joint, levels = list[Graph](), list[Graph]()
     if scene.times.size and is_extruded(scene.result.case):
         joint = graphs_along_joint(scene, [other for other in before if other.times.size])
-    if len(scene.result.history["time"]):
+    if scene.quake is not None:
+        rows = within(scene.quake, scene.times)
+        earlier = [within(other.quake, scene.times) for other in before if other.quake is not None]
+        for graph in graphs_over_time(rows, earlier):
+            graphs.add(*graph, now=scene.times.clip(rows["time"][0]))
+    elif len(scene.result.history["time"]):
         levels = graphs_of_history(scene, before)
-    for y_axis, x_axis, curves in (*joint[:2], *levels[:1], *joint[2:], *levels[1:]):
-        graphs.add(y_axis, x_axis, curves)
+    for graph in (*joint[:2], *levels[:1], *joint[2:], *levels[1:]):
+        graphs.add(*graph)
     graphs.write_names()
+
+
+#: Curves of an earthquake over time, the most important first: title, units, curves (name, column
+#: of quake.csv, color).
+OVER_TIME: tuple[tuple[str, Units, tuple[tuple[str, str, Color], ...]], ...] = (
+    ("ground", ACCELERATIONS, (("x", "ground_ax", DARK), ("y", "ground_ay", ORANGE))),
+    ("crest movement", LENGTHS, (("", "crest_ux", BLUE),)),
+    ("opening", LENGTHS, (("heel", "heel_opening", RED), ("toe", "toe_opening", GREEN))),
+    ("slip", LENGTHS, (("", "slip_mean", ORANGE),)),
+    ("shear force T", FORCES, (("strength", "strength", RED), ("T", "T", BLUE))),
+)
+
+
+def graphs_over_time(rows: Table, earlier: list[Table]) -> list[Graph]:
+    """Graphs of the rows of an earthquake; earlier: those of earlier runs, for comparison."""
+    shown = []
+    for title, units, parts in OVER_TIME:
+        curves = [
+            Curve(name, *envelope(rows, column), color)
+            for name, column, color in parts
+            if column in rows and (column != "ground_ay" or rows[column].any())
+        ]
+        last = parts[-1][1]
+        curves += [Curve(BEFORE, *envelope(other, last), GREY) for other in earlier]
+        shown.append(((title, units), ("time", SECONDS), curves))
+    return shown
+
+
+def within(rows: Table, times: np.ndarray) -> Table:
+    """The rows between the second frame, or the one before if they are regular, and the last one;
+    all rows with the frame of the static state alone.
+    """
+    first = max(2 * times[1] - times[2], 0.0) if len(times) > 2 else 0.0
+    shown = (rows["time"] >= first) & (rows["time"] <= (times[-1] or math.inf))
+    return {name: column[shown] for name, column in rows.items()}
+
+
+def envelope(rows: Table, column: str) -> tuple[np.ndarray, np.ndarray]:
+    """Times (n,) and values (1, n) of a column: the smallest and the largest of each part."""
+    chosen = [
+        part[[first, last]]
+        for part in np.array_split(np.arange(len(rows["time"])), PARTS)
+        if len(part)
+        for first, last in [sorted((rows[column][part].argmin(), rows[column][part].argmax()))]
+    ]
+    index = np.unique(chosen)
+    return rows["time"][index], rows[column][index][None]
 
 
 def graphs_along_joint(scene: SolvedScene, before: Sequence[SolvedScene]) -> list[Graph]:

@@ -1,4 +1,6 @@
-"""Numbers of a run: finite elements beside the gravity method, step by step; a table of all."""
+"""Numbers of a run, step by step: finite elements beside the gravity method, or those of an
+earthquake; a table of all steps.
+"""
 
 from __future__ import annotations
 
@@ -7,11 +9,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..model.results import HISTORY, Results
-from ..post.summary import SHOWN, Table, levels_table, requested_rows
-from ..post.units import Units, unit
+from .. import ROUND_OFF
+from ..arrays import Table as Columns
+from ..model.results import HISTORY, QUAKE, Results, column_of
+from ..post.summary import SHOWN, Table, levels_table, requested_rows, table_of
+from ..post.units import FORCES, LENGTHS, Units, unit, with_unit
 from ..statics import gravity
 from ..statics.verdict import hints, path_statement
+from ..studies.quake import QuakeResult
 
 NUMBER: Units = (("-", 1),)
 #: Safety factors: column, heading, meaning.
@@ -27,6 +32,30 @@ FACTORS = (
 BY_GRAVITY = "N", "T", "M", "U", "x_resultant", "crack_length", "SSF", "OSF"
 #: Columns that are not shown where they are zero.
 OPTIONAL = "tail_level", "U", "flux", "process_zone"
+#: Numbers of an earthquake: column of quake.csv, heading, units.
+ACCELERATIONS: Units = (("m/s2", 1),)
+SECONDS: Units = (("s", 1),)
+QUAKE_SHOWN: tuple[tuple[str, str, Units], ...] = (
+    ("ground_ax", "ground acceleration", ACCELERATIONS),
+    ("crest_ax", "crest acceleration", ACCELERATIONS),
+    ("crest_ux", "crest movement", LENGTHS),
+    ("heel_opening", "heel opening", LENGTHS),
+    ("toe_opening", "toe opening", LENGTHS),
+    ("open_length", "open or broken", LENGTHS[:1]),
+    ("slip_mean", "slip", LENGTHS),
+    ("N", "N'", FORCES),
+    ("T", "T", FORCES),
+    ("shear_reserve", "strength - |T|", FORCES),
+)
+#: Those of which the largest size is shown; residual values of run.json, their headings and units.
+PEAKS = QUAKE_SHOWN[:7]
+RESIDUAL: tuple[tuple[str, str, Units], ...] = (
+    ("slip", "residual slip", LENGTHS),
+    ("tilt", "residual tilt", (("rad", 1), ("mrad", 1e3), ("µrad", 1e6))),
+    ("rigid_block", "slip of a rigid block", LENGTHS),
+)
+#: Label, value and tooltip.
+Row = tuple[str, str, str]
 #: Between the numbers of the finite elements and of the gravity method.
 BESIDE = " | "
 
@@ -53,11 +82,13 @@ class Numbers:
         rigid = {name: float(getattr(method, name)) for name in BY_GRAVITY}
         return Numbers(state, rigid, case.joint_length)
 
-    def rows(self) -> list[tuple[str, str, str]]:
+    def rows(self) -> list[Row]:
         """Rows of label, value and tooltip; values of both methods in a common unit."""
         columns = [(name, head, units, HISTORY[name][1]) for name, head, units in SHOWN]
         columns += [(name, head, NUMBER, meaning) for name, head, meaning in FACTORS]
-        rows = []
+        methods = BESIDE.join(["finite elements", "gravity method"][: 1 + bool(self.rigid)])
+        shown = "the level that the drawing area shows"
+        rows = [(f"At t = {self.elements['time']:.4g}", methods, shown)]
         for name, head, units, meaning in columns:
             both = [method[name] for method in (self.elements, self.rigid) if name in method]
             finite = np.nan_to_num(both, posinf=0.0)
@@ -73,6 +104,79 @@ class Numbers:
         """In which part of the joint its normal force acts, by each method."""
         both = [m["x_resultant"] for m in (self.elements, self.rigid) if m]
         return [gravity.position(x, self.length) for x in both]
+
+
+@dataclass(frozen=True)
+class QuakeNumbers(Numbers):
+    """Numbers at a frame of an earthquake: `elements`; quake: its row of quake.csv; peaks: largest
+    and residual values of all rows, as `rows`.
+    """
+
+    quake: dict[str, float]
+    peaks: list[Row]
+
+    @staticmethod
+    def of(found: QuakeResult) -> list[QuakeNumbers]:
+        """The numbers at all frames, of the joint with the largest residual slip."""
+        frames, rows, peaks = found.frames.joints[found.joint], shown_rows(found), []
+        for name, head, units in PEAKS:
+            k = int(np.argmax(np.abs(rows[name])))
+            value = with_unit(rows[name][k], units, 3)
+            peaks.append((f"largest {head}", f"{value} at {rows['time'][k]:.2f} s", QUAKE[name][1]))
+        for name, head, units in RESIDUAL:
+            value = found.summary["residual"].get(column_of(name, found.joint))
+            if value is not None:
+                peaks.append((head, with_unit(value, units, 3), "mean of the last second"))
+        times = frames.history["time"]
+        every = f"{np.median(np.diff(times)):.4g} s: {len(times)} of {len(rows['time'])} steps"
+        peaks.append(("Shown every", every, "the curves over time have all steps"))
+        nearest = [int(np.argmin(np.abs(rows["time"] - time))) for time in times]
+        return [
+            QuakeNumbers(
+                frames.state(time),
+                {},
+                frames.case.joint_length,
+                quake={name: float(column[k]) for name, column in rows.items()},
+                peaks=peaks,
+            )
+            for time, k in zip(times, nearest, strict=True)
+        ]
+
+    def rows(self) -> list[Row]:
+        """See `Numbers`."""
+        shown = "the time that the drawing area shows"
+        rows = [(f"At t = {self.elements['time']:.4g} s", "earthquake", shown)]
+        for name, head, units in QUAKE_SHOWN:
+            if name in self.quake:
+                rows.append((head, with_unit(self.quake[name], units, 3), QUAKE[name][1]))
+        return [*rows, *self.peaks]
+
+
+def shown_rows(found: QuakeResult) -> Columns:
+    """The rows of quake.csv of the joint with the largest residual slip, without round-off, with
+    openings not below 0 and the shear strength in the direction of T.
+    """
+    rows = {
+        name: np.where(np.abs(column) > ROUND_OFF * np.abs(column).max(), column, 0.0)
+        for name, column in found.rows_of(found.joint).items()
+        if np.isfinite(column).all()  # a law may not limit shear
+    }
+    rows |= {name: np.maximum(rows[name], 0.0) for name in ("heel_opening", "toe_opening")}
+    if "shear_reserve" in rows:
+        rows["strength"] = np.sign(rows["T"]) * (rows["shear_reserve"] + np.abs(rows["T"]))
+    return rows
+
+
+def table_of_frames(numbers: list[QuakeNumbers]) -> Table:
+    """Table of the frames."""
+    columns = ("time", "t", SECONDS), *QUAKE_SHOWN
+    return table_of(
+        [
+            (head, np.array([row.quake[name] for row in numbers]), units)
+            for name, head, units in columns
+            if name in numbers[0].quake
+        ]
+    )
 
 
 def three_digits(value: float) -> str:

@@ -30,7 +30,7 @@ from ..model.scene import BED, DOWN, FLOOR, SIDES, TOP, UP
 from ..post.outline import exaggeration, joint_lines, section_of, skin
 from ..post.units import FORCES, with_unit
 from .camera import Camera, result_camera, undeformed_camera
-from .worker import SolvedScene
+from .scene import SolvedScene
 
 #: Length of a force's arrow over the dam's size, and of the resultant's.
 ARROW, RESULTANT = 0.12, 0.25
@@ -255,11 +255,7 @@ class Deformed:
         self.depth = self.scene.bodies["dam"].points[:, 2].max()
         joints = self.scene.result.joints
         self.joints = [self.near_side(k, own) for k, own in enumerate(joints)]
-        states = [self.scene.result.state(time) for time in self.times]
-        self.loadings = [
-            Loading.at(case, time, state["level"], state["tail_level"])
-            for time, state in zip(self.times, states, strict=True)
-        ]
+        self.loadings = [self.scene.loading(time) for time in self.times]
         lines = joint_lines(case, [joint.rows[0] for joint in self.joints])
         #: sections, undeformed and by step; None if one section does not represent the geometry
         self.undeformed, *self.sections = (

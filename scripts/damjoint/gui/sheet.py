@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import gmsh
@@ -17,6 +18,7 @@ from ..accuracy import REFINED
 from ..model import casefile
 from ..model.case import CASES, Case, case_file, first_mesh, load
 from ..model.parameters import INCLUDE, assignments, declared, listing, parse_by_gmsh
+from ..studies import quake
 
 
 @dataclass(frozen=True)
@@ -24,7 +26,8 @@ class Request:
     """A case (letter, name or path) and the user's changes to it.
 
     levels, tail_levels: 'a,b,c' [m]; steps: equal steps between two levels; accuracy: coarse,
-    standard, fine or a percentage. None: the case's own.
+    standard, fine or a percentage; record: path of a record. None: the case's own. quake: whether
+    the record follows the last level; frames: FIRST:LAST [s] of what is shown of it, None: all.
     """
 
     case: str
@@ -33,16 +36,28 @@ class Request:
     tail_levels: str | None = None
     steps: str | None = None
     accuracy: str | None = None
+    record: str | None = None
+    quake: bool = False
+    frames: str | None = None
+
+    @property
+    def span(self) -> quake.Span:
+        """`frames` as numbers. Raises InputError."""
+        return quake.span_of("frames =", self.frames) if self.frames else None
 
     def load(self) -> Case:
-        """Load the case as `damjoint run` does.
+        """Load the case as `damjoint run` or `damjoint quake` does.
 
         Raises InputError.
         """
         if self.steps is not None and not self.steps.isdigit():
             raise InputError(f"steps = {self.steps}: must be an integer >= 1")
         steps = None if self.steps is None else int(self.steps)
-        return load(self.case, self.overrides, self.levels, self.tail_levels, steps, self.accuracy)
+        water = self.levels, self.tail_levels, steps, self.accuracy
+        case = load(self.case, self.overrides, *water, Path(self.record) if self.record else None)
+        if self.quake:
+            quake.check(case, self.span)
+        return case
 
 
 #: Parameters that the titles of the package's cases mention.
@@ -70,7 +85,8 @@ class Sheet:
         if TITLED & set(self.request.overrides):
             title = f"case {case.name}, changed"
         water = " and ".join([case["uplift"], *case.also_uplift])
-        return title, f"law {case['law']}, uplift {water}"
+        scene = f"law {case['law']}, uplift {water}"
+        return title, f"{scene}, {case.record.name}" if self.request.quake else scene
 
 
 def check_request(request: Request) -> Sheet:
@@ -80,7 +96,7 @@ def check_request(request: Request) -> Sheet:
     Raises InputError.
     """
     path = case_file(request.case)
-    unchanged = replace(request, overrides={}, levels=None, tail_levels=None, steps=None)
+    unchanged = Request(request.case, accuracy=request.accuracy)
     fill_database(unchanged, unchanged.load())
     own = {name: gmsh_value(declared()[name].label) for name in declared()}
     changes = {n: v for n, v in request.overrides.items() if v != own[n]}
@@ -125,6 +141,8 @@ def case_text(sheet: Sheet, run: Case) -> str:
     file.defaults |= request.overrides
     file.defaults |= {name: run[name] for name in REFINED} if request.accuracy else {}
     file.texts = {"title": case.title}
+    if case.record:
+        file.texts["record"] = str(case.record.resolve())
     if case.also_uplift:
         file.texts["also_uplift"] = " ".join(case.also_uplift)
     file.lists = {

@@ -15,14 +15,13 @@ from typing import Any
 import gmsh
 
 from .. import InputError
+from ..dynamics.frames import MOST_FRAMES
 from ..model.case import ACCURACIES, Case
 from ..model.parameters import AUTOMATIC, Parameter, levels_of
-from ..statics.verdict import verdict
 from . import views
-from .numbers import BESIDE
+from .scene import SolvedScene
 from .sheet import Request, Sheet
 from .views import CONTENTS, FIELDS, Display
-from .worker import SolvedScene
 
 # Names in the tree. Digits order it and are not shown; Gmsh's own "0Modules" follows the results.
 CASE = "00Case/0Case"
@@ -34,13 +33,20 @@ LEVELS = "Parameters/1Water levels/0[m] Levels at t = 1, 2, ..."
 TAIL_LEVELS = "Parameters/1Water levels/1[m] Tailwater"
 STEPS = "Parameters/1Water levels/2Steps between two levels"
 TIMES = "Parameters/1Water levels/3Steps at t"
+#: Switch of the earthquake; its group of parameters, with the record and the times shown.
+QUAKE = "Parameters/0Scene/9Earthquake after the last level"
+EARTHQUAKE = "Earthquake"
+RECORD = "Parameters/91Earthquake/01Record: CSV file"
+FRAMES = "Parameters/91Earthquake/02[s] Show from : to"
+#: Parameters of other groups that an earthquake needs, too.
+OF_EARTHQUAKE = "added_mass", "quake_uplift"
 #: Entries on the water levels.
 OF_LEVELS = (LEVELS, TAIL_LEVELS, STEPS, TIMES)
 ACCURACY = "Parameters/3Mesh/0Accuracy"
 FIELD = "02Display/0Color of the bodies"
 SCALES = "02Display/1Scales"
 CONTENT = "02Display/2Show"
-SCENE = "02Display/3Water in the joint"
+SCENE = "02Display/3Scene"
 KEEP = "02Display/4Keep the last curves"
 FOLDER = "03Output/0Folder"
 SAVE = "03Output/1Save"
@@ -58,6 +64,8 @@ BUTTONS = (
 BUTTON = {"Macro": "Action", "Aspect": "Button"}
 #: Choices: the case's own value; a case file of the user.
 OWN, OPEN = "as the case", "open a case file ..."
+#: Choice of the times of an earthquake that are shown.
+WHOLE = "the whole record"
 
 #: Verdict before a run.
 NOT_RUN = "not run yet"
@@ -127,7 +135,8 @@ class Tree:
         """Put a sheet into the tree."""
         new_case = self.sheet is None or sheet.path != self.sheet.path or not get_text(SAVE)
         self.sheet = sheet
-        put(*self.scene_entries(sheet), *map(self.entry, sheet.entries))
+        put(*self.scene_entries(sheet), *self.quake_entries(sheet))
+        put(*map(self.entry, sheet.entries))
         if new_case:
             put(
                 text(FOLDER, str(Path("out") / sheet.case.name), help="folder that Save writes"),
@@ -139,7 +148,7 @@ class Tree:
             )
         # read back, since the database may round a number
         self.shown = {e["name"]: value_of(e["name"]) for e in sheet.entries} | {
-            name: value_of(name) for name in (CASE, FILE, LEVELS, TAIL_LEVELS, STEPS, ACCURACY)
+            name: value_of(name) for name in (CASE, FILE, LEVELS, TAIL_LEVELS, RECORD)
         }
 
     def scene_entries(self, sheet: Sheet) -> list[dict[str, Any]]:
@@ -179,6 +188,32 @@ class Tree:
             ),
         ]
 
+    def quake_entries(self, sheet: Sheet) -> list[dict[str, Any]]:
+        """Entries of the earthquake: its switch, and what shows only with it."""
+        request = sheet.request
+        return [
+            number(
+                QUAKE,
+                request.quake,
+                choices=[0, 1],
+                help="Run computes the static loads, then the record",
+            ),
+            text(
+                RECORD,
+                str(sheet.case.record or ""),
+                kind="file",
+                visible=request.quake,
+                help="acceleration of the ground: time [s], horizontal and, if any, vertical",
+            ),
+            text(
+                FRAMES,
+                request.frames or WHOLE,
+                choices=[WHOLE],
+                visible=request.quake,
+                help=f"FIRST:LAST, e.g. 2:5; up to {MOST_FRAMES} times between them are shown",
+            ),
+        ]
+
     def title(self, case: str) -> str:
         """Title of a case in the menu."""
         name = case.lower()
@@ -202,6 +237,11 @@ class Tree:
         parameter = next(p for p in self.known.values() if p.label == declared["name"])
         copied = "type", "name", "values", "visible", "choices"
         entry = {k: declared[k] for k in copied if k in declared}
+        quake = self.sheet.request.quake
+        if parameter.group == EARTHQUAKE:
+            entry["visible"] = quake and declared["visible"]
+        elif parameter.name in OF_EARTHQUAKE:
+            entry["visible"] = quake or declared["visible"]
         allowed = f"{parameter.name}: {parameter.allowed()}"
         note = declared.get("help", "") if not parameter.automatic else ""
         entry["help"] = ". ".join(filter(None, [allowed, parameter.meaning, note]))
@@ -250,8 +290,11 @@ class Tree:
             overrides={**request.overrides, **changed},
             levels=self.levels(LEVELS, request.levels),
             tail_levels=self.levels(TAIL_LEVELS, request.tail_levels),
-            steps=None if get_text(STEPS) in ("", OWN) else get_text(STEPS),
-            accuracy=None if get_text(ACCURACY) in ("", OWN) else get_text(ACCURACY),
+            steps=chosen(STEPS, OWN),
+            accuracy=chosen(ACCURACY, OWN),
+            record=request.record if get_text(RECORD) == shown[RECORD] else get_text(RECORD),
+            quake=bool(get_number(QUAKE)),
+            frames=chosen(FRAMES, WHOLE),
         )
 
     def levels(self, name: str, before: str | None) -> str | None:
@@ -262,6 +305,12 @@ class Tree:
         except InputError:  # reported when the case is loaded
             same = False
         return before if same else now
+
+
+def chosen(name: str, default: str) -> str | None:
+    """Read a text from the tree; None if it is empty or the default."""
+    value = get_text(name)
+    return None if value in ("", default) else value
 
 
 def short_labels(known: Mapping[str, Parameter]) -> dict[str, str]:
@@ -317,18 +366,14 @@ def show_results(scenes: list[SolvedScene], shown: int, step: int) -> None:
     """Show the results of a scene at a step: finite elements beside the gravity method."""
     scene = scenes[shown]
     color = WARN if scene.failed or scene.message else GOOD
-    modes = [s.result.case["uplift"] for s in scenes]
-    show_verdict(scene.end_state or verdict(scene.result), color, scene.message or "the dam stands")
+    names = [s.name for s in scenes]
+    show_verdict(scene.end_state or scene.verdict, color, scene.statement)
     show_display(True)
-    put(text(SCENE, modes[shown], choices=modes, visible=len(modes) > 1))
+    put(text(SCENE, names[shown], choices=names, visible=len(names) > 1))
     clear_numbers()
     if not scene.numbers:
         return
-    numbers = scene.numbers[step]
-    head = BESIDE.join(["finite elements", "gravity method"][: 1 + bool(numbers.rigid)])
-    note = "the level that the drawing area shows"
-    rows = [(f"At t = {scene.times[step]:.4g}", head, note), *numbers.rows()]
-    entries = [(*row, "LightYellow") for row in rows]
+    entries = [(*row, "LightYellow") for row in scene.numbers[step].rows()]
     entries += [(f"Note {i + 1}", w, w, WARN) for i, w in enumerate(scene.warnings)]
     for i, (label, value, note, highlight) in enumerate(entries):
         more = {"help": note, "attributes": {"Highlight": highlight}}
@@ -350,9 +395,9 @@ def hide_results() -> None:
 
 def chosen_scene(scenes: list[SolvedScene]) -> int:
     """Index of the scene that the user has chosen."""
-    modes = [scene.result.case["uplift"] for scene in scenes]
-    mode = get_text(SCENE)
-    return modes.index(mode) if mode in modes else 0
+    names = [scene.name for scene in scenes]
+    name = get_text(SCENE)
+    return names.index(name) if name in names else 0
 
 
 def drop_level_entries() -> None:

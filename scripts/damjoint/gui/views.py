@@ -7,7 +7,7 @@ Works on the current Gmsh session, with or without a window.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from textwrap import wrap
 
 import gmsh
@@ -45,8 +45,8 @@ from .gallery import (
 from .graphs import Graphs, show_graphs
 from .layout import LEFT, Layout
 from .numbers import three_digits
+from .scene import SolvedScene
 from .shapes import Deformed, Label, Pieces, undeformed_loads
-from .worker import SolvedScene
 
 #: Offset of a layer along z over the dam's size: lines and faces in one plane hide one another.
 LAYER = 5e-4
@@ -144,6 +144,8 @@ def show(
     step: that is shown first, by default the last.
     """
     gallery, case, legend = Gallery(step), scene.result.case, list[Entry]()
+    if scene.quake is not None:  # scales that change with each frame would hide the motion
+        display = replace(display, scales=OF_ALL)
     if display.content == TABLE:
         show_table(gallery, scene, layout)
     else:
@@ -160,14 +162,28 @@ def show(
         for place, (color, words) in zip(layout.legend, legend, strict=False):
             gallery.write(*place, [words], color, SIZES[3])
         show_warnings(gallery, scene.warnings, layout)
-    show_heading(gallery, (title, f"law {case['law']}, uplift {case['uplift']}"), layout)
+    record = f", {case.record.name}" if scene.quake is not None else ""
+    words = f"law {case['law']}, uplift {case['uplift']}{record}"
+    show_heading(gallery, (title, words), layout)
     gallery.balance(gallery.step)
     return gallery
 
 
 def caption(scene: SolvedScene, step: int) -> tuple[str, str, str]:
-    """Describe a step in three lines: level; opening, crack, softening; safety factors."""
+    """Describe a step in three lines: level; opening, crack, softening; safety factors. Of an
+    earthquake: time; crest and opening; slip.
+    """
     now, time = scene.numbers[step].elements, scene.times[step]
+    name = scene.result.case.named((scene.joint,))
+    if scene.quake is not None:
+        rows = scene.numbers[step].rows()
+        words = {label: f"{label} {value}" for label, value, _ in rows}
+        on_joint = ", ".join(words[n] for n in ("heel opening", "toe opening", "slip"))
+        return (
+            f"t = {time:.3f} s of {scene.quake['time'][-1]:.4g} s, {words['ground acceleration']}",
+            f"{words['crest movement']}, {words['crest acceleration']}",
+            f"{name}: {on_joint}" if name else on_joint,
+        )
     tail = f", tailwater {now['tail_level']:.4g} m" if now["tail_level"] > 0 else ""
     opening = now["max_opening"]
     state = f"opening {with_unit(opening, LENGTHS, 3)}" if opening > 0 else "closed"
@@ -179,7 +195,6 @@ def caption(scene: SolvedScene, step: int) -> tuple[str, str, str]:
     factors = [f"{n} {three_digits(now[n])}" for n in known if n in now]
     where = scene.numbers[step].positions[0]
     last = scene.result.case.times[-1]
-    name = scene.result.case.named((scene.joint,))
     return (
         f"level {now['level']:.4g} m{tail} (t = {time:.4g} of {last:g})",
         f"{name}: {state}" if name else state,

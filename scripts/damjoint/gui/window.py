@@ -23,8 +23,9 @@ from . import export, tree, views
 from .camera import result_camera, undeformed_camera
 from .gallery import RED, Gallery
 from .layout import MESSAGE, Layout, open_window
+from .scene import SolvedScene
 from .sheet import Request, Sheet
-from .worker import EngineProcess, SolvedScene
+from .worker import EngineProcess
 
 #: Actions after changes of parameters; load, reset: of the database, from Gmsh's menu beside Run.
 CHANGES = "check", "load", "reset"
@@ -163,13 +164,14 @@ class Session:
     def export(self, action: str) -> None:
         """Write the drawing area as a picture, or all levels as an animation."""
         folder, gallery = tree.get_text(tree.FOLDER), self.gallery
+        self.show_status("exporting ...", tree.CALM)
         try:
             if not self.windowed or not self.shows_results or not gallery:
                 raise InputError("nothing to export: press Run in the window first")
             if action == tree.PICTURE_ACTION:
                 file = export.picture(folder)
             else:
-                file = export.animation(folder, gallery, len(self.scenes[self.scene_shown].times))
+                file = export.animation(folder, gallery, self.scenes[self.scene_shown])
         except (InputError, OSError) as error:
             self.show_status(str(error), tree.BAD)
         else:
@@ -248,29 +250,23 @@ class Session:
         """The engine's process has ended, by a second Stop or by itself."""
         self.free(message, tree.BAD)
 
-    def on_step(self, at: tuple[int, int, float]) -> None:
-        """A step has converged: show it, a few times a second."""
+    def on_step(self, reached: str) -> None:
+        """A step has converged: show what it has reached, a few times a second."""
         if time.perf_counter() < self.next_progress or self.engine.interrupted:
             return
         self.next_progress = time.perf_counter() + PROGRESS
-        case = self.tree.sheet.case
-        scene, number, now = at
-        several = f"uplift {case.scenes()[scene]['uplift']}, " if case.also_uplift else ""
-        several += f"pass {number}, " if case.accuracy else ""
-        levels = f"level {case.level_at(now):.3g} m of {case.levels[-1]:.4g} m"
-        self.show_status(
-            f"running: {several}{levels}, t = {now:.3g} of {case.times[-1]:g}", tree.CALM
-        )
+        self.show_status(f"running: {reached}", tree.CALM)
 
     def on_done(self, scenes: list[SolvedScene]) -> None:
         """A run has ended, at its last level or before: show its results."""
         self.keep_or_drop()
         self.scenes, self.title = scenes, self.tree.sheet.heading[0]
-        self.step = max(len(scenes[0].times) - 1, 0)
-        self.show(0)
+        first = next((k for k, scene in enumerate(scenes) if scene.quake), 0)
+        self.step = max(len(scenes[first].times) - 1, 0)
+        self.show(first)
         took = f"{time.perf_counter() - self.started:.2f} s"
-        problems = [scene.message for scene in scenes if scene.message]
-        self.last_status = f"done in {took}: the dam stands", tree.GOOD
+        problems = [scene.message for scene in scenes[first:] if scene.message]
+        self.last_status = f"done in {took}: {scenes[first].statement}", tree.GOOD
         if problems:
             self.last_status = f"{problems[0]} ({took})", tree.WARN
         self.last_request = self.tree.sheet.request

@@ -10,103 +10,26 @@ import contextlib
 import multiprocessing
 import os
 import signal
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from functools import partial
 from multiprocessing.connection import Connection
 from pathlib import Path
 from types import FrameType
-from typing import Any
+from typing import Any, TypeAlias
 
-import numpy as np
-
-from .. import InputError, RunError, accuracy
-from ..engines import Outcome
+from .. import InputError, accuracy
 from ..engines.condensed import solve as engine
-from ..model.fields import Field
-from ..model.mesh import Body
+from ..model.case import Case
 from ..model.parameters import declared
-from ..model.results import Results
-from ..post.summary import Table
-from ..runner import early_end, write_outcomes
-from ..statics.verdict import decisive_joint, failed, statement
+from ..post.folder import claim_output_folder
+from ..runner import write_outcomes
 from ..storage import atomic_write
-from .numbers import Numbers, table_of_levels, warnings
+from ..studies import quake
+from .scene import SolvedScene
 from .sheet import Request, Sheet, case_text, check_request, titles
 
 #: First line of case files that Save may replace.
 SAVED = "// Saved by the window of damjoint; replaced when a run is saved to this folder again.\n"
-
-
-@dataclass
-class SolvedScene:
-    """The results of a scene, for the window."""
-
-    result: Results
-    bodies: dict[str, Body]
-    #: displacement and stress by requested time
-    fields: dict[float, Field]
-    #: interrupted or failed; empty if no error ended the run
-    end_state: str
-    #: why it ended or failed; empty if the dam stands
-    message: str
-    failed: bool
-    #: at each of `times`
-    numbers: list[Numbers]
-    table: Table
-    warnings: list[str]
-
-    @staticmethod
-    def of(outcome: Outcome) -> SolvedScene:
-        """Convert an outcome; computes the bodies' fields."""
-        result, (state, _) = outcome.result, early_end(outcome)
-        own = result.joints[decisive_joint(result)]
-        message = statement(result)
-        if state and isinstance(outcome.error, (InputError, RunError)):
-            message = str(outcome.error)
-        elif state:
-            message = reached(state, result)
-        return SolvedScene(
-            result,
-            outcome.mesh().bodies,
-            outcome.fields(),
-            end_state=state,
-            message=message,
-            failed=bool(state) or failed(result),
-            numbers=[Numbers.at(own, time) for time in np.unique(result.joint["time"])],
-            table=table_of_levels(own),
-            warnings=warnings(result),
-        )
-
-    @property
-    def joint(self) -> int:
-        """The number of the joint whose curves and numbers are shown."""
-        return decisive_joint(self.result)
-
-    @property
-    def own(self) -> Results:
-        """The results of that joint."""
-        return self.result.joints[self.joint]
-
-    @property
-    def times(self) -> np.ndarray:
-        """Requested times that were reached: the steps of every view."""
-        return np.unique(self.result.joint["time"])
-
-
-def reached(state: str, result: Results) -> str:
-    """What a run has reached before it was interrupted, or failed: level, mesh, estimated error."""
-    case, estimate = result.case, result.info.get("error_estimate")
-    if not result.last:
-        return state
-    words = f"{state} at level {result.last['level']:.4g} m of {case.levels[-1]:.4g} m"
-    if estimate:
-        meshes = estimate["n_joint"]
-        errors = [q["relative"] for q in estimate["quantities"].values() if q["used"]]
-        words += f" on mesh {len(meshes)} (n_joint = {meshes[-1]})"
-        if errors:
-            words += f"; estimated errors up to {accuracy.percent(max(errors))}"
-            words += f" of {accuracy.percent(estimate['accuracy'])} required"
-    return words
 
 
 class Stop:
@@ -126,6 +49,14 @@ class Stop:
             self.at_once = False
             raise KeyboardInterrupt
 
+    def __enter__(self) -> None:
+        """Begin a run."""
+        self.requested, self.at_once = False, True
+
+    def __exit__(self, *_: object) -> None:
+        """End a run."""
+        self.at_once = False
+
     def after_step(self) -> None:
         """Raise KeyboardInterrupt if a stop is requested."""
         self.at_once = False
@@ -137,12 +68,12 @@ def serve(pipe: Connection) -> None:
     """Process the messages of the window until it closes.
 
     In: ("check", Request), ("run", Request), ("save", folder). Out: ("ready", titles, parameters),
-    ("checked", Sheet), ("rejected", message), ("step", (number of the scene, pass, time)),
-    ("done", [SolvedScene]), ("failed", message), ("saved", folder).
+    ("checked", Sheet), ("rejected", message), ("step", what was reached), ("done", [SolvedScene]),
+    ("failed", message), ("saved", folder).
     """
     stop = Stop()
     pipe.send(("ready", titles(), declared()))
-    last: tuple[Sheet, list[Outcome]] | None = None
+    last: tuple[Case, str, Write] | None = None
     while True:
         try:
             kind, argument = pipe.recv()
@@ -156,9 +87,10 @@ def serve(pipe: Connection) -> None:
             sheet = check_request(argument)
             pipe.send(("checked", sheet))
             if kind == "run":
-                outcomes = run_case(sheet, pipe, stop)
-                pipe.send(("done", [SolvedScene.of(outcome) for outcome in outcomes]))
-                last = sheet, outcomes
+                run = run_quake if sheet.request.quake else run_case
+                scenes, write = run(sheet, pipe, stop)
+                pipe.send(("done", scenes))
+                last = sheet.case, case_text(sheet, scenes[0].result.case), write
         except InputError as error:
             pipe.send(("rejected", str(error)))
         except KeyboardInterrupt:
@@ -167,37 +99,77 @@ def serve(pipe: Connection) -> None:
             pipe.send(("failed", str(error) or type(error).__name__))
 
 
-def run_case(sheet: Sheet, pipe: Connection, stop: Stop) -> list[Outcome]:
+#: Writes the files of a run into a folder.
+Write: TypeAlias = Callable[[Path], None]
+
+
+def run_case(sheet: Sheet, pipe: Connection, stop: Stop) -> tuple[list[SolvedScene], Write]:
     """Solve the scenes of a case; sends a message after each converged step, with the number of the
     pass through the levels: an accuracy takes several, with smaller steps and elements.
 
-    Raises an error before the first step; a later error is in the outcome.
+    Raises an error before the first step; a later error is in the scene.
     """
-    outcomes = []
+    outcomes, case = [], sheet.case
     last = [0, 1, 0.0]
 
     def on_step(scene: int, time: float) -> None:
         before, number, reached_time = last
         number = 1 if scene != before else number + (time <= reached_time)
         last[:] = scene, number, time
-        pipe.send(("step", (scene, number, time)))
+        several = f"uplift {case.scenes()[scene]['uplift']}, " if case.also_uplift else ""
+        several += f"pass {number}, " if case.accuracy else ""
+        pipe.send(("step", several + level_reached(case, time)))
         stop.after_step()
 
-    stop.requested, stop.at_once = False, True
-    try:
-        for outcome in accuracy.solve(sheet.case, engine, on_step, True):
+    with stop:
+        for outcome in accuracy.solve(case, engine, on_step, True):
             outcomes.append(outcome)
             if outcome.error:
                 break
-    finally:
-        stop.at_once = False
     if outcomes[-1].error and not any(outcome.result.last for outcome in outcomes):
         raise outcomes[-1].error
-    return outcomes
+    return [SolvedScene.of(outcome) for outcome in outcomes], partial(
+        write_outcomes, case, outcomes
+    )
 
 
-def save(folder: str, last: tuple[Sheet, list[Outcome]] | None) -> None:
-    """Write the last run and a case file that repeats it.
+def run_quake(sheet: Sheet, pipe: Connection, stop: Stop) -> tuple[list[SolvedScene], Write]:
+    """Solve the static loads of a case and its earthquake; as `run_case`."""
+    case, error = sheet.case, None
+
+    def on_step(time: float) -> None:
+        pipe.send(("step", level_reached(case, time)))
+        stop.after_step()
+
+    with quake.single_thread():
+        with stop:
+            under_way = quake.QuakeRun(case, sheet.request.span, on_step)
+            try:
+                for _ in under_way.steps():
+                    now = under_way.quake.now.time, under_way.quake.record.duration
+                    pipe.send(("step", "earthquake, t = {:.2f} s of {:.2f} s".format(*now)))
+                    stop.after_step()
+            except (Exception, KeyboardInterrupt) as caught:
+                if not len(under_way.history):
+                    raise
+                error = caught
+        result = under_way.result_so_far(error) if error else under_way.result()
+
+    def write(folder: Path) -> None:
+        with claim_output_folder(case, folder):
+            quake.write(result, folder, fields=True, picture=True)
+
+    return SolvedScene.of_earthquake(result), write
+
+
+def level_reached(case: Case, time: float) -> str:
+    """What a static step has reached."""
+    levels = f"level {case.level_at(time):.3g} m of {case.levels[-1]:.4g} m"
+    return f"{levels}, t = {time:.3g} of {case.times[-1]:g}"
+
+
+def save(folder: str, last: tuple[Case, str, Write] | None) -> None:
+    """Write the last run, by its case, the text of a case file that repeats it, and its files.
 
     Replaces only case files written by the window. Raises InputError if there is no run or no
     folder, or the folder can not be written.
@@ -206,15 +178,15 @@ def save(folder: str, last: tuple[Sheet, list[Outcome]] | None) -> None:
         raise InputError("nothing to save: press Run first")
     if not folder.strip():
         raise InputError("out: name a folder")
-    sheet, outcomes = last
-    file = Path(folder) / f"{sheet.case.name}.case"
+    case, text, write = last
+    file = Path(folder) / f"{case.name}.case"
     if file.exists() and not file.read_bytes().startswith(SAVED.encode()):
         raise InputError(
             f"out = {folder}: must not have a {file.name} of your own; choose another folder"
         )
-    write_outcomes(sheet.case, outcomes, Path(folder))
+    write(Path(folder))
     with atomic_write(file) as part:
-        part.write_text(SAVED + case_text(sheet, outcomes[0].result.case), encoding="utf-8")
+        part.write_text(SAVED + text, encoding="utf-8")
 
 
 class EngineProcess:

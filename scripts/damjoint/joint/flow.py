@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy import linalg, sparse
@@ -25,6 +26,17 @@ def scaled(matrix: Sparse, weights: Array) -> Sparse:
 NO_NODES = np.zeros(0, int)
 
 
+@dataclass(frozen=True, kw_only=True)
+class Wetted:
+    """The quadrature of the water's force on a joint, or on a part of it: points, opening at them
+    from the unknowns, and fields of order 1 at them from their values at the nodes.
+    """
+
+    points: elements.Points
+    opening: Sparse
+    fields: Sparse
+
+
 class JointFields:
     """Scalar fields of order 1 on the joint, and its normalised path coordinate.
 
@@ -38,11 +50,10 @@ class JointFields:
         linear, number = elements.Space(surface, 1), len(surface.points)
         points = elements.points_of(linear, rule, gradients=True)
         self.joint, self.dim, self.nodes, self.toe = joint, joint.dim, number, toe
-        #: fields at the Gauss points, their slopes there along x, y, z, and fields at the points of
-        #: the water and at the locations of the joint's space, from their values at the nodes
+        #: fields at the Gauss points, their slopes there along x, y, z, and fields at the locations
+        #: of the joint's space, from their values at the nodes
         self.at_points = points.values
         self.slopes = [g for g in points.gradients[: joint.dim] if np.abs(g.data).max() > 1e-12]
-        self.at_water = elements.points_of(linear, elements.WATER).values
         self.at_locations = space.interpolation(1)
         laplace = sum(g.T @ scaled(g, points.weights) for g in self.slopes).tocsc()
         self.ends = np.concatenate([heel, toe])
@@ -55,6 +66,18 @@ class JointFields:
             else harmonic(laplace, nodes, y[nodes])
             for nodes in (heel, toe)
         )
+
+    @cached_property
+    def from_heel(self) -> Array:
+        """Distance of the nodes from the line of the heel [m]."""
+        heel, points = self.joint.heel, self.joint.surface.points
+        ends = np.concatenate([heel.points[table[:, [0, -1]]] for _, table in heel.cells])
+        start, along = ends[:, 0], ends[:, 1] - ends[:, 0]
+        length = np.maximum(np.sum(along**2, axis=1), 1e-300)
+        away = points[:, None] - start
+        share = np.clip(np.einsum("nsc,sc->ns", away, along) / length, 0, 1)
+        feet = share[:, :, None] * along
+        return np.asarray(np.linalg.norm(away - feet, axis=2).min(axis=1))
 
 
 def harmonic(laplace: Sparse, fixed: IntArray, values: Array) -> Array:
@@ -134,19 +157,15 @@ class Flow:
         self,
         fields: JointFields,
         points: elements.Points,
-        water_points: elements.Points,
-        opening_at_water: Sparse,
+        wetted: Wetted,
         at_points: Sparse,
     ) -> None:
-        """points, water_points: Gauss points of the law, of the water's force; opening_at_water:
-        opening at the latter from the unknowns; at_points: jump at the former.
-        """
+        """points: Gauss points of the law; at_points: jump there from the unknowns."""
         self.fields, self.points, self.dim = fields, points, fields.dim
         self.inside, number = fields.inside, fields.nodes
         #: nodal forces of the pressure at the inner nodes
-        self.lift = (
-            opening_at_water.T @ scaled(fields.at_water[:, self.inside], water_points.weights)
-        ).tocsr()
+        inner = wetted.fields[:, self.inside]
+        self.lift = (wetted.opening.T @ scaled(inner, wetted.points.weights)).tocsr()
         self.opening = at_points[:: fields.dim]
         self.inner_slopes = [g[:, self.inside] for g in fields.slopes]
         slopes = [g @ fields.xi for g in fields.slopes]

@@ -17,9 +17,9 @@ from ..fem.condensation import Condensed, CondensedJoint
 from ..model.case import Case, OfJoint
 from ..model.mesh import JointMesh, heel_normal
 from ..model.scene import UP
-from .flow import Flow, JointFields
+from .flow import Flow, JointFields, Wetted
 from .linear_system import Border, Change, UndamagedSystem
-from .wet_faces import WetFace
+from .wet_faces import WetFace, points_where
 
 
 def frames(normals: Array) -> Array:
@@ -100,11 +100,6 @@ class JointInterface:
         #: joint bends, a node has rows in the frame of each of its elements
         self.rows, node_frames = self._node_frames()
         self.at_nodes = self._components(space.interpolation(bulk.order)[self.rows], node_frames)
-        self.water_points = elements.points_of(space, elements.WATER)
-        #: opening at the points of the water from the unknowns
-        self.opening_at_water = self._components(
-            self.water_points.values, self.frames[self.water_points.elements], 1
-        )
         self.heel = self._heel_row()
         self.chord = Chord.of(self.mesh)
         #: extent along z [m], 1 in 2D
@@ -185,14 +180,30 @@ class JointInterface:
         ends = self.mesh.ends
         return ends | {"joint_along": [float(self.length)]}
 
-    # -- flow
+    # -- water
+
+    @cached_property
+    def wetted(self) -> Wetted:
+        """The quadrature of the water's force on the whole joint."""
+        points = elements.points_of(self.space, elements.WATER)
+        linear = elements.points_of(elements.Space(self.surface, 1), elements.WATER)
+        return self._wetted(points, linear.values)
+
+    def wetted_within(self, distance: float) -> Wetted:
+        """The same for the part within a distance from the heel [m]."""
+        linear = elements.Space(self.surface, 1)
+        height = self.fields.from_heel - distance
+        points, fields = (points_where(space, height) for space in (self.space, linear))
+        return self._wetted(points, fields.values)
+
+    def _wetted(self, points: elements.Points, fields: Sparse) -> Wetted:
+        opening = self._components(points.values, self.frames[points.elements], 1)
+        return Wetted(points=points, opening=opening, fields=fields)
 
     @cached_property
     def flow(self) -> Flow:
         """Operators of water that flows in the joint."""
-        return Flow(
-            self.fields, self.points, self.water_points, self.opening_at_water, self.at_points
-        )
+        return Flow(self.fields, self.points, self.wetted, self.at_points)
 
     @cached_property
     def fields(self) -> JointFields:
@@ -286,7 +297,9 @@ class Interface:
         """Linear system of the undamaged joints for a tangent (q, 3, 3); the last one is kept."""
         if self._undamaged is None or not np.array_equal(tangent, self._undamaged.tangent):
             points = np.arange(len(self.weights))
-            matrix = self.bulk.stiffness + self.stiffness(tangent, points).toarray()
+            of_joints = self.stiffness(tangent, points).tocoo()
+            matrix = self.bulk.stiffness.copy()
+            matrix[of_joints.row, of_joints.col] += of_joints.data
             self._undamaged = UndamagedSystem(tangent, matrix)
         return self._undamaged
 

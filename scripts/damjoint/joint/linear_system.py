@@ -18,7 +18,7 @@ import numpy as np
 from numpy.linalg import norm
 from scipy import linalg
 
-from ..arrays import Array, IntArray, Sparse
+from ..arrays import Array, IntArray, Sparse, mirror
 from .flow import FlowDerivative
 
 
@@ -55,7 +55,7 @@ class UndamagedSystem:
         if info:
             raise linalg.LinAlgError("tangent of the undamaged joint: not positive definite")
         inverse, _ = linalg.lapack.dpotri(factor, lower=True, overwrite_c=True)
-        self.compliance: Array = np.tril(inverse) + np.tril(inverse, -1).T
+        self.compliance: Array = mirror(inverse).T
         self._by_pressure: tuple[Sparse, Array] | None = None
 
     def by_pressure(self, lift: Sparse) -> Array:

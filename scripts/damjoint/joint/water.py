@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from .. import ROUND_OFF
 from ..arrays import Array, Sparse
 from ..laws import Law
 from ..model.case import Case, flows, has_drains, remembers
-from ..model.loads import Loading
+from ..model.loads import Loading, heads_at_ends
 from .flow import FlowDerivative, FlowSolution
 from .interface import JointInterface
 from .joint_laws import JointVariables
@@ -28,8 +29,8 @@ class Still:
 
 @dataclass(frozen=True, kw_only=True)
 class Pressure:
-    """Water pressure in the joint [Pa] at the law's points, at the integration points of the water
-    and at the nodes.
+    """Water pressure in the joint [Pa] at the law's points, at those of `JointWater.wetted` and at
+    the nodes.
     """
 
     points: Array
@@ -51,18 +52,21 @@ class JointWater:
         #: that the earthquake opens
         self.remembers = remembers(case)
         self.dries = self.remembers and case["quake_uplift"] == "zero"
-        self.wet, self.flowing = case["uplift"] != "none", flows(case)
+        #: distance from the heel beyond which there is no water [m]
+        self.waterstop = case["waterstop"] if case["uplift"] == "waterstop" else None
+        self.wet, self.flowing = case["uplift"] != "none" and self.waterstop != 0, flows(case)
         #: nodes and points of the drains of flowing water
         drained = self.flowing and has_drains(case)
         self.drains = joint.drains(case["drain_x"]) if drained else None
         self.unit_weight = case["rho_water"] * case["g"]
+        #: the part of the joint on which water may press
+        self.wetted = joint.wetted_within(self.waterstop) if self.waterstop else joint.wetted
         self.law: Law[Any] = case.law
 
     def head(self, loading: Loading, matrix: Sparse | None = None) -> Array:
         """Head [m] in a joint of uniform transmissivity, at the joint's nodes or at the places that
-        an interpolation matrix of `JointFields` leads to: linear along the joint between the levels
-        of reservoir (plus joint_head_offset) and tailwater; a dry end has its own height, or the
-        head of the other end if that is lower.
+        an interpolation matrix of `JointFields` leads to: linear along the joint between the heads
+        of `heads_at_ends`. With a waterstop: that of the reservoir.
 
         Drains reduce the head above their outlet, the tailwater or their own height, by their
         effectiveness (EM 1110-2-2200); USBR counts the reduction from the reservoir's head.
@@ -70,9 +74,9 @@ class JointWater:
         case, along = self.case, self.joint.fields
         fields = along.heel_y, along.toe_y, along.xi
         heel, toe, xi = fields if matrix is None else (matrix @ field for field in fields)
-        level, tail = loading.level, loading.tail
-        first = np.maximum(level + case["joint_head_offset"], np.minimum(heel, tail))
-        last = np.maximum(tail, np.minimum(toe, level))
+        if self.waterstop is not None:
+            return np.full(len(xi), loading.level + case["joint_head_offset"])
+        first, last = heads_at_ends(case, loading.level, loading.tail, heel, toe)
         if case["uplift"] != "drained":
             return first + (last - first) * xi
         at = case["drain_x"] / self.joint.length
@@ -89,14 +93,20 @@ class JointWater:
         """Pressure [Pa], not below zero, at places of height y that an interpolation matrix of
         `JointFields` leads to; beyond: pressure of flowing water beyond the imposed one.
         """
-        return np.maximum(self.unit_weight * (self.head(loading, matrix) - y) + beyond, 0)
+        pressure = np.maximum(self.unit_weight * (self.head(loading, matrix) - y) + beyond, 0)
+        if self.waterstop is None:
+            return pressure
+        from_heel = matrix @ self.joint.fields.from_heel
+        return pressure * (from_heel <= self.waterstop + ROUND_OFF * self.joint.length)
 
     def lift(self, loading: Loading, beyond: Array | float = 0.0) -> Array:
         """Forces of the water in the joint on its two faces (j,)."""
-        joint = self.joint
-        weights, y = joint.water_points.weights, joint.water_points.positions[:, 1]
-        pressure = self.uplift(loading, joint.fields.at_water, y, beyond)
-        forces: Array = joint.opening_at_water.T @ (weights * pressure)
+        y = self.wetted.points.positions[:, 1]
+        return self.force(self.uplift(loading, self.wetted.fields, y, beyond))
+
+    def force(self, pressure: Array) -> Array:
+        """Forces on the two faces (j,) of pressures at the points of `wetted` [Pa]."""
+        forces: Array = self.wetted.opening.T @ (self.wetted.points.weights * pressure)
         return forces
 
     def expand_to_nodes(self, inner: Array) -> Array:
@@ -157,7 +167,7 @@ class JointWater:
     ) -> tuple[Array, FlowSolution]:
         """Forces of flowing water on the faces of the joint (j,), and its flow's solution."""
         solution = self.solve_flow(jump, variables, loading)
-        beyond = self.joint.fields.at_water @ self.expand_to_nodes(solution.pressure)
+        beyond = self.wetted.fields @ self.expand_to_nodes(solution.pressure)
         return self.lift(loading, beyond), solution
 
     def opened(self, jump: Array, variables: Any, still: Still | None) -> tuple[Array, Any]:
@@ -225,7 +235,7 @@ class JointWater:
             drains = () if self.drains is None else (self.drains[0],)
             flux, leakage = joint.flow.flux(conductivity, total, joint.width, *drains)
         points = at(fields.at_points, joint.points.positions)
-        water_points = at(fields.at_water, joint.water_points.positions)
+        water_points = at(self.wetted.fields, self.wetted.points.positions)
         nodes = at(fields.at_locations, joint.space.locations)
         if still and self.dries:
             opening = joint.jumps(joint.at_points, jump)[:, 0]
@@ -234,7 +244,7 @@ class JointWater:
             spread = fields.at_points.T @ (weights * lost_at_points)
             lost_at_nodes = spread / (fields.at_points.T @ weights)
             points = points - lost_at_points
-            water_points = water_points - fields.at_water @ lost_at_nodes
+            water_points = water_points - self.wetted.fields @ lost_at_nodes
             nodes = np.maximum(nodes - fields.at_locations @ lost_at_nodes, 0)
         return Pressure(
             points=points, water_points=water_points, nodes=nodes, flux=flux, leakage=leakage

@@ -8,10 +8,11 @@ face_points) the pressure is integrated with these alone, as in published tests.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cached_property
 
 import numpy as np
+from scipy import sparse
 
 from ..arrays import Array, IntArray
 from ..fem import elements
@@ -94,25 +95,67 @@ class WetFace:
     def add_wet_part(self, forces: Array, element: int, level: float, height: Height) -> None:
         """Add the forces on an element below the waterline, a straight line on a plane element."""
         shape, functions = self.elements[element]
-        corners = elements.corners_of(shape)
-        nodes = self.surface.points[functions[: len(corners)]]
+        nodes = self.surface.points[functions[: len(elements.corners_of(shape))]]
         normal = self.surface.normals[element, : self.dim]
         of_functions = forces.reshape(-1, self.dim)
-        simplex, points = ("line", 4) if len(corners) == 2 else ("triangle", 6)
-        for part in below(corners, nodes[:, 1] - level):
-            for x, weight in zip(*elements.rule(simplex, points), strict=True):
-                u = elements.nodal(simplex, x)[0] @ part
-                n, dn = elements.nodal(shape, u)
-                jacobian = dn.T @ nodes
-                area = measure(part) * weight * np.sqrt(np.linalg.det(jacobian @ jacobian.T))
-                force = area * height(level, n @ nodes[:, 1], abs(normal[0]))
-                values = elements.basis(shape, self.space.order, u)[0]
-                of_functions[functions] -= force * np.outer(values, normal)
+        for u, place, area in points_below(shape, nodes, nodes[:, 1] - level):
+            force = area * height(level, place[1], abs(normal[0]))
+            values = elements.basis(shape, self.space.order, u)[0]
+            of_functions[functions] -= force * np.outer(values, normal)
 
+
+#: No functions.
+NONE = np.zeros(0, int)
 
 #: m0 m2 - m1^2 over m1^2 from which force and lever can be distinguished; and part of the face's
 #: height by which the waterline is raised until they can.
 DISTINCT, RAISE = 1e-3, 0.01
+
+
+def points_below(shape: str, nodes: Array, height: Array) -> Iterator[tuple[Array, Array, float]]:
+    """Quadrature points on the part of an element where a linear field is negative: reference
+    coordinates, position (3,), weight.
+
+    nodes (n, 3), height (n,): positions and values of the field at its corners.
+    """
+    corners = elements.corners_of(shape)
+    simplex, points = ("line", 4) if len(corners) == 2 else ("triangle", 6)
+    for part in below(corners, height):
+        for x, weight in zip(*elements.rule(simplex, points), strict=True):
+            u = elements.nodal(simplex, x)[0] @ part
+            n, dn = elements.nodal(shape, u)
+            jacobian = dn.T @ nodes
+            area = measure(part) * weight * np.sqrt(np.linalg.det(jacobian @ jacobian.T))
+            yield u, n @ nodes, float(area)
+
+
+def points_where(space: elements.Space, height: Array) -> elements.Points:
+    """Quadrature points on the part of a surface where a field of order 1, from its values at the
+    nodes, is negative; element by element.
+    """
+    surface, start = space.body, 0
+    rows: list[tuple[Array, IntArray, Array, float, int]] = []
+    for shape, table in space.connectivity:
+        number = len(elements.corners_of(shape))
+        for e, functions in enumerate(table):
+            corners = functions[:number]
+            if (height[corners] < 0).any():
+                points = points_below(shape, surface.points[corners], height[corners])
+                rows += [
+                    (elements.basis(shape, space.order, u)[0], functions, place, area, start + e)
+                    for u, place, area in points
+                ]
+        start += len(table)
+    values, functions, places, areas, numbers = zip(*rows, strict=True) if rows else ([],) * 5
+    pointers = np.cumsum([0, *map(len, values)])
+    data = (np.concatenate([[], *values]), np.concatenate([NONE, *functions]), pointers)
+    return elements.Points(
+        weights=np.array(areas, float),
+        positions=np.array(places, float).reshape(-1, 3),
+        values=sparse.csr_matrix(data, (len(rows), len(space.locations))),
+        gradients=(),
+        elements=np.array(numbers, int),
+    )
 
 
 def below(corners: Array, height: Array) -> list[Array]:

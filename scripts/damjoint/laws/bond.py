@@ -48,7 +48,8 @@ class Bond(Law[BondVariables]):
 
     def __init__(self, parameters: Mapping[str, Any]) -> None:
         p = parameters
-        self.K_N, self.K_T, self.artificial = p["K_N"], p["K_T"], p["artificial"]
+        self.K_N, self.K_T = p["K_N"], p["K_T"]
+        self.artificial, self.yield_tolerance = p["artificial"], p["yield_tolerance"]
         self.tensile_strength, self.cohesion, self.mu = p["sigma_max"], p["adhesion"], p["mu"]
         self.delta_e = self.tensile_strength / self.K_N
         self.delta_c = 2 * p["G_f"] / (self.tensile_strength or self.cohesion or 1.0)
@@ -93,7 +94,8 @@ class Bond(Law[BondVariables]):
         size = np.linalg.norm(shear, axis=1)
         excess = size + self.mu * self.K_N * np.minimum(jump[:, 0], 0)
         opened = self.damage_by_opening(jump[:, 0], before)
-        if_opening = np.maximum((excess - self.cohesion * (1 - opened)) / self.K_T, 0)
+        beyond = excess - self.cohesion * (1 - opened)
+        if_opening = np.where(beyond > self.yield_tolerance * size, beyond / self.K_T, 0)
         if_slip = (excess - self.cohesion * (1 - before)) / self.K_slip
         by_opening = before + per_slip * if_opening <= opened
         broken = ~by_opening & (before + per_slip * if_slip >= 1)

@@ -60,7 +60,8 @@ class Friction(Law[FrictionVariables]):
     def __init__(self, parameters: Mapping[str, Any]) -> None:
         p = parameters
         self.K_N, self.K_T, self.H = p["K_N"], p["K_T"], p["pena_tang"]
-        self.mu, self.adhesion, self.artificial = p["mu"], p["adhesion"], p["artificial"]
+        self.mu, self.adhesion = p["mu"], p["adhesion"]
+        self.artificial, self.yield_tolerance = p["artificial"], p["yield_tolerance"]
         self.hardens = bool(self.H)
         self.tensile_strength = self.open_tension = self.adhesion / self.mu
         self.cap_opening = self.adhesion / (self.mu * self.K_N)
@@ -109,7 +110,8 @@ class Friction(Law[FrictionVariables]):
         size = np.linalg.norm(shear, axis=1)
         excess = size + self.mu * normal - self.H * variables.accumulated - self.adhesion
         direction = shear / np.maximum(size, 1e-300)[:, None]
-        return Trial(normal, size, direction, np.maximum(excess / (self.K_T + self.H), 0))
+        slips = excess > self.yield_tolerance * size
+        return Trial(normal, size, direction, np.where(slips, excess / (self.K_T + self.H), 0))
 
     def traction_and_tangent(
         self, jump: Array, variables: FrictionVariables

@@ -17,6 +17,7 @@ from . import casefile
 from .arithmetic import number
 from .constraints import (
     check_also_uplift,
+    check_distances,
     check_drive,
     check_levels,
     check_lifts,
@@ -48,9 +49,12 @@ CASES = data("cases")
 #: Constants of pro/parameters.pro that both engines use.
 SHARED = (
     *("strategy_growth", "strategy_secant", "strategy_release", "strategy_iterations", "cut"),
-    *("round_off", "coarsest", "artificial", "release_length", "crack_aperture", "crack_most"),
-    *("zangar_angle", "zangar_cm"),
+    *("round_off", "coarsest", "artificial", "yield_tolerance", "release_length"),
+    *("crack_aperture", "crack_most", "zangar_angle", "zangar_cm"),
 )
+
+#: Those of them that the laws use.
+SOLVER = "artificial", "yield_tolerance", "release_length"
 
 #: Variables of pro/section.pro: the joint's ends, the segments of the faces, the marks of line
 #: forces.
@@ -196,7 +200,8 @@ class Case(ParameterValues):
     def with_joints(self, joints: Sequence[OfJoint]) -> Case:
         """The case of a user's own geometry, with the names and ends of its joints.
 
-        Raises InputError if the case has lists of another length.
+        Raises InputError if the case has lists of another length, or drains or a waterstop beyond
+        the end of a joint.
         """
         same = [replace(joint, hardening_asked=self.hardening_asked) for joint in joints]
         known = self.of_joints or same
@@ -210,12 +215,16 @@ class Case(ParameterValues):
             replace(joint, values=own.values, section=section, hardening_asked=own.hardening_asked)
             for own, joint, section in zip(known, joints, ends, strict=True)
         )
-        return replace(self, section=ends[0], of_joints=tuple(of_joints) if len(joints) > 1 else ())
+        several = tuple(of_joints) if len(joints) > 1 else ()
+        case = replace(self, section=ends[0], of_joints=several)
+        for own in case.joints:
+            check_distances(own, own.section["joint_along"][0])
+        return case
 
     @cached_property
     def law(self) -> Law[Any]:
         """The joint's law with its parameters."""
-        solver = {name: self.shared[name][0] for name in ("artificial", "release_length")}
+        solver = {name: self.shared[name][0] for name in SOLVER}
         return LAWS[self["law"]](self.values | solver)
 
     @property

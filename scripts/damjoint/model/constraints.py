@@ -31,12 +31,13 @@ def check_values(
         parameter.check(case.values[name])
     if by_parameters:
         check_section(case, section)
+        check_distances(case, section["joint_along"][0])
     elif case["temperature_linear"]:
         raise InputError(
             f"temperature_linear = {case['temperature_linear']:g}: must be 0 with a geometry of "
             "one's own (it is linear between the faces of the section)"
         )
-    check_drains(case, section["joint_length"][0])
+    check_drains(case)
     check_works(case)
     if not by_parameters and case["added_mass"] == ZANGAR:
         raise InputError(
@@ -120,18 +121,20 @@ def check_lifts(
                 )
 
 
-def check_drains(case: ParameterValues, length: float) -> None:
-    """Drains: within the length of the joint [m]; with a prescribed displacement their pressure has
-    to be linear in the level.
-    """
-    if not has_drains(case):
-        return
+def check_distances(case: ParameterValues, length: float) -> None:
+    """Distances of drains and waterstop from the heel: within the length of the joint [m]."""
+    present = {"drain_x": has_drains(case), "waterstop": case["uplift"] == "waterstop"}
+    for name in present:
+        if present[name] and not case[name] < length:
+            raise InputError(
+                f"{name} = {case[name]:g}: must be < the joint's length ({length:g} m)"
+            )
+
+
+def check_drains(case: ParameterValues) -> None:
+    """Drains: with a prescribed displacement their pressure has to be linear in the level."""
     water, drive = case.water, case.scene.drive
-    if not water.drain_x < length:
-        raise InputError(
-            f"drain_x = {water.drain_x:g}: must be < the joint's length ({length:g} m)"
-        )
-    if not flows(case) and drive != "level" and water.drain_level > 0:
+    if has_drains(case) and not flows(case) and drive != "level" and water.drain_level > 0:
         raise InputError(
             f"drain_level = {water.drain_level:g}: must be 0 with drive = {drive} "
             "(the pressure has to be linear in the level)"
@@ -146,8 +149,8 @@ def check_works(case: ParameterValues) -> None:
             laws = " or ".join(law for law, rules in LAWS.items() if name in rules.works)
             raise InputError(
                 f"{name} = {case[name]:g}: must be 0 with law = {case['law']}, uplift = "
-                f"{case['uplift']} (only law = {laws} includes it, with uplift = none, imposed "
-                "or drained)"
+                f"{case['uplift']} (only law = {laws} includes it, with uplift = none, imposed, "
+                "drained or waterstop)"
             )
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import Array
-from .case import Case
+from .case import Case, flows
 from .constraints import ZANGAR
 from .mesh import Face
 from .parameters import TINY
@@ -44,6 +44,27 @@ class Loading:
     def part(self, name: str) -> float:
         """The factor of a load of STAGED."""
         return self.grown[STAGED.index(name)]
+
+
+def heads_at_ends(
+    case: Case, level: float, tail: float, heel_y: Array | float, toe_y: Array | float
+) -> tuple[Array, Array]:
+    """Heads [m] of the water in a joint at its heel and toe of these elevations [m], for levels of
+    reservoir and tailwater.
+
+    A dry end has its own elevation as head: no pressure. Of water whose flow is computed this is an
+    exit, and no water enters there: a head on the other side that is lower holds here, too.
+    """
+    reservoir = level + case["joint_head_offset"]
+    wet_heel, wet_toe = reservoir > heel_y, tail > toe_y
+    exit_heel, exit_toe = heel_y, toe_y
+    if flows(case):
+        exit_heel, exit_toe = np.minimum(heel_y, tail), np.minimum(toe_y, reservoir)
+    at_rest = np.minimum(np.minimum(heel_y, toe_y), max(reservoir, tail))  # below both ends
+    return (
+        np.where(wet_heel, reservoir, np.where(wet_toe, exit_heel, at_rest)),
+        np.where(wet_toe, tail, np.where(wet_heel, exit_toe, at_rest)),
+    )
 
 
 #: All loads complete, without water.

@@ -339,6 +339,8 @@ class Mesh:
             surface = self._body(self.dim - 1, [(f"face{i}", face.tag)])
             for body, part in self._by_body(surface, face.body):
                 self.faces[f"face{len(self.faces)}"] = Face(part, body, *face[2:])
+        #: whether a face of a user's own geometry is part of several bodies
+        self.divided = len(self.faces) > len(faces)
         self._turn_outwards()
         last = max(joint.surface.element_tags.max() for joint in self.joints)
         if last >= MOST_TAGS:
@@ -626,12 +628,36 @@ class Mesh:
             "joint_elements": sum(len(surface.element_tags) for surface in joints),
         }
 
+    def _divide_faces(self) -> None:
+        """Give each of `faces` a physical group of its own, numbered as in pro/section.pro."""
+        gmsh = start_gmsh()
+        d, first = self.dim - 1, int(constants()["SEGMENT"][0])
+        faces = list(self.faces.values())
+        entities: list[list[int]] = [[] for _ in faces]
+        for _, entity in gmsh.model.getEntities(d):
+            tags = np.concatenate([np.zeros(0, int), *gmsh.model.mesh.getElements(d, entity)[1]])
+            for of_face, face in zip(entities, faces, strict=True):
+                within = np.isin(tags, face.surface.element_tags)
+                if within.all() and len(tags):
+                    of_face.append(entity)
+                elif within.any():
+                    raise self._bad(
+                        f"a face of side {face.side}: must be divided where its bodies meet with "
+                        "engine = getdp"
+                    )
+        gmsh.model.removePhysicalGroups([(d, first + i) for i in range(len(faces))])
+        for i, of_face in enumerate(entities):
+            gmsh.model.addPhysicalGroup(d, of_face, first + i)
+
     def write(self, path: Path) -> None:
         """Write the mesh, which must be Gmsh's current one, for GetDP (MSH 2.2, binary).
 
-        Raises OSError if the disk is full, which Gmsh does not report.
+        Raises OSError if the disk is full, which Gmsh does not report; InputError if a curve or
+        surface of a face is part of several bodies.
         """
         gmsh = start_gmsh()
+        if self.divided:
+            self._divide_faces()
         gmsh.option.setNumber("Mesh.MshFileVersion", 2.2)
         # else elements are renumbered, shape by shape
         gmsh.option.setNumber("Mesh.PreserveNumberingMsh2", 1)

@@ -32,7 +32,7 @@ AUTOMATIC = -1.0
 OF_JOINTS = (
     *("law", "uplift", "joint_slope", "aperture_min"),
     *("drains", "drain_x", "drain_effectiveness", "drain_level"),
-    "drain_reference",
+    *("drain_reference", "waterstop"),
     *("grout_pressure", "grout_t", "saw_thickness", "saw_t"),
 )
 #: Limits that mean > 0 and < 0.5 in the declarations; limit of ONELAB that means none.
@@ -323,11 +323,12 @@ def levels_of(name: str, levels: Any) -> tuple[float, ...]:
 
 def assignments(values: Mapping[str, Value]) -> str:
     """Lines default_name = value; in the common language of Gmsh and GetDP."""
-    lines = (
-        f'default_{n} = "{v}";\n' if isinstance(v, str) else f"default_{n} = {v!r};\n"
-        for n, v in values.items()
-    )
-    return "".join(lines)
+    return "".join(f"default_{name} = {quoted(value)};\n" for name, value in values.items())
+
+
+def quoted(value: Value) -> str:
+    """A value in that language."""
+    return f'"{value}"' if isinstance(value, str) else repr(value)
 
 
 def listing(name: str, values: Iterable[float]) -> str:

@@ -12,7 +12,6 @@ import numpy as np
 
 from ..arrays import Array, Table
 from .case import Case
-from .mesh import Body
 
 #: Columns of joint.csv: a row per joint node and requested level.
 JOINT = {
@@ -119,6 +118,9 @@ QUAKE = {
     "T": ("N/m", "shear force on the joint, downstream > 0"),
     "M": ("N m/m", "moment of N about the toe, stabilising > 0"),
     "U": ("N/m", "uplift: resultant of the water pressure in the joint"),
+    "T_inertia": ("N/m", "part of T: inertia of all that is above the joint, with its water"),
+    "N_inertia": ("N/m", "the same part of N"),
+    "M_inertia": ("N m/m", "the same part of M"),
     "shear_reserve": ("N/m", "largest shear force that the joint transmits, mu N + c L, minus |T|"),
     "open_length": ("m", "length of joint that is open or broken"),
     "iterations": ("-", "Newton iterations of the step"),
@@ -128,7 +130,7 @@ QUAKE = {
 #: Those of a joint. With several joints: of the first one; of joint 2, 3, ... by `column_of`.
 QUAKE_OF_JOINTS = (
     *("heel_opening", "toe_opening", "slip_mean", "slip_heel", "slip_toe"),
-    *("N", "T", "M", "U", "shear_reserve", "open_length"),
+    *("N", "T", "M", "U", "T_inertia", "N_inertia", "M_inertia", "shear_reserve", "open_length"),
 )
 
 
@@ -141,25 +143,6 @@ def quake_columns(case: Case) -> dict[str, tuple[str, str]]:
         for name in QUAKE_OF_JOINTS
     }
     return QUAKE | others
-
-
-@dataclass(frozen=True, kw_only=True)
-class QuakeResult:
-    """The rows of an earthquake and what they amount to."""
-
-    case: Case
-    rows: Table
-    #: time (rows,), distance from the heel (nodes,), effective normal stress (rows, nodes)
-    stress: Table
-    #: states with the largest displacements, in 2D: name, time [s], and the displacement since the
-    #: static state (nodes, 2) of each body [m]
-    shapes: list[tuple[str, float, dict[str, Array]]]
-    bodies: dict[str, Body]
-    #: for run.json
-    summary: dict[str, Any]
-    #: whether the dam is in static equilibrium after the earthquake
-    stands: bool
-    statement: str
 
 
 @dataclass
@@ -242,12 +225,13 @@ def rows_of(table: Table, number: int, columns: Collection[str]) -> Table:
 
 def rows_at(table: Table, time: float | None = None) -> Table:
     """The rows of one time (the last one by default), sorted joint by joint, from heel to toe, then
-    by z.
+    by z, y and x.
     """
     time = table["time"].max() if time is None else time
     rows = np.flatnonzero(np.isclose(table["time"], time))
-    s, z = (np.round(table[n][rows] / (np.abs(table["s"]).max() or 1.0), 9) for n in "sz")
-    rows = rows[np.lexsort((z, s, table["joint"][rows]))]
+    scale = np.abs(table["s"]).max() or 1.0
+    x, y, z, s = (np.round(table[n][rows] / scale, 9) for n in "xyzs")
+    rows = rows[np.lexsort((x, y, z, s, table["joint"][rows]))]
     return {name: column[rows] for name, column in table.items()}
 
 

@@ -23,7 +23,7 @@ from ..storage import PART, atomic_write, locked_folder
 
 #: Files of a run: tables, pictures CASE....png, fields.
 TABLES = ("joint.csv", "history.csv", "curve.csv", "gravity.csv", "critical.csv", "run.json")
-TABLES += ("quake.csv", "quake_stress.npz", "quake_state.npz")
+TABLES += ("quake.csv", "quake_joint.csv", "quake_stress.npz", "quake_state.npz")
 PICTURES = ("", "_curve", "_check", "_critical", "_quake")
 FIELDS = re.compile(r"(bulk|joint)(_t[\w.+-]+\.vtu|\.msh)|fields\.pvd")
 

@@ -390,7 +390,9 @@ VIEW = view_from(-35, 30)
 
 
 def draw_maps(figure: FigureBase, solution: Solution, time: float) -> None:
-    """Draw maps of the joint in true shape: opening, effective normal stress, shear stress."""
+    """Draw maps of the joint in true shape: opening, effective normal stress, shear stress; below
+    each other, or side by side if the joint is not much wider than high.
+    """
     rows, joint = solution.result.at(time), solution.bodies["joint"]
     nearest = row_of_nodes(joint, rows)
     names, places = projected(joint)
@@ -403,13 +405,23 @@ def draw_maps(figure: FigureBase, solution: Solution, time: float) -> None:
         ("sigma_n_eff", "effective normal stress, tension > 0", STRESSES),
         ("tau_1", "shear stress, downstream > 0", STRESSES),
     )
-    maps = panels(figure, len(shown), 1, right=0.3, bottom=0.45, top=0.25, down=0.4).flat
-    for axes, (name, label, units) in zip(maps, shown, strict=True):
+    wide = np.ptp(shape.x) > WIDE * np.ptp(shape.y)
+    table = (len(shown), 1) if wide else (1, len(shown))
+    maps = panels(figure, *table, right=0.3, bottom=0.45, top=0.25, down=0.4)
+    for axes, (name, label, units) in zip(maps.flat, shown, strict=True):
         size, factor = unit([rows[name]], units)
-        draw_map(axes, shape, rows[name][nearest] * factor, f"{label} [{size}]")
+        draw_map(axes, shape, rows[name][nearest] * factor, f"{label} [{size}]", wide)
+    for axes in maps[:, 0]:
         axes.set_ylabel(f"{names[1]} [m]", fontsize=9)
-        axes.tick_params(labelbottom=name == shown[-1][0])
-    axes.set_xlabel(f"{names[0]} [m]", fontsize=9)
+    for axes in maps[:-1].flat:
+        axes.tick_params(labelbottom=False)
+    for axes in maps[-1]:
+        axes.set_xlabel(f"{names[0]} [m]", fontsize=9)
+
+
+#: Width over height of the joint from which on its maps are below each other; letters in a line of
+#: a title beside others.
+WIDE, LETTERS = 2.0, 23
 
 
 #: Triangles of a face by the number of its corners.
@@ -417,21 +429,21 @@ HALVES = {3: ([0, 1, 2],), 4: ([0, 1, 2], [0, 2, 3])}
 
 
 def projected(joint: Body) -> tuple[list[str], np.ndarray]:
-    """The joint in the plane of two axes in which its area is largest: their names, that of its
-    longer side first, and the places of its nodes (2, n) [m].
+    """The joint in the plane of two axes in which its area is largest: their names, y last, else
+    that of its longer side first, and the places of its nodes (2, n) [m].
     """
     normals = np.zeros(3)
     for _, table in joint.cells:
         first, second, *_, last = (joint.points[table[:, i]] for i in range(table.shape[1]))
         normals += np.abs(np.cross(second - first, last - first)).sum(axis=0)
     extent = np.ptp(joint.points, axis=0)
-    axes = sorted(set(range(3)) - {int(normals.argmax())}, key=lambda i: -extent[i])
+    axes = sorted(set(range(3)) - {int(normals.argmax())}, key=lambda i: (i == 1, -extent[i]))
     return ["xyz"[i] for i in axes], joint.points[:, axes].T
 
 
-def draw_map(axes: Axes, shape: Triangulation, values: np.ndarray, title: str) -> None:
+def draw_map(axes: Axes, shape: Triangulation, values: np.ndarray, title: str, wide: bool) -> None:
     """Draw a map of values at the nodes, with a thick line at zero; its scale diverges from zero,
-    and ends before extremes of small parts of the joint.
+    and ends before extremes of small parts of the joint. wide: whether its title fits into a line.
     """
     values = np.where(np.abs(values) < ROUND_OFF * np.abs(values).max(), 0, values)
     low, high = scale_of(values)
@@ -444,7 +456,8 @@ def draw_map(axes: Axes, shape: Triangulation, values: np.ndarray, title: str) -
     axes.tricontour(shape, shown, levels, colors="black", linewidths=0.25)
     if values.min() < 0 < values.max():
         axes.tricontour(shape, values, [0], colors="black", linewidths=1.4)
-    axes.set_title(title, fontsize=8, loc="left")
+    lines = [title] if wide else textwrap.wrap(title, LETTERS)
+    axes.set_title("\n".join(lines), fontsize=8, loc="left")
     axes.set_aspect("equal")
     bar = axes.figure.colorbar(filled, ax=axes, pad=0.02, fraction=0.05, aspect=12)
     ticks = MaxNLocator(4).tick_values(levels[0], levels[-1])

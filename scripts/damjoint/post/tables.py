@@ -9,6 +9,7 @@ from typing import TextIO
 
 import numpy as np
 
+from ..arrays import Table
 from ..model.results import Results
 from ..storage import atomic_write
 
@@ -43,13 +44,15 @@ def write_csv(target: Path | TextIO, table: Mapping[str, Column]) -> None:
     )
 
 
+def rounded(joint: Table) -> Table:
+    """The table of the joints with rounded coordinates."""
+    return joint | {axis: np.round(joint[axis], DECIMALS) + 0.0 for axis in "xyz"}
+
+
 def write(results: Results, folder: Path) -> None:
     """Write joint.csv and history.csv into a folder; under displacement control also curve.csv."""
     case, history = results.case, results.history
-    joint = dict(results.joint)
-    for axis in "xyz":
-        joint[axis] = np.round(joint[axis], DECIMALS) + 0.0
-    write_csv(folder / "joint.csv", joint)
+    write_csv(folder / "joint.csv", rounded(results.joint))
     write_csv(folder / "history.csv", history)
     if case["drive"] != "level":
         pressure = case["rho_water"] * case["g"] * history["level"]

@@ -45,8 +45,9 @@ def joint_row(equilibrium: Equilibrium, state: State, number: int) -> dict[str, 
     frames = joint.frames[joint.points.elements]
     along_axes = np.einsum("qk,qkc->qc", traction, frames)
     N, T, M = joint.chord.resultants(weights, joint.points.positions, along_axes)
-    normals = joint.surface.normals[joint.water_points.elements]
-    uplift = joint.water_points.weights * pressure.water_points / joint.width
+    wetted = equilibrium.water[number].wetted.points
+    normals = joint.surface.normals[wetted.elements]
+    uplift = wetted.weights * pressure.water_points / joint.width
     return {
         "crack_length": weights @ law.is_open(at_points, variables),
         "process_zone": weights @ law.in_process_zone(at_points, variables),
@@ -171,7 +172,7 @@ def joint_rows(equilibrium: Equilibrium, state: State, number: int) -> tuple[Arr
         "slip": nodes[:, 7],
         "s": joint.xi * joint.length,
     }
-    if THICKNESS.keys() & joint_columns(equilibrium.case).keys():
+    if THICKNESS.keys() & joint_columns(equilibrium.case.joints[number]).keys():
         added = law.added_thickness(variables, len(jump))
         columns |= dict.fromkeys(THICKNESS, joint.mean_at_nodes(added))
     of_law = law.column_values(variables)

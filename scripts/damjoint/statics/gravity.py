@@ -21,7 +21,7 @@ import numpy as np
 
 from ..model.case import Case, remembers
 from ..model.constraints import ZANGAR
-from ..model.loads import Loading, line_forces, zangar_column, zangar_share
+from ..model.loads import Loading, heads_at_ends, line_forces, zangar_column, zangar_share
 from ..model.parameters import constants
 
 #: Columns of gravity.csv: a row per load on the body above the joint, and their sum.
@@ -258,10 +258,11 @@ class Uplift:
     """The water in the joint for a crack of length a from the heel: pressure [Pa] linear between
     places s [m].
 
-    Heads are pressure heads above the joint's ends, never negative. By `uplift`: none; imposed: H1
-    to H2; drained: reduced at the drains; cracked: H1 in the crack, beyond it as imposed or,
-    with drains beyond the crack, as drained [USACE EM 1110-2-2200]; flow: as cracked without
-    drains, the limit of the cubic law for a narrow closed joint.
+    Heads as in `heads_at_ends`. By `uplift`: none; imposed: linear from heel to toe; drained:
+    reduced at the drains; cracked: that of the heel in the crack, beyond it as imposed or, with
+    drains beyond the crack, as drained [USACE EM 1110-2-2200]; flow: as cracked without drains, the
+    limit of the cubic law for a narrow closed joint; waterstop: the reservoir's up to it, none
+    behind it. The pressure is not below zero.
     """
 
     def __init__(
@@ -277,26 +278,50 @@ class Uplift:
         pressure.
         """
         self.length, mode = body.length, case["uplift"]
-        head = level + case["joint_head_offset"]
-        self.h1, self.h2 = h1, h2 = max(head - body.heel[1], 0.0), max(tail - body.toe[1], 0.0)
+        ends = heads_at_ends(case, level, tail, body.heel[1], body.toe[1])
+        #: heads at heel and toe [m]
+        self.first, self.last = first, last = float(ends[0]), float(ends[1])
         #: distance from the heel and head of the outlet [m] of drains that the crack has not passed
         self.drains: tuple[float, float] | None = None
         wet_crack, crack = crack, crack if mode in ("cracked", "flow") else 0.0
         drained = mode == "drained" or (mode == "cracked" and case["drains"])
-        places, heads = [0.0, crack, self.length], [h1, h1, h2]
+        if mode == "waterstop":
+            first = last = level + case["joint_head_offset"]
+        places, heads = [0.0, crack, self.length], [first, first, last]
         at = case["drain_x"]
         if drained and crack <= at < self.length:
-            outlet = max(max(case["drain_level"], tail) - (body.heel[1] + at * body.along[1]), 0.0)
+            outlet = max(case["drain_level"], tail, body.heel[1] + at * body.along[1])
             self.drains = at, outlet
             undrained = float(np.interp(at, places[1:], heads[1:]))
             if mode == "drained" and case["drain_reference"] == "reservoir":
-                undrained = h1
+                undrained = first
             places.insert(2, at)
             heads.insert(2, drained_head(case, undrained, outlet))
+        self.s = np.array(places)
+        height = np.interp(self.s, [0.0, self.length], [body.heel[1], body.toe[1]])
         weight = case["rho_water"] * case["g"] if mode != "none" else 0.0
-        self.s, self.p = np.array(places), weight * np.array(heads)
+        self.p = weight * (np.array(heads) - height)
+        self.cut_off_suction()
+        if mode == "waterstop":
+            self.stop(min(case["waterstop"], self.length))
         if dry_until > wet_crack:
             self.dry(wet_crack, dry_until)
+
+    def cut_off_suction(self) -> None:
+        """Set negative pressures to zero."""
+        s, p = self.s, self.p
+        crossings = np.flatnonzero(p[:-1] * p[1:] < 0)
+        share = p[crossings] / (p[crossings] - p[crossings + 1])
+        zeros = s[crossings] + share * (s[crossings + 1] - s[crossings])
+        self.s = np.insert(s, crossings + 1, zeros)
+        self.p = np.maximum(np.insert(p, crossings + 1, 0.0), 0.0)
+
+    def stop(self, at: float) -> None:
+        """Take the pressure away behind a waterstop [m from the heel]."""
+        before = self.s < at
+        pressure = np.interp(at, self.s, self.p) if at else 0.0
+        self.s = np.concatenate([self.s[before], [at, at, self.length]])
+        self.p = np.concatenate([self.p[before], [pressure, 0.0, 0.0]])
 
     def dry(self, start: float, end: float) -> None:
         """Take the pressure away between two places [m from the heel]."""
@@ -321,7 +346,7 @@ class Uplift:
 
 def drained_head(case: Case, undrained: float, outlet: float) -> float:
     """Head at the drains [m]: they reduce the head above their outlet (the gallery or, if higher,
-    the tailwater) by their effectiveness; all heads above the joint at the drains.
+    the tailwater) by their effectiveness.
     """
     return undrained - case["drain_effectiveness"] * max(undrained - outlet, 0.0)
 
@@ -541,11 +566,10 @@ def at(case: Case, time: float, level: float | None = None, tension: bool = True
         block, uncracked = state(crack), body.length - crack
         return 2 * block.N * uncracked - 6 * block.M - at_tip * uncracked**2
 
-    spans, degree = pieces(case, body, level, tail), 3
+    spans = pieces(case, body, level, tail)
     if before is not None:
-        ends = sorted({0.0, before, min(case["drain_x"], body.length), body.length})
-        spans, degree = spans_between(ends), 4
-    arrested = [state(crack) for crack in arrest_lengths(excess, spans, degree)]
+        spans = spans_between(sorted({0.0, before, min(case["drain_x"], body.length), body.length}))
+    arrested = [state(crack) for crack in arrest_lengths(excess, spans)]
     standing = [block for block in arrested if block.stands]
     first, *further = standing or arrested[:1] or [state(body.length)]
     behind = float(np.nextafter(case["drain_x"], body.length))
@@ -577,32 +601,34 @@ def pieces(case: Case, body: RigidBlock, level: float, tail: float) -> list[tupl
     ends = [0.0, body.length]
     if uplift.drains:
         at, outlet = uplift.drains
-        h1, h2 = uplift.h1, uplift.h2
+        first, last = uplift.first, uplift.last
         ends.append(at)
-        if h1 != h2 and (share := (h1 - outlet) / (h1 - h2)) != 1:
+        if first != last and (share := (first - outlet) / (first - last)) != 1:
             ends.append((at - share * body.length) / (1 - share))
     return spans_between(sorted(e for e in ends if 0 <= e <= body.length))
 
 
-#: Relative tolerances: imaginary part of a real root of the cubic, over the length of its span;
-#: crack length, over that of the joint.
+#: Degree of the polynomial of `arrest_lengths`.
+DEGREE = 4
+#: Relative tolerances: imaginary part of a real root of it, over the length of its span; crack
+#: length, over that of the joint.
 REAL_ROOT, CRACK_TOLERANCE = 1e-6, 1e-12
 
 
 def arrest_lengths(
-    excess: Callable[[float], float], spans: list[tuple[float, float]], degree: int = 3
+    excess: Callable[[float], float], spans: list[tuple[float, float]]
 ) -> list[float]:
     """The crack lengths [m] at which growth stops: the tension at the tip falls to its limit.
 
     excess: of the tension over its limit [N]; times the uncracked length it is a polynomial of
-    a degree in the crack length within each of the spans.
+    degree 4 in the crack length within each of the spans (3 on a level joint).
     """
     length, lengths = spans[-1][1], []
+    angles = np.pi * (np.arange(DEGREE + 1) + 0.5) / (DEGREE + 1)
     for start, end in spans:
-        angles = np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1)
         x = (start + end) / 2 + (end - start) / 2 * np.cos(angles)
         values = [excess(a) * (length - a) for a in x]
-        rough = np.polynomial.Polynomial.fit(x, values, degree, domain=[start, end]).roots()
+        rough = np.polynomial.Polynomial.fit(x, values, DEGREE, domain=[start, end]).roots()
         rough = np.sort(rough.real[np.abs(rough.imag) < REAL_ROOT * (end - start)])
         turns = [a for a in rough if start < a < end]
         # between two roots, and beside the first and the last, the sign is known

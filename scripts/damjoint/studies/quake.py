@@ -4,30 +4,37 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Iterator
-from dataclasses import asdict, replace
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from tabulate import tabulate
 from threadpoolctl import threadpool_limits
 
-from .. import InputError, RunError
-from ..arrays import Table
+from .. import ROUND_OFF, InputError, RunError
+from ..arrays import Array
+from ..arrays import Table as Columns
 from ..dynamics import checkpoint
+from ..dynamics.frames import at_nodes
 from ..dynamics.history import QuakeHistory
 from ..dynamics.record import Record
 from ..dynamics.rigid_block import RigidBlock
 from ..dynamics.stepper import Earthquake
+from ..engines.condensed.recover import recover
 from ..engines.condensed.solve import about
 from ..fem import factor
 from ..fem.bodies import Bodies
 from ..joint.interface import interface_of
 from ..model.case import Case
-from ..model.results import QuakeResult, column_of, quake_columns
+from ..model.fields import Field, Solution
+from ..model.mesh import Mesh
+from ..model.results import QUAKE, QUAKE_OF_JOINTS, Results, column_of, quake_columns
 from ..post import folder as folders
 from ..post import tables
+from ..post.field_files import write_fields
+from ..post.summary import Table
 from ..progress import Progress
 from ..solver.controls import LevelControl
 from ..solver.history import joint_row
@@ -38,8 +45,13 @@ from ..statics.verdict import statement
 from ..storage import atomic_write
 from ..versions import versions
 
-#: Files of an earthquake: rows, stress along the joint in time, the run under way.
-ROWS, STRESS, CHECKPOINT = "quake.csv", "quake_stress.npz", "quake_state.npz"
+#: Files of an earthquake: rows, tables of the joints in the frames, stress along the first joint in
+#: time, the run under way.
+ROWS, FRAMES, STRESS = "quake.csv", "quake_joint.csv", "quake_stress.npz"
+CHECKPOINT = "quake_state.npz"
+
+#: First and last time of the frames [s]; None: the whole record.
+Span: TypeAlias = tuple[float, float] | None
 
 #: Wall seconds between two writes of a run under way.
 BETWEEN_WRITES = 10.0
@@ -55,8 +67,19 @@ PEAKS = ("ground_ax", "crest_ux", "crest_ax")
 PEAKS_OF_JOINTS = ("heel_opening", "toe_opening", "slip_mean", "open_length")
 
 
-def check(case: Case) -> None:
-    """Raise InputError if an earthquake of a case can not be computed."""
+def span_of(name: str, text: str) -> tuple[float, float]:
+    """Two times FIRST:LAST [s] from a text; name: for the message. Raises InputError."""
+    with contextlib.suppress(ValueError):
+        first, last = map(float, text.split(":"))
+        if 0 <= first < last:
+            return first, last
+    raise InputError(f"{name} {text}: must be two times FIRST:LAST [s], 0 <= FIRST < LAST")
+
+
+def check(case: Case, span: Span = None) -> None:
+    """Raise InputError if an earthquake of a case can not be computed; span: of the frames."""
+    if case.accuracy:
+        raise InputError(f"accuracy = {100 * case.accuracy:g}%: must not be set for damjoint quake")
     if case["drive"] != "level":
         raise InputError(f"drive = {case['drive']}: must be level for damjoint quake")
     for name in ("k_h", "k_v"):
@@ -65,57 +88,242 @@ def check(case: Case) -> None:
                 f"{name} = {case[name]:g}: must be 0 for damjoint quake: the record replaces the "
                 "seismic coefficients"
             )
-    Record.of(case)
+    duration = Record.of(case).duration
+    if span and span[0] >= duration:
+        raise InputError(
+            f"fields = {span[0]:g}:{span[1]:g}: must begin before the end of the record, "
+            f"{duration:g} s"
+        )
 
 
-def run(case: Case, out: Path, picture: bool = True, progress: bool = True) -> QuakeResult:
+@dataclass(frozen=True, kw_only=True)
+class QuakeResult:
+    """The rows of an earthquake and what they amount to."""
+
+    case: Case
+    rows: Columns
+    #: time (rows,), distance from the heel (nodes,), effective normal stress (rows, nodes)
+    stress: Columns
+    #: the tables of the static loads; and with the state after the earthquake as a further row
+    before: Results
+    static: Results
+    #: the tables of the frames; times in seconds
+    frames: Results
+    #: displacement and stress of the bodies by time of the static states, and of the frames
+    static_fields: Callable[[], dict[float, Field]]
+    fields: Callable[[], dict[float, Field]]
+    #: states with the largest displacements, in 2D: name, time [s], and the displacement since the
+    #: static state (nodes, 2) of each body [m]
+    shapes: list[tuple[str, float, dict[str, Array]]]
+    mesh: Mesh
+    #: for run.json
+    summary: dict[str, Any]
+    #: whether the dam is in static equilibrium after the earthquake
+    stands: bool
+    #: interrupted or failed; empty if it has reached its end
+    state: str
+    statement: str
+
+    @property
+    def joint(self) -> int:
+        """The number of the joint with the largest residual slip."""
+        slips = [self.summary["residual"][column_of("slip", k)] for k in self.joints]
+        return int(np.argmax(np.abs(slips)))
+
+    @property
+    def joints(self) -> range:
+        """Numbers of the joints."""
+        return range(len(self.case.joints))
+
+    def rows_of(self, joint: int) -> Columns:
+        """The rows of a joint, by its number, with the columns of QUAKE."""
+        own = {name: column_of(name, joint) for name in QUAKE_OF_JOINTS}
+        return {name: self.rows[own.get(name, name)] for name in QUAKE}
+
+
+class QuakeRun:
+    """An earthquake of a case under way."""
+
+    def __init__(
+        self, case: Case, span: Span = None, on_step: Callable[[float], None] = lambda _: None
+    ) -> None:
+        """Compute the static loads; on_step: is called with the time of each of their steps.
+
+        Raises RunError if there is no static equilibrium.
+        """
+        start = time.perf_counter()
+        self.static = static = LoadStepper(case, interface_of(case), on_step)
+        static.run()
+        if static.stopped:
+            reason = statement(static.results())
+            raise RunError(f"earthquake: the static loads have no equilibrium: {reason}")
+        self.before = static.results()
+        case = static.case  # with the joints of a user's own geometry
+        self.quake = Earthquake(case, static.model, static.state, Bodies.of(case))
+        self.history = QuakeHistory.of(self.quake, span)
+        self.seconds = {"static": time.perf_counter() - start, "earthquake": 0.0, "steps": 0}
+
+    def steps(self) -> Iterator[float]:
+        """Compute the steps that remain, add their rows, and yield the length of each."""
+        start, before = time.perf_counter(), len(self.history)
+        for step in self.quake.steps():
+            self.history.add(self.quake, step)
+            now = time.perf_counter() - start, len(self.history) - before
+            self.seconds["earthquake"], self.seconds["steps"] = now
+            yield step.dt
+
+    def result(self) -> QuakeResult:
+        """The result at the end, with the static state after it as a further row of the static
+        history.
+        """
+        quake, static = self.quake, self.static
+        found = summary(quake, self.history)
+        found["seconds"] = {name: round(value, 3) for name, value in self.seconds.items()}
+        after = self.static_state_after()
+        found["after"] = {"equilibrium": after is not None}
+        if after is not None:
+            number = len(quake.case.levels) + 1.0
+            state = replace(after.state, time=number)
+            static.history.add(replace(after, state=state), 0)
+            static.history.save(state)
+            last = static.history.last
+            names = "crest_ux", "N", "T", "M", "crack_length"
+            found["after"] |= {name: last[name] for name in names}
+        full = self.stands_with_full_uplift()
+        if full is not None:
+            found["after"]["equilibrium_with_full_uplift_in_the_crack"] = full
+        slips = [
+            f"{1e3 * found['residual'][column_of('slip', k)]:.3g} mm"
+            for k in range(len(quake.case.joints))
+        ]
+        words = f"residual slip {', '.join(slips)}; "
+        words += (
+            "the dam stands after the earthquake"
+            if after is not None
+            else "no static equilibrium is found after the earthquake"
+        )
+        return self._result_of(found, after is not None, "", words)
+
+    def result_so_far(self, error: BaseException) -> QuakeResult:
+        """The result up to an error or interrupt."""
+        self.history.end_at_complete_row(self.quake)
+        state = "failed" if isinstance(error, Exception) else "interrupted"
+        reached = f"{state} after t = {self.quake.now.time:.6g} s of the record"
+        words = f"{reached}: {error}" if str(error) else reached
+        return self._result_of(summary(self.quake, self.history), False, state, words)
+
+    def _result_of(
+        self, found: dict[str, Any], stands: bool, state: str, statement: str
+    ) -> QuakeResult:
+        """The result with a summary, an end and its statement."""
+        quake, history, static = self.quake, self.history, self.static.results()
+        static.info |= about(quake.problem.model.equilibrium.bulk)
+        seconds = {name: value for name, value in self.seconds.items() if name != "steps"}
+        static.info |= {"quake": found, "versions": versions(), "wall_seconds": seconds}
+        if not state:  # a joint that has slipped everywhere is no failure here
+            static.info["verdict"] = "stands" if stands else "no equilibrium"
+        return QuakeResult(
+            case=quake.case,
+            rows=history.table,
+            stress=self.stress_table(),
+            before=self.before,
+            static=static,
+            frames=history.frames.results(quake),
+            static_fields=self.static_fields,
+            fields=lambda: history.frames.fields(
+                quake, self.static_fields()[quake.problem.static.time]
+            ),
+            shapes=self.shapes(),
+            mesh=quake.bodies.mesh,
+            summary=found,
+            stands=stands,
+            state=state,
+            statement=statement,
+        )
+
+    def static_fields(self) -> dict[float, Field]:
+        """Displacement and stress of the bodies by time of the static states."""
+        scenes = [(self.static.model.equilibrium, self.static.history)]
+        return recover(self.quake.bodies, scenes)[0]
+
+    def static_state_after(self) -> StepResult | None:
+        """The step to the static equilibrium under the last loads, with the joints as they are;
+        None if none is found.
+        """
+        return static_step(self.static.model, self.quake.now.state)
+
+    def stands_with_full_uplift(self) -> bool | None:
+        """Whether there is an equilibrium after the earthquake with the full head in the crack;
+        None if the water is not imposed.
+        """
+        case = self.quake.case
+        if any(joint["uplift"] not in ("imposed", "drained") for joint in case.joints):
+            return None
+        cracked = case.with_values({"uplift": "cracked", "drains": 0.0})
+        model = Model(cracked, self.quake.problem.model.equilibrium.interface)
+        return static_step(model, self.quake.now.state) is not None
+
+    def shapes(self) -> list[tuple[str, float, dict[str, Array]]]:
+        """The states with the largest displacements, see `QuakeResult`."""
+        if self.quake.case["dim"] == 3:
+            return []
+        return [
+            (name, peak.time, at_nodes(self.quake.system, peak.displacement))
+            for name, peak in self.history.peaks.items()
+        ]
+
+    def stress_table(self) -> Columns:
+        """Effective normal stress along the first joint in time."""
+        joint = self.quake.problem.model.equilibrium.interface.joints[0]
+        return {
+            "time": np.array(self.history.rows["time"]),
+            "s": np.sort(joint.xi) * joint.length,
+            "sigma_n_eff": np.array(self.history.stress, np.float32).reshape(-1, len(joint.xi)),
+        }
+
+
+def static_step(model: Model, end: State) -> StepResult | None:
+    """The step from the end of an earthquake to the static equilibrium under the last loads."""
+    return model.advance(end, end.time, LevelControl(end.loading.level))
+
+
+def run(
+    case: Case,
+    out: Path,
+    span: Span = None,
+    fields: bool = False,
+    picture: bool = True,
+    progress: bool = True,
+) -> QuakeResult:
     """Compute the earthquake of a case and write its results into a folder.
 
-    A run that was interrupted continues with the same command. Raises InputError, RunError.
+    span: of the frames [s], by default the whole record; fields, picture: whether to write those
+    files. A run that was interrupted continues with the same command. Raises InputError, RunError.
     """
-    check(case)
-    start = time.perf_counter()
+    check(case, span)
     folders.check_writable(out)
-    key = checkpoint.fingerprint(case)
-    resumed = (out / CHECKPOINT).is_file()
+    key, path = checkpoint.fingerprint(case, span), out / CHECKPOINT
+    resumed = path.is_file()
     with single_thread(), folders.claim_output_folder(case, out, keep=resumed):
         try:
-            static, quake = prepared(case)
+            under_way = QuakeRun(case, span)
         except BaseException as error:
             state = "failed" if isinstance(error, Exception) else "interrupted"
             folders.write_state(case, out, state, str(error) or "no step had converged")
             raise
-        history = checkpoint.read(out / CHECKPOINT, key, quake) if resumed else None
-        if resumed and history is None:
+        if resumed and not checkpoint.read(path, key, under_way.quake, under_way.history):
             folders.clear(out)
-        history = history or QuakeHistory.of(case)
-        first = len(history)
-        before = time.perf_counter()
         try:
-            follow(quake, history, out / CHECKPOINT, key, progress)
+            follow(under_way, path, key, progress)
         except BaseException as error:
-            history.end_at_complete_row(quake)
-            state = "failed" if isinstance(error, Exception) else "interrupted"
-            reached = f"{state} after t = {quake.now.time:.6g} s of the record"
-            why = f"{reached}: {error}" if str(error) else reached
+            result = under_way.result_so_far(error)
             with contextlib.suppress(OSError):
-                checkpoint.write(out / CHECKPOINT, key, quake, history)
-            write_tables(static, history, quake, out)
-            write_info(static, out, summary(quake, history), state, why)
+                checkpoint.write(path, key, under_way.quake, under_way.history)
+            write_tables(result, out)
             raise
-        seconds = {
-            "static": before - start,
-            "earthquake": time.perf_counter() - before,
-            "steps": len(history) - first,
-        }
-        result = finished(static, quake, history, seconds)
-        write_tables(static, history, quake, out)
-        write_info(static, out, result.summary, "", result.statement)
-        if picture:
-            from .quake_picture import draw  # matplotlib takes long to load
-
-            draw(result, out)
-        (out / CHECKPOINT).unlink(missing_ok=True)
+        result = under_way.result()
+        write(result, out, fields, picture)
+        path.unlink(missing_ok=True)
     return result
 
 
@@ -134,137 +342,24 @@ def outcome_of(case: Case) -> tuple[LoadStepper, bool, dict[str, Any]]:
     Raises RunError.
     """
     with single_thread():
-        static, quake = prepared(case)
-        history = QuakeHistory.of(case)
-        for _ in whole(quake, history):
+        under_way = QuakeRun(case)
+        for _ in under_way.steps():
             pass
-        after = static_state_after(static.model, quake.now.state)
-    return static, after is not None, summary(quake, history)
+        after = under_way.static_state_after()
+    return under_way.static, after is not None, summary(under_way.quake, under_way.history)
 
 
-def prepared(case: Case) -> tuple[LoadStepper, Earthquake]:
-    """The static loading of a case, and its earthquake before the first step.
-
-    Raises RunError if there is no static equilibrium.
-    """
-    interface = interface_of(case)
-    static = LoadStepper(case, interface)
-    static.run()
-    if static.stopped:
-        raise RunError(
-            f"earthquake: the static loads have no equilibrium: {statement(static.results())}"
-        )
-    case = static.case  # with the joints of a user's own geometry
-    return static, Earthquake(case, static.model, static.state, Bodies.of(case))
-
-
-def follow(quake: Earthquake, history: QuakeHistory, path: Path, key: str, progress: bool) -> None:
+def follow(under_way: QuakeRun, path: Path, key: str, progress: bool) -> None:
     """Compute the steps to the end of the record; writes the run under way into a file."""
-    written = time.perf_counter()
+    written, quake = time.perf_counter(), under_way.quake
     options = {"bar_format": BAR, "leave": False}
     with Progress(quake.case.name, quake.record.duration, progress, **options) as bar:
         bar.update(quake.now.time)
-        for step in whole(quake, history):
+        for step in under_way.steps():
             bar.update(step)
             if time.perf_counter() - written > BETWEEN_WRITES:
-                checkpoint.write(path, key, quake, history)
+                checkpoint.write(path, key, quake, under_way.history)
                 written = time.perf_counter()
-
-
-def whole(quake: Earthquake, history: QuakeHistory) -> Iterator[float]:
-    """Compute the steps, add their rows, and yield the length of each."""
-    for step in quake.steps():
-        history.add(quake, step)
-        yield step.dt
-
-
-def finished(
-    static: LoadStepper, quake: Earthquake, history: QuakeHistory, seconds: dict[str, float]
-) -> QuakeResult:
-    """The result of an earthquake that has reached its end, with the static state after it as a
-    further row of the static history.
-    """
-    found = summary(quake, history)
-    found["seconds"] = {name: round(value, 3) for name, value in seconds.items()}
-    after = static_state_after(static.model, quake.now.state)
-    found["after"] = {"equilibrium": after is not None}
-    if after is not None:
-        number = len(quake.case.levels) + 1.0
-        state = replace(after.state, time=number)
-        static.history.add(replace(after, state=state), 0)
-        static.history.save(state)
-        last = static.history.last
-        found["after"] |= {name: last[name] for name in ("crest_ux", "N", "T", "M", "crack_length")}
-    full = with_full_uplift(quake)
-    if full is not None:
-        found["after"]["equilibrium_with_full_uplift_in_the_crack"] = full
-    slips = [
-        f"{1e3 * found['residual'][column_of('slip', k)]:.3g} mm"
-        for k in range(len(quake.case.joints))
-    ]
-    words = f"residual slip {', '.join(slips)}; "
-    words += (
-        "the dam stands after the earthquake"
-        if after is not None
-        else "no static equilibrium is found after the earthquake"
-    )
-    return QuakeResult(
-        case=quake.case,
-        rows=history.table,
-        stress=stress_table(quake, history),
-        shapes=shapes(quake, history),
-        bodies={name: space.body for name, space in quake.system.spaces.items()},
-        summary=found,
-        stands=after is not None,
-        statement=words,
-    )
-
-
-def static_state_after(model: Model, end: State) -> StepResult | None:
-    """The step to the static equilibrium under the last loads, with the joints as they are; None if
-    none is found.
-    """
-    return model.advance(end, end.time, LevelControl(end.loading.level))
-
-
-def with_full_uplift(quake: Earthquake) -> bool | None:
-    """Whether there is an equilibrium after the earthquake with the full head in the crack; None if
-    the water is not imposed.
-    """
-    case = quake.case
-    if any(joint["uplift"] not in ("imposed", "drained") for joint in case.joints):
-        return None
-    cracked = case.with_values({"uplift": "cracked", "drains": 0.0})
-    model = Model(cracked, quake.problem.model.equilibrium.interface)
-    return static_state_after(model, quake.now.state) is not None
-
-
-def shapes(
-    quake: Earthquake, history: QuakeHistory
-) -> list[tuple[str, float, dict[str, np.ndarray]]]:
-    """The states with the largest displacements, see `QuakeResult`."""
-    system, result = quake.system, []
-    if quake.case["dim"] == 3:
-        return result
-    for name, peak in history.peaks.items():
-        moved = {
-            body: (matrix @ peak.displacement).reshape(-1, 2)[
-                : len(system.spaces[body].body.points)
-            ]
-            for body, matrix in system.motion.items()
-        }
-        result.append((name, peak.time, moved))
-    return result
-
-
-def stress_table(quake: Earthquake, history: QuakeHistory) -> Table:
-    """Effective normal stress along the first joint in time."""
-    joint = quake.problem.model.equilibrium.interface.joints[0]
-    return {
-        "time": np.array(history.rows["time"]),
-        "s": np.sort(joint.xi) * joint.length,
-        "sigma_n_eff": np.array(history.stress, np.float32),
-    }
 
 
 def summary(quake: Earthquake, history: QuakeHistory) -> dict[str, Any]:
@@ -291,7 +386,7 @@ def summary(quake: Earthquake, history: QuakeHistory) -> dict[str, Any]:
     for name in names:
         row = int(np.argmax(np.abs(rows[name])))
         result["peaks"][name] = {"value": rows[name][row], "time": rows["time"][row]}
-    last = rows["time"] > rows["time"][-1] - MEAN_OVER
+    last = rows["time"] > rows["time"][-1] - MEAN_OVER * (1 - ROUND_OFF)
     residual = result["residual"] = {}
     for k in joints:
         heel, toe, slip = (
@@ -335,47 +430,66 @@ def rigid_block(quake: Earthquake, number: int) -> RigidBlock:
     )
 
 
-def write_tables(static: LoadStepper, history: QuakeHistory, quake: Earthquake, out: Path) -> None:
-    """Write the tables of the static states, quake.csv and the stress along the first joint."""
-    tables.write(static.results(), out)
-    tables.write_csv(out / ROWS, history.table)
+def write(result: QuakeResult, out: Path, fields: bool, picture: bool) -> None:
+    """Write the files of an earthquake into a folder; fields, picture: also those files."""
+    write_tables(result, out)
+    if fields:
+        write_fields(Solution(result.frames, result.mesh.bodies, result.fields()), out / "fields")
+    if picture:
+        from .quake_picture import draw  # matplotlib takes long to load
+
+        draw(result, out)
+
+
+def write_tables(result: QuakeResult, out: Path) -> None:
+    """Write the tables of the static states and of the earthquake, and run.json."""
+    tables.write(result.static, out)
+    tables.write_csv(out / ROWS, result.rows)
+    tables.write_csv(out / FRAMES, tables.rounded(result.frames.joint))
     with atomic_write(out / STRESS) as part, part.open("wb") as file:
-        np.savez_compressed(file, **stress_table(quake, history))
+        np.savez_compressed(file, **result.stress)
+    folders.write_info(result.static, out, result.state, result.statement)
 
 
-def write_info(static: LoadStepper, out: Path, found: dict[str, Any], state: str, why: str) -> None:
-    """Write run.json."""
-    results = static.results()
-    results.info |= about(static.model.equilibrium.bulk)
-    seconds = {n: v for n, v in found.get("seconds", {}).items() if n != "steps"}
-    results.info |= {"quake": found, "versions": versions(), "wall_seconds": seconds}
-    if "after" in found:  # a joint that has slipped everywhere is no failure here
-        stands = found["after"]["equilibrium"]
-        results.info["verdict"] = "stands" if stands else "no equilibrium"
-    folders.write_info(results, out, state, why)
+def peaks_table(found: dict[str, Any], case: Case) -> Table:
+    """Tabulate the peaks of a summary."""
+    columns = quake_columns(case)
+    rows = [
+        (name, columns[name][0], f"{peak['value']:.4g}", f"{peak['time']:.3f}")
+        for name, peak in found["peaks"].items()
+    ]
+    return Table(["peak of", "unit", "value", "at t"], ["", "", "", "s"], rows)
+
+
+#: Residual values of a summary: meaning, unit.
+RESIDUAL = {
+    "slip": ("residual slip", "m"),
+    "tilt": ("residual tilt", "-"),
+    "rigid_block": ("rigid block, slip", "m"),
+}
+
+
+def residual_table(found: dict[str, Any]) -> Table:
+    """Tabulate the residual values of a summary."""
+    rows = [
+        (name.replace(base, meaning), unit, f"{value:.4g}")
+        for name, value in found["residual"].items()
+        for base, (meaning, unit) in RESIDUAL.items()
+        if name.startswith(base)
+    ]
+    return Table(["at rest", "unit", "value"], ["", "", ""], rows)
+
+
+def modes(found: dict[str, Any]) -> str:
+    """Natural frequencies and damping ratios of a summary."""
+    frequencies = ", ".join(f"{f:.3g}" for f in found["frequencies"])
+    ratios = ", ".join(f"{r:.1%}" for r in found["damping"]["ratios"])
+    return f"natural frequencies, joint closed, with the water: {frequencies} Hz; damping {ratios}"
 
 
 def text(result: QuakeResult) -> str:
     """Peaks and residual values as printed tables."""
     found = result.summary
-    units = {"slip": "m", "tilt": "-", "rigid_block": "m"}
-    meaning = {"slip": "residual slip", "tilt": "residual tilt", "rigid_block": "rigid block, slip"}
-    columns = quake_columns(result.case)
-    peaks = [
-        (name, columns[name][0], f"{p['value']:.4g}", f"{p['time']:.3f}")
-        for name, p in found["peaks"].items()
-    ]
-    rest = [
-        (name.replace(base, meaning[base]), units[base], f"{value:.4g}")
-        for name, value in found["residual"].items()
-        for base in units
-        if name.startswith(base)
-    ]
-    frequencies = ", ".join(f"{f:.3g}" for f in found["frequencies"])
-    ratios = ", ".join(f"{r:.1%}" for r in found["damping"]["ratios"])
-    lines = [
-        f"natural frequencies, joint closed, with the water: {frequencies} Hz; damping {ratios}",
-        tabulate(peaks, ("peak of", "unit", "value", "at t [s]"), disable_numparse=True),
-        tabulate(rest, ("at rest", "unit", "value"), disable_numparse=True),
-    ]
-    return "\n\n".join(lines)
+    tables = peaks_table(found, result.case), residual_table(found)
+    parts = [tabulate(table.rows, table.heads, disable_numparse=True) for table in tables]
+    return "\n\n".join([modes(found), *parts])

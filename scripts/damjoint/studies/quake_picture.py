@@ -1,4 +1,6 @@
-"""Picture of an earthquake: record, crest, openings, slip and joint stress over one time axis."""
+"""Picture of an earthquake: record, crest, openings, slip, forces and joint stress over one time
+axis; the dam at its peaks.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,7 @@ import numpy as np
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
-from ..model.results import QuakeResult, column_of
+from ..model.results import column_of
 from ..post.drawing import (
     BLUE,
     CONCRETE,
@@ -23,9 +25,10 @@ from ..post.drawing import (
     write_picture,
 )
 from ..post.outline import exaggeration
+from .quake import QuakeResult
 
 #: Height of the curves, and of the deformed dams below them [inches].
-CURVES, SHAPES = 10.5, 2.6
+CURVES, SHAPES = 12.0, 2.6
 #: Part of the stresses within the colors of the map [%].
 SHOWN = 99
 #: Largest number of rows of the map of the stress.
@@ -45,14 +48,15 @@ def figure(result: QuakeResult) -> Figure:
     shapes = SHAPES if result.shapes else 0.0
     picture = figure_of(9.0, CURVES + shapes)
     picture.text(0.05, 0.988, f"{case.title}: {result.statement}", va="top", fontsize=10)
-    axes = panels(picture, 6, left=0.9, right=1.1, top=0.45, bottom=0.5 + shapes, down=0.2)[:, 0]
-    time, joints = rows["time"], range(len(case.joints))
+    axes = panels(picture, 7, left=0.9, right=1.1, top=0.6, bottom=0.5 + shapes, down=0.25)[:, 0]
+    time, joints = rows["time"], result.joints
     curves = [
         ("ground [m/s$^2$]", [("along x", rows["ground_ax"], DARK)]),
         ("crest $u_x$ [mm]", [("relative to the ground", 1e3 * rows["crest_ux"], BLUE)]),
         ("crest $a_x$ [m/s$^2$]", [("absolute", rows["crest_ax"], BLUE)]),
         ("opening [mm]", []),
         ("slip [mm]", []),
+        ("forces [MN/m]", forces(result)),
     ]
     if rows["ground_ay"].any():
         curves[0][1].append(("along y", rows["ground_ay"], ORANGE))
@@ -72,14 +76,15 @@ def figure(result: QuakeResult) -> Figure:
         ax.set_xlim(0, time[-1])
     if block is not None:
         axes[4].axhline(1e3 * block, color=DARK, lw=0.8, ls="--", label="rigid block, at the end")
-    for ax in axes[:5]:
-        ax.legend(fontsize=7, loc="center right")
+    for ax in axes[:6]:
+        above = {"loc": "lower right", "bbox_to_anchor": (1, 0.97), "ncols": 4, "frameon": False}
+        ax.legend(fontsize=7, **above)
         ax.tick_params(labelbottom=False, labelsize=8)
     step = max(1, len(time) // MOST_ROWS)
     values = stress["sigma_n_eff"][::step].T / 1e6
     # the stress of the corner elements is singular
     bound = float(np.percentile(np.abs(values), SHOWN)) or 1.0
-    mesh = axes[5].pcolormesh(
+    mesh = axes[6].pcolormesh(
         stress["time"][::step],
         stress["s"],
         values,
@@ -89,16 +94,28 @@ def figure(result: QuakeResult) -> Figure:
         shading="nearest",
         rasterized=True,
     )
-    axes[5].set_xlim(0, time[-1])
-    axes[5].set_ylabel("s from heel [m]", fontsize=8)
-    axes[5].set_xlabel("t [s]", fontsize=8)
-    axes[5].tick_params(labelsize=8)
-    box = axes[5].get_position()
+    axes[6].set_xlim(0, time[-1])
+    axes[6].set_ylabel("s from heel [m]", fontsize=8)
+    axes[6].set_xlabel("t [s]", fontsize=8)
+    axes[6].tick_params(labelsize=8)
+    box = axes[6].get_position()
     bar = picture.add_axes((box.x1 + 0.02, box.y0, 0.015, box.height))
     picture.colorbar(mesh, cax=bar, extend="both").set_label("$\\sigma_n'$ [MPa]", fontsize=8)
     bar.tick_params(labelsize=7)
     draw_shapes(picture, result)
     return picture
+
+
+def forces(result: QuakeResult) -> list[tuple[str, np.ndarray, str]]:
+    """Curves of T, its strength and N' of the joint with the largest residual slip [MN/m]."""
+    rows, name = result.rows_of(result.joint), result.case.named((result.joint,))
+    end = f", {name}" if name else ""
+    strength = rows["shear_reserve"] + np.abs(rows["T"])
+    curves = [(f"N'{end}", rows["N"], GREY)]
+    if np.isfinite(strength).all():  # a law may not limit shear
+        curves.append((f"strength for T{end}", np.copysign(strength, rows["T"]), RED))
+    curves.append((f"T{end}", rows["T"], BLUE))
+    return [(words, values / 1e6, color) for words, values, color in curves]
 
 
 def draw_shapes(picture: Figure, result: QuakeResult) -> None:
@@ -110,14 +127,16 @@ def draw_shapes(picture: Figure, result: QuakeResult) -> None:
         axes = picture.add_axes(box)
         scale = exaggeration(moved, result.case.size)
         for body, displacement in moved.items():
-            solid = result.bodies[body]
+            solid = result.mesh.bodies[body]
             points = solid.points[:, :2]
             color = ROCK if body == "foundation" else CONCRETE
             for _, table in solid.cells:
                 cells = PolyCollection((points + scale * displacement)[table], facecolor=color)
                 cells.set(edgecolor=GREY, linewidth=0.15, rasterized=True)
                 axes.add_collection(cells)
-        dams = np.vstack([b.points for n, b in result.bodies.items() if n != "foundation"])
+        dams = np.vstack(
+            [result.mesh.bodies[name].points for name in moved if name != "foundation"]
+        )
         low, high = dams.min(axis=0), dams.max(axis=0)
         room = 0.2 * result.case.size
         axes.set(xlim=(low[0] - room, high[0] + room), ylim=(low[1] - room / 2, high[1] + room / 2))

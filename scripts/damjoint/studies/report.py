@@ -27,7 +27,7 @@ from ..post.units import FORCES, MOMENTS, Units, unit
 from ..statics.gravity import GravityMethod, force, resultant_of
 from ..statics.verdict import decisive_joint, failed, statement, stiffness_ratio
 from ..storage import atomic_write
-from . import report_input
+from . import quake, report_input
 from .check import (
     REQUIRED,
     SHOWN,
@@ -77,6 +77,16 @@ class Picture:
 
 
 @dataclass(frozen=True)
+class Earthquake:
+    """An earthquake in the report."""
+
+    pictures: list[Picture]
+    tables: list[Table]
+    #: uplift, natural frequencies and damping
+    notes: list[str]
+
+
+@dataclass(frozen=True)
 class RunSection:
     """A run in the report."""
 
@@ -95,6 +105,8 @@ class RunSection:
     hints: list[str]
     pictures: list[Picture]
     levels: Table
+    #: of an earthquake: its picture, peaks and residual values, modes; else None
+    earthquake: Earthquake | None
     #: both methods, loads and formulas of the gravity method; None for a user's own geometry
     methods: Table | None
     loads: Table | None
@@ -249,11 +261,9 @@ def run_section(folder: Path, solution: Solution) -> RunSection:
             *filter(None, [which_joint(result), critical, earthquake(info), *info["hints"]]),
             *filter(None, [discretisation_error(result)]),
         ],
-        pictures=[
-            *(pictures_of(solution) if len(result.joint["time"]) else []),
-            *earthquake_picture(folder, info),
-        ],
+        pictures=pictures_of(solution) if len(result.joint["time"]) else [],
         levels=levels_table(own),
+        earthquake=earthquake_section(folder, case, info),
         methods=methods_table(case, checks, judged=judged) if checks else None,
         loads=loads_table(rigid) if rigid else None,
         formulas=formulas(rigid) if rigid and rigid.stands else [],
@@ -262,7 +272,7 @@ def run_section(folder: Path, solution: Solution) -> RunSection:
         computation=computation(result),
         materials=report_input.materials(case),
         other_input=report_input.other_input(case),
-        limits=[*report_input.limits(case)],
+        limits=[*report_input.limits(case, earthquake="quake" in info)],
         versions=versions(info),
     )
 
@@ -447,28 +457,36 @@ def critical_value(info: dict[str, Any] | None) -> str:
 
 
 def earthquake(info: dict[str, Any]) -> str:
-    """Statement and peaks of `damjoint quake`, if run.json has them."""
+    """Statement of `damjoint quake`, if run.json has it."""
     found = info.get("quake")
     if not found or "peaks" not in found:
         return ""
-    ground, crest = (abs(found["peaks"][name]["value"]) for name in ("ground_ax", "crest_ax"))
-    block, frequency = found["residual"].get("rigid_block"), found["frequencies"][0]
-    by_block = "" if block is None else f"slip of the rigid block {1e3 * block:.3g} mm; "
+    ground = abs(found["peaks"]["ground_ax"]["value"])
     return (
-        f"earthquake {Path(found['record']).name}, {ground:.3g} m/s2: {info['statement']}; largest "
-        f"acceleration of the crest {crest:.3g} m/s2; {by_block}"
-        f"first natural frequency {frequency:.3g} Hz; N', T and the verdict are those of the "
-        "static state after it"
+        f"earthquake {Path(found['record']).name}, {ground:.3g} m/s2: {info['statement']}; N', T "
+        "and the verdict are those of the static state after it"
     )
 
 
-def earthquake_picture(folder: Path, info: dict[str, Any]) -> Iterator[Picture]:
-    """The picture of `damjoint quake`, if there is one in the folder."""
-    path = folder / f"{info['case']}_quake.png"
-    if info.get("quake") and path.is_file():
+def earthquake_section(folder: Path, case: Case, info: dict[str, Any]) -> Earthquake | None:
+    """The section on `damjoint quake`, if run.json has its results."""
+    found = info.get("quake")
+    if not found or "peaks" not in found:
+        return None
+    pictures, path = [], folder / f"{info['case']}_quake.png"
+    if path.is_file():
         address = "data:image/png;base64," + base64.b64encode(path.read_bytes()).decode()
         caption = "Earthquake: relative to the ground, since the static state before it."
-        yield Picture("full", caption, address)
+        pictures.append(Picture("full", caption, address))
+    uplift = report_input.QUAKE_UPLIFTS[found["quake_uplift"]]
+    notes = [
+        f"{quake.modes(found)}.",
+        f"{found['steps']} steps of {found['dt']:g} s over {found['time']:g} s, halved up to "
+        f"{found['halvings']} times where they did not converge.",
+        f"Water pressure in the joint: {uplift}.",
+    ]
+    tables = [quake.peaks_table(found, case), quake.residual_table(found)]
+    return Earthquake(pictures, tables, [note[0].upper() + note[1:] for note in notes])
 
 
 def discretisation_error(result: Results) -> str:

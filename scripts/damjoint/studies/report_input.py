@@ -49,6 +49,7 @@ UPLIFTS = {
     "drained": "pressure piecewise linear from heel to drains to toe, independent of the opening",
     "cracked": "full reservoir head in the crack, linear beyond it",
     "flow": "laminar flow by the cubic law, with the computed opening",
+    "waterstop": "reservoir pressure from the heel to the waterstop, none behind it",
 }
 ADDED_MASS = {1: "Westergaard", 2: "Zangar"}
 QUAKE_UPLIFTS = {
@@ -64,8 +65,9 @@ LOADS = {
     "earthquake": ("k_h", "k_v"),
     "temperature": ("temperature_dam", "temperature_linear", "temperature_found"),
 }
+DYNAMIC = "dynamic response, "
 NEVER_MODELLED = (
-    "shrinkage, creep, swelling of the concrete, dynamic response, pore pressure and "
+    f"shrinkage, creep, swelling of the concrete, {DYNAMIC}pore pressure and "
     "seepage in concrete and rock"
 )
 
@@ -202,8 +204,10 @@ def loading(case: Case) -> dict[str, Entry]:
     return entries
 
 
-def limits(case: Case) -> Iterator[str]:
-    """Yield what the model of a case includes and what it does not, a sentence each."""
+def limits(case: Case, earthquake: bool = False) -> Iterator[str]:
+    """Yield what the model of a case includes and what it does not, a sentence each; earthquake:
+    whether a record follows the static loads.
+    """
     yield "Displacements and strains are small: equilibrium is that of the undeformed geometry."
     yield (
         "Dam and foundation are homogeneous, isotropic and linear elastic. Only the joint opens, "
@@ -246,7 +250,15 @@ def limits(case: Case) -> Iterator[str]:
     if any(case[name] for name in LOADS["temperature"]):
         yield "Changes of temperature are prescribed: no conduction of heat is computed."
     absent = [load for load, names in LOADS.items() if not any(case[n] for n in names)]
-    yield f"Not modelled: {NEVER_MODELLED}."
+    never = NEVER_MODELLED
+    if earthquake:
+        yield (
+            "Earthquake: the rock has no mass and does not radiate, which is conservative; what an "
+            "impact of the joint costs is the damping of the bodies and of the time integration; "
+            "the mass of the water is that of an incompressible reservoir at the last level."
+        )
+        absent, never = [n for n in absent if n != "earthquake"], never.replace(DYNAMIC, "")
+    yield f"Not modelled: {never}."
     if absent:
         yield f"Loads that are zero: {', '.join(absent)}."
     yield (

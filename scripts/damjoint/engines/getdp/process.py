@@ -13,9 +13,11 @@ from functools import lru_cache
 from pathlib import Path
 
 from ... import InputError, RunError, data
+from ...arrays import Value
+from ...joint.interface import Chord
 from ...model.case import Case
 from ...model.mesh import LINES, Mesh, area, heel_normal
-from ...model.parameters import assignments, constants, listing
+from ...model.parameters import assignments, constants, declared, listing, quoted
 from ...model.scene import SIDES
 from ...storage import check_end
 
@@ -82,28 +84,50 @@ def environment(folder: Path, threads: int = 1) -> dict[str, str]:
 
 def own_lists(mesh: Mesh) -> dict[str, list[float]]:
     """The lists of pro/section.pro for a user's own geometry."""
-    (joint,), bodies, faces = mesh.joints, mesh.bodies, mesh.faces.values()
-    length = area(joint.heel) if mesh.dim == 3 else 1.0
-    normal, crest = heel_normal(joint.surface, joint.heel), bodies["crest"].points[0]
+    bodies, faces, heel = mesh.bodies, mesh.faces.values(), mesh.joints[0].heel
+    length = area(heel) if mesh.dim == 3 else 1.0
     lines = [name for name in LINES if name in bodies]
     shapes = {shape for solid in mesh.solids.values() for shape, _ in solid.cells}
-
-    def body_number(body: str) -> float:
-        """Number of a body in pro/section.pro."""
-        return float(constants()["UPPER" if body == joint.upper else "UNDER"][0])
-
+    number, lowest = numbers(mesh), constants()["UNDER"][0]
     return {
         "own_side": [float(SIDES.index(face.side)) for face in faces],
-        "own_body": [body_number(face.body) for face in faces],
+        "own_body": [number[face.body] + lowest for face in faces],
         "own_low": [float(face.surface.points[:, 1].min()) for face in faces],
-        "own_ends": [
-            *(values[0] for values in joint.ends.values()),
-            *(joint.width, length, *normal[:2], *crest),
-        ],
+        "own_joints": [float(len(mesh.joints))],
+        "own_bodies": [float(len(number))],
+        "own_first_heel": [length, *heel_normal(mesh.joints[0].surface, heel)],
+        "own_crest": [*bodies["crest"].points[0], number[mesh.bearer("crest")]],
         "own_quadrangles": [float("quad" in shapes)],
         "own_mark_region": [constants()[name.upper()][0] for name in lines],
-        "own_mark_body": [body_number(mesh.bearer(name)) for name in lines],
+        "own_mark_body": [number[mesh.bearer(name)] + lowest for name in lines],
     }
+
+
+def numbers(mesh: Mesh) -> dict[str, float]:
+    """The number of each body in pro/joints.pro."""
+    return {name: float(b) for b, name in enumerate(reversed(mesh.solids))}
+
+
+def values_of_joint(case: Case, mesh: Mesh | None, number: int) -> str:
+    """The macro of pro/joints.pro that sets the values of a joint, by its number from 0.
+
+    mesh: of a user's own geometry.
+    """
+    own, vectors = case.joints[number], ""
+    values: dict[str, Value] = {n: own[n] for n, known in declared().items() if known.of_joints}
+    if mesh:
+        joint, of_body, chord = mesh.joints[number], numbers(mesh), Chord.of(mesh.joints[number])
+        values |= {name: ends[0] for name, ends in joint.ends.items()}
+        values |= {
+            "toe_z": float(joint.surface.points[joint.toe_nodes, 2].mean()),
+            "width": joint.width,
+            "upper": of_body[joint.upper],
+            "lower": of_body[joint.lower],
+        }
+        vectors += listing("chord", chord.plane.T @ chord.along)
+        vectors += listing("upwards", chord.plane.T @ chord.normal)
+    lines = "".join(f"{name} = {quoted(value)};\n" for name, value in values.items())
+    return f"Macro Joint_{number}\n{lines}{vectors}Return\n"
 
 
 def write_problem(
@@ -119,11 +143,20 @@ def write_problem(
         "times": case.times,
         "save_step": [float(t in case.requested) for t in case.times],
     }
-    if case.geometry and mesh:
+    of_joints = ""
+    mesh = mesh if case.geometry else None
+    if mesh:
         lists |= own_lists(mesh)
+    if mesh or case.of_joints:
+        macros = (values_of_joint(case, mesh, k) for k in range(len(case.joints)))
+        of_joints = "of_joints = 1;\n" + "".join(macros)
+    if case.lift_heights:
+        lists["lift_heights"] = case.lift_heights
+        lists["lift_slopes"] = [lift["joint_slope"] for lift in case.joints[1:]]
     path = folder / "scene.pro"
     path.write_text(
-        assignments(case.values)
+        of_joints
+        + assignments(case.values)
         + "".join(listing(name, values) for name, values in lists.items())
         + "".join(f"{name} = {value!r};\n" for name, value in (options or {}).items())
         + f'out_dir = "./";\nInclude "{data("pro")}/damjoint.pro";\n'
@@ -220,10 +253,12 @@ class Runner:
         Raises RunError, OSError (a full disk, which GetDP itself does not notice).
         """
         problem = write_problem(case, mesh, folder, {"views": 0.0, "fields": float(fields)})
-        steps = []
+        steps, of_joints = [], []
 
         def watch(line: str) -> None:
-            if match := re.match(rf"step {NUMBER} ", line):
+            if line.startswith("joint "):
+                of_joints.append(line)
+            elif match := re.match(rf"step {NUMBER} ", line):
                 steps.append(line)
                 on_step(float(match[1]))
 
@@ -232,6 +267,7 @@ class Runner:
         if (numbering := problem.with_suffix(".pre")).exists():  # GetDP reads it, too
             check_end(numbering, *(f"$End{block}\n" for block in LAST_BLOCKS))
         if steps:
+            check_end(folder / "joints.txt", "".join(of_joints))
             check_end(folder / "history.txt", "".join(steps))
         status = folder / "status.txt"
         if not status.exists():

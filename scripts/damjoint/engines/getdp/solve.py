@@ -27,29 +27,34 @@ SOLID = ("free", "split")
 def check(case: Case) -> None:
     """Raise InputError if there is no GetDP, or it cannot run the case."""
     process.find_getdp()
-    joints = len(mesh_of(case).joints if case.geometry else case.joints)
-    if joints > 1:
-        raise InputError(
-            f"engine = getdp: must be condensed for a dam with several joints ({joints})"
-        )
     if case["dim"] == 3 and case["mesh_pattern"] not in SOLID:
         raise InputError(
             f"mesh_pattern = {case['mesh_pattern']}: must be one of {', '.join(SOLID)} "
             "with engine = getdp in 3D"
         )
-    if not (data("pro") / f"law_{case['law']}.pro").is_file():
-        raise InputError(
-            f"law = {case['law']}: must have a file pro/law_{case['law']}.pro with engine = getdp"
-        )
-    if remembers(case):
-        raise InputError(
-            f"quake_uplift = {case['quake_uplift']}: must be crack with engine = getdp and "
-            f"uplift = {case['uplift']}"
-        )
-    if flows(case) and has_drains(case):
-        raise InputError(f"drains = 1: must be 0 with engine = getdp and uplift = {case['uplift']}")
     if case.geometry:
-        check_own(mesh_of(case), case)
+        mesh = mesh_of(case)
+        case = case.with_joints([joint.of_case for joint in mesh.joints])
+        check_own(mesh, case)
+    for own in case.joints:
+        check_joint(own)
+
+
+def check_joint(own: Case) -> None:
+    """Raise InputError if this engine cannot run a joint, from its case."""
+    if not (data("pro") / f"law_{own['law']}.pro").is_file():
+        raise InputError(
+            f"law = {own['law']}: must have a file pro/law_{own['law']}.pro with engine = getdp"
+        )
+    if remembers(own):
+        raise InputError(
+            f"quake_uplift = {own['quake_uplift']}: must be crack with engine = getdp and "
+            f"uplift = {own['uplift']}"
+        )
+    if flows(own) and has_drains(own):
+        raise InputError(f"drains = 1: must be 0 with engine = getdp and uplift = {own['uplift']}")
+    if own["uplift"] == "waterstop":
+        raise InputError("uplift = waterstop: must be another one with engine = getdp")
 
 
 def check_own(mesh: Mesh, case: Case) -> None:
@@ -57,13 +62,19 @@ def check_own(mesh: Mesh, case: Case) -> None:
     shapes = {shape for solid in mesh.solids.values() for shape, _ in solid.cells}
     if mesh.dim == 3 and shapes != {"tetra"}:
         raise InputError(f"geometry = {case.geometry}: must have tetrahedra with engine = getdp")
-    ends = [end for joint in mesh.joints for end in (joint.heel, joint.toe)]
-    level = all(np.ptp(end.points[:, 1]) < 1e-9 * case.size for end in ends)
-    if not level and case["uplift"] != "none":
-        raise InputError(
-            f"uplift = {case['uplift']}: must be none with engine = getdp where heel or toe are "
-            "not level"
-        )
+    for joint, own in zip(mesh.joints, case.joints, strict=True):
+        if joint.upper == joint.lower:
+            raise InputError(
+                f"geometry = {case.geometry}: joint {joint.name} must lie between two bodies with "
+                "engine = getdp"
+            )
+        ends = (joint.heel, joint.toe)
+        level = all(np.ptp(end.points[:, 1]) < 1e-9 * case.size for end in ends)
+        if not level and own["uplift"] != "none":
+            raise InputError(
+                f"uplift = {own['uplift']}: must be none with engine = getdp where heel or toe are "
+                "not level"
+            )
 
 
 #: Memory of GetDP [bytes per unknown], by dimension, and functions of order 2 per node of the mesh.

@@ -10,27 +10,25 @@ import numpy as np
 from ...model.case import Case
 from ...model.fields import Field
 from ...model.mesh import Mesh
-from ...model.results import JOINT, Results, history_table, joint_columns, joint_table
+from ...model.results import (
+    FLUX,
+    JOINT,
+    THICKNESS,
+    Results,
+    column_of,
+    history_table,
+    joint_columns,
+    joint_table,
+)
 from ...storage import check_end
+from .process import numbers
 
-#: Columns of history.txt (pro/step_control.pro), after the word "step".
-PRINTED = [
-    "time",
-    "level",
-    "iterations",
-    "cuts",
-    "residual",
-    "crack_length",
-    "process_zone",
-    "slip_length",
-    "max_opening",
-    "crest_ux",
-    "N",
-    "T",
-    "M",
-    "heel",
-    "flux",
-    "U",
+#: Columns of history.txt (pro/step_control.pro), after the word "step"; and of joints.txt, after
+#: "joint".
+PRINTED = ["time", "level", "iterations", "cuts", "residual", "crest_ux", "heel"]
+PRINTED_OF_JOINTS = [
+    *("crack_length", "process_zone", "slip_length", "max_opening"),
+    *("N", "T", "M", "flux", "U"),
 ]
 
 
@@ -59,14 +57,26 @@ def node_means(rows: np.ndarray, values: np.ndarray, number: int) -> np.ndarray:
     return total / np.bincount(rows, minlength=number)[:, None]
 
 
-def read_history(case: Case, folder: Path) -> dict[str, np.ndarray]:
-    """Complete rows of history.txt, {column of PRINTED: values}, and tail_level."""
-    file = folder / "history.txt"
+def complete_rows(file: Path, columns: list[str]) -> np.ndarray:
+    """The complete rows (n, columns) of history.txt or joints.txt."""
     # a line without its end is incomplete
     lines = file.read_text().split("\n")[:-1] if file.exists() else []
     rows = (line.split()[1:] for line in lines)
-    steps = np.array([*takewhile(lambda row: len(row) == len(PRINTED), rows)], float)
-    printed = dict(zip(PRINTED, steps.reshape(-1, len(PRINTED)).T, strict=True))
+    complete = takewhile(lambda row: len(row) == len(columns), rows)
+    return np.array([*complete], float).reshape(-1, len(columns))
+
+
+def read_history(case: Case, folder: Path) -> dict[str, np.ndarray]:
+    """Complete steps of history.txt and joints.txt, {column: values}, and tail_level."""
+    steps = complete_rows(folder / "history.txt", PRINTED)
+    number = len(case.joints)
+    of_joints = complete_rows(folder / "joints.txt", PRINTED_OF_JOINTS)
+    steps = steps[: len(of_joints) // number]
+    printed = dict(zip(PRINTED, steps.T, strict=True))
+    for k in range(number):
+        own = of_joints[k::number][: len(steps)]
+        names = [column_of(name, k) for name in PRINTED_OF_JOINTS]
+        printed |= dict(zip(names, own.T, strict=True))
     return printed | {"tail_level": np.array([case.tail_at(time) for time in printed["time"]])}
 
 
@@ -79,30 +89,45 @@ def saved_times(case: Case, history: dict[str, np.ndarray], stopped: bool) -> di
     return saved
 
 
-def read_joint(
+def read_joints(
     case: Case, folder: Path, number: int, time: float, level: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Rows of the joint at a requested time, and the same extrapolated from the Gauss points.
+    """Rows of the joints at a requested time, and the same extrapolated from the Gauss points.
 
     Raises OSError, ValueError if a file is missing or incomplete.
     """
+    parts = [read_joint(case, k, folder, number, time, level) for k in range(len(case.joints))]
+    averaged, extrapolated = (np.vstack(rows) for rows in zip(*parts, strict=True))
+    return averaged, extrapolated
+
+
+def read_joint(
+    case: Case, joint: int, folder: Path, number: int, time: float, level: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """As `read_joints`, of a joint by its number from 0."""
+    own = case.joints[joint]
 
     def table(name: str, components: int = 3) -> tuple[np.ndarray, np.ndarray]:
-        return read_simple_table(folder / f"{name}_{number}.txt", components)
+        return read_simple_table(folder / f"{name}_{joint}_{number}.txt", components)
+
+    def more(name: str) -> np.ndarray:
+        """A column that not every joint has."""
+        if name not in joint_columns(own):
+            return np.full((len(nodes), 1), np.nan)
+        file = name if name in FLUX | THICKNESS else "law_scalar"
+        return node_means(rows, table(file, 1)[1], len(nodes))
 
     order = [1, 0, 2]  # y, x, z: normal, tangent 1, tangent 2
     points, jump = table("jump")
     nodes, rows = nodes_of(points)
     tables = jump, table("traction")[1], table("state")[1]
     jump, traction, state = (node_means(rows, values, len(nodes)) for values in tables)
-    more = [
-        node_means(rows, table(name, 1)[1], len(nodes))
-        for name in joint_columns(case)
-        if name not in JOINT
-    ]
-    when = np.tile([time, level, 1.0], (len(nodes), 1))
-    distance = case.joint_along * node_means(rows, table("path", 1)[1], len(nodes))
-    averaged = np.hstack([when, nodes, jump[:, order], traction[:, order], state, distance, *more])
+    others = [more(name) for name in joint_columns(case) if name not in JOINT]
+    when = np.tile([time, level, joint + 1.0], (len(nodes), 1))
+    distance = own.joint_along * node_means(rows, table("path", 1)[1], len(nodes))
+    averaged = np.hstack(
+        [when, nodes, jump[:, order], traction[:, order], state, distance, *others]
+    )
     extrapolated = averaged.copy()
     corners, _ = table("mean_jump_0")
     _, corner_rows = nodes_of(np.vstack([nodes, corners]))
@@ -152,7 +177,7 @@ def read(case: Case, folder: Path) -> tuple[Results, dict[int, float]]:
     for number, time in saved_times(case, history, stopped).items():
         level = history["level"][np.flatnonzero(history["time"] == time)[0]]
         try:
-            blocks.append(read_joint(case, folder, number, time, level))
+            blocks.append(read_joints(case, folder, number, time, level))
         except (OSError, ValueError):  # GetDP was stopped while it wrote this table
             if finished:
                 raise
@@ -189,12 +214,14 @@ def read_rest(path: Path, wanted: np.ndarray) -> np.ndarray | float:
 
 def read_fields(folder: Path, saved: dict[int, float], mesh: Mesh) -> dict[float, Field]:
     """Fields of the bodies by time; saved: see `read`."""
-    result, solids = {}, mesh.solids.items()
-    at_rest = {n: read_rest(folder / f"u_{n}_0.txt", solid.node_tags) for n, solid in solids}
+    result, solids, body = {}, mesh.solids.items(), numbers(mesh)
+    at_rest = {
+        n: read_rest(folder / f"u_{body[n]:.0f}_0.txt", solid.node_tags) for n, solid in solids
+    }
     for number, time in saved.items():
         elements, stress = read_values(folder / f"stress_{number}.txt")
         stress = stress[:, [0, 3, 5, 1, 4, 2]]
-        displacement = {n: read_values(folder / f"u_{n}_{number}.txt") for n, _ in solids}
+        displacement = {n: read_values(folder / f"u_{body[n]:.0f}_{number}.txt") for n, _ in solids}
         result[time] = Field(
             {n: pick(*displacement[n], solid.node_tags) - at_rest[n] for n, solid in solids},
             {n: pick(elements, stress, solid.element_tags) for n, solid in solids},

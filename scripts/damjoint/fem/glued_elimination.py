@@ -1,0 +1,57 @@
+"""Condensation of all bodies at once, in a single sparse factorisation: for 3D, where the joints
+have too many unknowns for dense matrices of each body.
+
+Unknowns w = (v, d): displacements v of the glued bodies, jumps d. A body moves by u_b = T_b w, so
+that A = sum T_b^T K_b T_b; its Schur complement on d is S. Unit loads F, a border of A, give the
+rest at the same time: t_0 = F_d - A_dv A_vv^-1 F_v, and F_v^T A_vv^-1 F_v, of which the row of a
+unit force on the crest has the displacements of the crest.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import sparse
+
+from ..arrays import Array, IntArray, Sparse
+from .bodies import Bodies
+from .factor import bordered, dense_schur
+from .glued_bodies import GluedBodies
+from .gluing import Gluing
+from .responses import Responses
+
+
+def responses_at_once(bodies: Bodies, gluing: Gluing) -> Responses:
+    """Eliminate all bodies in a single factorisation."""
+    glued = GluedBodies.of(bodies.by_name, gluing)
+    motion = glued.motion(gluing)
+    unit_loads: dict[str, Array] = {}
+    loaded: list[Sparse] = []
+    dof_of_face: dict[str, IntArray] = {}
+    count = 0
+    for name, body in bodies.by_name.items():
+        for load, forces in body.unit_loads.items():
+            unit_loads[load] = unit_loads.get(load, 0) + motion[name].T @ forces
+        dofs = bodies.loaded_dofs(name)
+        column = np.full(body.stiffness.shape[0], -1)
+        column[dofs] = count + np.arange(len(dofs))
+        count += len(dofs)
+        loaded.append(motion[name][dofs])
+        dof_of_face |= {face: column[of_face] for face, of_face in body.face_dofs.items()}
+    crest_body, crest = bodies.crest
+    rows: list[Sparse] = [*loaded, *unit_loads.values(), motion[crest_body][crest]]
+    loads = sparse.vstack(rows, format="csr").T
+    stiffness = sum(m.T @ bodies.by_name[name].stiffness @ m for name, m in motion.items())
+    matrix = bordered(stiffness, loads)
+    del stiffness
+    schur = dense_schur(matrix, np.arange(len(glued.free), matrix.shape[0]))
+    joints, border = slice(0, gluing.unknowns), slice(gluing.unknowns, None)
+    forces, at_crest = schur[joints, border].copy(), -schur[-1, border]
+    return Responses(
+        stiffness=schur[joints, joints].copy(),
+        units=dict(zip(unit_loads, forces[:, count:-1].T, strict=True)),
+        pressure=forces[:, :count],
+        dof_of_face=dof_of_face,
+        crest_jump=forces[:, -1],
+        crest_units=dict(zip(unit_loads, map(float, at_crest[count:-1]), strict=True)),
+        crest_pressure=at_crest[:count],
+    )

@@ -1,0 +1,137 @@
+"""Solved scenes as the window shows them: the static loads, and an earthquake after them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .. import InputError, RunError, accuracy
+from ..arrays import Table as Columns
+from ..engines import Outcome
+from ..model.fields import Field
+from ..model.loads import Loading
+from ..model.mesh import Body
+from ..model.results import Results
+from ..post.summary import Table
+from ..runner import early_end
+from ..statics.verdict import decisive_joint, failed, statement, verdict
+from ..studies.quake import QuakeResult
+from .numbers import Numbers, QuakeNumbers, shown_rows, table_of_frames, table_of_levels, warnings
+
+
+@dataclass(kw_only=True)
+class SolvedScene:
+    """The results of a scene, for the window."""
+
+    #: its name among the scenes of a run
+    name: str
+    result: Results
+    bodies: dict[str, Body]
+    #: displacement and stress by time of the steps
+    fields: dict[float, Field]
+    verdict: str
+    #: interrupted or failed; empty if no error ended the run
+    end_state: str
+    #: why it ended or failed; empty if the dam stands
+    message: str
+    #: how it has ended
+    statement: str
+    failed: bool
+    #: number of the joint whose curves and numbers are shown
+    joint: int
+    #: at each of `times`
+    numbers: list[Numbers]
+    table: Table
+    warnings: list[str]
+    #: see `shown_rows`, of an earthquake; else None
+    quake: Columns | None = None
+
+    @staticmethod
+    def of(outcome: Outcome) -> SolvedScene:
+        """The scene of an outcome; computes the bodies' fields."""
+        result, (state, _) = outcome.result, early_end(outcome)
+        joint = decisive_joint(result)
+        own = result.joints[joint]
+        message = statement(result)
+        if state and isinstance(outcome.error, (InputError, RunError)):
+            message = str(outcome.error)
+        elif state:
+            message = reached(state, result)
+        return SolvedScene(
+            name=str(result.case["uplift"]),
+            result=result,
+            bodies=outcome.mesh().bodies,
+            fields=outcome.fields(),
+            verdict=verdict(result),
+            end_state=state,
+            message=message,
+            statement=message or "the dam stands",
+            failed=bool(state) or failed(result),
+            joint=joint,
+            numbers=[Numbers.at(own, time) for time in times_of(result)],
+            table=table_of_levels(own),
+            warnings=warnings(result),
+        )
+
+    @staticmethod
+    def of_earthquake(found: QuakeResult) -> list[SolvedScene]:
+        """The scenes of the static loads and of the earthquake after them."""
+        static = Outcome(found.before, lambda: found.mesh, found.static_fields)
+        numbers = QuakeNumbers.of(found)
+        earthquake = SolvedScene(
+            name="earthquake",
+            result=found.frames,
+            bodies=found.mesh.bodies,
+            fields=found.fields(),
+            verdict="stands" if found.stands else "no equilibrium",
+            end_state=found.state,
+            message="" if found.stands else found.statement,
+            statement=found.statement,
+            failed=not found.stands,
+            joint=found.joint,
+            numbers=list(numbers),
+            table=table_of_frames(numbers),
+            warnings=[],
+            quake=shown_rows(found),
+        )
+        before = SolvedScene.of(static)
+        before.name = "static loads"
+        return [before, earthquake]
+
+    @property
+    def own(self) -> Results:
+        """The results of the joint that is shown."""
+        return self.result.joints[self.joint]
+
+    @property
+    def times(self) -> np.ndarray:
+        """Times of the steps of every view: those levels that were reached, or [s] the frames."""
+        return times_of(self.result)
+
+    def loading(self, time: float) -> Loading:
+        """The static loads at one of `times`."""
+        state, case = self.result.state(time), self.result.case
+        at = time if self.quake is None else case.times[-1]
+        return Loading.at(case, at, state["level"], state["tail_level"])
+
+
+def times_of(result: Results) -> np.ndarray:
+    """Times of the tables of the joints."""
+    return np.unique(result.joint["time"])
+
+
+def reached(state: str, result: Results) -> str:
+    """What a run has reached before it was interrupted, or failed: level, mesh, estimated error."""
+    case, estimate = result.case, result.info.get("error_estimate")
+    if not result.last:
+        return state
+    words = f"{state} at level {result.last['level']:.4g} m of {case.levels[-1]:.4g} m"
+    if estimate:
+        meshes = estimate["n_joint"]
+        errors = [q["relative"] for q in estimate["quantities"].values() if q["used"]]
+        words += f" on mesh {len(meshes)} (n_joint = {meshes[-1]})"
+        if errors:
+            words += f"; estimated errors up to {accuracy.percent(max(errors))}"
+            words += f" of {accuracy.percent(estimate['accuracy'])} required"
+    return words
