@@ -77,4 +77,4 @@ Else
   fixed() += Surface In BoundingBox {-7, -2 - eps, -eps, 7, -2 + eps, 2};
   Physical Surface("fixed") = {fixed()};
 EndIf
-Physical Point("crest") = {5};
+Physical Point("crest") = {6};

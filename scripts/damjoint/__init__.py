@@ -8,6 +8,7 @@
 `help(dj.case)`, `help(dj.run)`, ... describe the functions, reference/python.md their use.
 The package:
 
+arrays.py   types of arrays; csr.py: sparse matrices; threads.py: threads of the linear algebra
 storage.py  atomic writes, locks on files and folders
 progress.py progress of long work, on a terminal and in redirected output
 model/      data: parameters, case, mesh, loads, results
@@ -83,10 +84,9 @@ def data(folder: str) -> Path:
     """The folder geo, pro, cases or reference: in the package where it is installed, else in the
     checkout.
     """
-    from importlib.resources import files
     from pathlib import Path
 
-    packaged = Path(str(files(__name__))) / folder
+    packaged = Path(__file__).parent / folder
     return packaged if packaged.is_dir() else Path(__file__).resolve().parents[2] / folder
 
 

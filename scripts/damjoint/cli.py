@@ -181,8 +181,10 @@ def add_command(commands: Commands, call: Callable, summary: str, *options: Pars
     return command
 
 
-def parser() -> Parser:
-    """Return the parser of the command."""
+def parser(word: str = "") -> Parser:
+    """Return the parser of the command: of all commands, or of the one that the first word of the
+    command line names.
+    """
     top = Parser(
         prog="damjoint",
         description="Concrete gravity dams on a thin joint: opening, cracking, sliding and uplift.",
@@ -190,19 +192,13 @@ def parser() -> Parser:
     )
     top.add_argument("--version", action="version", version=__version__)
     commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True)
-    add_run(commands)
-    add_check(commands)
-    add_plot(commands)
-    add_report(commands)
-    add_gui(commands)
-    add_new(commands)
-    add_validate(commands)
-    add_critical(commands)
-    add_quake(commands)
-    add_sweep(commands)
-    add_stress(commands)
-    add_bench(commands)
-    add_law(commands)
+    adders = (
+        *(add_run, add_check, add_plot, add_report, add_gui, add_new, add_validate, add_critical),
+        *(add_quake, add_sweep, add_stress, add_bench, add_law),
+    )
+    named = [add for add in adders if add.__name__ == f"add_{word}"]
+    for add in named or adders:
+        add(commands)
     return top
 
 
@@ -480,6 +476,8 @@ def add_quake(commands: Commands) -> None:
         "record_unit (default: that of the case)",
     )
     command.add_path("--out", "FOLDER", help="output folder (default: out/CASE_quake)")
+    help_engine = f"{ENGINE}: tables only, and an interrupted run starts again"
+    command.add_argument("--engine", default="auto", metavar="NAME", help=help_engine)
     command.add_argument(
         "--fields",
         nargs="?",
@@ -495,9 +493,11 @@ def add_quake(commands: Commands) -> None:
 
 def do_quake(arguments: argparse.Namespace) -> int:
     """Run damjoint quake; 1 if there is no static equilibrium after the earthquake."""
+    from .engines import engine_of
     from .model import parameters
     from .model.case import load
-    from .studies import quake
+    from .studies import quake, quake_getdp
+    from .studies.quake_result import QuakeResult, text
 
     case = load(
         arguments.case,
@@ -508,13 +508,20 @@ def do_quake(arguments: argparse.Namespace) -> int:
         arguments.accuracy,
         record=arguments.record,
     )
-    if case["dim"] == 3:
+    engine_of(case, arguments.engine)
+    if arguments.engine == "getdp" and arguments.fields:
+        raise InputError("--fields: must not be given with --engine getdp")
+    if case["dim"] == 3 and arguments.engine != "getdp":
         warn_if_slow()
     out = arguments.out or Path("out") / f"{case.name}_quake"
-    fields = arguments.fields is not None
-    result = quake.run(case, out, arguments.fields, fields, not arguments.no_picture)
+    result: QuakeResult | quake_getdp.GetdpQuakeResult
+    if arguments.engine == "getdp":
+        result = quake_getdp.run(case, out)
+    else:
+        fields = arguments.fields is not None
+        result = quake.run(case, out, arguments.fields, fields, not arguments.no_picture)
     print(f"{case.name}: {result.statement}; {len(result.rows['time'])} steps; {out}\n")
-    print(quake.text(result))
+    print(text(result.case, result.summary))
     return int(not result.stands)
 
 
@@ -754,7 +761,7 @@ def main(argv: list[str] | None = None) -> int:
     try:
         for word in words:
             check_encoding(word)
-        arguments = parser().parse_args(with_negative_lists(words))
+        arguments = parser(*words[:1]).parse_args(with_negative_lists(words))
         if getattr(arguments, "run_geo", False):
             os.environ[RUN_GEO] = "1"  # an environment variable, for the processes of a sweep
         return arguments.call(arguments)

@@ -8,9 +8,13 @@ import threading
 import time
 from collections.abc import Iterable, Iterator
 from types import TracebackType
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
-from tqdm import tqdm
+if TYPE_CHECKING:
+    from tqdm import tqdm
+
+#: Seconds before a bar appears: what takes less does not load it.
+DELAY = 0.3
 
 #: Seconds between two lines, and without an update after which a line says so.
 INTERVAL = 10.0
@@ -21,7 +25,7 @@ Item = TypeVar("Item")
 class Progress:
     """Progress of one piece of work, a context manager.
 
-    The lines come from a thread: also while the work does not report, as during unstable crack
+    Bar and lines come from a thread: also while the work does not report, as during unstable crack
     growth or in another process.
     """
 
@@ -29,13 +33,15 @@ class Progress:
         self, title: str, total: float | None = None, show: bool = True, **options: Any
     ) -> None:
         """total: of all updates; show: whether anything is printed; options: of tqdm's bar."""
-        terminal = sys.stderr.isatty()
-        self.bar = tqdm(desc=title, total=total, disable=not (show and terminal), **options)
-        self.title, self.total, self.done = title, total, 0.0
+        self.title, self.total, self.done, self.options = title, total, 0.0, options
         self.start = self.updated = time.monotonic()
         self.over = threading.Event()
-        if show and not terminal:
-            threading.Thread(target=self.write_lines, daemon=True).start()
+        self.bar: tqdm[Any] | None = None
+        self.thread: threading.Thread | None = None
+        if show:
+            work = self.show_bar if sys.stderr.isatty() else self.write_lines
+            self.thread = threading.Thread(target=work, daemon=True)
+            self.thread.start()
 
     def __enter__(self) -> Progress:
         return self
@@ -47,17 +53,32 @@ class Progress:
         trace: TracebackType | None,
     ) -> None:
         self.over.set()
-        self.bar.close()
+        if self.thread:
+            self.thread.join()
+        if self.bar:
+            self.bar.close()
 
     def update(self, amount: float = 1.0) -> None:
         """Add to what is done."""
         self.done, self.updated = self.done + amount, time.monotonic()
-        self.bar.update(amount)
+        if self.bar:
+            self.bar.update(self.done - self.bar.n)
 
     def describe(self, title: str) -> None:
         """Replace the title."""
         self.title, self.updated = title, time.monotonic()
-        self.bar.set_description_str(title)
+        if self.bar:
+            self.bar.set_description_str(title)
+
+    def show_bar(self) -> None:
+        """Show the bar on the terminal, unless the work is over before."""
+        if self.over.wait(DELAY):
+            return
+        from tqdm import tqdm
+
+        bar = tqdm(desc=self.title, total=self.total, initial=self.done, **self.options)
+        bar.start_t -= time.monotonic() - self.start
+        self.bar = bar
 
     def write_lines(self) -> None:
         """Print lines to stderr until the work is over."""
@@ -70,10 +91,17 @@ class Progress:
         now, parts = time.monotonic(), [self.title]
         if self.total:
             parts.append(f"{100 * self.done / self.total:.0f} %")
-        parts.append(tqdm.format_interval(now - self.start))
+        parts.append(clock(now - self.start))
         if now - self.updated > INTERVAL:
-            parts.append(f"nothing new for {tqdm.format_interval(now - self.updated)}")
+            parts.append(f"nothing new for {clock(now - self.updated)}")
         return ", ".join(parts)
+
+
+def clock(seconds: float) -> str:
+    """Seconds as [hours:]minutes:seconds."""
+    minutes, rest = divmod(int(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes:02}:{rest:02}"
 
 
 def track(items: Iterable[Item], title: str, total: int | None = None) -> Iterator[Item]:

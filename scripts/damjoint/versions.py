@@ -6,11 +6,12 @@ import os
 import platform
 import re
 import subprocess
+import sys
 from functools import lru_cache
-from importlib.metadata import version
 from pathlib import Path
 
 from . import __version__
+from .storage import cached
 
 #: Folders of the checkout that hold the code.
 CODE_FOLDERS = "scripts", "pro", "geo", "cases"
@@ -20,8 +21,18 @@ PACKAGES = "gmsh", "numpy", "scipy"
 
 def versions() -> dict[str, str]:
     """Return the versions of damjoint, Python and PACKAGES by name."""
-    packages = {name: version(name) for name in PACKAGES}
+    # it takes long to read them; an installation changes the time of its folder
+    folders = [path for path in sys.path if path.endswith("-packages") and os.path.isdir(path)]
+    key = repr([(path, os.stat(path).st_mtime_ns) for path in folders])
+    packages = cached("versions", key, installed)
     return {"damjoint": __version__, **packages, "python": platform.python_version()}
+
+
+def installed() -> dict[str, str]:
+    """Return the versions of PACKAGES by name."""
+    from importlib.metadata import version
+
+    return {name: version(name) for name in PACKAGES}
 
 
 @lru_cache(maxsize=1)
@@ -32,22 +43,16 @@ def commit() -> str:
     checkout = Path(__file__).parents[2]
     if not (checkout / ".git").exists():
         return ""
-
-    def git(*words: str) -> str:
-        done = subprocess.run(
-            # without locks, which runs at the same time would wait for
-            ["git", "--no-optional-locks", "-C", str(checkout), *words],
-            capture_output=True,
-            text=True,
-            check=True,
-        )
-        return done.stdout.strip()
-
+    # without locks, which runs at the same time would wait for
+    git = "git", "--no-optional-locks", "-C", str(checkout)
+    words = "status", "--porcelain=v2", "--branch", "--", *CODE_FOLDERS
     try:
-        changed = git("status", "--porcelain", "--", *CODE_FOLDERS)
-        return git("rev-parse", "--short=7", "HEAD") + (" with changes" if changed else "")
+        done = subprocess.run([*git, *words], capture_output=True, text=True, check=True)
     except (OSError, subprocess.CalledProcessError):
         return ""
+    head = re.search("^# branch.oid ([0-9a-f]{7})", done.stdout)
+    changed = re.search("^[^#]", done.stdout, re.MULTILINE)
+    return head[1] + (" with changes" if changed else "") if head else ""
 
 
 def machine() -> str:

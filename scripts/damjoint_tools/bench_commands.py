@@ -1,5 +1,5 @@
-"""What a user waits for: start, pictures and fields of runs, critical values; and the order in
-which large 3D bodies are condensed.
+"""What a user waits for: start, pictures and fields of runs, critical values, earthquakes; and the
+order in which large 3D bodies are condensed.
 """
 
 from __future__ import annotations
@@ -10,11 +10,19 @@ from functools import partial
 from unittest import mock
 
 import numpy as np
+from damjoint import data
+from damjoint.dynamics.history import QuakeHistory
+from damjoint.dynamics.record import Record
+from damjoint.dynamics.step import TimeStep
+from damjoint.dynamics.stepper import Earthquake
+from damjoint.engines.getdp import quake as getdp_quake
 from damjoint.fem import factor
 from damjoint.fem.bodies import Bodies
 from damjoint.fem.condensation import condense
+from damjoint.joint.interface import Interface
 from damjoint.model.case import load
 from damjoint.progress import track
+from damjoint.solver.load_stepper import LoadStepper
 from damjoint.studies.critical import Search
 from threadpoolctl import threadpool_limits
 
@@ -124,3 +132,70 @@ def critical(measurements: Measurements) -> Table:
     for name in track(SEARCHES, "critical"):
         table.add_measured(measurements, (name,), partial(measure, *SEARCHES[name]))
     return table
+
+
+#: The dam of 45 m in an earthquake: it slides, opens and closes.
+QUAKE = {"law": "friction", "mu": 0.8, "adhesion": 1e4, "pena_tang": 0.0, "uplift": "imposed"}
+QUAKE |= {"record_unit": "m/s2", "record_scale": 3.0, "dt": 0.0025, "n_joint": 40.0}
+SOLID = {"dim": 3.0, "mesh_pattern": "split", "thickness": 10.0, "n_layers": 4.0, "order": 1.0}
+SOLID |= {"n_joint": 20.0}
+#: Scenes, and the part of the record [s] that is computed.
+QUAKES = {
+    "2D, order 1, 0.5 s": ({"order": 1.0}, 0.5),
+    "2D, order 2, 0.5 s": ({}, 0.5),
+    "3D, order 1, 0.1 s": (SOLID, 0.1),
+    "2D, order 2, whole record": ({}, np.inf),
+}
+#: Time of the record at which its strong part begins [s].
+STRONG = 3.0
+
+
+def quakes(measurements: Measurements) -> Table:
+    """Measure time steps of an earthquake in both engines, one thread: milliseconds a step, set-up
+    of the condensed engine in its steps, most halvings of a step, largest difference of the slip
+    over the largest slip. The whole record by the condensed engine alone.
+    """
+    heads = "unknowns", "steps", "ms a step", "set-up in steps", "halvings"
+    table = Table("quakes", "scene", *heads, "seconds", "GetDP: ms a step", "ratio", "difference")
+    short = list(QUAKES)[:1]
+    for name in track(short if measurements.short else QUAKES, "quakes"):
+        table.add_measured(measurements, (name,), partial(measure_quake, *QUAKES[name]))
+    return table
+
+
+def measure_quake(settings: dict, span: float) -> tuple:
+    """Measure a part [s] of a record; returns the columns of `quakes` but for the first."""
+    start = {"record_start": STRONG} if np.isfinite(span) else {}
+    record = data("reference") / "friuli.csv"
+    case = load("dam", QUAKE | start | settings, "40", record=record)
+    with threadpool_limits(1):
+        bodies = Bodies.of(case)
+        static = LoadStepper(case, Interface(condense(case, bodies), case["quadrature"]))
+        static.run()
+        begin = time.perf_counter()
+        quake = Earthquake(static.case, static.model, static.state, bodies)
+        quake.steps_of_length[0] = TimeStep(quake.problem, quake.dt)
+        set_up = time.perf_counter() - begin
+        quake.record = first_part(quake.record, span)
+        history = QuakeHistory.of(quake)
+        begin = time.perf_counter()
+        for step in quake.steps():
+            history.add(quake, step)
+        spent = time.perf_counter() - begin
+    number, slip = len(history), history.table["slip_mean"]
+    each = spent / number
+    columns = quake.system.size, number, 1e3 * each, set_up / each, quake.halvings, spent
+    if not np.isfinite(span):
+        return *columns, "", "", ""
+    found = getdp_quake.solve(quake.case, quake.record, quake.damping, quake.dt, lambda _time: None)
+    if found.error:
+        raise found.error
+    by_getdp = found.seconds["earthquake"] / len(found.rows["time"])
+    difference = np.abs(found.rows["slip_mean"] - slip).max() / np.abs(slip).max()
+    return *columns, 1e3 * by_getdp, by_getdp / each, difference
+
+
+def first_part(record: Record, span: float) -> Record:
+    """A record up to a time [s]."""
+    kept = record.times <= span
+    return Record(record.times[kept], record.acceleration[kept])

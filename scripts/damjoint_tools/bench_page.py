@@ -180,6 +180,7 @@ def page(
         "## Precision on a fine mesh",
         "; ".join(precise) + ".",
         *of_joints(tables["joints"]),
+        *of_quakes(tables["quakes"]),
         *of_stress(tables["stress"]),
     ]
     return "\n\n".join(parts) + "\n"
@@ -328,6 +329,27 @@ def of_joints(table: Table) -> list[str]:
     ]
 
 
+def of_quakes(table: Table) -> list[str]:
+    """Time steps of an earthquake."""
+    both = [i for i, by_getdp in enumerate(table["GetDP: ms a step"]) if by_getdp != ""]
+    numbers = lambda name: [table[name][i] for i in both]
+    times = numbers("ms a step"), numbers("GetDP: ms a step")
+    text = (
+        f"A time step takes {min(times[0]):.1f} to {max(times[0]):.1f} ms, the set-up up to "
+        f"{max(table['set-up in steps']):.0f} steps; the reference GetDP model takes "
+        f"{min(times[1]):.0f} to {max(times[1]):.0f} ms a step, and its slip differs by at most "
+        f"{max(numbers('difference')):.0e} of the largest one."
+    )
+    if "2D, order 2, whole record" in table["scene"]:
+        text += f" The whole record, 17 s and the rest, takes {table['seconds'][-1]:.0f} s."
+    return [
+        "## Earthquake",
+        "The case `dam` with friction under three times the record `friuli.csv`, in steps of 2.5 "
+        f"ms, one thread. {text}",
+        as_text(table),
+    ]
+
+
 def of_stress(grid: Table) -> list[str]:
     """Flow with extreme parameters."""
     ends = ", ".join(f"{k} {v}" for k, v in Counter(grid["end"]).items())
@@ -367,7 +389,7 @@ def measure(measurements: Measurements) -> tuple[dict[str, Table], list[str]]:
     tables = [cases := bench_cost.cases(measurements)]
     studies = bench_cost.switches, bench_cost.sweeps, bench_cost.growth, bench_cost.stress
     studies += bench_commands.start, bench_commands.pictures, bench_commands.critical
-    studies += bench_commands.orders, bench_cost.joints
+    studies += bench_commands.orders, bench_cost.joints, bench_commands.quakes
     tables += [study(measurements) for study in studies]
     tables.append(modelings(measurements, cases))
     with threadpool_limits(1):

@@ -6,7 +6,7 @@ import csv
 import json
 
 import pytest
-from damjoint_tools import bench_cost, bench_page
+from damjoint_tools import bench_commands, bench_cost, bench_page
 from damjoint_tools.bench_table import Measurements
 
 
@@ -14,7 +14,7 @@ from damjoint_tools.bench_table import Measurements
 def test_the_short_benchmark_writes_consistent_files(command, tmp_path):
     assert command("bench", "--short", "--out", "bench")[0] == 0
     text = (tmp_path / "bench" / "benchmarks.md").read_text()
-    assert text.startswith("# Benchmarks\n") and text.count("\n## ") == 13
+    assert text.startswith("# Benchmarks\n") and text.count("\n## ") == 14
     assert (tmp_path / "bench" / "accuracy.png").read_bytes()[:4] == b"\x89PNG"
     *lines, blank, source = (tmp_path / "bench" / "modelings.md").read_text().splitlines()
     assert len(lines) == 13 and not blank and source in text
@@ -67,3 +67,16 @@ def test_seconds_of_several_joints(tmp_path):
     assert measured["ratio"][1] == measured["seconds"][1] / measured["seconds"][0]
     title, text, rows = bench_page.of_joints(measured)
     assert title == "## Several joints" and "up to 2 joints" in text and rows.count("\n") == 3
+
+
+@pytest.mark.heavy
+def test_milliseconds_of_time_steps(tmp_path):
+    measured = bench_commands.quakes(Measurements(tmp_path / "log", short=True))
+    (scene,), (steps,) = measured["scene"], measured["steps"]
+    assert (scene, steps) == ("2D, order 1, 0.5 s", 200)
+    assert measured["seconds"][0] == pytest.approx(steps * measured["ms a step"][0] / 1e3)
+    expected = measured["GetDP: ms a step"][0] / measured["ms a step"][0]
+    assert measured["ratio"][0] == pytest.approx(expected)
+    assert 0 < measured["difference"][0] < 1e-5
+    title, text, rows = bench_page.of_quakes(measured)
+    assert title == "## Earthquake" and "ms a step" in text and rows.count("\n") == 2

@@ -5,8 +5,8 @@ from dataclasses import fields
 import numpy as np
 import pytest
 from blocks import write_blocks
-from damjoint import runner
-from damjoint.engines.getdp import law
+from damjoint import InputError, runner
+from damjoint.engines.getdp import law, solve
 from damjoint.laws import LAWS
 from damjoint.model.case import Case, load
 from damjoint.model.results import JOINT, Results
@@ -180,6 +180,7 @@ SECTIONS = {
     "all loads": (SHAPE | STAGED, "20,41", "0"),
     "lift, all loads": (SHAPE | STAGED | {"joint_height": 10.0, "law": "bond"}, "20,41", "0"),
     "falling base": ({"joint_slope": -4.0, "law": "friction", "adhesion": 4e5}, "30,44", "2"),
+    "bed below the heel": ({"joint_slope": -4.0, "floor_water": 1.0}, "30,44", "0,5"),
     "sloping lift": ({"joint_height": 20.0, "joint_slope": 3.0} | SHAPE, "30,46.5", "0,24"),
     "drains, overtopped": ({"uplift": "drained", "joint_slope": 3.0}, "20,46.5", "0,5"),
     "drains, USBR": ({"uplift": "drained", "drain_reference": "reservoir"}, "20,45", "0,5"),
@@ -311,6 +312,23 @@ def test_runs_of_both_engines_agree_where_four_bodies_meet(tmp_path):
     case = load(str(tmp_path / "own.case"), settings, "10,18")
     (result,) = agree(case, tmp_path)
     assert len(result.joints) == 6 and sum(map(changed, result.joints)) > 2
+
+
+def test_a_face_that_is_not_divided_where_bodies_meet_is_refused(tmp_path):
+    """Its elements are those of a single curve of the mesh."""
+    path, joints = tmp_path / "own.msh", {"base": (0, 0, 10, 0), "lift": (0, 5, 10, 5)}
+    write_blocks(path, {"low": (0, 0, 10, 5), "high": (0, 5, 10, 12)}, joints)
+    (tmp_path / "own.case").write_text('geometry = "own.msh";')
+    solve.check(load(str(tmp_path / "own.case")))
+    lines = path.read_text().splitlines()
+    (upstream,) = (line.split()[1] for line in lines if line.endswith('"upstream"'))
+    fields = [line.split() for line in lines]
+    for line in fields:
+        if line[1:4] == ["1", "2", upstream]:  # a line of this group
+            line[4] = "1000"
+    path.write_text("\n".join(map(" ".join, fields)) + "\n")
+    with pytest.raises(InputError, match=r"a face of dam.*divided where the body ends"):
+        solve.check(load(str(tmp_path / "own.case")))
 
 
 def difference(one, other):

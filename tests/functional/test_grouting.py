@@ -41,7 +41,7 @@ def test_published_openings_of_a_grouted_joint():
         (np.ones(len(face.locations)), (range(len(face.locations)), 2 * space.find(face))),
         (len(face.locations), 2 * functions),
     )
-    opening = 2 * points.values @ pick
+    opening = 2 * points.values.scipy() @ pick
     free = np.flatnonzero(np.repeat(space.locations[:, 1] > 0, 2))
     law = load("ssnp142", LAW | {"grout_pressure": PRESSURE, "grout_t": 2.0}).law
     variables, u = law.initial(len(points.weights)), np.zeros(2 * functions)

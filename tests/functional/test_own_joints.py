@@ -5,6 +5,7 @@ import pytest
 from blocks import write_blocks
 from damjoint import InputError
 from damjoint.engines.condensed.solve import check
+from damjoint.engines.getdp import solve as getdp
 from damjoint.joint.interface import interface_of
 from damjoint.model.case import load
 from damjoint.model.mesh import mesh_of
@@ -125,6 +126,8 @@ def test_slip_of_an_inclined_crack_inside_a_body(solved):
     assert np.abs(rows["delta_t1"][middle]) == pytest.approx(slip, rel=0.02)
     tips = np.abs(rows["s"] - 1) > 1 - 1e-9
     assert np.all(rows["delta_t1"][tips] == 0) and tips.sum() == 2
+    with pytest.raises(InputError, match="joint crack must lie between two bodies"):
+        getdp.check(results.case)
 
 
 @pytest.mark.parametrize("dim", [2, 3])

@@ -62,17 +62,17 @@ law_has_grouting = 0;
 law_has_sawing = 0;
 law_has_release = 0;
 Function {
-  law_tangent[] = TensorDiag[K_T, K_N, K_T];
-  law_secant[] = TensorDiag[K_T, K_N, K_T];
-  law_traction[] = TensorDiag[K_T, K_N, K_T] * $1;
-  law_initial_scalar[] = 0;
-  law_new_scalar[] = $2;
-  law_new_vector[] = $3;
-  law_damage[] = 0;
-  law_slip[] = 0;
-  law_open[] = 0;
-  law_slid[] = 0;
-  law_critical_opening[] = 0;
+  law_tangent[Sur_Law] = TensorDiag[K_T, K_N, K_T];
+  law_secant[Sur_Law] = TensorDiag[K_T, K_N, K_T];
+  law_traction[Sur_Law] = TensorDiag[K_T, K_N, K_T] * $1;
+  law_initial_scalar[Sur_Law] = 0;
+  law_new_scalar[Sur_Law] = $2;
+  law_new_vector[Sur_Law] = $3;
+  law_damage[Sur_Law] = 0;
+  law_slip[Sur_Law] = 0;
+  law_open[Sur_Law] = 0;
+  law_slid[Sur_Law] = 0;
+  law_critical_opening[Sur_Law] = 0;
 }
 """
 

@@ -9,12 +9,16 @@ import numpy as np
 import pytest
 from damjoint import RunError
 from damjoint.dynamics import step as step_module
+from damjoint.dynamics.frames import MOST_FRAMES, Frames, interval_of
 from damjoint.dynamics.history import QuakeHistory
 from damjoint.dynamics.scheme import Motion
 from damjoint.dynamics.step import TimeStep
 from damjoint.fem import factor
-from damjoint.fem.bodies import Bodies
+from damjoint.fem.bodies import Bodies, material_of
+from damjoint.fem.elasticity import stress
+from damjoint.model.case import load
 from damjoint.solver.history import joint_row
+from damjoint.studies.quake import QuakeRun
 from quakes import BLOCK, DAM, earthquake, joint_of, mean_slip, smooth_record, write_record
 from scipy.integrate import solve_ivp
 from scipy.linalg import eigh
@@ -482,6 +486,63 @@ def test_the_command_writes_rows_summary_and_picture(command, case_file, tmp_pat
     assert "earthquake wave.csv, " in page and "data:image/png" in page
 
 
+def test_frames_are_states_of_the_bodies_and_the_joint(command, case_file, tmp_path):
+    """Files for ParaView at the times asked for; the gap between the bodies is that of the joint,
+    the stress that of the displacement.
+    """
+    code, _, err = command("quake", case_file, "--fields", "0.1:0.4", "--set", "weight_first=0")
+    assert code == 0, err
+    folder = tmp_path / "out" / "my_quake"
+    joint = np.genfromtxt(folder / "quake_joint.csv", delimiter=",", names=True)
+    times = np.unique(joint["time"])
+    assert times == pytest.approx([0, *np.arange(0.1, 0.4001, 0.005)])
+    names = {path.name for path in (folder / "fields").iterdir()}
+    assert {f"{part}_t{t:g}.vtu" for part in ("bulk", "joint") for t in times} < names
+    listed = (folder / "fields" / "fields.pvd").read_text()
+    assert listed.count("<DataSet") == 2 * len(times)
+    case = load("dam", DAM | {"weight_first": 0.0}, "30", record=tmp_path / "wave.csv")
+    under_way = QuakeRun(case)
+    for _ in under_way.steps():
+        pass
+    result, space = under_way.result(), under_way.quake.system.spaces
+    fields, bodies = result.fields(), result.mesh.bodies
+    surface, worst = joint_of(under_way.quake).surface, 0.0
+    for time in result.frames.history["time"][::10]:
+        gap = [
+            fields[time].displacement[name][
+                np.searchsorted(bodies[name].node_tags, surface.node_tags)
+            ]
+            for name in ("dam", "foundation")
+        ]
+        rows = result.frames.at(time)
+        order = np.argsort(surface.points[:, 0])
+        opening = (gap[0] - gap[1])[order, 1]
+        assert opening == pytest.approx(rows["delta_n"], abs=1e-12)
+        moved = fields[time].displacement["dam"][None, :, :2]
+        expected = stress(space["dam"], moved, material_of(case))[0]
+        assert fields[time].stress["dam"] == pytest.approx(expected, abs=1e-3)
+        worst = max(worst, opening.max())
+    assert worst > 1e-4
+    assert len(result.frames.history["time"]) <= MOST_FRAMES
+
+
+@pytest.mark.parametrize("steps", [10, 196, 197, 198, 4001, 20000])
+@pytest.mark.parametrize("span", [(0.0, np.inf), (0.015, np.inf), (0.01, 0.05), (0.0, 1.97)])
+def test_frames_are_at_most_200(steps, span):
+    """The static state, every n-th step within the span, and the end if it is in the span."""
+    times = np.add.accumulate(np.full(steps, 0.005))
+    duration = 0.005 * steps
+    interval = interval_of(0.005, duration, span)
+    frames = Frames(interval, span, None)
+    chosen = np.array([time for time in times if frames.wanted(time, duration)])
+    assert 1 + len(chosen) <= MOST_FRAMES
+    first, last = max(span[0], interval), min(span[1], duration)
+    count = np.floor(last / interval + 1e-6) - np.ceil(first / interval - 1e-6) + 1
+    rest = last == duration and duration % interval > 1e-6 < interval - duration % interval
+    assert len(chosen) == count + rest
+    assert len(chosen) > min(90, count - 1)
+
+
 def test_an_interrupted_run_continues_with_the_same_rows(command, case_file, tmp_path, monkeypatch):
     add, steps = QuakeHistory.add, []
 
@@ -557,6 +618,9 @@ def test_a_sweep_of_earthquakes(command, case_file, tmp_path):
         (["--set", "drive=crest"], "drive = crest: must be level for damjoint quake"),
         (["--record", "nothing.csv"], "record = nothing.csv: "),
         (["--accuracy", "1%"], "accuracy = 1%: must not be set for damjoint quake"),
+        (["--fields", "2"], "--fields 2: must be two times FIRST:LAST"),
+        (["--fields", "2:1"], "--fields 2:1: must be two times FIRST:LAST"),
+        (["--fields", "3:4"], "fields = 3:4: must begin before the end of the record, 0.7 s"),
     ],
 )
 def test_bad_input_is_one_line_and_writes_nothing(command, case_file, options, message):

@@ -13,7 +13,8 @@ import gmsh
 import numpy as np
 import pytest
 from damjoint.gui import tree, views
-from damjoint.gui.graphs import INTERVALS, MARGIN, METRES, Scale, thinned
+from damjoint.gui.curves import METRES
+from damjoint.gui.graphs import INTERVALS, MARGIN, Scale, thinned
 from damjoint.gui.layout import ABOVE_AXES, BELOW_AXES, BESIDE_AXES, Layout
 from damjoint.gui.sheet import Request, titles
 from damjoint.gui.views import caption
@@ -22,6 +23,7 @@ from damjoint.post.units import LENGTHS
 from damjoint.statics.verdict import hints
 from damjoint.studies.check import compare_methods
 from PIL import Image
+from quakes import DAM, smooth_record
 
 SMALL = {"n_joint": 10.0, "h_dam": 3.0, "h_found": 4.0}
 WORDS = [word for name, value in SMALL.items() for word in ("--set", f"{name}={value}")]
@@ -379,6 +381,14 @@ def test_the_drawing_follows_the_geometry_and_can_be_meshed(open_window):
     assert len(gmsh.model.mesh.getNodes()[0]) > 100
 
 
+def test_lift_joints_are_drawn(open_window, tmp_path):
+    mine = tmp_path / "mine.case"
+    mine.write_text("lift_heights() = {20}; levels() = {30};")
+    open_window(str(mine))
+    heights = [gmsh.model.getBoundingBox(*curve)[4] for curve in gmsh.model.getEntities(1)]
+    assert pytest.approx(20, abs=1e-6) in heights
+
+
 BAD_VALUES = [
     (tree.LEVELS, "3, 60", "levels = 60: must be between 0 and 20 m"),
     (tree.LEVELS, "high", "levels = high: must be a list of levels in metres"),
@@ -539,6 +549,71 @@ def test_both_uplifts_of_a_published_case_are_run(open_window):
     user.type("uplift", "imposed")  # the value of the case: both again
     user.run()
     assert len(user.session.scenes) == 2
+
+
+def test_an_earthquake_follows_the_static_loads(open_window, command, tmp_path):
+    """With the switch on its parameters appear; its results are those of the command, at the times
+    chosen; without it nothing of it is left.
+    """
+    small = {n: v for n, v in DAM.items() if n != "record_unit"}
+    user = open_window("dam", **small | {"dt": 0.005})
+    hidden = "record_scale", "quake_uplift", tree.RECORD, tree.FRAMES
+    assert not any(user.entry(name)["visible"] for name in hidden)
+    user.type(tree.LEVELS, "30")
+    assert "record: must be" in user.type(tree.QUAKE, 1.0)
+    assert all(user.entry(name)["visible"] for name in hidden)
+    assert "record: must be" in user.run()
+    record = smooth_record(tmp_path / "wave.csv", 5.0, duration=0.5)
+    assert "record_unit = unstated: must be" in user.type(tree.RECORD, str(record))
+    assert user.type("record_unit", "m/s2") == "ready: press Run"
+    assert "must be two times" in user.type(tree.FRAMES, "0.5")
+    user.type(tree.FRAMES, "0:0.5")
+    assert user.run().startswith("done in") and "residual slip" in user.session.status
+    before, earthquake = user.session.scenes
+    assert before.times.tolist() == [1] and len(earthquake.times) == 101
+    assert user.entry(tree.SCENE)["choices"] == ["static loads", "earthquake"]
+    user.session.gallery.set_step(40)
+    user.session.turn()
+    shown, (_, _, lines) = numbers_shown(user), shown_results()
+    assert "At t = 0.2 s" in shown and "residual slip" in shown and "ground acceleration" in shown
+    assert any(line.startswith("t = 0.200 s of 0.7 s") for line in lines)
+    assert {"law friction, uplift imposed, wave.csv", "slip [mm]", "crest movement [mm]"} <= set(
+        lines
+    )
+    user.save(tmp_path / "window")
+    user.type(tree.CONTENT, views.TABLE)
+    assert {"ground", "slip"} <= set(shown_results()[2])
+    user.type(tree.CONTENT, views.SCENE)
+    user.type(tree.SCENE, "static loads")
+    assert any(line.startswith("level 30 m") for line in shown_results()[2])
+    user.type(tree.QUAKE, 0.0)
+    assert tree.get_text(tree.VERDICT) == tree.NOT_RUN
+    assert user.run().startswith("done in") and len(user.session.scenes) == 1
+    user.session.close()
+    code, _, _ = command("quake", tmp_path / "window" / "dam.case", "--out", "again")
+    user.session = Session(Request("a"))  # closed by the fixture
+    assert code == 0
+    for name in ("quake.csv", "joint.csv", "history.csv"):
+        one, other = ((tmp_path / f / name).read_bytes() for f in ("window", "again"))
+        assert one == other
+    assert (tmp_path / "window" / "fields" / "bulk_t0.2.vtu").exists()
+
+
+def test_stop_keeps_the_steps_of_an_earthquake(open_window, tmp_path):
+    record = smooth_record(tmp_path / "wave.csv", 1.0, duration=20.0)
+    user = open_window("dam", **DAM)
+    user.type(tree.LEVELS, "30")
+    user.type(tree.RECORD, str(record))
+    user.type(tree.QUAKE, 1.0)
+    user.press("run")
+    user.wait(lambda session: "earthquake, t = 1." in session.status)
+    user.press("stop")
+    user.wait()
+    assert re.match(r"interrupted after t = 1\.\d* s of the record", user.session.status)
+    earthquake = user.session.scenes[1]
+    assert len(earthquake.times) > 1 and earthquake.end_state == "interrupted"
+    user.save(tmp_path / "stopped")
+    assert json.loads((tmp_path / "stopped/run.json").read_text())["state"] == "interrupted"
 
 
 def test_accuracy_refines_the_mesh(open_window):

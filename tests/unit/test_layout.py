@@ -10,9 +10,9 @@ from damjoint_tools import pages
 
 PACKAGE = Path(damjoint.__file__).parent
 #: Each part uses only those before it.
-PARTS = ["", "storage", "progress", "laws", "model", "fem", "joint", "solver", "dynamics"]
-PARTS += ["engines", "statics", "post", "accuracy", "versions", "runner", "studies", "library"]
-PARTS += ["gui", "cli", "__main__"]
+PARTS = ["", "csr", "threads", "storage", "progress", "laws", "model", "fem", "joint", "solver"]
+PARTS += ["dynamics", "engines", "statics", "post", "accuracy", "versions", "runner", "studies"]
+PARTS += ["library", "gui", "cli", "__main__"]
 
 
 def part_of(path):

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from .. import ROUND_OFF
 from ..arrays import Array
 from ..fem.bodies import material_of
 from ..fem.elasticity import stress
@@ -21,6 +20,8 @@ from .system import System
 
 #: Largest number of frames.
 MOST_FRAMES = 200
+#: Share of the interval of frames by which a time may miss them: sums of steps have round-off.
+NEAR = 1e-6
 
 
 @dataclass
@@ -39,23 +40,22 @@ class Frames:
     @staticmethod
     def of(quake: Earthquake, span: tuple[float, float] | None = None) -> Frames:
         """The frame of the static state; span: of all others [s], by default the whole record."""
-        first, last = span or (0.0, math.inf)
-        steps = (min(last, quake.record.duration) - first) / quake.dt
-        interval = quake.dt * max(1, math.ceil(steps / (MOST_FRAMES - 3) - ROUND_OFF))
-        frames = Frames(interval, (first, last), History(quake.problem.model.equilibrium))
+        span = span or (0.0, math.inf)
+        interval = interval_of(quake.dt, quake.record.duration, span)
+        frames = Frames(interval, span, History(quake.problem.model.equilibrium))
         frames.add(quake, quake.problem.at_rest, 0, 0.0)
         return frames
 
     def __len__(self) -> int:
         return len(self.displacement)
 
-    def wanted(self, quake: Earthquake, time: float) -> bool:
-        """Whether there is a frame at the end of a step."""
-        near = ROUND_OFF * quake.dt
+    def wanted(self, time: float, duration: float) -> bool:
+        """Whether there is a frame at a time, of a record of a duration."""
+        near = NEAR * self.interval
         first, last = self.span
-        regular = abs(time / self.interval - round(time / self.interval)) < ROUND_OFF
-        at_end = time >= quake.record.duration - near
-        return (regular or at_end) and first - near <= time <= last + near
+        regular = abs(time - round(time / self.interval) * self.interval) < near
+        at_end = time > duration - near
+        return (regular or at_end) and first - near < time < last + near
 
     def add(self, quake: Earthquake, moving: Moving, iterations: int, residual: float) -> None:
         """The frame of a state."""
@@ -98,6 +98,15 @@ class Frames:
             )
             for i, time in enumerate(self.history.rows["time"])
         }
+
+
+def interval_of(dt: float, duration: float, span: tuple[float, float]) -> float:
+    """The smallest multiple of dt at which there are at most MOST_FRAMES in a span: the static
+    state, both ends of the span, and the end of a record of a duration.
+    """
+    first, last = span
+    steps = (min(last, duration) - first) / dt
+    return dt * max(1, math.ceil(steps / (MOST_FRAMES - 3) - NEAR))
 
 
 def at_nodes(system: System, displacement: Array) -> dict[str, Array]:

@@ -144,6 +144,6 @@ class QuakeHistory:
             value = sign * float(row[column])
             if name not in self.peaks or value > self.peaks[name].value:
                 self.peaks[name] = Peak(value, step.end.time, motion.displacement)
-        if self.frames.wanted(quake, step.end.time):
+        if self.frames.wanted(step.end.time, quake.record.duration):
             self.frames.add(quake, step.end, step.iterations, step.residual)
         self.complete = len(self.stress), len(self.frames), step.end

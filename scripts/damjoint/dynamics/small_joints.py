@@ -10,7 +10,7 @@ import numpy as np
 from scipy import sparse
 
 from ..arrays import Array
-from ..fem.condensation import Condensed
+from ..fem.condensed import Condensed
 from ..joint.interface import Interface
 from ..joint.linear_system import Border, Change, lu_solve
 
@@ -30,7 +30,7 @@ class SmallInterface(Interface):
         for q in range(number):
             block = self.at_points[d * q : d * (q + 1)]
             touched = np.unique(block.indices)
-            local = block[:, touched].toarray()
+            local = block.columns(touched).toarray()
             # d (B^T W T B)[a, b] / d T[k, l]
             parts = self.weights[q] * np.einsum("ka,lb->abkl", local, local)
             places = touched[:, None] * size + touched

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import Array, Sparse
-from ..fem.condensation import Condensed
+from ..fem.condensed import Condensed
 from ..fem.factor import partial_factors
 from ..joint.equilibrium import Equilibrium
 from ..joint.interface import Interface

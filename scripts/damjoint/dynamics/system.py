@@ -16,6 +16,7 @@ from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from ..arrays import Array, IntArray, Sparse
+from ..csr import CsrMatrix
 from ..fem.bodies import Bodies, ElasticBody
 from ..fem.elasticity import mass
 from ..fem.elements import Space
@@ -104,7 +105,7 @@ class System:
             of_body = self.motion[name][:, : self.jumps[0]]
             touched = np.unique(of_body.indices)
             result[touched] = (of_body.T @ value)[touched]
-        jumps, value = joint.unknowns, nodal(joint.space, joint.dim, motion)
+        jumps, value = joint.unknowns.scipy(), nodal(joint.space, joint.dim, motion)
         result[self.jumps] = (jumps.T @ value) / np.maximum(np.ravel(abs(jumps).sum(axis=0)), 1)
         return result
 
@@ -127,12 +128,14 @@ class System:
         motions = np.array([self.rigid_motion(joint, above, motion) for motion in of_forces])
         return np.hstack([(self.mass @ motions.T).T, motions @ self.inertia]) / joint.width
 
-    def frequencies(self, of_joints: Sparse, number: int) -> tuple[Array, Array]:
+    def frequencies(self, of_joints: CsrMatrix, number: int) -> tuple[Array, Array]:
         """The lowest natural frequencies (number,) [Hz] with a stiffness of the joints (j, j), and
         their modes (n, number), undamped.
         """
         n, j = self.size, len(self.jumps)
-        joint = sparse.block_diag([sparse.csr_matrix((n - j, n - j)), of_joints], format="csr")
+        joint = sparse.block_diag(
+            [sparse.csr_matrix((n - j, n - j)), of_joints.scipy()], format="csr"
+        )
         matrix = (self.stiffness + joint).tocsr()
         factors = partial_factors(matrix, self.jumps)
         inverse = np.linalg.inv(factors.schur)
@@ -186,7 +189,7 @@ def added_mass(case: Case, interface: Interface, body: ElasticBody) -> Sparse:
             continue
         density = case["rho_water"] * water_depths(case, face, level, interface.floor)
         normal = sparse.hstack(
-            [face.points.values.multiply(face.normals[:, [axis]]) for axis in range(face.dim)]
+            [face.points.values.scaled(face.normals[:, axis]).scipy() for axis in range(face.dim)]
         ).tocsr()
         weighted = normal.T @ sparse.diags(face.points.weights * density) @ normal
         number = dofs.reshape(-1, face.dim).T.ravel()

@@ -23,12 +23,6 @@ from .elasticity import (
 )
 from .elements import WATER, Space, points_of
 
-#: Parameters that the bodies depend on besides those of the mesh.
-PARAMETERS = (
-    *("order", "hold_z"),
-    *(f"{p}_{name}" for p in ("E", "nu") for name in dict.fromkeys(MATERIALS.values())),
-)
-
 #: Weights that act, region and component: concrete also along x (earthquake).
 WEIGHTS = (("dam", 0), ("dam", 1), ("lower", 0), ("lower", 1), ("foundation", 1))
 

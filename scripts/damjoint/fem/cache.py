@@ -16,21 +16,29 @@ from collections.abc import Mapping
 from dataclasses import fields
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy import linalg
 
 from .. import RunError, __version__, data
 from ..arrays import Array
 from ..model.case import Case
 from ..model.loads import COMPLETE, overtopped, thermal_strains
 from ..model.mesh import Body, Face, JointMesh, Mesh, mesh_of, shares
+from ..model.scene import MATERIALS
 from ..storage import cache_folder
-from .bodies import PARAMETERS, Bodies
-from .condensation import Condensed, CondensedJoint, condense
-from .gluing import JointDofs
+from ..threads import scipy_linalg
+from .condensed import Condensed, CondensedJoint, JointDofs
 from .memory import check_size
+
+if TYPE_CHECKING:
+    from .bodies import Bodies
+
+#: Parameters that the bodies depend on besides those of the mesh.
+PARAMETERS = (
+    *("order", "hold_z"),
+    *(f"{p}_{name}" for p in ("E", "nu") for name in dict.fromkeys(MATERIALS.values())),
+)
 
 #: Size up to which the cache may grow [bytes]; the files longest unused are deleted first.
 LIMIT = 2_000_000_000
@@ -62,7 +70,7 @@ def fingerprint(mesh: Mesh) -> str:
 def sources() -> str:
     """Hash of the files that condensed bodies of a case are computed by: meshes and elements."""
     package = Path(__file__).parents[1]
-    meshes = (package / "model" / name for name in ("cut.py", "mesh.py"))
+    meshes = (package / name for name in ("csr.py", "model/cut.py", "model/mesh.py"))
     code = *meshes, *sorted((package / "fem").glob("*.py"))
     shapes = data("pro") / "section.pro", *sorted(data("geo").glob("*.geo"))
     texts = [path.read_bytes() for path in (*shapes, *code)]
@@ -83,11 +91,15 @@ def cached(case: Case) -> tuple[Condensed, Bodies | None]:
         return stored, None
     if not case.geometry:
         check_size(case)
+    scipy_linalg()
+    from .bodies import Bodies
+    from .condensation import condense
+
     try:
         with np.errstate(over="raise", invalid="raise"):
             bodies = Bodies.of(case)
             condensed = condense(case, bodies)
-    except (ArithmeticError, RuntimeError, linalg.LinAlgError) as error:
+    except (ArithmeticError, RuntimeError, np.linalg.LinAlgError) as error:
         if isinstance(error, RunError):
             raise
         raise RunError(f"bodies: can not be eliminated ({error}); look at the geometry") from None

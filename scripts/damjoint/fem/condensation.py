@@ -32,40 +32,12 @@ from scipy import linalg
 
 from ..arrays import Array, IntArray
 from ..model.case import Case
-from ..model.mesh import Face, JointMesh
 from . import factor
 from .bodies import Bodies, ElasticBody
+from .condensed import Condensed, CondensedJoint
 from .glued_elimination import responses_at_once
-from .gluing import BodyDofs, Gluing, JointDofs
+from .gluing import BodyDofs, Gluing
 from .responses import Responses
-
-
-@dataclass(frozen=True, kw_only=True)
-class CondensedJoint:
-    """A joint of condensed bodies."""
-
-    mesh: JointMesh
-    dofs: JointDofs
-
-
-@dataclass(frozen=True, kw_only=True)
-class Condensed(Responses):
-    """The condensed bodies of a case."""
-
-    dim: int
-    order: int
-    #: thickness along z [m], 1 in 2D
-    width: float
-    counts: dict[str, int]
-    #: number of free degrees of freedom of all bodies
-    unknowns: int
-    joints: list[CondensedJoint]
-    #: the wet faces
-    faces: dict[str, Face]
-    #: library that eliminated them, with its version
-    factorisation: str
-    #: wall seconds of mesh, assembly and condensation
-    seconds: dict[str, float]
 
 
 @dataclass(frozen=True, kw_only=True)

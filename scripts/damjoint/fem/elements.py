@@ -12,9 +12,9 @@ from functools import cache
 from itertools import combinations, product
 
 import numpy as np
-from scipy import sparse
 
-from ..arrays import Array, IntArray, Sparse
+from ..arrays import Array, IntArray
+from ..csr import CsrMatrix, stacked
 from ..model.mesh import Body
 
 #: Corners of the reference elements, by node number.
@@ -255,7 +255,7 @@ class Space:
         products = np.searchsorted(self.codes, part.codes)
         return np.concatenate([nodes, len(self.body.points) + products])
 
-    def interpolation(self, order: int) -> Sparse:
+    def interpolation(self, order: int) -> CsrMatrix:
         """Values at the locations, from the functions up to an order (locations, functions)."""
         rows, matrices = [], []
         for shape, table in self.connectivity:
@@ -264,12 +264,11 @@ class Space:
             pointers = columns.shape[1] * np.arange(len(columns) + 1)
             data = np.tile(np.ravel(local), len(table))
             size = len(columns), len(self.locations) if order == 2 else len(self.body.points)
-            matrices.append(sparse.csr_matrix((data, columns.ravel(), pointers), size))
+            matrices.append(CsrMatrix(data, columns.ravel(), pointers, size))
             rows.append(table.ravel())
         _, first = np.unique(np.concatenate(rows), return_index=True)
-        values = sparse.vstack(matrices, format="csr")[first]
-        values.eliminate_zeros()
-        return values
+        values = stacked(matrices)[first]
+        return values.where(values.data != 0)
 
 
 def codes_of(pairs: IntArray) -> IntArray:
@@ -299,9 +298,9 @@ class Points:
     weights: Array
     positions: Array
     #: (q, functions)
-    values: Sparse
+    values: CsrMatrix
     #: (q, functions) for x, y and z; empty if not wanted
-    gradients: tuple[Sparse, ...]
+    gradients: tuple[CsrMatrix, ...]
     #: element of each point
     elements: IntArray
 
@@ -335,8 +334,8 @@ def points_of(space: Space, numbers: dict[str, int], gradients: bool = False) ->
     pointers = np.concatenate([[0], np.cumsum(widths)])
     size = (len(widths), len(space.locations))
 
-    def build(data: Array) -> Sparse:
-        return sparse.csr_matrix((data, np.concatenate(tables), pointers), size)
+    def build(data: Array) -> CsrMatrix:
+        return CsrMatrix(data, np.concatenate(tables), pointers, size)
 
     slope = np.concatenate(slopes)
     return Points(

@@ -44,14 +44,14 @@ def responses_at_once(bodies: Bodies, gluing: Gluing) -> Responses:
     matrix = bordered(stiffness, loads)
     del stiffness
     schur = dense_schur(matrix, np.arange(len(glued.free), matrix.shape[0]))
-    joints, border = slice(0, gluing.unknowns), slice(gluing.unknowns, None)
-    forces, at_crest = schur[joints, border].copy(), -schur[-1, border]
+    number = gluing.unknowns
+    t_0, moved = schur[number:, :number], -schur[-1, number:]
     return Responses(
-        stiffness=schur[joints, joints].copy(),
-        units=dict(zip(unit_loads, forces[:, count:-1].T, strict=True)),
-        pressure=forces[:, :count],
+        stiffness=schur[:number, :number].copy(),
+        units={n: row.copy() for n, row in zip(unit_loads, t_0[count:-1], strict=True)},
+        pressure=schur[:number, number : number + count].copy(),
         dof_of_face=dof_of_face,
-        crest_jump=forces[:, -1],
-        crest_units=dict(zip(unit_loads, map(float, at_crest[count:-1]), strict=True)),
-        crest_pressure=at_crest[:count],
+        crest_jump=t_0[-1].copy(),
+        crest_units=dict(zip(unit_loads, moved[count:-1].tolist(), strict=True)),
+        crest_pressure=moved[:count],
     )

@@ -16,25 +16,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from ..arrays import Array, IntArray, Sparse
+from ..arrays import IntArray, Sparse
 from .bodies import Bodies
+from .condensed import JointDofs
 
 #: A sum of independent jumps: factors by their numbers.
 Jumps = dict[int, float]
-
-
-@dataclass(frozen=True, kw_only=True)
-class JointDofs:
-    """The jumps of a joint, dim * function + component, from the unknowns: entries of a matrix."""
-
-    rows: IntArray
-    columns: IntArray
-    factors: Array
-
-    def matrix(self, jumps: int, unknowns: int) -> Sparse:
-        """The matrix (jumps, unknowns)."""
-        entries = self.factors, (self.rows, self.columns)
-        return sparse.csr_matrix(entries, (jumps, unknowns))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -27,9 +27,9 @@ void damjoint_release(DMUMPS_STRUC_C *factors) {
 /* Factorise a symmetric matrix of n unknowns, given by the entries (row, column: from 1) of its
    upper triangle. order (n): position of each unknown in the elimination, from 1, or NULL for that
    of MUMPS. keep (kept): unknowns that are not eliminated; their Schur complement (kept, kept) has
-   its lower triangle filled by rows. store: whether factors are stored, for damjoint_solve.
-   available: memory [MB]; needed: the estimate. error: 0,
-   TOO_LARGE if the estimate exceeds the memory, or the (negative) error of MUMPS.
+   its lower triangle filled by rows. store: whether to store the factors, for damjoint_solve.
+   available: memory [MB]; needed: the estimate. error: 0, TOO_LARGE if the estimate exceeds the
+   memory, or the (negative) error of MUMPS.
    Returns the factors, which use keep and schur until they are released; NULL after an error. */
 DMUMPS_STRUC_C *damjoint_factorise(int n, long long entries, int *row, int *column, double *value,
                                    int *order, int kept, int *keep, double *schur, int store,
@@ -50,7 +50,7 @@ DMUMPS_STRUC_C *damjoint_factorise(int n, long long entries, int *row, int *colu
   mumps->icntl[0] = mumps->icntl[1] = mumps->icntl[2] = -1; /* no messages */
   mumps->icntl[3] = 0;
   mumps->cntl[0] = 0; /* no pivoting: eliminated unknowns are positive definite */
-  mumps->icntl[13] = 2; /* so no memory [percent] for delayed pivots */
+  mumps->icntl[13] = 2; /* hence no memory [percent] for delayed pivots */
   mumps->icntl[30] = !store;
   mumps->n = n;
   mumps->nnz = entries;

@@ -8,20 +8,15 @@ texts of their own.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import gmsh
 import numpy as np
 
-from ..arrays import Table
-from ..model.fields import along
-from ..post.units import FORCES, LENGTHS, STRESSES, Units, unit
-from .gallery import BLUE, DARK, GREEN, GREY, LAKE, ORANGE, RED, Color, Gallery
+from ..post.units import Units, unit
+from .gallery import DARK, GREY, Color, Gallery
 from .layout import Layout
-from .numbers import ACCELERATIONS, SECONDS
-from .scene import SolvedScene
-from .shapes import Pieces, is_extruded
+from .shapes import Pieces
 
 #: Intervals between the ticks of an axis; margin around them, in intervals.
 INTERVALS, MARGIN = 4, 0.2
@@ -36,7 +31,6 @@ GRID: Color = (225, 225, 225, 255)
 TEXT = 11
 #: Name of the curves of earlier runs.
 BEFORE = "before"
-METRES: Units = (("m", 1),)
 
 
 @dataclass(frozen=True)
@@ -87,8 +81,6 @@ class Curve:
 
 #: Title and units of both axes, y first; curves.
 Graph = tuple[tuple[str, Units], tuple[str, Units], list[Curve]]
-#: Parts of the time of an earthquake of which the smallest and the largest value are drawn.
-PARTS = 300
 
 
 class Graphs:
@@ -276,127 +268,3 @@ def thinned(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             shown.append(i)
     shown.append(len(x) - 1)
     return x[shown], y[:, shown]
-
-
-#: Curves along the joint, the most important first: title, units, curves (name, column, color).
-ALONG_JOINT: tuple[tuple[str, Units, tuple[tuple[str, str, Color], ...]], ...] = (
-    ("opening", LENGTHS, (("", "delta_n", BLUE),)),
-    (
-        "normal stress",
-        STRESSES,
-        (("total", "sigma_n", BLUE), ("effective", "sigma_n_eff", GREEN)),
-    ),
-    ("shear stress", STRESSES, (("", "tau_1", ORANGE),)),
-    ("slip", LENGTHS, (("jump", "delta_t1", ORANGE), ("slip", "slip", DARK))),
-    ("water pressure", STRESSES, (("", "p", LAKE),)),
-)
-#: Columns and graphs that only a scene with water in the joint has.
-OF_WATER = "sigma_n_eff", "p"
-
-
-def show_graphs(graphs: Graphs, scene: SolvedScene, before: Sequence[SolvedScene]) -> None:
-    """Show the graphs of a scene for which there is space, the most important first.
-
-    before: earlier runs, whose last curves are drawn in grey.
-    """
-    joint, levels = list[Graph](), list[Graph]()
-    if scene.times.size and is_extruded(scene.result.case):
-        joint = graphs_along_joint(scene, [other for other in before if other.times.size])
-    if scene.quake is not None:
-        rows = within(scene.quake, scene.times)
-        earlier = [within(other.quake, scene.times) for other in before if other.quake is not None]
-        for graph in graphs_over_time(rows, earlier):
-            graphs.add(*graph, now=scene.times.clip(rows["time"][0]))
-    elif len(scene.result.history["time"]):
-        levels = graphs_of_history(scene, before)
-    for graph in (*joint[:2], *levels[:1], *joint[2:], *levels[1:]):
-        graphs.add(*graph)
-    graphs.write_names()
-
-
-#: Curves of an earthquake over time, the most important first: title, units, curves (name, column
-#: of quake.csv, color).
-OVER_TIME: tuple[tuple[str, Units, tuple[tuple[str, str, Color], ...]], ...] = (
-    ("ground", ACCELERATIONS, (("x", "ground_ax", DARK), ("y", "ground_ay", ORANGE))),
-    ("crest movement", LENGTHS, (("", "crest_ux", BLUE),)),
-    ("opening", LENGTHS, (("heel", "heel_opening", RED), ("toe", "toe_opening", GREEN))),
-    ("slip", LENGTHS, (("", "slip_mean", ORANGE),)),
-    ("shear force T", FORCES, (("strength", "strength", RED), ("T", "T", BLUE))),
-)
-
-
-def graphs_over_time(rows: Table, earlier: list[Table]) -> list[Graph]:
-    """Graphs of the rows of an earthquake; earlier: those of earlier runs, for comparison."""
-    shown = []
-    for title, units, parts in OVER_TIME:
-        curves = [
-            Curve(name, *envelope(rows, column), color)
-            for name, column, color in parts
-            if column in rows and (column != "ground_ay" or rows[column].any())
-        ]
-        last = parts[-1][1]
-        curves += [Curve(BEFORE, *envelope(other, last), GREY) for other in earlier]
-        shown.append(((title, units), ("time", SECONDS), curves))
-    return shown
-
-
-def within(rows: Table, times: np.ndarray) -> Table:
-    """The rows between the second frame, or the one before if they are regular, and the last one;
-    all rows with the frame of the static state alone.
-    """
-    first = max(2 * times[1] - times[2], 0.0) if len(times) > 2 else 0.0
-    shown = (rows["time"] >= first) & (rows["time"] <= (times[-1] or math.inf))
-    return {name: column[shown] for name, column in rows.items()}
-
-
-def envelope(rows: Table, column: str) -> tuple[np.ndarray, np.ndarray]:
-    """Times (n,) and values (1, n) of a column: the smallest and the largest of each part."""
-    chosen = [
-        part[[first, last]]
-        for part in np.array_split(np.arange(len(rows["time"])), PARTS)
-        if len(part)
-        for first, last in [sorted((rows[column][part].argmin(), rows[column][part].argmax()))]
-    ]
-    index = np.unique(chosen)
-    return rows["time"][index], rows[column][index][None]
-
-
-def graphs_along_joint(scene: SolvedScene, before: Sequence[SolvedScene]) -> list[Graph]:
-    """Opening, stresses, slip and pressure along the joint (means over z in 3D)."""
-    shown = []
-    rows = [along(scene.own.at(time)) for time in scene.times]
-    earlier = [along(other.own.at()) for other in before]
-    wet = scene.result.case["uplift"] != "none"
-    for title, units, parts in ALONG_JOINT:
-        curves = [
-            Curve(name, rows[0]["s"], np.array([r[column] for r in rows]), color)
-            for name, column, color in parts
-            if wet or column not in OF_WATER
-        ]
-        if curves:
-            first = parts[0][1]
-            curves += [Curve(BEFORE, other["s"], other[first][None], GREY) for other in earlier]
-            shown.append(((title, units), ("from the heel", METRES), curves))
-    return shown
-
-
-def graphs_of_history(scene: SolvedScene, before: Sequence[SolvedScene]) -> list[Graph]:
-    """The level over opening, crest displacement and crack length, all converged steps."""
-    driven, shown = scene.result.case["drive"] != "level", []
-    quantities = (
-        ("heel opening" if driven else "largest opening", "max_opening", LENGTHS, BLUE),
-        ("crest movement", "crest_ux", LENGTHS, BLUE),
-        ("crack length", "crack_length", METRES, RED),
-    )
-    for title, column, units, color in quantities:
-        curves = []
-        for other in (scene, *before):
-            history = other.own.history
-            x = history[column]
-            if column == "max_opening":  # below 0 in a closed joint
-                x = other.result.heel if driven else np.maximum(x, 0.0)
-            if len(x):
-                name, kind = ("", color) if other is scene else (BEFORE, GREY)
-                curves.append(Curve(name, x, history["level"][None], kind, points=other is scene))
-        shown.append((("level", METRES), (title, units), curves))
-    return shown

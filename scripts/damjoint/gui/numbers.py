@@ -16,7 +16,7 @@ from ..post.summary import SHOWN, Table, levels_table, requested_rows, table_of
 from ..post.units import FORCES, LENGTHS, Units, unit, with_unit
 from ..statics import gravity
 from ..statics.verdict import hints, path_statement
-from ..studies.quake import QuakeResult
+from ..studies.quake_result import QuakeResult
 
 NUMBER: Units = (("-", 1),)
 #: Safety factors: column, heading, meaning.
@@ -128,8 +128,8 @@ class QuakeNumbers(Numbers):
             if value is not None:
                 peaks.append((head, with_unit(value, units, 3), "mean of the last second"))
         times = frames.history["time"]
-        every = f"{np.median(np.diff(times)):.4g} s: {len(times)} of {len(rows['time'])} steps"
-        peaks.append(("Shown every", every, "the curves over time have all steps"))
+        shown = f"{len(times)} of {len(rows['time'])} steps"
+        peaks.append(("Shown", shown, "the curves over time have all steps"))
         nearest = [int(np.argmin(np.abs(rows["time"] - time))) for time in times]
         return [
             QuakeNumbers(

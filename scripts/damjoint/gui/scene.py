@@ -16,7 +16,7 @@ from ..model.results import Results
 from ..post.summary import Table
 from ..runner import early_end
 from ..statics.verdict import decisive_joint, failed, statement, verdict
-from ..studies.quake import QuakeResult
+from ..studies.quake_result import QuakeResult
 from .numbers import Numbers, QuakeNumbers, shown_rows, table_of_frames, table_of_levels, warnings
 
 

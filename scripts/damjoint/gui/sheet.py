@@ -46,7 +46,7 @@ class Request:
         return quake.span_of("frames =", self.frames) if self.frames else None
 
     def load(self) -> Case:
-        """Load the case as `damjoint run` or `damjoint quake` does.
+        """Load the case as `damjoint run` or, with the record, `damjoint quake` does.
 
         Raises InputError.
         """
@@ -54,10 +54,7 @@ class Request:
             raise InputError(f"steps = {self.steps}: must be an integer >= 1")
         steps = None if self.steps is None else int(self.steps)
         water = self.levels, self.tail_levels, steps, self.accuracy
-        case = load(self.case, self.overrides, *water, Path(self.record) if self.record else None)
-        if self.quake:
-            quake.check(case, self.span)
-        return case
+        return load(self.case, self.overrides, *water, Path(self.record) if self.record else None)
 
 
 #: Parameters that the titles of the package's cases mention.
@@ -76,6 +73,16 @@ class Sheet:
     path: str
 
     @property
+    def problem(self) -> str:
+        """Why its earthquake can not be computed: its fields show nevertheless; else empty."""
+        try:
+            if self.request.quake:
+                quake.check(self.case, self.request.span)
+        except InputError as error:
+            return str(error)
+        return ""
+
+    @property
     def heading(self) -> tuple[str, str]:
         """Title of the case, and its joint law and uplift.
 
@@ -86,7 +93,8 @@ class Sheet:
             title = f"case {case.name}, changed"
         water = " and ".join([case["uplift"], *case.also_uplift])
         scene = f"law {case['law']}, uplift {water}"
-        return title, f"{scene}, {case.record.name}" if self.request.quake else scene
+        shaken = self.request.quake and case.record
+        return title, f"{scene}, {case.record.name}" if shaken else scene
 
 
 def check_request(request: Request) -> Sheet:

@@ -27,6 +27,7 @@ from ..model.fields import (
 from ..post.units import LENGTHS, STRESSES, unit, with_unit
 from . import layout as places
 from .camera import CLIPPED
+from .curves import show_graphs
 from .gallery import (
     BALANCED,
     DARK,
@@ -42,7 +43,7 @@ from .gallery import (
     Color,
     Gallery,
 )
-from .graphs import Graphs, show_graphs
+from .graphs import Graphs
 from .layout import LEFT, Layout
 from .numbers import three_digits
 from .scene import SolvedScene
@@ -318,7 +319,7 @@ def show_table(gallery: Gallery, scene: SolvedScene, layout: Layout) -> None:
     """Show the table of all levels, the level shown marked; some levels if there are too many."""
     table = scene.table
     names = [
-        [*wrap(name, HEADING), f"[{size}]" if size else ""]
+        [*wrap(name, HEADING, break_long_words=False), f"[{size}]" if size else ""]
         for name, size in zip(table.names, table.units, strict=True)
     ]
     top = TABLE_TOP + places.LINE * max(map(len, names)) + ROW / 2

@@ -17,8 +17,8 @@ import gmsh
 
 from .. import InputError, RunError, data
 from ..model.case import Case
-from ..model.mesh import shares
-from ..model.parameters import assignments, listing, start_gmsh
+from ..model.mesh import as_text, shares
+from ..model.parameters import listing, start_gmsh
 from . import export, tree, views
 from .camera import result_camera, undeformed_camera
 from .gallery import RED, Gallery
@@ -192,7 +192,7 @@ class Session:
             request = self.tree.request()
         except InputError as error:
             self.hide_results()
-            self.on_rejected(str(error))
+            self.on_failed(str(error))
             return None
         if request != self.last_request:
             self.hide_results()
@@ -230,7 +230,9 @@ class Session:
             return
         if before and before.path != sheet.path:
             self.drop_results()
-        if not self.scenes:
+        if sheet.problem:
+            self.free(sheet.problem, tree.BAD)
+        elif not self.scenes:
             self.free("ready: press Run", tree.CALM)
         elif sheet.request != self.last_request:
             self.free("changed since the run: press Run", tree.CALM)
@@ -238,16 +240,8 @@ class Session:
             self.show(self.scene_shown)
             self.free(*self.last_status)
 
-    def on_rejected(self, message: str) -> None:
-        """A value is bad: only show the message."""
-        self.free(message, tree.BAD)
-
     def on_failed(self, message: str) -> None:
-        """A run, check or save has failed."""
-        self.free(message, tree.BAD)
-
-    def on_died(self, message: str) -> None:
-        """The engine's process has ended, by a second Stop or by itself."""
+        """A value is bad; a run, check or save has failed; or the engine's process has ended."""
         self.free(message, tree.BAD)
 
     def on_step(self, reached: str) -> None:
@@ -315,7 +309,7 @@ class Session:
         source = drawing = case.geometry or data("geo") / "dam.geo"
         if drawing.suffix == ".geo":  # may use parameters of the case
             values = case.values if case.geometry else shares(case)
-            text = assignments(values) + listing("levels", case.levels)
+            text = as_text(values) + listing("levels", case.levels)
             drawing = Path(self.folder.name) / f"{case.name}.geo"
             drawing.write_text(f'{text}Include "{source}";\n')
         gmsh.model.remove()

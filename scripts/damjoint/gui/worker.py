@@ -68,8 +68,8 @@ def serve(pipe: Connection) -> None:
     """Process the messages of the window until it closes.
 
     In: ("check", Request), ("run", Request), ("save", folder). Out: ("ready", titles, parameters),
-    ("checked", Sheet), ("rejected", message), ("step", what was reached), ("done", [SolvedScene]),
-    ("failed", message), ("saved", folder).
+    ("checked", Sheet), ("step", what was reached), ("done", [SolvedScene]), ("failed", message),
+    ("saved", folder).
     """
     stop = Stop()
     pipe.send(("ready", titles(), declared()))
@@ -87,12 +87,12 @@ def serve(pipe: Connection) -> None:
             sheet = check_request(argument)
             pipe.send(("checked", sheet))
             if kind == "run":
+                if sheet.problem:
+                    raise InputError(sheet.problem)
                 run = run_quake if sheet.request.quake else run_case
                 scenes, write = run(sheet, pipe, stop)
                 pipe.send(("done", scenes))
                 last = sheet.case, case_text(sheet, scenes[0].result.case), write
-        except InputError as error:
-            pipe.send(("rejected", str(error)))
         except KeyboardInterrupt:
             pipe.send(("failed", "stopped before the first step"))
         except Exception as error:  # shown in the window, which stays open
@@ -213,7 +213,7 @@ class EngineProcess:
     def messages(self, wait: float | None = 0.0) -> Iterator[tuple[Any, ...]]:
         """Receive messages; wait: longest time for the first one [s], None: until it comes.
 
-        If the process has died: ("died", message), and a new process is started.
+        If the process has ended: ("failed", message), and a new process is started.
         """
         try:
             while self.pipe.poll(wait):
@@ -224,7 +224,7 @@ class EngineProcess:
             message = f"the engine's process ended (exit code {self.process.exitcode}): press Run"
             message = "stopped at once, no results" if self.killed else message
             self.start()
-            yield "died", message
+            yield "failed", message
 
     def stop(self) -> None:
         """Stop a run after the next converged step; at the second call at once, without results."""

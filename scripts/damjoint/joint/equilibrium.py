@@ -16,6 +16,7 @@ import numpy as np
 from ..arrays import Array
 from ..model.case import Case
 from ..model.loads import AddedPressure, Loading, line_forces, thermal_strains, water_column
+from ..model.scene import BED, DOWN
 from .flow import FlowDerivative, FlowSolution
 from .interface import Interface
 from .joint_laws import TANGENT, JointLaws, JointVariables, Mode
@@ -34,6 +35,9 @@ class Residual:
     #: with the level (j,)
     by_level: Callable[[], Array]
 
+
+#: Sides of the faces under the tailwater.
+BY_TAIL = DOWN, BED
 
 #: Step of a difference with the level, over the size of the dam; level below which the reservoir
 #: counts as empty, and the level that replaces it, over the same.
@@ -56,6 +60,10 @@ class Equilibrium:
         #: tangent (q, 3, 3) of the undamaged joints
         points = [len(joint.points.weights) for joint in interface.joints]
         self.undamaged = self.laws.undamaged_tangent(points)
+        #: forces on the functions of a face under the tailwater, by its name and level: of the last
+        self.tail_forces = lru_cache(maxsize=4)(
+            lambda name, tail: self.face_forces(interface.faces[name], Loading(0.0, tail))
+        )
         #: forces on the loaded unknowns and t_0; with the water in the joints: of the last loadings
         self.external_forces = lru_cache(maxsize=4)(self._external_forces)
         self.loads = lru_cache(maxsize=4)(self._loads)
@@ -68,7 +76,7 @@ class Equilibrium:
         also silt and the added mass of the water in an earthquake.
         """
         case = self.case
-        level = loading.tail if face.side in ("down", "bed") else loading.level
+        level = loading.tail if face.side in BY_TAIL else loading.level
         if case["face_load"] == "uniform":
             pressure = np.full(len(face.y), self.unit_weight * level)
             return face.spread(-pressure[:, None] * face.normals)
@@ -115,8 +123,12 @@ class Equilibrium:
         bulk = self.bulk
         forces = np.zeros(bulk.pressure.shape[1])
         for name, face in self.interface.faces.items():
+            by_tail = face.side in BY_TAIL
+            on_face = (
+                self.tail_forces(name, loading.tail) if by_tail else self.face_forces(face, loading)
+            )
             dofs = bulk.dof_of_face[name]
-            np.add.at(forces, dofs[dofs >= 0], self.face_forces(face, loading)[dofs >= 0])
+            np.add.at(forces, dofs[dofs >= 0], on_face[dofs >= 0])
         total = bulk.pressure @ forces
         for name, size in self.unit_loads(loading).items():
             total += size * bulk.units[name]

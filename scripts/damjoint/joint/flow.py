@@ -7,20 +7,16 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy import linalg, sparse
 
-from ..arrays import Array, IntArray, Sparse
+from ..arrays import Array, IntArray
+from ..csr import CsrMatrix, added
 from ..fem import elements
 from ..model.mesh import JointMesh
+from ..threads import scipy_linalg
 
-
-def scaled(matrix: Sparse, weights: Array) -> Sparse:
-    """Product diag(weights) matrix."""
-    return sparse.csr_matrix(
-        (matrix.data * np.repeat(weights, np.diff(matrix.indptr)), matrix.indices, matrix.indptr),
-        matrix.shape,
-    )
-
+#: Number of unknowns up to which the Laplace equation is solved by a dense matrix: scipy takes
+#: longer to load.
+DENSE = 300
 
 #: No drains.
 NO_NODES = np.zeros(0, int)
@@ -33,8 +29,8 @@ class Wetted:
     """
 
     points: elements.Points
-    opening: Sparse
-    fields: Sparse
+    opening: CsrMatrix
+    fields: CsrMatrix
 
 
 class JointFields:
@@ -55,7 +51,7 @@ class JointFields:
         self.at_points = points.values
         self.slopes = [g for g in points.gradients[: joint.dim] if np.abs(g.data).max() > 1e-12]
         self.at_locations = space.interpolation(1)
-        laplace = sum(g.T @ scaled(g, points.weights) for g in self.slopes).tocsc()
+        laplace = added([g.T @ g.scaled(points.weights) for g in self.slopes])
         self.ends = np.concatenate([heel, toe])
         self.inside = np.setdiff1d(np.arange(number), self.ends)
         y = surface.points[:, 1]
@@ -80,15 +76,20 @@ class JointFields:
         return np.asarray(np.linalg.norm(away - feet, axis=2).min(axis=1))
 
 
-def harmonic(laplace: Sparse, fixed: IntArray, values: Array) -> Array:
+def harmonic(laplace: CsrMatrix, fixed: IntArray, values: Array) -> Array:
     """Solve the Laplace equation (n,) with these values at fixed nodes."""
     field = np.zeros(laplace.shape[0])
     field[fixed] = values
     free = np.setdiff1d(np.arange(len(field)), fixed)
-    if len(free):
-        from scipy.sparse.linalg import splu  # takes long to load
+    rows = laplace[free]
+    right = -(rows.columns(fixed) @ values)
+    matrix = rows.columns(free)
+    if len(free) <= DENSE:
+        field[free] = np.linalg.solve(matrix.toarray(), right)
+    else:
+        from scipy.sparse.linalg import splu
 
-        field[free] = splu(laplace[free][:, free]).solve(-laplace[free][:, fixed] @ values)
+        field[free] = splu(matrix.scipy().tocsc()).solve(right)
     return field
 
 
@@ -158,16 +159,16 @@ class Flow:
         fields: JointFields,
         points: elements.Points,
         wetted: Wetted,
-        at_points: Sparse,
+        at_points: CsrMatrix,
     ) -> None:
         """points: Gauss points of the law; at_points: jump there from the unknowns."""
         self.fields, self.points, self.dim = fields, points, fields.dim
         self.inside, number = fields.inside, fields.nodes
         #: nodal forces of the pressure at the inner nodes
-        inner = wetted.fields[:, self.inside]
-        self.lift = (wetted.opening.T @ scaled(inner, wetted.points.weights)).tocsr()
+        inner = wetted.fields.columns(self.inside).scaled(wetted.points.weights)
+        self.lift = wetted.opening.T @ inner
         self.opening = at_points[:: fields.dim]
-        self.inner_slopes = [g[:, self.inside] for g in fields.slopes]
+        self.inner_slopes = [g.columns(self.inside) for g in fields.slopes]
         slopes = [g @ fields.xi for g in fields.slopes]
         size = np.sqrt(sum(t**2 for t in slopes))
         #: unit vectors towards the toe at the Gauss points
@@ -184,8 +185,8 @@ class Flow:
             # their entries in the matrix
             self.products, entries_of = [], []
             pattern = fields.at_points
-            for width in np.unique(np.diff(pattern.indptr)):
-                rows = np.flatnonzero(np.diff(pattern.indptr) == width)
+            for width in np.unique(pattern.counts):
+                rows = np.flatnonzero(pattern.counts == width)
                 entries = pattern.indptr[rows][:, None] + np.arange(width)
                 nodes = pattern.indices[entries]
                 product = sum(
@@ -274,10 +275,11 @@ class Flow:
         nodes = self.inside[free]
         total = imposed.copy()
         total[drains] = drained
+        linalg = scipy_linalg()
         try:
             factor = linalg.cho_factor(matrix[np.ix_(nodes, nodes)])
             total[nodes] -= linalg.cho_solve(factor, matrix[nodes] @ total)
-        except (linalg.LinAlgError, ValueError):
+        except (np.linalg.LinAlgError, ValueError):
             return FlowSolution(pressure=np.full(len(self.inside), np.nan), systems=[])
 
         def inverse(coupling: Array) -> Array:
@@ -301,11 +303,13 @@ class Flow:
         columns = np.unique(opening.indices)
 
         def of(system: FlowSystem) -> Array:
-            coupling = sum(
-                g[points].T @ scaled(opening, rate[points] * d[points])
-                for g, d in zip(self.inner_slopes, system.gradients, strict=True)
+            coupling = added(
+                [
+                    g[points].T @ opening.scaled(rate[points] * d[points])
+                    for g, d in zip(self.inner_slopes, system.gradients, strict=True)
+                ]
             )
-            return -system.inverse(coupling[:, columns].toarray())
+            return -system.inverse(coupling.columns(columns).toarray())
 
         parts = (system.share * of(system) for system in solution.systems)
         return FlowDerivative(pressure=np.asarray(sum(parts)), columns=columns)
@@ -329,7 +333,7 @@ class Flow:
             flux[self.order] = np.repeat(of_parts, np.diff(known))
             return flux, float(of_parts[-1])
         slopes = self.fields.slopes
-        at_toe = 1.0 * np.isin(np.arange(self.fields.nodes), self.fields.toe)
+        at_toe: Array = np.isin(np.arange(self.fields.nodes), self.fields.toe).astype(float)
         # tested with the function that is 1 at the toe: consistent with the weak form
         out = sum((g @ total) * (g @ at_toe) for g in slopes)
         leakage = -float(points.weights @ (conductivity * out)) / width

@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy import sparse
 
-from ..arrays import Array, IntArray, Sparse
+from ..arrays import Array, IntArray
+from ..csr import CsrMatrix, added, stacked
 from ..fem import elements
 from ..fem.cache import cached, key_of
-from ..fem.condensation import Condensed, CondensedJoint
+from ..fem.condensed import Condensed, CondensedJoint
 from ..model.case import Case, OfJoint
 from ..model.mesh import JointMesh, heel_normal
 from ..model.scene import UP
@@ -126,26 +126,21 @@ class JointInterface:
         means = [np.bincount(self.rows, column) / count for column in columns.T]
         return np.column_stack(means) if values.ndim > 1 else means[0]
 
-    def _components(self, values: Sparse, frames: Array, most: int = 3) -> Sparse:
+    def _components(self, values: CsrMatrix, frames: Array, most: int = 3) -> CsrMatrix:
         """The first `most` components in frames (q, 3, 3) of the jump, interpolated by values (q,
         functions): point by point, from the unknowns.
         """
         parts = [values @ self.unknowns[c :: self.dim] for c in range(self.dim)]
         number = min(self.dim, most)
-        stacked = sparse.vstack(
-            [
-                sum(
-                    parts[c].multiply(frames[:, k, c, None])
-                    for c in range(self.dim)
-                    if frames[:, k, c].any()
-                )
-                for k in range(number)
-            ],
-            format="csr",
-        )
-        return stacked[np.arange(stacked.shape[0]).reshape(number, -1).T.ravel()]
 
-    def jumps(self, matrix: Sparse, unknowns: Array) -> Array:
+        def along(axes: Array) -> CsrMatrix:
+            return added([part.scaled(axes[:, c]) for c, part in enumerate(parts)])
+
+        rows = stacked([along(frames[:, k]) for k in range(number)])
+        rows = rows.where(rows.data != 0)
+        return rows[np.arange(rows.shape[0]).reshape(number, -1).T.ravel()]
+
+    def jumps(self, matrix: CsrMatrix, unknowns: Array) -> Array:
         """delta_n, delta_t1, delta_t2 (q, 3) by at_points or at_nodes."""
         return np.pad((matrix @ unknowns).reshape(-1, self.dim), ((0, 0), (0, 3 - self.dim)))
 
@@ -196,7 +191,7 @@ class JointInterface:
         points, fields = (points_where(space, height) for space in (self.space, linear))
         return self._wetted(points, fields.values)
 
-    def _wetted(self, points: elements.Points, fields: Sparse) -> Wetted:
+    def _wetted(self, points: elements.Points, fields: CsrMatrix) -> Wetted:
         opening = self._components(points.values, self.frames[points.elements], 1)
         return Wetted(points=points, opening=opening, fields=fields)
 
@@ -231,11 +226,6 @@ class JointInterface:
         return nodes, np.flatnonzero(beside[self.points.elements])
 
 
-def stacked(matrices: list[Sparse]) -> Sparse:
-    """Matrices below each other."""
-    return sparse.vstack(matrices, format="csr")
-
-
 class Interface:
     """The joints of condensed bodies; unknowns: their free displacement jumps (j,)."""
 
@@ -247,9 +237,7 @@ class Interface:
         self.at_points = stacked([joint.at_points for joint in self.joints])
         #: likewise at the nodes, by the rows of each joint
         self.at_nodes = stacked([joint.at_nodes for joint in self.joints])
-        self.from_points = self.at_points.T.tocsr()
-        #: pattern of from_points: unknowns on which each component at a Gauss point acts
-        self.touched = self.from_points != 0
+        self.from_points = self.at_points.T
         self.faces = {
             name: WetFace(face, bulk.order, bulk.dim, int(face_points))
             for name, face in bulk.faces.items()
@@ -258,22 +246,21 @@ class Interface:
         #: height of the reservoir floor [m]
         self.floor = min(upstream, default=0.0)
         self._undamaged: UndamagedSystem | None = None
-        self._lift: tuple[tuple[int, ...], Sparse] = (), None
+        self._lift: tuple[tuple[int, ...], CsrMatrix] | None = None
 
-    def jumps(self, matrix: Sparse, unknowns: Array) -> Array:
+    def jumps(self, matrix: CsrMatrix, unknowns: Array) -> Array:
         """delta_n, delta_t1, delta_t2 (q, 3) by at_points or at_nodes."""
         return np.pad((matrix @ unknowns).reshape(-1, self.dim), ((0, 0), (0, 3 - self.dim)))
 
     def forces(self, traction: Array) -> Array:
         """Nodal forces (j,) of a traction (q, 3) at the Gauss points."""
         weighted = self.weights[:, None] * traction[:, : self.dim]
-        return np.asarray(self.from_points @ weighted.ravel())
+        return self.from_points @ weighted.ravel()
 
-    def lift(self, flowing: tuple[int, ...]) -> Sparse:
+    def lift(self, flowing: tuple[int, ...]) -> CsrMatrix:
         """Nodal forces of the pressures of the joints of these numbers; the last ones are kept."""
-        if flowing != self._lift[0]:
-            lifts = [self.joints[k].flow.lift for k in flowing]
-            self._lift = flowing, sparse.hstack(lifts, format="csr")
+        if self._lift is None or flowing != self._lift[0]:
+            self._lift = flowing, stacked([self.joints[k].flow.lift.T for k in flowing]).T
         return self._lift[1]
 
     @property
@@ -283,23 +270,23 @@ class Interface:
 
     # -- linear systems
 
-    def stiffness(self, tangent: Array, points: IntArray) -> Sparse:
+    def stiffness(self, tangent: Array, points: IntArray) -> CsrMatrix:
         """Stiffness (j, j) of some Gauss points with a tangent (points, 3, 3)."""
         number, d = len(points), self.dim
-        if not number:
-            return sparse.csr_matrix((self.at_points.shape[1],) * 2)
         rows = self.at_points[(d * points[:, None] + np.arange(d)).ravel()]
         blocks = self.weights[points, None, None] * tangent[:, :d, :d]
-        diagonal = blocks, np.arange(number), np.arange(number + 1)
-        return (rows.T @ (sparse.bsr_matrix(diagonal, (d * number,) * 2) @ rows)).tocsr()
+        columns = np.repeat(np.arange(d * number).reshape(number, d), d, axis=0)
+        diagonal = CsrMatrix(
+            blocks.ravel(), columns.ravel(), d * np.arange(d * number + 1), (d * number,) * 2
+        )
+        return rows.T @ (diagonal @ rows)
 
     def undamaged(self, tangent: Array) -> UndamagedSystem:
         """Linear system of the undamaged joints for a tangent (q, 3, 3); the last one is kept."""
         if self._undamaged is None or not np.array_equal(tangent, self._undamaged.tangent):
             points = np.arange(len(self.weights))
-            of_joints = self.stiffness(tangent, points).tocoo()
             matrix = self.bulk.stiffness.copy()
-            matrix[of_joints.row, of_joints.col] += of_joints.data
+            self.stiffness(tangent, points).add_to(matrix)
             self._undamaged = UndamagedSystem(tangent, matrix)
         return self._undamaged
 
@@ -308,7 +295,7 @@ class Interface:
         # rows: components of the traction
         differs = (tangent != undamaged).any(axis=2)[:, : self.dim]
         points = np.flatnonzero(differs.any(axis=1))
-        rows = np.flatnonzero(self.touched @ differs.ravel())
+        rows = np.unique(self.at_points[np.flatnonzero(differs)].indices)
         change = tangent[points] - undamaged[points]
         return Change(law=self.stiffness(change, points)[rows], rows=rows)
 

@@ -13,12 +13,14 @@ equation it stays regular at a limit point of the load, where A is singular.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.linalg import norm
-from scipy import linalg
 
-from ..arrays import Array, IntArray, Sparse, mirror
+from ..arrays import Array, IntArray, mirror
+from ..csr import CsrMatrix
+from ..threads import scipy_linalg
 from .flow import FlowDerivative
 
 
@@ -26,7 +28,8 @@ from .flow import FlowDerivative
 class Change:
     """L (rows, j), without its zero rows, and P if water flows, in joints of these numbers."""
 
-    law: Sparse
+    #: a CsrMatrix; dense in the steps of a small model, see dynamics/small_joints.py
+    law: Any
     rows: IntArray
     flow: FlowDerivative | None = None
     flowing: tuple[int, ...] = ()
@@ -46,40 +49,45 @@ class UndamagedSystem:
     """The inverse tangent of the undamaged joints, C = A_0^-1 (j, j)."""
 
     def __init__(self, tangent: Array, matrix: Array) -> None:
-        """tangent: (q, 3, 3) of the Gauss points; matrix: A_0, overwritten.
+        """tangent: (q, 3, 3) of the Gauss points; matrix: A_0, overwritten if it is large.
 
         Raises LinAlgError if A_0 is not positive definite: the joint does not support the dam.
         """
         self.tangent = tangent
-        factor, info = linalg.lapack.dpotrf(matrix.T, lower=True, overwrite_a=True, clean=False)
-        if info:
-            raise linalg.LinAlgError("tangent of the undamaged joint: not positive definite")
-        inverse, _ = linalg.lapack.dpotri(factor, lower=True, overwrite_c=True)
-        self.compliance: Array = mirror(inverse).T
-        self._by_pressure: tuple[Sparse, Array] | None = None
+        #: A_0 of few unknowns
+        self.matrix = matrix if len(matrix) <= FEW else None
+        self.compliance = positive_inverse(matrix)
+        self._by_pressure: tuple[CsrMatrix, Array] | None = None
 
-    def by_pressure(self, lift: Sparse) -> Array:
+    def by_pressure(self, lift: CsrMatrix) -> Array:
         """C B (j, p), the jumps by unit pressures with nodal forces B; the last one is kept."""
         if self._by_pressure is None or self._by_pressure[0] is not lift:
             self._by_pressure = lift, np.ascontiguousarray((lift.T @ self.compliance).T)
         return self._by_pressure[1]
 
     def solve(
-        self, change: Change, right: Array, border: Border | None = None, lift: Sparse | None = None
+        self,
+        change: Change,
+        right: Array,
+        border: Border | None = None,
+        lift: CsrMatrix | None = None,
     ) -> tuple[Array, float]:
         """Solve A x = right (j,), bordered or not; x and s (0 without border).
 
         lift: B, if water flows. Raises LinAlgError if the system is singular.
         """
         compliance, law, rows, flow = self.compliance, change.law, change.rows, change.flow
-        m, start = len(rows), compliance @ right
+        m = len(rows)
         size = m + (len(flow.pressure) if flow else 0)
+        if self.matrix is not None and size > len(right) / 2:
+            return self._solve_whole(self.matrix.copy(), change, right, border, lift)
+        start = compliance @ right
         small = np.zeros((size + (border is not None),) * 2)
         small_right = np.zeros(len(small))
         touched = np.unique(law.indices)
-        small[:m, :m] = law[:, touched] @ compliance[np.ix_(touched, rows)]
+        small[:m, :m] = law.columns(touched) @ compliance[np.ix_(touched, rows)]
         small_right[:m] = law @ start
-        if flow:
+        if flow and lift:
             by_pressure = self.by_pressure(lift)
             small[:m, m:size] = -(law @ by_pressure)
             small[m:size, :m] = flow.pressure @ compliance[np.ix_(flow.columns, rows)]
@@ -106,9 +114,53 @@ class UndamagedSystem:
         x -= s * by_slope
         return x, s
 
+    def _solve_whole(
+        self,
+        matrix: Array,
+        change: Change,
+        right: Array,
+        border: Border | None,
+        lift: CsrMatrix | None,
+    ) -> tuple[Array, float]:
+        """The same by A, assembled from A_0."""
+        matrix[change.rows] += change.law.toarray()
+        if change.flow and lift:
+            matrix[:, change.flow.columns] -= lift @ change.flow.pressure
+        if border is None:
+            return lu_solve(matrix, right), 0.0
+        # a row of the size of the others, for the choice of the pivots
+        scale = np.abs(matrix).max() / (np.abs(border.row).max() or 1)
+        whole = np.empty((len(right) + 1,) * 2)
+        whole[:-1, :-1], whole[:-1, -1] = matrix, border.slope
+        whole[-1, :-1], whole[-1, -1] = scale * border.row, scale * border.rate
+        *x, s = lu_solve(whole, np.append(right, scale * border.gap))
+        return np.array(x), float(s)
 
-#: Number of unknowns from which on single precision pays.
-SINGLE_PRECISION = 300
+
+def positive_inverse(matrix: Array) -> Array:
+    """The inverse of a symmetric positive definite matrix, which may be overwritten.
+
+    Raises LinAlgError if it is not positive definite.
+    """
+    if len(matrix) <= FEW:
+        np.linalg.cholesky(matrix)
+        inverse = np.linalg.inv(matrix)
+        return np.asarray((inverse + inverse.T) / 2)
+    lapack = scipy_linalg().lapack
+    factor, info = lapack.dpotrf(matrix.T, lower=True, overwrite_a=True, clean=False)
+    if info:
+        raise np.linalg.LinAlgError("not positive definite")
+    inverse, _ = lapack.dpotri(factor, lower=True, overwrite_c=True)
+    return mirror(inverse).T
+
+
+#: Number of unknowns up to which numpy inverts a matrix (by LU, three times the operations, but
+#: scipy takes longer to load), and A is factorised where more than half of its rows change.
+FEW = 600
+
+#: Number of unknowns from which on single precision pays: fewer save less than it takes to load
+#: scipy.
+SINGLE_PRECISION = 450
 
 
 def lu_solve(matrix: Array, right: Array) -> Array:
@@ -120,11 +172,12 @@ def lu_solve(matrix: Array, right: Array) -> Array:
     if not right.any():
         return np.zeros_like(right)
     if len(right) > SINGLE_PRECISION:
-        factors, pivots, info = linalg.lapack.sgetrf(matrix.T.astype(np.float32), overwrite_a=True)
+        lapack = scipy_linalg().lapack
+        factors, pivots, info = lapack.sgetrf(matrix.T.astype(np.float32), overwrite_a=True)
         solution: Array = np.zeros_like(right)
         residual, size = right, norm(right)
         for _ in range(0 if info else 8):
-            correction = linalg.lapack.sgetrs(factors, pivots, residual / size, trans=1)[0]
+            correction = lapack.sgetrs(factors, pivots, residual / size, trans=1)[0]
             solution = solution + size * correction
             residual, before = right - matrix @ solution, size
             size = norm(residual)
@@ -132,7 +185,4 @@ def lu_solve(matrix: Array, right: Array) -> Array:
                 return solution
             if not size < 0.1 * before:
                 break
-    factors, pivots, info = linalg.lapack.dgetrf(matrix.T, overwrite_a=True)
-    if info:
-        raise linalg.LinAlgError("singular matrix")
-    return np.asarray(linalg.lapack.dgetrs(factors, pivots, right, trans=1)[0])
+    return np.asarray(np.linalg.solve(matrix, right))

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from .. import ROUND_OFF
-from ..arrays import Array, Sparse
+from ..arrays import Array
+from ..csr import CsrMatrix
 from ..laws import Law
 from ..model.case import Case, flows, has_drains, remembers
 from ..model.loads import Loading, heads_at_ends
@@ -63,7 +64,7 @@ class JointWater:
         self.wetted = joint.wetted_within(self.waterstop) if self.waterstop else joint.wetted
         self.law: Law[Any] = case.law
 
-    def head(self, loading: Loading, matrix: Sparse | None = None) -> Array:
+    def head(self, loading: Loading, matrix: CsrMatrix | None = None) -> Array:
         """Head [m] in a joint of uniform transmissivity, at the joint's nodes or at the places that
         an interpolation matrix of `JointFields` leads to: linear along the joint between the heads
         of `heads_at_ends`. With a waterstop: that of the reservoir.
@@ -89,7 +90,7 @@ class JointWater:
             drained + (last - drained) * (xi - at) / (1 - at),
         )
 
-    def uplift(self, loading: Loading, matrix: Sparse, y: Array, beyond: Array | float) -> Array:
+    def uplift(self, loading: Loading, matrix: CsrMatrix, y: Array, beyond: Array | float) -> Array:
         """Pressure [Pa], not below zero, at places of height y that an interpolation matrix of
         `JointFields` leads to; beyond: pressure of flowing water beyond the imposed one.
         """
@@ -222,7 +223,7 @@ class JointWater:
             inner = self.solve_flow(*opened, loading).pressure
         beyond = self.expand_to_nodes(np.asarray(inner))
 
-        def at(matrix: Sparse, positions: Array) -> Array:
+        def at(matrix: CsrMatrix, positions: Array) -> Array:
             if not self.wet:
                 return np.zeros(len(positions))
             return self.uplift(loading, matrix, positions[:, 1], matrix @ beyond)

@@ -12,9 +12,9 @@ from collections.abc import Callable, Iterator
 from functools import cached_property
 
 import numpy as np
-from scipy import sparse
 
 from ..arrays import Array, IntArray
+from ..csr import CsrMatrix
 from ..fem import elements
 from ..model.mesh import Face
 
@@ -152,7 +152,7 @@ def points_where(space: elements.Space, height: Array) -> elements.Points:
     return elements.Points(
         weights=np.array(areas, float),
         positions=np.array(places, float).reshape(-1, 3),
-        values=sparse.csr_matrix(data, (len(rows), len(space.locations))),
+        values=CsrMatrix(*data, (len(rows), len(space.locations))),
         gradients=(),
         elements=np.array(numbers, int),
     )

@@ -628,32 +628,40 @@ class Mesh:
             "joint_elements": sum(len(surface.element_tags) for surface in joints),
         }
 
-    def _divide_faces(self) -> None:
-        """Give each of `faces` a physical group of its own, numbered as in pro/section.pro."""
-        gmsh = start_gmsh()
-        d, first = self.dim - 1, int(constants()["SEGMENT"][0])
-        faces = list(self.faces.values())
+    def face_entities(self) -> list[list[int]]:
+        """Gmsh's curves or surfaces of each of `faces`; the mesh must be Gmsh's current one.
+
+        Raises InputError if one of them is part of several bodies.
+        """
+        gmsh, faces = start_gmsh(), list(self.faces.values())
         entities: list[list[int]] = [[] for _ in faces]
-        for _, entity in gmsh.model.getEntities(d):
-            tags = np.concatenate([np.zeros(0, int), *gmsh.model.mesh.getElements(d, entity)[1]])
+        for _, entity in gmsh.model.getEntities(self.dim - 1):
+            parts = gmsh.model.mesh.getElements(self.dim - 1, entity)[1]
+            tags = np.concatenate([np.zeros(0, int), *parts])
             for of_face, face in zip(entities, faces, strict=True):
                 within = np.isin(tags, face.surface.element_tags)
-                if within.all() and len(tags):
-                    of_face.append(entity)
-                elif within.any():
+                if within.any() and not within.all():
                     raise self._bad(
-                        f"a face of side {face.side}: must be divided where its bodies meet with "
-                        "engine = getdp"
+                        f"a face of {face.body}: must have curves or surfaces of its own with "
+                        "engine = getdp, divided where the body ends"
                     )
-        gmsh.model.removePhysicalGroups([(d, first + i) for i in range(len(faces))])
+                if within.any():
+                    of_face.append(entity)
+        return entities
+
+    def _divide_faces(self) -> None:
+        """Give each of `faces` a physical group of its own, numbered as in pro/section.pro."""
+        gmsh, first = start_gmsh(), int(constants()["SEGMENT"][0])
+        entities, d = self.face_entities(), self.dim - 1
+        gmsh.model.removePhysicalGroups([(d, first + i) for i in range(len(entities))])
         for i, of_face in enumerate(entities):
             gmsh.model.addPhysicalGroup(d, of_face, first + i)
 
     def write(self, path: Path) -> None:
         """Write the mesh, which must be Gmsh's current one, for GetDP (MSH 2.2, binary).
 
-        Raises OSError if the disk is full, which Gmsh does not report; InputError if a curve or
-        surface of a face is part of several bodies.
+        Raises OSError if the disk is full, which Gmsh does not report; InputError as
+        `face_entities`.
         """
         gmsh = start_gmsh()
         if self.divided:

@@ -11,7 +11,7 @@ import signal
 import tempfile
 import threading
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import lru_cache
 from types import ModuleType
 from typing import Any
@@ -187,21 +187,20 @@ def sources() -> str:
 @lru_cache(maxsize=1)
 def declared() -> dict[str, Parameter]:
     """All declared parameters by name."""
+    stored = cached("declarations", sources(), lambda: [asdict(p) for p in declarations()])
+    parameters = (Parameter(**one | {"choices": tuple(one["choices"])}) for one in stored)
+    return {parameter.name: parameter for parameter in parameters}
+
+
+def declarations() -> list[Parameter]:
+    """All declared parameters, by Gmsh's parser without a case."""
     text = re.sub(r"//[^\n]*", "", DECLARATIONS.read_text())
-    rest_of = dict(DECLARED.findall(text))
-    label_of = {name: matched(r'Name\s+"([^"]+)"', rest) for name, rest in rest_of.items()}
-    entries = cached("parameters", sources(), lambda: onelab_entries(list(label_of.values())))
-    return {
-        name: declaration(name, rest, text, label_of[name], entries[label_of[name]])
-        for name, rest in rest_of.items()
-    }
-
-
-def onelab_entries(labels: list[str]) -> dict[str, Any]:
-    """Entries of the ONELAB database by label, without a case."""
     parse_by_gmsh(INCLUDE)
-    gmsh = start_gmsh()
-    return {label: json.loads(gmsh.onelab.get(label)) for label in labels}
+    gmsh, result = start_gmsh(), []
+    for name, rest in DECLARED.findall(text):
+        label = matched(r'Name\s+"([^"]+)"', rest)
+        result.append(declaration(name, rest, text, label, json.loads(gmsh.onelab.get(label))))
+    return result
 
 
 def declaration(name: str, rest: str, text: str, label: str, entry: dict[str, Any]) -> Parameter:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import zip_longest
 from textwrap import wrap
 from typing import NamedTuple
 
 import numpy as np
-from tabulate import tabulate
 
 from ..model.results import Results
 from ..statics import gravity
@@ -103,5 +104,27 @@ def text_of_joint(result: Results) -> str:
         "\n".join([*wrap(name, 10), f"[{size}]" if size else ""])
         for name, size in zip(names, sizes, strict=True)
     ]
-    sides = *("right" for _ in heads[1:]), "left"
-    return str(tabulate(rows, heads, disable_numparse=True, colalign=sides))
+    return aligned(rows, heads)
+
+
+#: Blanks between two columns; a column is at least so much wider than its heading.
+GAP = 2
+
+
+def aligned(rows: list[tuple[str, ...]], heads: list[str]) -> str:
+    """Align rows of cells below headings of several lines; the last column to the left, the others
+    to the right. (A package for this takes longer to load than the run to compute.)
+    """
+    lines = list(zip_longest(*(head.split("\n") for head in heads), fillvalue=""))
+    widths = [
+        max(*(len(part) + GAP for part in head), *map(len, cells))
+        for head, cells in zip(zip(*lines, strict=True), zip(*rows, strict=True), strict=True)
+    ]
+    sides = [str.rjust] * (len(widths) - 1) + [str.ljust]
+
+    def line(cells: Sequence[str]) -> str:
+        padded = (side(c, w) for side, c, w in zip(sides, cells, widths, strict=True))
+        return (" " * GAP).join(padded).rstrip()
+
+    rule = (" " * GAP).join("-" * width for width in widths)
+    return "\n".join([*map(line, lines), rule, *map(line, rows)])

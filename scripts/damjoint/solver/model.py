@@ -209,14 +209,16 @@ class Model:
                     side, mode = np.where(releasing, 0, side), replace(mode, releasing=releasing)
             here = replace(loads, level=level)
             residual = equilibrium.residual(jump, variables, here, mode, frozen_lift, still)
-            size, border = float(np.linalg.norm(residual.value)), None
+            size, gap = float(np.linalg.norm(residual.value)), 0.0
             if isinstance(control, DisplacementControl):
                 gap = control.value - control.measure(equilibrium, jump, here)
-                border = control.gradient(equilibrium), control.rate(equilibrium, here), gap
                 size = float(np.hypot(size, stiffness * gap))
 
             def correction(secant: bool) -> tuple[Array, float]:
-                edge = border and Border(residual.by_level(), *border)
+                edge = None
+                if isinstance(control, DisplacementControl):
+                    row, rate = control.gradient(equilibrium), control.rate(equilibrium, here)
+                    edge = Border(residual.by_level(), row, rate, gap)
                 change = residual.by_jump(secant)
                 return interface.solve(equilibrium.undamaged, change, -residual.value, edge)
 

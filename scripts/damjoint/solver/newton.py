@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg
 
 from ..arrays import Array
 
@@ -115,7 +114,7 @@ def newton(
         sizes.append(now.size)
         try:
             jump, level = now.correction(iterations < strategy.secant)
-        except (linalg.LinAlgError, ValueError):  # singular, or not a number
+        except (np.linalg.LinAlgError, ValueError):  # singular, or not a number
             return None
         fraction = 1.0
         for _ in range(strategy.halvings + 1):

@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 from scipy.optimize import bisect
-from threadpoolctl import threadpool_limits
 
 from .. import InputError
 from ..arrays import Setting, Settings
@@ -35,6 +34,7 @@ from ..solver.path import PRECISION, ROUGH, SURE, Point
 from ..statics import gravity
 from ..statics.limit import elastic_heel_stress
 from ..statics.verdict import bound, highest_by_statics, statement, tension_share
+from ..threads import limited_threads
 from .failure_path import FailurePath, Trial, critical_columns, row
 
 #: Parameters that are divided by the strength reduction factor. The fracture energies are included:
@@ -229,7 +229,7 @@ class Search:
 
     def run(self) -> CriticalValue:
         """Search."""
-        with threadpool_limits(1):
+        with limited_threads(1):
             return self.level() if self.of == "level" else self.value()
 
     def level(self) -> CriticalValue:

@@ -5,17 +5,14 @@ from __future__ import annotations
 import contextlib
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
-from tabulate import tabulate
-from threadpoolctl import threadpool_limits
 
 from .. import ROUND_OFF, InputError, RunError
-from ..arrays import Array
-from ..arrays import Table as Columns
+from ..arrays import Array, Table
 from ..dynamics import checkpoint
 from ..dynamics.frames import at_nodes
 from ..dynamics.history import QuakeHistory
@@ -29,12 +26,10 @@ from ..fem.bodies import Bodies
 from ..joint.interface import interface_of
 from ..model.case import Case
 from ..model.fields import Field, Solution
-from ..model.mesh import Mesh
-from ..model.results import QUAKE, QUAKE_OF_JOINTS, Results, column_of, quake_columns
+from ..model.results import column_of
 from ..post import folder as folders
 from ..post import tables
 from ..post.field_files import write_fields
-from ..post.summary import Table
 from ..progress import Progress
 from ..solver.controls import LevelControl
 from ..solver.history import joint_row
@@ -43,7 +38,9 @@ from ..solver.model import Model, StepResult
 from ..solver.state import State
 from ..statics.verdict import statement
 from ..storage import atomic_write
+from ..threads import limited_threads
 from ..versions import versions
+from .quake_result import QuakeResult
 
 #: Files of an earthquake: rows, tables of the joints in the frames, stress along the first joint in
 #: time, the run under way.
@@ -62,7 +59,7 @@ MEAN_OVER = 1.0
 #: Format of the progress bar: seconds of the record.
 BAR = "{desc} {n:.2f} of {total:.2f} s|{bar}| {elapsed}, {remaining} left"
 
-#: Columns of which the largest size is reported.
+#: Table of which the largest size is reported.
 PEAKS = ("ground_ax", "crest_ux", "crest_ax")
 PEAKS_OF_JOINTS = ("heel_opening", "toe_opening", "slip_mean", "open_length")
 
@@ -94,51 +91,6 @@ def check(case: Case, span: Span = None) -> None:
             f"fields = {span[0]:g}:{span[1]:g}: must begin before the end of the record, "
             f"{duration:g} s"
         )
-
-
-@dataclass(frozen=True, kw_only=True)
-class QuakeResult:
-    """The rows of an earthquake and what they amount to."""
-
-    case: Case
-    rows: Columns
-    #: time (rows,), distance from the heel (nodes,), effective normal stress (rows, nodes)
-    stress: Columns
-    #: the tables of the static loads; and with the state after the earthquake as a further row
-    before: Results
-    static: Results
-    #: the tables of the frames; times in seconds
-    frames: Results
-    #: displacement and stress of the bodies by time of the static states, and of the frames
-    static_fields: Callable[[], dict[float, Field]]
-    fields: Callable[[], dict[float, Field]]
-    #: states with the largest displacements, in 2D: name, time [s], and the displacement since the
-    #: static state (nodes, 2) of each body [m]
-    shapes: list[tuple[str, float, dict[str, Array]]]
-    mesh: Mesh
-    #: for run.json
-    summary: dict[str, Any]
-    #: whether the dam is in static equilibrium after the earthquake
-    stands: bool
-    #: interrupted or failed; empty if it has reached its end
-    state: str
-    statement: str
-
-    @property
-    def joint(self) -> int:
-        """The number of the joint with the largest residual slip."""
-        slips = [self.summary["residual"][column_of("slip", k)] for k in self.joints]
-        return int(np.argmax(np.abs(slips)))
-
-    @property
-    def joints(self) -> range:
-        """Numbers of the joints."""
-        return range(len(self.case.joints))
-
-    def rows_of(self, joint: int) -> Columns:
-        """The rows of a joint, by its number, with the columns of QUAKE."""
-        own = {name: column_of(name, joint) for name in QUAKE_OF_JOINTS}
-        return {name: self.rows[own.get(name, name)] for name in QUAKE}
 
 
 class QuakeRun:
@@ -192,16 +144,7 @@ class QuakeRun:
         full = self.stands_with_full_uplift()
         if full is not None:
             found["after"]["equilibrium_with_full_uplift_in_the_crack"] = full
-        slips = [
-            f"{1e3 * found['residual'][column_of('slip', k)]:.3g} mm"
-            for k in range(len(quake.case.joints))
-        ]
-        words = f"residual slip {', '.join(slips)}; "
-        words += (
-            "the dam stands after the earthquake"
-            if after is not None
-            else "no static equilibrium is found after the earthquake"
-        )
+        words = statement_of(quake.case, found)
         return self._result_of(found, after is not None, "", words)
 
     def result_so_far(self, error: BaseException) -> QuakeResult:
@@ -272,7 +215,7 @@ class QuakeRun:
             for name, peak in self.history.peaks.items()
         ]
 
-    def stress_table(self) -> Columns:
+    def stress_table(self) -> Table:
         """Effective normal stress along the first joint in time."""
         joint = self.quake.problem.model.equilibrium.interface.joints[0]
         return {
@@ -331,7 +274,7 @@ def run(
 def single_thread() -> Iterator[None]:
     """Compute with a single thread, also in MUMPS: the matrices of a step are small."""
     factor.library()  # a limit reaches only libraries that are loaded
-    with threadpool_limits(1):
+    with limited_threads(1):
         yield
 
 
@@ -365,8 +308,6 @@ def follow(under_way: QuakeRun, path: Path, key: str, progress: bool) -> None:
 def summary(quake: Earthquake, history: QuakeHistory) -> dict[str, Any]:
     """Peaks with their times, residual values, frequencies, damping and the rigid block."""
     case, rows, record = quake.case, history.table, quake.record
-    joints = range(len(case.joints))
-    names = [*PEAKS, *(column_of(name, k) for k in joints for name in PEAKS_OF_JOINTS)]
     result: dict[str, Any] = {
         "record": str(case.record),
         "duration": record.duration,
@@ -382,12 +323,23 @@ def summary(quake: Earthquake, history: QuakeHistory) -> dict[str, Any]:
     }
     if not len(history):
         return result
-    result["peaks"] = {}
-    for name in names:
+    result |= peaks_and_rest(case, rows)
+    for k, joint in enumerate(case.joints):
+        block = rigid_block(quake, k).slip(record) if joint.law.limits_shear else None
+        if block is not None:
+            result["residual"][column_of("rigid_block", k)] = block
+    return result
+
+
+def peaks_and_rest(case: Case, rows: Table) -> dict[str, Any]:
+    """Largest values with their times, and residual slip and tilt, from the rows of quake.csv."""
+    joints = range(len(case.joints))
+    peaks = {}
+    for name in (*PEAKS, *(column_of(name, k) for k in joints for name in PEAKS_OF_JOINTS)):
         row = int(np.argmax(np.abs(rows[name])))
-        result["peaks"][name] = {"value": rows[name][row], "time": rows["time"][row]}
+        peaks[name] = {"value": rows[name][row], "time": rows["time"][row]}
     last = rows["time"] > rows["time"][-1] - MEAN_OVER * (1 - ROUND_OFF)
-    residual = result["residual"] = {}
+    residual = {}
     for k in joints:
         heel, toe, slip = (
             rows[column_of(name, k)][last].mean()
@@ -395,10 +347,20 @@ def summary(quake: Earthquake, history: QuakeHistory) -> dict[str, Any]:
         )
         residual[column_of("slip", k)] = slip
         residual[column_of("tilt", k)] = (heel - toe) / case.joints[k].joint_along
-        if case.joints[k].law.limits_shear:
-            block = rigid_block(quake, k).slip(record)
-            residual |= {} if block is None else {column_of("rigid_block", k): block}
-    return result
+    return {"peaks": peaks, "residual": residual}
+
+
+def statement_of(case: Case, found: dict[str, Any]) -> str:
+    """What a summary says of the end of an earthquake."""
+    slips = [
+        f"{1e3 * found['residual'][column_of('slip', k)]:.3g} mm" for k in range(len(case.joints))
+    ]
+    end = (
+        "the dam stands after the earthquake"
+        if found["after"]["equilibrium"]
+        else "no static equilibrium is found after the earthquake"
+    )
+    return f"residual slip {', '.join(slips)}; {end}"
 
 
 def rigid_block(quake: Earthquake, number: int) -> RigidBlock:
@@ -449,47 +411,3 @@ def write_tables(result: QuakeResult, out: Path) -> None:
     with atomic_write(out / STRESS) as part, part.open("wb") as file:
         np.savez_compressed(file, **result.stress)
     folders.write_info(result.static, out, result.state, result.statement)
-
-
-def peaks_table(found: dict[str, Any], case: Case) -> Table:
-    """Tabulate the peaks of a summary."""
-    columns = quake_columns(case)
-    rows = [
-        (name, columns[name][0], f"{peak['value']:.4g}", f"{peak['time']:.3f}")
-        for name, peak in found["peaks"].items()
-    ]
-    return Table(["peak of", "unit", "value", "at t"], ["", "", "", "s"], rows)
-
-
-#: Residual values of a summary: meaning, unit.
-RESIDUAL = {
-    "slip": ("residual slip", "m"),
-    "tilt": ("residual tilt", "-"),
-    "rigid_block": ("rigid block, slip", "m"),
-}
-
-
-def residual_table(found: dict[str, Any]) -> Table:
-    """Tabulate the residual values of a summary."""
-    rows = [
-        (name.replace(base, meaning), unit, f"{value:.4g}")
-        for name, value in found["residual"].items()
-        for base, (meaning, unit) in RESIDUAL.items()
-        if name.startswith(base)
-    ]
-    return Table(["at rest", "unit", "value"], ["", "", ""], rows)
-
-
-def modes(found: dict[str, Any]) -> str:
-    """Natural frequencies and damping ratios of a summary."""
-    frequencies = ", ".join(f"{f:.3g}" for f in found["frequencies"])
-    ratios = ", ".join(f"{r:.1%}" for r in found["damping"]["ratios"])
-    return f"natural frequencies, joint closed, with the water: {frequencies} Hz; damping {ratios}"
-
-
-def text(result: QuakeResult) -> str:
-    """Peaks and residual values as printed tables."""
-    found = result.summary
-    tables = peaks_table(found, result.case), residual_table(found)
-    parts = [tabulate(table.rows, table.heads, disable_numparse=True) for table in tables]
-    return "\n\n".join([modes(found), *parts])

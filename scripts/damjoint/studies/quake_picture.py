@@ -25,7 +25,7 @@ from ..post.drawing import (
     write_picture,
 )
 from ..post.outline import exaggeration
-from .quake import QuakeResult
+from .quake_result import QuakeResult
 
 #: Height of the curves, and of the deformed dams below them [inches].
 CURVES, SHAPES = 12.0, 2.6

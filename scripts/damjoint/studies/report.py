@@ -27,7 +27,7 @@ from ..post.units import FORCES, MOMENTS, Units, unit
 from ..statics.gravity import GravityMethod, force, resultant_of
 from ..statics.verdict import decisive_joint, failed, statement, stiffness_ratio
 from ..storage import atomic_write
-from . import quake, report_input
+from . import quake_result, report_input
 from .check import (
     REQUIRED,
     SHOWN,
@@ -480,12 +480,12 @@ def earthquake_section(folder: Path, case: Case, info: dict[str, Any]) -> Earthq
         pictures.append(Picture("full", caption, address))
     uplift = report_input.QUAKE_UPLIFTS[found["quake_uplift"]]
     notes = [
-        f"{quake.modes(found)}.",
+        f"{quake_result.modes(found)}.",
         f"{found['steps']} steps of {found['dt']:g} s over {found['time']:g} s, halved up to "
         f"{found['halvings']} times where they did not converge.",
         f"Water pressure in the joint: {uplift}.",
     ]
-    tables = [quake.peaks_table(found, case), quake.residual_table(found)]
+    tables = [quake_result.peaks_table(found, case), quake_result.residual_table(found)]
     return Earthquake(pictures, tables, [note[0].upper() + note[1:] for note in notes])
 
 

@@ -18,8 +18,6 @@ from itertools import chain
 from pathlib import Path
 from typing import TypeAlias
 
-from threadpoolctl import threadpool_limits
-
 from .. import InputError, RunError, __version__, accuracy
 from ..arrays import Value, Values
 from ..engines import engine_of
@@ -32,6 +30,7 @@ from ..solver.load_stepper import LoadStepper
 from ..statics.limit import mechanism
 from ..statics.verdict import failed, statement, verdict
 from ..storage import lock
+from ..threads import limited_threads
 from . import quake
 from .critical import Search
 from .plan import Plan, Row, cases_of, column_of, in_file
@@ -101,7 +100,7 @@ def last_rows(tasks: list[Task]) -> list[dict[str, Value]]:
     if there is no equilibrium), the outcome, the critical value.
     """
     solved: Solved = {}
-    with threadpool_limits(1):
+    with limited_threads(1):
         return [
             (last_row(task, solved) if task.slip_limit is None else quake_row(task))
             | critical_value(task)

@@ -5,20 +5,21 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from functools import lru_cache, partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from threadpoolctl import threadpool_limits
-
-from ...fem.bodies import Bodies
 from ...fem.cache import cached
-from ...fem.condensation import Condensed
+from ...fem.condensed import Condensed
 from ...fem.memory import joint_size
 from ...joint.interface import Interface
 from ...model.case import Case
 from ...model.fields import Field
 from ...model.mesh import mesh_of
 from ...solver.load_stepper import LoadStepper
+from ...threads import limited_threads
 from .. import OnStep, Outcome
+
+if TYPE_CHECKING:  # takes as long to load as a whole 2D run
+    from ...fem.bodies import Bodies
 
 #: Number of jump unknowns from which on several threads of the linear algebra are faster than one.
 THREADED_UNKNOWNS = 2000
@@ -42,7 +43,7 @@ def about(bulk: Condensed) -> dict[str, Any]:
 
 def solve(case: Case, on_step: OnStep, _fields: bool) -> Iterator[Outcome]:
     """The scenes of a case on one condensed mesh; see engines/__init__.py."""
-    with threadpool_limits(1 if case.geometry or joint_size(case) < THREADED_UNKNOWNS else None):
+    with limited_threads(1 if case.geometry or joint_size(case) < THREADED_UNKNOWNS else None):
         start = time.perf_counter()
         bulk, made = cached(case)
         before = bulk.seconds if made else {"cache": time.perf_counter() - start}
@@ -52,6 +53,8 @@ def solve(case: Case, on_step: OnStep, _fields: bool) -> Iterator[Outcome]:
 
         @lru_cache
         def bodies() -> Bodies:
+            from ...fem.bodies import Bodies
+
             return made or Bodies.of(case)
 
         def fields(number: int) -> dict[float, Field]:

@@ -131,11 +131,15 @@ def values_of_joint(case: Case, mesh: Mesh | None, number: int) -> str:
 
 
 def write_problem(
-    case: Case, mesh: Mesh | None, folder: Path, options: dict[str, float] | None = None
+    case: Case,
+    mesh: Mesh | None,
+    folder: Path,
+    options: dict[str, float] | None = None,
+    more_lists: dict[str, list[float]] | None = None,
 ) -> Path:
     """Write the problem file of a case, scene.pro, into the folder of its results.
 
-    mesh: of a user's own geometry; options: further constants of pro/*.pro.
+    mesh: of a user's own geometry; options, more_lists: further constants and lists of pro/*.pro.
     """
     lists: dict[str, Sequence[float]] = {
         "levels": case.levels,
@@ -147,6 +151,7 @@ def write_problem(
     mesh = mesh if case.geometry else None
     if mesh:
         lists |= own_lists(mesh)
+    lists |= more_lists or {}
     if mesh or case.of_joints:
         macros = (values_of_joint(case, mesh, k) for k in range(len(case.joints)))
         of_joints = "of_joints = 1;\n" + "".join(macros)

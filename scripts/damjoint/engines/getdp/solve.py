@@ -62,6 +62,8 @@ def check_own(mesh: Mesh, case: Case) -> None:
     shapes = {shape for solid in mesh.solids.values() for shape, _ in solid.cells}
     if mesh.dim == 3 and shapes != {"tetra"}:
         raise InputError(f"geometry = {case.geometry}: must have tetrahedra with engine = getdp")
+    if mesh.divided:
+        mesh.face_entities()
     for joint, own in zip(mesh.joints, case.joints, strict=True):
         if joint.upper == joint.lower:
             raise InputError(
@@ -81,6 +83,12 @@ def check_own(mesh: Mesh, case: Case) -> None:
 PER_UNKNOWN, EDGES = {2: 3000, 3: 8000}, {2: 4, 3: 8}
 
 
+def check_sizes(case: Case, mesh: Mesh) -> None:
+    """Raise RunError if the unknowns of a mesh need more memory than is available."""
+    functions = mesh.nodes if case["order"] == 1 else EDGES[int(case["dim"])] * mesh.nodes
+    check_size(case, case["dim"] * functions)
+
+
 def check_size(case: Case, unknowns: float) -> None:
     """Raise RunError if so many unknowns need more memory than is available."""
     at_once = min(2, len(case.scenes()))
@@ -96,8 +104,7 @@ def solve(case: Case, on_step: OnStep, fields: bool) -> Iterator[Outcome]:
     if not case.geometry:
         check_size(case, bulk_size(case))
     mesh = mesh_of(case)
-    functions = mesh.nodes if case["order"] == 1 else EDGES[int(case["dim"])] * mesh.nodes
-    check_size(case, case["dim"] * functions)
+    check_sizes(case, mesh)
     meshed = time.perf_counter() - start
     with tempfile.TemporaryDirectory(prefix="damjoint-") as name, ThreadPoolExecutor(2) as pool:
         mesh_file = Path(name) / "scene.msh"

@@ -1,0 +1,161 @@
+"""An earthquake by the reference GetDP model against the condensed engine."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from damjoint.dynamics.history import QuakeHistory
+from damjoint.engines.getdp import quake as engine
+from quakes import DAM, earthquake, smooth_record, write_record
+
+SHORT = DAM | {"record_rest": 0.0, "dt": 0.005}
+BOND = {"law": "bond", "sigma_max": 2e5, "G_f": 100.0, "G_t": 1000.0, "adhesion": 3e5}
+ENDO = {"law": "endo", "sigma_max": 2e5, "adhesion": 1.2 * 0.8 * 2e5, "G_f": 100.0}
+SOLID = {"dim": 3.0, "thickness": 7.0, "hold_z": 1.0, "mesh_pattern": "split"}
+SOLID |= {"n_joint": 6.0, "h_dam": 15.0, "h_found": 45.0}
+BATTER = {"batter": 4.0, "batter_height": 20.0}
+SCENES = {
+    "friction": {},
+    "bond": BOND,
+    "rupture": {"law": "rupture", "sigma_max": 2e5},
+}
+#: Further laws, meshes, water, damping, sections; and steps that are halved.
+MORE = {
+    "endo": ENDO,
+    "order 2": {"order": 2.0},
+    "quadrangles of order 2": {"order": 2.0, "mesh_pattern": "regular"},
+    "dry": {"uplift": "none", "added_mass": 0.0},
+    "flow": {"uplift": "flow"},
+    "flow, unchanged": {"uplift": "flow", "quake_uplift": "unchanged"},
+    "no uplift in the crack": {"quake_uplift": "zero"},
+    "flow, none in the crack": {"uplift": "flow", "quake_uplift": "zero"},
+    "dashpots": {"joint_damping_n": 1e8, "joint_damping_t": 5e7},
+    "dashpots, rupture": {"law": "rupture", "sigma_max": 2e5, "joint_damping_n": 1e8},
+    "cracked bond": {"uplift": "cracked"} | BOND,
+    "Rayleigh, Newmark": {"damping_mass": 1.0, "hht_alpha": 0.0},
+    "Zangar, batter": {"added_mass": 2.0, "hht_alpha": -0.3} | BATTER,
+    "sloping lift": {"joint_height": 10.0, "joint_slope": 3.0} | BATTER,
+    "halved": {"dt": 0.02, "damping": 0.0, "sigma_max": 2e5, "G_f": 20.0, "G_t": 50.0}
+    | {"law": "bond", "adhesion": 2e5, "record_component": "horizontal"},
+    "solid": SOLID,
+    "three joints": {
+        "lift_heights": (15.0, 30.0),
+        "mu": (1.2, 0.7, 0.9),
+        "law": ("bond", "friction", "rupture"),
+    },
+}
+
+
+def both(tmp_path, settings, levels="30"):
+    """quake.csv of the reference GetDP model and of the condensed engine, and the latter."""
+    times = np.arange(0, 0.2001, 0.005)
+    wave = 5 * np.sin(np.pi * times / 0.2) ** 2 * np.sin(10 * np.pi * times)
+    record = write_record(tmp_path / "r.csv", times, wave, -0.7 * wave)
+    quake = earthquake(record, SHORT | settings, levels)
+    history = QuakeHistory.of(quake)
+    for step in quake.steps():
+        history.add(quake, step)
+    found = engine.solve(quake.case, quake.record, quake.damping, quake.dt, lambda _: None)
+    assert found.error is None and found.stands is not None
+    return found.rows, history.table, quake
+
+
+def agree(rows, expected):
+    """Assert equal rows: slips to 1e-5 of the largest one, other columns of their largest value."""
+    assert len(rows["time"]) == len(expected["time"])
+    assert set(engine.ROWS + engine.ROWS_OF_JOINTS) <= set(rows) <= set(expected)
+    slips = [name for name in rows if name.startswith("slip")]
+    size = max(np.abs(expected[name]).max() for name in slips)
+    for name in set(rows) - {"iterations", "residual"}:
+        scale = size if name in slips else np.abs(expected[name]).max()
+        if np.isinf(scale):
+            assert (rows[name] == expected[name]).all()
+        else:
+            assert rows[name] == pytest.approx(expected[name], rel=0, abs=1e-5 * scale), name
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_slip_agrees_with_the_condensed_engine(tmp_path, scene):
+    rows, expected, _ = both(tmp_path, SCENES[scene])
+    agree(rows, expected)
+    assert np.abs(expected["slip_mean"]).max() > 1e-4 and expected["open_length"].max() > 10
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("scene", MORE)
+def test_further_scenes_agree_with_the_condensed_engine(tmp_path, scene):
+    levels = "40" if scene == "halved" else "30"
+    rows, expected, quake = both(tmp_path, MORE[scene], levels)
+    agree(rows, expected)
+    assert np.abs(expected["slip_mean"]).max() > 1e-4
+    assert quake.halvings == (1 if scene == "halved" else 0)
+
+
+# -- the command
+
+
+@pytest.fixture
+def case_file(tmp_path):
+    """A case with a record beside it."""
+    smooth_record(tmp_path / "wave.csv", 5.0, duration=0.2)
+    path = tmp_path / "my.case"
+    lines = [
+        f'default_{n} = "{v}";' if isinstance(v, str) else f"default_{n} = {v};"
+        for n, v in SHORT.items()
+    ]
+    path.write_text(
+        "\n".join(['title = "wave"; record = "wave.csv"; levels() = {20, 30};', *lines, ""])
+    )
+    return path
+
+
+def test_the_command_writes_the_tables_of_both_engines(command, case_file):
+    """quake.csv, and the static states before and after the earthquake."""
+    tables = []
+    for name in "getdp", "condensed":
+        words = "--engine", name, "--out", name, "--no-picture"
+        code, out, _ = command("quake", case_file, *words)
+        assert code == 0 and "residual slip" in out and "40 steps" in out
+        info = json.loads(Path(name, "run.json").read_text())
+        assert (info["engine"], info["state"], info["verdict"]) == (name, "complete", "stands")
+        files = "quake", "history", "joint"
+        tables.append([np.genfromtxt(f"{name}/{f}.csv", delimiter=",", names=True) for f in files])
+        tables[-1].append(info["quake"])
+    (rows, history, joint, found), (expected, last, nodes, wanted) = tables
+    agree(*({n: t[n] for n in t.dtype.names} for t in (rows, expected)))
+    assert history["time"].tolist() == last["time"].tolist() == [1, 2, 3]
+    for name in "crest_ux", "N", "T", "M":
+        assert history[name] == pytest.approx(last[name], rel=1e-6)
+    assert joint["time"].tolist() == nodes["time"].tolist()
+    size = np.abs(nodes["delta_t1"]).max()
+    assert joint["delta_t1"] == pytest.approx(nodes["delta_t1"], abs=1e-6 * size)
+    for name in "frequencies", "damping", "duration", "dt", "steps", "halvings":
+        assert found[name] == wanted[name]
+    assert found["residual"]["slip"] == pytest.approx(wanted["residual"]["slip"], rel=1e-5)
+    assert command("report", "getdp")[0] == 0
+    assert "earthquake wave.csv, " in Path("report.html").read_text()
+
+
+@pytest.mark.parametrize(
+    "options, message",
+    [
+        (
+            ["--set", "face_load=uniform"],
+            "face_load = uniform: must be hydrostatic for an earthquake",
+        ),
+        (["--set", "k_h=0.1"], "k_h = 0.1: must be 0 for damjoint quake"),
+        (["--fields"], "--fields: must not be given with --engine getdp"),
+        (["--engine", "fast"], "engine = fast: must be one of auto, condensed, getdp"),
+    ],
+)
+def test_what_the_model_can_not_compute_is_one_line(command, case_file, options, message):
+    code, out, err = command("quake", case_file, "--engine", "getdp", *options)
+    assert (code, out) == (2, "") and err.count("\n") == 1
+    assert message in err and not Path("out").exists()
+
+
+def test_a_dam_without_static_equilibrium_is_a_failed_run(command, case_file):
+    code, _, err = command("quake", case_file, "--engine", "getdp", "--set", "mu=0.1")
+    assert code == 1 and "static loads have no equilibrium" in err
+    assert json.loads(Path("out/my_quake/run.json").read_text())["state"] == "failed"
