@@ -145,11 +145,10 @@ def modelings(measurements: Measurements, cases: Table) -> Table:
         with tempfile.TemporaryDirectory() as folder:
             results = run(case, Path(folder), False, False, False)
         rows = [c for result in results for c in validation.compare(result)]
-        compared = [c for c in rows if c.verdict != "info"]
-        difference = 100 * max(abs(c.difference) for c in compared)
+        difference = 100 * max(abs(c.difference) for c in rows)
         shows = case.title.split(": ", 1)[1]
         spent = (cases[n][row] for n in ("seconds", "published", "times faster"))
-        return shows, len(compared), f"{difference:.1f} %", *spent
+        return shows, len(rows), f"{difference:.1f} %", *spent
 
     for row, name in enumerate(cases["case"][:-1]):
         table.add_measured(measurements, (name.upper(),), partial(measure, row, load(name)))

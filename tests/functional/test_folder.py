@@ -203,7 +203,7 @@ def test_an_invalid_file_of_getdp_is_reported(command, tmp_path, fake_getdp, lef
     "name",
     [
         *("scene.pre", "history.txt", "joints.txt", "status.txt", "jump_0_1.txt"),
-        *("traction_0_2.txt", "path_0_2.txt", "mean_jump_0_1.txt", "law_scalar_0_2.txt"),
+        *("traction_0_2.txt", "path_0_2.txt", "mean_jump_0_0_1.txt", "law_scalar_0_2.txt"),
         *("u_1_1.txt", "stress_2.txt"),
     ],
 )

@@ -2,7 +2,10 @@
 
 import numpy as np
 import pytest
+from damjoint.joint.equilibrium import Equilibrium
+from damjoint.joint.interface import interface_of
 from damjoint.model.case import load
+from damjoint.model.loads import Loading
 from damjoint.post import validation
 from damjoint.studies import validate
 
@@ -20,6 +23,7 @@ ITERATIONS = {
     "i": (6, None),
     "j": (5, None),
     "k": (None, 120),
+    "a_file": (6, None),
     "c_file": (5, None),
     "d_file": (5, None),
     "j_file": (5, None),
@@ -35,7 +39,7 @@ def test_published_values(solve, name):
     comparisons = [c for result in solve(name) for c in validation.compare(result)]
     missed = [c for c in comparisons if c.verdict == "fail"]
     assert not missed, "\n" + validation.report(missed)
-    assert sum(c.verdict == "pass" for c in comparisons) >= 5
+    assert len(comparisons) >= (1 if name == "a_file" else 5)
 
 
 @pytest.mark.parametrize("name", MODELINGS)
@@ -53,7 +57,7 @@ def test_iterations_at_the_published_steps(solve, name):
 def test_validate_prints_the_table(command, tmp_path):
     code, out, _ = command("validate", "c", "j")
     assert code == 0
-    assert ", 0 failed, " in out.splitlines()[-1]
+    assert ", 0 failed;" in out.splitlines()[-1]
     assert (tmp_path / "out" / "c" / "joint.csv").exists()
 
 
@@ -61,7 +65,7 @@ def test_validate_exits_with_1_if_a_row_fails(command, monkeypatch):
     """With the references of the first case changed by 10 %."""
     from dataclasses import replace
 
-    rows = [replace(r, value=1.1 * r.value) for r in validation.table("ssnp142") if r.tolerance]
+    rows = [replace(r, value=1.1 * r.value) for r in validation.table("ssnp142")]
     monkeypatch.setattr(validation, "table", lambda family: rows)
     code, out, _ = command("validate", "c")
     assert code == 1
@@ -79,22 +83,25 @@ def test_published_tests_beside_ssnp142(family, tmp_path):
 def test_validate_takes_families_and_cases(command):
     code, out, _ = command("validate", "ssnp162", "ssnv503")
     assert code == 0
-    assert out.splitlines()[-2].startswith("ssnp162: 21 passed, 0 failed")
+    assert out.splitlines()[-2].startswith("ssnp162: 27 passed, 0 failed")
     assert out.splitlines()[-1].startswith("ssnv503: 7 passed, 0 failed")
 
 
 @pytest.mark.parametrize("name, points", [("c_file", 2), ("j_file", 4)])
-def test_the_line_force_is_the_error_of_the_published_integration(name, points):
-    """Force and moment of the pressure on ten sides of the face, water at 9 m, against the exact
-    ones.
-    """
-    sides = [0.1, 0.245, 0.448, 0.731, 1.126, 1.676, 2.444, 3.515, 5.009, 7.093, 10]
+def test_the_pressure_on_the_face_is_integrated_as_published(name, points):
+    """Force and moment of the pressure on the ten sides of the test file's mesh, water at 9 m."""
+    sides = [0.1, 0.245359, 0.448128, 0.730980, 1.125545, 1.675943, 2.443722, 3.514736, 5.008748]
+    sides = np.array([*sides, 7.092821, 10])
     x, weights = np.polynomial.legendre.leggauss(points)
-    half, middle = np.diff(sides)[:, None] / 2, (np.array(sides[1:]) + sides[:-1])[:, None] / 2
+    half, middle = np.diff(sides)[:, None] / 2, (sides[1:] + sides[:-1])[:, None] / 2
     y = middle + half * x
     pressure = half * weights * np.maximum(9 - y, 0)
-    depth, case = 8.9, load(name)
-    error = pressure.sum() - depth**2 / 2
-    assert case["force_x"] == pytest.approx(9810 * error, rel=1e-9)
-    moment = (pressure * (y - 0.1)).sum() - depth**3 / 6
-    assert case["force_at"] == pytest.approx(moment / error, rel=1e-9)
+    equilibrium = Equilibrium(case := load(name), interface_of(case))
+    (face,) = [f for f in equilibrium.interface.faces.values() if f.side == "up"]
+    forces = equilibrium.face_forces(face, Loading(8.9, 0.0)).reshape(-1, 2)[:, 0] / 9810
+    # order 2 adds to the nodal functions, which alone sum to 1 and to y
+    nodes = len(face.surface.points)
+    assert forces[:nodes].sum() == pytest.approx(pressure.sum(), rel=1e-6)
+    moment = forces[:nodes] @ face.surface.points[:, 1]
+    assert moment == pytest.approx((pressure * (y - 0.1)).sum(), rel=1e-6)
+    assert abs(pressure.sum() / (8.9**2 / 2) - 1) > 1e-3  # the exact force differs

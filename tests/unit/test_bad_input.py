@@ -65,10 +65,10 @@ def test_a_parameter_out_of_range_is_refused(command, tmp_path, setting, allowed
 @pytest.mark.parametrize(
     "words, parts",
     [
-        (("run", "z"), ("case z", "unknown", "a, b, c")),
+        (("run", "z"), ("case z", "unknown", "b, c, c_file")),
         (("run", "none.case"), ("case none.case", "unknown")),
         (("validate", "zz"), ("case zz", "unknown")),
-        (("validate", "dam"), ("case dam", "reference", "a, b, c")),
+        (("validate", "dam"), ("case dam", "reference", "b, c, c_file")),
         (("sweep", "a", "--vary", "mu"), ("--vary mu", "NAME=V1,V2")),
         (("sweep", "a", "--vary", "mu=0.1:0.5:-0.1"), ("--vary mu=0.1:0.5:-0.1", "step")),
         (("sweep", "a", "--vary", "mu=-1,1"), ("mu = -1", "> 0")),

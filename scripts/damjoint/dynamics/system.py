@@ -212,7 +212,7 @@ def water_depths(case: Case, face: WetFace, level: float, floor: float) -> Array
     face with exact resultant and moment.
     """
     added = AddedPressure.unit(case, level, floor)
-    if face.straight and not face.flat:
+    if face.corrects:
         column = lambda surface, low, high: added.column(surface, low, high, face.tilt[0])
         heights = face.corrected(level, added.height, column)
     else:

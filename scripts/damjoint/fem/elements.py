@@ -170,6 +170,17 @@ def rule(shape: str, points: int) -> tuple[Array, Array]:
     return np.array(x, float), np.array(w, float)
 
 
+@cache
+def to_corners(shape: str, points: int) -> Array:
+    """Values at the corners (n, q) from values at the points of a rule, by the combination of nodal
+    functions nearest to them (least squares); from one point a constant.
+    """
+    x, weights = rule(shape, points)
+    root = np.sqrt(weights)
+    functions = np.array([nodal(shape, u)[0] for u in x])
+    return np.asarray(np.linalg.pinv(root[:, None] * functions) * root)
+
+
 #: Number of quadrature points in a body, by order and shape.
 BULK = {
     1: {"triangle": 1, "quad": 4, "tetra": 1, "wedge": 6, "hexahedron": 8},
@@ -191,6 +202,11 @@ JOINT = {
 }
 #: For water pressure and other loads on surfaces and lines.
 WATER = {"vertex": 1, "line": 4, "triangle": 6, "quad": 16}
+#: On wet faces, by parameter `face_points`; as on a side of a triangle, the rule of like degree.
+SIDE_POINTS = {
+    2: {"line": 2, "triangle": 3, "quad": 4},
+    4: {"line": 4, "triangle": 6, "quad": 16},
+}
 
 
 @cache

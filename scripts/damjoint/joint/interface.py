@@ -144,6 +144,21 @@ class JointInterface:
         """delta_n, delta_t1, delta_t2 (q, 3) by at_points or at_nodes."""
         return np.pad((matrix @ unknowns).reshape(-1, self.dim), ((0, 0), (0, 3 - self.dim)))
 
+    def extrapolate(self, values: Array) -> Array:
+        """Values (corners, n) at the corner nodes from values (q, n) at the Gauss points: a linear
+        function of each element, mean over the elements around a node.
+        """
+        number, start = len(self.surface.points), 0
+        total, count = np.zeros((number, values.shape[1])), np.zeros((number, 1))
+        for shape, cells in self.surface.cells:
+            points = self.rule[shape]
+            own = values[start : start + points * len(cells)].reshape(len(cells), points, -1)
+            start += points * len(cells)
+            at_corners = elements.to_corners(shape, points) @ own
+            np.add.at(total, cells, at_corners)
+            np.add.at(count, cells, 1)
+        return total / count
+
     def _heel_row(self) -> Array:
         """Mean opening along the heel, from the unknowns."""
         heel = elements.Space(self.mesh.heel, self.order)
@@ -214,7 +229,7 @@ class JointInterface:
 class Interface:
     """The joints of condensed bodies; unknowns: their free displacement jumps (j,)."""
 
-    def __init__(self, bulk: Condensed, quadrature: str) -> None:
+    def __init__(self, bulk: Condensed, quadrature: str, face_points: float = 0) -> None:
         self.bulk, self.dim = bulk, bulk.dim
         self.joints = [JointInterface(bulk, joint, quadrature) for joint in bulk.joints]
         #: of the Gauss points of all joints, joint by joint: weights; jump from the unknowns
@@ -224,7 +239,8 @@ class Interface:
         self.at_nodes = stacked([joint.at_nodes for joint in self.joints])
         self.from_points = self.at_points.T
         self.faces = {
-            name: WetFace(face, bulk.order, bulk.dim) for name, face in bulk.faces.items()
+            name: WetFace(face, bulk.order, bulk.dim, int(face_points))
+            for name, face in bulk.faces.items()
         }
         upstream = [f.surface.points[:, 1].min() for f in self.faces.values() if f.side == UP]
         #: height of the reservoir floor [m]
@@ -305,10 +321,11 @@ class LastInterface:
 
     def of(self, case: Case) -> Interface:
         """The joints of a case with its condensed bodies."""
-        key = *key_of(case), case["quadrature"]
+        rules = case["quadrature"], case["face_points"]
+        key = *key_of(case), *rules
         if self.interface is None or key != self.key:
             self.interface = None  # free its memory first
-            self.interface, self.key = Interface(cached(case)[0], case["quadrature"]), key
+            self.interface, self.key = Interface(cached(case)[0], *rules), key
         return self.interface
 
 

@@ -2,7 +2,8 @@
 
 On a straight face the quadrature is corrected by a factor a + b (y - low) that makes resultant and
 moment exact (as in pro/loads.pro); on any other face the elements that the waterline cuts are
-integrated over their wet part only.
+integrated over their wet part only. With a number of Gauss points per element side (parameter
+face_points) the pressure is integrated with these alone, as in published tests.
 """
 
 from __future__ import annotations
@@ -26,16 +27,19 @@ Column = Callable[[float, float, float], tuple[float, float]]
 class WetFace:
     """A face with its quadrature; forces are (functions * dim,)."""
 
-    def __init__(self, face: Face, order: int, dim: int) -> None:
+    def __init__(self, face: Face, order: int, dim: int, side_points: int = 0) -> None:
         self.face, self.side, self.dim = face, face.side, dim
         self.low, self.high, surface = face.low, face.high, face.surface
         self.surface, self.space = surface, elements.Space(surface, order)
-        self.points = elements.points_of(self.space, elements.WATER)
+        rules = elements.SIDE_POINTS[side_points] if side_points else elements.WATER
+        self.points = elements.points_of(self.space, rules)
         self.normals = surface.normals[self.points.elements][:, :dim]
         self.to_functions = self.points.values.T
         self.y, self.tilt = self.points.positions[:, 1], np.abs(self.normals[:, 0])
-        self.straight = self.high > self.low
+        straight, self.exact = self.high > self.low, not side_points
         self.flat = np.ptp(surface.points[:, 1]) < 1e-9 * np.abs(surface.points).max()
+        #: whether the quadrature is corrected
+        self.corrects = self.exact and straight and not self.flat
 
     @cached_property
     def elements(self) -> list[tuple[str, IntArray]]:
@@ -48,16 +52,13 @@ class WetFace:
 
     def press(self, level: float, height: Height, column: Column) -> Array:
         """Nodal forces [m x area] of a height of pressure on the face."""
-        if self.flat or not self.straight:
-            cut = np.zeros(0, int) if self.flat else self.cut_by(level)
-            outside = ~np.isin(self.points.elements, cut)
-            forces = self.spread(
-                -(height(level, self.y, self.tilt) * outside)[:, None] * self.normals
-            )
-            for element in cut:
-                self.add_wet_part(forces, int(element), level, height)
-        else:
-            forces = self.spread(-self.corrected(level, height, column)[:, None] * self.normals)
+        if self.corrects:
+            return self.spread(-self.corrected(level, height, column)[:, None] * self.normals)
+        cut = self.cut_by(level) if self.exact and not self.flat else np.zeros(0, int)
+        outside = ~np.isin(self.points.elements, cut)
+        forces = self.spread(-(height(level, self.y, self.tilt) * outside)[:, None] * self.normals)
+        for element in cut:
+            self.add_wet_part(forces, int(element), level, height)
         return forces
 
     def corrected(self, level: float, height: Height, column: Column) -> Array:

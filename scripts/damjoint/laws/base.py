@@ -154,6 +154,10 @@ class Law(Generic[V]):
         damage = self.damage(jump, variables)
         return (damage > 0) & (damage < 1) & ~self.is_open(jump, variables)
 
+    def added_thickness(self, variables: V, points: int) -> Array:
+        """Thickness that grout adds to the joint and the saw takes off, < 0 (q,) [m]."""
+        return np.zeros(points)
+
     def column_values(self, variables: V) -> dict[str, Array]:
         """The values (q,) of `columns`."""
         return {}

@@ -96,8 +96,12 @@ class Friction(Law[FrictionVariables]):
     # -- response
 
     def opening(self, jump: Array, variables: FrictionVariables) -> Array:
-        """The opening beyond what the saw has removed, its thickness less the opening before."""
-        return np.asarray(jump[:, 0] + np.maximum(variables.sawn - variables.gap, 0))
+        """The opening beyond what the saw has removed."""
+        return np.asarray(jump[:, 0] - self.added_thickness(variables, len(jump)))
+
+    def added_thickness(self, variables: FrictionVariables, points: int) -> Array:
+        """See `Law`: the thickness of the saw less the opening before."""
+        return -np.maximum(variables.sawn - variables.gap, 0)
 
     def trial(self, jump: Array, variables: FrictionVariables) -> Trial:
         """The elastic predictor and the slip that returns it to the yield surface."""

@@ -103,13 +103,16 @@ class Rupture(Law[RuptureVariables]):
     # -- response
 
     def gap(self, jump: Array, variables: RuptureVariables) -> Array:
-        """The opening beyond the thickness that grout and saw leave, before grout enters (q,) [m];
-        a joint that is only sawn loses the thickness of the saw less its opening before.
+        """The opening beyond what grout and saw leave, before grout enters (q,) [m]."""
+        return np.asarray(jump[:, 0] - self.added_thickness(variables, len(jump)))
+
+    def added_thickness(self, variables: RuptureVariables, points: int) -> Array:
+        """See `Law`; a joint that is only sawn loses the thickness of the saw less its opening
+        before.
         """
         v = variables
-        if self.grout:
-            return np.asarray(jump[:, 0] - v.thickness + v.sawn)
-        return np.asarray(jump[:, 0] + np.maximum(v.sawn - v.thickness, 0))
+        added = v.thickness - v.sawn if self.grout else -np.maximum(v.sawn - v.thickness, 0)
+        return np.broadcast_to(added, points)
 
     def opening(self, jump: Array, variables: RuptureVariables) -> Array:
         """The opening beyond the thickness that grout and saw leave (q,) [m]."""

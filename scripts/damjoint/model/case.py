@@ -404,6 +404,7 @@ def first_mesh(case: Case) -> dict[str, float | str]:
         "mesh_pattern": "split" if solid else "free",
         "n_layers": 1.0,
         "quadrature": "full",
+        "face_points": 0.0,
         "n_joint": float(n),
         "h_dam": -1.0,
         "h_found": -1.0,

@@ -9,7 +9,7 @@ import numpy as np
 from ..arrays import Array, IntArray, Table
 from ..laws import COLUMNS
 from .mesh import Body
-from .results import FLUX, Results
+from .results import FLUX, THICKNESS, Results
 from .scene import numbered
 
 
@@ -47,7 +47,7 @@ OF_JOINT = {
     "p": ("Pa", ("p",)),
     "damage": ("-", ("damage",)),
     "slip": ("m", ("slip",)),
-    **{name: (unit, (name,)) for name, (unit, _) in (COLUMNS | FLUX).items()},
+    **{name: (unit, (name,)) for name, (unit, _) in (COLUMNS | FLUX | THICKNESS).items()},
 }
 
 

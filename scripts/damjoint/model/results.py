@@ -36,6 +36,9 @@ JOINT = {
 #: Additional column where water flows.
 FLUX = {"flux": ("kg/(m s)", "mass flux towards the toe, mean of the elements around the node")}
 
+#: Additional column where the joint is grouted or sawn.
+THICKNESS = {"joint_thickness": ("m", "thickness that grout adds and the saw takes off (< 0)")}
+
 #: Columns of history.csv: a row per converged step. Forces are per metre of thickness, in 3D too.
 HISTORY = {
     "time": ("-", "t of the step"),
@@ -153,8 +156,8 @@ class Results:
     history: Table
     #: a row per joint node and requested level, columns `joint_columns`
     joint: Table
-    #: the same rows with jumps and stresses extrapolated from element means, as published codes
-    #: print them
+    #: the same rows with jumps and stresses extrapolated from the Gauss points of each element, as
+    #: published codes print them
     extrapolated: Table
     #: whether the run ended before its last level
     stopped: bool = False
@@ -190,7 +193,7 @@ class Results:
         return rows_at(self.joint, time)
 
     def at_extrapolated(self, time: float | None = None) -> Table:
-        """As `at`, with jump and stress extrapolated from the integration points."""
+        """As `at`, with jump and stress extrapolated from the Gauss points."""
         return rows_at(self.extrapolated, time)
 
     def state(self, time: float) -> dict[str, float]:
@@ -236,7 +239,9 @@ def joint_columns(case: Case) -> Columns:
     """The columns of a case's joint.csv: unit and meaning."""
     of_laws = [dict(joint.law.columns) for joint in case.joints]
     flow = FLUX if any(joint["uplift"] == "flow" for joint in case.joints) else {}
-    return functools.reduce(operator.or_, [JOINT, *of_laws, flow])
+    worked = any(joint["grout_pressure"] or joint["saw_thickness"] for joint in case.joints)
+    works = THICKNESS if worked else {}
+    return functools.reduce(operator.or_, [JOINT, *of_laws, flow, works])
 
 
 def joint_table(case: Case, blocks: list[Array]) -> Table:

@@ -178,7 +178,7 @@ class Section:
         self.joint_faces = [self.faces_of(joint) for joint in self.joints]
         around = self.dam.between(self.toe, self.heel)
         height = self.dam.points[around, 1]
-        crest = np.flatnonzero(height > height.max() - LEVEL * np.ptp(height))
+        crest = np.flatnonzero(height >= height.max() - LEVEL * np.ptp(height))
         #: height of the undeformed crest [m]
         self.top = height.max()
         #: displaced faces and crest of the dam, each from downstream to upstream (n, 2) [m]

@@ -263,17 +263,19 @@ def draw_published(
     axes: Axes, case: Case, curves: dict[str, np.ndarray], colors: dict[str, str], factor: float
 ) -> None:
     """Draw published values of some quantities with their tolerances, at the time they are for."""
-    references = validation.references(case)
+    references = [
+        r for r in validation.references(case) if r.y is None and r.read_as != validation.SLIP_TWICE
+    ]
     if not np.isclose(curves["time"][0], validation.reference_time(case)):
         return
     for name, color in colors.items():
-        rows = [r for r in references if (r.coordinate, r.quantity) == ("x", name) and r.tolerance]
+        rows = [r for r in references if r.quantity == name]
         if rows:
             value = np.array([r.value for r in rows]) * factor
             spread = np.abs(value) * [r.tolerance for r in rows]
             style = {"fmt": "o", "markersize": 4, "color": color, "mfc": "white", "capsize": 2}
             label = "published" if name != "delta_t1" else None  # delta_n has the label
-            axes.errorbar([r.at for r in rows], value, spread, **style, label=label)
+            axes.errorbar([r.x for r in rows], value, spread, **style, label=label)
 
 
 class Line(NamedTuple):

@@ -14,6 +14,7 @@ from ..joint.interface import JointInterface
 from ..model.case import Case
 from ..model.results import (
     HISTORY_OF_JOINTS,
+    THICKNESS,
     Results,
     column_of,
     history_table,
@@ -70,7 +71,7 @@ class History:
     at_rest: State | None = None
     #: RECORDED, a value per step
     rows: dict[str, list[float]] = field(default_factory=dict)
-    #: per requested level: the joint's rows, and those extrapolated from element means
+    #: per requested level: the joint's rows, and those extrapolated from the Gauss points
     tables: list[tuple[Array, Array]] = field(default_factory=list)
     #: the states of the tables
     saved: list[State] = field(default_factory=list)
@@ -130,8 +131,8 @@ class History:
         return crest(state.jump, state.loading) - (crest(rest.jump, rest.loading) if rest else 0.0)
 
     def save(self, state: State) -> None:
-        """The joints at the state last added, node by node; and with jump and stress made from
-        element means.
+        """The joints at the state last added, node by node; and with jump and stress extrapolated
+        from the Gauss points.
         """
         parts = [
             joint_rows(self.equilibrium, state, k)
@@ -150,7 +151,7 @@ class History:
 
 def joint_rows(equilibrium: Equilibrium, state: State, number: int) -> tuple[Array, Array]:
     """The rows of a joint, by its number, at a state: node by node, columns `joint_columns` but for
-    sigma_n_eff; and the same with jump and stress made from element means.
+    sigma_n_eff; and the same with jump and stress extrapolated from the Gauss points.
     """
     joint, law = equilibrium.interface.joints[number], equilibrium.laws.laws[number]
     variables, pressure = state.node_variables.joints[number], state.pressures[number]
@@ -171,19 +172,18 @@ def joint_rows(equilibrium: Equilibrium, state: State, number: int) -> tuple[Arr
         "slip": nodes[:, 7],
         "s": joint.xi * joint.length,
     }
+    if THICKNESS.keys() & joint_columns(equilibrium.case.joints[number]).keys():
+        added = law.added_thickness(variables, len(jump))
+        columns |= dict.fromkeys(THICKNESS, joint.mean_at_nodes(added))
     of_law = law.column_values(variables)
     columns |= {name: joint.mean_at_nodes(of_law[name]) for name in law.columns}
     if pressure.flux is not None:
-        columns["flux"] = node_means(joint, pressure.flux[:, None], True)[:, 0]
+        columns["flux"] = node_means(joint, pressure.flux)
     at_points = joint.jumps(joint.at_points, state.jump)
     stress, _ = law.traction_and_tangent(at_points, state.variables.joints[number])
     stress[:, 0] -= pressure.points
-    weights, elements = joint.points.weights, joint.points.elements
-    total = np.bincount(elements, weights)
-    parts = (*at_points.T, *stress.T)
-    means = np.column_stack([np.bincount(elements, weights * v) / total for v in parts])
     extrapolated = {name: columns[name].copy() for name in JUMP_AND_STRESS}
-    at_corners = node_means(joint, means, False)
+    at_corners = joint.extrapolate(np.hstack([at_points, stress]))
     for name, values in zip(JUMP_AND_STRESS, at_corners.T, strict=True):
         extrapolated[name][:corners] = values
     nothing = np.full(len(place), np.nan)  # of a column that only other joints have
@@ -193,21 +193,19 @@ def joint_rows(equilibrium: Equilibrium, state: State, number: int) -> tuple[Arr
     return one, other
 
 
-#: Columns of joint.csv that are made from element means, too.
+#: Columns of joint.csv that are also extrapolated from the Gauss points.
 JUMP_AND_STRESS = ("delta_n", "delta_t1", "delta_t2", "sigma_n", "tau_1", "tau_2")
 
 
-def node_means(joint: JointInterface, values: Array, middles: bool) -> Array:
-    """Mean over the joint elements around each node (and each middle of an edge) of element values
-    (e, m).
+def node_means(joint: JointInterface, values: Array) -> Array:
+    """Mean over the joint elements around each node and each middle of an edge of element values
+    (e,).
     """
-    space = joint.space
-    number = len(space.locations) if middles else len(space.body.points)
-    total, count, start = np.zeros((number, values.shape[1])), np.zeros(number), 0
-    for (_, functions), (_, cells) in zip(space.connectivity, space.body.cells, strict=True):
-        table = functions if middles else cells
-        rows = np.repeat(np.arange(start, start + len(table)), table.shape[1])
-        np.add.at(total, table.ravel(), values[rows])
-        np.add.at(count, table.ravel(), 1)
-        start += len(table)
-    return total / count[:, None]
+    number, start = len(joint.space.locations), 0
+    total, count = np.zeros(number), np.zeros(number)
+    for _, functions in joint.space.connectivity:
+        rows = np.repeat(np.arange(start, start + len(functions)), functions.shape[1])
+        np.add.at(total, functions.ravel(), values[rows])
+        np.add.at(count, functions.ravel(), 1)
+        start += len(functions)
+    return total / count

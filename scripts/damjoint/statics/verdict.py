@@ -229,7 +229,7 @@ def mean(results: Results, column: str) -> float:
     if not len(results.joint["time"]):
         return 0.0
     rows = results.at()
-    place, inverse = np.unique(rows["x"].round(9), return_inverse=True)
+    place, inverse = np.unique(rows["s"].round(9), return_inverse=True)
     values = np.bincount(inverse, rows[column]) / np.bincount(inverse)
     return float(np.sum((values[1:] + values[:-1]) / 2 * np.diff(place)) / np.ptp(place))
 

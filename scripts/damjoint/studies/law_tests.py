@@ -100,23 +100,12 @@ def ramp(times: Sequence[float], values: Sequence[float]) -> Iterator[tuple[floa
         yield float(t), float(np.interp(t, times, values))
 
 
-def ssnp143() -> dict[str, LawTest]:
-    """C: two blocks of 10 m in all and their joint in series, pressed by a displacement of 3e-6 m;
-    the joint is sawn at t = 2. All points are alike, also in 3D (D).
-    """
-    settings: Values = {"K_N": 1e12, "K_T": 2e12, "saw_thickness": 1e-6, "saw_t": 2.0}
-    rupture: Values = {"sigma_max": 3e6, "pena_rupture": 0.2, "pena_contact": 0.8}
-    friction: Values = {"mu": 0.35, "adhesion": 1000.0, "pena_tang": 2e11}
-    spring = 3e12 / 10
-    steps = [(t, Loaded(-spring * 3e-6, spring), 0.0, 0.0) for t in (1.0, 2.0, 3.0)]
-    return {
-        "C rupture": LawTest("rupture", settings | rupture, steps),
-        "C friction": LawTest("friction", settings | friction, steps),
-    }
-
-
 def ssnp162() -> dict[str, LawTest]:
-    """A cube of 1 m and a joint in series, pulled by a displacement; the joint alone in shear."""
+    """A cube of 1 m and a joint in series, pulled by a displacement; the joint alone in shear.
+
+    Other modelings are these on other elements: B, C, M, N, O that of A; F, Q, R of E; H, I of G; P
+    of D; K, L of J.
+    """
     tests, quarters = {}, (0, 15, 30, 45, 60)
     rupture: Values = {"K_N": 1e12, "K_T": 2e12, "sigma_max": 1e5, "alpha": 1.5}
     rupture |= {"pena_rupture": 0.5, "pena_contact": 3.0}
@@ -129,6 +118,12 @@ def ssnp162() -> dict[str, LawTest]:
     sheared = dict(ramp(quarters, (0, 0, broken, broken, 0)))
     tests["A II"] = LawTest(
         "rupture", rupture, [(t, n, sheared[t], 0.0) for t, n in ramp(quarters, normal)]
+    )
+    # in 3D, sheared along z
+    normal = (0, 1.1e-7, 1.1e-7, 1.1e-7 / 9, 1.1e-7 / 9)
+    sheared = dict(ramp((0, 30, 60), (0, -broken, broken)))
+    tests["B III"] = LawTest(
+        "rupture", rupture, [(t, n, 0.0, sheared[t]) for t, n in ramp(quarters, normal)]
     )
     # with water of 500 Pa in the joint
     p = 500.0
@@ -149,6 +144,13 @@ def ssnp162() -> dict[str, LawTest]:
     tests["D II"] = LawTest(
         "friction", friction, [(t, n, sheared[t], 0.0) for t, n in ramp(quarters, normal)]
     )
+    # with water of 50 kPa in the joint
+    wet: Values = {"K_N": 1e7, "K_T": 2e7, "mu": 0.5, "adhesion": 1e5, "pena_tang": 20.0}
+    p = 5e4
+    elastic = 2e5 / 1e7 + (2e5 - p) / E
+    pulled = (0, elastic, 2 * elastic, -((2e5 / 3 - p) / 1e7 + 2e5 / 3 / E))
+    steps = [(t, Loaded(E * u + p, E), 0.0, 0.0) for t, u in ramp(quarters[:-1], pulled)]
+    tests["J I"] = LawTest("friction", wet, steps, p)
     # in 3D: sheared to and fro while it slips across
     soft: Values = {"K_N": 0.1, "K_T": 0.15, "mu": 0.2, "adhesion": 0.1, "pena_tang": 1e-7}
     quarters = (0, 15, 30, 45, 60)
@@ -168,6 +170,8 @@ def ssnp164() -> dict[str, LawTest]:
     pulled = [*ramp((0, 20, 40, 60, 80), (0, 6e-6, 1e-4, 5e-4, 4.9999e-4))]
     sheared = ramp((0, 10, 20, 30, 40, 50), (0, 0, 5e-7, 3e-5, 9e-5, 5e-4))
     pressed = ramp((0, 10, 20, 30, 40), (0, 1e5, 1e6, 1e7, 1e8))
+    to_and_fro = (0, 0, 5e-7, 3e-5, 2.9995e-5, 9e-5, 5e-4)
+    lifted = ramp((0, 10, 20, 30, 40, 50, 60), to_and_fro)
     return {
         "A": LawTest("endo", endo, [(t, Loaded(E * u, E), 0.0, 0.0) for t, u in pulled]),
         "B": LawTest("endo", endo, [(t, Loaded(-1e4), jump, 0.0) for t, jump in sheared]),
@@ -175,6 +179,10 @@ def ssnp164() -> dict[str, LawTest]:
         "C": LawTest("endo", endo, [(t, Loaded(E * u, E), 0.0, -1e-6) for t, u in pulled]),
         # water presses the cube against a wall
         "D": LawTest("endo", endo, [(t, Loaded(p, E), 0.0, 0.0) for t, p in pressed]),
+        # as B, while water lifts the cube up to two thirds of the pressure on it
+        "E": LawTest(
+            "endo", endo, [(t, Loaded(-1e4 * (1 - t / 90)), jump, 0.0) for t, jump in lifted]
+        ),
     }
 
 
@@ -194,4 +202,4 @@ def ssnv503() -> dict[str, LawTest]:
     }
 
 
-FAMILIES = {"ssnp143": ssnp143, "ssnp162": ssnp162, "ssnp164": ssnp164, "ssnv503": ssnv503}
+FAMILIES = {"ssnp162": ssnp162, "ssnp164": ssnp164, "ssnv503": ssnv503}

@@ -47,7 +47,7 @@ def solve(case: Case, on_step: OnStep, _fields: bool) -> Iterator[Outcome]:
         start = time.perf_counter()
         bulk, made = cached(case)
         before = bulk.seconds if made else {"cache": time.perf_counter() - start}
-        interface = Interface(bulk, case["quadrature"])
+        interface = Interface(bulk, case["quadrature"], case["face_points"])
         steppers: list[LoadStepper] = []
         recovered: list[dict[float, Field]] = []
 

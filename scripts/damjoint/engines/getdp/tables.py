@@ -13,6 +13,7 @@ from ...model.mesh import Mesh
 from ...model.results import (
     FLUX,
     JOINT,
+    THICKNESS,
     Results,
     column_of,
     history_table,
@@ -91,7 +92,7 @@ def saved_times(case: Case, history: dict[str, np.ndarray], stopped: bool) -> di
 def read_joints(
     case: Case, folder: Path, number: int, time: float, level: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Rows of the joints at a requested time, and the same extrapolated from element means.
+    """Rows of the joints at a requested time, and the same extrapolated from the Gauss points.
 
     Raises OSError, ValueError if a file is missing or incomplete.
     """
@@ -113,7 +114,7 @@ def read_joint(
         """A column that not every joint has."""
         if name not in joint_columns(own):
             return np.full((len(nodes), 1), np.nan)
-        file = name if name in FLUX else "law_scalar"
+        file = name if name in FLUX | THICKNESS else "law_scalar"
         return node_means(rows, table(file, 1)[1], len(nodes))
 
     order = [1, 0, 2]  # y, x, z: normal, tangent 1, tangent 2
@@ -128,16 +129,36 @@ def read_joint(
         [when, nodes, jump[:, order], traction[:, order], state, distance, *others]
     )
     extrapolated = averaged.copy()
-    corners, mean_jump = table("mean_jump")
+    corners, _ = table("mean_jump_0")
     _, corner_rows = nodes_of(np.vstack([nodes, corners]))
     corner_rows = corner_rows[len(nodes) :]
     present = np.unique(corner_rows)
-    means = (slice(6, 9), mean_jump), (slice(9, 12), table("mean_traction")[1])
-    for columns, values in means:
+    count = int(case["dim"])  # corners of an element
+    for columns, name in (slice(6, 9), "jump"), (slice(9, 12), "traction"):
+        moments = np.array([table(f"mean_{name}_{k}")[1] for k in range(len(MOMENTS))])
+        values = corner_values(corners.reshape(-1, count, 3), moments[:, ::count])
         with np.errstate(invalid="ignore"):
             at_nodes = node_means(corner_rows, values[:, order], len(nodes))
         extrapolated[present, columns] = at_nodes[present]
     return averaged, extrapolated
+
+
+#: What element means are weighted with (pro/output.pro).
+MOMENTS = "1", "x", "y", "z"
+
+
+def corner_values(corners: np.ndarray, moments: np.ndarray) -> np.ndarray:
+    """Values (elements x corners, 3) at the corners (elements, n, 3) of lines or triangles, from
+    means over each element of a quantity times MOMENTS (4, elements, 3): the linear function with
+    these means, or a constant if they are those of one Gauss point.
+    """
+    count = corners.shape[1]
+    products = (1 + np.eye(count)) / (count * (count + 1))  # means of two nodal functions
+    middle = corners.mean(axis=1, keepdims=True)
+    about = moments[1:] - middle.transpose(2, 0, 1) * moments[0]
+    slopes = np.linalg.pinv((corners - middle).transpose(0, 2, 1) @ products, rcond=1e-9)
+    parts = slopes @ about.transpose(1, 0, 2)
+    return np.asarray(moments[0][:, None] + parts).reshape(-1, 3)
 
 
 def read(case: Case, folder: Path) -> tuple[Results, dict[int, float]]:
