@@ -128,7 +128,7 @@ class QuakeNumbers(Numbers):
             if value is not None:
                 peaks.append((head, with_unit(value, units, 3), "mean of the last second"))
         times = frames.history["time"]
-        shown = f"{len(times)} of {len(rows['time'])} steps"
+        shown = f"{len(times)} times, {len(rows['time'])} steps"
         peaks.append(("Shown", shown, "the curves over time have all steps"))
         nearest = [int(np.argmin(np.abs(rows["time"] - time))) for time in times]
         return [
