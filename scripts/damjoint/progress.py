@@ -55,19 +55,19 @@ class Progress:
         self.over.set()
         if self.thread:
             self.thread.join()
-        if self.bar:
+        if self.bar is not None:  # a bar without total has no truth value
             self.bar.close()
 
     def update(self, amount: float = 1.0) -> None:
         """Add to what is done."""
         self.done, self.updated = self.done + amount, time.monotonic()
-        if self.bar:
+        if self.bar is not None:
             self.bar.update(self.done - self.bar.n)
 
     def describe(self, title: str) -> None:
         """Replace the title."""
         self.title, self.updated = title, time.monotonic()
-        if self.bar:
+        if self.bar is not None:
             self.bar.set_description_str(title)
 
     def show_bar(self) -> None:

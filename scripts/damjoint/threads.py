@@ -9,7 +9,7 @@ from types import ModuleType
 
 from threadpoolctl import threadpool_limits
 
-#: The limits that hold now, the last one within the others, with what ends each.
+#: The limits that hold now, the last one within the others, and the stack that ends each.
 LIMITS: list[tuple[int | None, ExitStack]] = []
 
 
@@ -22,7 +22,7 @@ def limited_threads(number: int | None) -> Iterator[None]:
         try:
             yield
         finally:
-            LIMITS.pop()
+            LIMITS.remove((number, stack))
 
 
 def scipy_linalg() -> ModuleType:

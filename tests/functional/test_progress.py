@@ -45,6 +45,19 @@ def test_lines_have_title_part_done_and_time(frequent):
         err.wait_for(r"other work, 75 %, 00:0\d, nothing new for 00:0\d\n")
 
 
+@pytest.mark.parametrize("total, shown", [(4, r"75%"), (None, r"3")])
+def test_a_bar_on_a_terminal(monkeypatch, total, shown):
+    """After the delay, with what was done before."""
+    monkeypatch.setattr(progress, "DELAY", 1e-3)
+    with redirect_stderr(Lines()) as err:
+        err.isatty = lambda: True
+        with Progress("work", total, mininterval=0) as bar:
+            bar.update(2)
+            err.wait_for("work: ")
+            bar.update(1)
+            err.wait_for(shown)
+
+
 def stop_after_a_line(err):
     with Progress("work"):
         err.wait_for("work")

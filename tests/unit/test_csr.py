@@ -11,9 +11,8 @@ from scipy import sparse
 def matrices(request, monkeypatch):
     """Three matrices of scipy: two of a shape, and one to multiply them with."""
     monkeypatch.setattr(csr, "LARGE", request.param)
-    rng = np.random.default_rng(7)
     shapes = (30, 20), (30, 20), (20, 12)
-    return [sparse.random_array(s, density=0.1, format="csr", rng=rng) for s in shapes]
+    return [sparse.random(*s, 0.1, "csr", random_state=7 + k) for k, s in enumerate(shapes)]
 
 
 def test_operations(matrices):
@@ -27,12 +26,12 @@ def test_operations(matrices):
         (a @ c, one @ third),
         (added([a, b]), one + other),
         (stacked([a, b]), sparse.vstack([one, other])),
-        (a.scaled(weights), sparse.diags_array(weights) @ one),
+        (a.scaled(weights), sparse.diags(weights) @ one),
         (-a, -one),
         (a[rows], one[rows]),
         (a[1::2], one[1::2]),
         (a.columns(columns), one[:, columns]),
-        (a.where(a.data > 0.5), one * (one > 0.5)),
+        (a.where(a.data > 0.5), one.multiply(one > 0.5)),
     ]
     for result, expected in pairs:
         assert result.shape == expected.shape

@@ -1,0 +1,35 @@
+"""What a command loads: the time of a short run is that of its imports."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+HEAVY = "gmsh", "scipy", "matplotlib", "tabulate", "tqdm", "importlib.metadata"
+PROGRAM = f"""
+import sys
+from damjoint.cli import main
+code = main(sys.argv[1:])
+print("loaded:", *(name for name in {HEAVY} if name in sys.modules))
+sys.exit(code)
+"""
+
+
+def loaded(cache, *words):
+    """The modules of HEAVY that a command has loaded."""
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM, *words],
+        env=os.environ | {"DAMJOINT_CACHE": str(cache)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return done.stdout.splitlines()[-1].split()[1:]
+
+
+@pytest.mark.parametrize("case", ["c", "g"])
+def test_a_run_with_a_warm_cache_loads_numpy_alone(tmp_path, case):
+    words = "run", case, "--no-fields", "--no-picture", "--out", str(tmp_path / "out")
+    assert "gmsh" in loaded(tmp_path / "cache", *words)
+    assert loaded(tmp_path / "cache", *words) == []
