@@ -373,7 +373,7 @@ def rigid_blocks(run: RunFiles) -> tuple[Block, Block]:
     and the most uplift.
 
     They differ if the water in the joint is computed: least, the uplift of the last state; most,
-    the head of the reservoir along the whole joint.
+    the highest head at the lowest point of the joint, along the whole joint.
     """
     case = run.case
     last = run.history["time"].max(initial=0)
@@ -381,7 +381,9 @@ def rigid_blocks(run: RunFiles) -> tuple[Block, Block]:
     moment = hand.resultant.moment
     if flows(case):
         least = water_resultants(run, run.joint[-1]) if run.joint else (0.0, 0.0)
-        pressure = max(hand.uplift.p.max(), 0.0)
+        head = max(hand.level + case["joint_head_offset"], hand.tail_level)
+        lowest = min(case.section[name][0] for name in ("heel_y", "toe_y"))
+        pressure = max(case["rho_water"] * case["g"] * (head - lowest), 0.0)
         most = pressure * run.length, pressure * run.length**2 / 2
     else:
         least = most = hand.U, hand.uplift.moment
