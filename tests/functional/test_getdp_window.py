@@ -80,6 +80,40 @@ def test_impossible_sections_are_refused_before_the_run(project, words, message)
     assert done.returncode and not (project / "res").exists()
 
 
+LIFTS = """
+lift_heights() = {12, 25};
+default_n_joint = 20;
+default_h_dam = 8;
+default_h_found = 30;
+default_law = "friction";
+default_adhesion = 5e4;
+levels() = {40, 46};
+"""
+
+
+def test_lifts_without_python(project):
+    """Three joints with the same parameters: their resultants at each step, by the default
+    engine.
+    """
+    (project / "lifts.case").write_text(LIFTS)
+    for kind in ("geo", "pro"):
+        text = (project / f"dam.{kind}").read_text()
+        (project / f"lifts.{kind}").write_text(text.replace("dam.case", "lifts.case"))
+    mesh = [sys.executable, "-c", GMSH, "lifts.geo", "-2", "-o", "lifts.msh"]
+    subprocess.run(mesh, cwd=project, check=True, capture_output=True)
+    solve = [find_getdp(), "lifts.pro", "-msh", "lifts.msh", "-solve", "Fill", "-v", "2"]
+    subprocess.run(solve, cwd=project, check=True, capture_output=True)
+    rows = complete_rows(project / "res/dam/joints.txt", PRINTED_OF_JOINTS)
+    case = load(str(project / "lifts.case"))
+    (result,) = runner.run(case, project / "other", False, False, False)
+    assert len(rows) == 2 * 3 and result.joints[0].last["slip_length"] > 0
+    for name in ("N", "T", "M", "U", "slip_length"):
+        expected = [own.history[name][step] for step in range(2) for own in result.joints]
+        printed = rows[:, PRINTED_OF_JOINTS.index(name)]
+        scale = np.abs(expected).max()
+        assert printed == pytest.approx(expected, rel=1e-6, abs=1e-9 * scale), name
+
+
 CHANGES = (
     COARSE | {"uplift": "none"},
     {"E": 3e11},

@@ -63,7 +63,7 @@ def test_sliding_of_a_bond_by_its_undamaged_cohesion():
             "s": np.array([0, length]),
         }
         result.joint.update(
-            half | {"slip": np.zeros(2), "z": np.zeros(2), "damage": np.full(2, 0.5)}
+            half | {n: np.zeros(2) for n in ("slip", "y", "z")} | {"damage": np.full(2, 0.5)}
         )
         assert verdict.shear_resistance(result, 0.0) == pytest.approx(
             left * result.case["adhesion"] * length

@@ -14,8 +14,8 @@ from pathlib import Path
 
 from ... import InputError, RunError, data
 from ...arrays import Value
-from ...joint.interface import Chord
 from ...model.case import Case
+from ...model.chord import Chord
 from ...model.mesh import LINES, Mesh, area, heel_normal
 from ...model.parameters import assignments, constants, declared, listing, quoted
 from ...model.scene import SIDES
