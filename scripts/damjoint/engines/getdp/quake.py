@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from ... import InputError, RunError
-from ...arrays import Table
+from ...arrays import Table, Value
 from ...dynamics.record import Record
 from ...dynamics.stepper import Damping
 from ...model.case import Case
@@ -34,6 +34,11 @@ ROWS_OF_JOINTS = [
 ]
 #: Those that count from the static state, the first row.
 FROM_STATIC = "slip_mean", "slip_heel", "slip_toe"
+
+
+#: Values that parameters must have: no others are part of this model.
+NEEDED: dict[str, Value] = {"face_load": "hydrostatic", "face_points": 0.0}
+NEEDED |= {"rock_mass": 0.0, "time_integration": "HHT"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,11 +64,13 @@ def check(case: Case) -> None:
             f"geometry = {case.geometry}: must be a section by parameters for an earthquake with "
             "engine = getdp"
         )
-    if case["face_load"] != "hydrostatic":
-        raise InputError(
-            f"face_load = {case['face_load']}: must be hydrostatic for an earthquake with "
-            "engine = getdp"
-        )
+    for name, needed in NEEDED.items():
+        value = case.values.get(name, needed)
+        if value != needed:
+            shown, allowed = (v if isinstance(v, str) else f"{v:g}" for v in (value, needed))
+            raise InputError(
+                f"{name} = {shown}: must be {allowed} for an earthquake with engine = getdp"
+            )
 
 
 def solve(
