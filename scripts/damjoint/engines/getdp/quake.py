@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from ... import InputError, RunError
-from ...arrays import Table
+from ...arrays import Table, Value
 from ...dynamics.record import Record
 from ...dynamics.stepper import Damping
 from ...model.case import Case
@@ -34,6 +34,11 @@ ROWS_OF_JOINTS = [
 ]
 #: Those that count from the static state, the first row.
 FROM_STATIC = "slip_mean", "slip_heel", "slip_toe"
+
+
+#: Values that parameters must have: no others are part of this model.
+NEEDED: dict[str, Value] = {"face_load": "hydrostatic", "face_points": 0.0}
+NEEDED |= {"rock_mass": 0.0, "time_integration": "HHT"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,13 +64,12 @@ def check(case: Case) -> None:
             f"geometry = {case.geometry}: must be a section by parameters for an earthquake with "
             "engine = getdp"
         )
-    needed = {"face_load": "hydrostatic", "rock_mass": 0, "time_integration": "HHT"}
-    for name, value in needed.items():
-        if case[name] != value:
-            given = case.values[name]
-            shown = given if isinstance(given, str) else f"{given:g}"
+    for name, needed in NEEDED.items():
+        value = case[name]
+        if value != needed:
+            shown, allowed = (v if isinstance(v, str) else f"{v:g}" for v in (value, needed))
             raise InputError(
-                f"{name} = {shown}: must be {value} for an earthquake with engine = getdp"
+                f"{name} = {shown}: must be {allowed} for an earthquake with engine = getdp"
             )
 
 
