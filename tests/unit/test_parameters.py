@@ -1,5 +1,6 @@
 """Parameters, case files, levels."""
 
+from pathlib import Path
 from typing import get_args
 
 import numpy as np
@@ -277,3 +278,13 @@ def test_groups_have_all_values_of_a_case():
     assert set(get_args(TextName)) == texts
     with pytest.raises(AttributeError):
         case.joint.mu = 1.0
+
+
+def test_reading_cases_leaves_no_files_open():
+    """A sweep over sizes of the dam reads hundreds of cases."""
+    opened = lambda: len(list(Path("/proc/self/fd").iterdir()))
+    parameters.parse_by_gmsh(parameters.INCLUDE)
+    before = opened()
+    for base in (30, 31, 32):
+        parameters.parse_by_gmsh(f"default_dam_base = {base};\n{parameters.INCLUDE}")
+    assert opened() == before

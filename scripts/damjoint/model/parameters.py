@@ -13,6 +13,7 @@ import threading
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from functools import lru_cache
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -146,13 +147,24 @@ def parse(text: str) -> dict[str, list[Any]]:
     return cached("variables", sources() + text, lambda: parse_by_gmsh(text))
 
 
+#: A line that includes a file.
+INCLUDED = re.compile(r'^Include "(.*)";$', re.M)
+
+
+def complete(text: str, folder: Path) -> str:
+    """A text with the files that it includes, of absolute paths or relative to a folder, in place
+    of the lines that include them: Gmsh does not close such files.
+    """
+    return INCLUDED.sub(lambda found: complete((folder / found[1]).read_text(), folder), text)
+
+
 def parse_by_gmsh(text: str) -> dict[str, list[Any]]:
     """The same without the cache; the ONELAB database is that of the text afterwards."""
     gmsh = start_gmsh()
     gmsh.parser.clear()
     gmsh.onelab.clear()
     with tempfile.NamedTemporaryFile("w", suffix=".geo") as file:
-        file.write(text)
+        file.write(complete(text, DECLARATIONS.parent))
         file.flush()
         try:
             gmsh.parser.parse(file.name)
