@@ -156,6 +156,33 @@ def test_momentum_is_balanced_at_every_step(tmp_path, alpha, vertical, rock_mass
     assert worst < 1e-9 * np.abs(static).max()
 
 
+def test_energy_is_only_lost_after_the_shaking(tmp_path):
+    """Kinetic energy, strain energy of bodies and joint, less the work of the static forces, of a
+    dam that still slides and rocks: friction, damping and the time integration only take from it.
+    """
+    record = smooth_record(tmp_path / "r.csv", 7.0, duration=0.5)
+    quake = earthquake(record, DAM | {"dt": 0.001, "record_rest": 0.25}, "40")
+    system, joint, static = quake.system, joint_of(quake), quake.problem.static
+    equilibrium = quake.problem.model.equilibrium
+    at_points = lambda state: joint.jumps(joint.at_points, state.jump)
+    traction = lambda state: equilibrium.laws.evaluate(at_points(state), state.variables)[0]
+    held = equilibrium.interface.forces(traction(static))
+    compliance = 1 / np.array([quake.case["K_N"], *[quake.case["K_T"]] * 2])
+    energies, moved = [], []
+    for step in quake.steps():
+        if step.end.time < 0.51:
+            continue
+        motion, state = step.end.motion, step.end.state
+        elastic = joint.points.weights @ (traction(state) ** 2 @ compliance)
+        strain = motion.displacement @ system.stiffness @ motion.displacement
+        kinetic = motion.velocity @ system.mass @ motion.velocity
+        energies.append((elastic + strain + kinetic) / 2 - held @ (state.jump - static.jump))
+        moved.append(mean_slip(quake))
+    changes = np.diff(energies)
+    assert np.ptp(moved) > 1e-3 and changes.sum() < 0
+    assert changes.max() < 1e-9 * np.ptp(energies)
+
+
 def test_the_added_mass_is_westergaards(tmp_path):
     """7/12 rho H^2 in front of a vertical face, in the mass and in the load along x only."""
     record = smooth_record(tmp_path / "r.csv", 1.0)

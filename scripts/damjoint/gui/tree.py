@@ -351,10 +351,13 @@ def display_entries() -> list[dict[str, Any]]:
     return [{**entry, "visible": False} for entry in entries]
 
 
-def show_display(visible: bool) -> None:
-    """Show or hide the entries of what is shown; they keep their values."""
+def show_display(visible: bool, scales: bool = True) -> None:
+    """Show or hide the entries of what is shown; they keep their values. scales: whether there is a
+    choice of scales.
+    """
     for name in gmsh.onelab.getNames("02Display/.*"):
-        gmsh.onelab.set(json.dumps({**json.loads(gmsh.onelab.get(name)), "visible": visible}))
+        shown = visible and (scales or name != SCALES)
+        gmsh.onelab.set(json.dumps({**json.loads(gmsh.onelab.get(name)), "visible": shown}))
 
 
 def display() -> Display:
@@ -368,7 +371,7 @@ def show_results(scenes: list[SolvedScene], shown: int, step: int) -> None:
     color = WARN if scene.failed or scene.message else GOOD
     names = [s.name for s in scenes]
     show_verdict(scene.end_state or scene.verdict, color, scene.statement)
-    show_display(True)
+    show_display(True, scales=scene.quake is None)
     put(text(SCENE, names[shown], choices=names, visible=len(names) > 1))
     clear_numbers()
     if not scene.numbers:

@@ -252,10 +252,12 @@ def limits(case: Case, earthquake: bool = False) -> Iterator[str]:
     absent = [load for load, names in LOADS.items() if not any(case[n] for n in names)]
     never = NEVER_MODELLED
     if earthquake:
+        if not case["rock_mass"]:
+            yield "Earthquake: the rock has no mass and does not radiate."
         yield (
-            "Earthquake: the rock has no mass and does not radiate, which is conservative; what an "
-            "impact of the joint costs is the damping of the bodies and of the time integration; "
-            "the mass of the water is that of an incompressible reservoir at the last level."
+            "What an impact of the joint costs is the damping of the bodies and of the time "
+            "integration; the mass of the water is that of an incompressible reservoir at the last "
+            "level."
         )
         absent, never = [n for n in absent if n != "earthquake"], never.replace(DYNAMIC, "")
     yield f"Not modelled: {never}."
