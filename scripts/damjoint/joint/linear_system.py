@@ -12,6 +12,7 @@ equation it stays regular at a limit point of the load, where A is singular.
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,7 +21,7 @@ from numpy.linalg import norm
 
 from ..arrays import Array, IntArray, mirror
 from ..csr import CsrMatrix
-from ..threads import scipy_linalg
+from ..threads import limited_threads, scipy_linalg
 from .flow import FlowDerivative
 
 
@@ -147,12 +148,17 @@ def positive_inverse(matrix: Array) -> Array:
         inverse = np.linalg.inv(matrix)
         return np.asarray((inverse + inverse.T) / 2)
     lapack = scipy_linalg().lapack
-    factor, info = lapack.dpotrf(matrix.T, lower=True, overwrite_a=True, clean=False)
+    with limited_threads(1) if len(matrix) > ONE_THREAD else nullcontext():
+        factor, info = lapack.dpotrf(matrix.T, lower=True, overwrite_a=True, clean=False)
     if info:
         raise np.linalg.LinAlgError("not positive definite")
     inverse, _ = lapack.dpotri(factor, lower=True, overwrite_c=True)
     return mirror(inverse).T
 
+
+#: Number of unknowns above which a Cholesky factorisation runs on one thread: on two, OpenBLAS
+#: 0.3.30 ends with a segmentation fault from about 15 000 on.
+ONE_THREAD = 10000
 
 #: Number of unknowns up to which numpy inverts a matrix (by LU, three times the operations, but
 #: scipy takes longer to load), and A is factorised where more than half of its rows change.
