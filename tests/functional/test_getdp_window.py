@@ -130,6 +130,8 @@ def test_a_changed_parameter_changes_the_next_run(project):
     """Changes one after the other, compared with the other engine."""
     labels = {n: parameter(n).label for change in CHANGES for n in change}
     start_gmsh()
+    # in the home folder, otherwise of the same name for all processes
+    gmsh.option.setString("Solver.SocketName", f".gmshsock_{os.getpid()}_")
     gmsh.onelab.clear()
     rows = [press_run(project, {labels[n]: v for n, v in change.items()}) for change in CHANGES]
     level = {"Parameters/1Water levels/20004Level 4 [m]": 8.5}
