@@ -79,6 +79,7 @@ class Progress:
         bar = tqdm(desc=self.title, total=self.total, initial=self.done, **self.options)
         bar.start_t -= time.monotonic() - self.start
         self.bar = bar
+        self.update(0)  # an update may have come before the bar was there
 
     def write_lines(self) -> None:
         """Print lines to stderr until the work is over."""
