@@ -200,12 +200,12 @@ def test_a_sweep_is_that_of_the_command(command, tmp_path, monkeypatch, accuracy
     sample = dj.Sample(2, {"mu": "normal(0.8,0.1)"}, seed=3)
     case = dj.case("dam", **CASE, law="friction", pena_tang=0, accuracy=accuracy)
     swept = dj.sweep(
-        case, sample=sample, k_h=[0, 0.5], tie={"adhesion": "1e5*mu"}, critical="level"
+        case, sample=sample, k_h=[0, 0.5], tie={"adhesion": "1e5*mu"}, critical="level", jobs=1
     )
     assert not list(tmp_path.iterdir())
     words = ["sweep", "dam", "--levels", "30,40", "--set", "n_joint=20", "--vary", "k_h=0,0.5"]
     words += ["--sample", "2", "mu=normal(0.8,0.1)", "--seed", "3", "--tie", "adhesion=1e5*mu"]
-    words += ["--set", "law=friction", "--set", "pena_tang=0", "--critical", "level"]
+    words += ["--set", "law=friction", "--set", "pena_tang=0", "--critical", "level", "--jobs", "1"]
     words += ["--accuracy", accuracy] if accuracy else []
     assert command(*words, "--out", "file.csv")[0] == 0
     with (tmp_path / "file.csv").open() as file:

@@ -148,6 +148,7 @@ def test_monoliths_are_in_equilibrium(dim):
         assert bases[1].last["T"] == pytest.approx(contraction.last["N"], rel=1e-6)
 
 
+@pytest.mark.heavy
 def test_each_block_of_a_dam_across_a_valley_is_in_equilibrium():
     """Weight and reservoir by the mesh; base and contraction joints by contact and water. In the
     latter the water's resultant is rho g b H^2/2.

@@ -68,7 +68,7 @@ def test_a_run_stops_at_the_critical_level(solve):
 
 
 @pytest.mark.parametrize(
-    "seed", [0, 1, *(pytest.param(s, marks=pytest.mark.heavy) for s in (2, 3))]
+    "seed", [1, *(pytest.param(s, marks=pytest.mark.heavy) for s in (0, 2, 3))]
 )
 def test_more_strength_never_fails_earlier(solve, seed):
     """Random dams of 20 to 60 m on brittle bonds, with more tensile strength, fracture energy or

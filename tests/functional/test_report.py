@@ -304,13 +304,21 @@ def test_values_are_merged_over_runs():
     assert report_input.by_runs([{"a": 1}] * 3 + [{"a": 2}])[0] == ("a", 1, "1 to 3")
 
 
-def test_pages_of_the_printed_report(checked):
+def test_pages_of_the_report_as_pdf(command, checked, tmp_path, monkeypatch):
     """A summary, a page per run, a page of input; nothing is wider than the page's text."""
     weasyprint = pytest.importorskip("weasyprint", exc_type=(ImportError, OSError))
-    folders = [checked / name for name in COMBINATIONS]
-    page = report.page_of([report.read_section(folder) for folder in folders])
-    pages = weasyprint.HTML(string=page).render().pages
-    assert len(pages) == 1 + len(folders) + 1
+    render, documents = weasyprint.HTML.render, []
+
+    def kept(*words, **options):
+        documents.append(render(*words, **options))
+        return documents[-1]
+
+    monkeypatch.setattr(weasyprint.HTML, "render", kept)
+    assert command("report", checked, "--to", "my.PDF") == (0, "my.PDF\n", "")
+    content = (tmp_path / "my.PDF").read_bytes()
+    assert content.startswith(b"%PDF-") and content.rstrip().endswith(b"%%EOF")
+    (pages,) = (document.pages for document in documents)
+    assert len(pages) == 1 + len(COMBINATIONS) + 1
     chapters = [label for part in pages for level, label, *_ in part.bookmarks if level == 2]
     assert [chapter.split()[0] for chapter in chapters[:5]] == ["Summary", "Limits", *["Run"] * 3]
     for part in pages:
@@ -322,14 +330,6 @@ def test_pages_of_the_printed_report(checked):
                 assert left - 0.1 <= child.position_x, words_of(str(child))
                 assert child.position_x + child.border_width() <= right + 0.1
                 assert child.position_y + child.border_height() <= bottom + 0.1
-
-
-def test_report_as_pdf(command, checked, tmp_path):
-    pytest.importorskip("weasyprint", exc_type=(ImportError, OSError))
-    folder = checked / "usual"
-    assert command("report", folder, "--to", "my.PDF") == (0, "my.PDF\n", "")
-    content = (tmp_path / "my.PDF").read_bytes()
-    assert content.startswith(b"%PDF-") and content.rstrip().endswith(b"%%EOF")
 
 
 def test_a_pdf_without_weasyprint_is_refused(command, checked, tmp_path, monkeypatch):

@@ -15,7 +15,6 @@ from damjoint.post.units import LENGTHS
 from damjoint.statics import gravity
 from damjoint.studies import chart, sweep
 from damjoint.studies.plan import plan_of
-from distributed import LocalCluster
 from scipy import stats
 
 
@@ -123,6 +122,8 @@ def test_all_rows_of_close_levels_converge_and_their_openings_increase(command, 
         "sigma_max=0",
         "--vary",
         "level=8:9:0.02",
+        "--set",
+        "n_joint=25",
         "--jobs",
         "1",
         "--out",
@@ -140,6 +141,8 @@ def test_a_scheduler_with_two_workers(tmp_path, monkeypatch):
     """The same rows as in this process, from a dask cluster of two processes; two bundles of two
     rows in a task.
     """
+    from distributed import LocalCluster  # slow to import, and each process reads all tests
+
     monkeypatch.setattr(sweep, "TASKS_PER_THREAD", 1)
     plan = plan_of(["mu=0.35,0.36,0.38,0.4", "level=8,9"], [], None, {})
     with LocalCluster(

@@ -8,17 +8,20 @@ import re
 import shutil
 import subprocess
 import sys
+from math import ceil
+from types import SimpleNamespace
 
 import gmsh
 import numpy as np
 import pytest
-from damjoint.gui import tree, views
+from damjoint.gui import tree, views, window
 from damjoint.gui.curves import METRES
 from damjoint.gui.graphs import INTERVALS, MARGIN, Scale, thinned
 from damjoint.gui.layout import ABOVE_AXES, BELOW_AXES, BESIDE_AXES, Layout
 from damjoint.gui.sheet import Request, titles
 from damjoint.gui.views import caption
 from damjoint.gui.window import ACTION, Session
+from damjoint.gui.worker import EngineProcess
 from damjoint.post.units import LENGTHS
 from damjoint.statics.verdict import hints
 from damjoint.studies.check import compare_methods
@@ -78,16 +81,52 @@ class User:
         return [gmsh.view.option.getString(tag, "Name") for tag in gmsh.view.getTags()]
 
 
+class SharedEngine(EngineProcess):
+    """The engine's process; that of a window that is closed serves the next one, as a start takes
+    longer than most tests.
+    """
+
+    ready, used = None, False
+
+    def messages(self, wait=0.0):
+        if self.used:
+            self.used = False
+            yield self.ready
+        for message in super().messages(wait):
+            if message[0] == "ready":
+                self.ready = message
+            yield message
+
+
+@pytest.fixture(scope="module")
+def engines():
+    """Processes of closed windows."""
+    unused = []
+    yield unused
+    for engine in unused:
+        engine.close()
+
+
 @pytest.fixture
-def open_window():
+def open_window(engines, monkeypatch):
     users = []
+
+    def engine():
+        if not engines:
+            return SharedEngine()
+        engines[-1].used = True
+        return engines.pop()
 
     def opened(case, **settings):
         users.append(User(case, **settings))
         return users[-1]
 
+    monkeypatch.setattr(window, "EngineProcess", engine)
     yield opened
     for user in users:
+        if not user.session.busy:
+            engines.append(user.session.engine)
+            user.session.engine = SimpleNamespace(close=lambda: None)
         user.session.close()
 
 
@@ -433,17 +472,17 @@ def test_buttons_pressed_during_a_run_act_after_it(open_window, tmp_path):
 
 def test_stop_keeps_the_converged_steps(open_window, tmp_path):
     user = open_window("e", **SMALL)
-    user.type(tree.STEPS, "800")
+    user.type(tree.STEPS, "200")
     user.press("run")
-    user.wait(lambda session: "level 3." in session.status)
+    user.wait(lambda session: re.search(r"level [3-8]\.", session.status))
     assert gmsh.onelab.getString("ONELAB/Button") == ["Stop", "stop"]
     user.press("stop")
     user.wait()
-    assert re.match(r"interrupted at level 3\.\d* m of 9 m \(", user.session.status)
+    assert re.match(r"interrupted at level [3-8]\.?\d* m of 9 m \(", user.session.status)
     assert gmsh.onelab.getString("ONELAB/Button") == ["Run", "run"]
     scene = user.session.scenes[0]
-    history = scene.result.history
-    assert len(history["time"]) > 800 and list(scene.times) == [1.0, history["time"][-1]]
+    times = scene.result.history["time"]
+    assert len(times) > 200 and list(scene.times) == [*range(1, ceil(times[-1])), times[-1]]
     assert any(name.startswith("displacement [") for name in user.views)
     user.save(tmp_path / "stopped")
     assert json.loads((tmp_path / "stopped/run.json").read_text())["state"] == "interrupted"
@@ -467,7 +506,9 @@ def test_after_reset_the_parameters_are_restored(open_window):
     assert gmsh.onelab.getString("ONELAB/Button") == ["Run", "run"]
 
 
-def test_nothing_to_save_before_a_run(open_window, tmp_path):
+def test_nothing_to_save_before_a_run(open_window, engines):
+    while engines:
+        engines.pop().close()
     user = open_window("e")
     user.press(tree.SAVE_ACTION)
     user.wait()

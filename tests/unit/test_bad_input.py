@@ -230,17 +230,11 @@ def test_a_level_that_is_not_a_number_is_refused(tmp_path):
         (("--vary", "mu=0.5", "--tie", "adhesion=1+\n2"), (r"--tie adhesion=1+\n2",)),
     ],
 )
-def test_a_bad_sweep_is_refused_in_one_line(tmp_path, words, parts):
-    """In a process of its own, so that warnings are included."""
-    done = subprocess.run(
-        [sys.executable, "-m", "damjoint", "sweep", "c", *words],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        timeout=300,
-    )
-    assert done.returncode == 2 and len(done.stderr.splitlines()) == 1, done.stderr
-    assert all(part in done.stderr for part in parts) and not any(tmp_path.iterdir())
+def test_a_bad_sweep_is_refused_in_one_line(command, tmp_path, recwarn, words, parts):
+    """And without a warning."""
+    code, _, error = command("sweep", "c", *words)
+    assert code == 2 and len(error.splitlines()) == 1 and not recwarn.list, error
+    assert all(part in error for part in parts) and not any(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("law, name", [("rupture", "sigma_max"), ("bond", "adhesion")])
