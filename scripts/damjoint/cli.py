@@ -390,8 +390,8 @@ def add_validate(commands: Commands) -> None:
         nargs="*",
         metavar="FAMILY|CASE",
         default=["ssnp142"],
-        help="families of tests (ssnp142, ssnp143, ssnp162, ssnp164, ssnv503; all) or cases, such "
-        "as the modelings a to k of SSNP142 (default: ssnp142)",
+        help="families of tests (ssnp142, ssnp143, ssnp162, ssnp164, ssnv503, sdnv138; all) or "
+        "cases, such as the modelings a to k of SSNP142 (default: ssnp142)",
     )
     command.add_path(
         "--out",
@@ -399,7 +399,8 @@ def add_validate(commands: Commands) -> None:
         default=Path("out"),
         help="folder that gets a folder for each case (default: out)",
     )
-    command.add_argument("--engine", default="auto", metavar="NAME", help=ENGINE)
+    help_engine = f"{ENGINE}, for cases; tests of a point and of an earthquake: condensed"
+    command.add_argument("--engine", default="auto", metavar="NAME", help=help_engine)
 
 
 def do_validate(arguments: argparse.Namespace) -> int:

@@ -9,8 +9,7 @@ its first value; the last two are not options of a case. beta and gamma of alpha
 the end of the step in both.
 """
 
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -23,73 +22,52 @@ from damjoint.fem.condensation import condense
 from damjoint.fem.elements import pairs_of
 from damjoint.joint.interface import Interface
 from damjoint.model.case import load
+from damjoint.post import validation
 from damjoint.solver.load_stepper import LoadStepper
+from damjoint.studies import quake_tests
 from quakes import write_record
 from scipy import sparse
 
-RECORD = Path(__file__).parents[2] / "reference" / "friuli.csv"
-BEGIN, END, HEIGHT = 3.01, 0.16, 9.9
-SCENE = {
-    "damping": 0.0,
-    "added_mass": 0.0,
-    "record_unit": "m/s2",
-    "record_start": BEGIN,
-    "record_rest": 0.0,
-    "joint_damping_n": 1e9,
-    "joint_damping_t": 2e9,
-}
+TESTS = quake_tests.sdnv138()
+END = validation.last_time("sdnv138")
+HEIGHT = 9.9
+#: SDNV138 with dashpots at the Gauss points
+SCENE = {**TESTS["B"].settings, "time_integration": "HHT"}
 
 
-@dataclass
-class Computed:
-    """The earthquake of a case before its first step, and the static displacement of the dam."""
+def published_values(name):
+    """Published numbers of a test, by quantity."""
+    return {r.quantity: r.value for r in validation.table("sdnv138") if r.modeling == name}
 
-    quake: Earthquake
-    static: np.ndarray
 
-    @staticmethod
-    def of(case, change=None):
-        bodies = Bodies.of(case)
-        bodies = change(bodies) if change else bodies
-        interface = Interface(condense(case, bodies), case["quadrature"], case["face_points"])
-        static = LoadStepper(case, interface)
-        static.run()
-        (fields,) = recover(bodies, [(static.model.equilibrium, static.history)])
-        quake = Earthquake(static.case, static.model, static.state, bodies)
-        scheme = HHT(case["hht_alpha"], weighted=False)
-        quake.problem = replace(quake.problem, scheme=scheme)
-        return Computed(quake, fields[case.times[-1]].displacement["dam"])
-
-    def at(self, place, moving, ground):
-        """Vertical displacement, and absolute acceleration along x, at a place of the dam."""
-        system = self.quake.system
-        points, moved = system.spaces["dam"].body.points, system.motion["dam"]
-        node = np.abs(points - [*place, 0]).sum(axis=1).argmin()
-        dim = int(self.quake.case["dim"])
-        up = (moved @ moving.motion.displacement)[dim * node + 1] + self.static[node, 1]
-        return up, (moved @ moving.motion.acceleration)[dim * node] + ground
+def computed(case, change=None):
+    """The earthquake of a case before its first step, with equilibrium at the end of the step, and
+    the static displacement of the dam; change: of the bodies.
+    """
+    bodies = Bodies.of(case)
+    bodies = change(bodies) if change else bodies
+    interface = Interface(condense(case, bodies), case["quadrature"], case["face_points"])
+    static = LoadStepper(case, interface)
+    static.run()
+    (fields,) = recover(bodies, [(static.model.equilibrium, static.history)])
+    quake = Earthquake(static.case, static.model, static.state, bodies)
+    quake.problem = replace(quake.problem, scheme=HHT(case["hht_alpha"], weighted=False))
+    return quake, fields[case.times[-1]].displacement["dam"]
 
 
 @pytest.mark.parametrize(
-    "settings, vertical, crest, heel",
-    [
-        ({"order": 1.0, "uplift": "imposed", "dt": 0.005}, 2.104e-5, -1.5526, -1.4015),
-        ({"order": 2.0, "uplift": "imposed", "dt": 0.01}, 1.775e-5, -1.5225, -1.4048),
-        ({"order": 2.0, "uplift": "none", "dt": 0.01}, 3.953e-7, -1.4045, -1.4050),
-    ],
-    ids=["b", "c", "d"],
+    "name, order, vertical", [("B", 1, 2.104e-5), ("C", 2, 1.775e-5), ("D", 2, 3.953e-7)]
 )
-def test_by_the_conventions_of_this_package(settings, vertical, crest, heel):
-    """u_y of the crest, and the absolute accelerations along x of crest and heel."""
+def test_by_the_conventions_of_this_package(name, order, vertical):
+    """u_y of the crest as by the independent solver, whose accelerations are as published."""
     own = {"dam_height": HEIGHT, "mesh_pattern": "free", "h_dam": 0.5, "h_found": 1.0}
-    own |= {"joint_head_offset": 0.1}
-    computed = Computed.of(load("c", SCENE | own | settings, "2.9,5.9,7.9,8.4,8.9", record=RECORD))
-    quake = computed.quake
-    begin = quake.record.times[1]  # of the record; before it a row of zeros
-    step = next(s for s in quake.steps() if s.end.time > begin + END - 1e-6)
-    up, above = computed.at((0, HEIGHT), step.end, step.ground[0])
-    _, below = computed.at((0, 0), step.end, step.ground[0])
-    assert [up, above, below] == pytest.approx([vertical, crest, heel], rel=5e-3)
+    own |= {"joint_head_offset": 0.1, "order": order, "time_integration": "HHT"}
+    test = replace(TESTS[name], case="c", settings={**TESTS[name].settings, **own})
+    quake, static = computed(test.load())
+    columns = quake_tests.columns(quake, static, quake.record.times[1], END)
+    exact = {**published_values(name), "crest_uy": vertical}
+    for quantity in ("crest_uy", "crest_ax", "heel_ax"):
+        assert columns[quantity][-1] == pytest.approx(exact[quantity], rel=5e-3), quantity
 
 
 # -- by the published conventions
@@ -113,43 +91,23 @@ def with_eight_functions(bodies):
     return replace(bodies, by_name={n: changed(b) for n, b in bodies.by_name.items()})
 
 
-@pytest.mark.parametrize("exact", [False, True])
-@pytest.mark.parametrize(
-    "name, settings, crest, heel",
-    [
-        ("c_file", {"dt": 0.005}, (2.2346934e-5, -1.5525937), (2.2472063e-5, -1.4015067)),
-        ("j_file", {"dt": 0.01}, (1.587775861e-5, -1.522505538), (1.600787247e-5, -1.404822985)),
-        (
-            "j_file",
-            {"dt": 0.01, "uplift": "none"},
-            (3.812983776e-7, -1.404499677),
-            (4.591035354e-7, -1.404986755),
-        ),
-    ],
-    ids=["b", "c", "d"],
-)
-def test_by_the_published_conventions(name, settings, crest, heel, exact):
-    """Published u_y and absolute acceleration along x of crest and heel at 0.16 s, by the options
-    of a case; and exactly, with the other conventions, too.
+@pytest.mark.parametrize("name", TESTS)
+def test_by_the_published_conventions(name):
+    """All digits, with those conventions, too, that are not options of a case; by the options
+    alone: test_published.py.
     """
-    published = SCENE | {"time_integration": "published"} | settings
-    case = load(name, published, "2.9,5.9,7.9,8.4,8.9", record=RECORD)
-    second = case["order"] == 2
-    computed = Computed.of(case, with_eight_functions if exact and second else None)
-    quake = computed.quake
-    begin = quake.record.times[1]  # of the record; before it a row of zeros
-    if exact:
-        rows, begin = read(RECORD), 0.0
-        rows = rows[rows[:, 0] > BEGIN - 1e-6]
-        quake.record = replace(quake.record, times=rows[:, 0] - BEGIN, acceleration=rows[:, 1:])
-    if exact and not second:  # b begins with the acceleration of equilibrium
+    case = TESTS[name].load()
+    quake, static = computed(case, with_eight_functions if case["order"] == 2 else None)
+    rows, begin = read(case.record), case["record_start"]
+    rows = rows[rows[:, 0] > begin - 1e-6]
+    quake.record = replace(quake.record, times=rows[:, 0] - begin, acceleration=rows[:, 1:])
+    if case["order"] == 1:  # B begins with the acceleration of equilibrium
         (joint,) = quake.problem.model.equilibrium.interface.joints
         relative = quake.system.translation(joint, ["dam"], -quake.record.at(0.0))
         quake.now = replace(quake.now, motion=Motion(*np.zeros((2, len(relative))), relative))
-    step = next(s for s in quake.steps() if s.end.time > begin + END - 1e-6)
-    error = 1e-6 if exact else 2e-4
-    assert computed.at((0, HEIGHT), step.end, step.ground[0]) == pytest.approx(crest, rel=error)
-    assert computed.at((0, 0), step.end, step.ground[0]) == pytest.approx(heel, rel=error)
+    columns = quake_tests.columns(quake, static, 0.0, END)
+    for quantity, value in published_values(name).items():
+        assert columns[quantity][-1] == pytest.approx(value, rel=1e-6), quantity
 
 
 # -- ZZZZ153
@@ -189,7 +147,7 @@ def test_two_blocks_pressed_together(tmp_path):
     """Without Poisson's effect two blocks are a bar; the published numbers, 0.13 % below its, are
     between those of tetrahedra of order 1 of two sizes. Its direction is vertical here.
     """
-    rows = read(RECORD)[:11]
+    rows = read(TESTS["B"].load().record)[:11]
     record = rows[:, 1] / 0.634568  # m/s2, as published
     path = write_record(tmp_path / "r.csv", rows[:, 0], 0 * record, -record)
     scene = {"dim": 3.0, "dam_base": 10.0, "dam_crest": 10.0, "dam_height": 10.0, "thickness": 1.0}
@@ -201,8 +159,7 @@ def test_two_blocks_pressed_together(tmp_path):
     def shortening(order, elements):
         mesh = {"order": order, "n_joint": elements}
         case = load("dam", SCENE | scene | mesh, "0", record=path)
-        computed = Computed.of(case)
-        return [-computed.at((0, 10), step.end, 0)[0] for step in computed.quake.steps()]
+        return -quake_tests.columns(*computed(case), 0.0, rows[-1, 0])["crest_uy"]
 
     exact = bar(record, 0.01, -0.1)
     assert shortening(2.0, 6.0) == pytest.approx(exact, rel=1e-5)

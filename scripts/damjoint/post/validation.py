@@ -22,6 +22,7 @@ FAMILIES = {
     "ssnp162": "the laws rupture and friction at one point: to and fro in tension and shear",
     "ssnp164": "the law endo at one point: tension, shear, both, opened and lifted by water",
     "ssnv503": "a slider on a plane of 30 degrees: sticks at 99 %, slips at 101 % of the friction",
+    "sdnv138": "the dam of SSNP142 C and J in an earthquake: rocks at the limit of overturning",
 }
 #: How a published number was read, column `read_as`: at a node; there from the Gauss points, as the
 #: published code prints it; and likewise with the released slip of the last step counted twice.
@@ -149,8 +150,15 @@ def compare(result: Results) -> list[Comparison]:
     return comparisons
 
 
-def compare_point(family: str, modeling: str, columns: Mapping[str, Array]) -> list[Comparison]:
-    """Compare the steps of a test of one point, columns by name, with its published numbers."""
+def last_time(family: str) -> float:
+    """The last time [s] of the published numbers of a family that states them."""
+    return max(r.t for r in table(family) if r.t is not None)
+
+
+def compare_steps(family: str, modeling: str, columns: Mapping[str, Array]) -> list[Comparison]:
+    """Compare the steps of a test that is not a static run, columns by name, with its published
+    numbers.
+    """
     return [
         Comparison(r, float(columns[r.quantity][np.abs(columns["t"] - r.t).argmin()]))
         for r in table(family)

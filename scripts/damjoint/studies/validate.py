@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 
 from .. import InputError, RunError
+from ..arrays import Array
 from ..model.case import load
 from ..post import validation
 from ..post.validation import FAMILIES, Comparison
 from ..runner import run
 from ..statics.verdict import statement
-from . import law_tests
+from . import law_tests, quake_tests
 
 
 def chosen(names: Sequence[str]) -> dict[str, list[str]]:
@@ -30,8 +32,19 @@ def chosen(names: Sequence[str]) -> dict[str, list[str]]:
 
 def tests_of(family: str) -> list[str]:
     """The tests of a family."""
-    points = law_tests.FAMILIES.get(family, dict)()
-    return [*validation.modelings(family), *points]
+    return [*validation.modelings(family), *tests_without_case(family)]
+
+
+def tests_without_case(family: str) -> dict[str, Callable[[], dict[str, Array]]]:
+    """The tests of a family that are not static runs of a case: functions that compute their
+    columns, a row per step.
+    """
+    laws = law_tests.FAMILIES.get(family, dict)()
+    quakes = quake_tests.FAMILIES.get(family, dict)()
+    return {name: partial(law_tests.follow, test) for name, test in laws.items()} | {
+        name: partial(quake_tests.follow, test, validation.last_time(family))
+        for name, test in quakes.items()
+    }
 
 
 def family_of(name: str) -> str:
@@ -54,10 +67,10 @@ def compare(
 
     Raises RunError if a case stops before its last level.
     """
-    points = law_tests.FAMILIES.get(family, dict)()
+    others = tests_without_case(family)
     for name in names:
-        if name in points:
-            yield from validation.compare_point(family, name, law_tests.follow(points[name]))
+        if name in others:
+            yield from validation.compare_steps(family, name, others[name]())
             continue
         case = load(name)
         for result in run(case, out / case.name, False, picture, engine=engine):
