@@ -275,9 +275,9 @@ face_points=0`), as everywhere else, the same meshes give the last columns."""
 OWN_CONVENTIONS = {"face_points": 0.0, "time_integration": "HHT"}
 QUAKES = """The same meshes, time steps and dashpots by the conventions of this package (the
 defaults of `face_points` and `time_integration`): exact pressure on the face, HHT of second order,
-dashpots at each Gauss point while it is closed. The dam rocks at the limit of overturning and the
-time step is one or two periods of its first frequency, so the displacements depend on each of
-these."""
+dashpots at each Gauss point while it is closed. With water in the joint (B, C) the dam is at the
+limit of overturning, and the time step is one or two periods of its first frequency: displacements
+depend on each of these."""
 OTHERS = (
     "The output of `damjoint validate all`, written by `make pages`. A value of a closed form or "
     "of another code is judged by the tolerance of the test file. A value that only the published "
@@ -298,9 +298,10 @@ OTHERS = (
     "same way and is left out.\n\n"
     "SDNV138 is judged by what the published code computes, at 0.02 %: what remains is that its "
     "quadrangles of order 2 have eight functions, here nine, and that a record here begins with a "
-    "row of zeros, at rest; without these two differences the tests of this package give the numbers to "
-    "1e-6. The reference of the test file has the values of B with its two points interchanged, "
-    "and judges B, C and D by them at 1 to 30 % (no displacement of D): it is not used."
+    "row of zeros, at rest; without these two differences the tests of this package give the "
+    "numbers to 1e-6. The reference of the test file has the values of B with its two points "
+    "interchanged, and judges B, C and D by them at 1 to 30 % (no displacement of D): it is not "
+    "used."
 )
 
 

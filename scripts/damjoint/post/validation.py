@@ -22,7 +22,7 @@ FAMILIES = {
     "ssnp162": "the laws rupture and friction at one point: to and fro in tension and shear",
     "ssnp164": "the law endo at one point: tension, shear, both, opened and lifted by water",
     "ssnv503": "a slider on a plane of 30 degrees: sticks at 99 %, slips at 101 % of the friction",
-    "sdnv138": "the dam of SSNP142 C and J in an earthquake: rocks at the limit of overturning",
+    "sdnv138": "the dam of SSNP142 C and J in an earthquake: near overturning; with a dry joint",
 }
 #: How a published number was read, column `read_as`: at a node; there from the Gauss points, as the
 #: published code prints it; and likewise with the released slip of the last step counted twice.
