@@ -205,7 +205,7 @@ def test_the_added_mass_is_westergaards(tmp_path):
 ELASTIC = DAM | {"adhesion": 1e12}
 
 
-@pytest.mark.parametrize("alpha", [-0.05, 0.0])
+@pytest.mark.parametrize("alpha", [-0.05, pytest.param(0.0, marks=pytest.mark.heavy)])
 def test_the_error_falls_with_the_square_of_the_step(tmp_path, alpha):
     record = smooth_record(tmp_path / "r.csv", 2.0, duration=0.64, interval=0.00125)
     ends = []
@@ -365,7 +365,9 @@ def test_linear_solvers_agree(tmp_path, monkeypatch, other):
     assert slips[1] == pytest.approx(slips[0], rel=1e-6)
 
 
-@pytest.mark.parametrize("pattern, order", [("layers", 1.0), ("split", 2.0)])
+@pytest.mark.parametrize(
+    "pattern, order", [("layers", 1.0), pytest.param("split", 2.0, marks=pytest.mark.heavy)]
+)
 def test_a_section_of_any_thickness_moves_as_in_plane_strain(tmp_path, pattern, order):
     """With both end faces fixed along z, per metre of thickness; the two meshes of the section
     differ a little.
@@ -585,16 +587,17 @@ def test_an_interrupted_run_continues_with_the_same_rows(command, case_file, tmp
         steps.append(step)
 
     monkeypatch.setattr(QuakeHistory, "add", interrupted)
-    code, _, err = command("quake", case_file, "--out", "one")
+    words = "quake", case_file, "--no-picture", "--out"
+    code, _, err = command(*words, "one")
     assert code == 130 and "interrupted" in err
     info = json.loads((tmp_path / "one" / "run.json").read_text())
     assert info["state"] == "interrupted"
     before = (tmp_path / "one" / "quake.csv").read_text().splitlines()
     assert len(before) == 61
-    assert command("quake", case_file, "--out", "one")[0] == 0
+    assert command(*words, "one")[0] == 0
     number = len(steps) - 1
     monkeypatch.setattr(QuakeHistory, "add", add)
-    assert command("quake", case_file, "--out", "two")[0] == 0
+    assert command(*words, "two")[0] == 0
     one, two = ((tmp_path / n / "quake.csv").read_text() for n in ("one", "two"))
     assert one == two and one.splitlines()[:61] == before
     assert number == len(two.splitlines()) - 1
@@ -610,7 +613,7 @@ def test_a_run_under_way_of_another_case_is_not_continued(command, case_file, mo
     monkeypatch.setattr(QuakeHistory, "add", interrupted)
     assert command("quake", case_file, "--out", "one")[0] == 130
     monkeypatch.setattr(QuakeHistory, "add", add)
-    changed = "quake", case_file, "--set", "mu=0.85"
+    changed = "quake", case_file, "--no-picture", "--set", "mu=0.85"
     assert command(*changed, "--out", "one")[0] == command(*changed, "--out", "two")[0] == 0
     one, two = (Path(n, "quake.csv").read_text() for n in ("one", "two"))
     assert one == two
@@ -625,7 +628,7 @@ def test_a_sweep_of_earthquakes(command, case_file, tmp_path):
     small, large = sorted(rows, key=lambda row: float(row["record_scale"]))
     assert (small["verdict"], small["failed"]) == ("stands", "0")
     assert (large["verdict"], large["failed"]) == ("residual slip", "1")
-    assert command("quake", case_file)[0] == 0
+    assert command("quake", case_file, "--no-picture")[0] == 0
     found = json.loads(Path("out/my_quake/run.json").read_text())["quake"]
     assert float(large["residual_slip"]) == pytest.approx(found["residual"]["slip"], rel=1e-9)
     peaks = [float(row["peak_ground_ax"]) for row in (small, large)]

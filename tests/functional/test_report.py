@@ -36,6 +36,18 @@ def ran(tmp_path_factory):
     return work / "my"
 
 
+def page_of(folder):
+    """Page of the report of a folder."""
+    path = folder.parent / "page.html"
+    assert cli.main(["report", str(folder), "--to", str(path)]) == 0
+    return path.read_text()
+
+
+@pytest.fixture(scope="module")
+def page(ran):
+    return page_of(ran)
+
+
 @pytest.fixture
 def folder(ran, tmp_path):
     """A copy of it that a test may change."""
@@ -158,11 +170,9 @@ def test_report_has_results_and_parameters(command, folder, tmp_path):
     assert f"machine {record['machine']}" in words and "cores" in record["machine"]
 
 
-def test_all_input_of_a_run_is_in_its_report(command, folder, tmp_path):
+def test_all_input_of_a_run_is_in_its_report(page, ran):
     """Every parameter that matters in the scene, with its value."""
-    assert command("report", folder)[0] == 0
-    page = (tmp_path / "report.html").read_text()
-    case = stored.read(folder).result.case
+    case = stored.read(ran).result.case
     entries = report_input.parameters(case)
     assert len(entries) > 40 and not entries.keys() & report_input.COMMON_MODULI
     text = words_of(page)
@@ -172,11 +182,9 @@ def test_all_input_of_a_run_is_in_its_report(command, folder, tmp_path):
         assert re.search(rf"{table}|{dense}", text), name
 
 
-def test_tables_of_the_report_have_the_values_of_the_files(command, folder, tmp_path):
+def test_tables_of_the_report_have_the_values_of_the_files(page, ran):
     """History at the levels; both methods; loads with lever arms; to the four digits printed."""
-    assert command("report", folder)[0] == 0
-    page = (tmp_path / "report.html").read_text()
-    result = stored.read(folder).result
+    result = stored.read(ran).result
     levels = rows_below(page, "At the requested levels, by finite elements")
     for head, name in (("N'", "N"), ("T", "T"), ("M", "M"), ("crest movement", "crest_ux")):
         assert_allclose(column(levels, head), result.history[name], rtol=1e-3)
@@ -235,10 +243,14 @@ def checked(tmp_path_factory):
     return work / "out"
 
 
-def test_report_of_load_combinations(command, checked, tmp_path):
+@pytest.fixture(scope="module")
+def page_of_check(checked):
+    return page_of(checked)
+
+
+def test_report_of_load_combinations(checked, page_of_check):
     """The summary has the factors and verdicts of check.csv, in its order."""
-    assert command("report", checked)[0] == 0
-    summary = rows_below((tmp_path / "report.html").read_text(), "Summary")
+    summary = rows_below(page_of_check, "Summary")
     with (checked / "check.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert [row[1].split(",")[0] for row in summary[1:]] == list(COMBINATIONS)
@@ -304,7 +316,7 @@ def test_values_are_merged_over_runs():
     assert report_input.by_runs([{"a": 1}] * 3 + [{"a": 2}])[0] == ("a", 1, "1 to 3")
 
 
-def test_pages_of_the_report_as_pdf(command, checked, tmp_path, monkeypatch):
+def test_pages_of_the_report_as_pdf(command, checked, page_of_check, tmp_path, monkeypatch):
     """A summary, a page per run, a page of input; nothing is wider than the page's text."""
     weasyprint = pytest.importorskip("weasyprint", exc_type=(ImportError, OSError))
     render, documents = weasyprint.HTML.render, []
@@ -314,6 +326,8 @@ def test_pages_of_the_report_as_pdf(command, checked, tmp_path, monkeypatch):
         return documents[-1]
 
     monkeypatch.setattr(weasyprint.HTML, "render", kept)
+    monkeypatch.setattr(report, "read_section", lambda _: None)
+    monkeypatch.setattr(report, "page_of", lambda _: page_of_check)
     assert command("report", checked, "--to", "my.PDF") == (0, "my.PDF\n", "")
     content = (tmp_path / "my.PDF").read_bytes()
     assert content.startswith(b"%PDF-") and content.rstrip().endswith(b"%%EOF")

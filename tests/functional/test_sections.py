@@ -121,7 +121,7 @@ RIGID = {
     "K_N": 1e10,
     "K_T": 1e10,
     "sigma_max": 0,
-    "n_joint": 400,
+    "n_joint": 200,
     "h_dam": 10,
     "h_found": 50,
 }

@@ -270,16 +270,21 @@ def test_a_failed_row_has_its_reason_and_the_others_are_computed(command, tmp_pa
     assert good["level"] == "9"
 
 
+OF_UPLIFT = "--vary", "uplift=none,imposed"
+OF_LEVEL = "--vary", "level=8,9"
+SAMPLE = "--sample", "3", "mu=uniform(0.3,0.2)"
+
+
 @pytest.mark.parametrize(
     "words, drawn",
     [
         (("--vary", "mu=0.4,0.5"), True),
-        (("--vary", "mu=0.4,0.5", "--vary", "uplift=none,imposed"), True),
-        (("--vary", "mu=0.4,0.5", "--vary", "level=8,9"), True),
-        (("--vary", "uplift=none,imposed"), True),
+        pytest.param(("--vary", "mu=0.4,0.5", *OF_UPLIFT), True, marks=pytest.mark.heavy),
+        (("--vary", "mu=0.4,0.5", *OF_LEVEL), True),
+        (OF_UPLIFT, True),
         (("--vary", "mu=0.4,0.5", "--critical", "level"), True),
-        (("--vary", "level=8,9", "--sample", "3", "mu=uniform(0.3,0.2)"), True),
-        (("--sample", "3", "mu=uniform(0.3,0.2)", "adhesion=uniform(0,1e3)"), True),
+        pytest.param((*OF_LEVEL, *SAMPLE), True, marks=pytest.mark.heavy),
+        ((*SAMPLE, "adhesion=uniform(0,1e3)"), True),
         (("--vary", "mu=0.4", "--vary", "level=9", "--vary", "adhesion=1,2"), False),
     ],
 )
