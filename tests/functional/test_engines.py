@@ -175,6 +175,8 @@ STAGED |= {"anchor_angle": 10.0, "k_h": 0.1, "k_v": 0.05, "floor_water": 1.0, "f
 STEEP = {"batter": 5.0, "batter_height": 35.0}
 HEAVY_SILT = {"silt_height": 12.0, "silt_weight": 1.0, "k_h": 0.1, "added_mass": 2.0}
 WARM = {"temperature_dam": -8.0, "temperature_linear": 15.0, "temperature_found": 3.0}
+#: Within an element of a lift joint
+STOPPED = {"joint_height": 20.0, "uplift": "waterstop", "waterstop": 5.2, "sigma_max": 2e4}
 SOLID = {"dim": 3.0, "thickness": 3.0, "n_layers": 2.0, "mesh_pattern": "split", "n_joint": 10.0}
 SECTIONS = {
     "all loads": (SHAPE | STAGED, "20,41", "0"),
@@ -191,6 +193,8 @@ SECTIONS = {
     "endo, flow": ({"law": "endo", "uplift": "flow"}, "30,41", "2"),
     "endo, cracked": ({"law": "endo", "uplift": "cracked", "G_f": 20.0}, "30,41", "0"),
     "flow driven": ({"uplift": "flow", "drive": "crest", "drive_by": 1e-3}, "20,40", "0"),
+    "waterstop": (STOPPED | {"joint_slope": 6.0}, "30,47,41", "0"),
+    "waterstop driven": (STOPPED | {"drive": "crest", "drive_by": 5e-4}, "40,45", "0"),
     "solid": (SOLID | SHAPE | {"joint_slope": 4.0, "silt_height": 12.0, "k_h": 0.1}, "20,41", "0"),
     "temperature": (SHAPE | WARM | {"joint_slope": 3.0, "k_h": 0.05}, "20,41", "0"),
     "temperature, lift": (WARM | {"joint_height": 10.0, "law": "bond", "order": 1.0}, "20,41", "0"),
@@ -249,6 +253,12 @@ SEVERAL = {
     "T, laws and water": (
         "monoliths",
         MONOLITHS | OF_BASES | {"uplift": ("flow", "cracked", "none")},
+        "45",
+        "0",
+    ),
+    "T, waterstop": (
+        "monoliths",
+        MONOLITHS | OF_BASES | {"uplift": ("flow", "imposed", "waterstop"), "waterstop": 1.3},
         "45",
         "0",
     ),

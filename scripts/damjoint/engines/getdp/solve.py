@@ -53,8 +53,8 @@ def check_joint(own: Case) -> None:
         )
     if flows(own) and has_drains(own):
         raise InputError(f"drains = 1: must be 0 with engine = getdp and uplift = {own['uplift']}")
-    if own["uplift"] == "waterstop":
-        raise InputError("uplift = waterstop: must be another one with engine = getdp")
+    if own["uplift"] == "waterstop" and own["dim"] == 3:
+        raise InputError("uplift = waterstop: must be another one with engine = getdp in 3D")
 
 
 def check_own(mesh: Mesh, case: Case) -> None:
