@@ -75,6 +75,7 @@ with pool_of(2) as pool:
 
 def test_a_full_disk_leaves_no_partial_file(command, tmp_path):
     """One line with the name of the file; the next run succeeds."""
+    assert command(*RUN)[0] == 0  # input is read through temporary files the first time
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (2000, hard))
     try:
