@@ -75,11 +75,12 @@ with pool_of(2) as pool:
 
 def test_a_full_disk_leaves_no_partial_file(command, tmp_path):
     """One line with the name of the file; the next run succeeds."""
-    assert command(*RUN)[0] == 0  # input is read through temporary files the first time
+    words = *RUN, "--levels", "3,4,5,6"
+    assert command(*words)[0] == 0  # the first time, input is read through a temporary file
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (2000, hard))
     try:
-        code, _, err = command(*RUN, "--levels", "3,4,5,6")
+        code, _, err = command(*words)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     assert code == 1 and "File too large: 'out/c/" in err and len(err.splitlines()) == 1

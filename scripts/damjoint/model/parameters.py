@@ -20,7 +20,7 @@ from typing import Any
 from .. import InputError, __version__, data
 from ..arrays import Setting, Value
 from ..laws import LAWS
-from ..storage import cached
+from ..storage import atomic_write, cached
 from .arithmetic import explained, quantity
 
 DECLARATIONS = data("pro") / "parameters.pro"
@@ -163,11 +163,12 @@ def parse_by_gmsh(text: str) -> dict[str, list[Any]]:
     gmsh = start_gmsh()
     gmsh.parser.clear()
     gmsh.onelab.clear()
-    with tempfile.NamedTemporaryFile("w", suffix=".geo") as file:
-        file.write(complete(text, DECLARATIONS.parent))
-        file.flush()
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "case.geo"
+        with atomic_write(path) as part:
+            part.write_text(complete(text, DECLARATIONS.parent))
         try:
-            gmsh.parser.parse(file.name)
+            gmsh.parser.parse(str(path))
         except Exception as error:  # what gmsh raises
             raise InputError(str(error)) from None
     variables = {}
