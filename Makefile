@@ -22,7 +22,7 @@ check: setup
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
-# Run the tests but those that take minutes (heavy); in CI all of them
+# Run the tests but the heavy ones; in CI all of them
 test: check
 	$(BIN)/pytest -q $(PARALLEL) $(if $(CI),,-m "not heavy")
 

@@ -156,17 +156,21 @@ def test_critical_value_of_a_parameter_that_must_not_be_less():
     assert answer.value == pytest.approx(9888 / 12683, rel=2e-4)
 
 
-def test_the_gravity_method_without_tension(command, tmp_path):
+@pytest.fixture(scope="module")
+def brittle():
+    """A search on a bond of high tensile strength and low fracture energy."""
+    settings = {"law": "bond", "mu": 5.0, "dam_base": 30.0, "sigma_max": 2e6, "G_f": 100.0}
+    settings |= {"adhesion": 5e6, "G_t": 1e5, "n_joint": 60.0}
+    return found("dam", settings=settings, levels="40,48")
+
+
+def test_the_gravity_method_without_tension(brittle):
     """Tensile strength above the linear stress at the heel and below the elastic one."""
-    strong = "law=bond", "mu=5", "dam_base=30", "sigma_max=2e6", "G_f=100", "adhesion=5e6"
-    settings = *strong, "G_t=1e5", "n_joint=60"
-    words = [word for setting in settings for word in ("--set", setting)]
-    _, out, _ = command("critical", "dam", *words, "--levels", "40,48")
-    record = json.loads((tmp_path / "out/dam_critical/run.json").read_text())["critical"]
-    free = record["gravity_method_with"]["without tension"]
-    assert record["value"] == pytest.approx(free, rel=0.02) and record["gravity_method"] > 70
-    assert f"gravity method: {record['gravity_method']:.6g} m; without tension: {free:.6g} m" in out
-    assert "(n_joint = 60), " in out and "kPa, exceeds the strength of 2000 kPa" in out
+    search, answer = brittle
+    lines, free = "\n".join(answer.lines(search)), answer.gravity_with["without tension"]
+    assert answer.value == pytest.approx(free, rel=0.02) and answer.gravity > 70
+    assert f"gravity method: {answer.gravity:.6g} m; without tension: {free:.6g} m" in lines
+    assert "(n_joint = 60), " in lines and "kPa, exceeds the strength of 2000 kPa" in lines
 
 
 def test_the_gravity_method_with_a_crack_past_the_drains():
@@ -180,13 +184,11 @@ def test_the_gravity_method_with_a_crack_past_the_drains():
     assert other.SSF == pytest.approx(1, abs=1e-4) and longer < first - 0.5
 
 
-def test_the_search_goes_on_over_unstable_crack_growth():
+def test_the_search_goes_on_over_unstable_crack_growth(brittle):
     """A bond that breaks over 20 m: the level falls by more than a metre, then rises to what
     friction holds.
     """
-    brittle = {"law": "bond", "mu": 5.0, "dam_base": 30.0, "sigma_max": 2e6, "G_f": 100.0}
-    brittle |= {"adhesion": 5e6, "G_t": 1e5, "n_joint": 60.0}
-    search, answer = found("dam", settings=brittle, levels="40,48")
+    search, answer = brittle
     (trial,) = search.trials
     levels = np.array([point.level for point in trial.path.points])
     falls = np.maximum.accumulate(levels) - levels

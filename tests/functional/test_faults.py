@@ -266,7 +266,13 @@ def test_too_little_memory_for_the_libraries_is_one_line(tmp_path, megabytes):
     assert not any(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("words", [("b", "--no-picture"), ("c", *BARE, "--set", "n_joint=1500")])
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("b", "--no-picture"),
+        pytest.param(("c", *BARE, "--set", "n_joint=1500"), marks=pytest.mark.heavy),
+    ],
+)
 def test_too_little_memory_for_the_case_is_one_line(tmp_path, words):
     """Refused before the linear algebra would wait for memory for ever."""
     code, err = limited(921_600_000, "run", *words, cwd=tmp_path)
