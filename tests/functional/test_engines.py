@@ -178,6 +178,8 @@ WARM = {"temperature_dam": -8.0, "temperature_linear": 15.0, "temperature_found"
 #: Within an element of a lift joint
 STOPPED = {"joint_height": 20.0, "uplift": "waterstop", "waterstop": 5.2, "sigma_max": 2e4}
 SOLID = {"dim": 3.0, "thickness": 3.0, "n_layers": 2.0, "mesh_pattern": "split", "n_joint": 10.0}
+DRAINS = {"drains": 1.0, "drain_x": 6.1, "sigma_max": 1e4}
+BROKEN = {"uplift": "cracked", "law": "friction", "adhesion": 2e5}
 SECTIONS = {
     "all loads": (SHAPE | STAGED, "20,41", "0"),
     "lift, all loads": (SHAPE | STAGED | {"joint_height": 10.0, "law": "bond"}, "20,41", "0"),
@@ -193,6 +195,10 @@ SECTIONS = {
     "endo, flow": ({"law": "endo", "uplift": "flow"}, "30,41", "2"),
     "endo, cracked": ({"law": "endo", "uplift": "cracked", "G_f": 20.0}, "30,41", "0"),
     "flow driven": ({"uplift": "flow", "drive": "crest", "drive_by": 1e-3}, "20,40", "0"),
+    "drains, flow": (DRAINS | {"uplift": "flow", "joint_slope": 2.0}, "30,46", "0,5"),
+    "drains, flow driven": (DRAINS | {"uplift": "flow", "drive": "crest"}, "20,40", "0"),
+    "drains, cracked": (DRAINS | BROKEN, "40,50", "0,5"),
+    "drains in the crack": (DRAINS | BROKEN | {"drain_x": 1.8, "order": 1.0}, "40,48,49", "0"),
     "waterstop": (STOPPED | {"joint_slope": 6.0}, "30,47,41", "0"),
     "waterstop driven": (STOPPED | {"drive": "crest", "drive_by": 5e-4}, "40,45", "0"),
     "solid": (SOLID | SHAPE | {"joint_slope": 4.0, "silt_height": 12.0, "k_h": 0.1}, "20,41", "0"),
@@ -233,6 +239,8 @@ FLOW = {"uplift": "flow", "aperture_min": (1e-5, 2e-5, 1e-4, 1e-5), "K_N": (1e11
 WORKS_ON_LIFTS = {"lift_heights": (15.0, 30.0), "law": ("friction", "rupture", "friction")}
 WORKS_ON_LIFTS |= {"grout_pressure": (0.0, 2e5, 0.0), "grout_t": 2.0, "saw_t": 2.0}
 WORKS_ON_LIFTS |= {"saw_thickness": (0.0, 0.0, 1e-4), "sigma_max": 0.0, "adhesion": 1e5}
+DRAINED = {"uplift": ("flow", "cracked", "flow", "flow"), "drains": 1.0}
+DRAINED |= {"drain_x": (6.1, 4.0, 2.1, 1.0), "drain_effectiveness": 0.3}
 WEAK = {"sigma_max": (2e5, 2e4, 2e4, 2e4)}
 TWO_LIFTS = {"joint_height": 10.0, "lift_heights": (25.0,), "law": "friction"}
 TWO_LIFTS |= {"adhesion": (1e5, 1e4)}
@@ -245,6 +253,7 @@ SEVERAL = {
     "laws and water": ("dam", LIFTS | OF_LAWS | OF_WATER | SLOPES | SHAPE, "30,47", "2"),
     "flow": ("dam", LIFTS | FLOW | WEAK, "30,49.3", "0,3"),
     "all loads": ("dam", LIFTS | STAGED | WARM | SLOPES | SHAPE | {"sigma_max": 2e4}, "20,45", "0"),
+    "drains": ("dam", LIFTS | FLOW | WEAK | DRAINED, "30,49.3", "0,3"),
     "lift above a lift": ("dam", SMALL | TWO_LIFTS, "51", "0"),
     "crest driven": ("dam", LIFTS | WEAK | {"drive": "crest", "drive_by": 6e-3}, "40,41", "0"),
     "heel driven": ("dam", LIFTS | WEAK | {"drive": "heel", "drive_by": 2e-4}, "40,46", "0"),
@@ -287,6 +296,18 @@ def test_runs_of_both_engines_agree_on_several_joints(scene, tmp_path):
 def changed(results):
     """Whether a joint is open, softens or slips at the end."""
     return any(results.last[name] for name in ("crack_length", "process_zone", "slip_length"))
+
+
+@pytest.mark.parametrize(
+    "settings, message",
+    [
+        (SOLID | {"uplift": "waterstop"}, "uplift = waterstop: .* with engine = getdp in 3D"),
+        (SOLID | {"uplift": "flow", "drains": 1.0}, "drains = 1: .* and uplift = flow in 3D"),
+    ],
+)
+def test_water_that_getdp_does_not_have_is_refused(settings, message):
+    with pytest.raises(InputError, match=message):
+        solve.check(load("dam", settings))
 
 
 def test_runs_of_both_engines_agree_on_a_grouted_contraction_joint(tmp_path):

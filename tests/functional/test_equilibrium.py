@@ -148,6 +148,8 @@ def test_the_head_at_the_heel_is_above_the_reservoir_by_the_offset(tmp_path, eng
         ("getdp", "drained", {}),
         ("condensed", "cracked", {}),
         ("condensed", "flow", {}),
+        ("getdp", "flow", {}),
+        ("getdp", "cracked", {}),
         ("condensed", "drained", {"mesh_pattern": "regular"}),
         ("condensed", "cracked", {"mesh_pattern": "regular"}),
         ("condensed", "drained", {"dim": 3, "n_layers": 2, "mesh_pattern": "layers"}),

@@ -51,8 +51,11 @@ def check_joint(own: Case) -> None:
             f"quake_uplift = {own['quake_uplift']}: must be crack with engine = getdp and "
             f"uplift = {own['uplift']}"
         )
-    if flows(own) and has_drains(own):
-        raise InputError(f"drains = 1: must be 0 with engine = getdp and uplift = {own['uplift']}")
+    if flows(own) and has_drains(own) and (own["dim"] == 3 or own.geometry):
+        raise InputError(
+            f"drains = 1: must be 0 with engine = getdp and uplift = {own['uplift']} in 3D and in "
+            "a geometry of one's own"
+        )
     if own["uplift"] == "waterstop" and own["dim"] == 3:
         raise InputError("uplift = waterstop: must be another one with engine = getdp in 3D")
 
