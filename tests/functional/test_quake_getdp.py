@@ -15,6 +15,7 @@ ENDO = {"law": "endo", "sigma_max": 2e5, "adhesion": 1.2 * 0.8 * 2e5, "G_f": 100
 SOLID = {"dim": 3.0, "thickness": 7.0, "hold_z": 1.0, "mesh_pattern": "split"}
 SOLID |= {"n_joint": 6.0, "h_dam": 15.0, "h_found": 45.0}
 BATTER = {"batter": 4.0, "batter_height": 20.0}
+DRAINS = {"drains": 1.0, "drain_x": 5.0}
 SCENES = {
     "friction": {},
     "bond": BOND,
@@ -30,6 +31,9 @@ MORE = {
     "flow, unchanged": {"uplift": "flow", "quake_uplift": "unchanged"},
     "no uplift in the crack": {"quake_uplift": "zero"},
     "flow, none in the crack": {"uplift": "flow", "quake_uplift": "zero"},
+    "drains, none in the crack": {"uplift": "cracked", "quake_uplift": "zero"} | DRAINS | BOND,
+    "drains, flow": {"uplift": "flow"} | DRAINS,
+    "waterstop": {"uplift": "waterstop", "waterstop": 5.2},
     "dashpots": {"joint_damping_n": 1e8, "joint_damping_t": 5e7},
     "dashpots, rupture": {"law": "rupture", "sigma_max": 2e5, "joint_damping_n": 1e8},
     "cracked bond": {"uplift": "cracked"} | BOND,
