@@ -1,5 +1,7 @@
 """Shared fixtures. A scene is computed once per session."""
 
+import signal
+
 import pytest
 from damjoint import runner
 from damjoint.model.case import load
@@ -11,6 +13,15 @@ def empty_cache(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("DAMJOINT_CACHE", str(tmp_path_factory.mktemp("cache")))
         yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def interrupts():
+    """Interrupts reach the commands that tests start, also where a script runs the tests in the
+    background, which makes the shell ignore them.
+    """
+    if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session")
