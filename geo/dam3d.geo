@@ -25,8 +25,10 @@ end_x = dam_base + found_side;
 Macro Around
   x_min = (x0 < x1) ? x0 : x1;
   y_min = (y0 < y1) ? y0 : y1;
+  x_max = x0 + x1 - x_min;
+  y_max = y0 + y1 - y_min;
   around() = Surface In BoundingBox {x_min - eps, y_min - eps, -eps,
-                                     x0 + x1 - x_min + eps, y0 + y1 - y_min + eps, thickness + eps};
+                                     x_max + eps, y_max + eps, thickness + eps};
   flat() = Surface In BoundingBox {-far, -far, -eps, far, far, eps};
   around() -= flat();
   flat() = Surface In BoundingBox {-far, -far, thickness - eps, far, far, far};
@@ -53,6 +55,25 @@ For j In {0 : top}
   y1 = all_toe_y(j);
   Call Around;
   joint() = {around()};
+  // without faces that lie in its box: below the heel or the toe of a joint that is inclined
+  For i In {0 : #seg_side() - 1}
+    If(seg_x0(i) > x_min - eps && seg_x0(i) < x_max + eps
+       && seg_x1(i) > x_min - eps && seg_x1(i) < x_max + eps
+       && seg_y0(i) > y_min - eps && seg_y0(i) < y_max + eps
+       && seg_y1(i) > y_min - eps && seg_y1(i) < y_max + eps)
+      x0 = seg_x0(i);
+      y0 = seg_y0(i);
+      x1 = seg_x1(i);
+      y1 = seg_y1(i);
+      Call Around;
+      joint() -= {around()};
+      x0 = all_heel_x(j);
+      y0 = all_heel_y(j);
+      x1 = all_toe_x(j);
+      y1 = all_toe_y(j);
+      Call Around;
+    EndIf
+  EndFor
   heel() = Curve In BoundingBox {x0 - eps, y0 - eps, -eps, x0 + eps, y0 + eps, thickness + eps};
   toe() = Curve In BoundingBox {x1 - eps, y1 - eps, -eps, x1 + eps, y1 + eps, thickness + eps};
   If(!StrCmp(mesh_pattern, "free"))

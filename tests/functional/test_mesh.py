@@ -86,7 +86,12 @@ def test_a_force_at_the_corner_of_the_crest():
     assert (found.bodies["force"].node_tags == found.bodies["crest"].node_tags).all()
 
 
-@pytest.mark.parametrize("settings", [{}, {"joint_height": 9.0}, {"dim": 3.0, "n_layers": 2.0}])
+#: The end of the batter is just below the heel of a joint that falls to the toe.
+BESIDE_HEEL = {"batter": 5.0, "batter_height": 8.9, "joint_height": 9.0, "joint_slope": -2.5}
+SOLID = {"dim": 3.0, "n_layers": 2.0}
+
+
+@pytest.mark.parametrize("settings", [{}, {"joint_height": 9.0}, SOLID, SOLID | BESIDE_HEEL])
 def test_a_joint_lies_between_its_bodies(settings):
     """Its nodes are nodes of both; its normals point to the upper one; its ends bound it."""
     found = mesh.Mesh(load("dam", {"n_joint": 6.0, "mesh_pattern": "free"} | settings))
