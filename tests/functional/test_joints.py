@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from damjoint import InputError
+from damjoint import InputError, runner
 from damjoint.joint.interface import interface_of
 from damjoint.model.case import load
 from damjoint.model.mesh import Mesh
@@ -12,6 +12,7 @@ from damjoint.solver.load_stepper import LoadStepper
 from damjoint.statics import gravity
 from damjoint.statics.verdict import failed, statement, verdict
 from damjoint.studies.check import FINITE_ELEMENTS, GRAVITY, compare_joints
+from damjoint_tools.stress import random_scene
 from scipy.optimize import brentq
 from sections import resultants
 
@@ -228,3 +229,13 @@ def test_the_mesh_of_one_joint_does_not_depend_on_an_earlier_mesh_of_several():
     one, several = load("dam", COARSE), load("dam", COARSE | {"lift_heights": LIFTS})
     before, _, after = Mesh(one), Mesh(several), Mesh(one)
     assert np.array_equal(before.bodies["dam"].points, after.bodies["dam"].points)
+
+
+@pytest.mark.parametrize(
+    ("number", "failure"),
+    [(271, "sliding on lift 3.109 m"), (317, "overturning on lift 12.21 m")],
+)
+def test_the_joint_that_fails_is_named(number, failure, tmp_path):
+    """Not one that slips on a hardening of its own, nor one that its tension holds."""
+    (result,) = runner.run(random_scene(7, number).case, tmp_path / "out", False, False, False)
+    assert verdict(result) == failure

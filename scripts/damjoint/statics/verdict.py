@@ -133,10 +133,12 @@ ARM_AT_TOE, ELEMENTS_AT_TOE = 0.01, 0.5
 
 def bound(results: Results) -> tuple[str, str, str]:
     """The bound of statics that the last state has reached, sliding or overturning, why, and at
-    which joint, if there are several; all empty if none.
+    which joint, if there are several; all empty if none. A joint on a hardening that the user has
+    set comes last: slipping further, it carries more.
     """
     case = results.case
-    for k, own in enumerate(results.joints):
+    joints = sorted(enumerate(results.joints), key=lambda joint: joint[1].case.hardening_asked)
+    for k, own in joints:
         mode, why = bound_of_joint(own)
         if mode and case.separates((k,)):
             return mode, why, case.named((k,))
@@ -147,7 +149,8 @@ def bound_of_joint(results: Results) -> tuple[str, str]:
     """The bound that the only joint of these results has reached, and why; both empty if none.
 
     A rigid block on a joint without tension has M >= 0; on elements the compression ends within the
-    last one at the toe. Friction's tension c/mu of the open part is no compression.
+    last one at the toe. Friction's tension c/mu of the open part is no compression. A joint that is
+    intact all along holds its tension.
     """
     case, last = results.case, results.last
     length, resistance = case.joint_along, shear_resistance(results, last["N"])
@@ -155,7 +158,8 @@ def bound_of_joint(results: Results) -> tuple[str, str]:
     pull = case.law.open_tension * crack
     normal, moment = last["N"] + pull, last["M"] + pull * (length - crack / 2)
     arm = moment / normal if normal > 0 else 0.0
-    if arm < max(ARM_AT_TOE, ELEMENTS_AT_TOE / case["n_joint"]) * length:
+    intact = not crack and not last["process_zone"]
+    if not intact and arm < max(ARM_AT_TOE, ELEMENTS_AT_TOE / case["n_joint"]) * length:
         side = "from" if arm >= 0 else "beyond"
         return "overturning", f"the resultant is {abs(arm):.3g} m {side} the toe"
     if last["T"] >= (1 - AT_BOUND) * resistance:
