@@ -149,8 +149,7 @@ def bound_of_joint(results: Results) -> tuple[str, str]:
     """The bound that the only joint of these results has reached, and why; both empty if none.
 
     A rigid block on a joint without tension has M >= 0; on elements the compression ends within the
-    last one at the toe. Friction's tension c/mu of the open part is no compression. A joint that is
-    intact all along holds its tension.
+    last one at the toe. Friction's tension c/mu of the open part is no compression.
     """
     case, last = results.case, results.last
     length, resistance = case.joint_along, shear_resistance(results, last["N"])
@@ -158,8 +157,7 @@ def bound_of_joint(results: Results) -> tuple[str, str]:
     pull = case.law.open_tension * crack
     normal, moment = last["N"] + pull, last["M"] + pull * (length - crack / 2)
     arm = moment / normal if normal > 0 else 0.0
-    intact = not crack and not last["process_zone"]
-    if not intact and arm < max(ARM_AT_TOE, ELEMENTS_AT_TOE / case["n_joint"]) * length:
+    if arm < max(ARM_AT_TOE, ELEMENTS_AT_TOE / case["n_joint"]) * length:
         side = "from" if arm >= 0 else "beyond"
         return "overturning", f"the resultant is {abs(arm):.3g} m {side} the toe"
     if last["T"] >= (1 - AT_BOUND) * resistance:
