@@ -133,12 +133,16 @@ ARM_AT_TOE, ELEMENTS_AT_TOE = 0.01, 0.5
 
 def bound(results: Results) -> tuple[str, str, str]:
     """The bound of statics that the last state has reached, sliding or overturning, why, and at
-    which joint, if there are several; all empty if none. A joint on a hardening that the user has
-    set comes last: slipping further, it carries more.
+    which joint, if there are several; all empty if none. Joints that still carry more come last:
+    one without a crack, by its tension, and one on a hardening that the user has set, by slipping.
     """
     case = results.case
-    joints = sorted(enumerate(results.joints), key=lambda joint: joint[1].case.hardening_asked)
-    for k, own in joints:
+
+    def carries_more(joint: tuple[int, Results]) -> tuple[bool, bool]:
+        last = joint[1].last
+        return joint[1].case.hardening_asked, not last["crack_length"] + last["process_zone"]
+
+    for k, own in sorted(enumerate(results.joints), key=carries_more):
         mode, why = bound_of_joint(own)
         if mode and case.separates((k,)):
             return mode, why, case.named((k,))
