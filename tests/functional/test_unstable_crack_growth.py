@@ -47,6 +47,17 @@ def test_a_hint_reports_unstable_crack_growth(solve):
     assert stable.last["level"] == 40 and not any("alpha" in hint for hint in hints(stable))
 
 
+@pytest.mark.heavy
+def test_a_relaxation_that_converges_slowly_is_ended_by_newtons_method(solve):
+    """A rigid block stands up to 7.5 m; rounds of the relaxation alone end at 6.5 m."""
+    dam = {"dam_height": 6.97, "dam_base": 4.28, "dam_crest": 0.693, "E": 1.79e10, "nu": 0.178}
+    law = {"law": "rupture", "K_N": 8.55e12, "K_T": 1.17e13, "sigma_max": 75400, "alpha": 1}
+    mesh = {"order": 1, "n_joint": 40, "found_side": 6.97, "found_depth": 6.97}
+    more = {"pena_rupture": 83.2, "uplift": "cracked", "weight_first": 0, "tail_levels": "0.596"}
+    (result,) = solve("ssnp142", "6.41,8.13", **dam, **law, **mesh, **more)
+    assert verdict(result) == "overturning" and result.last["level"] > 7.4
+
+
 @pytest.mark.parametrize("law", LAWS)
 def test_alternate_minimisation_converges_to_the_law(law):
     """At constant jump: freeze the damage, update it, until it does not change."""

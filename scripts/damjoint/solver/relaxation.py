@@ -18,15 +18,18 @@ ROUNDS = 100
 SAME = 1e-6
 
 
-def relax(model: Model, begin: State, time: float, control: Control) -> StepResult | None:
-    """The state after unstable crack growth, by alternate minimisation: the step is solved with
-    frozen damage, then the damage is updated, until the law is in equilibrium.
+def relax(
+    model: Model, begin: State, time: float, control: Control
+) -> tuple[StepResult, bool] | None:
+    """The state after unstable crack growth by alternate minimisation, and whether the law is in
+    equilibrium there; None if there is none. The step is solved with frozen damage, then the damage
+    is updated, until the law is in equilibrium or after ROUNDS of them.
 
     Where the flow cannot be solved for together with the jump its pressure is frozen, too. The
     relaxed state is more damaged than a direct step would give.
     """
     equilibrium, state = model.equilibrium, begin
-    laws, iterations, sizes = equilibrium.laws, 0, list[float]()
+    laws, iterations, sizes, found = equilibrium.laws, 0, list[float](), None
     still = model.still(begin, time)
     strategies = [strategy for strategy in model.strategies[:-1] if not strategy.release]
     for _ in range(ROUNDS):
@@ -58,11 +61,12 @@ def relax(model: Model, begin: State, time: float, control: Control) -> StepResu
         if size <= model.convergence.tolerance:
             pressures = equilibrium.pressures(jump, variables, state.loading, still)
             relaxed = replace(step.state, pressures=pressures).after(begin)
-            return StepResult(relaxed, iterations, size / (model.reference or 1.0))
+            return StepResult(relaxed, iterations, size / (model.reference or 1.0)), True
         if repeats(size, sizes, SAME):
             return None
         sizes.append(size)
-    return None
+        found = replace(step, iterations=iterations), False
+    return found
 
 
 def over_unstable_growth(
@@ -70,15 +74,16 @@ def over_unstable_growth(
 ) -> tuple[StepResult | None, bool]:
     """A step over unstable crack growth, and whether it is the relaxed state: by Newton's method
     from that state, by the law from the last one; where it does not converge and `accept_relaxed`,
-    the relaxed state itself.
+    the relaxed state itself, if the law is in equilibrium there.
     """
-    relaxed = relax(model, begin, time, control)
-    if relaxed is None:
+    found = relax(model, begin, time, control)
+    if found is None:
         return None, False
+    relaxed, balanced = found
     first, *others = model.strategies
     strategies = [first, *(strategy for strategy in others if strategy.release)]
     guess = relaxed.state.jump, relaxed.state.loading.level
     step = model.advance(begin, time, control, strategies=strategies, persist=False, guess=guess)
     if step:
         return replace(step, iterations=relaxed.iterations + step.iterations), False
-    return (relaxed, True) if accept_relaxed else (None, False)
+    return (relaxed, True) if accept_relaxed and balanced else (None, False)
