@@ -50,11 +50,12 @@ def solve(tmp_path_factory):
 @pytest.fixture
 def command(capfd, tmp_path, monkeypatch):
     """command(*words): exit code, standard output and standard error of damjoint, run in an empty
-    folder.
+    folder, without the lines of progress that a slow machine has time to print.
     """
     from damjoint import cli
 
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("damjoint.progress.INTERVAL", 1e6)
 
     def call(*words):
         try:
