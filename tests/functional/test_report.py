@@ -309,6 +309,13 @@ def test_limits_of_the_model_follow_the_case():
     assert "gravity method" not in own and "foundation reaches" not in own
 
 
+def test_parameters_of_a_report_are_those_of_its_own_case():
+    """Not those of the case that the process read last, nor none if the case is cached."""
+    dry, wet = load("dam", {"uplift": "none"}), load("dam", {"uplift": "flow"})
+    listed = [report_input.visible(case) for case in (dry, wet, dry, wet)]
+    assert "visc" in listed[1] - listed[0] and listed[2:] == listed[:2]
+
+
 def test_values_are_merged_over_runs():
     runs = [{"a": 1, "b": 1}, {"a": 1, "b": 2}, {"a": 1}, {"a": 1, "b": 2}, {"a": 1, "b": 2}]
     merged = report_input.by_runs(runs)

@@ -6,13 +6,19 @@ import json
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from typing import NamedTuple, TypeVar
 
-import gmsh
 import numpy as np
 
 from .. import ROUND_OFF
 from ..arrays import Value
 from ..model.case import Case, equal_steps, has_drains
-from ..model.parameters import Parameter, constants, declared, parse
+from ..model.parameters import (
+    Parameter,
+    constants,
+    declared,
+    parse,
+    parse_by_gmsh,
+    start_gmsh,
+)
 from ..post import stored
 from ..post.units import STRESSES, Units, unit
 
@@ -164,8 +170,9 @@ def parameters(case: Case) -> dict[str, Entry]:
 
 def visible(case: Case) -> set[str]:
     """Parameters that matter in the scene, by the visibility in their declarations."""
-    parse(stored.parser_input(case.values, case.levels))
-    shown = lambda p: json.loads(gmsh.onelab.get(p.label)).get("visible", True)
+    parse_by_gmsh(stored.parser_input(case.values, case.levels))
+    onelab = start_gmsh().onelab
+    shown = lambda p: json.loads(onelab.get(p.label)).get("visible", True)
     return {name for name, p in declared().items() if shown(p)}
 
 
