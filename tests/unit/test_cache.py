@@ -41,6 +41,22 @@ def test_all_of_an_entry_is_read_again(entry):
         assert array.dtype == arrays[1][name].dtype and np.array_equal(array, arrays[1][name])
 
 
+def test_bodies_in_the_cache_have_all_faces_under_water(tmp_path, monkeypatch):
+    """A face above the tailwater of the case that was condensed first: the neck, in a case whose
+    tailwater reaches it.
+    """
+    monkeypatch.setenv("DAMJOINT_CACHE", str(tmp_path))
+    below, lower, above = (
+        load("dam", SMALL | {"neck_height": 10}, (44.0,), (tail,)) for tail in (3.0, 4.0, 42.0)
+    )
+    downstream = [
+        [face.low for face in cache.cached(case)[0].faces.values() if face.tailwater]
+        for case in (below, above)
+    ]
+    assert [sorted(heights) for heights in downstream] == [[0], [0, 35]]
+    assert cache.key_of(below) == cache.key_of(lower)
+
+
 class Trap:
     """Object whose pickle creates a file when it is loaded."""
 

@@ -85,7 +85,7 @@ class ElasticBody:
             face_dofs={
                 n: dofs(face.surface)
                 for n, face in mesh.faces.items()
-                if face.body == name and wet(case, face)
+                if face.body == name and wet(case, face.side, face.lowest)
             },
         )
 

@@ -23,7 +23,7 @@ import numpy as np
 from .. import RunError, __version__, data
 from ..arrays import Array
 from ..model.case import Case
-from ..model.loads import COMPLETE, overtopped, thermal_strains
+from ..model.loads import COMPLETE, overtopped, thermal_strains, wet_segments
 from ..model.mesh import Body, Face, JointMesh, Mesh, mesh_of, shares
 from ..model.scene import MATERIALS
 from ..storage import cache_folder
@@ -46,13 +46,13 @@ LIMIT = 2_000_000_000
 
 def key_of(case: Case) -> tuple[object, ...]:
     """All that condensed bodies depend on."""
-    shape = fingerprint(mesh_of(case)) if case.geometry else tuple(shares(case).items())
-    tail = max(case.tail_levels)
-    faces = tail > 0, case["floor_water"], overtopped(case)
-    # which faces of an own geometry are under water depends on heights that only its mesh has
-    levels = (case.reached, tail) if case.geometry else ()
+    shape: object = tuple(shares(case).items())
+    under_water: tuple[float, ...] = wet_segments(case)
+    if case.geometry:  # which of its faces are under water depends on heights that its mesh has
+        shape = fingerprint(mesh_of(case))
+        under_water = case.reached, max(case.tail_levels), case["floor_water"], overtopped(case)
     thermal = thermal_strains(case, COMPLETE)
-    return (shape, *(case[n] for n in PARAMETERS), *faces, *levels, *thermal)
+    return (shape, *(case[n] for n in PARAMETERS), *under_water, *thermal)
 
 
 def fingerprint(mesh: Mesh) -> str:

@@ -14,9 +14,8 @@ import numpy as np
 from ..arrays import Array
 from .case import Case, flows
 from .constraints import ZANGAR
-from .mesh import Face
 from .parameters import TINY
-from .scene import DOWN, SIDES, TOP, UP
+from .scene import DOWN, SIDES, TAILWATER, TOP, UP
 
 #: Loads that grow linearly from t = <name>_t - 1 to t = <name>_t.
 STAGED = ("silt", "ice", "force", "anchor", "quake", "temperature")
@@ -124,13 +123,19 @@ def across(case: Case, positions: Array) -> Array:
     return share
 
 
-def wet(case: Case, face: Face) -> bool:
-    """Whether water (or silt) may press on a face in a case."""
-    if face.side == UP:
+def wet(case: Case, side: str, lowest: float) -> bool:
+    """Whether water (or silt) may press on a face in a case, from its side and its lowest y [m]."""
+    if side == UP:
         return True
-    highest = max(case.tail_levels) if face.tailwater else case.reached
-    loaded = {DOWN: True, TOP: overtopped(case)}.get(face.side, bool(case["floor_water"]))
-    return loaded and highest > face.surface.points[:, 1].min()
+    highest = max(case.tail_levels) if side in TAILWATER else case.reached
+    loaded = {DOWN: True, TOP: overtopped(case)}.get(side, bool(case["floor_water"]))
+    return loaded and highest > lowest
+
+
+def wet_segments(case: Case) -> tuple[bool, ...]:
+    """Whether water may press on each segment of the section of a case."""
+    segments = zip(*(case.section[f"seg_{n}"] for n in ("side", "y0", "y1")), strict=True)
+    return tuple(wet(case, SIDES[int(side)], min(y0, y1)) for side, y0, y1 in segments)
 
 
 def overtopped(case: Case) -> bool:

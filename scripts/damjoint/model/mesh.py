@@ -20,7 +20,7 @@ from .body import Body as Body
 from .case import Case, OfJoint, has_drains
 from .cut import cut
 from .parameters import assignments, constants, listing, start_gmsh
-from .scene import BED, DOWN, FLOOR, SIDES, TOP, UP, Joint, numbered, stacked
+from .scene import BED, DOWN, FLOOR, SIDES, TAILWATER, TOP, UP, Joint, numbered, stacked
 
 if TYPE_CHECKING:
     from scipy import sparse
@@ -123,7 +123,12 @@ class Face:
     @property
     def tailwater(self) -> bool:
         """Whether tailwater, not the reservoir, presses on it."""
-        return self.side in (DOWN, BED)
+        return self.side in TAILWATER
+
+    @property
+    def lowest(self) -> float:
+        """Lowest y [m]."""
+        return float(self.surface.points[:, 1].min()) if np.isnan(self.low) else self.low
 
 
 @dataclass

@@ -39,3 +39,5 @@ def stacked(names: Sequence[str]) -> list[Joint]:
 #: Sides of a face, in the order of the numbers in pro/section.pro: reservoir, tailwater, water on
 #: the crest, on the reservoir's floor, on the tailwater's bed.
 SIDES = UP, DOWN, TOP, FLOOR, BED = "up", "down", "top", "floor", "bed"
+#: Sides on which tailwater presses, not the reservoir.
+TAILWATER = DOWN, BED
