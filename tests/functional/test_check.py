@@ -11,12 +11,14 @@ import damjoint as dj
 import matplotlib.image
 import pytest
 from damjoint.post import folder as folders
-from damjoint.post.check_picture import draw_joint
+from damjoint.post.check_picture import draw_check, draw_joint
 from damjoint.statics import gravity
+from damjoint.statics.verdict import verdict
 from damjoint.studies.check import (
     SafetyCheck,
     by_finite_elements,
     by_gravity,
+    compare_joints,
     compare_methods,
     hand_calculation,
     picture_table,
@@ -315,3 +317,15 @@ def test_partial_factors_on_friction_and_adhesion():
         resistance = 0.6 * numbers["N"] + 1e5 * (34 - numbers["crack_length"])
         assert numbers["SSF"] == pytest.approx(resistance / numbers["T"], rel=1e-9)
     assert "SSF with the partial factors factor_mu = 1.5, factor_c = 3" in check.notes
+
+
+def test_picture_of_each_joint_of_a_dam_that_fails(solve, tmp_path):
+    """Also of a joint that does not fail."""
+    weak = {"law": "bond", "mu": 0.3, "adhesion": 1e5, "lift_heights": (15.0,)}
+    (result,) = solve("dam", (45.0,), n_joint=24.0, order=1.0, **weak)
+    assert verdict(result) == "sliding on base" and len(result.joints) == 2
+    for k, check in enumerate(compare_joints(result)):
+        method = hand_calculation(result.joints[k])
+        path = draw_check(result, k, method, picture_table(check), check.why, tmp_path)
+        assert matplotlib.image.imread(path).std() > 0.1
+        path.unlink()

@@ -35,6 +35,8 @@ LOWER_BODY, LINES = "#dde2e8", "#b0b0b0"
 #: lines of cracks by the gravity method, length of a resultant's arrow.
 UPLIFT_AT, STRESS_AT, TALL = 0.14, 0.52, 0.24
 CRACK_AT, LONGER_AT, ARROW = -0.02, -0.04, 0.4
+#: Least unit of depth over the dam's base; a diagram's name above its axis [points].
+SHORTEST, NAME_ABOVE = 0.6, 13
 #: Ground beside the dam over its base; below the dam over its height.
 BESIDE, BELOW = 0.6, 0.1
 #: Places along the joint between which a resultant is drawn; heel 0, toe 1.
@@ -54,15 +56,23 @@ ENDS = np.array([0.0, 1.0])
 
 
 def draw_check(
-    result: Results, method: GravityMethod, cells: list[tuple[str, ...]], why: str, folder: Path
+    result: Results,
+    joint: int,
+    method: GravityMethod,
+    cells: list[tuple[str, ...]],
+    why: str,
+    folder: Path,
 ) -> Path:
-    """Draw the last saved state to folder/<case>_check.png and return its path.
+    """Draw the last saved state of a joint to folder/<case>_check.png and return its path.
 
-    cells: table beside the picture, headings in the first row, quantities in the first column;
-    why: the requirements that are not met.
+    joint: its number; method: the gravity method on it; cells: table beside the picture, headings
+    in the first row, quantities in the first column; why: the requirements that are not met.
     """
     figure = figure_of(*SIZE)
-    title, reasons = textwrap.wrap(heading(result), 100), textwrap.wrap(why, 150)
+    own = result.joints[joint]
+    name = result.case.named((joint,))
+    title = textwrap.wrap(heading(own) + (f"; {name}" if name else ""), 100)
+    reasons = textwrap.wrap(why, 150)
     top = 0.97 - TITLE * len(title) - REASON * len(reasons)
     section, beside = (
         figure.add_axes((left, BOTTOM, width, top - BOTTOM)) for left, width in (SECTION, TABLE)
@@ -77,7 +87,7 @@ def draw_check(
         parse_math=False,
     )
     draw_scene(section, method)
-    draw_joint(section, result, method)
+    draw_joint(section, own, method)
     section.set_anchor("NW")
     handles, labels = section.get_legend_handles_labels()
     labels = [textwrap.fill(label, 48) for label in labels]
@@ -166,8 +176,8 @@ def draw_fluid(axes: Axes, face: np.ndarray, outer: float, surface: float, color
 
 
 class UnderJoint:
-    """Coordinates below the joint: distance s from the heel along it and depth, both over its
-    length.
+    """Coordinates below the joint: distance s from the heel along it, over its length, and depth,
+    over its length or, below a short lift joint, part of the base.
     """
 
     def __init__(self, method: GravityMethod) -> None:
@@ -175,11 +185,12 @@ class UnderJoint:
         self.heel, self.length = np.array(body.heel), body.length
         self.along = np.array(body.along)
         self.down = np.array([self.along[1], -self.along[0]])
+        self.unit_depth = max(body.length, SHORTEST * method.case["dam_base"])
 
     def place(self, s: np.ndarray | float, depth: np.ndarray | float) -> np.ndarray:
         """Transform to x, y (2, ...) [m]."""
         axes = zip(self.heel, self.along, self.down, strict=True)
-        return np.array([x + self.length * (a * s + d * depth) for x, a, d in axes])
+        return np.array([x + self.length * a * s + self.unit_depth * d * depth for x, a, d in axes])
 
 
 @dataclass(frozen=True)
@@ -270,7 +281,8 @@ def draw_diagram(axes: Axes, under: UnderJoint, diagram: Diagram, label: str) ->
         line = under.place(computed[0], depth + scale * computed[1])
         axes.plot(*line, color=diagram.color, label=label)
     axes.plot(*outline(*by_hand), "--", color="black", linewidth=1)
-    axes.text(*under.place(0.5, depth - 0.02), diagram.name, ha="center", va="bottom", fontsize=9)
+    above = {"xytext": (0, NAME_ABOVE), "textcoords": "offset points"}
+    axes.annotate(diagram.name, under.place(0.5, depth), **above, ha="center", fontsize=9)
     for end, s, side in ((0, -0.015, "right"), (-1, 1.015, "left")):
         values = {"FE": computed[1], "gravity": by_hand[1]}
         shown = {name: f"{v[end] * factor:.3g} {size}" for name, v in values.items() if len(v)}
@@ -287,7 +299,8 @@ def draw_resultant(
     if not (DRAWN_RESULTANT[0] < s < DRAWN_RESULTANT[1] and last["N"] > 0):
         return
     back = ARROW / size
-    start, end = under.place(s - back * last["T"], -back * last["N"]), under.place(s, 0)
+    height = back * last["N"] * under.length / under.unit_depth
+    start, end = under.place(s - back * last["T"], -height), under.place(s, 0)
     axes.annotate(
         "",
         end,

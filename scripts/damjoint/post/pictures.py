@@ -32,6 +32,7 @@ from .drawing import (
     DARK,
     GREEN,
     GREY,
+    LABEL,
     ORANGE,
     RED,
     STATES,
@@ -57,12 +58,17 @@ TITLE, MESSAGE = 0.3, 0.18
 MARGIN, PER_INCH = 0.15, (9.5, 15)
 #: Width of the panels on the right over that of the section on the left.
 RIGHT = 1.25
+#: Width of the bars of all joints beside the history, over that of the figure; inches per letter of
+#: their names.
+SHARES, PER_LETTER = 0.25, 0.068
 #: Share of the shear's range that must be negative for the limit to be drawn with both signs.
 BOTH_SIGNS = 0.02
 #: Limits of an axis in percent: lines at 0 and 100 are visible.
 PERCENT = (-3, 103)
 #: Percentiles between which a map has a scale; its last colors are those of all values beyond.
 SCALED, CLIPPED = (2, 98), 0.25
+#: Ground shown around the dam in the view, over the dam's size.
+AROUND = 0.3
 #: Intervals of the scale of a map, about; its least range.
 LEVELS, TINY = 10, 1e-9
 DISTANCE = "distance from the heel along the joint [m]"
@@ -106,8 +112,15 @@ def picture(solution: Solution) -> Figure:
         left, right = parts[0].subfigures(1, 2, width_ratios=(1, RIGHT))
         draw_dam(left, solution, time)
         own = solution.of_joint(decisive_joint(result))
+        beside = parts[1]
+        if case.of_joints and is_own_solid(case):
+            right, below = right.subfigures(2, 1)
+            draw_shares(below, result, time)
+        elif case.of_joints:
+            beside, shares = beside.subfigures(1, 2, width_ratios=(1 - SHARES, SHARES))
+            draw_shares(shares, result, time)
         draw_joint(right, own, time)
-        draw_history(parts[1], own.result)
+        draw_history(beside, own.result)
         if len(parts) > 2:
             draw_solid(parts[2], solution, time)
     return figure
@@ -165,7 +178,7 @@ def draw_curves(figure: FigureBase, result: Results, time: float) -> None:
     """
     case, curves = result.case, along(result.at(time))
     s, states = curves["s"], state_of(curves)
-    jumps, normals, shears = panels(figure, 3, 1, bottom=0.55, top=0.28, down=0.32).flat
+    jumps, normals, shears = panels(figure, 3, 1, bottom=0.62, top=0.28, down=0.32).flat
     draw_jumps(jumps, case, curves)
     factor = draw_normal_stress(normals, case, curves)
     if not (validation.references(case) or case.geometry):
@@ -187,7 +200,7 @@ def draw_curves(figure: FigureBase, result: Results, time: float) -> None:
     shears.set_xlabel(DISTANCE, fontsize=9)
     occurring = [style.patch() for number, style in STATES.items() if (states == number).any()]
     if occurring:
-        place = {"loc": "lower left", "bbox_to_anchor": (0.1, -0.01), "ncols": len(occurring)}
+        place = {"loc": "lower left", "bbox_to_anchor": (0.1, 0), "ncols": len(occurring)}
         figure.legend(handles=occurring, **place, fontsize=7.5, frameon=False, borderpad=0.2)
 
 
@@ -321,6 +334,24 @@ def history_panels(result: Results) -> list[tuple[str, Units, list[Line]]]:
     return shown
 
 
+def draw_shares(figure: FigureBase, result: Results, time: float) -> None:
+    """Draw which share of each joint is open and has slipped at a requested time."""
+    names = result.case.joint_names
+    left = LABEL + PER_LETTER * max(map(len, names))
+    (axes,) = panels(figure, left=left, bottom=0.42, top=0.25).flat
+    for column, color, label, thick in (
+        ("slip_length", ORANGE, "slipped", 0.8),
+        ("crack_length", RED, "open", 0.4),
+    ):
+        shares = [100 * own.state(time)[column] / own.case.joint_along for own in result.joints]
+        axes.barh(range(len(names)), shares, thick, color=color, label=label)
+    axes.set_yticks(range(len(names)), names, fontsize=7)
+    axes.set_xlim(*PERCENT)
+    axes.set_xlabel("share of each joint [%]", fontsize=9)
+    axes.grid(axis="x", alpha=0.3)
+    legend_above(axes)
+
+
 def joint_length(result: Results) -> float:
     """Length of the joint from heel to toe, along it [m]."""
     return float(distance(result.joint).max())
@@ -354,10 +385,11 @@ def draw_view(figure: FigureBase, solution: Solution, time: float) -> None:
     scale = exaggeration(field.displacement, solution.result.case.size)
     sizes = {name: np.linalg.norm(u, axis=1) for name, u in field.displacement.items()}
     length, factor = unit(list(sizes.values()), LENGTHS)
-    polygons, depths, values = [], [], []
+    polygons, depths, values, near = [], [], [], []
     for name, displacement in field.displacement.items():
         body = solution.bodies[name]
         places = (body.points + scale * displacement) @ VIEW
+        near += [places] if name != "foundation" else []
         for table, _ in skin(body):
             polygons += list(places[table, :2])
             depths.append(places[table, 2].mean(axis=1))
@@ -366,9 +398,12 @@ def draw_view(figure: FigureBase, solution: Solution, time: float) -> None:
     (axes,) = panels(figure, left=0.15, right=0.85, bottom=0.15, top=0.3).flat
     faces = PolyCollection([polygons[i] for i in order], cmap="YlGnBu", edgecolor=GREY)
     faces.set(array=np.concatenate(values)[order], linewidth=0.1, rasterized=True)
-    axes.add_collection(faces)
+    axes.add_collection(faces, autolim=False)
+    dam = np.concatenate(near)[:, :2]
+    around = AROUND * np.ptp(dam, axis=0).max()
+    axes.update_datalim([dam.min(axis=0) - around, dam.max(axis=0) + around])
     axes.autoscale_view()
-    axes.set_aspect("equal", anchor="N")
+    axes.set_aspect("equal", adjustable="datalim")
     axes.set_axis_off()
     title = f"displacement [{length}], drawn x {scale:g}"
     axes.set_title(title, fontsize=8, loc="left")

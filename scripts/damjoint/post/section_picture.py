@@ -39,12 +39,12 @@ from .units import FORCES, STRESSES, with_unit
 ARROW = 0.16
 #: Over the dam's height: ground shown beside and below; distance of a level's mark from the edge;
 #: depth of the drains; distance of the middle third below the joint.
-BESIDE, BELOW, MARK, DRAIN, THIRD = 0.6, 0.45, 0.12, 0.3, 0.025
+BESIDE, BELOW, MARK, DRAIN, THIRD = 0.6, 0.45, 0.1, 0.3, 0.025
 #: Length of the resultant's arrow over that of the others; space above all, for a label, over the
 #: height of the picture.
 RESULTANT, LABEL = 2.5, 0.05
-#: Height of the legend below the section, up to four rows [inches].
-LEGEND = 0.62
+#: Height of the axis below the section, and of the legend's usual number of rows [inches].
+BOTTOM, LEGEND, ROWS = 0.4, 0.62, 4
 #: Arrows of a uniform pressure: places along the face, away from its ends.
 PRESSED = np.linspace(0.04, 0.96, 9)
 DRAINS = {"color": "#1565c0", "linestyle": "-.", "linewidth": 1.5}
@@ -52,7 +52,7 @@ DRAINS = {"color": "#1565c0", "linestyle": "-.", "linewidth": 1.5}
 
 def draw_section(figure: FigureBase, solution: Solution, time: float) -> None:
     """Draw the section at a requested time; a note instead if there is none."""
-    (axes,) = panels(figure, left=0.55, right=0.1, bottom=0.4 + LEGEND, top=0.25).flat
+    (axes,) = panels(figure, left=0.55, right=0.1, bottom=BOTTOM + LEGEND, top=0.25).flat
     axes.set_anchor("N")
     case, field = solution.result.case, solution.fields.get(time)
     rows = [own.at(time) for own in solution.result.joints]
@@ -99,16 +99,25 @@ class SectionDrawing:
         self.water()
         self.bodies()
         self.joint()
-        for k in range(len(self.joints)):
-            self.drains(k)
+        self.drains()
         self.forces()
         for k in range(len(self.joints)):
             self.resultant(k)
         self.axes.set_aspect("equal")
         self.axes.set_xlabel("x [m]", fontsize=9)
         self.axes.set_ylabel("y [m]", fontsize=9)
+        self.write_legend()
+
+    def write_legend(self) -> None:
+        """Write the legend below the section, which gives way to more rows than usual."""
         handles, labels = zip(*self.legend, strict=True) if self.legend else ((), ())
-        self.axes.figure.legend(
+        figure, more = self.axes.figure, -(-len(labels) // 2) - ROWS
+        if more > 0:
+            height = figure.bbox.height / figure.dpi
+            box = self.axes.get_position(original=True)
+            box.y0 = (BOTTOM + LEGEND * (1 + more / ROWS)) / height
+            self.axes.set_position(box)
+        figure.legend(
             handles,
             labels,
             loc="lower left",
@@ -235,19 +244,17 @@ class SectionDrawing:
         lowest = np.full(len(points), self.rows[joint]["z"].min())
         return nearest_rows(np.column_stack([points, lowest]), self.rows[joint])
 
-    def drains(self, joint: int) -> None:
-        """Draw the line of a joint's drains from it down into the ground."""
-        case = self.joints[joint].case
-        if not has_drains(case):
-            return
-        x, y = self.on_joint(case["drain_x"], joint)
-        self.axes.plot([x, x], [y, y - DRAIN * self.height], **DRAINS, zorder=3)
-        self.legend.append(
-            (
-                Line2D([], [], **DRAINS),
-                f"drains{self.of_joint(joint)}, {case['drain_x']:.3g} m from the heel",
-            )
-        )
+    def drains(self) -> None:
+        """Draw the lines of the joints' drains from them down into the ground."""
+        at: dict[str, list[int]] = {}
+        for k, own in enumerate(self.joints):
+            if has_drains(own.case):
+                x, y = self.on_joint(own.case["drain_x"], k)
+                self.axes.plot([x, x], [y, y - DRAIN * self.height], **DRAINS, zorder=3)
+                at.setdefault(f"{own.case['drain_x']:.3g}", []).append(k)
+        for place, joints in at.items():
+            name = f" of {self.case.named(joints)}" if len(at) > 1 else ""
+            self.legend.append((Line2D([], [], **DRAINS), f"drains{name}, {place} m from the heel"))
 
     def forces(self) -> None:
         """Draw arrows of ice, additional force, anchor and earthquake, of those that act."""
@@ -268,11 +275,6 @@ class SectionDrawing:
             shown = ", ".join(f"{n} = {share * case[n]:.3g}" for n in ("k_h", "k_v") if case[n])
             self.legend.append((arrow_handle(RED), f"earthquake, {shown}"))
 
-    def of_joint(self, joint: int) -> str:
-        """The name of a joint for a label; empty if there is only one."""
-        name = self.case.named((joint,))
-        return f" of {name}" if name else ""
-
     def resultant(self, joint: int) -> None:
         """Draw the effective resultant where it meets a joint, and the joint's middle third."""
         length = distance(self.rows[joint]).max()
@@ -291,7 +293,8 @@ class SectionDrawing:
         place = self.on_joint(at / self.joints[joint].case.joint_length * length, joint)
         longer = RESULTANT * length / distance(self.rows[0]).max()
         self.arrow(place, normal * down + shear * along, GREEN, "", longer)
-        which = self.case.named((joint,)) or "resultant"
+        name = self.case.named((joint,))
+        which = f"on {name}:" if name else "resultant"
         label = f"{which} {with_unit(math.hypot(normal, shear), FORCES, 3)}, {at:.3g} m from heel"
         self.legend.append((arrow_handle(GREEN), label))
 

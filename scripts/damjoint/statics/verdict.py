@@ -51,8 +51,10 @@ def decisive_joint(results: Results) -> int:
     """The number of the joint at which the dam fails; of a dam that stands, of the one that is
     cracked or has slipped over the largest part of its length.
     """
-    _, joint = failure(results)
     names = results.case.joint_names
+    if len(names) == 1:
+        return 0
+    _, joint = failure(results)
     if joint:
         return next(k for k, name in enumerate(names) if joint.startswith(name))
     parts = [

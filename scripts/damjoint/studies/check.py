@@ -438,7 +438,7 @@ def check_cases(cases: list[Case], out: Path) -> list[SafetyCheck]:
             write_csv(folder / "gravity.csv", loads_table(methods))
             k = min(range(len(methods)), key=lambda k: of_joints[k].margin)
             worst = of_joints[k]
-            draw_check(result.joints[k], methods[k], picture_table(worst), worst.why, folder)
+            draw_check(result, k, methods[k], picture_table(worst), worst.why, folder)
         rows = [row for check in checks for row in check.rows]
         write_csv(out / "check.csv", {name: [row[name] for row in rows] for name in CHECK})
     return checks
