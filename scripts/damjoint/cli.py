@@ -241,6 +241,7 @@ def run_and_print(arguments: argparse.Namespace, drawing: DrawingProcess | None)
         arguments.steps,
         arguments.accuracy,
     )
+    note_ineffective(case)
     out = arguments.out or Path("out") / case.name
     fields, picture = not arguments.no_fields, drawing is not None
     code = 0
@@ -287,6 +288,8 @@ def do_check(arguments: argparse.Namespace) -> int:
     settings = parameters.settings(arguments.settings)
     water = arguments.levels, arguments.tail_levels
     cases = [load(name, settings, *water, accuracy=arguments.accuracy) for name in arguments.cases]
+    for case in cases:
+        note_ineffective(case)
     if any(case["dim"] == 3 for case in cases):
         warn_if_slow()
     checks = check_cases(cases, arguments.out)
@@ -351,6 +354,15 @@ def do_gui(arguments: argparse.Namespace) -> int:
 
     gui(Request(arguments.case, parameters.settings(arguments.settings)))
     return 0
+
+
+def note_ineffective(case: Case) -> None:
+    """Print a note on the parameters that a case sets in vain."""
+    from .model.parameters import declared
+
+    for name in case.ineffective:
+        needed = declared()[name].matters
+        print(f"damjoint: {case.name}: {name} has no effect; it needs {needed}", file=sys.stderr)
 
 
 def warn_if_slow() -> None:
@@ -510,6 +522,7 @@ def do_quake(arguments: argparse.Namespace) -> int:
         record=arguments.record,
     )
     engine_of(case, arguments.engine)
+    note_ineffective(case)
     if arguments.engine == "getdp" and arguments.fields:
         raise InputError("--fields: must not be given with --engine getdp")
     if case["dim"] == 3 and arguments.engine != "getdp":

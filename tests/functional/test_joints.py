@@ -194,7 +194,10 @@ def test_settings_of_a_joint_apply_to_it_alone():
     [
         ({"mu": (0.9, 1.0)}, "mu = 0.9,1.0: must be one value, or as many as there are joints (4)"),
         ({"lift_heights": (25.0, 12.0, 38.0)}, "lift_heights = 25,12,38: must increase"),
-        ({"lift_heights": (12.0, 25.0, 50.0)}, "joint_height = 50: must be < dam_height"),
+        (
+            {"lift_heights": (12.0, 25.0, 50.0)},
+            "lift_heights = 12,25,50: each must be > 0 and < dam_height (45 m)",
+        ),
         ({"E_dam": (1e10, 2e10, 1e10, 1e10)}, "E_dam = 1"),
         ({"mu": (0.9, -1.0, 1.0, 1.0)}, "mu = -1.0: must be"),
         ({"mesh_pattern": "regular"}, "mesh_pattern = regular: must be"),

@@ -19,6 +19,10 @@ def refuse(command, tmp_path, words, parts):
     assert sorted(tmp_path.rglob("*")) == before
 
 
+#: A base and two lift joints with drains.
+LIFTS = "--set", "lift_heights=15,30", "--set", "uplift=drained"
+
+
 @pytest.mark.parametrize(
     "setting, allowed",
     [
@@ -66,7 +70,7 @@ def test_a_parameter_out_of_range_is_refused(command, tmp_path, setting, allowed
     "words, parts",
     [
         (("run", "z"), ("case z", "unknown", "b, c, c_file")),
-        (("run", "none.case"), ("case none.case", "unknown")),
+        (("run", "none.case"), ("case none.case", "no such file", "damjoint new none.case")),
         (("validate", "zz"), ("case zz", "unknown")),
         (("validate", "dam"), ("case dam", "reference", "b, c, c_file")),
         (("sweep", "a", "--vary", "mu"), ("--vary mu", "NAME=V1,V2")),
@@ -94,6 +98,12 @@ def test_a_parameter_out_of_range_is_refused(command, tmp_path, setting, allowed
         ((*RUN, "--levels", "3,,6"), ("levels = 3,,6", "list of levels in metres")),
         ((*RUN, "--levels", "3;6"), ("levels = 3;6", "list of levels in metres")),
         ((*RUN, "--set", "dam_height=4"), ("levels = 9", "and 8 m")),
+        ((*RUN, "--set", "E_dam=25"), ("E_dam = 25", ">= 1e+06 Pa", "25*GPa")),
+        (("run", "dam", "--set", "dam_height=4500"), ("dam_height = 4500", "<= 1000")),
+        (("run", "dam", "--set", "silt_height=46"), ("silt_height = 46", "<= dam_height (45 m)")),
+        (("run", "dam", *LIFTS, "--set", "lift_heights=15,45"), ("lift_heights = 15,45", "(45 m)")),
+        (("run", "dam", *LIFTS, "--set", "lift_heights=-3"), ("lift_heights = -3", "> 0")),
+        (("run", "dam", *LIFTS, "--set", "drain_x=15"), ("lift 30 m: drain_x = 15", "length (14")),
         (
             (*RUN, "--tail-levels", "1,2"),
             ("tail_levels = 1,2", "one level or as many as levels (4)"),

@@ -120,6 +120,13 @@ def test_every_preset_fits_a_dam(tmp_path, path):
         ('also_uplift = "imposed";', "other modes than uplift"),
         ('also_uplift = "some";', "none, imposed, drained, cracked, flow"),
         ("levels() = {1, 2, 3}; tail_levels() = {1, 2};", "tail_levels = 1,2"),
+        ("mu = 0.7;", "default_mu"),
+        ("default_law = bond;", "quotes, one of rupture, friction"),
+        ('lift_heights() = {9}; law() = {"bond", friction};', "quotes, one of rupture, friction"),
+        ('default_law = "glue";', "line 1"),
+        ("default_mu = 0,8;", "not a comma"),
+        ("levels() = {3, 6} default_mu = 1;", "semicolon between"),
+        ('Include "none.case";', 'line 1: Include "none.case": there is no such file'),
     ],
 )
 def test_other_statements_are_refused_before_gmsh_reads_them(command, tmp_path, text, message):
@@ -128,6 +135,21 @@ def test_other_statements_are_refused_before_gmsh_reads_them(command, tmp_path, 
     code, out, err = command("run", "mine.case", "--no-fields", "--no-picture")
     assert (code, out) == (2, "") and len(err.splitlines()) == 1
     assert message in err and sorted(tmp_path.rglob("*")) == before
+
+
+def test_parameters_without_effect_are_named(command, tmp_path):
+    """Those that the case or the command sets to another value than the default, in the run."""
+    write(
+        tmp_path,
+        'default_law = "friction"; default_G_t = 500; default_sigma_max = 0.2*MPa; levels() = {9};',
+    )
+    small = "--set", "n_joint=8", "--set", "order=1", "--no-fields", "--no-picture"
+    code, _, err = command("run", "mine.case", *small, "--set", "visc=2e-3")
+    notes = [f"damjoint: mine: {n} has no effect; it needs " for n in ("G_t", "visc")]
+    assert (code, err) == (0, f"{notes[0]}law = bond\n{notes[1]}uplift = flow\n")
+    lifts = {"lift_heights": (15.0,), "law": ("bond", "friction"), "G_t": 500.0, "alpha": 0.5}
+    assert load("dam", lifts).ineffective == ("alpha",)
+    assert load("a").ineffective == ()
 
 
 def test_files_that_are_no_cases_are_refused(command, tmp_path):

@@ -20,6 +20,7 @@ from .constraints import (
     check_distances,
     check_drive,
     check_levels,
+    check_lift_heights,
     check_lifts,
     check_softening,
     check_steps,
@@ -32,6 +33,7 @@ from .parameters import (
     INCLUDE,
     assignments,
     checked,
+    constants,
     declared,
     independent,
     levels_of,
@@ -151,6 +153,25 @@ class Case(ParameterValues):
                 of_joints=(),
             )
             for own in self.of_joints
+        )
+
+    @property
+    def ineffective(self) -> tuple[str, ...]:
+        """The parameters that the case sets to another value than their default, though they matter
+        at none of its joints.
+        """
+        if self.source is None:
+            return ()
+        packaged = self.source.path.resolve().parent == CASES.resolve()
+        text, known = self.source.text, declared()
+        of_joints = [joint.values for scene in self.scenes() for joint in scene.joints]
+        of_file = {} if packaged else {**text.defaults, **text.of_joints}
+        return tuple(
+            name
+            for name, value in {**of_file, **self.source.overrides}.items()
+            if name in known
+            and not any(known[name].matters_in(values) for values in of_joints)
+            and value != constants()[name][0]
         )
 
     @property
@@ -359,6 +380,8 @@ def case_file(case: str) -> Path:
                     "bytes, and not . or .."
                 )
             return path
+    if Path(case).suffix == ".case":
+        raise InputError(f"case {case}: there is no such file; damjoint new {case} writes one")
     names = ", ".join(path.stem for path in sorted(CASES.glob("*.case")))
     raise InputError(f"case {case}: unknown; allowed: {names}, or the path of a .case file")
 
@@ -584,8 +607,14 @@ def check_joints(case: Case) -> None:
 
     Raises InputError.
     """
-    for joint in case.joints:
-        check_values(joint, joint.section, joint.geometry is None)
+    if case.lift_heights:
+        check_lift_heights(case.lift_heights, case["dam_height"])
+    for joint, name in zip(case.joints, case.joint_names, strict=True):
+        try:
+            check_values(joint, joint.section, joint.geometry is None)
+        except InputError as error:  # of a value for all joints the first one
+            where = "" if joint is case.joints[0] else f"{name}: "
+            raise InputError(f"{where}{error}") from None
     if case.lift_heights:
         sections = [joint.section for joint in case.joints]
         check_lifts(case, case.lift_heights, sections)

@@ -28,7 +28,7 @@ from typing import TypeAlias
 from .. import InputError, data
 from ..arrays import Value
 from .arithmetic import arithmetic_value, explained
-from .parameters import assignments, checked, declared, parameter
+from .parameters import Parameter, assignments, checked, declared, parameter
 
 LISTS = ("levels", "tail_levels", "times", "lift_heights")
 TEXTS = ("title", "also_uplift", "geometry", "record")
@@ -143,8 +143,13 @@ def add_statement(case: CaseText, statement: list[Token], path: Path, where: str
     kinds, tokens = (tuple(part[i] for part in statement) for i in (0, 1))
     where = f"{where}: {excerpt(statement)}"
     name = tokens[0] if kinds[:1] == ("name",) else ""
+    if tokens.count("=") > 1:
+        raise InputError(f"{where}: has two =; is there a semicolon between the statements?")
     if name == "Include" and kinds[1:] == ("text",):
-        read_into(case, included(tokens[1][1:-1], path))
+        file = included(tokens[1][1:-1], path)
+        if not file.exists():
+            raise InputError(f"{where}: there is no such file beside {path.name}, and no preset")
+        read_into(case, file)
     elif name in LISTS and tokens[1:4] == ("(", ")", "="):
         case.lists[name] = numbers(items_of(kinds[4:], tokens[4:], where), case, where)
     elif name in TEXTS and tokens[1:2] == ("=",):
@@ -159,10 +164,12 @@ def add_statement(case: CaseText, statement: list[Token], path: Path, where: str
         with located(where):
             known = parameter(name)
         case.of_joints.pop(name, None)
-        case.defaults[name] = known.check(value_in((kinds[2:], tokens[2:]), case, where))
+        value = value_in((kinds[2:], tokens[2:]), known, case, where)
+        with located(where):
+            case.defaults[name] = known.check(value)
     elif tokens[1:4] == ("(", ")", "=") and name in declared():
         items = items_of(kinds[4:], tokens[4:], where)
-        values = tuple(value_in(item, case, where) for item in items)
+        values = tuple(value_in(item, parameter(name), case, where) for item in items)
         with located(where):
             checked(name, values)
         case.defaults.pop(name, None)
@@ -170,6 +177,7 @@ def add_statement(case: CaseText, statement: list[Token], path: Path, where: str
     else:
         allowed = [*(f"{n}()" for n in LISTS), *TEXTS, "Include", "default_<parameter>"]
         near = difflib.get_close_matches("".join(tokens[:3]).partition("=")[0], allowed, 1)
+        near = [f"default_{name}"] if name in declared() else near
         raise InputError(
             f"{where}: not a statement of a case; allowed: "
             + (f"{near[0]} (did you mean that?), " if near else "")
@@ -205,9 +213,11 @@ def numbers(items: list[Item], case: CaseText, where: str) -> list[float]:
     return [evaluate(tokens, case, where) for _, tokens in items]
 
 
-def value_in(item: Item, case: CaseText, where: str) -> Value:
-    """A text or the value of an arithmetic expression."""
+def value_in(item: Item, known: Parameter, case: CaseText, where: str) -> Value:
+    """A text or the value of an arithmetic expression, for a parameter."""
     kinds, tokens = item
+    if known.text and kinds != ("text",):
+        raise InputError(f"{where}: must be a text in quotes, {known.allowed()}")
     return tokens[0][1:-1] if kinds == ("text",) else evaluate(tokens, case, where)
 
 
@@ -221,4 +231,5 @@ def evaluate(tokens: tuple[str, ...], case: CaseText, where: str) -> float:
             f"{where}: must be a number, or arithmetic with + - * / ^ ( ), Pi, units and defaults "
             "set before"
         )
+        message += "; a decimal number has a point, not a comma" if "," in tokens else ""
         raise InputError(explained(message, error)) from None

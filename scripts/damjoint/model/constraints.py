@@ -15,6 +15,8 @@ from ..laws import LAWS
 from .parameters import constants, declared
 from .values import Group, ParameterValues, flows, has_drains
 
+#: The least Young's modulus [Pa], that of a soft soil.
+LEAST_MODULUS = 1e6
 #: Value of added_mass: Zangar's pressure in place of Westergaard's.
 ZANGAR = 2
 
@@ -29,6 +31,7 @@ def check_values(
     check_energies(case)
     for name, parameter in declared().items():
         parameter.check(case.values[name])
+    check_moduli(case)
     if by_parameters:
         check_section(case, section)
         check_distances(case, section["joint_along"][0])
@@ -46,6 +49,16 @@ def check_values(
         )
     for violation in LAWS[case["law"]].violations(case.values):
         raise InputError(violation)
+
+
+def check_moduli(case: ParameterValues) -> None:
+    """Young's moduli [Pa]: not those of a number in GPa or MPa without its unit."""
+    for name in ("E_dam", "E_found"):
+        if case[name] < LEAST_MODULUS:
+            raise InputError(
+                f"{name} = {case[name]:g}: must be >= {LEAST_MODULUS:g} Pa (a unit is a factor: "
+                "25*GPa)"
+            )
 
 
 def check_energies(case: ParameterValues) -> None:
@@ -75,6 +88,7 @@ def check_section(case: ParameterValues, section: Mapping[str, Sequence[float]])
         ("batter_height", "<=", operator.le),
         ("neck_height", "<", operator.lt),
         ("joint_height", "<", operator.lt),
+        ("silt_height", "<=", operator.le),
     ):
         if not holds(case[name], height):
             raise InputError(f"{name} = {case[name]:g}: must be {sign} dam_height ({height:g} m)")
@@ -100,6 +114,16 @@ def check_section(case: ParameterValues, section: Mapping[str, Sequence[float]])
             "mesh_pattern = regular: must be free, layers or split for a section with batter, "
             "neck, lift joint or line forces"
         )
+
+
+def check_lift_heights(heights: Sequence[float], height: float) -> None:
+    """Heights of the joints above the first one [m]: within the dam, of a height [m]."""
+    listed = ",".join(f"{h:g}" for h in heights)
+    for lift in heights:
+        if not 0 < lift < height:
+            raise InputError(
+                f"lift_heights = {listed}: each must be > 0 and < dam_height ({height:g} m)"
+            )
 
 
 def check_lifts(

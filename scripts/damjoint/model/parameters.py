@@ -94,6 +94,10 @@ class Parameter:
         """Description and unit."""
         return f"{self.description} [{self.unit}]" if self.unit else self.description
 
+    def matters_in(self, values: Mapping[str, Value]) -> bool:
+        """Whether the parameter matters with the values of all parameters."""
+        return not self.matters or any(holds(c, values) for c in self.matters.split(" or "))
+
     def allowed(self) -> str:
         """The allowed values, as text."""
         if self.choices:
@@ -268,6 +272,15 @@ def condition_text(condition: str) -> str:
     for mark, word in (("==", "="), ("!= 0", "not 0"), ("||", "or")):
         words = words.replace(mark, word)
     return words.strip("()")
+
+
+def holds(condition: str, values: Mapping[str, Value]) -> bool:
+    """Whether one part of a condition, as `condition_text` writes it, holds: "law not rupture"."""
+    name, relation, other = (*condition.split(), "not", "0")[:3]
+    value = values[name]
+    if isinstance(value, float):
+        return value > 0 if relation == ">" else (value == float(other)) == (relation == "=")
+    return (value == other) == (relation == "=")
 
 
 def parameter(name: str) -> Parameter:

@@ -19,6 +19,9 @@ title = "{title}";
 // Reservoir and tailwater [m above the base's heel] at t = 1, 2, ..., from 0; they may go down.
 levels() = {{30, 40, 45}};
 tail_levels() = {{0, 0, 3}};
+
+// Lift joints at these heights [m] above the base; values of each joint, the lowest first.
+// lift_heights() = {{15, 30}};  law() = {{"bond", "friction", "friction"}};  mu() = {{0.8, 1, 1}};
 """
 
 #: Parameters that differ from dam to dam.

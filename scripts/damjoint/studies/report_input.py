@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from typing import NamedTuple, TypeVar
 
@@ -16,8 +15,6 @@ from ..model.parameters import (
     constants,
     declared,
     parse,
-    parse_by_gmsh,
-    start_gmsh,
 )
 from ..post import stored
 from ..post.units import STRESSES, Units, unit
@@ -169,11 +166,9 @@ def parameters(case: Case) -> dict[str, Entry]:
 
 
 def visible(case: Case) -> set[str]:
-    """Parameters that matter in the scene, by the visibility in their declarations."""
-    parse_by_gmsh(stored.parser_input(case.values, case.levels))
-    onelab = start_gmsh().onelab
-    shown = lambda p: json.loads(onelab.get(p.label)).get("visible", True)
-    return {name for name, p in declared().items() if shown(p)}
+    """Parameters that matter in the scene, at one of its joints."""
+    joints = [joint.values for joint in case.joints]
+    return {n for n, known in declared().items() if any(map(known.matters_in, joints))}
 
 
 def entry(parameter: Parameter, value: Value, default: list[Value]) -> Entry:
