@@ -309,6 +309,20 @@ def test_limits_of_the_model_follow_the_case():
     assert "gravity method" not in own and "foundation reaches" not in own
 
 
+def test_input_of_several_joints_is_in_the_report():
+    own = {"law": ("bond", "friction"), "mu": (0.7, 0.8), "adhesion": (1e5, 1e5)}
+    case = load("dam", own | {"lift_heights": (15.0,), "uplift": "drained"})
+    materials, other = report_input.materials(case), report_input.other_input(case)
+    assert (materials["mu"].value, materials["mu"].default) == ("0.7, 0.8", "0.8")
+    assert (materials["adhesion"].value, materials["adhesion"].default) == ("100", "200")
+    assert materials["drain_x"].default == "" and "G_t" in materials and "pena_tang" in materials
+    values = {n: other[n].value for n in ("joints", "lift_heights", "law")}
+    assert values == {"joints": "base, lift 15 m", "lift_heights": "15", "law": "bond, friction"}
+    sentences = [*report_input.limits(case)]
+    assert sum("Joint law" in words for words in sentences) == 2
+    assert any(words.endswith("(lift 15 m).") for words in sentences)
+
+
 def test_parameters_of_a_report_are_those_of_its_own_case():
     """Not those of the case that the process read last, nor none if the case is cached."""
     dry, wet = load("dam", {"uplift": "none"}), load("dam", {"uplift": "flow"})

@@ -301,7 +301,8 @@ def describe_scene(case: Case) -> str:
     size = f"geometry {case.geometry.name}" if case.geometry else size
     solid = "3D" if case.geometry else f"3D, {case['thickness']:g} m thick"
     plane = "plane strain" if case["dim"] == 2 else solid
-    return f"{size}; {plane}; joint law {case['law']}; water in the joint: {case['uplift']}"
+    law, water = (", ".join(dict.fromkeys(j[n] for j in case.joints)) for n in ("law", "uplift"))
+    return f"{size}; {plane}; joint law {law}; water in the joint: {water}"
 
 
 def summary_of(result: Results, check: SafetyCheck | None) -> dict[str, float]:

@@ -150,19 +150,23 @@ def in_table(name: str, entry: Entry) -> bool:
 
 
 def parameters(case: Case) -> dict[str, Entry]:
-    """List the parameters that matter in a case by name.
+    """List the parameters that matter in a case by name; with the values of all joints where they
+    differ.
 
-    The default of an automatic parameter is the value that follows from the others.
+    The default of an automatic parameter is the value that follows from the others, at the first
+    joint.
     """
     known, values = declared(), case.values
     own = {n: v for n, v in values.items() if not known[n].automatic}
     automatic, defaults = parse(stored.parser_input(own, case.levels)), constants()
     matter = visible(case)
-    return {
-        name: entry(parameter, values[name], (automatic if parameter.automatic else defaults)[name])
-        for name, parameter in known.items()
-        if name in matter and name not in COMMON_MODULI
-    }
+    entries = {}
+    for name, parameter in known.items():
+        if name in matter and name not in COMMON_MODULI:
+            joints = case.joints if parameter.of_joints else [case]
+            default = (automatic if parameter.automatic else defaults)[name][0]
+            entries[name] = entry(parameter, [joint[name] for joint in joints], default)
+    return entries
 
 
 def visible(case: Case) -> set[str]:
@@ -171,15 +175,20 @@ def visible(case: Case) -> set[str]:
     return {n for n, known in declared().items() if any(map(known.matters_in, joints))}
 
 
-def entry(parameter: Parameter, value: Value, default: list[Value]) -> Entry:
-    """Format a parameter of a case and, if it differs, its default."""
-    other = None if same(value, default[0]) else default[0]
-    if isinstance(value, str):
-        return Entry(parameter.description, value, "", str(other or ""))
-    numbers = np.array([value] if other is None else [value, other], float)
+def entry(parameter: Parameter, values: Sequence[Value], default: Value) -> Entry:
+    """Format a parameter of a case, with a value for each joint where they differ, and its default
+    where that differs, too.
+    """
+    shown = values[:1] if all(same(v, values[0]) for v in values) else values
+    compared = values[:1] if parameter.automatic else values
+    others = [] if all(same(v, default) for v in compared) else [default]
+    if parameter.text:
+        return Entry(parameter.description, ", ".join(map(str, shown)), "", "".join(others))
+    numbers = np.array([*shown, *others], float)
     name, factor = unit([numbers], UNITS.get(parameter.unit, ((parameter.unit, 1),)))
     texts = [f"{v * factor:.6g}" for v in numbers]
-    return Entry(parameter.description, texts[0], name, *texts[1:])
+    of_joints, of_default = texts[: len(shown)], texts[len(shown) :]
+    return Entry(parameter.description, ", ".join(of_joints), name, *of_default)
 
 
 def same(value: Value, default: Value) -> bool:
@@ -201,9 +210,27 @@ def loading(case: Case) -> dict[str, Entry]:
     }
     if equal:
         entries["times"] = Entry("Load steps from level to level", f"{steps}")
+    if case.lift_heights:
+        text = "Heights of the heels of the lift joints"
+        entries = {"lift_heights": Entry(text, listed(case.lift_heights), "m")} | entries
+    if case.of_joints:
+        text = "Joints, in the order of values that differ"
+        entries = {"joints": Entry(text, ", ".join(case.joint_names))} | entries
     if case.geometry:
         entries = {"geometry": Entry("Geometry file", case.geometry.name)} | entries
     return entries
+
+
+def limits_of_joint(joint: Case) -> Iterator[str]:
+    """Yield what the model of a joint includes: its law, its water, its drains."""
+    law = LAWS.get(joint["law"], "a law of the user")
+    yield f"Joint law {joint['law']}: {law}."
+    yield f"Water in the joint, uplift = {joint['uplift']}: {UPLIFTS[joint['uplift']]}."
+    if has_drains(joint):
+        yield (
+            f"Drains {joint['drain_x']:g} m from the heel with an effectiveness of "
+            f"{joint['drain_effectiveness']:g}; their efficiency in service is not verified."
+        )
 
 
 def limits(case: Case, earthquake: bool = False) -> Iterator[str]:
@@ -230,14 +257,13 @@ def limits(case: Case, earthquake: bool = False) -> Iterator[str]:
             f"The foundation reaches {case['found_side']:g} m beyond heel and toe and "
             f"{case['found_depth']:g} m down, with fixed sides and bottom."
         )
-    law = LAWS.get(case["law"], "a law of the user")
-    yield f"Joint law {case['law']}: {law}."
-    yield f"Water in the joint, uplift = {case['uplift']}: {UPLIFTS[case['uplift']]}."
-    if has_drains(case):
-        yield (
-            f"Drains {case['drain_x']:g} m from the heel with an effectiveness of "
-            f"{case['drain_effectiveness']:g}; their efficiency in service is not verified."
-        )
+    of_joints: dict[str, list[int]] = {}
+    for number, joint in enumerate(case.joints):
+        for sentence in limits_of_joint(joint):
+            of_joints.setdefault(sentence, []).append(number)
+    for sentence, numbers in of_joints.items():
+        some = len(numbers) < len(case.joints)
+        yield sentence[:-1] + (f" ({case.named(numbers)})." if some else ".")
     if case["face_load"] == "uniform":
         yield "The water pressure on the faces is uniform, not hydrostatic."
     if not case["floor_water"]:
