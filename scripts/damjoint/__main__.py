@@ -2,6 +2,7 @@
 streams, signals, address space) before the libraries are imported.
 """
 
+import atexit
 import os
 import resource
 import signal
@@ -71,6 +72,20 @@ def enough_address_space() -> bool:
     return limit >= LEAST_ADDRESS_SPACE
 
 
+def leave(code: int) -> None:
+    """End the process after what is registered for its exit: Python would free every object, which
+    takes a tenth of a short run, and might end by a signal instead. Returns if the output can not
+    be written, which Python reports.
+    """
+    atexit._run_exitfuncs()
+    try:
+        for stream in (sys.stdout, sys.stderr):
+            stream.flush()
+    except (OSError, ValueError):
+        return
+    os._exit(code)
+
+
 def main() -> int:
     """Run the command: 0 done, 1 failed, 2 bad input, 130 interrupted."""
     open_streams()
@@ -87,10 +102,7 @@ def main() -> int:
     finally:  # the clean-up at exit is not interrupted
         for number in (*INTERRUPTS, signal.SIGALRM):
             signal.signal(number, signal.SIG_IGN)
-    if code == 130:  # exit at once: Python might end by the signal instead
-        for stream in (sys.stdout, sys.stderr):
-            stream.flush()
-        os._exit(code)
+    leave(code)
     return code
 
 

@@ -27,6 +27,20 @@ Settings: TypeAlias = Mapping[str, Setting]
 #: Values by the names of pro/parameters.pro.
 Values: TypeAlias = Mapping[str, Value]
 
+
+
+def distinct(numbers: IntArray) -> IntArray:
+    """The different ones of some numbers >= 0, sorted. (numpy.unique loads numpy.ma.)"""
+    return np.flatnonzero(np.bincount(numbers))
+
+
+def others(size: int, numbers: IntArray) -> IntArray:
+    """The numbers from 0 to size - 1 that are not among some numbers, sorted."""
+    mask = np.ones(size, bool)
+    mask[numbers] = False
+    return np.flatnonzero(mask)
+
+
 #: Size of the blocks that are transposed.
 BLOCK = 128
 

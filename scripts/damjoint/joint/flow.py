@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..arrays import Array, IntArray
+from ..arrays import Array, IntArray, distinct, others
 from ..csr import CsrMatrix, added
 from ..fem import elements
 from ..model.mesh import JointMesh
@@ -53,7 +53,7 @@ class JointFields:
         self.at_locations = space.interpolation(1)
         laplace = added([g.T @ g.scaled(points.weights) for g in self.slopes])
         self.ends = np.concatenate([heel, toe])
-        self.inside = np.setdiff1d(np.arange(number), self.ends)
+        self.inside = others(number, self.ends)
         y = surface.points[:, 1]
         self.xi = harmonic(laplace, self.ends, np.isin(self.ends, toe).astype(float))
         self.heel_y, self.toe_y = (
@@ -80,7 +80,7 @@ def harmonic(laplace: CsrMatrix, fixed: IntArray, values: Array) -> Array:
     """Solve the Laplace equation (n,) with these values at fixed nodes."""
     field = np.zeros(laplace.shape[0])
     field[fixed] = values
-    free = np.setdiff1d(np.arange(len(field)), fixed)
+    free = others(len(field), fixed)
     rows = laplace[free]
     right = -(rows.columns(fixed) @ values)
     matrix = rows.columns(free)
@@ -138,7 +138,7 @@ class FlowDerivative:
         """The derivatives of several joints, one below the other; None if there is none."""
         if len(parts) < 2:
             return parts[0] if parts else None
-        columns = np.unique(np.concatenate([part.columns for part in parts]))
+        columns = distinct(np.concatenate([part.columns for part in parts]))
         ends = np.cumsum([0, *(len(part.pressure) for part in parts)])
         pressure = np.zeros((ends[-1], len(columns)))
         for first, last, part in zip(ends, ends[1:], parts, strict=False):
@@ -300,7 +300,7 @@ class Flow:
         """
         points = np.flatnonzero(rate)
         opening = self.opening[points]
-        columns = np.unique(opening.indices)
+        columns = distinct(opening.indices)
 
         def of(system: FlowSystem) -> Array:
             coupling = added(

@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..arrays import Array, IntArray
+from ..arrays import Array, IntArray, distinct
 from ..csr import CsrMatrix, added, stacked
 from ..fem import elements
 from ..fem.cache import cached, key_of
@@ -179,7 +179,8 @@ class JointInterface:
             crossed = table[(low <= at) & (at <= high)]
             away = np.abs(xi[crossed] - at)
             near.append(crossed[away <= away.min(axis=1, keepdims=True) + same])
-        nodes = np.intersect1d(np.concatenate(near), self.fields.inside)
+        nearest = np.concatenate(near)
+        nodes = distinct(nearest[np.isin(nearest, self.fields.inside)])
         beside = np.concatenate([np.isin(table, nodes).any(axis=1) for table in tables])
         return nodes, np.flatnonzero(beside[self.points.elements])
 
@@ -253,7 +254,7 @@ class Interface:
         # rows: components of the traction
         differs = (tangent != undamaged).any(axis=2)[:, : self.dim]
         points = np.flatnonzero(differs.any(axis=1))
-        rows = np.unique(self.at_points[np.flatnonzero(differs)].indices)
+        rows = distinct(self.at_points[np.flatnonzero(differs)].indices)
         change = tangent[points] - undamaged[points]
         return Change(law=self.stiffness(change, points)[rows], rows=rows)
 

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.linalg import norm
 
-from ..arrays import Array, IntArray, mirror
+from ..arrays import Array, IntArray, distinct, mirror
 from ..csr import CsrMatrix
 from ..threads import limited_threads, scipy_linalg
 from .flow import FlowDerivative
@@ -85,7 +85,7 @@ class UndamagedSystem:
         start = compliance @ right
         small = np.zeros((size + (border is not None),) * 2)
         small_right = np.zeros(len(small))
-        touched = np.unique(law.indices)
+        touched = distinct(law.indices)
         small[:m, :m] = law.columns(touched) @ compliance[np.ix_(touched, rows)]
         small_right[:m] = law @ start
         if flow and lift:

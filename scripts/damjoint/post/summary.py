@@ -86,8 +86,9 @@ def levels_table(result: Results) -> Table:
 def requested_rows(result: Results) -> np.ndarray:
     """Indices in the history of the requested levels that were reached, and of its last row."""
     times = result.history["time"]
-    rows = np.flatnonzero([np.isclose(result.case.requested, t).any() for t in times])
-    return np.union1d(rows, len(times) - 1) if len(times) else rows
+    shown = np.array([np.isclose(result.case.requested, t).any() for t in times], bool)
+    shown[-1:] = True
+    return np.flatnonzero(shown)
 
 
 def text(result: Results) -> str:
