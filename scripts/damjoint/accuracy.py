@@ -11,13 +11,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 
 from . import RunError
+from .classes import dataclass
 from .engines import OnStep, Outcome
 from .model.case import Case, has_plane_fields
 from .model.fields import along

@@ -28,7 +28,6 @@ Settings: TypeAlias = Mapping[str, Setting]
 Values: TypeAlias = Mapping[str, Value]
 
 
-
 def distinct(numbers: IntArray) -> IntArray:
     """The different ones of some numbers >= 0, sorted. (numpy.unique loads numpy.ma.)"""
     return np.flatnonzero(np.bincount(numbers))

@@ -6,13 +6,13 @@ Large matrices are multiplied by scipy, in the same order of summation.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
 from .arrays import Array, IntArray
+from .classes import dataclass
 
 if TYPE_CHECKING:
     from scipy import sparse
@@ -27,7 +27,7 @@ def ranges(starts: IntArray, counts: IntArray) -> IntArray:
     return np.repeat(starts - ends + counts, counts) + np.arange(ends[-1] if len(ends) else 0)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class CsrMatrix:
     """A matrix (m, n): the entries of row i are data[indptr[i] : indptr[i + 1]], in columns
     `indices`, of which none is repeated in a row.

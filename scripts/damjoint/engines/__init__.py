@@ -8,11 +8,11 @@ bodies are needed) and raises RunError. Engines write no output folders.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from importlib import import_module
 from types import ModuleType
 
 from .. import InputError
+from ..classes import dataclass
 from ..model.case import Case
 from ..model.fields import Field
 from ..model.mesh import Mesh

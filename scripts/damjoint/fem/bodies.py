@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from ..arrays import Array, IntArray, Sparse
+from ..classes import dataclass
 from ..model.case import Case
 from ..model.loads import COMPLETE, across, thermal_strains, wet
 from ..model.mesh import LINES, Body, Mesh, mesh_of

@@ -24,13 +24,13 @@ the problem definition (tests compare both).
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from scipy import linalg
 
 from ..arrays import Array, IntArray
+from ..classes import dataclass
 from ..model.case import Case
 from . import factor
 from .bodies import Bodies, ElasticBody

@@ -7,13 +7,13 @@ engines solve one discrete problem. Wedges and hexahedra are of the condensed en
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cache
 from itertools import combinations, product
 
 import numpy as np
 
 from ..arrays import Array, IntArray
+from ..classes import dataclass
 from ..csr import CsrMatrix, stacked
 from ..model.mesh import Body
 
@@ -121,7 +121,7 @@ TRIANGLE: dict[int, tuple[list[tuple[float, ...]], list[float]]] = {
         [0.1125] + [0.0629695902724135] * 3 + [0.066197076394253] * 3,
     ),
 }
-#: Gauss-Legendre rules with 1 to 4 points: the values of numpy.polynomial, which takes long to load.
+#: Gauss-Legendre rules with 1 to 4 points: values of numpy.polynomial, which takes long to load.
 GAUSS: dict[int, tuple[list[float], list[float]]] = {
     1: ([0.0], [2.0]),
     2: ([-0.5773502691896257, 0.5773502691896257], [1.0, 1.0]),

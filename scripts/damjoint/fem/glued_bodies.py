@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy import sparse
 
 from ..arrays import Array, IntArray, Sparse
+from ..classes import dataclass
 from .bodies import ElasticBody
 from .factor import solve_symmetric
 from .gluing import Gluing

@@ -11,12 +11,11 @@ joint there is a sum of these.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy import sparse
 
 from ..arrays import IntArray, Sparse
+from ..classes import dataclass
 from .bodies import Bodies
 from .condensed import JointDofs
 

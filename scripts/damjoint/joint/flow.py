@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
 from ..arrays import Array, IntArray, distinct, others
+from ..classes import dataclass
 from ..csr import CsrMatrix, added
 from ..fem import elements
 from ..model.mesh import JointMesh

@@ -4,12 +4,13 @@ operators, and the linear systems of Newton's method.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
 from ..arrays import Array, IntArray, distinct
+from ..classes import dataclass
 from ..csr import CsrMatrix, added, stacked
 from ..fem import elements
 from ..fem.cache import cached, key_of

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from .. import ROUND_OFF
 from ..arrays import Array
+from ..classes import dataclass
 from ..csr import CsrMatrix
 from ..laws import Law
 from ..model.case import Case, flows, has_drains, remembers

@@ -8,13 +8,14 @@ those beyond the thickness that grout and saw leave.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Array, BoolArray
+from ..classes import dataclass
 from .base import Evidence, Law
 
 

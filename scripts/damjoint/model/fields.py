@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ..arrays import Array, IntArray, Table
+from ..classes import dataclass
 from ..laws import COLUMNS
 from .mesh import Body
 from .results import FLUX, THICKNESS, Results

@@ -11,7 +11,7 @@ import signal
 import tempfile
 import threading
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from functools import lru_cache
 from pathlib import Path
 from types import ModuleType
@@ -19,6 +19,7 @@ from typing import Any
 
 from .. import InputError, __version__, data
 from ..arrays import Setting, Value
+from ..classes import dataclass
 from ..laws import LAWS
 from ..storage import atomic_write, cached
 from .arithmetic import explained, quantity

@@ -9,13 +9,14 @@ more, however large the displacement, is a mechanism.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
 from .. import ROUND_OFF
 from ..arrays import Array
+from ..classes import dataclass
 from ..model.case import Case
 from ..model.results import column_of
 from .controls import (

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from ..arrays import Array
+from ..classes import dataclass
 from ..joint.equilibrium import Equilibrium
 from ..joint.joint_laws import JointLaws, JointVariables
 from ..joint.water import Pressure, Still
