@@ -55,6 +55,7 @@ def run(
     Returns the results in the order of case.scenes(). A run that stops early or is interrupted
     writes its converged steps. Raises InputError, RunError.
     """
+    versions.git_status()  # on another core meanwhile
     chosen = engine_of(case, engine)
     outcomes = list[Outcome]()
     with folders.claim_output_folder(case, out):  # after the checks: bad input removes nothing

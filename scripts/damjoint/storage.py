@@ -5,10 +5,9 @@ from __future__ import annotations
 import contextlib
 import errno
 import fcntl
-import hashlib
 import json
 import os
-import shutil
+import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -56,19 +55,22 @@ def cache_folder() -> Path | None:
 
 def cached(kind: str, key: str, compute: Callable[[], Any]) -> Any:
     """A value of JSON from the cache folder, or computed and added to it; key: all that it depends
-    on. A file that cannot be read is replaced; one that cannot be written only costs the entry.
+    on. A file that cannot be read, or of another key, is replaced; one that cannot be written only
+    costs the entry.
     """
     parent = cache_folder()
     if parent is None:
         return compute()
-    path = parent / f"{kind}-{hashlib.sha256(key.encode()).hexdigest()[:24]}.json"
-    with contextlib.suppress(OSError, ValueError):
-        return json.loads(path.read_text())
+    path = parent / f"{kind}-{zlib.crc32(key.encode()):08x}.json"
+    with contextlib.suppress(OSError, ValueError, KeyError, TypeError):
+        stored = json.loads(path.read_text())
+        if stored["key"] == key:
+            return stored["value"]
     value = compute()
     with contextlib.suppress(OSError):
         parent.mkdir(parents=True, exist_ok=True)
         with atomic_write(path) as part:
-            part.write_text(json.dumps(value))
+            part.write_text(json.dumps({"key": key, "value": value}))
     return value
 
 
@@ -82,6 +84,8 @@ def check_end(path: Path, *ends: str) -> None:
         file.seek(max(0, file.seek(0, os.SEEK_END) - max(map(len, ends))))
         last = file.read()
     if not last.endswith(tuple(end.encode() for end in ends)):
+        import shutil
+
         free = shutil.disk_usage(path.parent).free
         message = f"truncated; its folder has {free} bytes free"
         raise OSError(errno.ENOSPC, message, str(path))

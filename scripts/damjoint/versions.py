@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import platform
 import re
@@ -36,22 +37,29 @@ def installed() -> dict[str, str]:
 
 
 @lru_cache(maxsize=1)
+def git_status() -> subprocess.Popen[str] | None:
+    """Start git on the checkout, for `commit`; None outside of a checkout of this project."""
+    checkout = Path(__file__).parents[2]
+    if not (checkout / ".git").exists():
+        return None
+    # without locks, which runs at the same time would wait for
+    git = "git", "--no-optional-locks", "-C", str(checkout)
+    words = "status", "--porcelain=v2", "--branch", "--", *CODE_FOLDERS
+    quiet = {"stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL, "text": True}
+    with contextlib.suppress(OSError):
+        return subprocess.Popen([*git, *words], **quiet)
+    return None
+
+
+@lru_cache(maxsize=1)
 def commit() -> str:
     """Return the commit of the checkout, with a note if its code has changes; empty outside of a
     checkout of this project.
     """
-    checkout = Path(__file__).parents[2]
-    if not (checkout / ".git").exists():
-        return ""
-    # without locks, which runs at the same time would wait for
-    git = "git", "--no-optional-locks", "-C", str(checkout)
-    words = "status", "--porcelain=v2", "--branch", "--", *CODE_FOLDERS
-    try:
-        done = subprocess.run([*git, *words], capture_output=True, text=True, check=True)
-    except (OSError, subprocess.CalledProcessError):
-        return ""
-    head = re.search("^# branch.oid ([0-9a-f]{7})", done.stdout)
-    changed = re.search("^[^#]", done.stdout, re.MULTILINE)
+    process = git_status()
+    status = process.communicate()[0] if process else ""
+    head = re.search("^# branch.oid ([0-9a-f]{7})", status)
+    changed = re.search("^[^#]", status, re.MULTILINE)
     return head[1] + (" with changes" if changed else "") if head else ""
 
 

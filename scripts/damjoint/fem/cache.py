@@ -8,10 +8,10 @@ another version is ignored and replaced.
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import json
 import os
 import zipfile
+import zlib
 from collections.abc import Mapping
 from dataclasses import fields
 from functools import lru_cache
@@ -57,6 +57,8 @@ def key_of(case: Case) -> tuple[object, ...]:
 
 def fingerprint(mesh: Mesh) -> str:
     """Hash of a mesh: its bodies and faces."""
+    import hashlib
+
     surfaces = {name: face.surface for name, face in mesh.faces.items()}
     digest = hashlib.sha256()
     for name, body in (mesh.bodies | surfaces).items():
@@ -68,13 +70,13 @@ def fingerprint(mesh: Mesh) -> str:
 
 @lru_cache(maxsize=1)
 def sources() -> str:
-    """Hash of the files that condensed bodies of a case are computed by: meshes and elements."""
+    """Checksum of the files that condensed bodies of a case are computed by: meshes and elements."""
     package = Path(__file__).parents[1]
     meshes = (package / name for name in ("csr.py", "model/cut.py", "model/mesh.py"))
     code = *meshes, *sorted((package / "fem").glob("*.py"))
     shapes = data("pro") / "section.pro", *sorted(data("geo").glob("*.geo"))
     texts = [path.read_bytes() for path in (*shapes, *code)]
-    return hashlib.sha256(b"".join(texts)).hexdigest()
+    return f"{zlib.crc32(b''.join(texts)):08x}"
 
 
 def cached(case: Case) -> tuple[Condensed, Bodies | None]:
@@ -85,7 +87,7 @@ def cached(case: Case) -> tuple[Condensed, Bodies | None]:
     """
     header = json.dumps([__version__, sources(), key_of(case)])
     parent = cache_folder()
-    path = parent and parent / (hashlib.sha256(header.encode()).hexdigest()[:24] + ".npz")
+    path = parent and parent / f"bodies-{zlib.crc32(header.encode()):08x}.npz"
     stored = read(path, header) if path else None
     if stored:
         return stored, None

@@ -9,10 +9,10 @@ complement, MUMPS itself orders by approximate minimum degree, which needs twice
 from __future__ import annotations
 
 import ctypes
-import hashlib
 import subprocess
 import tempfile
 import weakref
+import zlib
 from functools import cache
 from pathlib import Path
 from types import ModuleType
@@ -41,9 +41,8 @@ TOO_LARGE, NO_MEMORY = 1, -13
 def library() -> ctypes.CDLL | None:
     """mumps.c as a library, compiled into the cache folder; None without compiler or MUMPS."""
     source = Path(__file__).with_name("mumps.c")
-    digest = hashlib.sha256(source.read_bytes()).hexdigest()[:16]
     parent = cache_folder() or Path(tempfile.mkdtemp(prefix="damjoint"))
-    path = parent / f"mumps-{digest}.so"
+    path = parent / f"mumps-{zlib.crc32(source.read_bytes()):08x}.so"
     try:
         return ctypes.CDLL(str(path))
     except OSError:  # not compiled yet, or for a MUMPS that is no longer installed

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import difflib
 import math
 import operator
 import re
@@ -34,6 +33,8 @@ class UnknownName(ValueError):
     """A name that is neither a unit nor known."""
 
     def __init__(self, name: str, known: Mapping[str, float]) -> None:
+        import difflib
+
         near = difflib.get_close_matches(name, known, 1)
         hint = f"did you mean {near[0]}?" if near else f"units: {', '.join(units())}"
         super().__init__(f"{name} is unknown ({hint})")

@@ -17,7 +17,6 @@ A case is a list of statements, in any layout, with // and /* */ comments:
 from __future__ import annotations
 
 import contextlib
-import difflib
 import re
 import unicodedata
 from collections.abc import Iterator
@@ -175,6 +174,8 @@ def add_statement(case: CaseText, statement: list[Token], path: Path, where: str
         case.defaults.pop(name, None)
         case.of_joints[name] = values
     else:
+        import difflib
+
         allowed = [*(f"{n}()" for n in LISTS), *TEXTS, "Include", "default_<parameter>"]
         near = difflib.get_close_matches("".join(tokens[:3]).partition("=")[0], allowed, 1)
         near = [f"default_{name}"] if name in declared() else near

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import tempfile
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -258,6 +257,8 @@ def generate(case: Case) -> None:
 
     Raises RunError, and InputError if a user's own geometry can not be read.
     """
+    import tempfile
+
     gmsh = start_gmsh()
     gmsh.clear()
     gmsh.parser.clear()

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
 import itertools
 import json
 import math
 import re
 import signal
-import tempfile
 import threading
+import zlib
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict
 from functools import lru_cache
@@ -165,6 +164,8 @@ def complete(text: str, folder: Path) -> str:
 
 def parse_by_gmsh(text: str) -> dict[str, list[Any]]:
     """The same without the cache; the ONELAB database is that of the text afterwards."""
+    import tempfile
+
     gmsh = start_gmsh()
     gmsh.parser.clear()
     gmsh.onelab.clear()
@@ -197,9 +198,9 @@ def constants() -> dict[str, list[Any]]:
 
 @lru_cache(maxsize=1)
 def sources() -> str:
-    """The texts of the declarations and of the files that they include."""
+    """Version and checksum of the declarations and of the files that they include."""
     texts = (DECLARATIONS.with_name(f"{n}.pro") for n in ("parameters", "section", "units"))
-    return __version__ + "".join(text.read_text() for text in texts)
+    return f"{__version__} {zlib.crc32(b''.join(text.read_bytes() for text in texts)):08x}\n"
 
 
 @lru_cache(maxsize=1)
@@ -291,6 +292,8 @@ def parameter(name: str) -> Parameter:
     """
     known = declared()
     if name not in known:
+        import difflib
+
         near = difflib.get_close_matches(name, known, 3) or sorted(known)
         raise InputError(f"{name}: unknown parameter; allowed: {', '.join(near)}")
     return known[name]
