@@ -60,8 +60,8 @@ if [ -n "$missing" ]; then
   install $missing
 fi
 
-# MUMPS, the fast factorisation: scripts/damjoint/fem/mumps.c is compiled at its first use. It uses
-# the BLAS of the system, whose reference version is slow.
+# MUMPS, the fast factorisation, for scripts/damjoint/fem/mumps.c. It uses the BLAS of the system,
+# whose reference version is slow.
 mumps_packages() {
   echo '#include <dmumps_c.h>
         int main(void) { return 0; }' | cc -x c - -ldmumps_seq -o /dev/null 2>/dev/null ||
@@ -76,10 +76,12 @@ fi
 
 # The stamp is newer than its sources if everything below has succeeded.
 if [ ! -x .venv/bin/python ] ||
-   [ -z "$(find .venv/.stamp -newer pyproject.toml -newer scripts/setup.sh 2>/dev/null)" ]; then
+   [ -z "$(find .venv/.stamp -newer pyproject.toml -newer scripts/setup.sh \
+           -newer scripts/damjoint/fem/mumps.c 2>/dev/null)" ]; then
   # for weasyprint, which writes reports as PDF; not required
   has libpangoft2-1.0.so.0 || install libpangoft2-1.0-0 >/dev/null 2>&1 || true
   [ -x .venv/bin/python ] || "$python" -m venv .venv
   .venv/bin/pip install -q --disable-pip-version-check -e ".[test,docs,fast]"
+  .venv/bin/python -c "from damjoint.fem import factor; factor.compile_into(factor.INSTALLED)"
   touch .venv/.stamp
 fi

@@ -80,6 +80,7 @@ def test_solution(system, method):
 def test_a_library_that_does_not_load_is_compiled_anew(tmp_path, monkeypatch):
     if factor.is_slow():
         pytest.skip("MUMPS")
+    monkeypatch.setattr(factor, "INSTALLED", tmp_path / "none")
     path = tmp_path / Path(factor.library()._name).name
     path.write_bytes(b"of another machine")
     monkeypatch.setenv("DAMJOINT_CACHE", str(tmp_path))
@@ -87,7 +88,19 @@ def test_a_library_that_does_not_load_is_compiled_anew(tmp_path, monkeypatch):
     assert factor.library()._name == str(path) and path.stat().st_size > 1000
 
 
+def test_the_library_of_the_installation_is_used(tmp_path, monkeypatch):
+    if factor.is_slow():
+        pytest.skip("MUMPS")
+    monkeypatch.setattr(factor, "INSTALLED", tmp_path / "lib")
+    monkeypatch.setenv("DAMJOINT_CACHE", str(tmp_path / "cache"))
+    factor.compile_into(tmp_path / "lib")
+    factor.library.cache_clear()
+    path = tmp_path / "lib" / factor.file_name()
+    assert factor.library()._name == str(path) and not (tmp_path / "cache").exists()
+
+
 def test_without_a_compiler_there_is_superlu(tmp_path, monkeypatch):
+    monkeypatch.setattr(factor, "INSTALLED", tmp_path / "none")
     monkeypatch.setenv("DAMJOINT_CACHE", str(tmp_path))
     monkeypatch.setenv("PATH", "")
     factor.library.cache_clear()

@@ -70,7 +70,7 @@ def fingerprint(mesh: Mesh) -> str:
 
 @lru_cache(maxsize=1)
 def sources() -> str:
-    """Checksum of the files that condensed bodies of a case are computed by: meshes and elements."""
+    """Checksum of the files by which condensed bodies are computed: meshes and elements."""
     package = Path(__file__).parents[1]
     meshes = (package / name for name in ("csr.py", "model/cut.py", "model/mesh.py"))
     code = *meshes, *sorted((package / "fem").glob("*.py"))

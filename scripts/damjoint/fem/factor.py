@@ -1,27 +1,30 @@
 """Sparse factorisations: Schur complements and systems of symmetric matrices.
 
-By MUMPS through mumps.c, which is compiled at its first use if the system has a C compiler and
-MUMPS (`make setup` installs both), else by scipy's SuperLU, which is several times slower in 3D
+By MUMPS through mumps.c, which `make setup` compiles, or its first use if the system has a C
+compiler and MUMPS; else by scipy's SuperLU, which is several times slower in 3D
 (is_slow). Large matrices are eliminated in METIS's order where pymetis is installed: with a Schur
 complement, MUMPS itself orders by approximate minimum degree, which needs twice the operations.
 """
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import subprocess
+import sys
 import tempfile
 import weakref
 import zlib
+from contextlib import AbstractContextManager
 from functools import cache
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import scipy
 from scipy import sparse
-from threadpoolctl import threadpool_info, threadpool_limits
+from threadpoolctl import ThreadpoolController
 
 from ..arrays import Array, IntArray, Sparse, mirror
 from ..storage import atomic_write, cache_folder
@@ -37,20 +40,36 @@ LARGE = 15000
 TOO_LARGE, NO_MEMORY = 1, -13
 
 
+SOURCE = Path(__file__).with_name("mumps.c")
+#: Folder of the Python environment into which `make setup` compiles it.
+INSTALLED = Path(sys.prefix) / "lib" / "damjoint"
+
+
 @cache
 def library() -> ctypes.CDLL | None:
-    """mumps.c as a library, compiled into the cache folder; None without compiler or MUMPS."""
-    source = Path(__file__).with_name("mumps.c")
+    """mumps.c as a library, of `make setup` or compiled into the cache folder; None without
+    compiler or MUMPS.
+    """
     parent = cache_folder() or Path(tempfile.mkdtemp(prefix="damjoint"))
-    path = parent / f"mumps-{zlib.crc32(source.read_bytes()):08x}.so"
+    for folder in (INSTALLED, parent):
+        # OSError: not compiled yet, or for a MUMPS that is no longer installed
+        with contextlib.suppress(OSError):
+            return ctypes.CDLL(str(folder / file_name()))
+    return compile_into(parent)
+
+
+def file_name() -> str:
+    """The name of the compiled library: of this state of mumps.c."""
+    return f"mumps-{zlib.crc32(SOURCE.read_bytes()):08x}.so"
+
+
+def compile_into(folder: Path) -> ctypes.CDLL | None:
+    """Compile mumps.c into a folder; None without compiler or MUMPS."""
+    path = folder / file_name()
     try:
-        return ctypes.CDLL(str(path))
-    except OSError:  # not compiled yet, or for a MUMPS that is no longer installed
-        pass
-    try:
-        parent.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(parents=True, exist_ok=True)
         with atomic_write(path) as part:
-            options = "-O2", "-shared", "-fPIC", source, "-ldmumps_seq", "-o", part
+            options = "-O2", "-shared", "-fPIC", SOURCE, "-ldmumps_seq", "-o", part
             subprocess.run(["cc", *options], check=True, capture_output=True)
         return ctypes.CDLL(str(path))
     except (OSError, subprocess.CalledProcessError):
@@ -115,12 +134,18 @@ def pointer(values: Array | IntArray) -> ctypes.c_void_p:
     return ctypes.c_void_p(values.ctypes.data)
 
 
-def as_other_libraries() -> threadpool_limits:
+#: The libraries that have threads, MUMPS's own BLAS among them: called when it is loaded.
+controller = cache(ThreadpoolController)
+
+
+def as_other_libraries() -> AbstractContextManager[Any]:
     """Limit the threads of MUMPS's own BLAS to those of the others: a limit that was set before it
     was loaded has not reached it.
     """
-    pools = (pool for pool in threadpool_info() if pool["user_api"] == "blas")
-    return threadpool_limits(min(pool["num_threads"] for pool in pools), "blas")
+    pools = (pool for pool in controller().info() if pool["user_api"] == "blas")
+    number = min(pool["num_threads"] for pool in pools)
+    limits: AbstractContextManager[Any] = controller().limit(limits=number, user_api="blas")
+    return limits
 
 
 class MumpsFactors:
