@@ -81,7 +81,7 @@ def errors(tmp_path, axis, size, **settings):
     return worst, after, np.interp(begin, times, energies) / whole, energies[-1] / whole
 
 
-@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize("axis", [0, pytest.param(1, marks=pytest.mark.heavy)])
 def test_a_wave_from_below_has_twice_its_velocity_at_the_surface_and_leaves(tmp_path, axis):
     """And at the base the velocity of the upward wave, later that of the reflected one."""
     coarse, _, _, _ = errors(tmp_path, axis, 4.0, dt=1e-3)

@@ -26,8 +26,15 @@ DAM = {"n_joint": 20, "h_dam": 8, "h_found": 30}
 WARM = {"temperature_dam": -8.0, "temperature_linear": 15.0, "temperature_found": 3.0}
 
 
-@pytest.mark.parametrize("engine", ["condensed", "getdp"])
-@pytest.mark.parametrize("solid", [False, True])
+@pytest.mark.parametrize(
+    "engine, solid",
+    [
+        ("condensed", False),
+        ("condensed", True),
+        ("getdp", False),
+        pytest.param("getdp", True, marks=pytest.mark.heavy),
+    ],
+)
 def test_a_free_wall_expands_and_bends_without_stress(engine, solid):
     """Uniform 10 K: the upstream edge moves by alpha T b/2 from the middle of the base. 10 K warmer
     downstream than upstream: the curvature is alpha T/b, in 3D of the horizontal sections, too.

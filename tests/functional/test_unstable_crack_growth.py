@@ -15,7 +15,9 @@ from damjoint_tools.verification import RunFiles, violations
 SLENDER = {"dam_height": 40, "dam_base": 28.8, "E": 1e10, "h_found": 7, "sigma_max": 100}
 
 
-@pytest.mark.parametrize("uplift", ["imposed", "flow", "cracked"])
+@pytest.mark.parametrize(
+    "uplift", ["flow", *(pytest.param(u, marks=pytest.mark.heavy) for u in ("imposed", "cracked"))]
+)
 @pytest.mark.parametrize("n_joint", [50, pytest.param(100, marks=pytest.mark.heavy)])
 def test_a_slender_dam_fills_to_its_crest(command, uplift, n_joint):
     """The result files satisfy equilibrium, law, pressure and irreversibility."""

@@ -72,7 +72,15 @@ def test_validate_exits_with_1_if_a_row_fails(command, monkeypatch):
     assert " 0 failed" not in out.splitlines()[-1]
 
 
-@pytest.mark.parametrize("family", [f for f in validation.FAMILIES if f != "ssnp142"])
+@pytest.mark.parametrize(
+    "family",
+    [
+        # SDNV138: one of its tests by default in test_sdnv138.py
+        pytest.param(family, marks=pytest.mark.heavy) if family == "sdnv138" else family
+        for family in validation.FAMILIES
+        if family != "ssnp142"
+    ],
+)
 def test_published_tests_beside_ssnp142(family, tmp_path):
     """Every row of the table has its test, and is within its tolerance."""
     comparisons = list(

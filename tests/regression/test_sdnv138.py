@@ -56,7 +56,12 @@ def computed(case, change=None):
 
 
 @pytest.mark.parametrize(
-    "name, order, vertical", [("B", 1, 2.104e-5), ("C", 2, 1.775e-5), ("D", 2, 3.953e-7)]
+    "name, order, vertical",
+    [
+        ("B", 1, 2.104e-5),
+        pytest.param("C", 2, 1.775e-5, marks=pytest.mark.heavy),
+        pytest.param("D", 2, 3.953e-7, marks=pytest.mark.heavy),
+    ],
 )
 def test_by_the_conventions_of_this_package(name, order, vertical):
     """u_y of the crest as by the independent solver, whose accelerations are as published."""
@@ -91,7 +96,7 @@ def with_eight_functions(bodies):
     return replace(bodies, by_name={n: changed(b) for n, b in bodies.by_name.items()})
 
 
-@pytest.mark.parametrize("name", TESTS)
+@pytest.mark.parametrize("name", ["B", "C", pytest.param("D", marks=pytest.mark.heavy)])
 def test_by_the_published_conventions(name):
     """All digits, with those conventions, too, that are not options of a case; by the options
     alone: test_published.py.

@@ -125,7 +125,8 @@ class Endo(Law[EndoVariables]):
         stiffness = self.K + S[:, None] * self.B  # of X, with p
         size = np.linalg.norm(trial[:, 1:], axis=1)
         direction = trial[:, 1:] / np.maximum(size, 1e-300)[:, None]
-        normal = np.insert(direction, 0, self.mu, axis=1)  # of the yield surface
+        friction = np.full(len(direction), self.mu)
+        normal = np.column_stack([friction, direction])  # of the yield surface
         stiff = stiffness[:, 1] + self.mu**2 * stiffness[:, 0]
         slip = np.maximum(size + self.mu * trial[:, 0], 0) / stiff
         flows = slip > 0
