@@ -35,9 +35,17 @@ WORDS = [word for name, value in SMALL.items() for word in ("--set", f"{name}={v
 class User:
     """Actions of a user: type, press, wait."""
 
-    def __init__(self, case, **settings):
-        self.session = Session(Request(case, settings))
+    def __init__(self, engines, case, **settings):
+        self.engines, self.session = engines, Session(Request(case, settings))
         self.wait()
+
+    def close(self):
+        """The next window uses the engine's process."""
+        if not self.session.busy:
+            self.engines.append(self.session.engine)
+            self.session.engine = SimpleNamespace(close=lambda: None)
+        self.session.close()
+        self.session = None
 
     def wait(self, until=lambda session: not session.busy):
         """Until a condition is true; nothing changes any more once the engine is idle."""
@@ -118,16 +126,24 @@ def open_window(engines, monkeypatch):
         return engines.pop()
 
     def opened(case, **settings):
-        users.append(User(case, **settings))
+        users.append(User(engines, case, **settings))
         return users[-1]
 
     monkeypatch.setattr(window, "EngineProcess", engine)
     yield opened
     for user in users:
-        if not user.session.busy:
-            engines.append(user.session.engine)
-            user.session.engine = SimpleNamespace(close=lambda: None)
-        user.session.close()
+        if user.session:
+            user.close()
+
+
+def test_nothing_to_save_before_a_run(open_window, engines):
+    """First, as it needs a process that has run nothing."""
+    while engines:
+        engines.pop().close()
+    user = open_window("e")
+    user.press(tree.SAVE_ACTION)
+    user.wait()
+    assert user.session.status == "nothing to save: press Run first"
 
 
 def test_all_parameters_are_in_the_tree_with_their_range_and_without_buttons_of_no_effect(
@@ -177,12 +193,11 @@ def test_results_and_saved_case_are_those_of_the_command(open_window, command, t
     assert tree.get_text(tree.TIMES) == "0.5, 1, 1.5, 2, 2.5, 3"
     assert user.run().startswith(("done in", "sliding"))
     user.save(tmp_path / "window")
-    user.session.close()
+    user.close()
     words = "--set", "law=friction", "--set", "uplift=flow", "--steps", "2"
     levels = "--levels", "3,5,6", "--tail-levels", "0,1,1"
     command("run", "a", *WORDS, *words, *levels, "--out", "batch")
     command("run", tmp_path / "window" / "a.case", "--out", "again")
-    user.session = Session(Request("a"))  # closed by the fixture
     saved = sorted(p.relative_to(tmp_path / "window") for p in (tmp_path / "window").rglob("*.*"))
     for folder in ("batch", "again"):
         found = sorted(p.relative_to(tmp_path / folder) for p in (tmp_path / folder).rglob("*.*"))
@@ -506,15 +521,6 @@ def test_after_reset_the_parameters_are_restored(open_window):
     assert gmsh.onelab.getString("ONELAB/Button") == ["Run", "run"]
 
 
-def test_nothing_to_save_before_a_run(open_window, engines):
-    while engines:
-        engines.pop().close()
-    user = open_window("e")
-    user.press(tree.SAVE_ACTION)
-    user.wait()
-    assert user.session.status == "nothing to save: press Run first"
-
-
 def test_a_case_file_of_the_user_is_not_overwritten(open_window, tmp_path):
     """Nor the target of a link; a file saved by the window itself is overwritten."""
     user = open_window("c", **SMALL)
@@ -632,9 +638,8 @@ def test_an_earthquake_follows_the_static_loads(open_window, command, tmp_path):
     user.type(tree.QUAKE, 0.0)
     assert tree.get_text(tree.VERDICT) == tree.NOT_RUN
     assert user.run().startswith("done in") and len(user.session.scenes) == 1
-    user.session.close()
+    user.close()
     code, _, _ = command("quake", tmp_path / "window" / "dam.case", "--out", "again")
-    user.session = Session(Request("a"))  # closed by the fixture
     assert code == 0
     for name in ("quake.csv", "joint.csv", "history.csv"):
         one, other = ((tmp_path / f / name).read_bytes() for f in ("window", "again"))
