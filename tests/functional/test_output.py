@@ -1,13 +1,17 @@
 """Files of a run."""
 
+import contextlib
 import csv
+import io
 import json
+import shutil
 import subprocess
 import sys
 
 import meshio
 import numpy as np
 import pytest
+from damjoint import cli
 from damjoint.post.field_files import write_vtu
 from damjoint.post.tables import write_csv
 from numpy.testing import assert_allclose
@@ -49,16 +53,28 @@ def read(path):
     return {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
 
 
+@pytest.fixture(scope="module")
+def ran(tmp_path_factory):
+    """The folder of a run and what it printed."""
+    folder = tmp_path_factory.mktemp("ran") / "here" / "out"
+    words = "run", "a", "--levels", "6,9", "--steps", "2", "--set", "n_joint=20"
+    out, err = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        code = cli.main([*words, "--out", str(folder)])
+    assert (code, err.getvalue()) == (0, "")
+    return folder, out.getvalue()
+
+
 @pytest.fixture
-def folder(command, tmp_path):
-    code, out, err = command(
-        "run", "a", "--levels", "6,9", "--steps", "2", "--out", "here/out", "--set", "n_joint=20"
-    )
-    assert (code, err) == (0, "")
+def folder(ran):
+    return ran[0]
+
+
+def test_a_run_prints_what_each_level_has(ran):
+    out = ran[1]
     assert "uplift imposed: stands; 4 steps" in out and "uplift none: stands; 4 steps" in out
     firsts = [line.split()[0] for line in out.splitlines() if line.startswith("   ")]
     assert [first for first in firsts if first.isdigit()] == ["6", "9"] * 2
-    return tmp_path / "here" / "out"
 
 
 def test_files_of_a_run(folder):
@@ -228,7 +244,8 @@ def test_length_of_the_fracture_process_zone(command, tmp_path, law):
     assert_allclose(zones[0], zones[1], atol=1e-9)
 
 
-def test_a_history_without_a_column_is_refused_as_of_an_earlier_version(command, folder):
+def test_a_history_without_a_column_is_refused_as_of_an_earlier_version(command, folder, tmp_path):
+    folder = shutil.copytree(folder, tmp_path / "out")
     path = folder / "history.csv"
     lines = (line.split(",") for line in path.read_text().splitlines())
     path.write_text("".join(",".join([*row[:7], *row[8:]]) + "\n" for row in lines))

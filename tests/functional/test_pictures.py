@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from functools import cache
 
 import damjoint as dj
 import numpy as np
@@ -40,20 +41,24 @@ PAGE = (297 - 20) / (210 - 20)
 @pytest.fixture(scope="module")
 def runs():
     """The run of one of CASES."""
-    done = {}
 
+    @cache
     def run(name):
-        if name not in done:
-            source, settings = CASES[name]
-            done[name] = dj.run(dj.case(source, **settings))
-        return done[name]
+        source, settings = CASES[name]
+        return dj.run(dj.case(source, **settings))
 
     return run
 
 
+@pytest.fixture(scope="module")
+def figures(runs):
+    """The picture of one of CASES."""
+    return cache(lambda name: runs(name).plot())
+
+
 @pytest.mark.parametrize("name", CASES)
-def test_a_picture_fits_a_page_and_nothing_is_clipped(runs, name):
-    figure = runs(name).plot()
+def test_a_picture_fits_a_page_and_nothing_is_clipped(figures, name):
+    figure = figures(name)
     width, height = figure.get_size_inches()
     assert width / height == pytest.approx(PAGE, rel=0.05)
     assert len(figure.findobj(Axes)) >= 7 and len(figure.findobj(Legend)) >= 5
@@ -81,9 +86,9 @@ def assert_nothing_is_clipped(figure):
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_lines_of_a_panel_differ_without_colors(runs, name):
+def test_lines_of_a_panel_differ_without_colors(figures, name):
     """In style of the line or marker."""
-    figure = runs(name).plot()
+    figure = figures(name)
     for axes in figure.findobj(Axes):
         lines = [line for line in axes.get_lines() if not line.get_label().startswith("_")]
         styles = {(line.get_linestyle(), line.get_marker()) for line in lines}
@@ -104,9 +109,9 @@ def test_a_picture_in_3d(runs):
     assert without.get_size_inches()[1] < height
 
 
-def test_the_title_is_just_above_the_panels(runs):
+def test_the_title_is_just_above_the_panels(figures):
     """Without a message there is no room for one."""
-    heads = {name: runs(name).plot().subfigs[0].bbox.height for name in ("closed", "overturning")}
+    heads = {name: figures(name).subfigs[0].bbox.height for name in ("closed", "overturning")}
     assert heads["closed"] < heads["overturning"]
 
 
