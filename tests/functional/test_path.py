@@ -56,6 +56,7 @@ def test_a_dam_on_a_brittle_bond_is_followed_beyond_its_limit_point(solve, n_joi
     assert result.last["crest_ux"] == pytest.approx(unbonded.last["crest_ux"], rel=0.05)
 
 
+@pytest.mark.heavy
 def test_a_run_stops_at_the_critical_level(solve):
     """Followed over a limit point, it overturns at the level that `critical` finds."""
     levels = "23.275,37.24,41.895,46.55"
