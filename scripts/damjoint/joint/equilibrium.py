@@ -58,6 +58,11 @@ class Equilibrium:
         self.flowing = tuple(k for k, water in enumerate(self.water) if water.flowing)
         self.unit_weight = case["rho_water"] * case["g"]
         self.laws = JointLaws([own.law for own in case.joints])
+        #: whether the state under rising water depends on the steps that lead to it; in a crack
+        #: water enters after the step that has opened it
+        self.path_dependent = any(
+            own.law.path_dependent or own["uplift"] == "cracked" for own in case.joints
+        )
         #: tangent (q, 3, 3) of the undamaged joints
         points = [len(joint.points.weights) for joint in interface.joints]
         self.undamaged = self.laws.undamaged_tangent(points)

@@ -43,6 +43,8 @@ class Law(Generic[V]):
     slip_name = "slip"
     #: whether it softens, so that a crack can grow unstably
     softens = False
+    #: whether the state under rising water depends on the steps that lead to it
+    path_dependent = True
     #: whether its shear stress is bounded, so that a dam can slide
     limits_shear = True
     #: parameter of its hardening modulus [Pa/m]; empty: it does not harden

@@ -55,6 +55,7 @@ class Friction(Law[FrictionVariables]):
     columns: Mapping[str, tuple[str, str]] = {
         "lambda": ("m", "friction: cumulated plastic slip, which hardens")
     }
+    path_dependent = False
     hardening_parameter = "pena_tang"
     works = ("saw_thickness",)
 

@@ -45,8 +45,9 @@ PARTS, SMALLEST, JUMPS = (1, 1 / 4, 1 / 16), 1e-4, (0.01, 0.05, 0.25)
 ZONE_GROWTH = 1.5
 
 #: Relative rise of the level that an increment aims at: the limit point of a joint that softens
-#: depends on the steps by some hundredths of it.
-RISE = 0.005
+#: depends on the steps by some hundredths of it. And where the state does not depend on them, which
+#: is used in the search for a critical value.
+RISE, LARGE_RISE = 0.005, 0.02
 
 #: How many times the displacement grows before a level counts as not rising any more: for a first
 #: estimate, and for the result.
@@ -186,6 +187,8 @@ class EquilibriumPath:
         #: increment [m]
         self.size = points[-1].displacement if points else 0.0
         self.increment = FIRST * self.size
+        #: relative rise of the level that an increment aims at
+        self.rise = RISE
 
     def add(self, point: Point) -> None:
         """Append an equilibrium."""
@@ -293,7 +296,7 @@ class EquilibriumPath:
             new = self.step(last, by, kind)
             if new:
                 rise = max((new.level - last.level) / new.level, 1e-12)
-                self.increment = by * min(max(RISE / rise, SHRINKING), GROWTH)
+                self.increment = by * min(max(self.rise / rise, SHRINKING), GROWTH)
                 self.add(new)
                 self.ended = len(self.points) >= MOST_POINTS
                 return

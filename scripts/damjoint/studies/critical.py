@@ -10,6 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import chain, zip_longest
 from pathlib import Path
 from typing import Any
@@ -24,7 +25,7 @@ from ..engines.condensed.solve import about
 from ..joint.interface import interface_of
 from ..laws import Evidence
 from ..model.case import Case, load
-from ..model.parameters import parameter
+from ..model.parameters import independent, parameter
 from ..model.results import Results, column_of, row_of_joint
 from ..post import folder as folders
 from ..post.tables import write_csv
@@ -193,19 +194,29 @@ class Search:
     # -- one value
     # ----------------------------------------------------------------------------------------------
 
+    @cached_property
+    def base(self) -> Case:
+        """The case with the settings of the search."""
+        return self.own.varied(self.settings)
+
     def case_at(self, value: float) -> Case:
         """The case with a value.
 
         Raises InputError.
         """
         if self.of == "strength":
-            factors = {n: value * self.partial.get(n, 1.0) for n in STRENGTH}
-            joints = self.own.joints
-            changed = {n: of_each([joint[n] / factors[n] for joint in joints]) for n in STRENGTH}
+            reduced = [self.reduced(joint, value) for joint in self.own.joints]
+            changed = {n: of_each([values[n] for values in reduced]) for n in STRENGTH}
             changed["pena_rupture"] = -1.0
+        elif self.name in independent():
+            return self.base.changed({self.name: value})
         else:
             changed = {self.name: value}
         return self.own.varied(self.settings | changed)
+
+    def reduced(self, joint: Case, factor: float) -> dict[str, float]:
+        """The strength of a joint, divided by a factor and the partial factors."""
+        return {n: joint[n] / (factor * self.partial.get(n, 1.0)) for n in STRENGTH}
 
     def path(self, value: float, case: Case, target: float | None = None) -> FailurePath:
         """The equilibrium path of a case, followed to a first estimate; adds a trial."""
@@ -228,9 +239,13 @@ class Search:
     # ----------------------------------------------------------------------------------------------
 
     def run(self) -> CriticalValue:
-        """Search."""
+        """Search, and compare with the gravity method."""
         with limited_threads(1):
-            return self.level() if self.of == "level" else self.value()
+            return self.beside_gravity(self.find())
+
+    def find(self) -> CriticalValue:
+        """Search, without the values of the gravity method."""
+        return self.level() if self.of == "level" else self.value()
 
     def level(self) -> CriticalValue:
         """The highest level of the path, beyond the case's highest level."""
@@ -238,6 +253,7 @@ class Search:
         levels, tails = self.own.levels[:last], self.own.tail_levels[:last]
         case = self.own.varied(self.settings, levels, tails)
         path = self.path(max(case.levels), case, case.highest_level)
+        path.refine()  # first: a limit point that is known is confirmed sooner
         path.follow(SURE)
         path.refine()
         if path.reached:
@@ -258,6 +274,7 @@ class Search:
         stands, fails = ends
         while True:
             stands, fails = self.bisect(stands, fails)
+            fails.path.refine()
             fails.path.follow(SURE)
             fails.path.refine()
             if not fails.stands:
@@ -347,25 +364,27 @@ class Search:
 
     def bisect(self, stands: Trial, fails: Trial) -> tuple[Trial, Trial]:
         """Narrow an interval to the precision: at the guesses in it, by secants and at least every
-        third time by half.
+        fourth time by half.
         """
-        ends, turn = (stands.value, fails.value), 0
+        ends, turn, stood = (stands.value, fails.value), 1, 0
         while abs(ends[0] - ends[1]) > PRECISION * max(map(abs, ends)):
             inside = [v for v in self.guesses if min(ends) < v < max(ends)]
             if inside:
                 value = inside[0]
             else:
-                secant = self.extrapolate(stands, fails) if turn % 3 else None
+                # the more values stand beside the same root, the farther beyond it
+                share = 0.4 * PRECISION * 4.0 ** max(stood - 1, 0)
+                secant = self.extrapolate(stands, fails, share) if turn % 4 else None
                 value, turn = middle(*ends) if secant is None else secant, turn + 1
             trial = self.trial(value)
             stands, fails = (trial, fails) if trial.stands else (stands, trial)
+            stood = stood + 1 if trial.stands else 0
             ends = stands.value, fails.value
         return stands, fails
 
-    def extrapolate(self, stands: Trial, fails: Trial) -> float | None:
+    def extrapolate(self, stands: Trial, fails: Trial, share: float) -> float | None:
         """The value at which the highest level reaches the target, by the secant of the two
-        failures nearest to a stand; shifted by less than the precision, to bracket it. None if
-        outside.
+        failures nearest to a stand; shifted by a share of it, to bracket it. None if outside.
         """
         known = [t for t in self.trials if not t.stands and t.path.points]
         known = sorted(known, key=lambda t: -abs(t.value - stands.value))[-2:]
@@ -374,7 +393,7 @@ class Search:
         if len(set(missing)) < 2:
             return None
         root = values[1] - missing[1] * np.diff(values)[0] / np.diff(missing)[0]
-        shift = np.sign(fails.value - stands.value) * 0.4 * PRECISION * abs(root)
+        shift = np.sign(fails.value - stands.value) * share * abs(root)
         low, high = sorted((stands.value, fails.value))
         return next((v for v in (root - shift, root + shift) if low < v < high), None)
 
@@ -413,9 +432,12 @@ class Search:
         else:
             mode, why, joint = self.by_statics(failing)
         events = events_on(failing.admissible) if failing.points else []
-        result = CriticalValue(
-            value, mode, why, "" if why else doubt, point, joint=joint, events=events
-        )
+        doubt = "" if why else doubt
+        return CriticalValue(value, mode, why, doubt, point, joint=joint, events=events)
+
+    def beside_gravity(self, result: CriticalValue) -> CriticalValue:
+        """A result with the values of the gravity method, and a note on them."""
+        value = result.value
         if value is None or (by_hand := self.by_gravity(value)) is None:
             return result
         others: dict[str, float] = {}
@@ -490,11 +512,22 @@ class Search:
         if self.own.geometry:
             return []
         try:
-            case = self.own if self.of == "level" else self.case_at(value)
+            joints = self.joints_at(value)
         except InputError:
             return []
         level = value if self.of == "level" else None
-        return [gravity.at(joint, case.times[-1], level, tension) for joint in case.joints]
+        return [gravity.at(joint, joint.times[-1], level, tension) for joint in joints]
+
+    def joints_at(self, value: float) -> Sequence[Case]:
+        """The case of each joint with a value, for the gravity method.
+
+        Raises InputError.
+        """
+        if self.of == "level":
+            return self.own.joints
+        if self.of == "strength":  # without Gmsh's parser
+            return [joint.with_values(self.reduced(joint, value)) for joint in self.base.joints]
+        return self.case_at(value).joints
 
     def rigid_block_stands(self, value: float, tension: bool, longest: bool) -> bool | None:
         """Whether the gravity method finds an equilibrium of all joints, with friction if the law

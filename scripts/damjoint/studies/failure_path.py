@@ -17,7 +17,7 @@ from ..model.case import Case
 from ..model.loads import Loading
 from ..model.results import HISTORY, Columns, with_all_joints
 from ..solver.load_stepper import LoadStepper
-from ..solver.path import EquilibriumPath, Point
+from ..solver.path import LARGE_RISE, EquilibriumPath, Point
 
 #: Columns of critical.csv: a row per equilibrium of each dam that was tried. With several joints:
 #: of the first one; see `critical_columns`.
@@ -83,6 +83,8 @@ class FailurePath(EquilibriumPath):
         ahead = [v for t, v in enumerate(case.levels, 1) if t >= stepper.state.time]
         self.target = max(ahead) if target is None else target
         super().__init__(self.points, len(case.levels), TICK)
+        if not stepper.model.equilibrium.path_dependent:
+            self.rise = LARGE_RISE
 
     def add(self, point: Point) -> None:
         """Append an equilibrium, if the toe is not crushed before it."""

@@ -168,7 +168,7 @@ def critical_value(task: Task) -> dict[str, Value]:
     if not task.search:
         return {}
     try:
-        answer = task.search().run()
+        answer = task.search().find()
     except Exception as error:
         return dict(zip(task.columns, ("", "", 0.0, message_of(error)), strict=True))
     value = "" if answer.value is None else answer.value
