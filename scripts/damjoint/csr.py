@@ -66,6 +66,11 @@ class CsrMatrix:
         self.add_to(dense)
         return dense
 
+    @cached_property
+    def dense(self) -> Array:
+        """The same, kept for products of a small matrix."""
+        return self.toarray()
+
     def add_to(self, dense: Array) -> None:
         """Add it to a dense array (m, n)."""
         dense[self.rows, self.indices] += self.data
@@ -99,7 +104,7 @@ class CsrMatrix:
         if isinstance(other, CsrMatrix):
             return self._times(other)
         if other.ndim == 2 and self.shape[0] * self.shape[1] <= LARGE:
-            return np.asarray(self.toarray() @ other)
+            return np.asarray(self.dense @ other)
         if other.ndim == 2 or len(self.data) > LARGE:
             return np.asarray(self.scipy() @ other)
         return np.bincount(self.rows, self.data * other[self.indices], self.shape[0])

@@ -70,9 +70,18 @@ class Equilibrium:
         self.tail_forces = lru_cache(maxsize=4)(
             lambda name, tail: self.face_forces(interface.faces[name], Loading(0.0, tail))
         )
+        #: unit loads by the parts of the loads that act
+        self.sizes = lru_cache(maxsize=4)(
+            lambda grown: self.unit_loads(Loading(0.0, 0.0, grown))
+        )
+        #: loaded unknowns on which a face acts, and the functions of the face that are among them
+        self.loaded = {
+            name: (dofs[dofs >= 0], np.flatnonzero(dofs >= 0))
+            for name, dofs in interface.bulk.dof_of_face.items()
+        }
         #: forces on the loaded unknowns and t_0; with the water in the joints: of the last loadings
-        self.external_forces = lru_cache(maxsize=4)(self._external_forces)
-        self.loads = lru_cache(maxsize=4)(self._loads)
+        self.external_forces = lru_cache(maxsize=8)(self._external_forces)
+        self.loads = lru_cache(maxsize=8)(self._loads)
 
     # -- loads
     # ---------------------------------------------------------------------------------------------
@@ -133,10 +142,10 @@ class Equilibrium:
             on_face = (
                 self.tail_forces(name, loading.tail) if by_tail else self.face_forces(face, loading)
             )
-            dofs = bulk.dof_of_face[name]
-            np.add.at(forces, dofs[dofs >= 0], on_face[dofs >= 0])
+            dofs, functions = self.loaded[name]
+            np.add.at(forces, dofs, on_face[functions])
         total = bulk.pressure @ forces
-        for name, size in self.unit_loads(loading).items():
+        for name, size in self.sizes(loading.grown).items():
             total += size * bulk.units[name]
         return forces, total
 
@@ -266,7 +275,7 @@ class Equilibrium:
         """The crest's displacement along x [m]."""
         bulk = self.bulk
         value = bulk.crest_pressure @ self.external_forces(loading)[0] + bulk.crest_jump @ jump
-        for name, size in self.unit_loads(loading).items():
+        for name, size in self.sizes(loading.grown).items():
             value += size * bulk.crest_units[name]
         return float(value)
 

@@ -19,6 +19,7 @@ from ..model.case import Case, OfJoint
 from ..model.chord import Chord
 from ..model.mesh import heel_normal
 from ..model.scene import UP
+from .assembly import MOST_TERMS, Assembly, number_of_terms
 from .flow import Flow, JointFields, Wetted
 from .linear_system import Border, Change, UndamagedSystem
 from .wet_faces import WetFace, points_where
@@ -36,6 +37,14 @@ def frames(normals: Array) -> Array:
     )
     along /= np.linalg.norm(along, axis=1)[:, None]
     return np.stack([normals, along, np.cross(along, normals)], axis=1)
+
+
+def jumps(matrix: CsrMatrix, unknowns: Array, dim: int) -> Array:
+    """delta_n, delta_t1, delta_t2 (q, 3) by a matrix of dim rows per point."""
+    components = (matrix @ unknowns).reshape(-1, dim)
+    result = np.zeros((len(components), 3))
+    result[:, :dim] = components
+    return result
 
 
 class JointInterface:
@@ -101,7 +110,7 @@ class JointInterface:
 
     def jumps(self, matrix: CsrMatrix, unknowns: Array) -> Array:
         """delta_n, delta_t1, delta_t2 (q, 3) by at_points or at_nodes."""
-        return np.pad((matrix @ unknowns).reshape(-1, self.dim), ((0, 0), (0, 3 - self.dim)))
+        return jumps(matrix, unknowns, self.dim)
 
     def extrapolate(self, values: Array) -> Array:
         """Values (corners, n) at the corner nodes from values (q, n) at the Gauss points: a linear
@@ -210,7 +219,7 @@ class Interface:
 
     def jumps(self, matrix: CsrMatrix, unknowns: Array) -> Array:
         """delta_n, delta_t1, delta_t2 (q, 3) by at_points or at_nodes."""
-        return np.pad((matrix @ unknowns).reshape(-1, self.dim), ((0, 0), (0, 3 - self.dim)))
+        return jumps(matrix, unknowns, self.dim)
 
     def forces(self, traction: Array) -> Array:
         """Nodal forces (j,) of a traction (q, 3) at the Gauss points."""
@@ -230,11 +239,19 @@ class Interface:
 
     # -- linear systems
 
+    @cached_property
+    def assembly(self) -> Assembly | None:
+        """The assembly of the stiffness; None for many points, by products of sparse matrices."""
+        few = number_of_terms(self.at_points, self.dim) <= MOST_TERMS
+        return Assembly(self.at_points, self.dim) if few else None
+
     def stiffness(self, tangent: Array, points: IntArray) -> CsrMatrix:
         """Stiffness (j, j) of some Gauss points with a tangent (points, 3, 3)."""
         number, d = len(points), self.dim
-        rows = self.at_points[(d * points[:, None] + np.arange(d)).ravel()]
         blocks = self.weights[points, None, None] * tangent[:, :d, :d]
+        if self.assembly:
+            return self.assembly.sum(blocks, points)
+        rows = self.at_points[(d * points[:, None] + np.arange(d)).ravel()]
         columns = np.repeat(np.arange(d * number).reshape(number, d), d, axis=0)
         diagonal = CsrMatrix(
             blocks.ravel(), columns.ravel(), d * np.arange(d * number + 1), (d * number,) * 2
@@ -255,7 +272,9 @@ class Interface:
         # rows: components of the traction
         differs = (tangent != undamaged).any(axis=2)[:, : self.dim]
         points = np.flatnonzero(differs.any(axis=1))
-        rows = distinct(self.at_points[np.flatnonzero(differs)].indices)
+        changes = np.zeros(self.at_points.shape[1], bool)
+        changes[self.at_points.indices[differs.ravel()[self.at_points.rows]]] = True
+        rows = np.flatnonzero(changes)
         change = tangent[points] - undamaged[points]
         return Change(law=self.stiffness(change, points)[rows], rows=rows)
 

@@ -42,6 +42,11 @@ class WetFace:
         self.corrects = self.exact and straight and not self.flat
 
     @cached_property
+    def powers(self) -> list[Array]:
+        """Heights of the points above the lowest end to the power of 0, 1 and 2."""
+        return [(self.y - self.low) ** k for k in range(3)]
+
+    @cached_property
     def elements(self) -> list[tuple[str, IntArray]]:
         """Shape and functions of each element."""
         return [(shape, row) for shape, table in self.space.connectivity for row in table]
@@ -52,6 +57,8 @@ class WetFace:
 
     def press(self, level: float, height: Height, column: Column) -> Array:
         """Nodal forces [m x area] of a height of pressure on the face."""
+        if level <= self.low:
+            return np.zeros(self.to_functions.shape[0] * self.dim)
         if self.corrects:
             return self.spread(-self.corrected(level, height, column)[:, None] * self.normals)
         cut = self.cut_by(level) if self.exact and not self.flat else np.zeros(0, int)
@@ -75,7 +82,7 @@ class WetFace:
             return np.zeros_like(y)
         while True:
             shape = height(shape_level, self.y, self.tilt)
-            m0, m1, m2 = (self.points.weights @ (shape * y**k) for k in range(3))
+            m0, m1, m2 = (self.points.weights @ (shape * power) for power in self.powers)
             determinant = m0 * m2 - m1**2
             if determinant > DISTINCT * m1**2 or shape_level > self.high:
                 break

@@ -113,7 +113,7 @@ class Rupture(Law[RuptureVariables]):
         """
         v = variables
         added = v.thickness - v.sawn if self.grout else -np.maximum(v.sawn - v.thickness, 0)
-        return np.broadcast_to(added, points)
+        return np.full(points, added)
 
     def opening(self, jump: Array, variables: RuptureVariables) -> Array:
         """The opening beyond the thickness that grout and saw leave (q,) [m]."""
@@ -140,28 +140,24 @@ class Rupture(Law[RuptureVariables]):
         return np.where((opening > 0) & (opening < self.L_CT), -self.K_T / self.L_CT, 0)
 
     def normal_response(
-        self, opening: Array, variables: RuptureVariables
-    ) -> tuple[Array, Array, Array]:
-        """Normal stress, its tangent, and a secant stiffness that is positive (q,)."""
+        self, opening: Array, variables: RuptureVariables, secant: bool = False
+    ) -> tuple[Array, Array]:
+        """Normal stress, and its tangent or a secant stiffness that is positive (q,)."""
         v, weak = variables, self.artificial * self.K_N
         closed, broken = opening <= 0, self.is_broken(opening, v)
         unloads = self.unloads(opening, v)
         with np.errstate(divide="ignore", invalid="ignore"):
             unloading = self.sigma_c * (1 - v.kappa / self.L_C) / v.kappa
-            normal = np.select(
-                [closed, broken, unloads],
-                [self.K_contact * opening, 0, unloading * opening],
-                self.sigma_c * (1 - opening / self.L_C),
+            open_stress = np.where(
+                unloads, unloading * opening, self.sigma_c * (1 - opening / self.L_C)
             )
-            secant = normal / opening
-        softening = -self.sigma_c / self.L_C if self.L_C else 0.0
-        branches = [(opening >= v.largest) | broken & ~closed, closed, unloads]
-        stiffness = [weak, self.K_contact, unloading]
-        return (
-            normal,
-            np.select(branches, stiffness, softening),
-            np.maximum(np.select(branches, stiffness, secant), weak),
-        )
+            normal = np.where(closed, self.K_contact * opening, np.where(broken, 0, open_stress))
+            softening: Array | float = -self.sigma_c / self.L_C if self.L_C else 0.0
+            softening = normal / opening if secant else softening
+        free = (opening >= v.largest) | broken & ~closed
+        bonded = np.where(closed, self.K_contact, np.where(unloads, unloading, softening))
+        stiffness = np.where(free, weak, bonded)
+        return normal, np.maximum(stiffness, weak) if secant else stiffness
 
     def stiffness(self, normal: Array, opening: Array) -> Array:
         """The diagonal stiffness (q, 3, 3): normal, and what is left of the shear stiffness."""
@@ -173,7 +169,7 @@ class Rupture(Law[RuptureVariables]):
     def traction_and_tangent(self, jump: Array, variables: RuptureVariables) -> tuple[Array, Array]:
         """See `Law`."""
         opening, slip = self.opening(jump, variables), jump[:, 1:] - variables.released
-        normal, slope, _ = self.normal_response(opening, variables)
+        normal, slope = self.normal_response(opening, variables)
         shear = (self.K_T * self.shear_share(opening))[:, None] * slip
         tangent = self.stiffness(slope, opening)
         tangent[:, 1:, 0] = self.shear_slope(opening)[:, None] * slip
@@ -182,7 +178,7 @@ class Rupture(Law[RuptureVariables]):
     def secant_stiffness(self, jump: Array, variables: RuptureVariables) -> Array:
         """See `Law`."""
         opening = self.opening(jump, variables)
-        return self.stiffness(self.normal_response(opening, variables)[2], opening)
+        return self.stiffness(self.normal_response(opening, variables, secant=True)[1], opening)
 
     def freeze(self, jump: Array, variables: RuptureVariables) -> FrozenRupture:
         """See `Law`."""
