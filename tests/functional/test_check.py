@@ -202,7 +202,7 @@ def test_a_note_gives_the_crack_without_tensile_strength(solve):
 def test_bad_input_writes_no_file(command, combinations, tmp_path):
     for words, message in (
         (("usual.case", "usual.case"), "case usual: must be given once"),
-        (("usual.case", "none.case"), "case none.case: unknown"),
+        (("usual.case", "none.case"), "case none.case: there is no such file"),
         (("usual.case", "--set", "f_c=-1"), "f_c = -1: must be"),
         (("usual.case", "--levels", "3,x"), "levels = 3,x: must be"),
     ):

@@ -450,7 +450,7 @@ BAD_VALUES = [
     (tree.STEPS, "0", "steps = 0: must be an integer >= 1"),
     (tree.STEPS, "two", "steps = two: must be an integer >= 1"),
     (tree.ACCURACY, "best", "accuracy = best: must be one of coarse, standard, fine"),
-    (tree.FILE, "nowhere.case", "case nowhere.case: unknown"),
+    (tree.FILE, "nowhere.case", "case nowhere.case: there is no such file"),
     (tree.CASE, float(len(titles())), "case file: choose it"),
     ("nu", 0.6, "nu = 0.6: must be"),
     ("n_joint", 10.5, "n_joint = 10.5: must be an integer"),

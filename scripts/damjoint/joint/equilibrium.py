@@ -71,9 +71,7 @@ class Equilibrium:
             lambda name, tail: self.face_forces(interface.faces[name], Loading(0.0, tail))
         )
         #: unit loads by the parts of the loads that act
-        self.sizes = lru_cache(maxsize=4)(
-            lambda grown: self.unit_loads(Loading(0.0, 0.0, grown))
-        )
+        self.sizes = lru_cache(maxsize=4)(lambda grown: self.unit_loads(Loading(0.0, 0.0, grown)))
         #: loaded unknowns on which a face acts, and the functions of the face that are among them
         self.loaded = {
             name: (dofs[dofs >= 0], np.flatnonzero(dofs >= 0))
