@@ -61,6 +61,6 @@ class Assembly:
         terms *= products[self.component[some], self.pair[some]]
         place, used = self.place[some], np.zeros(len(self.rows), bool)
         used[place] = True
-        data = np.bincount((np.cumsum(used) - 1)[place], terms, np.count_nonzero(used))
+        data = np.asarray(np.bincount((np.cumsum(used) - 1)[place], terms), float)
         pointers = np.searchsorted(self.rows[used], np.arange(size + 1))
         return CsrMatrix(data, self.columns[used], pointers, (size, size))

@@ -240,7 +240,7 @@ class Interface:
     # -- linear systems
 
     @cached_property
-    def assembly(self) -> Assembly | None:
+    def by_terms(self) -> Assembly | None:
         """The assembly of the stiffness; None for many points, by products of sparse matrices."""
         few = number_of_terms(self.at_points, self.dim) <= MOST_TERMS
         return Assembly(self.at_points, self.dim) if few else None
@@ -249,8 +249,8 @@ class Interface:
         """Stiffness (j, j) of some Gauss points with a tangent (points, 3, 3)."""
         number, d = len(points), self.dim
         blocks = self.weights[points, None, None] * tangent[:, :d, :d]
-        if self.assembly:
-            return self.assembly.sum(blocks, points)
+        if self.by_terms:
+            return self.by_terms.sum(blocks, points)
         rows = self.at_points[(d * points[:, None] + np.arange(d)).ravel()]
         columns = np.repeat(np.arange(d * number).reshape(number, d), d, axis=0)
         diagonal = CsrMatrix(
@@ -289,23 +289,28 @@ class Interface:
         return self.undamaged(undamaged).solve(change, right, border, lift)
 
 
-@dataclass
+#: Number of unknowns up to which two interfaces are kept.
+SMALL = 2000
+
+
 class LastInterface:
-    """A cache of one entry: a study computes its scenes mesh by mesh, and an interface with its
-    dense matrices may take gigabytes.
+    """The last interface, and the one before if both are small: a study computes its scenes mesh by
+    mesh, and an interface with its dense matrices may take gigabytes. The rows of a sweep take
+    turns with the searches for their critical values, in which water may stand on the crest.
     """
 
-    key: tuple[object, ...] = ()
-    interface: Interface | None = None
+    def __init__(self) -> None:
+        self.last: dict[tuple[object, ...], Interface] = {}
 
     def of(self, case: Case) -> Interface:
         """The joints of a case with its condensed bodies."""
         rules = case["quadrature"], case["face_points"]
         key = *key_of(case), *rules
-        if self.interface is None or key != self.key:
-            self.interface = None  # free its memory first
-            self.interface, self.key = Interface(cached(case)[0], *rules), key
-        return self.interface
+        if key not in self.last:
+            small = [k for k, i in self.last.items() if len(i.bulk.stiffness) <= SMALL]
+            self.last = {k: self.last[k] for k in small[-1:]}  # free the memory of others first
+            self.last[key] = Interface(cached(case)[0], *rules)
+        return self.last[key]
 
 
 #: The interface of this process: studies and tools share it.

@@ -24,7 +24,7 @@ from ..engines import Outcome
 from ..engines.condensed.solve import about
 from ..joint.interface import interface_of
 from ..laws import Evidence
-from ..model.case import Case, load
+from ..model.case import Case, Source, load, resolve
 from ..model.parameters import independent, parameter
 from ..model.results import Results, column_of, row_of_joint
 from ..post import folder as folders
@@ -132,6 +132,24 @@ class CriticalValue:
         return lines
 
 
+@dataclass
+class LastResolved:
+    """The last case that was resolved: the rows of a sweep differ in independent parameters."""
+
+    source: Source | None = None
+    case: Case | None = None
+
+    def of(self, source: Source) -> Case:
+        """The case of a source, see `resolve`."""
+        if self.case is None or source != self.source:
+            self.source, self.case = source, resolve(source)
+        return self.case
+
+
+#: The case of this process: searches share it.
+last_resolved = LastResolved().of
+
+
 class Search:
     """The search for a critical value."""
 
@@ -184,6 +202,12 @@ class Search:
             )
 
     @property
+    def matters(self) -> bool:
+        """Whether the parameter has an effect in the case, by its declaration."""
+        joints = (joint.values for joint in self.own.joints)
+        return any(map(parameter(self.name).matters_in, joints))
+
+    @property
     def unit(self) -> str:
         """Unit of the varied quantity, after a blank."""
         if self.of in ("level", "strength"):
@@ -197,7 +221,14 @@ class Search:
     @cached_property
     def base(self) -> Case:
         """The case with the settings of the search."""
-        return self.own.varied(self.settings)
+        source, alone = self.own.source.with_overrides(self.settings), independent()
+        single = {n for n, v in source.overrides.items() if n in alone and not isinstance(v, tuple)}
+        rest = {n: v for n, v in source.overrides.items() if n not in single}
+        try:
+            case = last_resolved(replace(source, overrides=rest))
+            return case.changed({n: source.overrides[n] for n in single})
+        except InputError:  # the others are not allowed without these
+            return resolve(source)
 
     def case_at(self, value: float) -> Case:
         """The case with a value.
@@ -251,7 +282,8 @@ class Search:
         """The highest level of the path, beyond the case's highest level."""
         last = int(np.argmax(self.own.levels)) + 1
         levels, tails = self.own.levels[:last], self.own.tail_levels[:last]
-        case = self.own.varied(self.settings, levels, tails)
+        below = last < len(self.own.levels)
+        case = self.own.varied(self.settings, levels, tails) if below else self.base
         path = self.path(max(case.levels), case, case.highest_level)
         path.refine()  # first: a limit point that is known is confirmed sooner
         path.follow(SURE)
@@ -267,6 +299,10 @@ class Search:
     def value(self) -> CriticalValue:
         """Search outwards from the case's own value for a stand and a failure, then bisect."""
         first = self.trial(1.0 if self.of == "strength" else self.own[self.name])
+        if self.of != "strength" and not self.matters:
+            name, where = self.name, parameter(self.name).matters
+            always = f"{result_of(first)} with any value"
+            return self.no_limit(first, f"{always}: {name} has no effect here, only with {where}")
         self.guesses = self.by_guess(first)
         ends = self.change(first)
         if ends is None:
@@ -311,10 +347,13 @@ class Search:
     def no_change(self, first: Trial) -> CriticalValue:
         """The result if all trials stand, or all fail."""
         tried = [t.value for t in self.trials]
-        ends = "stands" if first.stands else "fails"
-        doubt = f"{ends} with all values tried, {min(tried):.6g} to {max(tried):.6g}{self.unit}"
-        point = point_at_target(first) if first.stands else None
-        return CriticalValue(None, first.path.mode, "", doubt, point)
+        doubt = f"{result_of(first)} with all values tried, {min(tried):.6g} to {max(tried):.6g}{self.unit}"
+        return self.no_limit(first, doubt)
+
+    def no_limit(self, trial: Trial, doubt: str) -> CriticalValue:
+        """The result without a critical value, and why there is none; trial: any of them."""
+        point = point_at_target(trial) if trial.stands else None
+        return CriticalValue(None, trial.path.mode, "", doubt, point)
 
     def change(self, first: Trial) -> tuple[Trial, Trial] | None:
         """The nearest tried values of which one stands and the other fails; None if all trials have
@@ -400,7 +439,7 @@ class Search:
     def interrupted(self, error: BaseException) -> CriticalValue:
         """The result of an interrupted search: its last trials."""
         standing = [t for t in self.trials if t.stands]
-        ends = [f"{t.value:.6g} {'stands' if t.stands else 'fails'}" for t in self.trials[-2:]]
+        ends = [f"{t.value:.6g} {result_of(t)}" for t in self.trials[-2:]]
         doubt = f"interrupted: {', '.join(ends)}" if ends else "interrupted"
         point = point_at_target(standing[-1]) if standing else None
         return CriticalValue(None, "", "", doubt, point, error=error)
@@ -573,6 +612,11 @@ def point_at_target(trial: Trial) -> Point:
     if path.points[path.arrival].control != "level":
         path.refine()
     return path.points[path.arrival]
+
+
+def result_of(trial: Trial) -> str:
+    """The result of a trial in a word."""
+    return "stands" if trial.stands else "fails"
 
 
 def middle(a: float, b: float) -> float:

@@ -22,7 +22,7 @@ from .. import InputError, RunError, __version__, accuracy
 from ..arrays import Value, Values
 from ..engines import engine_of
 from ..joint.interface import Interface, interface_of
-from ..model.case import Case, first_mesh, resolve
+from ..model.case import Case, equal_steps, first_mesh, resolve, with_drive_times
 from ..model.results import history_columns
 from ..post.tables import as_text
 from ..progress import track
@@ -193,7 +193,8 @@ def planned(case: Case, plan: Plan) -> Iterator[tuple[str, Values, Task]]:
 def search_of(case: Case, quantity: str) -> Search:
     """The search of a row's critical value, with one step per level."""
     levels = {"levels": case.levels, "tail_levels": case.tail_levels}
-    return Search(resolve(replace(case.source, **levels, steps=None)), quantity)
+    source, times = replace(case.source, **levels, steps=None), equal_steps(len(case.levels), 1)
+    return Search(with_drive_times(replace(case, times=times, source=source)), quantity)
 
 
 def bundles(tasks: dict[str, Task]) -> list[list[str]]:
