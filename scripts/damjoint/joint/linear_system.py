@@ -81,7 +81,7 @@ class UndamagedSystem:
         m = len(rows)
         size = m + (len(flow.pressure) if flow else 0)
         if self.matrix is not None and size > len(right) / 2:
-            return self._solve_whole(self.matrix.copy(), change, right, border, lift)
+            return self._solve_whole(self.matrix, change, right, border, lift)
         start = compliance @ right
         small = np.zeros((size + (border is not None),) * 2)
         small_right = np.zeros(len(small))
@@ -117,22 +117,25 @@ class UndamagedSystem:
 
     def _solve_whole(
         self,
-        matrix: Array,
+        undamaged: Array,
         change: Change,
         right: Array,
         border: Border | None,
         lift: CsrMatrix | None,
     ) -> tuple[Array, float]:
-        """The same by A, assembled from A_0."""
-        matrix[change.rows] += change.law.toarray()
+        """The same by A, assembled from A_0 in a matrix with room for the border."""
+        law, size = change.law, len(right)
+        whole = np.empty((size + (border is not None),) * 2)
+        matrix = whole[:size, :size]
+        matrix[:] = undamaged
+        matrix[change.rows[law.rows], law.indices] += law.data
         if change.flow and lift:
             matrix[:, change.flow.columns] -= lift @ change.flow.pressure
         if border is None:
-            return lu_solve(matrix, right), 0.0
+            return lu_solve(whole, right), 0.0
         # a row of the size of the others, for the choice of the pivots
-        scale = np.abs(matrix).max() / (np.abs(border.row).max() or 1)
-        whole = np.empty((len(right) + 1,) * 2)
-        whole[:-1, :-1], whole[:-1, -1] = matrix, border.slope
+        scale = max(matrix.max(), -matrix.min()) / (np.abs(border.row).max() or 1)
+        whole[:-1, -1] = border.slope
         whole[-1, :-1], whole[-1, -1] = scale * border.row, scale * border.rate
         *x, s = lu_solve(whole, np.append(right, scale * border.gap))
         return np.array(x), float(s)

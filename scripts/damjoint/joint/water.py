@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -63,6 +64,14 @@ class JointWater:
         #: the part of the joint on which water may press
         self.wetted = joint.wetted_within(self.waterstop) if self.waterstop else joint.wetted
         self.law: Law[Any] = case.law
+        #: heights of heel and toe [m] and path coordinate at the places of `head`
+        self.places = lru_cache(maxsize=4)(self._places)
+
+    def _places(self, matrix: CsrMatrix | None) -> tuple[Array, Array, Array]:
+        along = self.joint.fields
+        if matrix is None:
+            return along.heel_y, along.toe_y, along.xi
+        return matrix @ along.heel_y, matrix @ along.toe_y, matrix @ along.xi
 
     def head(self, loading: Loading, matrix: CsrMatrix | None = None) -> Array:
         """Head [m] in a joint of uniform transmissivity, at the joint's nodes or at the places that
@@ -72,9 +81,7 @@ class JointWater:
         Drains reduce the head above their outlet, the tailwater or their own height, by their
         effectiveness (EM 1110-2-2200); USBR counts the reduction from the reservoir's head.
         """
-        case, along = self.case, self.joint.fields
-        fields = along.heel_y, along.toe_y, along.xi
-        heel, toe, xi = fields if matrix is None else (matrix @ field for field in fields)
+        case, (heel, toe, xi) = self.case, self.places(matrix)
         if self.waterstop is not None:
             return np.full(len(xi), loading.level + case["joint_head_offset"])
         first, last = heads_at_ends(case, loading.level, loading.tail, heel, toe)

@@ -99,8 +99,9 @@ class Bond(Law[BondVariables]):
         if_slip = (excess - self.cohesion * (1 - before)) / self.K_slip
         by_opening = before + per_slip * if_opening <= opened
         broken = ~by_opening & (before + per_slip * if_slip >= 1)
-        slip = np.select([by_opening, broken], [if_opening, excess / self.K_T], if_slip)
-        damage = np.select([by_opening, broken], [opened, 1.0], before + per_slip * if_slip)
+        slip = np.where(by_opening, if_opening, np.where(broken, excess / self.K_T, if_slip))
+        by_slip = np.where(broken, 1.0, before + per_slip * if_slip)
+        damage = np.where(by_opening, opened, by_slip)
         direction = shear / np.maximum(size, 1e-300)[:, None]
         return Trial(size, direction, slip, damage, by_opening, broken)
 
@@ -133,11 +134,9 @@ class Bond(Law[BondVariables]):
         broken = (damage >= 1) | (self.tensile_strength == 0)
 
         tangent = np.zeros((len(jump), 3, 3))
-        tangent[:, 0, 0] = np.select(
-            [closed, broken],
-            [self.K_N, self.artificial * self.K_N],
-            slope + opening * d_slope * d_damage,
-        )
+        open_slope = slope + opening * d_slope * d_damage
+        weak = np.where(broken, self.artificial * self.K_N, open_slope)
+        tangent[:, 0, 0] = np.where(closed, self.K_N, weak)
         by_slip = opening * d_slope * per_slip * with_size
         tangent[:, 0, 1:] = np.where(closed | broken, 0, by_slip)[:, None] * n
         tangent[:, 1:, 0] = (-self.K_T * with_opening)[:, None] * n

@@ -224,6 +224,8 @@ class AddedPressure:
 
     def height(self, level: float, y: Array, tilt: Array) -> Array:
         """Heights of pressure at heights y [m] where the normal has the horizontal part tilt."""
+        if not self.size:
+            return np.zeros_like(y)
         depth = np.maximum(level - self.floor, 0)
         if not self.zangar:
             return self.size * tilt * np.sqrt(depth * np.maximum(level - y, 0))
