@@ -7,10 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from closed_forms import BASE, CENTROID, HEIGHT, WATER, WEIGHT, slide_level
+from damjoint.joint.interface import interface_of
 from damjoint.model.case import load
 from damjoint.solver import path
 from damjoint.statics import gravity
 from damjoint.statics.verdict import highest_by_statics
+from damjoint.studies import failure_path
 from damjoint.studies.critical import Search, critical, table
 from damjoint.studies.failure_path import FailurePath
 from scipy.optimize import brentq
@@ -266,9 +268,63 @@ def test_a_rigid_block_that_opens_to_its_toe():
 
 
 def test_a_missing_limit_is_reported(command):
-    words = ("critical", "c", "--of", "visc", "--levels", "3")
+    words = ("critical", "c", "--of", "adhesion", "--levels", "3")
     code, out, _ = command(*words)
-    assert code == 1 and "no critical visc found: stands with all values tried" in out
+    assert code == 1 and "no critical adhesion found: stands with all values tried, 0 to 4" in out
+
+
+@pytest.mark.parametrize(
+    "case, of, message",
+    [
+        ("c", "visc", "visc has no effect; it needs uplift = flow"),
+        ("a", "mu", "mu has no effect; it needs law not rupture"),
+    ],
+)
+def test_a_parameter_without_effect_is_not_varied(case, of, message):
+    search, answer = found(case, of, levels="3")
+    assert len(search.trials) == 1 and answer.value is None
+    assert answer.doubt == f"stands with any value: {message}"
+
+
+@pytest.mark.parametrize(
+    "settings, rise",
+    [
+        ({"law": "friction"}, path.LARGE_RISE),
+        ({"law": "rupture"}, path.LARGE_RISE),
+        ({"law": "rupture", "uplift": "cracked"}, path.RISE),
+        ({"law": "bond"}, path.RISE),
+        ({"law": "friction", "lift_heights": (20.0,)}, path.LARGE_RISE),
+        ({"lift_heights": (20.0,), "law": ("friction", "bond")}, path.RISE),
+    ],
+)
+def test_steps_are_long_only_where_the_state_does_not_depend_on_them(settings, rise):
+    case = load("dam", DAM | settings, "20")
+    assert FailurePath(case, interface_of(case)).rise == rise
+
+
+@pytest.mark.parametrize("settings", [{"law": "friction", "adhesion": 1e5}, {"law": "rupture"}])
+def test_long_steps_lead_to_the_same_critical_level(settings, monkeypatch):
+    """Of laws whose state does not depend on the steps; bond keeps the short ones."""
+    long, short = [], []
+    for searches in (long, short):
+        searches += found("dam", settings=DAM | settings)
+        monkeypatch.setattr(failure_path, "LARGE_RISE", path.RISE)
+    assert long[1].value == pytest.approx(short[1].value, rel=path.PRECISION / 2)
+    assert long[1].mode == short[1].mode
+    ((coarse,), (fine,)) = (searches[0].trials for searches in (long, short))
+    assert len(coarse.path.points) < 0.6 * len(fine.path.points)
+
+
+@pytest.mark.parametrize("of", ["strength", "mu", "k_h", "G_f"])
+def test_the_gravity_method_of_a_trial_has_the_values_of_its_case(of):
+    """Without Gmsh's parser, which computes what follows from other parameters."""
+    drained = {"law": "bond", "uplift": "drained", "lift_heights": (12.0,), "mu": (0.9, 0.7)}
+    search = Search(load("dam", DAM | drained | {"factor_mu": 1.2}), of)
+    value = 1.3 * (1.0 if of == "strength" else search.own[of] or 0.1)
+    by_parser = search.own.varied(search.case_at(value).source.overrides)
+    blocks = [gravity.at(joint, 3.0) for joint in by_parser.joints]
+    assert [b.SSF for b in search.rigid_blocks(value)] == [b.SSF for b in blocks]
+    assert search.case_at(value) == by_parser
 
 
 @pytest.mark.parametrize(

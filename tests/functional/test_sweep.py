@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 
 import pytest
 from closed_forms import slide_level
@@ -14,7 +15,7 @@ from damjoint.model.case import CASES, load
 from damjoint.post.units import LENGTHS
 from damjoint.statics import gravity
 from damjoint.studies import chart, sweep
-from damjoint.studies.plan import plan_of
+from damjoint.studies.plan import plan_of, plan_with
 from processes import without_progress
 from scipy import stats
 
@@ -253,6 +254,18 @@ def test_a_critical_level_is_a_column(command, tmp_path):
     assert (row["mode"], row["confirmed"]) == ("sliding", "1") and row["confirmed_by"]
     assert (tmp_path / "sweep.png").exists()
     assert command(*words)[0] == 2
+
+
+def test_the_search_of_a_row_is_that_of_its_case():
+    """The parser resolves the case of all rows once; values differ in independent parameters."""
+    base = load("dam", {"law": "bond", "lift_heights": (12.0,), "adhesion": (2e5, 3e5)}, steps=3)
+    plan = plan_with([("mu", [0.7, 0.9]), ("rho_dam", [2300.0])], [], None, {}, "level")
+    for _, row, task in sweep.planned(base, plan):
+        search = task.search()
+        settings = base.source.overrides | row
+        own = load("dam", settings, levels=base.levels, tail_levels=base.tail_levels)
+        assert search.base == replace(own.varied(search.settings), published=False)
+        assert search.own == replace(own, published=False)
 
 
 def test_a_failed_row_has_its_reason_and_the_others_are_computed(command, tmp_path, monkeypatch):

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from damjoint.fem.bodies import Bodies
 from damjoint.fem.condensation import condense
+from damjoint.joint import interface as joint_interface
 from damjoint.joint import linear_system
 from damjoint.joint.flow import FlowDerivative
-from damjoint.joint.interface import Interface
+from damjoint.joint.interface import Interface, LastInterface
 from damjoint.joint.linear_system import Border, lu_solve
 from damjoint.model.case import load
 from numpy.testing import assert_allclose
@@ -27,6 +28,35 @@ def interface(request):
     )
     case = load("e", SMALL | solid)
     return Interface(condense(case, Bodies.of(case)), case["quadrature"])
+
+
+def test_stiffness_of_points(interface, monkeypatch):
+    """The assembly by terms is the product of sparse matrices, to the last bit."""
+    rng = np.random.default_rng(24)
+    number, size = len(interface.weights), len(interface.bulk.stiffness)
+    tangent = rng.normal(size=(number, 3, 3))
+    for points in (np.arange(number), np.arange(0, number, 3), np.zeros(0, int)):
+        by_terms = interface.stiffness(tangent[points], points)
+        with monkeypatch.context() as patch:
+            patch.setitem(vars(interface), "by_terms", None)
+            product = interface.stiffness(tangent[points], points)
+        assert by_terms.shape == (size, size)
+        for name in ("data", "indices", "indptr"):
+            assert np.array_equal(getattr(by_terms, name), getattr(product, name))
+
+
+def test_two_small_interfaces_are_kept(monkeypatch):
+    """A run and the search for its critical level take turns; a large one is freed first."""
+    of = LastInterface().of
+    cases = [load("e", SMALL | {"dim": 2.0, "order": 1.0}, levels) for levels in ("8", "11", "8.5")]
+    cases[2] = cases[2].with_values({"E_dam": 1e10})
+    first, crest = of(cases[0]), of(cases[1])
+    assert first is not crest and of(cases[0]) is first and of(cases[1]) is crest
+    of(cases[2])
+    assert of(cases[1]) is crest and of(cases[0]) is not first
+    monkeypatch.setattr(joint_interface, "SMALL", 0)
+    first = of(cases[2])
+    assert of(cases[1]) is not crest and of(cases[2]) is not first
 
 
 @pytest.mark.parametrize("few", [0, linear_system.FEW], ids=["reduced", "whole"])

@@ -300,9 +300,8 @@ class Search:
         """Search outwards from the case's own value for a stand and a failure, then bisect."""
         first = self.trial(1.0 if self.of == "strength" else self.own[self.name])
         if self.of != "strength" and not self.matters:
-            name, where = self.name, parameter(self.name).matters
-            always = f"{result_of(first)} with any value"
-            return self.no_limit(first, f"{always}: {name} has no effect here, only with {where}")
+            doubt = f"{result_of(first)} with any value: {self.name} has no effect; it needs "
+            return self.no_limit(first, doubt + parameter(self.name).matters)
         self.guesses = self.by_guess(first)
         ends = self.change(first)
         if ends is None:
