@@ -10,7 +10,6 @@ from functools import cached_property
 import numpy as np
 
 from ..arrays import Array, IntArray, distinct
-from ..classes import dataclass
 from ..csr import CsrMatrix, added, stacked
 from ..fem import elements
 from ..fem.cache import cached, key_of

@@ -346,8 +346,8 @@ class Search:
     def no_change(self, first: Trial) -> CriticalValue:
         """The result if all trials stand, or all fail."""
         tried = [t.value for t in self.trials]
-        doubt = f"{result_of(first)} with all values tried, {min(tried):.6g} to {max(tried):.6g}{self.unit}"
-        return self.no_limit(first, doubt)
+        span = f"{min(tried):.6g} to {max(tried):.6g}{self.unit}"
+        return self.no_limit(first, f"{result_of(first)} with all values tried, {span}")
 
     def no_limit(self, trial: Trial, doubt: str) -> CriticalValue:
         """The result without a critical value, and why there is none; trial: any of them."""
