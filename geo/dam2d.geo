@@ -299,13 +299,15 @@ Else
   surface_right() = {14, 15};
 EndIf
 
-// Between several joints: element sizes by the distance from the nearest one
+// Between several joints: element sizes by the distance from the nearest one, not below that of
+// the joint (MathEval reads no negative factor)
 If(top > 0)
   Field[1] = Distance;
   Field[1].CurvesList = {joint_curves()};
   Field[1].Sampling = 10 * n_joint;
   Field[2] = MathEval;
-  Field[2].F = Sprintf("%.16g + %.16g * F1", h_joint, (h_dam - h_joint) / dam_height);
+  per_metre = (h_dam > h_joint) ? (h_dam - h_joint) / dam_height : 0;
+  Field[2].F = Sprintf("%.16g + %.16g * F1", h_joint, per_metre);
   Background Field = 2;
   Mesh.MeshSizeExtendFromBoundary = 0;
   Mesh.MeshSizeFromPoints = 0;

@@ -39,6 +39,13 @@ def solved(levels, case="dam", **settings):
     return LoadStepper(case, interface_of(case)).run()
 
 
+def test_elements_of_a_coarse_joint_below_a_fine_crest():
+    """The joint's size holds where that of the crest is smaller."""
+    lift = COARSE | {"n_joint": 10.0, "lift_heights": (15.0,)}
+    fine, equal = (Mesh(load("dam", lift | {"h_dam": size})).counts for size in (2.0, 3.4))
+    assert fine == equal
+
+
 @pytest.mark.parametrize("uplift", ["none", "imposed"])
 def test_resultants_of_each_joint_are_those_of_statics(uplift):
     results = solved([30, 42], uplift=uplift, K_N=(1e11, 2e11, 5e10, 1e12), **SLOPES)

@@ -18,10 +18,11 @@ from damjoint.gui import tree, views, window
 from damjoint.gui.curves import METRES
 from damjoint.gui.graphs import INTERVALS, MARGIN, Scale, thinned
 from damjoint.gui.layout import ABOVE_AXES, BELOW_AXES, BESIDE_AXES, Layout
-from damjoint.gui.sheet import Request, titles
+from damjoint.gui.sheet import Request, case_text, check_request, titles
 from damjoint.gui.views import caption
 from damjoint.gui.window import ACTION, Session
 from damjoint.gui.worker import EngineProcess
+from damjoint.model.case import load
 from damjoint.post.units import LENGTHS
 from damjoint.statics.verdict import hints
 from damjoint.studies.check import compare_methods
@@ -441,6 +442,61 @@ def test_lift_joints_are_drawn(open_window, tmp_path):
     open_window(str(mine))
     heights = [gmsh.model.getBoundingBox(*curve)[4] for curve in gmsh.model.getEntities(1)]
     assert pytest.approx(20, abs=1e-6) in heights
+
+
+def test_each_joint_of_a_case_with_several_is_shown_and_saved(open_window, command, tmp_path):
+    """A changed value is that of all joints, and the heights can be changed; the saved case gives
+    the same bytes.
+    """
+    mine = tmp_path / "mine.case"
+    mine.write_text(
+        'lift_heights() = {15, 25}; law() = {"bond", "friction", "friction"}; mu() = {0.9, 1, 1};'
+        'levels() = {30}; default_uplift = "drained";'
+    )
+    user = open_window(str(mine), **SMALL)
+    law = user.entry("law")
+    assert law["values"] == ["bond"] and law["label"] == "= bond, friction, friction: Joint law"
+    assert user.entry("G_t")["visible"] and user.entry("pena_tang")["visible"]
+    assert tree.get_text(tree.LIFTS) == "15, 25"
+    assert "one value, or as many" in user.type(tree.LIFTS, "20")
+    user.type(tree.LIFTS, "15, 20")
+    user.type("mu", 0.8)
+    assert user.run().startswith("done in")
+    names = [f"drained, {joint}" for joint in ("base", "lift 15 m", "lift 20 m")]
+    assert sorted(user.entry(tree.SCENE)["choices"]) == names
+    for scene in user.session.scenes:
+        user.type(tree.SCENE, scene.name)
+        assert numbers_shown(user)["Joint"] == scene.name.removeprefix("drained, ")
+        normal = scene.own.last["N"]
+        assert scene.numbers[0].elements["N"] == normal
+        assert scene.numbers[0].rigid["N"] == pytest.approx(normal, rel=1e-8)
+    user.save(tmp_path / "window")
+    assert "one value, or as many" in user.type(tree.LIFTS, "none")
+    user.type("law", "friction")
+    assert not user.session.tree.sheet.case.of_joints
+    user.session.close()
+    saved = load(str(tmp_path / "window/mine.case"))
+    assert [j["law"] for j in saved.joints] == ["bond", "friction", "friction"]
+    assert [j["mu"] for j in saved.joints] == [0.8, 0.8, 0.8]
+    assert command("run", tmp_path / "window/mine.case", "--out", tmp_path / "again")[0] == 0
+    for name in ("joint.csv", "history.csv"):
+        one, other = ((tmp_path / folder / name).read_bytes() for folder in ("window", "again"))
+        assert one == other
+    user.session = Session(Request("a"))  # closed by the fixture
+
+
+def test_a_saved_case_has_its_own_geometry(tmp_path):
+    sheet = check_request(Request("monoliths", {"K_N": 5e10}))
+    (tmp_path / "saved.case").write_text(case_text(sheet, sheet.case))
+    saved = load(str(tmp_path / "saved.case"))
+    assert saved.geometry.samefile(sheet.case.geometry)
+    assert saved.values == sheet.case.values and saved.of_joints == sheet.case.of_joints
+
+
+def test_lists_of_several_joints_on_the_command_line(open_window):
+    user = open_window("dam", lift_heights=(15.0,), mu=(0.9, 1.0), **SMALL)
+    assert user.entry("mu")["label"] == "= 0.9, 1: Friction coefficient mu"
+    assert len(user.session.tree.sheet.case.joints) == 2
 
 
 BAD_VALUES = [

@@ -116,15 +116,15 @@ class QuakeNumbers(Numbers):
     peaks: list[Row]
 
     @staticmethod
-    def of(found: QuakeResult) -> list[QuakeNumbers]:
-        """The numbers at all frames, of the joint with the largest residual slip."""
-        frames, rows, peaks = found.frames.joints[found.joint], shown_rows(found), []
+    def of(found: QuakeResult, joint: int) -> list[QuakeNumbers]:
+        """The numbers at all frames, of a joint by its number."""
+        frames, rows, peaks = found.frames.joints[joint], shown_rows(found, joint), []
         for name, head, units in PEAKS:
             k = int(np.argmax(np.abs(rows[name])))
             value = with_unit(rows[name][k], units, 3)
             peaks.append((f"largest {head}", f"{value} at {rows['time'][k]:.2f} s", QUAKE[name][1]))
         for name, head, units in RESIDUAL:
-            value = found.summary["residual"].get(column_of(name, found.joint))
+            value = found.summary["residual"].get(column_of(name, joint))
             if value is not None:
                 peaks.append((head, with_unit(value, units, 3), "mean of the last second"))
         times = frames.history["time"]
@@ -152,13 +152,13 @@ class QuakeNumbers(Numbers):
         return [*rows, *self.peaks]
 
 
-def shown_rows(found: QuakeResult) -> Columns:
-    """The rows of quake.csv of the joint with the largest residual slip, without round-off, with
-    openings not below 0 and the shear strength in the direction of T.
+def shown_rows(found: QuakeResult, joint: int) -> Columns:
+    """The rows of quake.csv of a joint, by its number, without round-off, with openings not below 0
+    and the shear strength in the direction of T.
     """
     rows = {
         name: np.where(np.abs(column) > ROUND_OFF * np.abs(column).max(), column, 0.0)
-        for name, column in found.rows_of(found.joint).items()
+        for name, column in found.rows_of(joint).items()
         if np.isfinite(column).all()  # a law may not limit shear
     }
     rows |= {name: np.maximum(rows[name], 0.0) for name in ("heel_opening", "toe_opening")}

@@ -48,56 +48,64 @@ class SolvedScene:
     quake: Columns | None = None
 
     @staticmethod
-    def of(outcome: Outcome) -> SolvedScene:
-        """The scene of an outcome; computes the bodies' fields."""
+    def of(outcome: Outcome, name: str = "") -> list[SolvedScene]:
+        """The scenes of an outcome, one for each joint, that of the decisive joint first; computes
+        the bodies' fields. name: of the outcome, by default its uplift.
+        """
         result, (state, _) = outcome.result, early_end(outcome)
-        joint = decisive_joint(result)
-        own = result.joints[joint]
+        bodies, fields, times = outcome.mesh().bodies, outcome.fields(), times_of(result)
         message = statement(result)
         if state and isinstance(outcome.error, (InputError, RunError)):
             message = str(outcome.error)
         elif state:
             message = reached(state, result)
-        return SolvedScene(
-            name=str(result.case["uplift"]),
-            result=result,
-            bodies=outcome.mesh().bodies,
-            fields=outcome.fields(),
-            verdict=verdict(result),
-            end_state=state,
-            message=message,
-            statement=message or "the dam stands",
-            failed=bool(state) or failed(result),
-            joint=joint,
-            numbers=[Numbers.at(own, time) for time in times_of(result)],
-            table=table_of_levels(own),
-            warnings=warnings(result),
-        )
+        return [
+            SolvedScene(
+                name=scene_name(name or str(result.case["uplift"]), result, joint),
+                result=result,
+                bodies=bodies,
+                fields=fields,
+                verdict=verdict(result),
+                end_state=state,
+                message=message,
+                statement=message or "the dam stands",
+                failed=bool(state) or failed(result),
+                joint=joint,
+                numbers=[Numbers.at(own, time) for time in times],
+                table=table_of_levels(own),
+                warnings=warnings(result),
+            )
+            for joint, own in first_of(decisive_joint(result), result)
+        ]
 
     @staticmethod
     def of_earthquake(found: QuakeResult) -> list[SolvedScene]:
-        """The scenes of the static loads and of the earthquake after them."""
+        """The scenes of the static loads and of the earthquake after them, one for each joint; of
+        the earthquake that of the largest residual slip first.
+        """
         static = Outcome(found.before, lambda: found.mesh, found.static_fields)
-        numbers = QuakeNumbers.of(found)
-        earthquake = SolvedScene(
-            name="earthquake",
-            result=found.frames,
-            bodies=found.mesh.bodies,
-            fields=found.fields(),
-            verdict="stands" if found.stands else "no equilibrium",
-            end_state=found.state,
-            message="" if found.stands else found.statement,
-            statement=found.statement,
-            failed=not found.stands,
-            joint=found.joint,
-            numbers=list(numbers),
-            table=table_of_frames(numbers),
-            warnings=[],
-            quake=shown_rows(found),
-        )
-        before = SolvedScene.of(static)
-        before.name = "static loads"
-        return [before, earthquake]
+        fields = found.fields()
+        scenes = SolvedScene.of(static, "static loads")
+        for joint, _ in first_of(found.joint, found.frames):
+            numbers = QuakeNumbers.of(found, joint)
+            earthquake = SolvedScene(
+                name=scene_name("earthquake", found.frames, joint),
+                result=found.frames,
+                bodies=found.mesh.bodies,
+                fields=fields,
+                verdict="stands" if found.stands else "no equilibrium",
+                end_state=found.state,
+                message="" if found.stands else found.statement,
+                statement=found.statement,
+                failed=not found.stands,
+                joint=joint,
+                numbers=list(numbers),
+                table=table_of_frames(numbers),
+                warnings=[],
+                quake=shown_rows(found, joint),
+            )
+            scenes.append(earthquake)
+        return scenes
 
     @property
     def own(self) -> Results:
@@ -114,6 +122,16 @@ class SolvedScene:
         state, case = self.result.state(time), self.result.case
         at = time if self.quake is None else case.times[-1]
         return Loading.at(case, at, state["level"], state["tail_level"])
+
+
+def first_of(joint: int, result: Results) -> list[tuple[int, Results]]:
+    """The numbers and results of all joints, one of them first."""
+    return sorted(enumerate(result.joints), key=lambda pair: pair[0] != joint)
+
+
+def scene_name(name: str, result: Results, joint: int) -> str:
+    """A scene's name with that of its joint, if there are several."""
+    return ", ".join(filter(None, [name, result.case.named((joint,))]))
 
 
 def times_of(result: Results) -> np.ndarray:

@@ -6,7 +6,6 @@ Loading a case empties the ONELAB database: only for the engine's process, not f
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -15,9 +14,10 @@ import gmsh
 
 from .. import InputError
 from ..accuracy import REFINED
+from ..arrays import Setting, Settings
 from ..model import casefile
 from ..model.case import CASES, Case, case_file, first_mesh, load
-from ..model.parameters import INCLUDE, assignments, declared, listing, parse_by_gmsh
+from ..model.parameters import INCLUDE, assignments, checked, declared, listing, parse_by_gmsh
 from ..studies import quake
 
 
@@ -31,7 +31,7 @@ class Request:
     """
 
     case: str
-    overrides: Mapping[str, float | str] = field(default_factory=dict)
+    overrides: Settings = field(default_factory=dict)
     levels: str | None = None
     tail_levels: str | None = None
     steps: str | None = None
@@ -91,8 +91,8 @@ class Sheet:
         case, title = self.case, self.case.title
         if TITLED & set(self.request.overrides):
             title = f"case {case.name}, changed"
-        water = " and ".join([case["uplift"], *case.also_uplift])
-        scene = f"law {case['law']}, uplift {water}"
+        water = " and ".join([case.of_all_joints("uplift"), *case.also_uplift])
+        scene = f"law {case.of_all_joints('law')}, uplift {water}"
         shaken = self.request.quake and case.record
         return title, f"{scene}, {case.record.name}" if shaken else scene
 
@@ -107,7 +107,8 @@ def check_request(request: Request) -> Sheet:
     unchanged = Request(request.case, accuracy=request.accuracy)
     fill_database(unchanged, unchanged.load())
     own = {name: gmsh_value(declared()[name].label) for name in declared()}
-    changes = {n: v for n, v in request.overrides.items() if v != own[n]}
+    lists = casefile.read(path).of_joints
+    changes = {n: v for n, v in request.overrides.items() if n in lists or v != own.get(n)}
     request = replace(request, overrides=changes)
     case = request.load()
     fill_database(request, case)
@@ -117,12 +118,17 @@ def check_request(request: Request) -> Sheet:
 
 
 def fill_database(request: Request, case: Case) -> None:
-    """Put the parameters of a request, which gives a case, into the ONELAB database."""
+    """Put the parameters of a request, which gives a case, into the ONELAB database: of several
+    joints those of the first one.
+    """
     file = casefile.read(case_file(request.case))
-    changes = {name: declared()[name].check(value) for name, value in request.overrides.items()}
-    mesh = first_mesh(case) if request.accuracy else {}
+    settings: dict[str, Setting] = {**file.defaults, **file.of_joints}
+    settings |= first_mesh(case) if request.accuracy else {}
+    settings |= {name: checked(name, value) for name, value in request.overrides.items()}
+    settings.pop("lift_heights", None)
+    first = {n: v[0] if isinstance(v, tuple) else v for n, v in settings.items()}
     lists = listing("levels", case.levels) + listing("times", case.times)
-    parse_by_gmsh(assignments(file.defaults | mesh | changes) + lists + INCLUDE)
+    parse_by_gmsh(assignments(first) + lists + INCLUDE)
 
 
 def gmsh_value(label: str) -> float | str:
@@ -146,11 +152,18 @@ def case_text(sheet: Sheet, run: Case) -> str:
     case, request = sheet.case, sheet.request
     file = casefile.read(case_file(request.case))
     file.defaults |= first_mesh(case) if request.accuracy else {}
-    file.defaults |= request.overrides
+    for name, value in request.overrides.items():
+        setting = checked(name, value)
+        if name in declared():
+            file.defaults.pop(name, None)
+            file.of_joints.pop(name, None)
+            (file.of_joints if isinstance(setting, tuple) else file.defaults)[name] = setting
     file.defaults |= {name: run[name] for name in REFINED} if request.accuracy else {}
     file.texts = {"title": case.title}
     if case.record:
         file.texts["record"] = str(case.record.resolve())
+    if case.geometry:
+        file.texts["geometry"] = str(case.geometry.resolve())
     if case.also_uplift:
         file.texts["also_uplift"] = " ".join(case.also_uplift)
     file.lists = {
@@ -158,4 +171,6 @@ def case_text(sheet: Sheet, run: Case) -> str:
         "tail_levels": list(case.tail_levels),
         "times": list(case.times),
     }
+    if case.lift_heights:
+        file.lists["lift_heights"] = list(case.lift_heights)
     return casefile.written(file)

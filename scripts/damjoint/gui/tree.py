@@ -40,6 +40,9 @@ RECORD = "Parameters/91Earthquake/01Record: CSV file"
 FRAMES = "Parameters/91Earthquake/02[s] Show from : to"
 #: Parameters of other groups that an earthquake needs, too.
 OF_EARTHQUAKE = "added_mass", "quake_uplift"
+#: Heights of the lift joints; text of none.
+LIFTS = "Parameters/2Geometry/26[m] Lift joints above the first one"
+NO_LIFTS = "none"
 #: Entries on the water levels.
 OF_LEVELS = (LEVELS, TAIL_LEVELS, STEPS, TIMES)
 ACCURACY = "Parameters/3Mesh/0Accuracy"
@@ -148,7 +151,7 @@ class Tree:
             )
         # read back, since the database may round a number
         self.shown = {e["name"]: value_of(e["name"]) for e in sheet.entries} | {
-            name: value_of(name) for name in (CASE, FILE, LEVELS, TAIL_LEVELS, RECORD)
+            name: value_of(name) for name in (CASE, FILE, LEVELS, TAIL_LEVELS, LIFTS, RECORD)
         }
 
     def scene_entries(self, sheet: Sheet) -> list[dict[str, Any]]:
@@ -179,6 +182,13 @@ class Tree:
                 help=f'equal steps between two levels, or "{OWN}"',
             ),
             text(TIMES, times, readOnly=True, help=f"t = {times}"),
+            text(
+                LIFTS,
+                levels_text(case.lift_heights) or NO_LIFTS,
+                visible=not case.geometry,
+                help=f"heights of their heels, from the lowest, or {NO_LIFTS}; values of each joint"
+                " are set in a case file",
+            ),
             text(
                 ACCURACY,
                 request.accuracy or OWN,
@@ -242,11 +252,18 @@ class Tree:
             entry["visible"] = quake and declared["visible"]
         elif parameter.name in OF_EARTHQUAKE:
             entry["visible"] = quake or declared["visible"]
+        elif parameter.of_joints:  # Gmsh knows the first joint only
+            joints = self.sheet.case.joints
+            entry["visible"] = any(parameter.matters_in(joint.values) for joint in joints)
         allowed = f"{parameter.name}: {parameter.allowed()}"
         note = declared.get("help", "") if not parameter.automatic else ""
         entry["help"] = ". ".join(filter(None, [allowed, parameter.meaning, note]))
         unit = f"[{parameter.unit}] " if parameter.unit not in ("", "-") else ""
         entry["label"] = unit + self.short[parameter.name]
+        if own := self.of_joints(parameter):
+            entry["label"] = f"{unit}= {own}: {self.short[parameter.name]}"
+            names = ", ".join(self.sheet.case.joint_names)
+            entry["help"] += f". Values of {names}: {own}; one typed here is that of all joints"
         if parameter.text:
             return entry
         choices = declared.get("choices", [])
@@ -263,6 +280,14 @@ class Tree:
             entry["label"] = f"{unit}= {value:.6g}: {self.short[parameter.name]}"
             entry["help"] = f"{entry['help']} = {value:.6g} ({parameter.help})"
         return entry
+
+    def of_joints(self, parameter: Parameter) -> str:
+        """The values of the joints, if the case sets a list of them; else empty."""
+        source = self.sheet.case.source
+        setting = {**source.text.of_joints, **source.overrides}.get(parameter.name)
+        if not isinstance(setting, tuple):
+            return ""
+        return ", ".join(v if isinstance(v, str) else f"{v:.6g}" for v in setting)
 
     def request(self) -> Request:
         """Read the user's request; another case starts without changes.
@@ -285,6 +310,10 @@ class Tree:
             for label in labels
             if label in shown and value_of(label) != shown[label]
         }
+        lifts = get_text(LIFTS)
+        if lifts != shown[LIFTS]:
+            none = lifts in (NO_LIFTS, "")
+            changed["lift_heights"] = () if none else levels_of("lift_heights", lifts)
         return replace(
             request,
             overrides={**request.overrides, **changed},
@@ -376,7 +405,10 @@ def show_results(scenes: list[SolvedScene], shown: int, step: int) -> None:
     clear_numbers()
     if not scene.numbers:
         return
-    entries = [(*row, "LightYellow") for row in scene.numbers[step].rows()]
+    rows = scene.numbers[step].rows()
+    if joint := scene.result.case.named((scene.joint,)):
+        rows.insert(0, ("Joint", joint, "whose numbers and curves are shown: Display / Scene"))
+    entries = [(*row, "LightYellow") for row in rows]
     entries += [(f"Note {i + 1}", w, w, WARN) for i, w in enumerate(scene.warnings)]
     for i, (label, value, note, highlight) in enumerate(entries):
         more = {"help": note, "attributes": {"Highlight": highlight}}

@@ -164,7 +164,8 @@ def show(
             gallery.write(*place, [words], color, SIZES[3])
         show_warnings(gallery, scene.warnings, layout)
     record = f", {case.record.name}" if scene.quake is not None else ""
-    words = f"law {case['law']}, uplift {case['uplift']}{record}"
+    law, uplift = (case.of_all_joints(name) for name in ("law", "uplift"))
+    words = f"law {law}, uplift {uplift}{record}"
     show_heading(gallery, (title, words), layout)
     gallery.balance(gallery.step)
     return gallery

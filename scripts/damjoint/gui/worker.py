@@ -128,9 +128,8 @@ def run_case(sheet: Sheet, pipe: Connection, stop: Stop) -> tuple[list[SolvedSce
                 break
     if outcomes[-1].error and not any(outcome.result.last for outcome in outcomes):
         raise outcomes[-1].error
-    return [SolvedScene.of(outcome) for outcome in outcomes], partial(
-        write_outcomes, case, outcomes
-    )
+    scenes = [scene for outcome in outcomes for scene in SolvedScene.of(outcome)]
+    return scenes, partial(write_outcomes, case, outcomes)
 
 
 def run_quake(sheet: Sheet, pipe: Connection, stop: Stop) -> tuple[list[SolvedScene], Write]:

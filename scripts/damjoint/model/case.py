@@ -179,6 +179,10 @@ class Case(ParameterValues):
         """Names of the joints, for messages."""
         return tuple(own.name for own in self.of_joints) or (joint_name(self["joint_height"]),)
 
+    def of_all_joints(self, name: str) -> str:
+        """The values of a parameter at all joints, each once, as text."""
+        return ", ".join(dict.fromkeys(str(joint[name]) for joint in self.joints))
+
     def above(self, numbers: Collection[int]) -> set[str]:
         """The bodies that without the joints of these numbers have no connection to the rock."""
         if not self.of_joints:
@@ -483,7 +487,8 @@ def resolve(source: Source) -> Case:
     overrides = {name: checked(name, value) for name, value in overrides.items()}
     lifts = lists.pop("lift_heights", ())
     if "lift_heights" in overrides:
-        lifts = levels_of("lift_heights", overrides.pop("lift_heights"))
+        given = overrides.pop("lift_heights")
+        lifts = levels_of("lift_heights", given) if given else ()
     geometry = own_geometry(file.texts["geometry"]) if "geometry" in file.texts else None
     values = settings_of_joints({**file.defaults, **file.of_joints, **overrides}, lifts, geometry)
     listed = "".join(listing(n, v) for n, v in lists.items())

@@ -320,7 +320,7 @@ def checked(name: str, value: Any) -> Setting:
     Raises InputError.
     """
     if name == "lift_heights":
-        return levels_of(name, value)
+        return levels_of(name, value) if value else ()
     known = parameter(name)
     if isinstance(value, (str, float, int)):
         return known.check(value)

@@ -301,7 +301,7 @@ def describe_scene(case: Case) -> str:
     size = f"geometry {case.geometry.name}" if case.geometry else size
     solid = "3D" if case.geometry else f"3D, {case['thickness']:g} m thick"
     plane = "plane strain" if case["dim"] == 2 else solid
-    law, water = (", ".join(dict.fromkeys(j[n] for j in case.joints)) for n in ("law", "uplift"))
+    law, water = (case.of_all_joints(name) for name in ("law", "uplift"))
     return f"{size}; {plane}; joint law {law}; water in the joint: {water}"
 
 
