@@ -353,9 +353,10 @@ def peaks_and_rest(case: Case, rows: Table) -> dict[str, Any]:
 
 def statement_of(case: Case, found: dict[str, Any]) -> str:
     """What a summary says of the end of an earthquake."""
-    slips = [
-        f"{1e3 * found['residual'][column_of('slip', k)]:.3g} mm" for k in range(len(case.joints))
-    ]
+    slips = []
+    for k in range(len(case.joints)):
+        slip, name = 1e3 * found["residual"][column_of("slip", k)], case.named((k,))
+        slips.append(f"{slip:.3g} mm" + (f" ({name})" if name else ""))
     end = (
         "the dam stands after the earthquake"
         if found["after"]["equilibrium"]

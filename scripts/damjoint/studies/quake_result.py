@@ -81,14 +81,14 @@ RESIDUAL = {
 }
 
 
-def residual_table(found: dict[str, Any]) -> Table:
+def residual_table(found: dict[str, Any], case: Case) -> Table:
     """Tabulate the residual values of a summary."""
-    rows = [
-        (name.replace(base, meaning), unit, f"{value:.4g}")
-        for name, value in found["residual"].items()
-        for base, (meaning, unit) in RESIDUAL.items()
-        if name.startswith(base)
-    ]
+    rows = []
+    for k in range(len(case.joints)):
+        of = f" ({case.named((k,))})" if case.of_joints else ""
+        for name, (meaning, unit) in RESIDUAL.items():
+            if (value := found["residual"].get(column_of(name, k))) is not None:
+                rows.append((meaning + of, unit, f"{value:.4g}"))
     return Table(["at rest", "unit", "value"], ["", "", ""], rows)
 
 
@@ -101,6 +101,6 @@ def modes(found: dict[str, Any]) -> str:
 
 def text(case: Case, found: dict[str, Any]) -> str:
     """Peaks and residual values of a summary as printed tables."""
-    tables = peaks_table(found, case), residual_table(found)
+    tables = peaks_table(found, case), residual_table(found, case)
     parts = [tabulate(table.rows, table.heads, disable_numparse=True) for table in tables]
     return "\n\n".join([modes(found), *parts])

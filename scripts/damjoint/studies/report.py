@@ -486,7 +486,7 @@ def earthquake_section(folder: Path, case: Case, info: dict[str, Any]) -> Earthq
         f"{found['halvings']} times where they did not converge.",
         f"Water pressure in the joint: {uplift}.",
     ]
-    tables = [quake_result.peaks_table(found, case), quake_result.residual_table(found)]
+    tables = [quake_result.peaks_table(found, case), quake_result.residual_table(found, case)]
     return Earthquake(pictures, tables, [note[0].upper() + note[1:] for note in notes])
 
 
