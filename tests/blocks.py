@@ -16,13 +16,14 @@ def write_blocks(
     joints: dict[str, tuple[float, float, float, float]],
     size: float = 1.0,
     fine: dict[str, float] | None = None,
+    crest: float | None = None,
 ) -> Path:
     """Write the mesh of rectangular blocks on rock.
 
     blocks: corners by name; blocks of one name are glued. joints: ends (heel, toe) by name. Faces:
     the left side of the leftmost block is upstream, the right side of the last one, if it stands on
     the rock, downstream. A joint whose name begins with _ is a line of the mesh, but glued. size:
-    of the elements [m]; fine: of those at joints, by name.
+    of the elements [m]; fine: of those at joints, by name; crest: its x, by default the leftmost.
     """
     gmsh = start_gmsh()
     gmsh.clear()
@@ -71,7 +72,8 @@ def write_blocks(
     x = min(corners[0] for corners in blocks.values())
     top = max(corners[3] for corners in blocks.values())
     group(1, inside(1, x, 0, x, top), "upstream")
-    group(0, inside(0, x, top, x, top), "crest")
+    crest = x if crest is None else crest
+    group(0, inside(0, crest, top, crest, top), "crest")
     *_, (_, bottom_of_last, right_of_last, top_of_last) = blocks.values()
     if bottom_of_last == 0:
         group(1, inside(1, right_of_last, 0, right_of_last, top_of_last), "downstream")

@@ -333,7 +333,8 @@ CROSS_JOINTS = {
 
 
 def test_runs_of_both_engines_agree_where_four_bodies_meet(tmp_path):
-    write_blocks(tmp_path / "own.msh", CROSS, CROSS_JOINTS, size=2.0)
+    """The crest is the end of a joint, too."""
+    write_blocks(tmp_path / "own.msh", CROSS, CROSS_JOINTS, size=2.0, crest=5)
     (tmp_path / "own.case").write_text('geometry = "own.msh";')
     laws = ("friction", "bond", "bond", "friction", "rupture", "friction")
     water = ("imposed", "flow", "cracked", "none", "none", "none")

@@ -96,7 +96,7 @@ def own_lists(mesh: Mesh) -> dict[str, list[float]]:
         "own_joints": [float(len(mesh.joints))],
         "own_bodies": [float(len(number))],
         "own_first_heel": [length, *heel_normal(mesh.joints[0].surface, heel)],
-        "own_crest": [*bodies["crest"].points[0], number[mesh.bearer("crest")]],
+        "own_crest_body": [number[mesh.bearer("crest")]],
         "own_quadrangles": [float("quad" in shapes)],
         "own_mark_region": [constants()[name.upper()][0] for name in lines],
         "own_mark_body": [number[mesh.bearer(name)] + lowest for name in lines],
