@@ -40,6 +40,14 @@ def test_schur_complement(system, method):
     assert reduced == pytest.approx(loads[keep] - through @ loads[inside], rel=1e-12, abs=1e-13)
 
 
+def test_schur_complement_without_other_unknowns(system, method):
+    matrix, loads = system
+    keep = np.arange(len(loads))[::-1]
+    schur, reduced = factor.schur_complement(matrix, keep, loads)
+    assert np.array_equal(schur, matrix.toarray()[::-1, ::-1])
+    assert np.array_equal(reduced, loads[::-1])
+
+
 def test_loads_as_a_border(system, method):
     """Also a load on one unknown, the same twice, and one on a kept unknown only."""
     matrix, loads = system

@@ -277,6 +277,8 @@ def schur_complement(matrix: Sparse, keep: IntArray, loads: Array) -> tuple[Arra
 
     Raises RunError if the estimated memory is not available, MemoryError if an allocation fails.
     """
+    if len(keep) == matrix.shape[0]:  # a body whose nodes all lie on joints and wet faces
+        return matrix[keep][:, keep].toarray(), loads[keep]
     mumps = library()
     if mumps is None:
         size, k = matrix.shape[0], len(keep)
