@@ -20,7 +20,9 @@ PUBLISHED = {
 }
 
 
-@pytest.mark.parametrize("name", PUBLISHED)
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=pytest.mark.heavy) if n in "dh" else n for n in PUBLISHED]
+)
 def test_element_counts(name, tmp_path):
     counts = mesh.write_mesh(load(name), tmp_path / "scene.msh")
     assert (counts["elements"], counts["joint_elements"]) == pytest.approx(PUBLISHED[name], rel=0.1)

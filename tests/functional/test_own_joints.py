@@ -193,7 +193,7 @@ def test_each_block_of_a_dam_across_a_valley_is_in_equilibrium():
 
 
 @pytest.mark.parametrize("order", [1.0, 2.0])
-@pytest.mark.parametrize("waterstop", [0.0, 0.7, 3.0])
+@pytest.mark.parametrize("waterstop", [0.0, 0.7, pytest.param(3.0, marks=pytest.mark.heavy)])
 def test_water_in_a_contraction_joint_up_to_its_waterstop(waterstop, order):
     """rho g b H^2/2 on either face, also where the waterstop cuts elements; each monolith carries
     it, less the contact with the other one, to its base.

@@ -493,6 +493,10 @@ def case_file(tmp_path):
     return path
 
 
+#: Where the accuracy does not matter.
+LONG_STEPS = "--set", "dt=0.01"
+
+
 def test_the_command_writes_rows_summary_and_picture(command, case_file, tmp_path):
     code, out, _ = command("quake", case_file)
     assert code == 0
@@ -616,9 +620,9 @@ def test_a_run_under_way_of_another_case_is_not_continued(command, case_file, mo
         raise KeyboardInterrupt
 
     monkeypatch.setattr(QuakeHistory, "add", interrupted)
-    assert command("quake", case_file, "--out", "one")[0] == 130
+    assert command("quake", case_file, *LONG_STEPS, "--out", "one")[0] == 130
     monkeypatch.setattr(QuakeHistory, "add", add)
-    changed = "quake", case_file, "--no-picture", "--set", "mu=0.85"
+    changed = "quake", case_file, "--no-picture", "--set", "mu=0.85", *LONG_STEPS
     assert command(*changed, "--out", "one")[0] == command(*changed, "--out", "two")[0] == 0
     one, two = (Path(n, "quake.csv").read_text() for n in ("one", "two"))
     assert one == two
@@ -626,14 +630,14 @@ def test_a_run_under_way_of_another_case_is_not_continued(command, case_file, mo
 
 def test_a_sweep_of_earthquakes(command, case_file, tmp_path):
     """A row fails by its residual slip, that of the single run; rows are not computed again."""
-    words = "sweep", case_file, "--vary", "record_scale=0.2,1", "--jobs", 1
+    words = "sweep", case_file, "--vary", "record_scale=0.2,1", "--jobs", 1, *LONG_STEPS
     code, out, _ = command(*words, "--quake", "0.005")
     assert code == 0 and "2 rows computed" in out
     rows = list(csv.DictReader(Path("my_sweep.csv").read_text().splitlines()))
     small, large = sorted(rows, key=lambda row: float(row["record_scale"]))
     assert (small["verdict"], small["failed"]) == ("stands", "0")
     assert (large["verdict"], large["failed"]) == ("residual slip", "1")
-    assert command("quake", case_file, "--no-picture")[0] == 0
+    assert command("quake", case_file, "--no-picture", *LONG_STEPS)[0] == 0
     found = json.loads(Path("out/my_quake/run.json").read_text())["quake"]
     assert float(large["residual_slip"]) == pytest.approx(found["residual"]["slip"], rel=1e-9)
     peaks = [float(row["peak_ground_ax"]) for row in (small, large)]

@@ -14,7 +14,7 @@ RELEASED = {"dam_height": 40, "dam_base": 30, "E": 1e10, "sigma_max": 0}
 
 
 @pytest.mark.parametrize("uplift", ["imposed", "flow"])
-@pytest.mark.parametrize("n_joint", [60, 100])
+@pytest.mark.parametrize("n_joint", [60, pytest.param(100, marks=pytest.mark.heavy)])
 def test_a_joint_without_tensile_strength_opens_in_one_step(solve, uplift, n_joint):
     """Some points are in equilibrium neither closed nor open, but within the shear release."""
     (result,) = solve("dam", "40", **RELEASED, uplift=uplift, n_joint=n_joint)
