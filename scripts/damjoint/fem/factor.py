@@ -17,6 +17,7 @@ import weakref
 import zlib
 from contextlib import AbstractContextManager
 from functools import cache
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, Literal
@@ -92,8 +93,10 @@ def name() -> str:
     if mumps is None:
         return f"SuperLU (scipy {scipy.__version__})"
     mumps.damjoint_mumps_version.restype = ctypes.c_char_p
-    ordering = metis()
-    order = f", METIS (pymetis {ordering.version})" if ordering else ""
+    try:
+        order = f", METIS (pymetis {version('pymetis')})"
+    except PackageNotFoundError:
+        order = ""
     return f"MUMPS {mumps.damjoint_mumps_version().decode()}{order}"
 
 

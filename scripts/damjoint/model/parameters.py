@@ -186,14 +186,16 @@ def parse_by_gmsh(text: str) -> dict[str, list[Any]]:
 
 #: A declaration of pro/parameters.pro: name, and everything up to its closing brace.
 DECLARED = re.compile(r"(\w+) = \{(?:Str\[)?default_\1\b((?:[^{}\"]|\"[^\"]*\"|\{[^{}]*\})*)\}")
+#: The default of a declaration.
+DEFAULT = re.compile(r"\bdefault_(\w+) = ([^,\]]*?)\s*[,\]]")
 #: A label: group and description without the digits that order the ONELAB tree, unit.
 LABEL = re.compile(r"^Parameters/\d*([^/]+)/\d*([^/]*?)(?: \[(.*)\])?$")
 
 
-@lru_cache(maxsize=1)
 def constants() -> dict[str, list[Any]]:
     """Variables of the declarations without a case: defaults, regions, the solvers' constants."""
-    return parse(INCLUDE)
+    variables: dict[str, list[Any]] = without_case()["variables"]
+    return variables
 
 
 @lru_cache(maxsize=1)
@@ -206,32 +208,44 @@ def sources() -> str:
 @lru_cache(maxsize=1)
 def declared() -> dict[str, Parameter]:
     """All declared parameters by name."""
-    stored = cached("declarations", sources(), lambda: [asdict(p) for p in declarations()])
+    stored = without_case()["parameters"]
     parameters = (Parameter(**one | {"choices": tuple(one["choices"])}) for one in stored)
     return {parameter.name: parameter for parameter in parameters}
 
 
+@lru_cache(maxsize=1)
+def without_case() -> dict[str, Any]:
+    """What Gmsh's parser makes of the declarations without a case: variables and parameters."""
+
+    def parsed() -> dict[str, Any]:
+        variables = parse_by_gmsh(INCLUDE)
+        return {"variables": variables, "parameters": [asdict(p) for p in declarations()]}
+
+    return dict(cached("declarations", sources(), parsed))
+
+
 def declarations() -> list[Parameter]:
-    """All declared parameters, by Gmsh's parser without a case."""
+    """All declared parameters, after Gmsh has parsed the declarations without a case."""
     text = re.sub(r"//[^\n]*", "", DECLARATIONS.read_text())
-    parse_by_gmsh(INCLUDE)
-    gmsh, result = start_gmsh(), []
+    gmsh, result, defaults = start_gmsh(), [], dict[str, str]()
+    for name, default in DEFAULT.findall(text):
+        defaults.setdefault(name, default)
     for name, rest in DECLARED.findall(text):
         label = matched(r'Name\s+"([^"]+)"', rest)
-        result.append(declaration(name, rest, text, label, json.loads(gmsh.onelab.get(label))))
+        entry = json.loads(gmsh.onelab.get(label))
+        result.append(declaration(name, rest, defaults[name], label, entry))
     return result
 
 
-def declaration(name: str, rest: str, text: str, label: str, entry: dict[str, Any]) -> Parameter:
-    """A parameter from the rest of its declaration, the text of all declarations, its label and its
-    entry in the ONELAB database.
+def declaration(name: str, rest: str, default: str, label: str, entry: dict[str, Any]) -> Parameter:
+    """A parameter from the rest of its declaration, its default, its label and its entry in the
+    ONELAB database.
     """
     group, description, unit = re.findall(LABEL, label)[0]
     # Min is -1 for a parameter that may be -1
     otherwise = entry.get("attributes", {}).get("Otherwise")
     low = {None: entry.get("min", -ANY), "> 0": TINY, ">= 0": 0.0}[otherwise]
     high = entry.get("max", ANY)
-    default = matched(rf"default_{name} = ([^,\]]*?)\s*[,\]]", text)
     return Parameter(
         name=name,
         label=label,
