@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import dataclasses
 import io
 import os
@@ -92,8 +93,28 @@ def levels(name: str, text: str) -> tuple[float, ...]:
     return levels_of(name, text)
 
 
+class Help(argparse.HelpFormatter):
+    """Help as wide as the terminal. (argparse loads shutil for it, and that what compresses.)"""
+
+    def __init__(self, prog: str) -> None:
+        super().__init__(prog, width=terminal_width() - 2)
+
+
+def terminal_width() -> int:
+    """Number of columns: $COLUMNS, else of the terminal, else 80."""
+    with contextlib.suppress(KeyError, ValueError):
+        if int(os.environ["COLUMNS"]) > 0:
+            return int(os.environ["COLUMNS"])
+    with contextlib.suppress(OSError, ValueError, AttributeError):
+        return os.get_terminal_size(sys.__stdout__.fileno()).columns or 80
+    return 80
+
+
 class Parser(argparse.ArgumentParser):
     """Parser of arguments that raises InputError."""
+
+    def __init__(self, **options: object) -> None:
+        super().__init__(formatter_class=Help, **options)
 
     def error(self, message: str) -> None:
         """Raise InputError instead of printing the usage."""

@@ -55,11 +55,11 @@ def run(
     Returns the results in the order of case.scenes(). A run that stops early or is interrupted
     writes its converged steps. Raises InputError, RunError.
     """
-    versions.git_status()  # on another core meanwhile
     chosen = engine_of(case, engine)
     outcomes = list[Outcome]()
     with folders.claim_output_folder(case, out):  # after the checks: bad input removes nothing
         try:
+            versions.git_status()  # runs on another core meanwhile
             with RunProgress(case, progress) as shown:
                 for outcome in accuracy.solve(case, chosen, shown.step, fields or picture):
                     save(outcome, case, out)
@@ -71,6 +71,8 @@ def run(
                 state = "failed" if isinstance(error, Exception) else "interrupted"
                 folders.write_state(case, out, state, str(error) or "no step had converged")
             raise
+        finally:
+            versions.commit()
         if fields or picture:
             write_fields_and_pictures(outcomes, case, out, fields, picture, drawing)
     return [outcome.result for outcome in outcomes]

@@ -38,12 +38,11 @@ def frames(normals: Array) -> Array:
     return np.stack([normals, along, np.cross(along, normals)], axis=1)
 
 
-def jumps(matrix: CsrMatrix, unknowns: Array, dim: int) -> Array:
-    """delta_n, delta_t1, delta_t2 (q, 3) by a matrix of dim rows per point."""
-    components = (matrix @ unknowns).reshape(-1, dim)
-    result = np.zeros((len(components), 3))
-    result[:, :dim] = components
-    return result
+def jumps_from(matrix: CsrMatrix, unknowns: Array, dim: int) -> Array:
+    """delta_n, delta_t1, delta_t2 (q, 3) by a matrix of dim rows for each point."""
+    jumps = np.zeros((matrix.shape[0] // dim, 3))
+    jumps[:, :dim] = (matrix @ unknowns).reshape(-1, dim)
+    return jumps
 
 
 class JointInterface:
@@ -109,7 +108,7 @@ class JointInterface:
 
     def jumps(self, matrix: CsrMatrix, unknowns: Array) -> Array:
         """delta_n, delta_t1, delta_t2 (q, 3) by at_points or at_nodes."""
-        return jumps(matrix, unknowns, self.dim)
+        return jumps_from(matrix, unknowns, self.dim)
 
     def extrapolate(self, values: Array) -> Array:
         """Values (corners, n) at the corner nodes from values (q, n) at the Gauss points: a linear
@@ -218,7 +217,7 @@ class Interface:
 
     def jumps(self, matrix: CsrMatrix, unknowns: Array) -> Array:
         """delta_n, delta_t1, delta_t2 (q, 3) by at_points or at_nodes."""
-        return jumps(matrix, unknowns, self.dim)
+        return jumps_from(matrix, unknowns, self.dim)
 
     def forces(self, traction: Array) -> Array:
         """Nodal forces (j,) of a traction (q, 3) at the Gauss points."""

@@ -41,6 +41,8 @@ TOKEN = re.compile(
     re.X | re.S,
 )
 
+#: A number that needs no arithmetic.
+PLAIN = re.compile(r"(0|[1-9]\d{,9})(\.\d{,9})?([eE][+-]?\d\d?)?")
 
 #: A token: its kind (a group of TOKEN) and its text.
 Token: TypeAlias = tuple[str, str]
@@ -224,6 +226,8 @@ def value_in(item: Item, known: Parameter, case: CaseText, where: str) -> Value:
 
 def evaluate(tokens: tuple[str, ...], case: CaseText, where: str) -> float:
     """The value of an arithmetic expression."""
+    if len(tokens) == 1 and PLAIN.fullmatch(tokens[0]):
+        return float(tokens[0])
     known = {f"default_{n}": v for n, v in case.defaults.items() if isinstance(v, float)}
     try:
         return arithmetic_value(" ".join(tokens), known)

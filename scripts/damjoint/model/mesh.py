@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -14,6 +15,7 @@ import numpy as np
 
 from .. import InputError, RunError, data
 from ..arrays import Array, BoolArray, IntArray, Setting
+from ..classes import dataclass
 from ..storage import check_end
 from .body import Body as Body
 from .case import Case, OfJoint, has_drains
@@ -214,7 +216,7 @@ def heel_normal(joint: Body, heel: Body) -> Array:
     return normal
 
 
-@dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True)
 class OwnGeometry:
     """The file of a user's own geometry in its present state, and all else its mesh depends on."""
 
