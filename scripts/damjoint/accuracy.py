@@ -21,7 +21,6 @@ from . import RunError
 from .classes import dataclass
 from .engines import OnStep, Outcome
 from .model.case import Case, has_plane_fields
-from .model.fields import along
 from .model.results import Results
 from .statics.verdict import stiffness_ratio
 
@@ -286,6 +285,8 @@ def common_times(results: list[Results]) -> list[float]:
 def quantities_at(result: Results, times: list[float]) -> dict[str, list[float]]:
     """QUANTITIES at requested times; the level also at the end of the run."""
     from scipy.integrate import trapezoid  # half of a run's start
+
+    from .model.fields import along
 
     states = [result.state(t) for t in times]
     means = [along(result.at(t)) for t in times]

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 from . import accuracy, versions
 from .engines import Outcome, engine_of
 from .model.case import Case
-from .model.fields import Solution
 from .model.results import Results
 from .post import folder as folders
 from .post import tables
@@ -128,6 +127,8 @@ def write_fields_and_pictures(
     drawing: DrawingProcess | None = None,
 ) -> None:
     """Write fields and pictures of the scenes of a case; add the seconds to run.json."""
+    from .model.fields import Solution
+
     for outcome in outcomes:
         with added_seconds(outcome.result):
             folder = folders.scene_folder(case, outcome.result.case, out)

@@ -10,13 +10,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from importlib import import_module
 from types import ModuleType
+from typing import TYPE_CHECKING
 
 from .. import InputError
 from ..classes import dataclass
 from ..model.case import Case
-from ..model.fields import Field
 from ..model.mesh import Mesh
 from ..model.results import Results
+
+if TYPE_CHECKING:
+    from ..model.fields import Field
 
 ENGINES = ("auto", "condensed", "getdp")
 

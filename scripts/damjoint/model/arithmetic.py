@@ -26,7 +26,7 @@ UNARY: dict[type[ast.unaryop], Callable[[float], float]] = {
 
 PI = {"Pi": math.pi}
 #: Numbers and powers in Python only: 1_000, 0x10, 2**3.
-PYTHON_ONLY = re.compile(r"\b\d+[_xXoObB]|\*\*")
+PYTHON_ONLY = r"\b\d+[_xXoObB]|\*\*"
 
 
 class UnknownName(ValueError):
@@ -87,7 +87,7 @@ def parsed(text: str) -> ast.expr:
 
     Raises ValueError.
     """
-    if PYTHON_ONLY.search(text) or not text.isascii():
+    if re.search(PYTHON_ONLY, text) or not text.isascii():
         raise ValueError(text)
     try:
         with warnings.catch_warnings():

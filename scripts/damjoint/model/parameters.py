@@ -152,14 +152,14 @@ def parse(text: str) -> dict[str, list[Any]]:
 
 
 #: A line that includes a file.
-INCLUDED = re.compile(r'^Include "(.*)";$', re.M)
+INCLUDED = r'(?m)^Include "(.*)";$'
 
 
 def complete(text: str, folder: Path) -> str:
     """A text with the files that it includes, of absolute paths or relative to a folder, in place
     of the lines that include them: Gmsh does not close such files.
     """
-    return INCLUDED.sub(lambda found: complete((folder / found[1]).read_text(), folder), text)
+    return re.sub(INCLUDED, lambda found: complete((folder / found[1]).read_text(), folder), text)
 
 
 def parse_by_gmsh(text: str) -> dict[str, list[Any]]:
@@ -185,11 +185,11 @@ def parse_by_gmsh(text: str) -> dict[str, list[Any]]:
 
 
 #: A declaration of pro/parameters.pro: name, and everything up to its closing brace.
-DECLARED = re.compile(r"(\w+) = \{(?:Str\[)?default_\1\b((?:[^{}\"]|\"[^\"]*\"|\{[^{}]*\})*)\}")
+DECLARED = r"(\w+) = \{(?:Str\[)?default_\1\b((?:[^{}\"]|\"[^\"]*\"|\{[^{}]*\})*)\}"
 #: The default of a declaration.
-DEFAULT = re.compile(r"\bdefault_(\w+) = ([^,\]]*?)\s*[,\]]")
+DEFAULT = r"\bdefault_(\w+) = ([^,\]]*?)\s*[,\]]"
 #: A label: group and description without the digits that order the ONELAB tree, unit.
-LABEL = re.compile(r"^Parameters/\d*([^/]+)/\d*([^/]*?)(?: \[(.*)\])?$")
+LABEL = r"^Parameters/\d*([^/]+)/\d*([^/]*?)(?: \[(.*)\])?$"
 
 
 def constants() -> dict[str, list[Any]]:
@@ -228,9 +228,9 @@ def declarations() -> list[Parameter]:
     """All declared parameters, after Gmsh has parsed the declarations without a case."""
     text = re.sub(r"//[^\n]*", "", DECLARATIONS.read_text())
     gmsh, result, defaults = start_gmsh(), [], dict[str, str]()
-    for name, default in DEFAULT.findall(text):
+    for name, default in re.findall(DEFAULT, text):
         defaults.setdefault(name, default)
-    for name, rest in DECLARED.findall(text):
+    for name, rest in re.findall(DECLARED, text):
         label = matched(r'Name\s+"([^"]+)"', rest)
         entry = json.loads(gmsh.onelab.get(label))
         result.append(declaration(name, rest, defaults[name], label, entry))
@@ -276,7 +276,7 @@ def independent() -> frozenset[str]:
     occur only in their own declaration.
     """
     texts = (DECLARATIONS, DECLARATIONS.with_name("section.pro"))
-    rest = "".join(DECLARED.sub("", re.sub(r"//[^\n]*", "", t.read_text())) for t in texts)
+    rest = "".join(re.sub(DECLARED, "", re.sub(r"//[^\n]*", "", t.read_text())) for t in texts)
     used = set(re.findall(r"\w+", rest))
     return frozenset(n for n, p in declared().items() if n not in used and not p.text)
 

@@ -25,7 +25,7 @@ from ..storage import PART, atomic_write, locked_folder
 TABLES = ("joint.csv", "history.csv", "curve.csv", "gravity.csv", "critical.csv", "run.json")
 TABLES += ("quake.csv", "quake_joint.csv", "quake_stress.npz", "quake_state.npz")
 PICTURES = ("", "_curve", "_check", "_critical", "_quake")
-FIELDS = re.compile(r"(bulk|joint)(_t[\w.+-]+\.vtu|\.msh)|fields\.pvd")
+FIELDS = r"(bulk|joint)(_t[\w.+-]+\.vtu|\.msh)|fields\.pvd"
 
 
 def check_writable(folder: Path) -> None:
@@ -107,7 +107,7 @@ def clear(folder: Path) -> None:
     fields = folder / "fields"
     if fields.is_dir() and not fields.is_symlink():
         for file in fields.iterdir():
-            if FIELDS.fullmatch(file.name.removeprefix(PART)):
+            if re.fullmatch(FIELDS, file.name.removeprefix(PART)):
                 file.unlink()
         remove_if_empty(fields)
 

@@ -12,7 +12,6 @@ from ...fem.condensed import Condensed
 from ...fem.memory import joint_size
 from ...joint.interface import Interface
 from ...model.case import Case
-from ...model.fields import Field
 from ...model.mesh import mesh_of
 from ...solver.load_stepper import LoadStepper
 from ...threads import limited_threads
@@ -20,6 +19,7 @@ from .. import OnStep, Outcome
 
 if TYPE_CHECKING:  # takes as long to load as a whole 2D run
     from ...fem.bodies import Bodies
+    from ...model.fields import Field
 
 #: Number of jump unknowns from which on several threads of the linear algebra are faster than one.
 THREADED_UNKNOWNS = 2000
