@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from functools import cached_property
 
 import numpy as np
+from damjoint.model.case import Case
 from damjoint.statics import gravity
 
 from .verification import (
@@ -56,6 +57,13 @@ class QuakeFiles(RunFiles):
         return self.tables("quake_joint.csv")[1:]
 
     @property
+    def residual_slip(self) -> float:
+        """Mean slip over the last part of the rest [m]."""
+        rows = self.history
+        last = rows["time"] > rows["time"][-1] - MEAN_OVER * (1 - DIGITS_TOLERANCE)
+        return float(rows["slip_mean"][last].mean())
+
+    @property
     def water(self) -> tuple[float, float]:
         """Reservoir and tailwater during the earthquake."""
         return self.case.levels[-1], self.case.tail_levels[-1]
@@ -85,7 +93,7 @@ def quake_violations(run: QuakeFiles) -> list[str]:
     """Return the rules that the files of an earthquake violate, in words."""
     found = list(bookkeeping(run)) + list(motion(run))
     water = uplift_in_closed_parts if run.whole["quake_uplift"] == "zero" else uplift
-    rules = (momentum, after, summary, water, heads, contact, strength, irreversibility)
+    rules = (start, momentum, after, summary, water, heads, contact, strength, irreversibility)
     for joint in run.joints:
         prefix = f"{joint.name}: " if joint.name else ""
         found += [prefix + violation for rule in rules for violation in rule(joint)]
@@ -97,9 +105,12 @@ def bookkeeping(run: QuakeFiles) -> Iterator[str]:
     record, case, rows = run.record, run.whole, run.history
     if record["parameters"] != case.values:
         yield "run.json: parameters differ from those of the case"
-    reserve = "shear_reserve" * (case["law"] == "rupture")  # of no limit
-    if not all(np.isfinite(rows[name]).all() for name in rows if not (reserve and reserve in name)):
+    reserve = "shear_reserve"  # inf with a law that does not limit the shear
+    if not all(np.isfinite(rows[name]).all() for name in rows if reserve not in name):
         yield "quake.csv: a value is not finite"
+    for joint in run.joints:
+        if np.isinf(joint.history[reserve]).all() != (joint.case["law"] == "rupture"):
+            yield f"quake.csv: {reserve} of law = {joint.case['law']}"
     steps = np.diff(rows["time"], prepend=0.0)
     if (np.abs(steps - rows["dt"]) > DIGITS_TOLERANCE * rows["dt"].max()).any():
         yield "quake.csv: the times are not the sums of the steps"
@@ -127,50 +138,99 @@ def ground_motion(run: QuakeFiles, times: np.ndarray) -> tuple[np.ndarray, float
     table = np.array([line.split(",") for line in lines if line[:1].isdigit()], float)
     scale = case["record_scale"] * (STANDARD_GRAVITY if case["record_unit"] == "g" else 1.0)
     axes = {"horizontal": {0}, "vertical": {1}, "both": {0, 1}}[case["record_component"]]
-    result = np.zeros((len(times), 2))
+    result, record_times = np.zeros((len(times), 2)), table[:, 0] + travel_time(case, table[:, 0])
     for axis in axes & set(range(table.shape[1] - 1)):
-        result[:, axis] = scale * np.interp(times, table[:, 0], table[:, axis + 1], right=0.0)
-    return result, float(table[-1, 0] + case["record_rest"])
+        result[:, axis] = scale * np.interp(times, record_times, table[:, axis + 1], right=0.0)
+    return result, float(record_times[-1] + case["record_rest"])
+
+
+def travel_time(case: Case, times: np.ndarray) -> float:
+    """Return the time [s] that a shear wave needs through rock with mass, in whole intervals of the
+    record.
+    """
+    if not case["rock_mass"]:
+        return 0.0
+    speed = np.sqrt(case["E_found"] / (2 * (1 + case["nu_found"]) * case["rho_found"]))
+    interval = np.diff(times).min()
+    return float(np.ceil(case["found_depth"] / speed / interval) * interval)
+
+
+def integral(run: QuakeFiles, acceleration: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return velocity and displacement (n, ...) of accelerations (n, ...) at the rows, from rest by
+    Newmark's differences.
+    """
+    alpha = run.case["hht_alpha"]
+    beta, gamma = (1 - alpha) ** 2 / 4, 0.5 - alpha
+    velocities, displacements = np.zeros((2, *acceleration.shape))
+    u, v, a = np.zeros((3, *acceleration.shape[1:]))
+    for k, (dt, now) in enumerate(zip(run.history["dt"], acceleration, strict=True)):
+        u = u + dt * v + dt**2 * ((0.5 - beta) * a + beta * now)
+        v = v + dt * ((1 - gamma) * a + gamma * now)
+        velocities[k], displacements[k], a = v, u, now
+    return velocities, displacements
 
 
 def motion(run: QuakeFiles) -> Iterator[str]:
-    """Check that the crest's displacement is that of its acceleration, by Newmark's differences."""
-    rows, alpha = run.history, run.case["hht_alpha"]
-    beta, gamma = (1 - alpha) ** 2 / 4, 0.5 - alpha
-    acceleration = rows["crest_ax"] - rows["ground_ax"]
-    u, v, a, worst = 0.0, 0.0, 0.0, 0.0
-    for dt, now, exact in zip(rows["dt"], acceleration, rows["crest_ux"], strict=True):
-        u += dt * v + dt**2 * ((0.5 - beta) * a + beta * now)
-        v += dt * ((1 - gamma) * a + gamma * now)
-        a, worst = now, max(worst, abs(u - exact))
+    """Check that the crest's displacement is that of its acceleration, from rest."""
+    rows = run.history
+    _, displacement = integral(run, rows["crest_ax"] - rows["ground_ax"])
+    worst = np.abs(displacement - rows["crest_ux"]).max()
     if worst > MOTION_TOLERANCE * np.abs(rows["crest_ux"]).max():
         yield f"crest_ux is off by {worst:.3g} m from the integral of crest_ax"
 
 
+def start(run: QuakeFiles) -> Iterator[str]:
+    """Check that the first frame is the static state."""
+    first, still = run.tables("quake_joint.csv")[0], run.tables("joint.csv")
+    static = next(rows for rows in still if rows["time"][0] == run.case.times[-1])
+    for name in ("delta_n", "delta_t1", "sigma_n", "tau_1", "p"):
+        if np.abs(first[name] - static[name]).max() > DIGITS_TOLERANCE * np.abs(static[name]).max():
+            yield f"quake_joint.csv: {name} does not start at the static state"
+
+
+def unit_loads(run: QuakeFiles) -> np.ndarray:
+    """Return the parts of T, N and M of a unit acceleration of the ground along x and y (2, 3)."""
+    g, static = run.case["g"], run.by_hand()
+    return np.array([run.by_hand(k_h=-1 / g), run.by_hand(k_v=-1 / g)]) - static
+
+
+def mass_damping(run: QuakeFiles) -> float:
+    """Return a0 [1/s] of Rayleigh's damping a0 M + a1 K."""
+    case, frequencies = run.case, run.record["quake"]["frequencies"]
+    ends = (case["damping_f1"], frequencies[0]), (case["damping_f2"], frequencies[-1])
+    w1, w2 = (2 * np.pi * (own if given == -1 else given) for given, own in ends)
+    return float(case["damping_mass"] * 2 * case["damping"] * w1 * w2 / (w1 + w2))
+
+
 def momentum(run: QuakeFiles) -> Iterator[str]:
     """Check T, N + U and, if the water does not change, M at every step: (1 + alpha) F1 - alpha F0
-    = static load + inertia, in which the ground's acceleration is weighted, too. No part of the
-    damping by the stiffness is left in these sums.
+    = static load + inertia + damping by the mass, in which the ground's acceleration and the
+    damping are weighted, too. No part of the damping by the stiffness is left in these sums.
+
+    Dashpots are not in the tables: with them the equations of all unknowns are verified instead.
     """
-    rows, g, alpha = run.history, run.case["g"], run.case["hht_alpha"]
-    static = run.by_hand()
-    # the load of a unit acceleration of the ground along x and y (2, 3)
-    unit = np.array([run.by_hand(k_h=-1 / g), run.by_hand(k_v=-1 / g)]) - static
-    ground = np.column_stack([rows["ground_ax"], rows["ground_ay"]])
-    change = np.diff(ground, axis=0, prepend=np.zeros((1, 2))) @ unit
+    rows, case = run.history, run.case
+    if case["joint_damping_n"] or case["joint_damping_t"]:
+        return
+    alpha = case["hht_alpha"] if case["time_integration"] == "HHT" else 0.0
+    weighted = lambda values, before: (
+        (1 + alpha) * values - alpha * np.vstack([before, values[:-1]])
+    )
+    ground = np.column_stack([rows["ground_ax"], rows["ground_ay"]]) @ unit_loads(run)
+    inertia = np.column_stack([rows[f"{name}_inertia"] for name in "TNM"])
+    static, none = run.by_hand(), np.zeros(3)
+    static[2] = run.static_row()["M"]  # less the moment of the water
+    forces = np.column_stack([rows["T"], rows["N"] + rows["U"], rows["M"]])
+    velocity, _ = integral(run, inertia - ground)
+    expected = static + inertia + weighted(ground, none) - ground
+    expected += mass_damping(run) * weighted(velocity, none)
+    error = np.abs(weighted(forces, static) - expected)
     constant = np.ptp(rows["U"]) <= DIGITS_TOLERANCE * run.weight
-    still = run.static_row()
     for k, name in enumerate(["T", "N", "M"] if constant else ["T", "N"]):
-        force = rows[name] + (rows["U"] if name == "N" else 0.0)
-        before = still["M"] if name == "M" else static[k]
-        expected = before + rows[f"{name}_inertia"] + alpha * change[:, k]
-        weighted = (1 + alpha) * force - alpha * np.concatenate([[before], force[:-1]])
-        error = np.abs(weighted - expected)
-        room = MOMENTUM_TOLERANCE * run.weight * (run.length if name == "M" else 1.0)
-        if error.max() > room:
-            time = rows["time"][error.argmax()]
-            share = MOMENTUM_TOLERANCE * error.max() / room
-            yield f"momentum: {name} is off by {share:.3g} of the weight at t = {time:g} s"
+        share = error[:, k] / (run.weight * (run.length if name == "M" else 1.0))
+        if share.max() > MOMENTUM_TOLERANCE:
+            time = rows["time"][share.argmax()]
+            yield f"momentum: {name} is off by {share.max():.3g} of the weight at t = {time:g} s"
 
 
 def uplift_in_closed_parts(run: QuakeFiles) -> Iterator[str]:
@@ -220,8 +280,7 @@ def summary(run: QuakeFiles) -> Iterator[str]:
     """Check peaks and residual slip of run.json against the rows."""
     found, rows = run.record["quake"], run.history
     suffix = f"_{run.number + 1}" if run.number else ""
-    last = rows["time"] > rows["time"][-1] - MEAN_OVER * (1 - DIGITS_TOLERANCE)
-    slip, largest = rows["slip_mean"][last].mean(), np.abs(rows["slip_mean"]).max()
+    slip, largest = run.residual_slip, np.abs(rows["slip_mean"]).max()
     room = DIGITS_TOLERANCE * max(largest, 1e-9)
     if abs(found["residual"][f"slip{suffix}"] - slip) > room:
         yield "run.json: the residual slip is not the mean of the last rows"

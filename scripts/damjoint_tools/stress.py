@@ -6,6 +6,7 @@ The verification is independent of the engines and of laws/: see verification.py
 from __future__ import annotations
 
 import csv
+import itertools
 import os
 import subprocess
 import sys
@@ -13,27 +14,26 @@ import tempfile
 import time
 from collections.abc import Iterator
 from concurrent.futures import as_completed
-from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-import numpy as np
-from damjoint import InputError
-from damjoint.arrays import Setting
-from damjoint.model.case import Case, has_drains, load
-from damjoint.model.parameters import declared
+from damjoint import InputError, RunError
 from damjoint.progress import track
 from damjoint.storage import lock
 from damjoint.studies.sweep import pool_of, read_done
 
 from .provenance import RECORDED, provenance
+from .quake_comparison import MEASURES, further_checks
 from .quake_verification import QuakeFiles, judge_quake, quake_violations
+from .random_quakes import RandomQuake, random_quake
+from .random_scenes import RandomScene, as_text, random_scene
 from .verification import RunFiles, judge_stop, violations
 
 #: Columns of the result file.
 COLUMNS = (
     *("scene", "class", "findings", "dim", "joints", "law", "uplift", "drive", "verdict", "level"),
     "highest_level",
-    *("steps", "iterations", "cuts", "seconds", "command"),
+    *("steps", "iterations", "cuts", "seconds", "command", "kind"),
+    *MEASURES,
     *RECORDED,
 )
 #: Outcomes of the verification.
@@ -44,377 +44,13 @@ CLASSES = VERIFIED, JUSTIFIED, UNDECIDED, DEFECT = (
 #: Time limit of a scene [s].
 TIME_LIMIT = 300
 
-#: Third number of the seed of the lift joints and of earthquakes, which are drawn apart.
-LIFT_DRAWS, QUAKE_DRAWS = 1, 2
-#: Parameters that are drawn for each joint, but for the place of its drains.
-OF_JOINTS = (
-    *("law", "K_N", "K_T", "sigma_max", "adhesion", "mu", "pena_rupture", "alpha", "pena_tang"),
-    *("G_f", "G_t", "joint_slope", "uplift", "aperture_min", "drains"),
-)
-#: Height of the highest lift over the dam's.
-HIGHEST_LIFT = 0.85
-
 #: One thread for each command, as several run at the same time.
 ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL")}
 
 
-@dataclass(frozen=True)
-class RandomScene:
-    """Random dam: parameters that differ from the default dam's, and levels as in the command."""
-
-    settings: dict[str, Setting]
-    levels: str
-    tail_levels: str
-    steps: int
-
-    @property
-    def words(self) -> list[str]:
-        """Arguments of the command `damjoint`."""
-        changed = [
-            word
-            for name, value in self.settings.items()
-            for word in ("--set", f"{name}={as_text(value)}")
-        ]
-        water = ["--levels", self.levels, "--tail-levels", self.tail_levels]
-        return ["run", "dam", *changed, *water, "--steps", str(self.steps)]
-
-    @property
-    def case(self) -> Case:
-        """The case as the command loads it."""
-        return load("dam", self.settings, self.levels, self.tail_levels, self.steps)
-
-
-@dataclass(frozen=True)
-class RandomQuake(RandomScene):
-    """Random dam with a random record, that is written into a file of the scene's name."""
-
-    #: rows of time [s], horizontal and vertical acceleration [m/s2]
-    record: np.ndarray = field(compare=False)
-    file: Path
-
-    @property
-    def words(self) -> list[str]:
-        """Arguments of the command `damjoint`."""
-        return ["quake", *super().words[1:], "--record", str(self.file)]
-
-    @property
-    def case(self) -> Case:
-        """The case as the command loads it; writes the record."""
-        self.file.parent.mkdir(exist_ok=True)
-        np.savetxt(self.file, self.record, "%.6g", ",")
-        return replace(super().case, record=self.file)
-
-
-def as_text(value: Setting) -> str:
-    """Format a setting as in the command: a value, or those of all joints."""
-    return ",".join(map(str, value)) if isinstance(value, tuple) else str(value)
-
-
-class RandomNumbers:
-    """Random numbers, rounded to three digits to keep the commands readable."""
-
-    def __init__(self, *seed: int) -> None:
-        self.generator = np.random.default_rng(seed)
-
-    def uniform(self, low: float, high: float) -> float:
-        """Draw a number, uniformly distributed."""
-        return float(f"{self.generator.uniform(low, high):.3g}")
-
-    def log_uniform(self, low: float, high: float) -> float:
-        """Draw a number whose logarithm is uniformly distributed."""
-        return float(f"{np.exp(self.generator.uniform(np.log(low), np.log(high))):.3g}")
-
-    def choice(self, *choices: float | str) -> float | str:
-        """Draw one of the choices with equal probability."""
-        return choices[self.generator.integers(len(choices))]
-
-    def event(self, probability: float) -> bool:
-        """Draw whether an event of this probability happens."""
-        return bool(self.generator.random() < probability)
-
-
-def random_scene(seed: int, number: int) -> RandomScene:
-    """Draw scene `number` of a seed: a dam with one to four joints."""
-    scene, rng = single_joint_scene(seed, number), RandomNumbers(seed, number, LIFT_DRAWS)
-    return with_lifts(scene, rng) if rng.event(0.4) else scene
-
-
-def single_joint_scene(seed: int, number: int) -> RandomScene:
-    """Draw a dam with one joint: any law, uplift, section and loads, stiffnesses over orders of
-    magnitude, rising and falling levels. New draws are appended, so that old seeds stay
-    reproducible.
-    """
-    rng = RandomNumbers(seed, number)
-    height, plain = rng.log_uniform(5, 150), rng.event(0.5)
-    solid = rng.event(0.1)
-    settings = mesh(rng, height, solid, plain) | section(rng, height, plain) | joint(rng)
-    settings |= loads(rng, height) if not plain else {}
-    settings["uplift"] = rng.choice("none", "imposed", "drained", "cracked", "flow")
-    if settings["uplift"] == "flow":
-        settings["aperture_min"] = rng.log_uniform(1e-8, 1e-4)
-    if settings["uplift"] == "cracked":
-        settings["drains"] = rng.choice(0, 1)
-    settings["weight_first"] = rng.choice(0, 1)
-    number_of_levels = int(rng.choice(1, 2, 3))
-    levels = [rng.uniform(0.3 * height, 1.2 * height) for _ in range(number_of_levels)]
-    levels = levels if rng.event(0.3) else sorted(levels)
-    tail = rng.uniform(0, 0.3 * height) if rng.event(0.4) else 0.0
-    if rng.event(0.15):
-        settings["drive"] = rng.choice("heel", "crest")
-        settings["drive_by"] = rng.log_uniform(1e-6, 1e-3) * height / 10
-    steps, tails = int(rng.choice(1, 1, 2, 4)), [tail]
-    # draws added later
-    settings |= drains(rng, settings)
-    if not plain and "joint_height" in settings and rng.event(0.5):
-        settings["joint_slope"] = rng.uniform(-5, 5)
-    if not plain and rng.event(0.15):
-        # up to 3 % of the thrust
-        settings["force_x"] = rng.log_uniform(5 * height**2, 150 * height**2)
-    if tail and rng.event(0.3):
-        tails = [rng.uniform(0, 0.3 * height) for _ in levels]
-    if not solid and rng.event(0.1):
-        settings, tails = slender_dam(rng, height), [0.0]
-        levels = sorted(rng.uniform(0.6 * height, height) for _ in levels)
-    water = (",".join(f"{level:g}" for level in heights) for heights in (levels, tails))
-    return RandomScene(settings, *water, steps)
-
-
-def with_lifts(scene: RandomScene, rng: RandomNumbers) -> RandomScene:
-    """Add one to three lift joints to a scene, each with its own law, strengths, slope, uplift and
-    drains.
-    """
-    case, count = scene.case, int(rng.choice(1, 2, 3))
-    height, settings = case["dam_height"], dict(scene.settings)
-    if settings.get("mesh_pattern") == "regular":
-        settings["mesh_pattern"] = "free"
-    lowest = max(case.section["heel_y"][0], case.section["toe_y"][0])
-    spacing = (HIGHEST_LIFT * height - lowest) / count
-    settings["lift_heights"] = tuple(
-        float(f"{lowest + (k + rng.uniform(0.6, 1)) * spacing:.4g}") for k in range(count)
-    )
-    # each end of a lift moves by less than the distance of two lifts, at least 0.6 of their spacing
-    steepest = np.degrees(np.arctan(0.25 * spacing / case.joint_length))
-    drawn = [
-        joint(rng)
-        | {
-            "joint_slope": rng.uniform(-steepest, steepest) if rng.event(0.4) else 0.0,
-            "uplift": rng.choice("none", "imposed", "drained", "cracked", "flow"),
-            "aperture_min": rng.log_uniform(1e-8, 1e-4),
-            "drains": rng.choice(0, 1),
-        }
-        for _ in range(count)
-    ]
-    drawn = [{n: v for n, v in settings.items() if n in OF_JOINTS}, *drawn]
-    names = [n for n in OF_JOINTS if any(n in own for own in drawn)]
-    default = {name: declared()[name].default for name in names}
-    settings |= {n: tuple(own.get(n, default[n]) for own in drawn) for n in names}
-    dry = replace(scene, settings=settings | {"uplift": "none"}).case
-    lengths = [joint.joint_length for joint in dry.joints]
-    settings["drain_x"] = tuple(rng.uniform(0.05 * length, 0.4 * length) for length in lengths)
-    return replace(scene, settings=settings)
-
-
-def random_quake(seed: int, number: int, folder: Path) -> RandomQuake:
-    """Draw earthquake `number` of a seed, with its record in a folder: a dam that stands before it,
-    of any law, uplift and damping, with one to three joints.
-    """
-    rng = RandomNumbers(seed, number, QUAKE_DRAWS)
-    height, solid = rng.log_uniform(8, 120), rng.event(0.1)
-    base = rng.uniform(0.75 * height, 1.0 * height)
-    settings = mesh(rng, height, solid, plain=False) | {
-        "n_joint": 10.0 if solid else rng.choice(10, 20),
-        "dam_base": base,
-        "dam_crest": rng.uniform(0.08 * base, 0.2 * base),
-        "E": rng.log_uniform(5e9, 1e11),
-        "nu": rng.uniform(0, 0.35),
-        "found_side": height,
-        "found_depth": height,
-    }
-    settings["h_dam"], settings["h_found"] = height / 4, height / 2
-    drawn = joint(rng)
-    while not 1e9 <= drawn["K_N"] <= 1e13:
-        drawn = joint(rng)
-    settings |= drawn | {"mu": rng.uniform(0.75, 1.2)}
-    if rng.event(0.6):  # weak: most of these slide or rock
-        for name, largest in (("sigma_max", 3e4), ("adhesion", 2e4)):
-            settings[name] = min(settings[name], rng.log_uniform(1e3, largest))
-    if not solid and rng.event(0.3):
-        settings["batter"] = rng.uniform(0.02 * base, 0.1 * base)
-        settings["batter_height"] = rng.uniform(0.3 * height, 0.9 * height)
-    if not solid and rng.event(0.2):
-        settings["joint_slope"] = rng.uniform(-3, 5)
-    settings["uplift"] = rng.choice("none", "imposed", "drained", "cracked", "flow")
-    settings |= {
-        "quake_uplift": rng.choice("crack", "unchanged", "zero"),
-        "added_mass": rng.choice(0, 1, 2),
-        "damping": rng.uniform(0.01, 0.1),
-        "hht_alpha": rng.choice(-0.05, -0.05, 0, -0.2),
-        "record_unit": rng.choice("m/s2", "g"),
-        "record_component": rng.choice("both", "both", "horizontal"),
-        "record_rest": rng.uniform(0.3, 1.2),
-    }
-    settings["record_scale"] = rng.choice(-1, 1) / (
-        9.80665 if settings["record_unit"] == "g" else 1
-    )
-    level = f"{rng.uniform(0.3 * height, 0.85 * height):g}"
-    record, file = random_record(rng), folder / f"{seed}-{number}.csv"
-    scene = RandomQuake(settings, level, "0", 1, record, file)
-    if not solid and rng.event(0.3):
-        count = int(rng.choice(1, 2))
-        heights = tuple(float(f"{height * (k + 1) / (count + 1.5):.4g}") for k in range(count))
-        return replace(scene, settings=settings | {"lift_heights": heights})
-    return scene
-
-
-def random_record(rng: RandomNumbers) -> np.ndarray:
-    """Draw a record: three waves that begin and end smoothly, up to 1 g, the vertical component
-    smaller.
-    """
-    times = np.arange(0, rng.uniform(0.8, 1.6), 0.01)
-    window = np.sin(np.pi * times / times[-1]) ** 2
-    waves = [
-        sum(
-            rng.uniform(0.2, 1)
-            * np.sin(2 * np.pi * (rng.log_uniform(1, 9) * times + rng.uniform(0, 1)))
-            for _ in range(3)
-        )
-        for _ in range(2)
-    ]
-    peak = rng.log_uniform(1.5, 10)
-    along, up = (peak * window * wave / np.abs(wave).max() for wave in waves)
-    return np.column_stack([times, along, 0.6 * up])
-
-
-def slender_dam(rng: RandomNumbers, height: float) -> dict[str, float | str]:
-    """Draw a slender dam of realistic stiffness on a joint that loses its shear stiffness on
-    opening: under uplift its crack grows unstably.
-    """
-    base = rng.uniform(0.68, 0.78) * height
-    return {
-        "dam_height": height,
-        "dam_base": base,
-        "dam_crest": rng.uniform(0.05 * base, 0.2 * base),
-        "n_joint": rng.choice(20, 40, 80),
-        "E": rng.log_uniform(1e10, 4e10),
-        "found_side": height,
-        "found_depth": height,
-        "law": "rupture",
-        "K_N": rng.log_uniform(1e11, 1e13),
-        "K_T": rng.log_uniform(1e11, 1e13),
-        "sigma_max": rng.choice(0, rng.log_uniform(1e2, 1e5)),
-        "alpha": rng.choice(0, 0.5, 1, 1.5),
-        "uplift": rng.choice("imposed", "cracked", "flow"),
-        "weight_first": 1,
-    }
-
-
-def mesh(rng: RandomNumbers, height: float, solid: bool, plain: bool) -> dict[str, float | str]:
-    """Draw dimension and mesh; coarse, as equilibrium holds on any mesh."""
-    settings = {"dam_height": height, "order": rng.choice(1, 2), "n_joint": rng.choice(10, 20, 40)}
-    if not solid:
-        settings["mesh_pattern"] = rng.choice("free", "regular") if plain else "free"
-        return settings
-    return settings | {
-        "dim": 3,
-        "n_joint": 10,
-        "mesh_pattern": rng.choice("free", "layers", "split"),
-        "thickness": rng.uniform(0.1 * height, 0.3 * height),
-        "hold_z": rng.choice(0, 1),
-        "n_layers": rng.choice(1, 2),
-        "h_dam": float(f"{height / 4:.3g}"),
-        "h_found": float(f"{height / 2:.3g}"),
-    }
-
-
-def section(rng: RandomNumbers, height: float, plain: bool) -> dict[str, float | str]:
-    """Draw outline and elasticity of the bodies."""
-    base = rng.uniform(0.45 * height, 1.0 * height)
-    drawn = {
-        "dam_base": base,
-        "dam_crest": rng.uniform(0.05 * base, 0.2 * base),
-        "E": rng.log_uniform(1e9, 1e13),
-        "nu": rng.uniform(0, 0.35),
-        "found_side": height,
-        "found_depth": height,
-    }
-    if plain:
-        return drawn
-    if rng.event(0.3):
-        drawn["E_found"] = rng.log_uniform(1e9, 1e13)
-    if rng.event(0.4):
-        drawn["batter"] = rng.uniform(0.02 * base, 0.2 * base)
-        drawn["batter_height"] = rng.uniform(0.3 * height, 0.9 * height)
-    if rng.event(0.3):
-        drawn["neck_height"] = rng.uniform(0.02 * height, 0.15 * height)
-    if rng.event(0.4):
-        drawn["joint_slope"] = rng.uniform(-8, 12)
-    elif rng.event(0.3):
-        drawn["joint_height"] = rng.uniform(0.1 * height, 0.5 * height)
-    return drawn
-
-
-def joint(rng: RandomNumbers) -> dict[str, float | str]:
-    """Draw law and strengths; fracture energies exceed the elastic energy at the strength."""
-    drawn = {
-        "law": rng.choice("rupture", "friction", "bond"),
-        "K_N": rng.log_uniform(1e8, 1e15),
-        "sigma_max": rng.choice(0, rng.log_uniform(1e3, 2e6)),
-        "adhesion": rng.choice(0, rng.log_uniform(1e3, 1e6)),
-        "mu": rng.uniform(0.2, 1.2),
-    }
-    drawn["K_T"] = float(f"{drawn['K_N'] * rng.log_uniform(0.1, 2):.3g}")
-    if drawn["law"] == "rupture":
-        drawn["pena_rupture"] = rng.log_uniform(0.1, 1e3)
-        drawn["alpha"] = rng.choice(0, 1, 1.5, 2)
-    if drawn["law"] == "friction":
-        drawn["pena_tang"] = rng.choice(-1, 0, float(f"{0.05 * drawn['K_T']:.3g}"))
-    if drawn["law"] == "bond":
-        pairs = ("G_f", "sigma_max", "K_N"), ("G_t", "adhesion", "K_T")
-        for energy, strength, stiffness in pairs:
-            elastic = drawn[strength] ** 2 / 2 / drawn[stiffness]
-            drawn[energy] = float(f"{rng.log_uniform(1.5, 100) * max(elastic, 1):.4g}")
-    return drawn
-
-
-def drains(rng: RandomNumbers, settings: dict[str, float | str]) -> dict[str, float | str]:
-    """Draw whether there are drains where the water flows; position, effectiveness and outlet level
-    of all drains.
-    """
-    drawn = {"drains": 1} if settings["uplift"] == "flow" and rng.event(0.4) else {}
-    if not has_drains({"drains": 0} | settings | drawn) or rng.event(0.5):
-        return drawn
-    base, height = settings["dam_base"], settings["dam_height"]
-    drawn["drain_x"] = rng.uniform(0.05 * base, 0.4 * base)
-    drawn["drain_effectiveness"] = rng.uniform(0, 1)
-    if "drive" not in settings:
-        drawn["drain_level"] = rng.uniform(0, 0.3 * height)
-    return drawn
-
-
-def loads(rng: RandomNumbers, height: float) -> dict[str, float | str]:
-    """Draw loads besides weight and water, as shares of the thrust of the water."""
-    thrust, drawn = 1000 * 9.81 * height**2 / 2, {}
-    if rng.event(0.3):
-        drawn["silt_height"] = rng.uniform(0.05 * height, 0.4 * height)
-    if rng.event(0.2):
-        drawn["ice_force"] = rng.log_uniform(0.001 * thrust, 0.03 * thrust)
-    if rng.event(0.2):
-        drawn["anchor_force"] = rng.log_uniform(0.01 * thrust, 0.2 * thrust)
-        drawn["anchor_angle"] = rng.uniform(-5, 20)
-    if rng.event(0.25):
-        drawn |= {"k_h": rng.uniform(-0.1, 0.2), "k_v": rng.uniform(-0.1, 0.1)}
-    if rng.event(0.15):
-        drawn["floor_water"] = 1
-    return drawn
-
-
 def run_and_verify(scene: RandomScene, folder: Path) -> dict[str, object]:
     """Run a scene by the command and verify its files; returns its row without the number."""
-    case, start = scene.case, time.perf_counter()
-    quake = isinstance(scene, RandomQuake)
-    words = [*scene.words, *(() if quake else ("--no-fields",)), "--no-picture"]
-    words += ["--out", str(folder / "out")]
-    environment = os.environ | ONE_THREAD | {"DAMJOINT_CACHE": str(folder / "cache")}
+    start, case = time.perf_counter(), scene.case
     row = {
         "command": " ".join(["damjoint", *scene.words]),
         "highest_level": max(case.levels),
@@ -422,6 +58,27 @@ def run_and_verify(scene: RandomScene, folder: Path) -> dict[str, object]:
         **{name: case[name] for name in ("dim", "drive")},
         **{name: as_text(scene.settings.get(name, case[name])) for name in ("law", "uplift")},
     }
+    try:
+        run = run_of(scene, folder)
+        row["seconds"] = f"{time.perf_counter() - start:.2f}"
+        row |= {"verdict": run.record["verdict"]} | verified(run)
+        if isinstance(scene, RandomQuake):
+            row |= {"kind": scene.kind} | with_further_checks(scene, run, folder, row)
+    except RunError as error:
+        row |= {"class": DEFECT, "findings": str(error)}
+        row.setdefault("seconds", f"{time.perf_counter() - start:.2f}")
+    return row
+
+
+def run_of(scene: RandomScene, folder: Path, *options: str, name: str = "out") -> RunFiles:
+    """Run a scene by the command with further options, and return its files, in folder/name.
+
+    Raises RunError if the command has written no result, or exceeds the time limit.
+    """
+    quake = isinstance(scene, RandomQuake)
+    words = [*scene.words, *(() if quake else ("--no-fields",)), "--no-picture", *options]
+    words += ["--out", str(folder / name)]
+    environment = os.environ | ONE_THREAD | {"DAMJOINT_CACHE": str(folder / "cache")}
     try:
         done = subprocess.run(
             [sys.executable, "-m", "damjoint", *words],
@@ -431,16 +88,32 @@ def run_and_verify(scene: RandomScene, folder: Path) -> dict[str, object]:
             timeout=TIME_LIMIT,
         )
     except subprocess.TimeoutExpired:
-        finding = f"not finished after {TIME_LIMIT} s"
-        return row | {"class": DEFECT, "findings": finding, "seconds": TIME_LIMIT}
-    row["seconds"] = f"{time.perf_counter() - start:.2f}"
-    run = (QuakeFiles if quake else RunFiles)(case, folder / "out", done.returncode)
+        raise RunError(f"not finished after {TIME_LIMIT} s") from None
+    run = (QuakeFiles if quake else RunFiles)(scene.case, folder / name, done.returncode)
     try:
-        row["verdict"] = run.record["verdict"]
+        _ = run.record["verdict"]
     except (OSError, KeyError):
         last = (done.stderr.strip().splitlines() or ["no message"])[-1]
-        return row | {"class": DEFECT, "findings": f"exit code {done.returncode}: {last}"}
-    return row | verified(run)
+        raise RunError(f"exit code {done.returncode}: {last}") from None
+    return run
+
+
+def with_further_checks(
+    scene: RandomQuake, run: QuakeFiles, folder: Path, row: dict[str, object]
+) -> dict[str, object]:
+    """Return the numbers of the further checks of a verified earthquake, and its class and findings
+    with theirs.
+    """
+    if row["class"] != VERIFIED:
+        return {}
+    runs = itertools.count(1)
+
+    def again(changed: RandomQuake, *options: str) -> RunFiles:
+        return run_of(changed, folder, *options, name=f"again_{next(runs)}")
+
+    measures, found = further_checks(scene, run, again)
+    numbers = {name: f"{value:.3g}" for name, value in measures.items()}
+    return numbers | {"class": DEFECT if found else VERIFIED, "findings": "; ".join(found)}
 
 
 def verified(run: RunFiles) -> dict[str, object]:

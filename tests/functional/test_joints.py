@@ -12,7 +12,7 @@ from damjoint.solver.load_stepper import LoadStepper
 from damjoint.statics import gravity
 from damjoint.statics.verdict import failed, statement, verdict
 from damjoint.studies.check import FINITE_ELEMENTS, GRAVITY, compare_joints
-from damjoint_tools.stress import random_scene
+from damjoint_tools.random_scenes import random_scene
 from scipy.optimize import brentq
 from sections import resultants
 

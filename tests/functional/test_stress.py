@@ -11,7 +11,7 @@ import pytest
 from damjoint import __version__, runner
 from damjoint.model.case import load
 from damjoint.post.tables import write_csv
-from damjoint_tools import pages, stress, verification
+from damjoint_tools import pages, random_scenes, stress, verification
 from damjoint_tools.verification import RunFiles, judge_stop, read_table, violations
 
 SCENES = {
@@ -71,10 +71,10 @@ def test_an_altered_column_of_a_joint_is_detected_there(
 
 
 def test_scenes_have_one_to_four_joints_and_can_be_loaded():
-    scenes = [stress.random_scene(7, number) for number in range(40)]
+    scenes = [random_scenes.random_scene(7, number) for number in range(40)]
     assert {len(scene.case.joints) for scene in scenes} == {1, 2, 3, 4}
     for number, scene in enumerate(scenes):
-        single = stress.single_joint_scene(7, number)
+        single = random_scenes.single_joint_scene(7, number)
         assert len(single.case.joints) == 1
         assert scene == single or "lift_heights" in scene.settings
 

@@ -1,0 +1,284 @@
+"""Random dams: drawn from a seed and a number, which reproduce them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from damjoint.arrays import Setting
+from damjoint.model.case import Case, has_drains, load
+from damjoint.model.parameters import declared
+
+#: Third number of the seed of the lift joints, which are drawn apart.
+LIFT_DRAWS = 1
+#: Parameters that are drawn for each joint, but for the place of its drains.
+OF_JOINTS = (
+    *("law", "K_N", "K_T", "sigma_max", "adhesion", "mu", "pena_rupture", "alpha", "pena_tang"),
+    *("G_f", "G_t", "joint_slope", "uplift", "aperture_min", "drains"),
+)
+#: Height of the highest lift over the dam's.
+HIGHEST_LIFT = 0.85
+
+
+@dataclass(frozen=True)
+class RandomScene:
+    """Random dam: parameters that differ from the default dam's, and levels as in the command."""
+
+    settings: dict[str, Setting]
+    levels: str
+    tail_levels: str
+    steps: int
+
+    @property
+    def words(self) -> list[str]:
+        """Arguments of the command `damjoint`."""
+        changed = [
+            word
+            for name, value in self.settings.items()
+            for word in ("--set", f"{name}={as_text(value)}")
+        ]
+        water = ["--levels", self.levels, "--tail-levels", self.tail_levels]
+        return ["run", "dam", *changed, *water, "--steps", str(self.steps)]
+
+    @property
+    def case(self) -> Case:
+        """The case as the command loads it."""
+        return load("dam", self.settings, self.levels, self.tail_levels, self.steps)
+
+
+def as_text(value: Setting) -> str:
+    """Format a setting as in the command: a value, or those of all joints."""
+    return ",".join(map(str, value)) if isinstance(value, tuple) else str(value)
+
+
+class RandomNumbers:
+    """Random numbers, rounded to three digits to keep the commands readable."""
+
+    def __init__(self, *seed: int) -> None:
+        self.generator = np.random.default_rng(seed)
+
+    def uniform(self, low: float, high: float) -> float:
+        """Draw a number, uniformly distributed."""
+        return float(f"{self.generator.uniform(low, high):.3g}")
+
+    def log_uniform(self, low: float, high: float) -> float:
+        """Draw a number whose logarithm is uniformly distributed."""
+        return float(f"{np.exp(self.generator.uniform(np.log(low), np.log(high))):.3g}")
+
+    def choice(self, *choices: float | str) -> float | str:
+        """Draw one of the choices with equal probability."""
+        return choices[self.generator.integers(len(choices))]
+
+    def event(self, probability: float) -> bool:
+        """Draw whether an event of this probability happens."""
+        return bool(self.generator.random() < probability)
+
+
+def random_scene(seed: int, number: int) -> RandomScene:
+    """Draw scene `number` of a seed: a dam with one to four joints."""
+    scene, rng = single_joint_scene(seed, number), RandomNumbers(seed, number, LIFT_DRAWS)
+    return with_lifts(scene, rng) if rng.event(0.4) else scene
+
+
+def single_joint_scene(seed: int, number: int) -> RandomScene:
+    """Draw a dam with one joint: any law, uplift, section and loads, stiffnesses over orders of
+    magnitude, rising and falling levels. New draws are appended, so that old seeds stay
+    reproducible.
+    """
+    rng = RandomNumbers(seed, number)
+    height, plain = rng.log_uniform(5, 150), rng.event(0.5)
+    solid = rng.event(0.1)
+    settings = mesh(rng, height, solid, plain) | section(rng, height, plain) | joint(rng)
+    settings |= loads(rng, height) if not plain else {}
+    settings["uplift"] = rng.choice("none", "imposed", "drained", "cracked", "flow")
+    if settings["uplift"] == "flow":
+        settings["aperture_min"] = rng.log_uniform(1e-8, 1e-4)
+    if settings["uplift"] == "cracked":
+        settings["drains"] = rng.choice(0, 1)
+    settings["weight_first"] = rng.choice(0, 1)
+    number_of_levels = int(rng.choice(1, 2, 3))
+    levels = [rng.uniform(0.3 * height, 1.2 * height) for _ in range(number_of_levels)]
+    levels = levels if rng.event(0.3) else sorted(levels)
+    tail = rng.uniform(0, 0.3 * height) if rng.event(0.4) else 0.0
+    if rng.event(0.15):
+        settings["drive"] = rng.choice("heel", "crest")
+        settings["drive_by"] = rng.log_uniform(1e-6, 1e-3) * height / 10
+    steps, tails = int(rng.choice(1, 1, 2, 4)), [tail]
+    # draws added later
+    settings |= drains(rng, settings)
+    if not plain and "joint_height" in settings and rng.event(0.5):
+        settings["joint_slope"] = rng.uniform(-5, 5)
+    if not plain and rng.event(0.15):
+        # up to 3 % of the thrust
+        settings["force_x"] = rng.log_uniform(5 * height**2, 150 * height**2)
+    if tail and rng.event(0.3):
+        tails = [rng.uniform(0, 0.3 * height) for _ in levels]
+    if not solid and rng.event(0.1):
+        settings, tails = slender_dam(rng, height), [0.0]
+        levels = sorted(rng.uniform(0.6 * height, height) for _ in levels)
+    water = (",".join(f"{level:g}" for level in heights) for heights in (levels, tails))
+    return RandomScene(settings, *water, steps)
+
+
+def with_lifts(scene: RandomScene, rng: RandomNumbers) -> RandomScene:
+    """Add one to three lift joints to a scene, each with its own law, strengths, slope, uplift and
+    drains.
+    """
+    case, count = scene.case, int(rng.choice(1, 2, 3))
+    height, settings = case["dam_height"], dict(scene.settings)
+    if settings.get("mesh_pattern") == "regular":
+        settings["mesh_pattern"] = "free"
+    lowest = max(case.section["heel_y"][0], case.section["toe_y"][0])
+    spacing = (HIGHEST_LIFT * height - lowest) / count
+    settings["lift_heights"] = tuple(
+        float(f"{lowest + (k + rng.uniform(0.6, 1)) * spacing:.4g}") for k in range(count)
+    )
+    # each end of a lift moves by less than the distance of two lifts, at least 0.6 of their spacing
+    steepest = np.degrees(np.arctan(0.25 * spacing / case.joint_length))
+    drawn = [
+        joint(rng)
+        | {
+            "joint_slope": rng.uniform(-steepest, steepest) if rng.event(0.4) else 0.0,
+            "uplift": rng.choice("none", "imposed", "drained", "cracked", "flow"),
+            "aperture_min": rng.log_uniform(1e-8, 1e-4),
+            "drains": rng.choice(0, 1),
+        }
+        for _ in range(count)
+    ]
+    settings |= of_joints([settings, *drawn])
+    dry = replace(scene, settings=settings | {"uplift": "none"}).case
+    lengths = [joint.joint_length for joint in dry.joints]
+    settings["drain_x"] = tuple(rng.uniform(0.05 * length, 0.4 * length) for length in lengths)
+    return replace(scene, settings=settings)
+
+
+def of_joints(drawn: list[dict[str, Setting]]) -> dict[str, Setting]:
+    """Return the settings of OF_JOINTS with a value for each joint, by default that of its
+    declaration.
+    """
+    names = [n for n in OF_JOINTS if any(n in own for own in drawn)]
+    default = {name: declared()[name].default for name in names}
+    return {n: tuple(own.get(n, default[n]) for own in drawn) for n in names}
+
+
+def slender_dam(rng: RandomNumbers, height: float) -> dict[str, float | str]:
+    """Draw a slender dam of realistic stiffness on a joint that loses its shear stiffness on
+    opening: under uplift its crack grows unstably.
+    """
+    base = rng.uniform(0.68, 0.78) * height
+    return {
+        "dam_height": height,
+        "dam_base": base,
+        "dam_crest": rng.uniform(0.05 * base, 0.2 * base),
+        "n_joint": rng.choice(20, 40, 80),
+        "E": rng.log_uniform(1e10, 4e10),
+        "found_side": height,
+        "found_depth": height,
+        "law": "rupture",
+        "K_N": rng.log_uniform(1e11, 1e13),
+        "K_T": rng.log_uniform(1e11, 1e13),
+        "sigma_max": rng.choice(0, rng.log_uniform(1e2, 1e5)),
+        "alpha": rng.choice(0, 0.5, 1, 1.5),
+        "uplift": rng.choice("imposed", "cracked", "flow"),
+        "weight_first": 1,
+    }
+
+
+def mesh(rng: RandomNumbers, height: float, solid: bool, plain: bool) -> dict[str, float | str]:
+    """Draw dimension and mesh; coarse, as equilibrium holds on any mesh."""
+    settings = {"dam_height": height, "order": rng.choice(1, 2), "n_joint": rng.choice(10, 20, 40)}
+    if not solid:
+        settings["mesh_pattern"] = rng.choice("free", "regular") if plain else "free"
+        return settings
+    return settings | {
+        "dim": 3,
+        "n_joint": 10,
+        "mesh_pattern": rng.choice("free", "layers", "split"),
+        "thickness": rng.uniform(0.1 * height, 0.3 * height),
+        "hold_z": rng.choice(0, 1),
+        "n_layers": rng.choice(1, 2),
+        "h_dam": float(f"{height / 4:.3g}"),
+        "h_found": float(f"{height / 2:.3g}"),
+    }
+
+
+def section(rng: RandomNumbers, height: float, plain: bool) -> dict[str, float | str]:
+    """Draw outline and elasticity of the bodies."""
+    base = rng.uniform(0.45 * height, 1.0 * height)
+    drawn = {
+        "dam_base": base,
+        "dam_crest": rng.uniform(0.05 * base, 0.2 * base),
+        "E": rng.log_uniform(1e9, 1e13),
+        "nu": rng.uniform(0, 0.35),
+        "found_side": height,
+        "found_depth": height,
+    }
+    if plain:
+        return drawn
+    if rng.event(0.3):
+        drawn["E_found"] = rng.log_uniform(1e9, 1e13)
+    if rng.event(0.4):
+        drawn["batter"] = rng.uniform(0.02 * base, 0.2 * base)
+        drawn["batter_height"] = rng.uniform(0.3 * height, 0.9 * height)
+    if rng.event(0.3):
+        drawn["neck_height"] = rng.uniform(0.02 * height, 0.15 * height)
+    if rng.event(0.4):
+        drawn["joint_slope"] = rng.uniform(-8, 12)
+    elif rng.event(0.3):
+        drawn["joint_height"] = rng.uniform(0.1 * height, 0.5 * height)
+    return drawn
+
+
+def joint(rng: RandomNumbers) -> dict[str, float | str]:
+    """Draw law and strengths; fracture energies exceed the elastic energy at the strength."""
+    drawn = {
+        "law": rng.choice("rupture", "friction", "bond"),
+        "K_N": rng.log_uniform(1e8, 1e15),
+        "sigma_max": rng.choice(0, rng.log_uniform(1e3, 2e6)),
+        "adhesion": rng.choice(0, rng.log_uniform(1e3, 1e6)),
+        "mu": rng.uniform(0.2, 1.2),
+    }
+    drawn["K_T"] = float(f"{drawn['K_N'] * rng.log_uniform(0.1, 2):.3g}")
+    if drawn["law"] == "rupture":
+        drawn["pena_rupture"] = rng.log_uniform(0.1, 1e3)
+        drawn["alpha"] = rng.choice(0, 1, 1.5, 2)
+    if drawn["law"] == "friction":
+        drawn["pena_tang"] = rng.choice(-1, 0, float(f"{0.05 * drawn['K_T']:.3g}"))
+    if drawn["law"] == "bond":
+        pairs = ("G_f", "sigma_max", "K_N"), ("G_t", "adhesion", "K_T")
+        for energy, strength, stiffness in pairs:
+            elastic = drawn[strength] ** 2 / 2 / drawn[stiffness]
+            drawn[energy] = float(f"{rng.log_uniform(1.5, 100) * max(elastic, 1):.4g}")
+    return drawn
+
+
+def drains(rng: RandomNumbers, settings: dict[str, float | str]) -> dict[str, float | str]:
+    """Draw whether there are drains where the water flows; position, effectiveness and outlet level
+    of all drains.
+    """
+    drawn = {"drains": 1} if settings["uplift"] == "flow" and rng.event(0.4) else {}
+    if not has_drains({"drains": 0} | settings | drawn) or rng.event(0.5):
+        return drawn
+    base, height = settings["dam_base"], settings["dam_height"]
+    drawn["drain_x"] = rng.uniform(0.05 * base, 0.4 * base)
+    drawn["drain_effectiveness"] = rng.uniform(0, 1)
+    if "drive" not in settings:
+        drawn["drain_level"] = rng.uniform(0, 0.3 * height)
+    return drawn
+
+
+def loads(rng: RandomNumbers, height: float) -> dict[str, float | str]:
+    """Draw loads besides weight and water, as shares of the thrust of the water."""
+    thrust, drawn = 1000 * 9.81 * height**2 / 2, {}
+    if rng.event(0.3):
+        drawn["silt_height"] = rng.uniform(0.05 * height, 0.4 * height)
+    if rng.event(0.2):
+        drawn["ice_force"] = rng.log_uniform(0.001 * thrust, 0.03 * thrust)
+    if rng.event(0.2):
+        drawn["anchor_force"] = rng.log_uniform(0.01 * thrust, 0.2 * thrust)
+        drawn["anchor_angle"] = rng.uniform(-5, 20)
+    if rng.event(0.25):
+        drawn |= {"k_h": rng.uniform(-0.1, 0.2), "k_v": rng.uniform(-0.1, 0.1)}
+    if rng.event(0.15):
+        drawn["floor_water"] = 1
+    return drawn
