@@ -332,6 +332,10 @@ def do_plot(arguments: argparse.Namespace) -> int:
     runs = [(folder, stored.read(folder)) for folder in stored.runs_in(arguments.out)]
     for folder, result in runs:
         print(pictures.draw(result, folder))
+        if "quake" in result.result.info:
+            print(
+                "damjoint: of an earthquake only the static states are drawn again", file=sys.stderr
+            )
     return 0
 
 
@@ -551,6 +555,8 @@ def do_quake(arguments: argparse.Namespace) -> int:
     out = arguments.out or Path("out") / f"{case.name}_quake"
     result: QuakeResult | quake_getdp.GetdpQuakeResult
     if arguments.engine == "getdp":
+        for line in quake_getdp.left_out(case, out, not arguments.no_picture):
+            print(f"damjoint: {line}", file=sys.stderr)
         result = quake_getdp.run(case, out)
     else:
         fields = arguments.fields is not None

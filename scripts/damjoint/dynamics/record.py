@@ -127,7 +127,9 @@ def read(path: Path) -> Array:
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
             lines = [line for line in file if line.strip() and not line.startswith("#")]
-    except (OSError, UnicodeDecodeError) as error:
+    except OSError as error:
+        raise InputError(f"record = {path}: {error.strerror}") from None
+    except UnicodeDecodeError as error:
         raise InputError(f"record = {path}: {error}") from None
     table = [[cell.strip() for cell in row] for row in csv.reader(lines[: MOST_ROWS + 2])]
     rows = []

@@ -16,7 +16,7 @@ from ..post.summary import SHOWN, Table, levels_table, requested_rows, table_of
 from ..post.units import FORCES, LENGTHS, Units, unit, with_unit
 from ..statics import gravity
 from ..statics.verdict import hints, path_statement
-from ..studies.quake_result import QuakeResult
+from ..studies.quake_result import QuakeResult, row_of_peak
 
 NUMBER: Units = (("-", 1),)
 #: Safety factors: column, heading, meaning.
@@ -120,7 +120,7 @@ class QuakeNumbers(Numbers):
         """The numbers at all frames, of a joint by its number."""
         frames, rows, peaks = found.frames.joints[joint], shown_rows(found, joint), []
         for name, head, units in PEAKS:
-            k = int(np.argmax(np.abs(rows[name])))
+            k = row_of_peak(name, rows[name])
             value = with_unit(rows[name][k], units, 3)
             peaks.append((f"largest {head}", f"{value} at {rows['time'][k]:.2f} s", QUAKE[name][1]))
         for name, head, units in RESIDUAL:

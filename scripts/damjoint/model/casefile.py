@@ -27,10 +27,9 @@ from typing import TypeAlias
 from .. import InputError, data
 from ..arrays import Value
 from .arithmetic import arithmetic_value, explained
-from .parameters import Parameter, assignments, checked, declared, parameter
+from .parameters import TEXTS, Parameter, assignments, checked, declared, parameter
 
 LISTS = ("levels", "tail_levels", "times", "lift_heights")
-TEXTS = ("title", "also_uplift", "geometry", "record")
 #: Limits: bytes of a case file, files of a case.
 LONGEST, MOST_FILES = 1_000_000, 50
 

@@ -36,6 +36,8 @@ OF_JOINTS = (
     *("drain_reference", "waterstop"),
     *("grout_pressure", "grout_t", "saw_thickness", "saw_t"),
 )
+#: Texts of a case that are no parameters, and options of commands that set them, too.
+TEXTS = {"title": "", "also_uplift": "", "geometry": "", "record": " or by --record FILE.csv"}
 #: Limits that mean > 0 and < 0.5 in the declarations; limit of ONELAB that means none.
 TINY, BELOW_HALF, ANY = 1e-30, 0.5 - 1e-9, 1e200
 
@@ -305,6 +307,8 @@ def parameter(name: str) -> Parameter:
     Raises InputError, with the nearest names, if there is none.
     """
     known = declared()
+    if name in TEXTS:
+        raise InputError(f'{name}: must be set in the case ({name} = "...";){TEXTS[name]}')
     if name not in known:
         import difflib
 

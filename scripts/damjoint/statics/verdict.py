@@ -416,7 +416,7 @@ def hints_on_state(results: Results, last: dict[str, float]) -> list[str]:
     """Hints on the last state: resolution of the crack, drains, tension at the heel."""
     case, messages, crack = results.case, [], last["crack_length"]
     element = case.joint_length / case["n_joint"]
-    if crack > 0 and not (case.accuracy or case.geometry):
+    if crack > 0 and not (case.accuracy or case.geometry or "quake" in results.info):
         messages.append(
             f"the crack ({crack:.3g} m) ends somewhere in an element of {element:.2g} m; "
             "--accuracy 3% chooses the mesh and estimates the error"

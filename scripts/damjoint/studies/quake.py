@@ -40,7 +40,7 @@ from ..statics.verdict import statement
 from ..storage import atomic_write
 from ..threads import limited_threads
 from ..versions import versions
-from .quake_result import QuakeResult
+from .quake_result import QuakeResult, row_of_peak
 
 #: Files of an earthquake: rows, tables of the joints in the frames, stress along the first joint in
 #: time, the run under way.
@@ -214,6 +214,7 @@ class QuakeRun:
         return [
             (name, peak.time, at_nodes(self.quake.system, peak.displacement))
             for name, peak in self.history.peaks.items()
+            if peak.value > 0  # the joint may stay closed
         ]
 
     def stress_table(self) -> Table:
@@ -337,7 +338,7 @@ def peaks_and_rest(case: Case, rows: Table) -> dict[str, Any]:
     joints = range(len(case.joints))
     peaks = {}
     for name in (*PEAKS, *(column_of(name, k) for k in joints for name in PEAKS_OF_JOINTS)):
-        row = int(np.argmax(np.abs(rows[name])))
+        row = row_of_peak(name, rows[name])
         peaks[name] = {"value": rows[name][row], "time": rows["time"][row]}
     last = rows["time"] > rows["time"][-1] - MEAN_OVER * (1 - ROUND_OFF)
     residual = {}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -37,13 +38,31 @@ class GetdpQuakeResult:
     statement: str
 
 
+def left_out(case: Case, out: Path, picture: bool) -> Iterator[str]:
+    """Yield what a run into a folder does not do, in words; picture: whether one is wanted.
+
+    Raises InputError.
+    """
+    check(case)
+    found = folders.read_info(out)
+    if found and found.get("state") in ("interrupted", "running"):
+        yield f"out = {out}: --engine getdp starts an interrupted earthquake again"
+    if picture:
+        yield "--engine getdp draws no picture of an earthquake: its tables only"
+
+
+def check(case: Case) -> None:
+    """Raise InputError if GetDP can not compute the earthquake of a case."""
+    quake.check(case)
+    engine.check(case)
+
+
 def run(case: Case, out: Path, progress: bool = True) -> GetdpQuakeResult:
     """Compute the earthquake of a case by GetDP and write its tables into a folder.
 
     An interrupted run starts again. Raises InputError, RunError.
     """
-    quake.check(case)
-    engine.check(case)
+    check(case)
     with folders.claim_output_folder(case, out):
         try:
             vibrations = earthquake_of(case)

@@ -63,13 +63,20 @@ class QuakeResult:
         return {name: self.rows[own.get(name, name)] for name in QUAKE}
 
 
+def row_of_peak(name: str, values: Array) -> int:
+    """The row in which a column of quake.csv is largest; an overlap of a joint is no opening."""
+    return int(np.argmax(values if "opening" in name else np.abs(values)))
+
+
 def peaks_table(found: dict[str, Any], case: Case) -> Table:
     """Tabulate the peaks of a summary."""
     columns = quake_columns(case)
-    rows = [
-        (name, columns[name][0], f"{peak['value']:.4g}", f"{peak['time']:.3f}")
-        for name, peak in found["peaks"].items()
-    ]
+    rows = []
+    for name, peak in found["peaks"].items():
+        unit, meaning = columns[name]
+        closed = "opening" in name and peak["value"] <= 0
+        value = ("closed", "") if closed else (f"{peak['value']:.4g}", f"{peak['time']:.3f}")
+        rows.append((meaning, unit, *value))
     return Table(["peak of", "unit", "value", "at t"], ["", "", "", "s"], rows)
 
 

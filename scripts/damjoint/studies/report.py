@@ -17,7 +17,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from matplotlib.figure import Figure
 
 from .. import ROUND_OFF, InputError, RunError, __version__
-from ..model.case import Case, is_name
+from ..model.case import Case, flows, is_name
 from ..model.fields import Solution
 from ..model.results import Results
 from ..post import pictures, stored
@@ -464,8 +464,8 @@ def earthquake(info: dict[str, Any]) -> str:
         return ""
     ground = abs(found["peaks"]["ground_ax"]["value"])
     return (
-        f"earthquake {Path(found['record']).name}, {ground:.3g} m/s2: {info['statement']}; N', T "
-        "and the verdict are those of the static state after it"
+        f"earthquake {Path(found['record']).name}, {ground:.3g} m/s2: {info['statement']}; N', T, "
+        "the verdict and the last row of the levels are those of the static state after it"
     )
 
 
@@ -479,11 +479,14 @@ def earthquake_section(folder: Path, case: Case, info: dict[str, Any]) -> Earthq
         address = "data:image/png;base64," + base64.b64encode(path.read_bytes()).decode()
         caption = "Earthquake: relative to the ground, since the static state before it."
         pictures.append(Picture("full", caption, address))
-    uplift = report_input.QUAKE_UPLIFTS[found["quake_uplift"]]
+    follows = found["quake_uplift"] == "zero" or any(map(flows, case.joints))
+    uplift = report_input.QUAKE_UPLIFTS[found["quake_uplift"] if follows else "unchanged"]
+    halved = "none of them halved"
+    if found["halvings"]:
+        halved = f"halved up to {found['halvings']} times where they did not converge"
     notes = [
         f"{quake_result.modes(found)}.",
-        f"{found['steps']} steps of {found['dt']:g} s over {found['time']:g} s, halved up to "
-        f"{found['halvings']} times where they did not converge.",
+        f"{found['steps']} steps of {found['dt']:g} s over {found['time']:g} s, {halved}.",
         f"Water pressure in the joint: {uplift}.",
     ]
     tables = [quake_result.peaks_table(found, case), quake_result.residual_table(found, case)]
