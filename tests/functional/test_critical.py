@@ -19,6 +19,8 @@ from scipy.optimize import brentq
 
 #: A dam of 45 m on a mesh that is fine enough for limits of the rigid block.
 DAM = {"E_dam": 2e10, "E_found": 3e10, "n_joint": 20.0}
+#: A dam of 45 m on a joint with friction and cohesion.
+FRICTION = DAM | {"law": "friction", "adhesion": 1e5}
 #: Friction without cohesion.
 UNBONDED = {"law": "bond", "sigma_max": 0.0, "adhesion": 0.0}
 
@@ -290,8 +292,8 @@ def test_a_parameter_without_effect_is_not_varied(case, of, message):
     "settings, rise",
     [
         ({"law": "friction"}, path.LARGE_RISE),
-        ({"law": "rupture"}, path.LARGE_RISE),
-        ({"law": "rupture", "uplift": "cracked"}, path.RISE),
+        ({"law": "friction", "uplift": "cracked"}, path.RISE),
+        ({"law": "rupture"}, path.RISE),
         ({"law": "bond"}, path.RISE),
         ({"law": "friction", "lift_heights": (20.0,)}, path.LARGE_RISE),
         ({"lift_heights": (20.0,), "law": ("friction", "bond")}, path.RISE),
@@ -302,17 +304,30 @@ def test_steps_are_long_only_where_the_state_does_not_depend_on_them(settings, r
     assert FailurePath(case, interface_of(case)).rise == rise
 
 
-@pytest.mark.parametrize("settings", [{"law": "friction", "adhesion": 1e5}, {"law": "rupture"}])
-def test_long_steps_lead_to_the_same_critical_level(settings, monkeypatch):
-    """Of laws whose state does not depend on the steps; bond keeps the short ones."""
-    long, short = [], []
-    for searches in (long, short):
-        searches += found("dam", settings=DAM | settings)
-        monkeypatch.setattr(failure_path, "LARGE_RISE", path.RISE)
-    assert long[1].value == pytest.approx(short[1].value, rel=path.PRECISION / 2)
-    assert long[1].mode == short[1].mode
-    ((coarse,), (fine,)) = (searches[0].trials for searches in (long, short))
+@pytest.fixture(scope="module")
+def by_short_steps():
+    """Friction that opens, then slides."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(failure_path, "LARGE_RISE", path.RISE)
+        return found("dam", settings=FRICTION)
+
+
+def test_long_steps_lead_to_the_same_critical_level(by_short_steps):
+    (search, long), (reference, short) = found("dam", settings=FRICTION), by_short_steps
+    assert long.value == pytest.approx(short.value, rel=1e-6)
+    assert long.confirmed and long.mode == short.mode == "sliding"
+    (coarse,), (fine,) = search.trials, reference.trials
     assert len(coarse.path.points) < 0.6 * len(fine.path.points)
+
+
+def test_a_path_that_long_steps_lose_is_followed_by_short_ones(by_short_steps, monkeypatch):
+    increments = FailurePath.increments
+    lost = lambda p: iter(()) if p.rise > path.RISE and len(p.points) > 6 else increments(p)
+    monkeypatch.setattr(FailurePath, "increments", lost)
+    (search, answer), (reference, short) = found("dam", settings=FRICTION), by_short_steps
+    assert answer.value == short.value and answer.why == short.why
+    levels = [table(s)["level"].tolist() for s in (search, reference)]
+    assert levels[0] == levels[1]
 
 
 @pytest.mark.parametrize("of", ["strength", "mu", "k_h", "G_f"])

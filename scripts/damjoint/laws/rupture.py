@@ -39,7 +39,7 @@ class Rupture(Law[RuptureVariables]):
 
     variable_names = ("kappa", "released_1", "released_2", "thickness")
     slip_name = "released slip"
-    softens, path_dependent = True, False
+    softens = True
     works = ("grout_pressure", "saw_thickness")
     limits_shear = False
 

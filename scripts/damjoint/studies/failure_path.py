@@ -17,7 +17,7 @@ from ..model.case import Case
 from ..model.loads import Loading
 from ..model.results import HISTORY, Columns, with_all_joints
 from ..solver.load_stepper import LoadStepper
-from ..solver.path import LARGE_RISE, EquilibriumPath, Point
+from ..solver.path import LARGE_RISE, RISE, EquilibriumPath, Point
 
 #: Columns of critical.csv: a row per equilibrium of each dam that was tried. With several joints:
 #: of the first one; see `critical_columns`.
@@ -83,6 +83,8 @@ class FailurePath(EquilibriumPath):
         ahead = [v for t, v in enumerate(case.levels, 1) if t >= stepper.state.time]
         self.target = max(ahead) if target is None else target
         super().__init__(self.points, len(case.levels), TICK)
+        #: where displacement control begins
+        self.begin, self.first_increment = list(self.points), self.increment
         if not stepper.model.equilibrium.path_dependent:
             self.rise = LARGE_RISE
 
@@ -169,14 +171,21 @@ class FailurePath(EquilibriumPath):
         """Continue until the target is reached, the dam slides or is crushed, the level has settled
         or no further equilibrium is found.
 
-        A highest level that is not far below the target is refined.
+        A path of long increments that is lost is followed again by short ones. A highest level that
+        is not far below the target is refined.
         """
-        while not (
-            self.ended or self.reached or self.crushed or self.slides or self.settled(factor)
-        ):
+        while not (self.ended or self.decided(factor)):
             self.advance()
-        if not self.reached:
+        if self.points and self.rise > RISE and not self.decided(factor):
+            self.points[:] = self.begin
+            self.rise, self.increment, self.ended = RISE, self.first_increment, False
+            self.follow(factor)
+        elif not self.reached:
             self.refine(self.target)
+
+    def decided(self, factor: float) -> bool:
+        """Whether the target is reached, or the dam slides, is crushed or its level has settled."""
+        return bool(self.reached or self.crushed or self.slides or self.settled(factor))
 
     # -- refinement of its end
     # ----------------------------------------------------------------------------------------------
