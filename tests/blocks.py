@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from damjoint.model.mesh import SIZE_OPTIONS
 from damjoint.model.parameters import start_gmsh
 
 #: Corners (x0, y0, x1, y1) of the rock [m].
@@ -27,6 +28,8 @@ def write_blocks(
     """
     gmsh = start_gmsh()
     gmsh.clear()
+    for option in SIZE_OPTIONS:  # of an earlier geometry in this process
+        gmsh.option.setNumber(f"Mesh.{option}", 1)
     gmsh.model.add("blocks")
     occ = gmsh.model.occ
     rectangle = lambda x0, y0, x1, y1: (2, occ.addRectangle(x0, y0, 0, x1 - x0, y1 - y0))

@@ -5,6 +5,7 @@ import signal
 import pytest
 from damjoint import runner
 from damjoint.model.case import load
+from damjoint.threads import limited_threads
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -12,6 +13,15 @@ def empty_cache(tmp_path_factory):
     """Use an empty cache instead of the user's."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("DAMJOINT_CACHE", str(tmp_path_factory.mktemp("cache")))
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def one_thread():
+    """Also of what tests call without a command, which chooses the number of threads itself: on two
+    cores, two processes with two threads each take five times as long.
+    """
+    with limited_threads(1):
         yield
 
 
