@@ -202,8 +202,11 @@ def constants() -> dict[str, list[Any]]:
 
 @lru_cache(maxsize=1)
 def sources() -> str:
-    """Version and checksum of the declarations and of the files that they include."""
-    texts = (DECLARATIONS.with_name(f"{n}.pro") for n in ("parameters", "section", "units"))
+    """Version and checksum of the declarations, of the files that they include, and of this file,
+    which determines what the cache has of them.
+    """
+    texts = [DECLARATIONS.with_name(f"{n}.pro") for n in ("parameters", "section", "units")]
+    texts.append(Path(__file__))
     return f"{__version__} {zlib.crc32(b''.join(text.read_bytes() for text in texts)):08x}\n"
 
 
