@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..arrays import Array
-from ..classes import dataclass
 from ..joint.equilibrium import Equilibrium
 from ..joint.joint_laws import JointLaws, JointVariables
 from ..joint.water import Pressure, Still
