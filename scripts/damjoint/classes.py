@@ -1,5 +1,5 @@
 """Dataclasses of the parts that every run loads. The standard library's compile each method when
-the class is made: eight for a frozen one, a tenth of a short run in all.
+the class is made, six for a frozen one: a tenth of a short run in all.
 """
 
 from __future__ import annotations

@@ -33,3 +33,16 @@ def test_a_run_with_a_warm_cache_loads_numpy_alone(tmp_path, case):
     words = "run", case, "--no-fields", "--no-picture", "--out", str(tmp_path / "out")
     assert "gmsh" in loaded(tmp_path / "cache", *words)
     assert loaded(tmp_path / "cache", *words) == []
+
+
+def test_what_is_registered_for_the_exit_is_called_before_the_process_ends(tmp_path):
+    program = """
+import atexit, sys
+from damjoint.__main__ import main
+atexit.register(print, "registered")
+sys.argv = ["damjoint", "new", "my.case"]
+sys.exit(main())
+"""
+    words = [sys.executable, "-c", program]
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "registered" and len(done.stdout.splitlines()) == 2
