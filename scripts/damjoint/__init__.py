@@ -12,6 +12,7 @@ arrays.py   types of arrays; csr.py: sparse matrices; threads.py: threads of the
 classes.py  dataclasses that are quick to load
 storage.py  atomic writes, locks on files and folders
 progress.py progress of long work, on a terminal and in redirected output
+versions.py versions of the code and of what it uses, machine
 model/      data: parameters, case, mesh, loads, results
 laws/       the joint laws, one file each
 fem/        finite elements of the bodies, condensed onto the joint
@@ -22,7 +23,6 @@ engines/    the engines: condensed/ from the parts above, getdp/ by the problem 
 statics/    gravity method, limit analysis, verdict
 post/       tables, pictures, fields and folders of results
 accuracy.py mesh refinement to a required accuracy, error estimate
-versions.py versions of the code and of what it uses, machine
 runner.py   solves a case and writes its results
 studies/    checks, sweeps, critical values, a law along a path, reports
 library.py  the interface for Python: case, run, fill, check, critical, sweep, further laws

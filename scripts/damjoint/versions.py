@@ -12,7 +12,6 @@ from functools import lru_cache
 from pathlib import Path
 
 from . import __version__
-from .storage import cached
 
 #: Folders of the checkout that hold the code.
 CODE_FOLDERS = "scripts", "pro", "geo", "cases"
@@ -22,18 +21,29 @@ PACKAGES = "gmsh", "numpy", "scipy"
 
 def versions() -> dict[str, str]:
     """Return the versions of damjoint, Python and PACKAGES by name."""
-    # it takes long to read them; an installation changes the time of its folder
-    folders = [path for path in sys.path if path.endswith("-packages") and os.path.isdir(path)]
-    key = repr([(path, os.stat(path).st_mtime_ns) for path in folders])
-    packages = cached("versions", key, installed)
+    packages = {name: installed(name) for name in PACKAGES}
     return {"damjoint": __version__, **packages, "python": platform.python_version()}
 
 
-def installed() -> dict[str, str]:
-    """Return the versions of PACKAGES by name."""
-    from importlib.metadata import version
+@lru_cache(maxsize=1)
+def in_folder_names() -> dict[str, str]:
+    """Return the versions that the folders NAME-VERSION.dist-info of installed packages name."""
+    folders = [path for path in sys.path if path.endswith("-packages") and os.path.isdir(path)]
+    names = [name for folder in reversed(folders) for name in os.listdir(folder)]
+    found = (re.fullmatch(r"([^-]+)-([^-]+)\.dist-info", name) for name in names)
+    return {match[1]: match[2] for match in found if match}
 
-    return {name: version(name) for name in PACKAGES}
+
+def installed(name: str) -> str:
+    """Return the version of a package; empty if it is not installed."""
+    if name in in_folder_names():
+        return in_folder_names()[name]
+    from importlib.metadata import PackageNotFoundError, version  # takes long to load
+
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return ""
 
 
 @lru_cache(maxsize=1)

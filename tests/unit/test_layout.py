@@ -10,8 +10,8 @@ from damjoint_tools import pages
 
 PACKAGE = Path(damjoint.__file__).parent
 #: Each part uses only those before it.
-PARTS = ["", "csr", "threads", "storage", "progress", "laws", "model", "fem", "joint", "solver"]
-PARTS += ["dynamics", "engines", "statics", "post", "accuracy", "versions", "runner", "studies"]
+PARTS = ["", "csr", "threads", "storage", "progress", "versions", "laws", "model", "fem", "joint"]
+PARTS += ["solver", "dynamics", "engines", "statics", "post", "accuracy", "runner", "studies"]
 PARTS += ["library", "gui", "cli", "__main__"]
 
 

@@ -4,10 +4,11 @@ import shutil
 import subprocess
 import sys
 from datetime import date
+from importlib import metadata
 from pathlib import Path
 
 import pytest
-from damjoint import __version__
+from damjoint import __version__, versions
 from damjoint_tools import pages, provenance
 
 ROOT = Path(__file__).parents[2]
@@ -67,3 +68,13 @@ def test_the_commit_is_that_of_the_checkout_with_its_changes(tmp_path):
 def test_readme_and_tour_have_a_place_for_the_line():
     for page, mark in (("README.md", "modelings"), ("reference/tour.md", "figures")):
         assert "\nnew\n<!-- /" in pages.between(mark, (ROOT / page).read_text(), "new")
+
+
+def test_versions_are_those_of_the_installed_packages(monkeypatch):
+    """By the names of their folders, or by what is in them."""
+    expected = {name: metadata.version(name) for name in versions.PACKAGES}
+    assert expected.items() <= versions.versions().items()
+    assert expected.items() <= versions.in_folder_names().items()
+    monkeypatch.setattr(versions, "in_folder_names", dict)
+    assert expected.items() <= versions.versions().items()
+    assert versions.installed("damjoint-nowhere") == ""

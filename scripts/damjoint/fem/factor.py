@@ -17,7 +17,6 @@ import weakref
 import zlib
 from contextlib import AbstractContextManager
 from functools import cache
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, Literal
@@ -29,6 +28,7 @@ from threadpoolctl import ThreadpoolController
 
 from ..arrays import Array, IntArray, Sparse, mirror
 from ..storage import atomic_write, cache_folder
+from ..versions import installed
 from .memory import available, check_memory, dense_memory
 
 if TYPE_CHECKING:  # loaded where it is used, as a command with cached data does not need it
@@ -93,10 +93,8 @@ def name() -> str:
     if mumps is None:
         return f"SuperLU (scipy {scipy.__version__})"
     mumps.damjoint_mumps_version.restype = ctypes.c_char_p
-    try:
-        order = f", METIS (pymetis {version('pymetis')})"
-    except PackageNotFoundError:
-        order = ""
+    ordering = installed("pymetis")
+    order = f", METIS (pymetis {ordering})" if ordering else ""
     return f"MUMPS {mumps.damjoint_mumps_version().decode()}{order}"
 
 
