@@ -59,21 +59,23 @@ def follow(quake: Earthquake) -> dict[str, float]:
     static = joint_forces(quake, begin, begin) - lift(equilibrium, problem.static.pressures)
     # since the static state: forces of the joints, of all but inertia, and of the ground
     joint, forces, load = np.zeros(len(static)), np.zeros(system.size), quake.load(0.0)
-    worst, given, rise, energies = 0.0, 0.0, 0.0, [np.zeros(4)]
+    viscous, worst, given, rise = np.zeros(system.size), 0.0, 0.0, 0.0
+    energies = [np.zeros(4)]
     for step in quake.steps():
         end, damping = step.end, damping_of(quake, begin)
         motion, moved = end.motion, end.motion.displacement - begin.motion.displacement
         joint_before, forces_before, load_before = joint, forces, load
         water = pressures_in_motion(quake.case, problem, begin.state)
         joint = joint_forces(quake, begin, end) - lift(equilibrium, water) - static
-        elastic, viscous = system.stiffness @ motion.displacement, damping @ motion.velocity
+        viscous_before, viscous = viscous, damping @ motion.velocity
+        elastic = system.stiffness @ motion.displacement
         forces, load = elastic + viscous, quake.load(end.time)
         forces[jumps] += joint
         inertia = system.mass @ motion.acceleration
         residual = inertia + (1 + alpha) * (forces - load) - alpha * (forces_before - load_before)
         worst = max(worst, float(np.linalg.norm(residual)))
         given += moved @ (load + load_before) / 2
-        lost = moved @ (viscous + damping @ begin.motion.velocity) / 2
+        lost = moved @ (viscous + viscous_before) / 2
         on_joint = moved[jumps] @ (joint + joint_before) / 2
         kinetic = motion.velocity @ (system.mass @ motion.velocity) / 2
         strain = motion.displacement @ elastic / 2

@@ -22,7 +22,7 @@ CHECKS = EQUATIONS, HALVED, STRONGER, REVERSED, GETDP, CLOSED_FORM = (
 )
 
 #: Interval of the records [s], and how often half of it is halved for the order of a scheme.
-RECORD_STEP, MOST_HALVINGS = 0.01, 3
+RECORD_STEP, MOST_HALVINGS = 0.01, 1
 #: A strength that no earthquake reaches [Pa].
 UNBREAKABLE = 1e9
 
@@ -176,7 +176,7 @@ def elastic(rng: RandomNumbers, scene: RandomQuake, solid: bool) -> RandomQuake:
     if rng.event(0.2):
         settings["time_integration"] = "published"
     frequency = 0.1 * np.sqrt(settings["E"] / 2400) / settings["dam_height"]  # about
-    halvings = max(0, int(np.ceil(np.log2(60 * frequency * RECORD_STEP / 2))))
+    halvings = max(0, int(np.ceil(np.log2(40 * frequency * RECORD_STEP / 2))))
     checks = (REVERSED, HALVED) if halvings <= MOST_HALVINGS else (REVERSED,)
     settings["dt"] = RECORD_STEP / 2 / 2 ** min(halvings, MOST_HALVINGS)
     return replace(scene, settings=settings, checks=checks)
@@ -193,9 +193,9 @@ def block(rng: RandomNumbers, scene: RandomQuake, solid: bool) -> RandomQuake:
         "dam_crest": base,
         "order": 1,
         "n_joint": 4,
-        "E": 1e14,
-        "K_N": 1e13,
-        "K_T": 1e13,
+        "E": 1e12,
+        "K_N": 1e12,
+        "K_T": 1e12,
         "law": "friction",
         "mu": float(f"{rng.uniform(0.2, 0.7) * min(peak, 6) / 9.81:.3g}"),
         "adhesion": 0,
@@ -207,7 +207,7 @@ def block(rng: RandomNumbers, scene: RandomQuake, solid: bool) -> RandomQuake:
         "found_depth": height,
         "h_dam": height,
         "h_found": height,
-        "dt": RECORD_STEP / 20,
+        "dt": RECORD_STEP / 10,
     }
     level = f"{rng.uniform(0.1 * height, 0.5 * height):g}"
     return replace(scene, settings=settings, levels=level, checks=(CLOSED_FORM, EQUATIONS))

@@ -75,7 +75,7 @@ def run_of(scene: RandomScene, folder: Path, *options: str, name: str = "out") -
 
     Raises RunError if the command has written no result, or exceeds the time limit.
     """
-    quake = isinstance(scene, RandomQuake)
+    quake, case = isinstance(scene, RandomQuake), scene.case
     words = [*scene.words, *(() if quake else ("--no-fields",)), "--no-picture", *options]
     words += ["--out", str(folder / name)]
     environment = os.environ | ONE_THREAD | {"DAMJOINT_CACHE": str(folder / "cache")}
@@ -89,7 +89,7 @@ def run_of(scene: RandomScene, folder: Path, *options: str, name: str = "out") -
         )
     except subprocess.TimeoutExpired:
         raise RunError(f"not finished after {TIME_LIMIT} s") from None
-    run = (QuakeFiles if quake else RunFiles)(scene.case, folder / name, done.returncode)
+    run = (QuakeFiles if quake else RunFiles)(case, folder / name, done.returncode)
     try:
         _ = run.record["verdict"]
     except (OSError, KeyError):

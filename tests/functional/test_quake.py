@@ -527,6 +527,31 @@ def test_the_command_writes_rows_summary_and_picture(command, case_file, tmp_pat
     assert "earthquake wave.csv, " in page and "data:image/png" in page
 
 
+def test_a_joint_that_stays_closed_has_no_peak_of_its_opening(command, case_file, tmp_path):
+    """Neither a value nor a picture of it; its water does not follow a crack."""
+    weak = "--set", "record_scale=0.05", "--set", "record_rest=0"
+    code, out, _ = command("quake", case_file, *weak, "--no-picture")
+    folder = tmp_path / "out" / "my_quake"
+    found = json.loads((folder / "run.json").read_text())
+    rows = np.genfromtxt(folder / "quake.csv", delimiter=",", names=True)
+    for name in "heel_opening", "toe_opening":
+        largest = found["quake"]["peaks"][name]["value"]
+        assert largest == pytest.approx(rows[name].max()) and largest < 0
+    assert code == 0 and out.count("closed") == 3  # and of the frequencies: joint closed
+    case = load(
+        "dam", DAM | {"record_rest": 0.0, "record_scale": 0.05}, "30", record=Path("wave.csv")
+    )
+    under_way = QuakeRun(case)
+    for _ in under_way.steps():
+        pass
+    assert {name for name, _, _ in under_way.shapes()} == {"crest downstream", "crest upstream"}
+    assert not any("--accuracy" in hint for hint in found["hints"])
+    assert command("report", folder)[0] == 0
+    page = Path("report.html").read_text()
+    assert "Water pressure in the joint: as before the earthquake." in page
+    assert "none of them halved" in page
+
+
 def test_frames_are_states_of_the_bodies_and_the_joint(command, case_file, tmp_path):
     """Files for ParaView at the times asked for; the gap between the bodies is that of the joint,
     the stress that of the displacement.
@@ -664,7 +689,8 @@ def test_a_sweep_of_earthquakes(command, case_file, tmp_path):
             "hold_z = 0: must be 1 with rock_mass = 1",
         ),
         (["--set", "drive=crest"], "drive = crest: must be level for damjoint quake"),
-        (["--record", "nothing.csv"], "record = nothing.csv: "),
+        (["--record", "nothing.csv"], "record = nothing.csv: No such file or directory"),
+        (["--set", "record=wave.csv"], 'record: must be set in the case (record = "...";) or by'),
         (["--accuracy", "1%"], "accuracy = 1%: must not be set for damjoint quake"),
         (["--fields", "2"], "--fields 2: must be two times FIRST:LAST"),
         (["--fields", "2:1"], "--fields 2:1: must be two times FIRST:LAST"),

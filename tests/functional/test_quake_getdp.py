@@ -7,6 +7,9 @@ import numpy as np
 import pytest
 from damjoint.dynamics.history import QuakeHistory
 from damjoint.engines.getdp import quake as engine
+from damjoint.model.case import load
+from damjoint.post import folder
+from damjoint.studies import quake_getdp
 from quakes import DAM, earthquake, smooth_record, write_record
 
 SHORT = DAM | {"record_rest": 0.0, "dt": 0.005}
@@ -165,6 +168,17 @@ def test_what_the_model_can_not_compute_is_one_line(command, case_file, options,
     code, out, err = command("quake", case_file, "--engine", "getdp", *options)
     assert (code, out) == (2, "") and err.count("\n") == 1
     assert message in err and not Path("out").exists()
+
+
+def test_what_a_run_leaves_out_is_said_before_it(case_file, tmp_path):
+    """The picture; and that an interrupted run starts again."""
+    case = load(str(case_file))
+    assert list(quake_getdp.left_out(case, tmp_path, False)) == []
+    (picture,) = quake_getdp.left_out(case, tmp_path, True)
+    assert "--engine getdp draws no picture" in picture
+    folder.write_state(case, tmp_path / "out", "interrupted")
+    again, _ = quake_getdp.left_out(case, tmp_path / "out", True)
+    assert again.endswith("--engine getdp starts an interrupted earthquake again")
 
 
 def test_a_dam_without_static_equilibrium_is_a_failed_run(command, case_file):

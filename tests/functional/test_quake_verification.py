@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,10 +10,18 @@ from damjoint.dynamics.frames import MOST_FRAMES
 from damjoint.model.case import load
 from damjoint.post.tables import write_csv
 from damjoint.studies import quake
-from damjoint_tools import stress
+from damjoint_tools import (
+    quake_comparison,
+    quake_equations,
+    quake_verification,
+    random_quakes,
+    random_scenes,
+    stress,
+)
 from damjoint_tools.quake_verification import QuakeFiles, judge_quake, quake_violations
+from damjoint_tools.random_quakes import RandomQuake, random_quake
 from damjoint_tools.verification import read_table
-from quakes import DAM, smooth_record
+from quakes import BLOCK, DAM, earthquake, mean_slip, smooth_record, write_record
 
 
 @pytest.fixture(scope="module")
@@ -22,6 +31,7 @@ def files(tmp_path_factory):
     record = smooth_record(folder / "wave.csv", 6.0, duration=0.6)
     settings = {"lift_heights": (20.0,), "law": ("friction", "bond"), "batter": 2.0}
     settings |= {"batter_height": 30.0, "added_mass": 2.0, "adhesion": (1e4, 1e5), "G_t": (50, 50)}
+    settings["damping_mass"] = 1.0
     case = load("dam", DAM | settings, "35", record=record)
     quake.run(case, folder / "out", picture=False, progress=False)
     return QuakeFiles(case, folder / "out", 0)
@@ -33,6 +43,11 @@ def test_the_files_of_an_earthquake_violate_no_rule(files):
     assert np.abs(rows["slip_mean"]).max() > 1e-3 and 50 < len(files.joint) <= MOST_FRAMES
     # the inertia of the whole dam, with its water, is the change of the shear force
     assert np.ptp(rows["T_inertia"]) > 0.5 * files.weight
+
+
+def test_the_damping_by_the_mass_is_in_the_balance_of_momentum(files, monkeypatch):
+    monkeypatch.setattr(quake_verification, "mass_damping", lambda run: 0.0)
+    assert any("momentum: T is off" in line for line in quake_violations(files))
 
 
 @pytest.mark.parametrize("number", [1, pytest.param(0, marks=pytest.mark.heavy)])
@@ -47,6 +62,7 @@ def test_the_files_of_an_earthquake_violate_no_rule(files):
         ("quake_joint", "sigma_n_eff", lambda v: v * 1.01, "contact"),
         ("quake_joint", "tau_1", lambda v: v * 100 + 1e6, "shear"),
         ("quake_joint", "p", lambda v: v * 1.01, "the integral of p"),
+        ("quake_joint", "delta_n", lambda v: v * 1.001, "delta_n does not start at the static"),
         ("history", "T", lambda v: v * 1.001, "after the earthquake T ="),
     ],
 )
@@ -72,6 +88,7 @@ def test_an_altered_column_of_a_joint_is_detected(
         ("ground_ay", lambda v: v + 1e-3, "not that of the record"),
         ("dt", lambda v: v * 1.001, "not the sums"),
         ("heel_opening", lambda v: v * np.nan, "not finite"),
+        ("shear_reserve", lambda v: v * np.inf, "shear_reserve of law = friction"),
         ("time", lambda v: np.append(v[:-1], v[-1] + 0.02), "the record at"),
     ],
 )
@@ -105,10 +122,10 @@ def test_the_end_of_an_earthquake_is_judged(files, tmp_path, statement, wrong):
 def test_random_earthquakes_have_no_defect_and_leave_static_scenes_as_they_are(
     command, tmp_path, number, seed
 ):
-    before = stress.random_scene(1, 3)
+    before = random_scenes.random_scene(1, 3)
     code, out, _ = command("stress", number, "--quake", "--seed", seed, "--out", "s.csv")
     assert code == 0 and f"{number} converged and verified" in out
-    assert stress.random_scene(1, 3) == before
+    assert random_scenes.random_scene(1, 3) == before
     rows = stress.read_rows(tmp_path / "s.csv")
     assert all("--record" in row["command"] and int(row["steps"]) > 100 for row in rows)
     records = {path.name for path in (tmp_path / "s_records").iterdir()}
@@ -116,7 +133,99 @@ def test_random_earthquakes_have_no_defect_and_leave_static_scenes_as_they_are(
 
 
 def test_random_earthquakes_can_be_loaded_and_have_all_laws_and_waters(tmp_path):
-    cases = [stress.random_quake(5, number, tmp_path).case for number in range(30)]
-    assert {case["law"] for case in cases} == {"rupture", "friction", "bond"}
+    scenes = [random_quake(5, number, tmp_path) for number in range(60)]
+    cases = [scene.case for scene in scenes]
+    assert {law for case in cases for law in (joint["law"] for joint in case.joints)} == {
+        *("rupture", "friction", "bond")
+    }
     assert len({case["uplift"] for case in cases}) == 5
     assert {len(case.joints) for case in cases} == {1, 2, 3}
+    assert {scene.kind for scene in scenes} == set(random_quakes.KINDS)
+    assert {check for scene in scenes for check in scene.checks} == set(random_quakes.CHECKS)
+    for name in ("rock_mass", "damping_mass", "joint_damping_n", "damping_f1"):
+        assert {bool(scene.settings.get(name)) for scene in scenes} == {True, False}
+    assert {case["time_integration"] for case in cases} == {"HHT", "published"}
+
+
+# -- the equations of all unknowns
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"hht_alpha": 0.0, "joint_damping_n": 1e8, "joint_damping_t": 5e7},
+        {"rock_mass": 1.0, "rho_found": 2600.0, "quake_uplift": "zero", "damping_mass": 1.0},
+        {"time_integration": "published", "joint_damping_n": 1e8},
+    ],
+)
+def test_the_equations_of_all_unknowns_and_the_balance_of_energy(tmp_path, settings):
+    """Energy is conserved with alpha = 0, and otherwise lost; wrong masses are noticed."""
+    record = smooth_record(tmp_path / "wave.csv", 6.0, duration=0.3)
+    short = DAM | settings | {"record_rest": 0.1}
+    quake = earthquake(record, short, "35")
+    found = quake_equations.follow(quake)
+    assert abs(mean_slip(quake)) > 1e-4 and found["residual"] < 1e-8
+    if settings.get("hht_alpha") == 0:
+        assert abs(found["lost"]) < 1e-8 and found["rise"] < 1e-8
+    else:
+        assert 1e-6 < found["lost"] < 0.2
+    wrong = earthquake(record, short, "35")
+    wrong.system = replace(wrong.system, mass=1.0001 * wrong.system.mass)
+    assert quake_equations.follow(wrong)["residual"] > 1e-6
+
+
+# -- further runs, and closed forms
+
+
+def test_the_slip_of_a_rigid_block_is_compared_with_its_closed_form(tmp_path):
+    """Under a half sine (Newmark 1965), 0.054306889 m; another friction is noticed."""
+    times = np.arange(0, 0.3025, 0.0025)
+    values = np.maximum(8 * np.sin(np.pi * times / 0.3), 0)
+    record = write_record(tmp_path / "r.csv", times, values)
+    case = load("dam", BLOCK | {"dt": 0.0025}, "0", record=record)
+    quake.run(case, tmp_path / "out", picture=False, progress=False)
+    run = QuakeFiles(case, tmp_path / "out", 0)
+    assert quake_comparison.sliding_block(run)[-1] == pytest.approx(-0.054306889, rel=5e-4)
+    measures, violated = quake_comparison.closed_form(None, run, None)
+    assert measures["closed_form"] < 1e-3 and not violated
+    rough = QuakeFiles(case.with_values({"mu": 0.6}), tmp_path / "out", 0)
+    assert quake_comparison.closed_form(None, rough, None)[1]
+
+
+def scene_of(tmp_path, kind, checks, **settings):
+    """A small scene with a wave as its record."""
+    times = np.arange(0, 0.4, 0.01)
+    wave = 4 * np.sin(np.pi * times / 0.39) ** 2 * np.sin(15 * times)
+    record = np.column_stack([times, wave, 0.3 * wave])
+    given = {n: v for n, v in DAM.items() if n not in settings} | settings
+    return RandomQuake(given, "30", "0", 1, record, tmp_path / "r.csv", kind, checks)
+
+
+ELASTIC = {"adhesion": 1e9, "quake_uplift": "unchanged", "dt": 0.0025}
+
+
+@pytest.mark.parametrize(
+    "kind, checks, settings, expected",
+    [
+        ("elastic", ("reversed",), ELASTIC, {"asymmetry": (0, 1e-6)}),
+        ("elastic", ("halved",), ELASTIC, {"order": (1.9, 2.1)}),
+        ("dam", ("halved",), {}, {"change_by_dt": (1e-6, 0.1)}),
+        ("dam", ("stronger",), {}, {"slip_if_stronger": (0.01, 0.95)}),
+        ("dam", ("getdp",), {"dt": 0.01}, {"engines": (1e-16, 1e-6)}),
+    ],
+)
+def test_further_runs_of_a_scene(tmp_path, kind, checks, settings, expected):
+    scene = scene_of(tmp_path, kind, checks, **settings)
+    run = stress.run_of(scene, tmp_path)
+    row = {"class": stress.VERIFIED}
+    found = stress.with_further_checks(scene, run, tmp_path, row)
+    assert (found["class"], found["findings"]) == (stress.VERIFIED, "")
+    for name, (low, high) in expected.items():
+        assert low <= float(found[name]) <= high, found
+
+
+def test_a_joint_that_slides_is_not_taken_for_an_elastic_one(tmp_path):
+    scene = scene_of(tmp_path, "elastic", ("reversed",))
+    run = stress.run_of(scene, tmp_path)
+    found = stress.with_further_checks(scene, run, tmp_path, {"class": stress.VERIFIED})
+    assert found["class"] == stress.DEFECT and "asymmetry" in found["findings"]
