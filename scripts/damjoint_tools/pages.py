@@ -23,16 +23,12 @@ from damjoint.post.validation import Comparison
 from damjoint.statics.gravity import LOADS
 from damjoint.studies.check import CHECK
 from damjoint.studies.failure_path import CRITICAL
-from tabulate import tabulate
 
 from .law_picture import draw as draw_laws
+from .markdown import markdown
+from .trust import trust_section
 
 REFERENCE = Path("reference")
-
-
-def markdown(rows: list[tuple], heads: tuple[str, ...]) -> str:
-    """A table in Markdown."""
-    return tabulate(rows, heads, tablefmt="github", disable_numparse=True)
 
 
 def parameters_page() -> str:
@@ -350,82 +346,6 @@ def take_bench(out: Path) -> None:
     readme.write_text(between("modelings", readme.read_text(), table.rstrip("\n")))
 
 
-#: What `damjoint stress` verifies in every scene.
-VERIFIED = """\
-- *Equilibrium*: $N + U$ and $T$ of every row of `history.csv`, and $M$ where there is a joint
-  table, equal the closed forms of the [gravity method](theory.md#gravity-method), to 1e-5 of the
-  dam's weight (times its base).
-- *Water*: $U$ is the integral of `p`, and the closed form where there is one; heads are between
-  those of reservoir and tailwater; in 2D the flux is the same at every node, except for the flow
-  into drains.
-- *Joint law*: at every node of `joint.csv` the normal stress of a closed point is $K_N$ times
-  $\\delta_n$, and an open point is not in compression. The tension is at most that of the damaged
-  joint, the shear at most the strength by friction, cohesion and hardening. Damage, cumulated slip
-  (friction), crack (rupture) and slipped length never decrease.
-- *Command*: parameters, times, levels, tailwater and exit code are those of the command line.
-- *A run that stops* is justified if statics guarantees no equilibrium at a higher level (by the
-  safe bound of a rigid block with friction as its only strength, under the largest uplift that a
-  crack can cause, with a margin of 5 %), and if the block is within 10 % of the failure that the
-  run reports.
-
-*Undecided* is a stop that these bounds neither justify nor refute: displacement control without a
-further equilibrium, or a joint that is too stiff for its mesh ($K_N h/E \\ge 100$, $h$ an element's
-length), which the run reports. A command that exceeds its time limit is a defect."""
-
-
-def trust_page(results: Path) -> str:
-    """reference/trust.md: random scenes verified, from the result file of the last run.
-
-    Raises ValueError if its rows are of different code.
-    """
-    from . import provenance
-    from .stress import CLASSES, DEFECT, UNDECIDED, counts, read_rows
-
-    rows = read_rows(results)
-    of = lambda name, value: [row for row in rows if row[name] == value]
-    tables = []
-    for name in ("law", "uplift", "joints", "dim", "drive"):
-        values = sorted({row[name] for row in rows if "," not in row[name]})  # no lists
-        lines = [(f"{name} = {value}", *counts(of(name, value)).values()) for value in values]
-        tables += lines
-    tables.append(("all", *counts(rows).values()))
-    slowest = sorted(rows, key=lambda row: -float(row["seconds"] or 0))[:5]
-    unsolved = [
-        f"- {row['scene']}, {row['class']}: {row['findings']}\n\n      {row['command']}"
-        for kind in (DEFECT, UNDECIDED)
-        for row in of("class", kind)
-    ]
-    worst = [(r["scene"], r["seconds"], r["iterations"], r["cuts"], r["findings"]) for r in slowest]
-    return (
-        "\n\n".join(
-            [
-                "# Verification on random dams",
-                f"{len(rows)} random scenes of `damjoint stress`. Each is computed by `damjoint "
-                "run` and verified from its result files, by code that is independent of the "
-                "engines. The scenes: dams from 5 to 150 m, $E$ from 1e9 to 1e13 Pa, $K_N$ from "
-                "1e8 to 1e15 Pa/m, all laws and uplifts, sections with batter, neck, sloping and "
-                "lift joint, silt, ice, anchor and earthquake, rising and falling water; four in "
-                "ten have two to four joints, each with its own law and uplift (the rows of a law "
-                "or an uplift below are of dams with one joint); one 2D "
-                "scene in ten is a slender dam with the stiffness of concrete on a brittle joint. "
-                "The name of a scene is SEED-NUMBER. Written by "
-                "`python -m damjoint_tools.pages trust FILE` from the result file.",
-                provenance.source_line(rows),
-                "## What is verified",
-                VERIFIED,
-                "## Result",
-                markdown(tables, ("scenes", *CLASSES)),
-                "## Defects and undecided stops",
-                "\n".join(unsolved) or "None.",
-                "## The slowest scenes",
-                "Seconds of the complete command, while other scenes run in parallel.",
-                markdown(worst, ("scene", "seconds", "iterations", "cuts", "findings")),
-            ]
-        )
-        + "\n"
-    )
-
-
 def main(words: list[str]) -> None:
     """Write the pages of a name: bench, trust, parameters, results, tour, laws (a picture),
     validation or all.
@@ -433,7 +353,9 @@ def main(words: list[str]) -> None:
     if words[0] == "bench":
         take_bench(Path(words[1]))
     if words[0] == "trust":
-        (REFERENCE / "trust.md").write_text(trust_page(Path(words[1])))
+        mark, section = trust_section(Path(words[1]))
+        page = REFERENCE / "trust.md"
+        page.write_text(between(mark, page.read_text(), section))
     if words[0] in ("parameters", "all"):
         (REFERENCE / "parameters.md").write_text(parameters_page())
     if words[0] in ("results", "all"):

@@ -11,7 +11,7 @@ import pytest
 from damjoint import __version__, runner
 from damjoint.model.case import load
 from damjoint.post.tables import write_csv
-from damjoint_tools import pages, random_scenes, stress, verification
+from damjoint_tools import random_scenes, stress, trust, verification
 from damjoint_tools.verification import RunFiles, judge_stop, read_table, violations
 
 SCENES = {
@@ -213,8 +213,8 @@ def test_stress_is_reproducible_and_resumed_and_makes_a_page(command, monkeypatc
     rows = list(csv.DictReader(before.splitlines()))
     assert {row["scene"] for row in rows} == {"3-0", "3-1"}
     assert stress.random_scene(3, 1) == stress.random_scene(3, 1) != stress.random_scene(3, 0)
-    page = pages.trust_page(Path("s.csv"))
-    assert "2 random scenes" in page and stress.VERIFIED in page
+    mark, page = trust.trust_section(Path("s.csv"))
+    assert mark == "dams" and "2 random scenes" in page and trust.VERIFIED in page
     assert f"Measured with damjoint {__version__} (" in page
     assert rows[0]["date"] in page and rows[0]["machine"] in page
     # rows of different code are neither added to one file nor shown on one page
@@ -224,7 +224,7 @@ def test_stress_is_reproducible_and_resumed_and_makes_a_page(command, monkeypatc
     assert code == 2 and error.count("\n") == 1 and "out = s.csv: must be a new file" in error
     assert Path("s.csv").read_text() == other
     with pytest.raises(ValueError, match="figures of different versions"):
-        pages.trust_page(Path("s.csv"))
+        trust.trust_section(Path("s.csv"))
 
 
 @pytest.mark.heavy

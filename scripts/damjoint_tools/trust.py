@@ -1,0 +1,193 @@
+"""The sections of reference/trust.md: random dams and earthquakes verified, from a result file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from .markdown import markdown
+from .provenance import source_line
+from .quake_comparison import MEASURES
+from .stress import CLASSES, DEFECT, UNDECIDED, counts, read_rows
+
+#: A row of a result file.
+Row = dict[str, str]
+
+#: What `damjoint stress` verifies in every scene.
+VERIFIED = """\
+- *Equilibrium*: $N + U$ and $T$ of every row of `history.csv`, and $M$ where there is a joint
+  table, equal the closed forms of the [gravity method](theory.md#gravity-method), to 1e-5 of the
+  dam's weight (times its base).
+- *Water*: $U$ is the integral of `p`, and the closed form where there is one; heads are between
+  those of reservoir and tailwater; in 2D the flux is the same at every node, except for the flow
+  into drains.
+- *Joint law*: at every node of `joint.csv` the normal stress of a closed point is $K_N$ times
+  $\\delta_n$, and an open point is not in compression. The tension is at most that of the damaged
+  joint, the shear at most the strength by friction, cohesion and hardening. Damage, cumulated slip
+  (friction), crack (rupture) and slipped length never decrease.
+- *Command*: parameters, times, levels, tailwater and exit code are those of the command line.
+- *A run that stops* is justified if statics guarantees no equilibrium at a higher level (by the
+  safe bound of a rigid block with friction as its only strength, under the largest uplift that a
+  crack can cause, with a margin of 5 %), and if the block is within 10 % of the failure that the
+  run reports.
+
+*Undecided* is a stop that these bounds neither justify nor refute: displacement control without a
+further equilibrium, or a joint that is too stiff for its mesh ($K_N h/E \\ge 100$, $h$ an element's
+length), which the run reports. A command that exceeds its time limit is a defect."""
+
+#: What `damjoint stress --quake` verifies in every scene, and beside it.
+QUAKES_VERIFIED = """\
+- *Start*: the first frame of `quake_joint.csv` is the static state; the motion begins at rest.
+- *Motion*: the displacement of the crest is the integral of its acceleration, by Newmark's
+  differences; the acceleration of the ground is that of the record, in rock with mass later by the
+  travel time of the wave.
+- *Momentum*: $T$, $N + U$ and, if the water does not change, $M$ of every joint at every step equal
+  the static loads, the inertia of all that is above the joint, the mass of the water included, and
+  the damping by the mass, to 1e-6 of the weight (times the base). Loads and masses by the gravity
+  method.
+- *Water, joint law*: as above, at every node of up to 200 frames.
+- *End*: the static state after the earthquake by hand, and that there is one if the rigid block
+  certainly stands; peaks and residual slip are those of the rows; the exit code."""
+QUAKES_BESIDE = """\
+- *Equations of all unknowns*: the residual of the equations of motion at every step with the
+  matrices of the bodies, laws, water, dashpots and the waves in rock with mass, at most 1e-8 of the
+  static loads. *Energy*: the work of the ground equals kinetic and strain energy and the work on
+  damping and joints, to 1e-8 with `hht_alpha = 0`, with which it also never rises while the ground
+  is at rest; the time integration gives no energy with other `hht_alpha`. In half of the dams, all
+  dams with dashpots (which are not part of the balance of momentum above) and all rigid blocks.
+- *Elastic joint*: the reversed record gives the reversed motion, a hundredth of the record a
+  hundredth of the motion, to 1e-5; the error falls with the square of the step, at least with its
+  first power in the published scheme (if the steps resolve the first mode).
+- *Rigid block*: the slip under the random record is that of Newmark's sliding block at every step,
+  but for errors where the block stops or turns: $\\mu g\\,\\Delta t$ and
+  $2 \\mu N/\\sqrt{K_T L m}$ in velocity.
+- *Engines*: `quake.csv` of the reference GetDP model is the same to 1e-5.
+- Measured, without a limit: by how much half the time step changes the residual slip, and 1.25
+  times the friction and cohesion the largest slip."""
+
+
+def trust_section(results: Path) -> tuple[str, str]:
+    """Return the name of a section, `dams` or `earthquakes`, and its text.
+
+    Raises ValueError if the rows are of different code.
+    """
+    rows = read_rows(results)
+    quakes = rows[0]["command"].startswith("damjoint quake")
+    return ("earthquakes", quake_section(rows)) if quakes else ("dams", dam_section(rows))
+
+
+def dam_section(rows: list[Row]) -> str:
+    """Return the section on dams under static loads."""
+    parts = [
+        f"{len(rows)} random scenes of `damjoint stress`. Each is computed by `damjoint "
+        "run` and verified from its result files, by code that is independent of the "
+        "engines. The scenes: dams from 5 to 150 m, $E$ from 1e9 to 1e13 Pa, $K_N$ from "
+        "1e8 to 1e15 Pa/m, all laws and uplifts, sections with batter, neck, sloping and "
+        "lift joint, silt, ice, anchor and earthquake, rising and falling water; four in "
+        "ten have two to four joints, each with its own law and uplift (the rows of a law "
+        "or an uplift below are of dams with one joint); one 2D "
+        "scene in ten is a slender dam with the stiffness of concrete on a brittle joint. "
+        "The name of a scene is SEED-NUMBER. Written by "
+        "`python -m damjoint_tools.pages trust FILE` from the result file.",
+        source_line(rows),
+        "## What is verified",
+        VERIFIED,
+        "## Result",
+        classes(rows, "law", "uplift", "joints", "dim", "drive"),
+        "## Defects and undecided stops",
+        unsolved(rows),
+        "## The slowest scenes",
+        SLOWEST,
+        slowest(rows),
+    ]
+    return "\n\n".join(parts)
+
+
+def quake_section(rows: list[Row]) -> str:
+    """Return the section on earthquakes."""
+    seeds = sorted({row["scene"].partition("-")[0] for row in rows}, key=int)
+    named = f"seed {seeds[0]}" if len(seeds) == 1 else f"seeds {', '.join(seeds)}"
+    parts = [
+        "## Earthquakes",
+        f"{len(rows)} random earthquakes of `damjoint stress --quake` ({named}), each computed by "
+        "`damjoint quake`. The scenes: dams from 8 to 120 m, $E$ from 5e9 to 1e11 Pa, $K_N$ from "
+        "1e9 to 1e13 Pa/m, all laws and uplifts, batter, sloping joint, one to three joints (most "
+        "of the lift joints with a law and water of their own); added mass, water in the crack by "
+        "each rule, damping of 1 to 10 % with and without its part by the mass, dashpots in the "
+        "joint, rock with mass; `hht_alpha` of 0, -0.05, -0.2, and the published scheme. Records "
+        "of 0.8 to 1.6 s of three waves of 1 to 9 Hz, up to 1 g, most with a vertical component, "
+        "of both signs. One scene in eight each has an elastic joint (no earthquake breaks it), "
+        "or is a rigid block with dry friction on a rigid ground. Written by the same command.",
+        source_line(rows),
+        "### What is verified in each earthquake",
+        QUAKES_VERIFIED,
+        "### And in a part of them, by further runs",
+        QUAKES_BESIDE,
+        "### Earthquakes: result",
+        classes(rows, "kind", "law", "uplift", "joints", "dim"),
+        measured(rows),
+        "### Earthquakes: defects and undecided stops",
+        unsolved(rows),
+        "### The slowest earthquakes",
+        SLOWEST,
+        slowest(rows),
+    ]
+    return "\n\n".join(parts)
+
+
+SLOWEST = "Seconds of the complete command, while other scenes run in parallel."
+
+
+def classes(rows: list[Row], *names: str) -> str:
+    """Return the table of the scenes of each class, by the values of columns; no lists."""
+    lines: list[tuple] = []
+    for name in names:
+        values = sorted({row[name] for row in rows if "," not in row[name]})
+        for value in values:
+            own = [row for row in rows if row[name] == value]
+            lines.append((f"{name} = {value}", *counts(own).values()))
+    lines.append(("all", *counts(rows).values()))
+    return markdown(lines, ("scenes", *CLASSES))
+
+
+def measured(rows: list[Row]) -> str:
+    """Return the table of the numbers of the further checks."""
+    conserves = lambda row: "hht_alpha=0 " in row["command"]
+    frictional = lambda row: "rupture" not in row["law"]
+    parts = {
+        "energy_lost": ((", alpha = 0", conserves), (", others", lambda row: not conserves(row))),
+        "change_by_dt": (
+            (", joints with friction", frictional),
+            (", with a joint of law = rupture", lambda row: not frictional(row)),
+        ),
+    }
+    lines: list[tuple] = []
+    for name, meaning in MEASURES.items():
+        for words, chosen in parts.get(name, (("", lambda row: True),)):
+            values = np.array([float(row[name]) for row in rows if row[name] and chosen(row)])
+            if len(values):
+                low, middle, high = np.percentile(values, [0, 50, 100])
+                cells = (f"{value:.2g}" for value in (low, middle, high))
+                lines.append((f"{meaning}{words}", len(values), *cells))
+    return markdown(lines, ("measured", "scenes", "smallest", "median", "largest"))
+
+
+def unsolved(rows: list[Row]) -> str:
+    """Return the list of defects and undecided stops, with their commands."""
+    return (
+        "\n".join(
+            f"- {row['scene']}, {row['class']}: {row['findings']}\n\n      {row['command']}"
+            for kind in (DEFECT, UNDECIDED)
+            for row in rows
+            if row["class"] == kind
+        )
+        or "None."
+    )
+
+
+def slowest(rows: list[Row]) -> str:
+    """Return the table of the scenes that take longest."""
+    first = sorted(rows, key=lambda row: -float(row["seconds"] or 0))[:5]
+    names = "scene", "seconds", "iterations", "cuts", "findings"
+    return markdown([tuple(row[name] for name in names) for row in first], names)
