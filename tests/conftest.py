@@ -58,6 +58,15 @@ def solve(tmp_path_factory):
 
 
 @pytest.fixture
+def no_pictures(monkeypatch):
+    """Sweeps and checks draw no pictures, which take longer than a small scene: for tests that do
+    not look at them.
+    """
+    monkeypatch.setattr("damjoint.studies.chart.draw", lambda *_: "no chart")
+    monkeypatch.setattr("damjoint.studies.check.draw_check", lambda *_: None)
+
+
+@pytest.fixture
 def command(capfd, tmp_path, monkeypatch):
     """command(*words): exit code, standard output and standard error of damjoint, run in an empty
     folder, without the lines of progress that a slow machine has time to print.

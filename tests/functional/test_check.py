@@ -105,6 +105,7 @@ def test_a_factor_below_the_required_one_fails(solve, setting, message):
         assert (stricter.row["verdict"], stricter.row["why"]) == ("fail", expected)
 
 
+@pytest.mark.usefixtures("no_pictures")
 def test_without_required_factors_the_verdict_is_not_checked(command, combinations, tmp_path):
     """Even with a sliding factor of 0.35, under a law without friction."""
     none = "required_SSF=0", "required_OSF=0", "f_c=0", "mu=0.2", "adhesion=0"

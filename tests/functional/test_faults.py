@@ -244,6 +244,7 @@ def test_output_in_a_locale_without_the_letters_of_the_units(tmp_path):
 
 
 @pytest.mark.parametrize("damage", [b"half", b"\xff", b'"', b"1,2"])
+@pytest.mark.usefixtures("no_pictures")
 def test_a_damaged_sweep_is_reported_and_not_changed(command, tmp_path, damage):
     """With the line of the damage."""
     words = "sweep", "c", *BARE[:-1], "--vary", "mu=0.5", "--out", "mu.csv"

@@ -174,6 +174,7 @@ def test_a_new_law_needs_its_file_in_getdp(monkeypatch):
         dj.run(dj.case("dam", **CASE, law="springs"), engine="getdp")
 
 
+@pytest.mark.usefixtures("no_pictures")
 def test_check_and_critical_are_those_of_the_commands(command, tmp_path):
     """The same numbers as check.csv and the same lines as damjoint critical."""
     (found,) = dj.check([dj.case("dam", levels=40, n_joint=20, required_SSF=2)])
@@ -194,6 +195,7 @@ def test_check_and_critical_are_those_of_the_commands(command, tmp_path):
 
 
 @pytest.mark.parametrize("accuracy", [None, pytest.param("10%", marks=pytest.mark.heavy)])
+@pytest.mark.usefixtures("no_pictures")
 def test_a_sweep_is_that_of_the_command(command, tmp_path, monkeypatch, accuracy):
     """The same rows as the file, from the same distribution; with an accuracy on the same mesh."""
     monkeypatch.chdir(tmp_path)

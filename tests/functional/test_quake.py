@@ -653,6 +653,7 @@ def test_a_run_under_way_of_another_case_is_not_continued(command, case_file, mo
     assert one == two
 
 
+@pytest.mark.usefixtures("no_pictures")
 def test_a_sweep_of_earthquakes(command, case_file, tmp_path):
     """A row fails by its residual slip, that of the single run; rows are not computed again."""
     words = "sweep", case_file, "--vary", "record_scale=0.2,1", "--jobs", 1, *LONG_STEPS

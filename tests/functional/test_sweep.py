@@ -25,6 +25,7 @@ def rows(path):
         return list(csv.DictReader(file))
 
 
+@pytest.mark.usefixtures("no_pictures")
 def test_rows_are_equal_to_single_runs(solve, command, tmp_path):
     words = (
         "sweep",
@@ -53,6 +54,7 @@ def test_rows_are_equal_to_single_runs(solve, command, tmp_path):
             assert float(row[name]) == pytest.approx(history[name][-1], rel=1e-6), name
 
 
+@pytest.mark.usefixtures("no_pictures")
 def test_a_sweep_is_resumed(command, tmp_path):
     """Half of the rows, then all on two processes: the first rows stay unchanged."""
     sweep = lambda mu: command(
@@ -93,6 +95,7 @@ def test_an_interrupted_sweep_ends_at_once_and_keeps_its_rows(tmp_path):
     assert 9 <= len(rows(out)) < 4001
 
 
+@pytest.mark.usefixtures("no_pictures")
 def test_the_row_of_a_dam_that_slides_has_its_verdict(command, tmp_path):
     command(
         "sweep",
@@ -115,6 +118,7 @@ def test_the_row_of_a_dam_that_slides_has_its_verdict(command, tmp_path):
         )
 
 
+@pytest.mark.usefixtures("no_pictures")
 def test_all_rows_of_close_levels_converge_and_their_openings_increase(command, tmp_path):
     """Without tensile strength the shear is lost on opening, a jump of the law."""
     command(
@@ -163,6 +167,7 @@ def test_a_scheduler_with_two_workers(tmp_path, monkeypatch):
         }
 
 
+@pytest.mark.usefixtures("no_pictures")
 def test_a_varied_level_has_the_tailwater_of_the_case(command, tmp_path):
     """Constant, or rising with the reservoir: interpolated at the varied level."""
     common = "default_n_joint = 10; default_h_dam = 3; levels() = {3, 6, 9}; times() = {3};"
@@ -223,6 +228,7 @@ def test_rows_skipped_by_statics_fail_in_a_full_run_too(command, tmp_path):
 MESH = "mesh_pattern=free", "quadrature=full", "n_layers=1", "h_dam=-1", "h_found=-1"
 
 
+@pytest.mark.usefixtures("no_pictures")
 def test_ties_loading_and_accuracy(command, solve, tmp_path):
     """A row with a tied parameter and given levels equals the single run; one mesh for all rows,
     refined for the case as it is.
@@ -268,6 +274,7 @@ def test_the_search_of_a_row_is_that_of_its_case():
         assert search.own == replace(own, published=False)
 
 
+@pytest.mark.usefixtures("no_pictures")
 def test_a_failed_row_has_its_reason_and_the_others_are_computed(command, tmp_path, monkeypatch):
     whole = sweep.stepped
 
