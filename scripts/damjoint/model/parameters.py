@@ -44,6 +44,8 @@ TINY, BELOW_HALF, ANY = 1e-30, 0.5 - 1e-9, 1e200
 
 #: Texts that a process caches: those of a run, but not of all rows of a sweep.
 CACHED = 10
+#: Texts of which it keeps the variables: those of one window, search or report.
+KEPT = 50
 COUNTER = itertools.count()
 
 
@@ -144,10 +146,17 @@ class Parameter:
 
 def parse(text: str) -> dict[str, list[Any]]:
     """Variables of Gmsh's parser after it has read a text written by this package: {name: numbers
-    or texts}; the first CACHED texts of a process are cached, which spares the start of Gmsh.
+    or texts}; the first CACHED texts of a process are cached, which spares the start of Gmsh, and
+    the last KEPT ones are kept in memory.
 
     Raises InputError.
     """
+    return {name: list(values) for name, values in parsed(text).items()}
+
+
+@lru_cache(maxsize=KEPT)
+def parsed(text: str) -> dict[str, list[Any]]:
+    """See `parse`; must not be changed."""
     if next(COUNTER) >= CACHED:
         return parse_by_gmsh(text)
     return cached("variables", sources() + text, lambda: parse_by_gmsh(text))
