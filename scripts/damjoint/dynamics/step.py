@@ -22,7 +22,7 @@ from ..fem.factor import partial_factors
 from ..joint.equilibrium import Equilibrium
 from ..joint.interface import Interface
 from ..joint.joint_laws import TANGENT, JointLaws, JointVariables, Mode
-from ..joint.water import Pressure, Still
+from ..joint.water import BeforeQuake, Pressure
 from ..model.loads import Loading
 from ..solver.controls import LevelControl
 from ..solver.model import Model, StepResult
@@ -96,7 +96,7 @@ class DynamicEquilibrium(Equilibrium):
         jump: Array,
         variables: JointVariables,
         loading: Loading,
-        still: Still | None = None,
+        before_quake: BeforeQuake | None = None,
     ) -> tuple[Pressure, ...]:
         """The water pressure in each joint, which does not change within a step."""
         return self.pressure

@@ -22,7 +22,7 @@ from .flow import FlowDerivative, FlowSolution
 from .interface import Interface
 from .joint_laws import TANGENT, JointLaws, JointVariables, Mode
 from .linear_system import Change
-from .water import JointWater, Pressure, Still
+from .water import BeforeQuake, JointWater, Pressure
 from .wet_faces import WetFace
 
 
@@ -101,9 +101,9 @@ class Equilibrium:
             return np.maximum(level - y, 0) + added.height(level, y, tilt)
 
         def column(level: float, low: float, high: float) -> tuple[float, float]:
-            still = water_column(level, low, high)
+            at_rest = water_column(level, low, high)
             quake = added.column(level, low, high, abs(face.normals[0, 0]))
-            return still[0] + quake[0], still[1] + quake[1]
+            return at_rest[0] + quake[0], at_rest[1] + quake[1]
 
         forces = self.unit_weight * face.press(level, height, column)
         grown = loading.part("silt") if face.side == "up" else 0.0
@@ -175,14 +175,14 @@ class Equilibrium:
         jump: Array,
         variables: JointVariables,
         loading: Loading,
-        still: Still | None = None,
+        before_quake: BeforeQuake | None = None,
     ) -> tuple[Array, list[FlowSolution]]:
         """Forces of flowing water on the faces of the joints (j,), and the solutions of its flow in
-        each joint where it flows; still: see `residual`.
+        each joint where it flows; before_quake: see `residual`.
         """
         total, solutions = np.zeros(len(jump)), []
         for k in self.flowing:
-            opened = self.water[k].opened(jump, variables.joints[k], still)
+            opened = self.water[k].opened(jump, variables.joints[k], before_quake)
             lift, solution = self.water[k].flowing_lift(*opened, loading)
             total += lift
             solutions.append(solution)
@@ -195,25 +195,25 @@ class Equilibrium:
         loading: Loading,
         mode: Mode = TANGENT,
         frozen_lift: Array | None = None,
-        still: Still | None = None,
+        before_quake: BeforeQuake | None = None,
     ) -> Residual:
         """The residual and its derivatives.
 
-        mode: of the laws; frozen_lift (j,): replaces the lift of the flowing water; still: the
-        joints whose opening the water follows instead, see `JointWater`.
+        mode: of the laws; frozen_lift (j,): replaces the lift of the flowing water; before_quake:
+        the joints whose opening the water follows instead, see `JointWater`.
         """
         interface = self.interface
         at_points = interface.jumps(interface.at_points, jump)
         traction, tangent = self.laws.evaluate(at_points, variables, mode)
-        dried = still if any(water.dries for water in self.water) else None
-        if dried:
-            lost, lost_rate = self.lost_pressure(at_points, variables, loading, dried)
+        dry_before = before_quake if any(water.dry_crack for water in self.water) else None
+        if dry_before:
+            lost, lost_rate = self.lost_pressure(at_points, variables, loading, dry_before)
             traction = traction + lost
         value = self.bulk.stiffness @ jump - self.loads(loading) + interface.forces(traction)
 
         flowing, solutions = bool(self.flowing) and frozen_lift is None, list[FlowSolution]()
         if flowing:
-            lift, solutions = self.flowing_lift(jump, variables, loading, still)
+            lift, solutions = self.flowing_lift(jump, variables, loading, before_quake)
             value = value - lift
         elif frozen_lift is not None:
             value = value - frozen_lift
@@ -222,13 +222,13 @@ class Equilibrium:
             stiffness = tangent
             if secant:
                 stiffness = (mode.frozen or self.laws).secant_stiffness(at_points, variables)
-            if dried:
+            if dry_before:
                 stiffness = stiffness + lost_rate
             change = interface.change(stiffness, self.undamaged)
             following = {
                 k: self.water[k].derivative(jump, variables.joints[k], solution)
                 for k, solution in zip(self.flowing, solutions, strict=False)
-                if not (still and self.water[k].remembers)
+                if not (before_quake and self.water[k].freezes_uplift)
             }
             flow = FlowDerivative.joined(list(following.values()))
             return replace(change, flow=flow, flowing=tuple(following))
@@ -236,11 +236,11 @@ class Equilibrium:
         def by_level() -> Array:
             slope = -self.rate(self._loads, loading)
             if flowing:
-                lifted = lambda other: self.flowing_lift(jump, variables, other, still)[0]
+                lifted = lambda other: self.flowing_lift(jump, variables, other, before_quake)[0]
                 slope = slope - self.rate(lifted, loading)
-            if dried:
+            if dry_before:
                 losing = lambda other: interface.forces(
-                    self.lost_pressure(at_points, variables, other, dried)[0]
+                    self.lost_pressure(at_points, variables, other, dry_before)[0]
                 )
                 slope = slope + self.rate(losing, loading)
             return slope
@@ -248,13 +248,13 @@ class Equilibrium:
         return Residual(value, by_jump, by_level)
 
     def lost_pressure(
-        self, jump: Array, variables: JointVariables, loading: Loading, still: Still
+        self, jump: Array, variables: JointVariables, loading: Loading, before_quake: BeforeQuake
     ) -> tuple[Array, Array]:
         """The losses of `JointWater.lost_pressure` at the points of all joints, for jumps (q, 3)
         there.
         """
         pairs = zip(self.water, variables.split(jump[:, 0]), variables.joints, strict=True)
-        losses = [water.lost_pressure(own, v, loading, still) for water, own, v in pairs]
+        losses = [water.lost_pressure(own, v, loading, before_quake) for water, own, v in pairs]
         traction, rate = (np.concatenate(parts) for parts in zip(*losses, strict=True))
         return traction, rate
 
@@ -263,11 +263,11 @@ class Equilibrium:
         jump: Array,
         variables: JointVariables,
         loading: Loading,
-        still: Still | None = None,
+        before_quake: BeforeQuake | None = None,
     ) -> tuple[Pressure, ...]:
-        """The water pressure in each joint at a jump; still: see `residual`."""
+        """The water pressure in each joint at a jump; before_quake: see `residual`."""
         pairs = zip(self.water, variables.joints, strict=True)
-        return tuple(water.pressure(jump, own, loading, still) for water, own in pairs)
+        return tuple(water.pressure(jump, own, loading, before_quake) for water, own in pairs)
 
     def crest(self, jump: Array, loading: Loading) -> float:
         """The crest's displacement along x [m]."""

@@ -12,7 +12,7 @@ from ..arrays import Array
 from ..classes import dataclass
 from ..csr import CsrMatrix
 from ..laws import Law
-from ..model.case import Case, flows, has_drains, remembers
+from ..model.case import Case, flows, freezes_uplift, has_drains
 from ..model.loads import Loading, heads_at_ends
 from .flow import FlowDerivative, FlowSolution
 from .interface import JointInterface
@@ -20,9 +20,9 @@ from .joint_laws import JointVariables
 
 
 @dataclass(frozen=True)
-class Still:
-    """The joints before an earthquake that leaves their water as it is: jumps (j,) and internal
-    variables.
+class BeforeQuake:
+    """The joints before a pseudo-static earthquake, from which their water follows with
+    quake_uplift = unchanged or zero: jumps (j,) and internal variables.
     """
 
     jump: Array
@@ -50,10 +50,10 @@ class JointWater:
     def __init__(self, case: Case, joint: JointInterface, number: int) -> None:
         """case: of the joint, see `Case.joints`; number: of the joint, from 0."""
         self.case, self.joint, self.number = case, joint, number
-        #: whether it follows in an earthquake from the joint before, and is absent in the crack
-        #: that the earthquake opens
-        self.remembers = remembers(case)
-        self.dries = self.remembers and case["quake_uplift"] == "zero"
+        #: whether the water follows from the joint before a pseudo-static earthquake, and whether
+        #: it is absent in the crack that the earthquake opens
+        self.freezes_uplift = freezes_uplift(case)
+        self.dry_crack = self.freezes_uplift and case["quake_uplift"] == "zero"
         #: distance from the heel beyond which there is no water [m]
         self.waterstop = case["waterstop"] if case["uplift"] == "waterstop" else None
         self.wet, self.flowing = case["uplift"] != "none" and self.waterstop != 0, flows(case)
@@ -178,16 +178,18 @@ class JointWater:
         beyond = self.wetted.fields @ self.expand_to_nodes(solution.pressure)
         return self.lift(loading, beyond), solution
 
-    def opened(self, jump: Array, variables: Any, still: Still | None) -> tuple[Array, Any]:
+    def opened(
+        self, jump: Array, variables: Any, before_quake: BeforeQuake | None
+    ) -> tuple[Array, Any]:
         """Jump and internal variables that the water follows: the present ones, or those before an
         earthquake.
         """
-        if still and self.remembers:
-            return still.jump, still.variables.joints[self.number]
+        if before_quake and self.freezes_uplift:
+            return before_quake.jump, before_quake.variables.joints[self.number]
         return jump, variables
 
     def lost_pressure(
-        self, opening: Array, variables: Any, loading: Loading, still: Still
+        self, opening: Array, variables: Any, loading: Loading, before_quake: BeforeQuake
     ) -> tuple[Array, Array]:
         """Pressure [Pa] that the water loses at the law's points in the crack that an earthquake
         opens, as a traction (q, 3), and its derivative (q, 3, 3).
@@ -197,10 +199,10 @@ class JointWater:
         """
         number, K_N = len(opening), self.case["K_N"]
         traction, rate = np.zeros((number, 3)), np.zeros((number, 3, 3))
-        if not self.dries:
+        if not self.dry_crack:
             return traction, rate
         fields, joint = self.joint.fields, self.joint
-        jump, before_variables = self.opened(still.jump, None, still)
+        jump, before_variables = self.opened(before_quake.jump, None, before_quake)
         beyond: Array | float = 0.0
         if self.flowing:
             solution = self.solve_flow(jump, before_variables, loading)
@@ -220,11 +222,11 @@ class JointWater:
         return self.joint.flow.derivative(solution, growing)
 
     def pressure(
-        self, jump: Array, variables: Any, loading: Loading, still: Still | None = None
+        self, jump: Array, variables: Any, loading: Loading, before_quake: BeforeQuake | None = None
     ) -> Pressure:
-        """The water pressure in the joint at a jump; still: the joints before an earthquake."""
+        """The water pressure in the joint at a jump; before_quake: see `Equilibrium.residual`."""
         joint, fields = self.joint, self.joint.fields
-        opened = self.opened(jump, variables, still)
+        opened = self.opened(jump, variables, before_quake)
         inner: Array | float = 0.0
         if self.flowing:
             inner = self.solve_flow(*opened, loading).pressure
@@ -245,9 +247,9 @@ class JointWater:
         points = at(fields.at_points, joint.points.positions)
         water_points = at(self.wetted.fields, self.wetted.points.positions)
         nodes = at(fields.at_locations, joint.space.locations)
-        if still and self.dries:
+        if before_quake and self.dry_crack:
             opening = joint.jumps(joint.at_points, jump)[:, 0]
-            lost_at_points = self.lost_pressure(opening, variables, loading, still)[0][:, 0]
+            lost_at_points = self.lost_pressure(opening, variables, loading, before_quake)[0][:, 0]
             weights = joint.points.weights  # at the nodes so that the resultant is the same
             spread = fields.at_points.T @ (weights * lost_at_points)
             lost_at_nodes = spread / (fields.at_points.T @ weights)

@@ -43,8 +43,8 @@ from .parameters import (
 from .scene import stacked
 from .values import ParameterValues
 from .values import flows as flows
+from .values import freezes_uplift as freezes_uplift
 from .values import has_drains as has_drains
-from .values import remembers as remembers
 
 CASES = data("cases")
 

@@ -164,8 +164,10 @@ def has_drains(values: Values | ParameterValues) -> bool:
     return values["uplift"] == "drained" or bool(flows(values) and values["drains"])
 
 
-def remembers(values: Values | ParameterValues) -> bool:
-    """Whether the water pressure in an earthquake follows from the joint before it."""
+def freezes_uplift(values: Values | ParameterValues) -> bool:
+    """Whether the water pressure in the joint during a pseudo-static earthquake follows from the
+    joint before it.
+    """
     mode, uplift = values["quake_uplift"], values["uplift"]
     if uplift == "none" or not (values["k_h"] or values["k_v"]):
         return False

@@ -216,8 +216,8 @@ class LoadStepper:
         )
 
     def beyond_path(self, smallest: bool) -> bool:
-        """Whether a step starts where the equilibrium path has ended: the dam has failed, or the
-        step can still be cut.
+        """Whether an equilibrium path has ended and is not followed again: the dam has failed, or
+        the step can be shortened first.
         """
         return self.path_ended and (self.mechanism is not None or not smallest)
 

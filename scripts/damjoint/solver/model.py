@@ -18,8 +18,8 @@ from ..joint.equilibrium import Equilibrium
 from ..joint.interface import Interface, interface_of
 from ..joint.joint_laws import TANGENT, Mode
 from ..joint.linear_system import Border
-from ..joint.water import Still
-from ..model.case import Case, remembers
+from ..joint.water import BeforeQuake
+from ..model.case import Case, freezes_uplift
 from ..model.loads import COMPLETE, Loading
 from .controls import Control, DisplacementControl, LevelControl
 from .newton import Convergence, Diverged, Iterate, Strategy, newton
@@ -111,13 +111,15 @@ class Model:
         """The loads of a time, at a level [m]."""
         return Loading.at(self.case, time, level, self.case.tail_at(time))
 
-    def still(self, state: State, time: float) -> Still | None:
+    def before_quake(self, state: State, time: float) -> BeforeQuake | None:
         """The joints before the earthquake, for a step from a state to a time, if the water in one
         of them follows from that.
         """
-        if not any(map(remembers, self.case.joints)) or not self.loading(time, 0.0).part("quake"):
+        if not any(map(freezes_uplift, self.case.joints)) or not self.loading(time, 0.0).part(
+            "quake"
+        ):
             return None
-        return state.still or Still(state.jump, state.variables)
+        return state.before_quake or BeforeQuake(state.jump, state.variables)
 
     def advance(
         self,
@@ -196,7 +198,7 @@ class Model:
         """A step by one strategy, from a jump and a level, see `advance`. Raises Diverged."""
         equilibrium, start = self.equilibrium, state.begin_step(self.equilibrium.laws, time)
         interface, laws, variables = equilibrium.interface, equilibrium.laws, start.variables
-        frozen_laws, still = frozen and frozen.points, self.still(state, time)
+        frozen_laws, before_quake = frozen and frozen.points, self.before_quake(state, time)
         loads, convergence = self.loading(time, begin[1]), self.convergence
         stiffness = equilibrium.case["K_N"] * equilibrium.bulk.width
 
@@ -209,7 +211,7 @@ class Model:
                     releasing = crossing & ((side < 0) | (strategy.release > 1))
                     side, mode = np.where(releasing, 0, side), replace(mode, releasing=releasing)
             here = replace(loads, level=level)
-            residual = equilibrium.residual(jump, variables, here, mode, frozen_lift, still)
+            residual = equilibrium.residual(jump, variables, here, mode, frozen_lift, before_quake)
             size, gap = float(np.linalg.norm(residual.value)), 0.0
             if isinstance(control, DisplacementControl):
                 gap = control.value - control.measure(equilibrium, jump, here)
@@ -239,7 +241,7 @@ class Model:
             start.update(equilibrium, end.jump, frozen),
             time=time,
             loading=loading,
-            pressures=equilibrium.pressures(end.jump, variables, loading, still),
-            still=still,
+            pressures=equilibrium.pressures(end.jump, variables, loading, before_quake),
+            before_quake=before_quake,
         )
         return StepResult(new.after(state), iterations, end.size / (self.reference or 1.0))

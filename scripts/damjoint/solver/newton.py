@@ -50,8 +50,8 @@ Evaluate = Callable[[Array, float, Iterate | None], Iterate]
 
 @dataclass(frozen=True)
 class Convergence:
-    """When an iterate has converged: norm of the residual <= tolerance, or what rounding alone
-    makes of it.
+    """When an iterate has converged: norm of the residual <= tolerance, or not above what rounding
+    alone makes of it.
 
     After a slip of a centimetre the terms of the residual are 1e9 times the loads and cancel; no
     iteration gets below a few times their rounding.
@@ -101,7 +101,7 @@ def newton(
     Raises Diverged.
 
     A correction is halved only while it makes the residual grow more than strategy.growth times:
-    while points open or break the residual has to rise, and a monotone line search would creep.
+    while points open or break the residual has to rise, which a monotone line search prevents.
     """
     now, sizes = start, list[float]()
     for iterations in range(strategy.iterations + 1):

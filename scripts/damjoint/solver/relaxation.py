@@ -30,7 +30,7 @@ def relax(
     """
     equilibrium, state = model.equilibrium, begin
     laws, iterations, sizes, found = equilibrium.laws, 0, list[float](), None
-    still = model.still(begin, time)
+    before_quake = model.before_quake(begin, time)
     strategies = [strategy for strategy in model.strategies[:-1] if not strategy.release]
     for _ in range(ROUNDS):
         start = state.begin_step(laws, time)
@@ -40,7 +40,7 @@ def relax(
         if step is None and equilibrium.flowing:
             level = control.level if isinstance(control, LevelControl) else start.loading.level
             loading = model.loading(time, level)
-            opened = still or start
+            opened = before_quake or start
             lift, _ = equilibrium.flowing_lift(opened.jump, opened.variables, loading)
             step = model.advance(
                 start,
@@ -56,10 +56,12 @@ def relax(
         iterations += step.iterations
         state = replace(step.state, time=begin.time)
         jump, variables = state.jump, state.begin_step(laws, time).variables
-        residual = equilibrium.residual(jump, variables, state.loading, still=still).value
+        residual = equilibrium.residual(
+            jump, variables, state.loading, before_quake=before_quake
+        ).value
         size = float(np.linalg.norm(residual))
         if size <= model.convergence.tolerance:
-            pressures = equilibrium.pressures(jump, variables, state.loading, still)
+            pressures = equilibrium.pressures(jump, variables, state.loading, before_quake)
             relaxed = replace(step.state, pressures=pressures).after(begin)
             return StepResult(relaxed, iterations, size / (model.reference or 1.0)), True
         if repeats(size, sizes, SAME):

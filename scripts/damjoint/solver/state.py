@@ -9,7 +9,7 @@ import numpy as np
 from ..arrays import Array
 from ..joint.equilibrium import Equilibrium
 from ..joint.joint_laws import JointLaws, JointVariables
-from ..joint.water import Pressure, Still
+from ..joint.water import BeforeQuake, Pressure
 from ..model.loads import Loading
 
 
@@ -35,7 +35,7 @@ class State:
     #: of the water in each joint; the aperture of what had broken before the step lets it in
     pressures: tuple[Pressure, ...] = ()
     #: the joints before the earthquake that acts, if the water follows from them
-    still: Still | None = None
+    before_quake: BeforeQuake | None = None
     #: the state before, without its own
     previous: State | None = None
 

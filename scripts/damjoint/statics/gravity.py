@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..model.case import Case, remembers
+from ..model.case import Case, freezes_uplift
 from ..model.constraints import ZANGAR
 from ..model.loads import Loading, heads_at_ends, line_forces, zangar_column, zangar_share
 from ..model.parameters import constants
@@ -582,10 +582,10 @@ def crack_before_earthquake(case: Case, time: float, level: float, tension: bool
     """The crack length [m] without the earthquake that acts at a time; None if the water in the
     joint does not follow from it.
     """
-    if not remembers(case) or not Loading.at(case, time, level, 0.0).part("quake"):
+    if not freezes_uplift(case) or not Loading.at(case, time, level, 0.0).part("quake"):
         return None
-    still = replace(case, values=case.values | {"k_h": 0.0, "k_v": 0.0})
-    return at(still, time, level, tension).crack_length
+    without_quake = replace(case, values=case.values | {"k_h": 0.0, "k_v": 0.0})
+    return at(without_quake, time, level, tension).crack_length
 
 
 def spans_between(ends: list[float]) -> list[tuple[float, float]]:

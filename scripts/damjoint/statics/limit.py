@@ -14,7 +14,7 @@ import numpy as np
 
 from ..joint.interface import Interface
 from ..laws import UNBREAKABLE
-from ..model.case import Case, flows, remembers
+from ..model.case import Case, flows, freezes_uplift
 from ..model.results import column_of
 from ..solver.load_stepper import LoadStepper
 
@@ -66,7 +66,7 @@ def mechanism(case: Case, interface: Interface) -> tuple[str, str]:
     Sliding: the shear exceeds the law's `shear_bound`. Overturning: with the tensile strength f
     and the joint's length L, the moment of the tension about the toe is at most f L^2/2.
     """
-    follows = (flows(joint) or remembers(joint) for joint in case.joints)
+    follows = (flows(joint) or freezes_uplift(joint) for joint in case.joints)
     if case["drive"] != "level" or any(follows):
         return "", ""
     if case.geometry:

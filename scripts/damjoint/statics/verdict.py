@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..laws import Evidence
-from ..model.case import Case, has_drains, remembers
+from ..model.case import Case, freezes_uplift, has_drains
 from ..model.loads import COMPLETE, thermal_strains
 from ..model.results import Results, row_of_joint
 from . import gravity
@@ -203,7 +203,7 @@ def highest_on_joint(case: Case, last: dict[str, float]) -> tuple[float, str, st
     from scipy.optimize import brentq  # half of a run's start
 
     law, time = case.law, min(last["time"], case.times[-1])
-    if case.geometry or case["uplift"] == "flow" or remembers(case):
+    if case.geometry or case["uplift"] == "flow" or freezes_uplift(case):
         return np.inf, "", ""
     crack = 0.0 if law.open_tension else last["crack_length"]
     block = lambda level: gravity.with_crack(case, time, level, crack)

@@ -15,7 +15,7 @@ import numpy as np
 
 from ... import InputError, RunError, data
 from ...fem.memory import bulk_size, check_memory
-from ...model.case import Case, flows, has_drains, remembers
+from ...model.case import Case, flows, freezes_uplift, has_drains
 from ...model.mesh import Mesh, mesh_of
 from .. import OnStep, Outcome
 from . import process, tables
@@ -46,7 +46,7 @@ def check_joint(own: Case) -> None:
         raise InputError(
             f"law = {own['law']}: must have a file pro/law_{own['law']}.pro with engine = getdp"
         )
-    if remembers(own):
+    if freezes_uplift(own):
         raise InputError(
             f"quake_uplift = {own['quake_uplift']}: must be crack with engine = getdp and "
             f"uplift = {own['uplift']}"
