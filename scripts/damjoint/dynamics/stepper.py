@@ -171,7 +171,7 @@ class Earthquake:
     def _step(self, length: float, halvings: int) -> Converged | None:
         """A step of a length; None if it does not converge."""
         now = self.now
-        if self.published:
+        if self.published and self.problem.dashpots.any():
             problem = with_corner_dashpots(self.problem, now.state)
             self.steps_of_length[halvings] = TimeStep(problem, length)
         elif halvings not in self.steps_of_length:

@@ -75,7 +75,8 @@ def figure(result: QuakeResult) -> Figure:
         ax.grid(alpha=0.3)
         ax.set_xlim(0, time[-1])
     if block is not None:
-        axes[4].axhline(1e3 * block, color=DARK, lw=0.8, ls="--", label="rigid block, at the end")
+        words = "rigid block at the end" + (f", {case.joint_names[0]}" if len(joints) > 1 else "")
+        axes[4].axhline(1e3 * block, color=DARK, lw=0.8, ls="--", label=words)
     for ax in axes[:6]:
         above = {"loc": "lower right", "bbox_to_anchor": (1, 0.97), "ncols": 4, "frameon": False}
         ax.legend(fontsize=7, **above)
