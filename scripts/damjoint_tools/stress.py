@@ -8,6 +8,8 @@ from __future__ import annotations
 import csv
 import itertools
 import os
+import resource
+import signal
 import subprocess
 import sys
 import tempfile
@@ -41,8 +43,8 @@ CLASSES = VERIFIED, JUSTIFIED, UNDECIDED, DEFECT = (
     *("converged and verified", "stopped and justified", "stopped, undecided", "defect"),
 )
 
-#: Time limit of a scene [s].
-TIME_LIMIT = 300
+#: Limit of a command's CPU time [s], and of its duration while others run, over that.
+TIME_LIMIT, LONGEST = 300, 4
 
 #: One thread for each command, as several run at the same time.
 ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL")}
@@ -85,10 +87,13 @@ def run_of(scene: RandomScene, folder: Path, *options: str, name: str = "out") -
             env=environment,
             capture_output=True,
             text=True,
-            timeout=TIME_LIMIT,
+            timeout=LONGEST * TIME_LIMIT,
+            preexec_fn=limit_time,
         )
     except subprocess.TimeoutExpired:
-        raise RunError(f"not finished after {TIME_LIMIT} s") from None
+        raise RunError(f"not finished after {LONGEST * TIME_LIMIT} s") from None
+    if done.returncode == -signal.SIGXCPU:
+        raise RunError(f"not finished after {TIME_LIMIT} s of CPU time")
     run = (QuakeFiles if quake else RunFiles)(case, folder / name, done.returncode)
     try:
         _ = run.record["verdict"]
@@ -96,6 +101,11 @@ def run_of(scene: RandomScene, folder: Path, *options: str, name: str = "out") -
         last = (done.stderr.strip().splitlines() or ["no message"])[-1]
         raise RunError(f"exit code {done.returncode}: {last}") from None
     return run
+
+
+def limit_time() -> None:
+    """Limit the CPU time of this process."""
+    resource.setrlimit(resource.RLIMIT_CPU, (TIME_LIMIT, TIME_LIMIT + 1))
 
 
 def with_further_checks(

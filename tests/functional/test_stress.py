@@ -227,6 +227,13 @@ def test_stress_is_reproducible_and_resumed_and_makes_a_page(command, monkeypatc
         trust.trust_section(Path("s.csv"))
 
 
+def test_a_scene_beyond_its_time_limit_is_a_defect(tmp_path, monkeypatch):
+    monkeypatch.setattr(stress, "TIME_LIMIT", 1)
+    row = stress.run_and_verify(random_scenes.random_scene(7, 111), tmp_path)
+    assert row["class"] == stress.DEFECT
+    assert row["findings"] == "not finished after 1 s of CPU time"
+
+
 @pytest.mark.heavy
 def test_random_dams_have_no_defect(tmp_path):
     rows = stress.stress(60, 7, tmp_path / "stress.csv")
