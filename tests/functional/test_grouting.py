@@ -33,7 +33,7 @@ def test_published_openings_of_a_grouted_joint():
     3.
     """
     space, face = block()
-    stiffness = elasticity(space, 2, {"dam": (3e12, 0.25)})
+    stiffness = elasticity(space, 2, {"dam": (3e12, 0.25)}).scipy()
     weight = -2400 * 9.81 * body_force(space, 2, 1)
     points, functions = points_of(face, JOINT["published"][2]), len(space.locations)
     # by symmetry the opening is twice the displacement of the face

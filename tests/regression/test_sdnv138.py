@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from damjoint.csr import CsrMatrix
 from damjoint.dynamics.record import read
 from damjoint.dynamics.scheme import HHT, Motion
 from damjoint.dynamics.stepper import Earthquake
@@ -91,7 +92,7 @@ def with_eight_functions(bodies):
         size = len(quads), len(body.space.locations)
         rule = sparse.csr_matrix((np.tile(signs, len(quads)), (rows, quads.ravel())), size)
         springs = 3e15 * sparse.kron(rule.T @ rule, sparse.eye(2))
-        return replace(body, stiffness=(body.stiffness + springs).tocsr())
+        return replace(body, stiffness=CsrMatrix.of_scipy(body.stiffness.scipy() + springs))
 
     return replace(bodies, by_name={n: changed(b) for n, b in bodies.by_name.items()})
 

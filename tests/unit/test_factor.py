@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from damjoint.csr import CsrMatrix
 from damjoint.fem import factor
 from scipy import sparse
 
@@ -34,7 +35,7 @@ def test_schur_complement(system, method):
     inside = np.setdiff1d(np.arange(len(loads)), keep)
     dense = matrix.toarray()
     through = dense[np.ix_(keep, inside)] @ np.linalg.inv(dense[np.ix_(inside, inside)])
-    schur, reduced = factor.schur_complement(matrix, keep, loads)
+    schur, reduced = factor.schur_complement(CsrMatrix.of_scipy(matrix), keep, loads)
     expected = dense[np.ix_(keep, keep)] - through @ dense[np.ix_(inside, keep)]
     assert schur == pytest.approx(expected, rel=1e-12, abs=1e-13)
     assert reduced == pytest.approx(loads[keep] - through @ loads[inside], rel=1e-12, abs=1e-13)
@@ -54,7 +55,7 @@ def test_loads_as_a_border(system, method):
     keep, size = np.array([7, 3, 250, 100, 101]), len(loads)
     unit = np.eye(size)[:, [40, 40, 3]]
     loads = np.hstack([loads, unit])
-    expected, reduced = factor.schur_complement(matrix, keep, loads)
+    expected, reduced = factor.schur_complement(CsrMatrix.of_scipy(matrix), keep, loads)
     with_loads = factor.bordered(matrix, sparse.csr_matrix(loads))
     schur = factor.dense_schur(with_loads, np.append(keep, np.arange(size, with_loads.shape[0])))
     assert schur[:5, :5] == pytest.approx(expected, rel=1e-12, abs=1e-13)

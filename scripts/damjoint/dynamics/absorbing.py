@@ -129,7 +129,7 @@ class AbsorbingRock:
 
         return AbsorbingRock(
             mass=moved.T @ mass(space, dim, {ROCK: density}) @ moved,
-            stiffness=moved.T @ elasticity(space, dim, elastic) @ moved,
+            stiffness=moved.T @ elasticity(space, dim, elastic).scipy() @ moved,
             dashpots=weighted @ blocks(impedance) @ values,
             field=FreeField(
                 record=record,

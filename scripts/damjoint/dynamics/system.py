@@ -78,7 +78,7 @@ class System:
             moved = motion[name]
             of_solid = mass(body.space, dim, densities)
             of_water = added_mass(case, interface, body)
-            stiffness = stiffness + moved.T @ body.stiffness @ moved
+            stiffness = stiffness + moved.T @ body.stiffness.scipy() @ moved
             of_mass = of_mass + moved.T @ (of_solid + of_water) @ moved
             x, y = (nodal(body.space, dim, uniform(axis)) for axis in np.eye(3)[:2])
             # the water follows a vertical motion of the ground

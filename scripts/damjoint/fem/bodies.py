@@ -8,8 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..arrays import Array, IntArray, Sparse
+from ..arrays import Array, IntArray, distinct
 from ..classes import dataclass
+from ..csr import CsrMatrix
 from ..model.case import Case
 from ..model.loads import COMPLETE, across, thermal_strains, wet
 from ..model.mesh import LINES, Body, Mesh, mesh_of
@@ -39,7 +40,7 @@ class ElasticBody:
 
     space: Space
     #: (n, n) [N/m]
-    stiffness: Sparse
+    stiffness: CsrMatrix
     #: load vectors (n,) by name: weight densities dam_x, dam_y, lower_x, ... [N/m3], forces per
     #: metre of a line ice_x, ice_y, ... [N/m], thermal strains dam_uniform, ... [-]
     unit_loads: dict[str, Array]
@@ -69,13 +70,15 @@ class ElasticBody:
         thermal = {n: thermal_load(space, dim, material, *s) for n, s in strains.items()}
         along_z = np.zeros(0, int)
         if dim == 3 and case["hold_z"]:
-            along_z = np.unique(dofs(within(mesh.bodies["sides"], body), [2]))
+            along_z = distinct(dofs(within(mesh.bodies["sides"], body), [2]))
         return ElasticBody(
             space=space,
             stiffness=elasticity(space, dim, material),
             unit_loads=dict(unit_loads(space, mesh, name)) | thermal,
             unit_strains={n: at_middles(space, *strain) for n, strain in strains.items()},
-            fixed_dofs=np.union1d(dofs(within(mesh.bodies["fixed"], body)), along_z),
+            fixed_dofs=distinct(
+                np.concatenate([dofs(within(mesh.bodies["fixed"], body)), along_z])
+            ),
             fixed_along_z=along_z,
             joint_dofs={
                 (number, above): dofs(joint.face(above))
@@ -121,7 +124,7 @@ def within(surface: Body, body: Body) -> Body:
     """The part of a surface that belongs to a body."""
     inside = np.isin(surface.node_tags, body.node_tags)
     cells = [(shape, table[inside[table].all(axis=1)]) for shape, table in surface.cells]
-    used = np.unique(np.concatenate([table.ravel() for _, table in cells]))
+    used = distinct(np.concatenate([table.ravel() for _, table in cells]))
     number = np.zeros(len(surface.points), int)
     number[used] = np.arange(len(used))
     return Body(
@@ -161,7 +164,8 @@ class Bodies:
             normals = self.mesh.faces[face].surface.normals[:, :dim]
             loaded = np.abs(normals).max(axis=0) > 1e-9
             dofs.append(of_face.reshape(-1, dim)[:, loaded].ravel())
-        return np.setdiff1d(np.concatenate(dofs), body.fixed_dofs)
+        every = distinct(np.concatenate(dofs))
+        return every[~np.isin(every, body.fixed_dofs)]
 
     @property
     def crest(self) -> tuple[str, int]:

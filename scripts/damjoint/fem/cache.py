@@ -26,7 +26,6 @@ from ..model.loads import COMPLETE, overtopped, thermal_strains, wet_segments
 from ..model.mesh import Body, Face, JointMesh, Mesh, mesh_of, shares
 from ..model.scene import MATERIALS
 from ..storage import cache_folder
-from ..threads import scipy_linalg
 from .condensed import Condensed, CondensedJoint, JointDofs
 from .memory import check_size
 
@@ -92,7 +91,6 @@ def cached(case: Case) -> tuple[Condensed, Bodies | None]:
         return stored, None
     if not case.geometry:
         check_size(case)
-    scipy_linalg()
     from .bodies import Bodies
     from .condensation import condense
 

@@ -27,15 +27,13 @@ import time
 from typing import Any
 
 import numpy as np
-from scipy import linalg
 
-from ..arrays import Array, IntArray
+from ..arrays import Array, IntArray, distinct, others
 from ..classes import dataclass
 from ..model.case import Case
 from . import factor
 from .bodies import Bodies, ElasticBody
 from .condensed import Condensed, CondensedJoint
-from .glued_elimination import responses_at_once
 from .gluing import BodyDofs, Gluing
 from .responses import Responses
 
@@ -66,19 +64,22 @@ class ReducedBody:
         those that are fixed are left out.
         """
         shared = np.flatnonzero(np.isin(joint, loaded))
-        loaded = np.setdiff1d(loaded, np.concatenate([joint, body.fixed_dofs]))
+        loaded = distinct(loaded)
+        loaded = loaded[~np.isin(loaded, np.concatenate([joint, body.fixed_dofs]))]
         stiffness, loads = body.stiffness, np.column_stack(list(body.unit_loads.values()))
         size = stiffness.shape[0]
-        free = np.setdiff1d(np.arange(size), body.fixed_dofs)
+        free = others(size, body.fixed_dofs)
         number = np.full(size, -1)
         number[free] = np.arange(len(free))
         n, ends = len(joint), np.concatenate([number[joint], number[loaded]])
-        schur, reduced_loads = factor.schur_complement(stiffness[free][:, free], ends, loads[free])
+        schur, reduced_loads = factor.schur_complement(
+            stiffness[free].columns(free), ends, loads[free]
+        )
         jj, jl, ll = schur[:n, :n], schur[:n, n:], schur[n:, n:]
         units, loaded_units = reduced_loads[:n], reduced_loads[n:]
         spread = jl
         if len(loaded):
-            to_joint = linalg.solve(ll, jl.T, assume_a="pos").T
+            to_joint = np.linalg.solve(ll, jl.T).T
             jj = jj - to_joint @ jl.T
             jj, spread = (jj + jj.T) / 2, -to_joint
             units = units - to_joint @ loaded_units
@@ -96,7 +97,7 @@ class ReducedBody:
 def add_at(total: Array, places: Any, values: Array) -> None:
     """Add values at places of an array, which may be repeated."""
     rows = np.ravel(places[0] if isinstance(places, tuple) else places)
-    if len(np.unique(rows)) == len(rows):
+    if len(distinct(rows)) == len(rows):
         total[places] += values  # several times faster
     else:
         np.add.at(total, places, values)
@@ -114,15 +115,15 @@ class JointElimination:
             stiffness, jumps = reduced[name].stiffness, own.jumps
             # (a body that a joint is inside of has several degrees of freedom of a node)
             add_at(glued, np.ix_(own.node, own.node), stiffness)
-            if jumps.nnz:
-                carried = stiffness @ jumps
+            if len(jumps.data):
+                carried = (jumps.T @ stiffness).T
                 add_at(coupling.T, own.node, carried)
                 by_jumps += jumps.T @ carried
         #: C^T
         self.coupling = coupling
         #: L of K = L L^T, and L^-1 C
-        self.factor = linalg.cholesky(glued, lower=True, overwrite_a=True)
-        self.half = linalg.solve_triangular(self.factor, coupling.T, lower=True)
+        self.factor = np.linalg.cholesky(glued)
+        self.half = np.linalg.solve(self.factor, coupling.T)
         #: S
         self.stiffness = by_jumps - self.half.T @ self.half
 
@@ -135,7 +136,7 @@ class JointElimination:
     def transmitted(self, own: BodyDofs, forces: Array) -> Array:
         """t_0 of forces (n, k) on the degrees of freedom of a body."""
         nodes = self.on_nodes(own, forces)
-        through = self.half.T @ linalg.solve_triangular(self.factor, nodes, lower=True)
+        through = self.half.T @ np.linalg.solve(self.factor, nodes)
         return own.jumps.T @ forces - through
 
 
@@ -157,10 +158,11 @@ def responses_body_by_body(bodies: Bodies, gluing: Gluing) -> Responses:
     above, own_dofs = reduced[crest_body], gluing.bodies[crest_body]
     size = len(above.loaded_stiffness)
     at_crest = 1.0 * (above.dofs[:size] == crest)
-    row = linalg.solve(above.loaded_stiffness, at_crest, assume_a="pos")
+    row = np.linalg.solve(above.loaded_stiffness, at_crest)
     crest_face = 1.0 * (own_dofs.dofs == crest) - above.coupling @ row
     crest_nodes = joints.on_nodes(own_dofs, crest_face)
-    crest_both = linalg.cho_solve((joints.factor, True), crest_nodes)
+    half = np.linalg.solve(joints.factor, crest_nodes)
+    crest_both = np.linalg.solve(joints.factor.T, half)
 
     pressure: list[Array] = []
     crest_pressure: list[Array] = []
@@ -201,7 +203,9 @@ def condense(case: Case, bodies: Bodies) -> Condensed:
     """Eliminate the bodies of a case."""
     start, mesh = time.perf_counter(), bodies.mesh
     gluing = Gluing.of(bodies)
-    eliminate = responses_at_once if mesh.dim == 3 else responses_body_by_body
+    eliminate = responses_body_by_body
+    if mesh.dim == 3:
+        from .glued_elimination import responses_at_once as eliminate
     responses = eliminate(bodies, gluing)
     return Condensed(
         **vars(responses),

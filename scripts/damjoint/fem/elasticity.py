@@ -11,9 +11,9 @@ from functools import reduce
 from typing import Any
 
 import numpy as np
-from scipy import sparse
 
 from ..arrays import Array, BoolArray, IntArray, Sparse
+from ..csr import LARGE, CsrMatrix
 from .elements import BULK, MASS, Space, basis, corners_of, geometry, nodal, points_of, tabulated
 
 #: Young's modulus [Pa] and Poisson's ratio [-] by region.
@@ -31,17 +31,21 @@ def lame(young: float, poisson: float) -> tuple[float, float]:
 MOST_ELEMENTS, MOST_ENTRIES = 50_000, 5_000_000
 
 
-def elasticity(space: Space, dim: int, material: Material) -> Sparse:
+def elasticity(space: Space, dim: int, material: Material) -> CsrMatrix:
     """Assemble the stiffness matrix [N/m] of an isotropic body, plane strain in 2D; degree of
     freedom dim * function + component.
     """
     size, parts = dim * len(space.locations), list[tuple[Array, IntArray, IntArray]]()
 
-    def assembled() -> Sparse:
+    def assembled() -> CsrMatrix | Sparse:
         values, rows, columns = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+        if len(values) <= LARGE:
+            return CsrMatrix.of_entries(values, rows, columns, (size, size))
+        from scipy import sparse
+
         return sparse.coo_matrix((values, (rows, columns)), (size, size)).tocsr()
 
-    def batches() -> Iterator[Sparse]:
+    def batches() -> Iterator[CsrMatrix | Sparse]:
         for (shape, table), region in zip(space.connectivity, space.body.regions, strict=True):
             for first in range(0, len(table), MOST_ELEMENTS):
                 elements = table[first : first + MOST_ELEMENTS]
@@ -56,7 +60,8 @@ def elasticity(space: Space, dim: int, material: Material) -> Sparse:
         if parts:
             yield assembled()
 
-    return reduce(operator.add, batches())
+    whole = reduce(operator.add, batches())
+    return whole if isinstance(whole, CsrMatrix) else CsrMatrix.of_scipy(whole)
 
 
 def element_stiffness(
@@ -121,6 +126,8 @@ def mass(space: Space, dim: int, densities: dict[str, float]) -> Sparse:
     """Assemble the consistent mass matrix [kg] of a body with a density [kg/m3] in some of its
     regions; degree of freedom dim * function + component.
     """
+    from scipy import sparse
+
     points, rows, columns, values = space.body.points[:, :dim], [], [], []
     for (shape, table), region in zip(space.connectivity, space.body.regions, strict=True):
         if not densities.get(region):

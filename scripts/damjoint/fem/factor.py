@@ -22,11 +22,10 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-import scipy
-from scipy import sparse
 from threadpoolctl import ThreadpoolController
 
-from ..arrays import Array, IntArray, Sparse, mirror
+from ..arrays import Array, IntArray, Sparse, mirror, others
+from ..csr import CsrMatrix
 from ..storage import atomic_write, cache_folder
 from ..versions import installed
 from .memory import available, check_memory, dense_memory
@@ -91,6 +90,8 @@ def name() -> str:
     """Library that factorises, with its version, and the order of large matrices."""
     mumps = library()
     if mumps is None:
+        import scipy
+
         return f"SuperLU (scipy {scipy.__version__})"
     mumps.damjoint_mumps_version.restype = ctypes.c_char_p
     ordering = installed("pymetis")
@@ -103,7 +104,18 @@ def is_slow() -> bool:
     return library() is None
 
 
-def elimination_order(matrix: Sparse, keep: IntArray) -> IntArray | None:
+def upper_triangle(matrix: CsrMatrix | Sparse) -> tuple[IntArray, IntArray, Array]:
+    """Rows, columns and values of the entries of the upper triangle of a matrix."""
+    if isinstance(matrix, CsrMatrix):
+        upper = matrix.rows <= matrix.indices
+        return matrix.rows[upper], matrix.indices[upper], matrix.data[upper]
+    from scipy import sparse
+
+    entries = sparse.triu(matrix, format="coo")
+    return entries.row, entries.col, entries.data
+
+
+def elimination_order(matrix: CsrMatrix | Sparse, keep: IntArray) -> IntArray | None:
     """Position (n,) from 1 of each unknown in METIS's order, with the unknowns `keep` last; None
     for MUMPS's own order.
     """
@@ -111,8 +123,9 @@ def elimination_order(matrix: Sparse, keep: IntArray) -> IntArray | None:
     pymetis = metis() if size >= LARGE else None
     if pymetis is None:
         return None
-    inside = np.setdiff1d(np.arange(size), keep)
-    graph = matrix[inside][:, inside].tocsr()
+    inside = others(size, keep)
+    whole = matrix.scipy() if isinstance(matrix, CsrMatrix) else matrix
+    graph = whole[inside][:, inside].tocsr()
     graph.data[:] = 1.0
     # unknowns of a node follow each other and have the same neighbours: a vertex of the graph
     neighbours = graph @ np.random.default_rng(0).random(len(inside))
@@ -158,7 +171,7 @@ class MumpsFactors:
     def __init__(
         self,
         mumps: ctypes.CDLL,
-        matrix: Sparse,
+        matrix: CsrMatrix | Sparse,
         keep: IntArray,
         what: str,
         beside: float = 0.0,
@@ -171,20 +184,20 @@ class MumpsFactors:
         fails.
         """
         self.mumps, self.keep = mumps, (keep + 1).astype(np.int32)
-        upper = sparse.triu(matrix, format="coo")
+        *places, values = upper_triangle(matrix)
         order, self.size = elimination_order(matrix, keep), matrix.shape[0]
         #: lower triangle of the Schur complement of `keep` (k, k)
         self.lower = np.zeros((len(keep), len(keep)))
         beside += float(self.lower.nbytes)
         needed, error = ctypes.c_double(), ctypes.c_int()
-        row, column = (i.astype(np.int32, copy=False) for i in (upper.row, upper.col))
+        row, column = (i.astype(np.int32, copy=False) for i in places)
         for index in row, column:
             index += 1
         mumps.damjoint_factorise.restype = ctypes.c_void_p
         with as_other_libraries():
             factors = mumps.damjoint_factorise(
-                *(self.size, ctypes.c_longlong(upper.nnz)),
-                *(pointer(row), pointer(column), pointer(upper.data)),
+                *(self.size, ctypes.c_longlong(len(values))),
+                *(pointer(row), pointer(column), pointer(values)),
                 None if order is None else pointer(order),
                 *(len(keep), pointer(self.keep), pointer(self.lower), int(store)),
                 *(ctypes.c_double((available() - beside) / 1e6), ctypes.byref(needed)),
@@ -253,7 +266,7 @@ class SuperLUFactors:
         return result
 
 
-def unknowns_text(matrix: Sparse, keep: IntArray) -> str:
+def unknowns_text(matrix: CsrMatrix | Sparse, keep: IntArray) -> str:
     """The unknowns of a matrix, for messages on memory."""
     return f"{matrix.shape[0]} unknowns, {len(keep)} of them on the joint and the wet faces,"
 
@@ -272,7 +285,7 @@ def partial_factors(matrix: Sparse, keep: IntArray) -> MumpsFactors | SuperLUFac
     )
 
 
-def schur_complement(matrix: Sparse, keep: IntArray, loads: Array) -> tuple[Array, Array]:
+def schur_complement(matrix: CsrMatrix, keep: IntArray, loads: Array) -> tuple[Array, Array]:
     """Dense Schur complement (k, k) of a symmetric matrix on the k unknowns `keep`, and loads (n,
     m) reduced to them (k, m).
 
@@ -282,14 +295,17 @@ def schur_complement(matrix: Sparse, keep: IntArray, loads: Array) -> tuple[Arra
         return matrix[keep][:, keep].toarray(), loads[keep]
     mumps = library()
     if mumps is None:
+        from scipy import sparse
+
         size, k = matrix.shape[0], len(keep)
         keep = np.append(keep, np.arange(size, size + loads.shape[1]))
-        schur = schur_by_superlu(bordered(matrix, sparse.csr_matrix(loads)), keep)
+        schur = schur_by_superlu(bordered(matrix.scipy(), sparse.csr_matrix(loads)), keep)
         return schur[:k, :k], schur[:k, k:]
     what = unknowns_text(matrix, keep)
     check_memory(dense_memory(len(keep)), what)
     factors = MumpsFactors(mumps, matrix, keep, what, loads.nbytes)
-    return factors.schur, loads[keep] - matrix[keep] @ factors.solve(loads)
+    rows, moved = matrix[keep], factors.solve(loads)
+    return factors.schur, loads[keep] - np.column_stack([rows @ column for column in moved.T])
 
 
 def dense_schur(matrix: Sparse, keep: IntArray) -> Array:
@@ -311,6 +327,8 @@ def bordered(matrix: Sparse, loads: Sparse) -> Sparse:
     the matrix and the border has the loads reduced to those unknowns and, negative, the work of
     each load on the displacements by each other one.
     """
+    from scipy import sparse
+
     return sparse.bmat([[matrix, loads], [loads.T, None]], format="csr")
 
 
@@ -329,6 +347,8 @@ def schur_by_superlu(matrix: Sparse, keep: IntArray) -> Array:
     (a floating body): its diagonal is raised, that of a border of loads lowered, which elimination
     leaves unchanged, and subtracted at the end.
     """
+    from scipy import sparse
+
     inside = np.setdiff1d(np.arange(matrix.shape[0]), keep)
     order = np.empty_like(inside)
     order[superlu(matrix[inside][:, inside].tocsc(), "MMD_AT_PLUS_A").perm_c] = inside

@@ -41,7 +41,7 @@ class GluedBodies:
             name: sparse.csr_matrix((np.ones(len(n)), (np.arange(len(n)), n)), (len(n), size))
             for name, n in numbers.items()
         }
-        stiffness = sum(m.T @ bodies[name].stiffness @ m for name, m in matrices.items())
+        stiffness = sum(m.T @ bodies[name].stiffness.scipy() @ m for name, m in matrices.items())
         free = np.setdiff1d(np.arange(size), np.concatenate(fixed))
         return GluedBodies(stiffness=stiffness.tocsr(), free=free, numbers=matrices)
 
@@ -53,7 +53,8 @@ class GluedBodies:
         for name, own in gluing.bodies.items():
             numbers, places = self.numbers[name], (own.dofs, np.arange(len(own.dofs)))
             shape = numbers.shape[0], len(own.dofs)
-            carried = sparse.csr_matrix((np.ones(len(own.dofs)), places), shape) @ own.jumps
+            placed = sparse.csr_matrix((np.ones(len(own.dofs)), places), shape)
+            carried = placed @ own.jumps.scipy()
             motion[name] = sparse.hstack([numbers[:, self.free], carried], format="csr")
         return motion
 

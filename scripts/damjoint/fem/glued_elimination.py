@@ -40,7 +40,7 @@ def responses_at_once(bodies: Bodies, gluing: Gluing) -> Responses:
     crest_body, crest = bodies.crest
     rows: list[Sparse] = [*loaded, *unit_loads.values(), motion[crest_body][crest]]
     loads = sparse.vstack(rows, format="csr").T
-    stiffness = sum(m.T @ bodies.by_name[name].stiffness @ m for name, m in motion.items())
+    stiffness = sum(m.T @ bodies.by_name[name].stiffness.scipy() @ m for name, m in motion.items())
     matrix = bordered(stiffness, loads)
     del stiffness
     schur = dense_schur(matrix, np.arange(len(glued.free), matrix.shape[0]))

@@ -12,10 +12,10 @@ joint there is a sum of these.
 from __future__ import annotations
 
 import numpy as np
-from scipy import sparse
 
-from ..arrays import IntArray, Sparse
+from ..arrays import IntArray
 from ..classes import dataclass
+from ..csr import CsrMatrix
 from .bodies import Bodies
 from .condensed import JointDofs
 
@@ -31,7 +31,7 @@ class BodyDofs:
     #: number of the glued degree of freedom, whose displacement is v (n,)
     node: IntArray
     #: of the jumps that the body carries, from the unknowns (n, unknowns)
-    jumps: Sparse
+    jumps: CsrMatrix
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,8 +89,10 @@ class Gluing:
                 else difference(carried.get(int(up[e]), {}), carried.get(int(low[e]), {}))
                 for e in own
             )
-            entries = combined(list(jumps), column, unknowns).tocoo()
-            return JointDofs(rows=rows[own][entries.row], columns=entries.col, factors=entries.data)
+            entries = combined(list(jumps), column, unknowns)
+            return JointDofs(
+                rows=rows[own][entries.rows], columns=entries.indices, factors=entries.data
+            )
 
         return Gluing(
             unknowns=unknowns,
@@ -137,9 +139,9 @@ def difference(one: Jumps, other: Jumps, factor: float = 1.0) -> Jumps:
     return {jump: value for jump, value in result.items() if value}
 
 
-def combined(rows: list[Jumps], column: IntArray, unknowns: int) -> Sparse:
+def combined(rows: list[Jumps], column: IntArray, unknowns: int) -> CsrMatrix:
     """Sums of jumps as a matrix (rows, unknowns); column: of each jump."""
     pointers = np.cumsum([0, *map(len, rows)])
     jumps = np.array([jump for row in rows for jump in row], int)
     factors = np.array([value for row in rows for value in row.values()])
-    return sparse.csr_matrix((factors, column[jumps], pointers), (len(rows), unknowns))
+    return CsrMatrix(factors, column[jumps], pointers, (len(rows), unknowns))

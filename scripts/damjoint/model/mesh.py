@@ -9,22 +9,20 @@ from collections.abc import Mapping
 from dataclasses import field, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from .. import InputError, RunError, data
 from ..arrays import Array, BoolArray, IntArray, Setting
 from ..classes import dataclass
+from ..csr import CsrMatrix
 from ..storage import check_end
 from .body import Body as Body
 from .case import Case, OfJoint, has_drains
 from .cut import cut
 from .parameters import assignments, constants, listing, start_gmsh
 from .scene import BED, DOWN, FLOOR, SIDES, TAILWATER, TOP, UP, Joint, numbered, stacked
-
-if TYPE_CHECKING:
-    from scipy import sparse
 
 #: Parameters that the mesh always depends on.
 GEOMETRY = (
@@ -745,7 +743,7 @@ def is_inside(surface: Body, body: Body) -> bool:
     size = int(max(surface.node_tags.max(), body.node_tags.max())) + 1
     shared = incidence(surface, size) @ incidence(body, size).T
     corners = np.concatenate([np.full(len(t), t.shape[1]) for _, t in surface.cells])
-    beside = np.bincount(shared.tocoo().row[shared.data == corners[shared.tocoo().row]])
+    beside = np.bincount(shared.rows[shared.data == corners[shared.rows]])
     return len(beside) == len(corners) and bool((beside == 2).all())
 
 
@@ -753,11 +751,11 @@ def cells_inside(surface: Body, body: Body) -> IntArray:
     """For each element of a surface, the body's cell that has all its nodes; -1: none."""
     size = int(max(surface.node_tags.max(), body.node_tags.max())) + 1
     rows = [incidence(b, size) for b in (surface, body)]
-    shared = (rows[0] @ rows[1].T).tocoo()
+    shared = rows[0] @ rows[1].T
     corners = np.concatenate([np.full(len(t), t.shape[1]) for _, t in surface.cells])
-    is_side = shared.data == corners[shared.row]
+    is_side = shared.data == corners[shared.rows]
     inside = np.full(len(corners), -1)
-    inside[shared.row[is_side]] = shared.col[is_side]
+    inside[shared.rows[is_side]] = shared.indices[is_side]
     return inside
 
 
@@ -781,11 +779,9 @@ def part_of(surface: Body, selected: BoolArray) -> Body:
     )
 
 
-def incidence(body: Body, size: int) -> sparse.csr_matrix:
+def incidence(body: Body, size: int) -> CsrMatrix:
     """Which of the mesh's nodes each element has (elements, size)."""
-    from scipy import sparse  # a tenth of a second, which pictures do not need
-
-    columns = np.concatenate([body.node_tags[table].ravel() for _, table in body.cells])
+    columns = np.concatenate([body.node_tags[table].ravel() for _, table in body.cells]).astype(int)
     widths = np.concatenate([np.full(len(t), t.shape[1]) for _, t in body.cells])
     pointers = np.concatenate([[0], np.cumsum(widths)])
-    return sparse.csr_matrix((np.ones(len(columns)), columns, pointers), (len(widths), size))
+    return CsrMatrix(np.ones(len(columns)), columns, pointers, (len(widths), size))

@@ -60,7 +60,7 @@ def recover(bodies: Bodies, scenes: list[tuple[Equilibrium, History]]) -> list[d
         for name, body in bodies.by_name.items():
             of_body = gluing.bodies[name]
             jumps[name][i, of_body.dofs] = of_body.jumps @ state.jump
-            load = -body.stiffness @ jumps[name][i]
+            load = -(body.stiffness.scipy() @ jumps[name][i])
             add_external_forces(load, body, equilibrium, state)
             loads[:, i] += glued.numbers[name].T @ load
     solution = glued.solve(loads)
