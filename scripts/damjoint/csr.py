@@ -43,7 +43,7 @@ class CsrMatrix:
         values: Array, rows: IntArray, columns: IntArray, shape: tuple[int, int]
     ) -> CsrMatrix:
         """The matrix of entries; those of the same place are added."""
-        places, inverse = np.unique(rows * shape[1] + columns, return_inverse=True)
+        places, inverse = np.unique(rows * np.int64(shape[1]) + columns, return_inverse=True)
         row, column = np.divmod(places, max(shape[1], 1))
         pointers = np.searchsorted(row, np.arange(shape[0] + 1))
         return CsrMatrix(np.bincount(inverse, values, len(places)), column, pointers, shape)

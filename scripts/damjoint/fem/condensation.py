@@ -31,6 +31,7 @@ import numpy as np
 from ..arrays import Array, IntArray, distinct, others
 from ..classes import dataclass
 from ..model.case import Case
+from ..threads import scipy_linalg
 from . import factor
 from .bodies import Bodies, ElasticBody
 from .condensed import Condensed, CondensedJoint
@@ -79,7 +80,7 @@ class ReducedBody:
         units, loaded_units = reduced_loads[:n], reduced_loads[n:]
         spread = jl
         if len(loaded):
-            to_joint = np.linalg.solve(ll, jl.T).T
+            to_joint = solve_positive(ll, jl.T).T
             jj = jj - to_joint @ jl.T
             jj, spread = (jj + jj.T) / 2, -to_joint
             units = units - to_joint @ loaded_units
@@ -92,6 +93,26 @@ class ReducedBody:
             loaded_stiffness=ll,
             loaded_units=loaded_units,
         )
+
+
+#: Number of unknowns up to which numpy solves by LU: more operations, but scipy loads longer.
+FEW = 600
+
+
+def solve_positive(matrix: Array, right: Array) -> Array:
+    """Solution of a dense symmetric positive definite system."""
+    if len(matrix) <= FEW:
+        return np.asarray(np.linalg.solve(matrix, right))
+    solution: Array = scipy_linalg().solve(matrix, right, assume_a="pos")
+    return solution
+
+
+def solve_lower(factor: Array, right: Array) -> Array:
+    """Solution of a dense lower triangular system."""
+    if len(factor) <= FEW:
+        return np.asarray(np.linalg.solve(factor, right))
+    solution: Array = scipy_linalg().solve_triangular(factor, right, lower=True)
+    return solution
 
 
 def add_at(total: Array, places: Any, values: Array) -> None:
@@ -112,18 +133,19 @@ class JointElimination:
         coupling = np.zeros((gluing.unknowns, gluing.nodes))
         by_jumps = np.zeros((gluing.unknowns, gluing.unknowns))
         for name, own in gluing.bodies.items():
-            stiffness, jumps = reduced[name].stiffness, own.jumps
+            stiffness = reduced[name].stiffness
             # (a body that a joint is inside of has several degrees of freedom of a node)
             add_at(glued, np.ix_(own.node, own.node), stiffness)
-            if len(jumps.data):
-                carried = (jumps.T @ stiffness).T
+            if len(own.jumps.data):
+                carried = own.on_jumps(stiffness).T
                 add_at(coupling.T, own.node, carried)
-                by_jumps += jumps.T @ carried
+                by_jumps += own.on_jumps(carried)
         #: C^T
         self.coupling = coupling
-        #: L of K = L L^T, and L^-1 C
-        self.factor = np.linalg.cholesky(glued)
-        self.half = np.linalg.solve(self.factor, coupling.T)
+        #: K, L of K = L L^T, and L^-1 C
+        self.glued = glued
+        self.factor = np.asarray(np.linalg.cholesky(glued), float)
+        self.half = solve_lower(self.factor, coupling.T)
         #: S
         self.stiffness = by_jumps - self.half.T @ self.half
 
@@ -136,8 +158,8 @@ class JointElimination:
     def transmitted(self, own: BodyDofs, forces: Array) -> Array:
         """t_0 of forces (n, k) on the degrees of freedom of a body."""
         nodes = self.on_nodes(own, forces)
-        through = self.half.T @ np.linalg.solve(self.factor, nodes)
-        return own.jumps.T @ forces - through
+        through = self.half.T @ solve_lower(self.factor, nodes)
+        return own.on_jumps(forces) - through
 
 
 def responses_body_by_body(bodies: Bodies, gluing: Gluing) -> Responses:
@@ -158,11 +180,10 @@ def responses_body_by_body(bodies: Bodies, gluing: Gluing) -> Responses:
     above, own_dofs = reduced[crest_body], gluing.bodies[crest_body]
     size = len(above.loaded_stiffness)
     at_crest = 1.0 * (above.dofs[:size] == crest)
-    row = np.linalg.solve(above.loaded_stiffness, at_crest)
+    row = solve_positive(above.loaded_stiffness, at_crest)
     crest_face = 1.0 * (own_dofs.dofs == crest) - above.coupling @ row
     crest_nodes = joints.on_nodes(own_dofs, crest_face)
-    half = np.linalg.solve(joints.factor, crest_nodes)
-    crest_both = np.linalg.solve(joints.factor.T, half)
+    crest_both = solve_positive(joints.glued, crest_nodes)
 
     pressure: list[Array] = []
     crest_pressure: list[Array] = []
@@ -193,7 +214,7 @@ def responses_body_by_body(bodies: Bodies, gluing: Gluing) -> Responses:
         units=units,
         pressure=np.hstack(pressure),
         dof_of_face=dof_of_face,
-        crest_jump=own_dofs.jumps.T @ crest_face - joints.coupling @ crest_both,
+        crest_jump=own_dofs.on_jumps(crest_face) - joints.coupling @ crest_both,
         crest_units=crest_units,
         crest_pressure=np.concatenate(crest_pressure),
     )

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Array, BoolArray, IntArray, Sparse
-from ..csr import LARGE, CsrMatrix
+from ..csr import CsrMatrix
 from .elements import BULK, MASS, Space, basis, corners_of, geometry, nodal, points_of, tabulated
 
 #: Young's modulus [Pa] and Poisson's ratio [-] by region.
@@ -27,8 +27,9 @@ def lame(young: float, poisson: float) -> tuple[float, float]:
     return young * poisson / ((1 + poisson) * (1 - 2 * poisson)), young / (2 * (1 + poisson))
 
 
-#: Numbers of elements computed and of entries assembled at a time.
-MOST_ELEMENTS, MOST_ENTRIES = 50_000, 5_000_000
+#: Numbers of elements computed and of entries assembled at a time; number of entries up to which
+#: numpy assembles them in less time than scipy takes to load, as 2D does not need it otherwise.
+MOST_ELEMENTS, MOST_ENTRIES, FEW_ENTRIES = 50_000, 5_000_000, 1_000_000
 
 
 def elasticity(space: Space, dim: int, material: Material) -> CsrMatrix:
@@ -39,7 +40,7 @@ def elasticity(space: Space, dim: int, material: Material) -> CsrMatrix:
 
     def assembled() -> CsrMatrix | Sparse:
         values, rows, columns = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
-        if len(values) <= LARGE:
+        if dim == 2 and len(values) <= FEW_ENTRIES:
             return CsrMatrix.of_entries(values, rows, columns, (size, size))
         from scipy import sparse
 

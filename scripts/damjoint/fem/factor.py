@@ -292,7 +292,7 @@ def schur_complement(matrix: CsrMatrix, keep: IntArray, loads: Array) -> tuple[A
     Raises RunError if the estimated memory is not available, MemoryError if an allocation fails.
     """
     if len(keep) == matrix.shape[0]:  # a body whose nodes all lie on joints and wet faces
-        return matrix[keep][:, keep].toarray(), loads[keep]
+        return matrix[keep].columns(keep).toarray(), loads[keep]
     mumps = library()
     if mumps is None:
         from scipy import sparse

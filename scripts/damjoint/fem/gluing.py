@@ -13,11 +13,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays import IntArray
+from ..arrays import Array, IntArray
 from ..classes import dataclass
 from ..csr import CsrMatrix
 from .bodies import Bodies
 from .condensed import JointDofs
+
+#: Size of a matrix up to which a dense product takes less time than scipy takes to load.
+FEW_ENTRIES = 400_000
 
 #: A sum of independent jumps: factors by their numbers.
 Jumps = dict[int, float]
@@ -32,6 +35,12 @@ class BodyDofs:
     node: IntArray
     #: of the jumps that the body carries, from the unknowns (n, unknowns)
     jumps: CsrMatrix
+
+    def on_jumps(self, forces: Array) -> Array:
+        """Forces (n, ...) on the degrees of freedom as forces (unknowns, ...) on the jumps."""
+        turned = self.jumps.T
+        few = turned.shape[0] * turned.shape[1] <= FEW_ENTRIES
+        return turned.toarray() @ forces if few else turned @ forces
 
 
 @dataclass(frozen=True, kw_only=True)
