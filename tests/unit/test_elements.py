@@ -170,3 +170,13 @@ def test_the_mass_matrix_is_the_integral_of_products(shape):
     other = function(lambda p: 1 + p[:, 1])
     exact = 2 * (2 + 8 / 3) * (2 if dim == 3 else 1)  # int x int (y + y^2), sides of 2
     assert one @ matrix @ other == pytest.approx(3 * exact)
+
+
+def test_a_matrix_assembled_in_batches_is_the_same(monkeypatch):
+    body, dim = grid("triangle")
+    space, material = Space(body, 2), {"dam": (YOUNG, POISSON)}
+    at_once = elasticity(space, dim, material).toarray()
+    monkeypatch.setattr("damjoint.fem.elasticity.MOST_ELEMENTS", 3)
+    monkeypatch.setattr("damjoint.fem.elasticity.MOST_ENTRIES", 800)
+    in_batches = elasticity(space, dim, material).toarray()
+    assert in_batches == pytest.approx(at_once, rel=1e-13, abs=1e-13 * np.abs(at_once).max())

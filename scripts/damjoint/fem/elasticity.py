@@ -5,9 +5,7 @@ Plane strain in 2D.
 
 from __future__ import annotations
 
-import operator
-from collections.abc import Callable, Iterator
-from functools import reduce
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -38,31 +36,33 @@ def elasticity(space: Space, dim: int, material: Material) -> CsrMatrix:
     """
     size, parts = dim * len(space.locations), list[tuple[Array, IntArray, IntArray]]()
 
-    def assembled() -> CsrMatrix | Sparse:
-        values, rows, columns = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
-        if dim == 2 and len(values) <= FEW_ENTRIES:
-            return CsrMatrix.of_entries(values, rows, columns, (size, size))
+    def number() -> int:
+        return sum(len(values) for values, _, _ in parts)
+
+    def assembled() -> Sparse:
         from scipy import sparse
 
+        values, rows, columns = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+        parts.clear()
         return sparse.coo_matrix((values, (rows, columns)), (size, size)).tocsr()
 
-    def batches() -> Iterator[CsrMatrix | Sparse]:
-        for (shape, table), region in zip(space.connectivity, space.body.regions, strict=True):
-            for first in range(0, len(table), MOST_ELEMENTS):
-                elements = table[first : first + MOST_ELEMENTS]
-                block = element_stiffness(space, dim, shape, elements, *lame(*material[region]))
-                dofs = (dim * elements[:, :, None] + np.arange(dim)).astype(np.int32)
-                dofs, n = dofs.reshape(len(elements), -1), block.shape[1]
-                rows, columns = np.repeat(dofs, n, axis=1), np.tile(dofs, n)
-                parts.append((block.ravel(), rows.ravel(), columns.ravel()))
-                if sum(len(values) for values, _, _ in parts) > MOST_ENTRIES:
-                    yield assembled()
-                    parts.clear()
-        if parts:
-            yield assembled()
-
-    whole = reduce(operator.add, batches())
-    return whole if isinstance(whole, CsrMatrix) else CsrMatrix.of_scipy(whole)
+    whole: Sparse = None
+    for (shape, table), region in zip(space.connectivity, space.body.regions, strict=True):
+        for first in range(0, len(table), MOST_ELEMENTS):
+            elements = table[first : first + MOST_ELEMENTS]
+            block = element_stiffness(space, dim, shape, elements, *lame(*material[region]))
+            dofs = (dim * elements[:, :, None] + np.arange(dim)).astype(np.int32)
+            dofs, n = dofs.reshape(len(elements), -1), block.shape[1]
+            rows, columns = np.repeat(dofs, n, axis=1), np.tile(dofs, n)
+            parts.append((block.ravel(), rows.ravel(), columns.ravel()))
+            if number() > MOST_ENTRIES:
+                whole = assembled() if whole is None else whole + assembled()
+    if whole is None and dim == 2 and number() <= FEW_ENTRIES:
+        values, rows, columns = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+        return CsrMatrix.of_entries(values, rows, columns, (size, size))
+    if parts:
+        whole = assembled() if whole is None else whole + assembled()
+    return CsrMatrix.of_scipy(whole)
 
 
 def element_stiffness(
