@@ -262,7 +262,7 @@ def run_and_print(arguments: argparse.Namespace, drawing: DrawingProcess | None)
         arguments.steps,
         arguments.accuracy,
     )
-    note_ineffective(case)
+    note_settings(case)
     out = arguments.out or Path("out") / case.name
     fields, picture = not arguments.no_fields, drawing is not None
     code = 0
@@ -310,7 +310,7 @@ def do_check(arguments: argparse.Namespace) -> int:
     water = arguments.levels, arguments.tail_levels
     cases = [load(name, settings, *water, accuracy=arguments.accuracy) for name in arguments.cases]
     for case in cases:
-        note_ineffective(case)
+        note_settings(case)
     if any(case["dim"] == 3 for case in cases):
         warn_if_slow()
     checks = check_cases(cases, arguments.out)
@@ -381,13 +381,21 @@ def do_gui(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def note_ineffective(case: Case) -> None:
-    """Print a note on the parameters that a case sets in vain."""
+def note_settings(case: Case) -> None:
+    """Print notes on the parameters that a case sets in vain, and on unusual values."""
+    from .model.constraints import USUAL
     from .model.parameters import declared
 
-    for name in case.ineffective:
-        needed = declared()[name].matters
-        print(f"damjoint: {case.name}: {name} has no effect; it needs {needed}", file=sys.stderr)
+    known, ineffective = declared(), case.ineffective
+    notes = [f"{name} has no effect; it needs {known[name].matters}" for name in ineffective]
+    notes += [
+        f"{name} = {value:g} {known[name].unit} is unusual ({USUAL[name][0]:g} to "
+        f"{USUAL[name][1]:g}); is it in another unit?"
+        for name, value in case.unusual.items()
+        if name not in ineffective
+    ]
+    for note in notes:
+        print(f"damjoint: {case.name}: {note}", file=sys.stderr)
 
 
 def warn_if_slow() -> None:
@@ -547,7 +555,7 @@ def do_quake(arguments: argparse.Namespace) -> int:
         record=arguments.record,
     )
     engine_of(case, arguments.engine)
-    note_ineffective(case)
+    note_settings(case)
     if arguments.engine == "getdp" and arguments.fields:
         raise InputError("--fields: must not be given with --engine getdp")
     if case["dim"] == 3 and arguments.engine != "getdp":

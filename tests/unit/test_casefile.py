@@ -152,6 +152,19 @@ def test_parameters_without_effect_are_named(command, tmp_path):
     assert load("a").ineffective == ()
 
 
+def test_values_that_may_be_in_another_unit_are_named(command, tmp_path):
+    """Not those of the package's cases, nor zero."""
+    write(tmp_path, "default_rho_dam = 24*kN/m3; default_mu = 38; default_adhesion = 0;")
+    small = "--set", "n_joint=8", "--set", "order=1", "--no-fields", "--no-picture"
+    words = *small, "--set", "law=friction", "--set", "mu=0.7", "--levels", "9"
+    code, _, err = command("run", "mine.case", *words)
+    note = "rho_dam = 24000 kg per m3 is unusual (1500 to 4000); is it in another unit?"
+    assert (code, err) == (0, f"damjoint: mine: {note}\n")
+    assert load("dam", {"lift_heights": (15.0,), "sigma_max": (2e5, 0.2)}).unusual == {
+        "sigma_max": 0.2
+    }
+
+
 def test_files_that_are_no_cases_are_refused(command, tmp_path):
     (tmp_path / "binary.case").write_bytes(bytes(range(256)))
     write(tmp_path, 'Include "itself.case";', "itself.case")

@@ -16,6 +16,7 @@ from ..laws import LAWS, Law
 from . import casefile
 from .arithmetic import number
 from .constraints import (
+    USUAL,
     check_also_uplift,
     check_distances,
     check_drive,
@@ -156,23 +157,32 @@ class Case(ParameterValues):
         )
 
     @property
-    def ineffective(self) -> tuple[str, ...]:
-        """The parameters that the case sets to another value than their default, though they matter
-        at none of its joints.
-        """
+    def given(self) -> dict[str, Setting]:
+        """The parameters that a user has set: in a case file of their own, or beside it."""
         if self.source is None:
-            return ()
+            return {}
         packaged = self.source.path.resolve().parent == CASES.resolve()
         text, known = self.source.text, declared()
-        of_joints = [joint.values for scene in self.scenes() for joint in scene.joints]
         of_file = {} if packaged else {**text.defaults, **text.of_joints}
+        return {n: v for n, v in {**of_file, **self.source.overrides}.items() if n in known}
+
+    @property
+    def ineffective(self) -> tuple[str, ...]:
+        """Those of `given` that differ from their default, though they matter at no joint."""
+        known = declared()
+        of_joints = [joint.values for scene in self.scenes() for joint in scene.joints]
         return tuple(
             name
-            for name, value in {**of_file, **self.source.overrides}.items()
-            if name in known
-            and not any(known[name].matters_in(values) for values in of_joints)
+            for name, value in self.given.items()
+            if not any(known[name].matters_in(values) for values in of_joints)
             and value != constants()[name][0]
         )
+
+    @property
+    def unusual(self) -> dict[str, float]:
+        """Those of `given` with a value that is neither 0 nor within USUAL, by name."""
+        pairs = [(n, joint[n]) for n in self.given if n in USUAL for joint in self.joints]
+        return {n: v for n, v in pairs if v and not USUAL[n][0] <= v <= USUAL[n][1]}
 
     @property
     def joint_names(self) -> tuple[str, ...]:

@@ -15,6 +15,17 @@ from ..laws import LAWS
 from .parameters import constants, declared
 from .values import Group, ParameterValues, flows, has_drains
 
+#: Usual values, from and to, in SI units: a density of 24 kN/m3 or a strength of 0.2 MPa without
+#: its unit is none.
+USUAL = {
+    **dict.fromkeys(("rho_dam", "rho_found"), (1500.0, 4000.0)),
+    "rho_water": (900.0, 1300.0),
+    "rho_silt": (200.0, 1500.0),
+    "mu": (0.1, 10.0),
+    **dict.fromkeys(("adhesion", "sigma_max"), (1e3, 1e7)),
+    "f_c": (1e5, 2e8),
+    "ice_force": (1e3, 1e6),
+}
 #: The least Young's modulus [Pa], that of a soft soil.
 LEAST_MODULUS = 1e6
 #: Value of added_mass: Zangar's pressure in place of Westergaard's.
