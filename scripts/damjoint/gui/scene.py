@@ -48,9 +48,9 @@ class SolvedScene:
     quake: Columns | None = None
 
     @staticmethod
-    def of(outcome: Outcome, name: str = "") -> list[SolvedScene]:
+    def of(outcome: Outcome, name: str) -> list[SolvedScene]:
         """The scenes of an outcome, one for each joint, that of the decisive joint first; computes
-        the bodies' fields. name: of the outcome, by default its uplift.
+        the bodies' fields. name: of the outcome, empty if it is the only one.
         """
         result, (state, _) = outcome.result, early_end(outcome)
         bodies, fields, times = outcome.mesh().bodies, outcome.fields(), times_of(result)
@@ -61,7 +61,7 @@ class SolvedScene:
             message = reached(state, result)
         return [
             SolvedScene(
-                name=scene_name(name or str(result.case["uplift"]), result, joint),
+                name=scene_name(name, result, joint),
                 result=result,
                 bodies=bodies,
                 fields=fields,

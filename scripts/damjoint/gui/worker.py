@@ -128,7 +128,10 @@ def run_case(sheet: Sheet, pipe: Connection, stop: Stop) -> tuple[list[SolvedSce
                 break
     if outcomes[-1].error and not any(outcome.result.last for outcome in outcomes):
         raise outcomes[-1].error
-    scenes = [scene for outcome in outcomes for scene in SolvedScene.of(outcome)]
+    scenes = []
+    for outcome in outcomes:
+        name = str(outcome.result.case["uplift"]) if case.also_uplift else ""
+        scenes += SolvedScene.of(outcome, name)
     return scenes, partial(write_outcomes, case, outcomes)
 
 
