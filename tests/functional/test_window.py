@@ -15,6 +15,7 @@ import gmsh
 import numpy as np
 import pytest
 from damjoint.gui import tree, views, window
+from damjoint.gui.camera import result_camera
 from damjoint.gui.curves import METRES
 from damjoint.gui.graphs import INTERVALS, MARGIN, Scale, thinned
 from damjoint.gui.layout import ABOVE_AXES, BELOW_AXES, BESIDE_AXES, Layout
@@ -23,6 +24,7 @@ from damjoint.gui.views import caption
 from damjoint.gui.window import ACTION, Session
 from damjoint.gui.worker import EngineProcess
 from damjoint.model.case import load
+from damjoint.model.mesh import mesh_of
 from damjoint.post.units import LENGTHS
 from damjoint.statics.verdict import hints
 from damjoint.studies.check import compare_methods
@@ -490,6 +492,14 @@ def test_a_saved_case_has_its_own_geometry(tmp_path):
     saved = load(str(tmp_path / "saved.case"))
     assert saved.geometry.samefile(sheet.case.geometry)
     assert saved.values == sheet.case.values and saved.of_joints == sheet.case.of_joints
+
+
+def test_all_blocks_of_a_dam_are_shown():
+    case = load("monoliths", {"n_joint": 8.0, "dim": 3.0})
+    mesh = mesh_of(case)
+    dam = np.concatenate([mesh.bodies[name].points for name in ("dam", "dam 2")])
+    box = result_camera(case, mesh.bodies).box
+    assert (box[0] <= dam.min(axis=0)).all() and (box[1] >= dam.max(axis=0)).all()
 
 
 def test_lists_of_several_joints_on_the_command_line(open_window):

@@ -120,7 +120,8 @@ def result_camera(case: Case, bodies: dict[str, Body]) -> Camera:
     """The dam with a part of the foundation; strips below it in 3D."""
     box = frame(case)
     if case.geometry:
-        box = around(bodies["dam"].points, box)
+        dams = [body.points for name, body in bodies.items() if name.split(" ")[0] == "dam"]
+        box = around(np.concatenate(dams), box)
     return Camera(box, turn_of(case), strips=case["dim"] == 3)
 
 
