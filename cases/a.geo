@@ -1,4 +1,4 @@
-// Mesh of a.case; the differences stand there.
+// Mesh of a.case, which lists what differs from the defaults.
 Include "../pro/units.pro";
 Include "a.case";
 Include "../geo/window.geo";

@@ -1,4 +1,4 @@
-// Mesh of b.case; the differences stand there.
+// Mesh of b.case, which lists what differs from the defaults.
 Include "../pro/units.pro";
 Include "b.case";
 Include "../geo/window.geo";

@@ -1,4 +1,4 @@
-// Mesh of c.case; the differences stand there.
+// Mesh of c.case, which lists what differs from the defaults.
 Include "../pro/units.pro";
 Include "c.case";
 Include "../geo/window.geo";

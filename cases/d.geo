@@ -1,4 +1,4 @@
-// Mesh of d.case; the differences stand there.
+// Mesh of d.case, which lists what differs from the defaults.
 Include "../pro/units.pro";
 Include "d.case";
 Include "../geo/window.geo";

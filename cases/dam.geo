@@ -1,4 +1,4 @@
-// Mesh of dam.case; the differences stand there.
+// Mesh of dam.case, which lists what differs from the defaults.
 Include "../pro/units.pro";
 Include "dam.case";
 Include "../geo/window.geo";

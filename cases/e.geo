@@ -1,4 +1,4 @@
-// Mesh of e.case; the differences stand there.
+// Mesh of e.case, which lists what differs from the defaults.
 Include "../pro/units.pro";
 Include "e.case";
 Include "../geo/window.geo";

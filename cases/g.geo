@@ -1,4 +1,4 @@
-// Mesh of g.case; the differences stand there.
+// Mesh of g.case, which lists what differs from the defaults.
 Include "../pro/units.pro";
 Include "g.case";
 Include "../geo/window.geo";

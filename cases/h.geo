@@ -1,4 +1,4 @@
-// Mesh of h.case; the differences stand there.
+// Mesh of h.case, which lists what differs from the defaults.
 Include "../pro/units.pro";
 Include "h.case";
 Include "../geo/window.geo";

@@ -1,4 +1,4 @@
-// Mesh of i.case; the differences stand there.
+// Mesh of i.case, which lists what differs from the defaults.
 Include "../pro/units.pro";
 Include "i.case";
 Include "../geo/window.geo";

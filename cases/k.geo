@@ -1,4 +1,4 @@
-// Mesh of k.case; the differences stand there.
+// Mesh of k.case, which lists what differs from the defaults.
 Include "../pro/units.pro";
 Include "k.case";
 Include "../geo/window.geo";

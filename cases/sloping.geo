@@ -1,4 +1,4 @@
-// Mesh of sloping.case; the differences stand there.
+// Mesh of sloping.case, which lists what differs from the defaults.
 Include "../pro/units.pro";
 Include "sloping.case";
 Include "../geo/window.geo";
