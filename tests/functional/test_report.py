@@ -323,6 +323,17 @@ def test_input_of_several_joints_is_in_the_report():
     assert any(words.endswith("(lift 15 m).") for words in sentences)
 
 
+def test_report_of_several_joints_has_the_levels_of_each(command, tmp_path):
+    lifts = "--set", "lift_heights=15", "--set", "law=bond,friction", "--levels", "30,40"
+    command("run", "dam", *SMALL, *lifts, "--out", "dam")
+    assert command("report", "dam")[0] == 0
+    page = (tmp_path / "report.html").read_text()
+    history = stored.read(tmp_path / "dam").result.history
+    for joint, normal in (("base", history["N"]), ("lift 15 m", history["N_2"])):
+        rows = rows_below(page, f"{joint}: at the requested levels, by finite elements")
+        assert_allclose(column(rows, "N'"), normal, rtol=1e-3)
+
+
 def test_parameters_of_a_report_are_those_of_its_own_case():
     """Not those of the case that the process read last, nor none if the case is cached."""
     dry, wet = load("dam", {"uplift": "none"}), load("dam", {"uplift": "flow"})

@@ -112,15 +112,13 @@ def picture(solution: Solution) -> Figure:
         left, right = parts[0].subfigures(1, 2, width_ratios=(1, RIGHT))
         draw_dam(left, solution, time)
         own = solution.of_joint(decisive_joint(result))
-        beside = parts[1]
         if case.of_joints and is_own_solid(case):
             right, below = right.subfigures(2, 1)
             draw_shares(below, result, time)
-        elif case.of_joints:
-            beside, shares = beside.subfigures(1, 2, width_ratios=(1 - SHARES, SHARES))
-            draw_shares(shares, result, time)
+            draw_history(parts[1], own.result)
+        else:
+            draw_histories(parts[1], result, time)
         draw_joint(right, own, time)
-        draw_history(beside, own.result)
         if len(parts) > 2:
             draw_solid(parts[2], solution, time)
     return figure
@@ -299,6 +297,19 @@ class Line(NamedTuple):
     label: str = ""
 
 
+def draw_histories(figure: FigureBase, result: Results, time: float) -> None:
+    """Draw the history of the decisive joint and, beside it, the shares of all joints if there are
+    several.
+    """
+    own = result.joints[decisive_joint(result)]
+    if not result.case.of_joints:
+        draw_history(figure, own)
+        return
+    left, right = figure.subfigures(1, 2, width_ratios=(1 - SHARES, SHARES))
+    draw_history(left, own)
+    draw_shares(right, result, time)
+
+
 def draw_history(figure: FigureBase, result: Results) -> None:
     """Draw opening, crest displacement, crack and, with flow, leakage against the level."""
     panels_shown = history_panels(result)
@@ -345,7 +356,8 @@ def draw_shares(figure: FigureBase, result: Results, time: float) -> None:
     ):
         shares = [100 * own.state(time)[column] / own.case.joint_along for own in result.joints]
         axes.barh(range(len(names)), shares, thick, color=color, label=label)
-    axes.set_yticks(range(len(names)), names, fontsize=7)
+    line = 72 * axes.bbox.height / axes.figure.dpi / len(names)  # [points]
+    axes.set_yticks(range(len(names)), names, fontsize=min(7, line))
     axes.set_xlim(*PERCENT)
     axes.set_xlabel("share of each joint [%]", fontsize=9)
     axes.grid(axis="x", alpha=0.3)

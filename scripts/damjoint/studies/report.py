@@ -104,7 +104,8 @@ class RunSection:
     #: hints on the result, critical value, discretisation error
     hints: list[str]
     pictures: list[Picture]
-    levels: Table
+    #: tables at the requested levels, by name of the joint, empty if there is only one
+    levels: dict[str, Table]
     #: of an earthquake: its picture, peaks and residual values, modes; else None
     earthquake: Earthquake | None
     #: both methods, loads and formulas of the gravity method; None for a user's own geometry
@@ -262,7 +263,7 @@ def run_section(folder: Path, solution: Solution) -> RunSection:
             *filter(None, [discretisation_error(result)]),
         ],
         pictures=pictures_of(solution) if len(result.joint["time"]) else [],
-        levels=levels_table(own),
+        levels={result.case.named((k,)): levels_table(o) for k, o in enumerate(result.joints)},
         earthquake=earthquake_section(folder, case, info),
         methods=methods_table(case, checks, judged=judged) if checks else None,
         loads=loads_table(rigid) if rigid else None,
@@ -278,9 +279,9 @@ def run_section(folder: Path, solution: Solution) -> RunSection:
 
 
 def which_joint(result: Results) -> str:
-    """Which of several joints the curves and the tables of levels and loads are of; else empty."""
+    """Which of several joints the curves and the table of loads are of; else empty."""
     name = result.case.named((decisive_joint(result),))
-    return f"curves and tables of levels and loads: {name}" if name else ""
+    return f"curves and table of loads: {name}" if name else ""
 
 
 def failures_of(result: Results, checks: list[SafetyCheck]) -> list[str]:
@@ -426,7 +427,7 @@ def drawn(solution: Solution, time: float, at_level: str) -> Iterator[tuple[str,
     caption = f"{name[0].upper()}{name[1:]} {at_level}. {colors}"
     yield "half" if has_fields else "full", caption, joint
     history = figure_of(*WIDE)
-    pictures.draw_history(history, own)
+    pictures.draw_histories(history, result, time)
     yield "full", "", history
     if result.case["dim"] == 3 and has_fields and not pictures.is_own_solid(result.case):
         solid = figure_of(*SOLID)
