@@ -281,7 +281,8 @@ def run_section(folder: Path, solution: Solution) -> RunSection:
 def which_joint(result: Results) -> str:
     """Which of several joints the curves and the table of loads are of; else empty."""
     name = result.case.named((decisive_joint(result),))
-    return f"curves and table of loads: {name}" if name else ""
+    shown = "curves" if result.case.geometry else "curves and table of loads"
+    return f"{shown}: {name}" if name else ""
 
 
 def failures_of(result: Results, checks: list[SafetyCheck]) -> list[str]:
@@ -420,10 +421,9 @@ def drawn(solution: Solution, time: float, at_level: str) -> Iterator[tuple[str,
         pictures.draw_dam(section, solution, time)
         yield "half", f"Section and loads {at_level}, deformed.", section
     number = decisive_joint(result)
-    own = result.joints[number]
     joint = figure_of(*(HALF if has_fields else SOLID))
     pictures.draw_joint(joint, solution.of_joint(number), time)
-    name = own.case.joint_names[0] if result.case.of_joints else "joint"
+    name = result.case.named((number,)) or "joint"
     caption = f"{name[0].upper()}{name[1:]} {at_level}. {colors}"
     yield "half" if has_fields else "full", caption, joint
     history = figure_of(*WIDE)
