@@ -125,7 +125,7 @@ def quake_section(rows: list[Row]) -> str:
         "### And in a part of them, by further runs",
         QUAKES_BESIDE,
         "### Earthquakes: result",
-        classes(rows, "kind", "law", "uplift", "joints", "dim"),
+        classes(rows, "kind", "law", "uplift", "joints", "dim", with_words=FEATURES),
         measured(rows),
         "### Earthquakes: defects and undecided stops",
         unsolved(rows),
@@ -139,14 +139,28 @@ def quake_section(rows: list[Row]) -> str:
 SLOWEST = "Seconds of the complete command, while other scenes run in parallel."
 
 
-def classes(rows: list[Row], *names: str) -> str:
-    """Return the table of the scenes of each class, by the values of columns; no lists."""
+#: What only a part of the earthquakes has, by a part of its command.
+FEATURES = {
+    "rock with mass": "rock_mass=1",
+    "dashpots in the joint": "joint_damping_n=",
+    "damping by the mass": "damping_mass=1",
+    "published scheme": "time_integration=published",
+}
+
+
+def classes(rows: list[Row], *names: str, with_words: dict[str, str] | None = None) -> str:
+    """Return the table of the scenes of each class, by the values of columns (no lists), and by
+    parts of the command.
+    """
     lines: list[tuple] = []
     for name in names:
         values = sorted({row[name] for row in rows if "," not in row[name]})
         for value in values:
             own = [row for row in rows if row[name] == value]
             lines.append((f"{name} = {value}", *counts(own).values()))
+    for words, part in (with_words or {}).items():
+        own = [row for row in rows if part in row["command"]]
+        lines.append((words, *counts(own).values()))
     lines.append(("all", *counts(rows).values()))
     return markdown(lines, ("scenes", *CLASSES))
 

@@ -17,6 +17,7 @@ from damjoint_tools import (
     random_quakes,
     random_scenes,
     stress,
+    trust,
 )
 from damjoint_tools.quake_verification import QuakeFiles, judge_quake, quake_violations
 from damjoint_tools.random_quakes import RandomQuake, random_quake
@@ -118,7 +119,7 @@ def test_the_end_of_an_earthquake_is_judged(files, tmp_path, statement, wrong):
     assert judge_quake(QuakeFiles(files.whole, tmp_path, 1))[0] == wrong
 
 
-@pytest.mark.parametrize("number, seed", [(1, 6), pytest.param(2, 2, marks=pytest.mark.heavy)])
+@pytest.mark.parametrize("number, seed", [(1, 23), pytest.param(2, 2, marks=pytest.mark.heavy)])
 def test_random_earthquakes_have_no_defect_and_leave_static_scenes_as_they_are(
     command, tmp_path, number, seed
 ):
@@ -130,6 +131,9 @@ def test_random_earthquakes_have_no_defect_and_leave_static_scenes_as_they_are(
     assert all("--record" in row["command"] and int(row["steps"]) > 100 for row in rows)
     records = {path.name for path in (tmp_path / "s_records").iterdir()}
     assert len(rows) == number and records == {f"{seed}-{k}.csv" for k in range(number)}
+    mark, page = trust.trust_section(tmp_path / "s.csv")
+    assert mark == "earthquakes" and f"{number} random earthquakes" in page
+    assert f"(seed {seed})" in page and trust.QUAKES_VERIFIED in page
 
 
 def test_random_earthquakes_can_be_loaded_and_have_all_laws_and_waters(tmp_path):
