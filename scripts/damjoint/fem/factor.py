@@ -26,7 +26,7 @@ from threadpoolctl import ThreadpoolController
 
 from ..arrays import Array, IntArray, Sparse, mirror, others
 from ..csr import CsrMatrix
-from ..storage import atomic_write, cache_folder
+from ..storage import cache_folder
 from ..versions import installed
 from .memory import available, check_memory, dense_memory
 
@@ -68,9 +68,11 @@ def compile_into(folder: Path) -> ctypes.CDLL | None:
     path = folder / file_name()
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        with atomic_write(path) as part:
+        with tempfile.TemporaryDirectory(dir=folder) as own:  # others may compile it, too
+            part = Path(own) / path.name
             options = "-O2", "-shared", "-fPIC", SOURCE, "-ldmumps_seq", "-o", part
             subprocess.run(["cc", *options], check=True, capture_output=True)
+            part.replace(path)
         return ctypes.CDLL(str(path))
     except (OSError, subprocess.CalledProcessError):
         return None
