@@ -205,7 +205,7 @@ def scene_of(tmp_path, kind, checks, **settings):
     return RandomQuake(given, "30", "0", 1, record, tmp_path / "r.csv", kind, checks)
 
 
-ELASTIC = {"adhesion": 1e9, "quake_uplift": "unchanged", "dt": 0.0025}
+ELASTIC = {"adhesion": 1e9, "quake_uplift": "unchanged", "dt": 0.005}
 
 
 @pytest.mark.parametrize(
