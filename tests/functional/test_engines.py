@@ -48,13 +48,13 @@ def test_grouted_and_sawn_laws_agree_point_by_point(works):
     laws_agree("rupture", 1, WORKS[works])
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(s, marks=pytest.mark.heavy) for s in (1, 2))])
 def test_a_sawn_friction_law_agrees_point_by_point(seed):
     laws_agree("friction", seed, WORKS["sawn"])
 
 
 @pytest.mark.parametrize("law_name", LAWS)
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [1, *(pytest.param(s, marks=pytest.mark.heavy) for s in (0, 2))])
 def test_laws_agree_point_by_point(law_name, seed):
     """The laws of pro/ and of the condensed engine along one path."""
     laws_agree(law_name, seed, {})

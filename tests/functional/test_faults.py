@@ -162,9 +162,11 @@ NESTED = "[" * 100_000 + "]" * 100_000
     "old, new",
     [
         ("{", NESTED),
-        ('"state": "complete"', f'"state": {NESTED}'),
+        pytest.param('"state": "complete"', f'"state": {NESTED}', marks=pytest.mark.heavy),
         ('"wall_seconds": {', '"wall_seconds": [1], "seconds": {'),
-        ('"versions": {', '"versions": ["damjoint"], "numbers": {'),
+        pytest.param(
+            '"versions": {', '"versions": ["damjoint"], "numbers": {', marks=pytest.mark.heavy
+        ),
         ('"title": "', '"title": "\\ud800'),
         ('"case": "c"', '"case": ".."'),
         ('"case": "c"', '"case": ["c"]'),
@@ -282,13 +284,8 @@ def test_too_little_memory_for_the_libraries_is_one_line(tmp_path, megabytes):
     assert not any(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize(
-    "words",
-    [
-        ("b", "--no-picture"),
-        pytest.param(("c", *BARE, "--set", "n_joint=1500"), marks=pytest.mark.heavy),
-    ],
-)
+@pytest.mark.heavy
+@pytest.mark.parametrize("words", [("b", "--no-picture"), ("c", *BARE, "--set", "n_joint=1500")])
 def test_too_little_memory_for_the_case_is_one_line(tmp_path, words):
     """Refused before the linear algebra would wait for memory for ever."""
     code, err = limited(921_600_000, "run", *words, cwd=tmp_path)

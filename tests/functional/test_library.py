@@ -22,6 +22,7 @@ def run():
     return dj.run(dj.case("dam", **CASE))
 
 
+@pytest.mark.heavy
 def test_the_code_of_the_page_runs(tmp_path, monkeypatch):
     """One block after the other; nothing is written."""
     monkeypatch.chdir(tmp_path)

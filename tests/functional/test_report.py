@@ -348,6 +348,7 @@ def test_values_are_merged_over_runs():
     assert report_input.by_runs([{"a": 1}] * 3 + [{"a": 2}])[0] == ("a", 1, "1 to 3")
 
 
+@pytest.mark.heavy
 def test_pages_of_the_report_as_pdf(command, checked, page_of_check, tmp_path, monkeypatch):
     """A summary, a page per run, a page of input; nothing is wider than the page's text."""
     weasyprint = pytest.importorskip("weasyprint", exc_type=(ImportError, OSError))

@@ -143,6 +143,7 @@ def test_all_rows_of_close_levels_converge_and_their_openings_increase(command, 
     assert len(openings) == 51 and openings == sorted(openings)
 
 
+@pytest.mark.heavy
 def test_a_scheduler_with_two_workers(tmp_path, monkeypatch):
     """The same rows as in this process, from a dask cluster of two processes; two bundles of two
     rows in a task.

@@ -75,10 +75,10 @@ def test_validate_exits_with_1_if_a_row_fails(command, monkeypatch):
 @pytest.mark.parametrize(
     "family",
     [
-        # SDNV138: one of its tests by default in test_sdnv138.py
-        pytest.param(family, marks=pytest.mark.heavy) if family == "sdnv138" else family
-        for family in validation.FAMILIES
-        if family != "ssnp142"
+        # long ones, of which test_sdnv138.py and test_law_endo.py have parts by default
+        pytest.param(f, marks=pytest.mark.heavy) if f in ("sdnv138", "ssnp164") else f
+        for f in validation.FAMILIES
+        if f != "ssnp142"
     ],
 )
 def test_published_tests_beside_ssnp142(family, tmp_path):
