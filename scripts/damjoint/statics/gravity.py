@@ -311,10 +311,11 @@ class Uplift:
         """Set negative pressures to zero."""
         s, p = self.s, self.p
         crossings = np.flatnonzero(p[:-1] * p[1:] < 0)
-        share = p[crossings] / (p[crossings] - p[crossings + 1])
-        zeros = s[crossings] + share * (s[crossings + 1] - s[crossings])
-        self.s = np.insert(s, crossings + 1, zeros)
-        self.p = np.maximum(np.insert(p, crossings + 1, 0.0), 0.0)
+        if len(crossings):
+            share = p[crossings] / (p[crossings] - p[crossings + 1])
+            zeros = s[crossings] + share * (s[crossings + 1] - s[crossings])
+            self.s, p = np.insert(s, crossings + 1, zeros), np.insert(p, crossings + 1, 0.0)
+        self.p = np.maximum(p, 0.0)
 
     def stop(self, at: float) -> None:
         """Take the pressure away behind a waterstop [m from the heel]."""
