@@ -24,7 +24,7 @@ from ..engines import Outcome
 from ..engines.condensed.solve import about
 from ..joint.interface import interface_of
 from ..laws import Evidence
-from ..model.case import Case, Source, load, resolve
+from ..model.case import Case, load, resolve
 from ..model.parameters import independent, parameter
 from ..model.results import Results, column_of, row_of_joint
 from ..post import folder as folders
@@ -132,24 +132,6 @@ class CriticalValue:
         return lines
 
 
-@dataclass
-class LastResolved:
-    """The last case that was resolved: the rows of a sweep differ in independent parameters."""
-
-    source: Source | None = None
-    case: Case | None = None
-
-    def of(self, source: Source) -> Case:
-        """The case of a source, see `resolve`."""
-        if self.case is None or source != self.source:
-            self.source, self.case = source, resolve(source)
-        return self.case
-
-
-#: The case of this process: searches share it.
-last_resolved = LastResolved().of
-
-
 class Search:
     """The search for a critical value."""
 
@@ -220,12 +202,14 @@ class Search:
 
     @cached_property
     def base(self) -> Case:
-        """The case with the settings of the search."""
+        """The case with the settings of the search; those that nothing else follows are set after
+        Gmsh's parser, which the rows of a sweep then share.
+        """
         source, alone = self.own.source.with_overrides(self.settings), independent()
         single = {n for n, v in source.overrides.items() if n in alone and not isinstance(v, tuple)}
         rest = {n: v for n, v in source.overrides.items() if n not in single}
         try:
-            case = last_resolved(replace(source, overrides=rest))
+            case = resolve(replace(source, overrides=rest))
             return case.changed({n: source.overrides[n] for n in single})
         except InputError:  # the others are not allowed without these
             return resolve(source)
