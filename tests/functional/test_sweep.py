@@ -87,7 +87,7 @@ def test_an_interrupted_sweep_ends_at_once_and_keeps_its_rows(tmp_path):
             time.sleep(0.05)
         os.killpg(process.pid, signal.SIGINT)
         try:
-            _, error = process.communicate(timeout=15)
+            _, error = process.communicate(timeout=120)
         except subprocess.TimeoutExpired:
             os.killpg(process.pid, signal.SIGKILL)
             raise
