@@ -16,7 +16,7 @@ from damjoint.model.case import load
 from damjoint.model.mesh import Body
 from damjoint.post import pictures
 from damjoint.post.drawing import runs_of
-from damjoint.post.drawing_process import DrawingProcess
+from damjoint.post.drawing_process import DrawingProcess, joined
 from damjoint.statics import gravity
 from matplotlib.axes import Axes
 from matplotlib.legend import Legend
@@ -213,7 +213,7 @@ def test_an_error_of_the_drawing_process_is_raised(runs, tmp_path):
 def test_the_drawing_process_ends_with_its_parent():
     script = """
 import time
-from damjoint.post.drawing_process import DrawingProcess
+from damjoint.post.drawing_process import DrawingProcess, joined
 with DrawingProcess() as drawing:
     print(drawing.group, flush=True)
     time.sleep(600)
@@ -243,3 +243,24 @@ def test_a_run_loads_neither_meshio_nor_the_plotting_library(tmp_path):
     done = subprocess.run([sys.executable, "-c", tell], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == "[]"
     assert (tmp_path / "out" / "c.png").exists() and (tmp_path / "out/fields/bulk_t1.vtu").exists()
+
+
+@pytest.mark.parametrize("name", ["flow", "k"])
+def test_two_processes_draw_the_same_picture(runs, tmp_path, name):
+    solution = runs(name).solution
+    pictures.draw(solution, tmp_path)
+    (file,) = tmp_path.glob(f"{solution.result.case.name}.png")
+    whole = file.read_bytes()
+    pictures.draw(solution, tmp_path, joined)
+    assert file.read_bytes() == whole
+
+
+def test_a_half_that_its_process_does_not_draw_is_drawn_by_the_other():
+    mine, white = os.getpid(), np.full((2, 2), 255)
+
+    def draw(half):
+        if half and os.getpid() != mine:
+            os._exit(1)
+        return white - 100 * np.eye(2)[half]
+
+    assert np.array_equal(joined(draw), 155 * np.ones((2, 2)))

@@ -13,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg  # not pyplot: it costs half of a 2D run
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure, FigureBase
+from matplotlib.image import imsave
 from matplotlib.patches import Patch
 
 from ..model.fields import OPEN, SLIPPED, SOFTENING
@@ -63,10 +64,22 @@ def figure_of(width: float, height: float) -> Figure:
     return figure
 
 
+def pixels_of(figure: Figure, dpi: int) -> np.ndarray:
+    """The pixels of a figure (height, width, RGBA)."""
+    figure.set_dpi(dpi)
+    figure.canvas.draw()
+    return np.asarray(figure.canvas.buffer_rgba())
+
+
+def write_pixels(pixels: np.ndarray, path: Path, dpi: int, **options: int) -> None:
+    """Write pixels as PNG; options: of PIL."""
+    with atomic_write(path) as part:
+        imsave(part, pixels, format="png", dpi=dpi, pil_kwargs=options)
+
+
 def write_picture(figure: Figure, path: Path, dpi: int, **options: int) -> None:
     """Write a figure as PNG; options: of PIL."""
-    with atomic_write(path) as part:
-        figure.savefig(part, dpi=dpi, format="png", pil_kwargs=options)
+    write_pixels(pixels_of(figure, dpi), path, dpi, **options)
 
 
 def panels(

@@ -15,7 +15,9 @@ from typing import TYPE_CHECKING
 
 from .. import RunError
 
-if TYPE_CHECKING:  # loading it takes the time that the second process saves
+if TYPE_CHECKING:  # loading them takes the time that the second process saves
+    import numpy as np
+
     from ..model.fields import Solution
 
 #: Forked processes share what is loaded; new interpreters would load it again.
@@ -67,6 +69,7 @@ class DrawingProcess:
 def serve(pipe: Connection, of_parent: Connection) -> None:
     """Draw what arrives through a pipe until the parent closes it or ends."""
     of_parent.close()  # a copy of the parent's end, which would keep the pipe open
+    gc.disable()  # a fork ends after a picture; searching the libraries' objects takes a quarter
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_DFL)
     with contextlib.suppress(EOFError, ConnectionError):
@@ -74,7 +77,6 @@ def serve(pipe: Connection, of_parent: Connection) -> None:
             from . import pictures
 
             pictures.prepare()
-            gc.freeze()  # the forks draw in three quarters of the time: none searches the libraries
         except Exception as error:
             pipe.send(error)
             return
@@ -82,13 +84,28 @@ def serve(pipe: Connection, of_parent: Connection) -> None:
             FORK.Process(target=answer, args=(pipe, pictures.draw, *pipe.recv())).start()
 
 
-def answer(
-    pipe: Connection, draw: Callable[[Solution, Path], object], solution: Solution, folder: Path
-) -> None:
+def answer(pipe: Connection, draw: Callable[..., object], solution: Solution, folder: Path) -> None:
     """Draw the pictures of a solution into a folder; send the error that this raises, or None."""
-    error = None
+    error, several = None, len(os.sched_getaffinity(0)) > 1
     try:
-        draw(solution, folder)
+        draw(solution, folder, joined if several else None)
     except Exception as raised:
         error = raised
     pipe.send(error)
+
+
+def joined(draw: Callable[[int], np.ndarray]) -> np.ndarray:
+    """Pixels of a picture of which a fork draws the second half: the darker ones of both halves."""
+    import numpy as np
+
+    pipe, other = FORK.Pipe(duplex=False)
+    process = FORK.Process(target=lambda: other.send(draw(1)))
+    process.start()
+    other.close()
+    first = draw(0)
+    try:
+        second = pipe.recv()
+    except EOFError:  # it has ended: this process shows why
+        second = draw(1)
+    process.join()
+    return np.minimum(first, second)

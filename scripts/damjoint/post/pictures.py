@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import textwrap
+from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -41,8 +42,10 @@ from .drawing import (
     figure_of,
     legend_above,
     panels,
+    pixels_of,
     runs_of,
     write_picture,
+    write_pixels,
 )
 from .outline import exaggeration, skin
 from .section_picture import draw_section
@@ -73,14 +76,22 @@ AROUND = 0.3
 LEVELS, TINY = 10, 1e-9
 DISTANCE = "distance from the heel along the joint [m]"
 
+#: Pixels of a picture by a function that draws one of its halves, see `picture`.
+Join = Callable[[Callable[[int], np.ndarray]], np.ndarray]
 
-def draw(solution: Solution, folder: Path) -> Path:
-    """Draw all into folder/<case>.png and return its path; a load curve into <case>_curve.png."""
+
+def draw(solution: Solution, folder: Path, joined: Join | None = None) -> Path:
+    """Draw all into folder/<case>.png and return its path; a load curve into <case>_curve.png.
+
+    joined: the pixels of the picture from those of its halves, which it has drawn.
+    """
     result = solution.result
     if result.case["drive"] != "level":
         write_picture(draw_curve(result), folder / f"{result.case.name}_curve.png", DPI)
     path = folder / f"{result.case.name}.png"
-    write_picture(picture(solution), path, DPI, compress_level=2)
+    half = lambda number: pixels_of(picture(solution, (number,)), DPI)
+    pixels = joined(half) if joined else pixels_of(picture(solution), DPI)
+    write_pixels(pixels, path, DPI, compress_level=2)
     return path
 
 
@@ -91,8 +102,12 @@ def prepare() -> None:
     write_picture(figure, Path(os.devnull), DPI)
 
 
-def picture(solution: Solution) -> Figure:
-    """Section and joint at the last state, or that of the published numbers; the history."""
+def picture(solution: Solution, halves: tuple[int, ...] = (0, 1)) -> Figure:
+    """Section and joint at the last state, or that of the published numbers; the history.
+
+    halves: the parts that are drawn, which take about the same time: heading, section and history;
+    joint, view and maps.
+    """
     result = solution.result
     case = result.case
     has_states = bool(len(result.joint["time"]))
@@ -106,19 +121,24 @@ def picture(solution: Solution) -> Figure:
             heights.append(SOLID)
     figure = figure_of(WIDTH, sum(heights))
     top, *parts = np.ravel(figure.subfigures(len(heights), 1, height_ratios=heights))
-    write_heading(top, title, message)
     if has_states:
-        time = shown_time(result)
+        time, shares = shown_time(result), case.of_joints and is_own_solid(case)
         left, right = parts[0].subfigures(1, 2, width_ratios=(1, RIGHT))
-        draw_dam(left, solution, time)
         own = solution.of_joint(decisive_joint(result))
-        if case.of_joints and is_own_solid(case):
+        if shares:
             right, below = right.subfigures(2, 1)
-            draw_shares(below, result, time)
+    if 0 in halves:
+        write_heading(top, title, message)
+    if has_states and 0 in halves:
+        draw_dam(left, solution, time)
+        if shares:
             draw_history(parts[1], own.result)
         else:
             draw_histories(parts[1], result, time)
+    if has_states and 1 in halves:
         draw_joint(right, own, time)
+        if shares:
+            draw_shares(below, result, time)
         if len(parts) > 2:
             draw_solid(parts[2], solution, time)
     return figure
