@@ -233,3 +233,24 @@ def test_a_joint_that_slides_is_not_taken_for_an_elastic_one(tmp_path):
     run = stress.run_of(scene, tmp_path)
     found = stress.with_further_checks(scene, run, tmp_path, {"class": stress.VERIFIED})
     assert found["class"] == stress.DEFECT and "asymmetry" in found["findings"]
+
+
+def test_engines_that_differ_are_compared_again_with_shorter_steps(files, tmp_path):
+    """Softening: a step of 5 ms may have several equilibria."""
+    altered(files, tmp_path, "quake", "N", lambda v: 1.01 * v)
+    other = QuakeFiles(files.whole, tmp_path, 0)
+    asked, scene = [], scene_of(tmp_path, "dam", ("getdp",))
+
+    def again(changed, *options):
+        asked.append((changed.settings.get("dt"), options))
+        return other if len(asked) == 1 else files
+
+    measures, violated = quake_comparison.further_checks(scene, files, again)
+    assert measures["engines"] == 0 and 1e-3 < measures["engines_at_dt"] and not violated
+    getdp = ("--engine", "getdp")
+    assert [options for _, options in asked] == [getdp, (), getdp]
+    assert [dt for dt, _ in asked[1:]] == pytest.approx([0.005 / 8] * 2)
+    measures, violated = quake_comparison.further_checks(
+        scene, files, lambda _, *options: other if options else files
+    )
+    assert len(violated) == 1 and violated[0].startswith("engines: ")
