@@ -213,7 +213,9 @@ ELASTIC = {"adhesion": 1e9, "quake_uplift": "unchanged", "dt": 0.005}
     [
         ("elastic", ("reversed",), ELASTIC, {"asymmetry": (0, 1e-6)}),
         ("elastic", ("halved",), ELASTIC, {"order": (1.9, 2.1)}),
-        ("dam", ("halved",), {}, {"change_by_dt": (1e-6, 0.1)}),
+        pytest.param(
+            *("dam", ("halved",), {}, {"change_by_dt": (1e-6, 0.1)}), marks=pytest.mark.heavy
+        ),
         ("dam", ("stronger",), {}, {"slip_if_stronger": (0.01, 0.95)}),
         ("dam", ("getdp",), {"dt": 0.01}, {"engines": (1e-16, 1e-6)}),
     ],
