@@ -5,6 +5,7 @@ Large matrices are multiplied by scipy, in the same order of summation.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, overload
@@ -17,8 +18,14 @@ from .classes import dataclass
 if TYPE_CHECKING:
     from scipy import sparse
 
-#: Number of entries up to which products are not worth loading scipy.
-LARGE = 100_000
+#: Numbers of entries up to which numpy takes less time: for products; if scipy is not loaded yet,
+#: for the assembly, for a transposed matrix and a product with a vector.
+LARGE, LARGER = 100_000, 1_000_000
+
+
+def is_large(entries: int) -> bool:
+    """Whether a transposed matrix or a product with a vector is left to scipy."""
+    return entries > (LARGE if "scipy.sparse" in sys.modules else LARGER)
 
 
 def ranges(starts: IntArray, counts: IntArray) -> IntArray:
@@ -43,6 +50,10 @@ class CsrMatrix:
         values: Array, rows: IntArray, columns: IntArray, shape: tuple[int, int]
     ) -> CsrMatrix:
         """The matrix of entries; those of the same place are added."""
+        if len(values) > LARGER:
+            from scipy import sparse
+
+            return CsrMatrix.of_scipy(sparse.coo_matrix((values, (rows, columns)), shape))
         places, inverse = np.unique(rows * np.int64(shape[1]) + columns, return_inverse=True)
         row, column = np.divmod(places, max(shape[1], 1))
         pointers = np.searchsorted(row, np.arange(shape[0] + 1))
@@ -89,7 +100,7 @@ class CsrMatrix:
     def T(self) -> CsrMatrix:
         """The transposed matrix."""
         shape = self.shape[::-1]
-        if len(self.data) > LARGE:
+        if is_large(len(self.data)):
             return CsrMatrix.of_scipy(self.scipy().T)
         order = np.argsort(self.indices, kind="stable")
         pointers = np.concatenate([[0], np.cumsum(np.bincount(self.indices, minlength=shape[0]))])
@@ -105,7 +116,7 @@ class CsrMatrix:
             return self._times(other)
         if other.ndim == 2 and self.shape[0] * self.shape[1] <= LARGE:
             return np.asarray(self.dense @ other)
-        if other.ndim == 2 or len(self.data) > LARGE:
+        if other.ndim == 2 or is_large(len(self.data)):
             return np.asarray(self.scipy() @ other)
         return np.bincount(self.rows, self.data * other[self.indices], self.shape[0])
 

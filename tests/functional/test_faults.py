@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from damjoint import RunError
+from damjoint.csr import CsrMatrix
 from damjoint.engines import engine_of
 from damjoint.fem import factor, memory
 from damjoint.storage import atomic_write, locked_folder
@@ -320,7 +321,7 @@ def test_mumps_out_of_memory_is_one_line(monkeypatch):
     for module in factor, memory:
         monkeypatch.setattr(module, "available", lambda: 0.0)
     with pytest.raises(RunError, match="3 unknowns need about"):
-        factor.solve_symmetric(matrix, np.ones((3, 1)))
+        factor.solve_symmetric(CsrMatrix.of_scipy(matrix), np.ones((3, 1)))
 
 
 def test_a_getdp_run_that_exceeds_the_memory_is_refused(command, monkeypatch):

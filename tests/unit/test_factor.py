@@ -82,7 +82,7 @@ def test_factors_that_are_stored(system, method):
 
 def test_solution(system, method):
     matrix, loads = system
-    solution = factor.solve_symmetric(matrix, loads)
+    solution = factor.solve_symmetric(CsrMatrix.of_scipy(matrix), loads)
     assert matrix @ solution == pytest.approx(loads, rel=1e-11, abs=1e-12)
 
 

@@ -25,9 +25,8 @@ def lame(young: float, poisson: float) -> tuple[float, float]:
     return young * poisson / ((1 + poisson) * (1 - 2 * poisson)), young / (2 * (1 + poisson))
 
 
-#: Numbers of elements computed and of entries assembled at a time; number of entries up to which
-#: numpy assembles them in less time than scipy takes to load, as 2D does not need it otherwise.
-MOST_ELEMENTS, MOST_ENTRIES, FEW_ENTRIES = 50_000, 5_000_000, 1_000_000
+#: Numbers of elements computed and of entries assembled at a time.
+MOST_ELEMENTS, MOST_ENTRIES = 50_000, 5_000_000
 
 
 def elasticity(space: Space, dim: int, material: Material) -> CsrMatrix:
@@ -57,7 +56,7 @@ def elasticity(space: Space, dim: int, material: Material) -> CsrMatrix:
             parts.append((block.ravel(), rows.ravel(), columns.ravel()))
             if number() > MOST_ENTRIES:
                 whole = assembled() if whole is None else whole + assembled()
-    if whole is None and dim == 2 and number() <= FEW_ENTRIES:
+    if whole is None and dim == 2:
         values, rows, columns = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
         return CsrMatrix.of_entries(values, rows, columns, (size, size))
     if parts:

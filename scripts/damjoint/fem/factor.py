@@ -367,13 +367,13 @@ def schur_by_superlu(matrix: Sparse, keep: IntArray) -> Array:
     return schur - np.diag(raised)
 
 
-def solve_symmetric(matrix: Sparse, right: Array) -> Array:
+def solve_symmetric(matrix: CsrMatrix, right: Array) -> Array:
     """Solution (n, m) of a symmetric positive definite system, all right-hand sides at once.
 
     Raises RunError if the estimated memory is not available.
     """
     mumps = library()
     if mumps is None:
-        return superlu(matrix.tocsc(), "MMD_AT_PLUS_A").solve(right)
+        return superlu(matrix.scipy().tocsc(), "MMD_AT_PLUS_A").solve(right)
     what = f"{matrix.shape[0]} unknowns"
     return MumpsFactors(mumps, matrix, np.zeros(0, int), what, right.nbytes).solve(right)

@@ -1,12 +1,12 @@
-"""All bodies of a case glued at their joints: a single elastic body, assembled."""
+"""All bodies of a case glued at their joints: a single elastic body."""
 
 from __future__ import annotations
 
 import numpy as np
-from scipy import sparse
 
-from ..arrays import Array, IntArray, Sparse
+from ..arrays import Array, IntArray, Sparse, others
 from ..classes import dataclass
+from ..csr import CsrMatrix
 from .bodies import ElasticBody
 from .factor import solve_symmetric
 from .gluing import Gluing
@@ -14,17 +14,19 @@ from .gluing import Gluing
 
 @dataclass(frozen=True, kw_only=True)
 class GluedBodies:
-    """All bodies, glued at the joints to a single elastic body; the last body's numbers first."""
+    """All bodies, glued at the joints to a single elastic body of n degrees of freedom."""
 
-    stiffness: Sparse
+    bodies: dict[str, ElasticBody]
+    #: n
+    size: int
     #: degrees of freedom that are not fixed
     free: IntArray
-    #: by body: the Boolean matrix of the numbers of its degrees of freedom
-    numbers: dict[str, Sparse]
+    #: by body: the number of each of its degrees of freedom; those of the last body come first
+    numbers: dict[str, IntArray]
 
     @staticmethod
     def of(bodies: dict[str, ElasticBody], gluing: Gluing) -> GluedBodies:
-        """Assemble bodies."""
+        """Number the degrees of freedom."""
         shared = np.full(gluing.nodes, -1)
         numbers, fixed, size = {}, list[IntArray](), 0
         for name, body in reversed(bodies.items()):
@@ -37,30 +39,45 @@ class GluedBodies:
             size += len(new)
             numbers[name] = number
             fixed.append(number[body.fixed_dofs])
-        matrices = {
-            name: sparse.csr_matrix((np.ones(len(n)), (np.arange(len(n)), n)), (len(n), size))
-            for name, n in numbers.items()
-        }
-        stiffness = sum(m.T @ bodies[name].stiffness.scipy() @ m for name, m in matrices.items())
-        free = np.setdiff1d(np.arange(size), np.concatenate(fixed))
-        return GluedBodies(stiffness=stiffness.tocsr(), free=free, numbers=matrices)
+        free = others(size, np.concatenate(fixed))
+        return GluedBodies(bodies=bodies, size=size, free=free, numbers=numbers)
 
     def motion(self, gluing: Gluing) -> dict[str, Sparse]:
         """By body b: T_b (degrees of freedom, n) of u_b = T_b w; w: the free displacements of the
         glued bodies, then the jumps that part them.
         """
+        from scipy import sparse
+
         motion = {}
         for name, own in gluing.bodies.items():
-            numbers, places = self.numbers[name], (own.dofs, np.arange(len(own.dofs)))
-            shape = numbers.shape[0], len(own.dofs)
-            placed = sparse.csr_matrix((np.ones(len(own.dofs)), places), shape)
+            number, shape = self.numbers[name], (len(self.numbers[name]), self.size)
+            glued = sparse.csr_matrix(
+                (np.ones(len(number)), (np.arange(len(number)), number)), shape
+            )
+            places = own.dofs, np.arange(len(own.dofs))
+            placed = sparse.csr_matrix(
+                (np.ones(len(own.dofs)), places), (len(number), len(own.dofs))
+            )
             carried = placed @ own.jumps.scipy()
-            motion[name] = sparse.hstack([numbers[:, self.free], carried], format="csr")
+            motion[name] = sparse.hstack([glued[:, self.free], carried], format="csr")
         return motion
+
+    def stiffness(self) -> CsrMatrix:
+        """Stiffness of the free degrees of freedom [N/m]."""
+        place = np.full(self.size, -1, np.int32)
+        place[self.free] = np.arange(len(self.free))
+        parts = []
+        for name, body in self.bodies.items():
+            number = place[self.numbers[name]]
+            rows = np.repeat(number, body.stiffness.counts)
+            columns = number[body.stiffness.indices]
+            kept = (rows >= 0) & (columns >= 0)
+            parts.append((body.stiffness.data[kept], rows[kept], columns[kept]))
+        values, rows, columns = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+        return CsrMatrix.of_entries(values, rows, columns, (len(self.free), len(self.free)))
 
     def solve(self, loads: Array) -> Array:
         """Displacements (n, m) under loads (n, m)."""
         solution = np.zeros(loads.shape)
-        stiffness = self.stiffness[self.free][:, self.free]
-        solution[self.free] = solve_symmetric(stiffness, loads[self.free])
+        solution[self.free] = solve_symmetric(self.stiffness(), loads[self.free])
         return solution

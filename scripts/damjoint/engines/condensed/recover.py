@@ -51,7 +51,7 @@ def recover(bodies: Bodies, scenes: list[tuple[Equilibrium, History]]) -> list[d
         return [{} for _ in scenes]
     gluing = Gluing.of(bodies)
     glued = GluedBodies.of(bodies.by_name, gluing)
-    loads = np.zeros((glued.stiffness.shape[0], len(states)))
+    loads = np.zeros((glued.size, len(states)))
     jumps = {
         name: np.zeros((len(states), body.stiffness.shape[0]))
         for name, body in bodies.by_name.items()
@@ -60,14 +60,12 @@ def recover(bodies: Bodies, scenes: list[tuple[Equilibrium, History]]) -> list[d
         for name, body in bodies.by_name.items():
             of_body = gluing.bodies[name]
             jumps[name][i, of_body.dofs] = of_body.jumps @ state.jump
-            load = -(body.stiffness.scipy() @ jumps[name][i])
+            load = -(body.stiffness @ jumps[name][i])
             add_external_forces(load, body, equilibrium, state)
-            loads[:, i] += glued.numbers[name].T @ load
+            loads[:, i] += np.bincount(glued.numbers[name], load, glued.size)
     solution = glued.solve(loads)
 
-    displacements = {
-        name: (glued.numbers[name] @ solution).T + jumps[name] for name in bodies.by_name
-    }
+    displacements = {n: solution[glued.numbers[n]].T + jumps[n] for n in bodies.by_name}
     at_nodes, stresses = {}, {}
     material, dim = material_of(states[0][0].case), bodies.mesh.dim
     for name, values in displacements.items():
