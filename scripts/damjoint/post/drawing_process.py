@@ -74,6 +74,9 @@ def serve(pipe: Connection, of_parent: Connection) -> None:
         signal.signal(number, signal.SIG_DFL)
     with contextlib.suppress(EOFError, ConnectionError):
         try:
+            from matplotlib import artist
+
+            artist.kwdoc = lambda _: ""  # makes the docstrings: a quarter of the time of loading it
             from . import pictures
 
             pictures.prepare()
