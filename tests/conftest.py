@@ -1,11 +1,19 @@
 """Shared fixtures. A scene is computed once per session."""
 
+import gc
 import signal
 
 import pytest
 from damjoint import runner
+from damjoint.__main__ import OBJECTS
 from damjoint.model.case import load
 from damjoint.threads import limited_threads
+
+
+def pytest_collection_finish():
+    """Search for garbage as rarely as the commands do, and not among the tests themselves."""
+    gc.freeze()
+    gc.set_threshold(OBJECTS)
 
 
 @pytest.fixture(scope="session", autouse=True)

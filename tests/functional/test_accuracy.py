@@ -50,7 +50,8 @@ def test_oscillating_values_have_no_observed_order():
     assert error > values[-1] - limit
 
 
-@pytest.mark.parametrize("scene", [pytest.param("imposed", marks=pytest.mark.heavy), "flow"])
+@pytest.mark.heavy
+@pytest.mark.parametrize("scene", ["imposed", "flow"])
 def test_true_errors_are_within_the_estimates(scene):
     """True errors are those against a mesh four times as fine."""
     case = load("dam", DAM | {"uplift": scene}, "40,46", accuracy="3%")

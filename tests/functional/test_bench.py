@@ -57,6 +57,7 @@ def test_the_short_benchmark_writes_consistent_files(command, tmp_path):
     assert all(float(row["difference"]) < 1e-9 for row in table("orders"))
 
 
+@pytest.mark.heavy
 def test_seconds_of_several_joints(tmp_path):
     measured = bench_cost.joints(Measurements(tmp_path / "log", short=True))
     assert measured["joints"] == [1, 2] and measured["ratio"][0] == 1

@@ -54,6 +54,7 @@ def rows(path):
         return {(row["case"], row["answer"]): row for row in csv.DictReader(file)}
 
 
+@pytest.mark.heavy
 def test_two_load_combinations(command, combinations, tmp_path):
     code, out, _ = command("check", *combinations)
     assert code == 0

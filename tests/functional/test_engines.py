@@ -249,12 +249,8 @@ OF_BASES = {"law": ("rupture", "bond", "friction"), "sigma_max": 2e4, "adhesion"
 OF_BASES |= {"pena_tang": 1e9, "order": 2.0}
 SOLID_BLOCKS = {"dim": 3.0, "n_joint": 8.0, "h_dam": 10.0, "h_found": 60.0}
 SEVERAL = {
-    "laws and water": ("dam", LIFTS | OF_LAWS | OF_WATER | SLOPES | SHAPE, "30,47", "2"),
     "all loads": ("dam", LIFTS | STAGED | WARM | SLOPES | SHAPE | {"sigma_max": 2e4}, "20,45", "0"),
-    "drains": ("dam", LIFTS | FLOW | WEAK | DRAINED, "30,49.3", "0,3"),
     "lift above a lift": ("dam", SMALL | TWO_LIFTS, "51", "0"),
-    "crest driven": ("dam", LIFTS | WEAK | {"drive": "crest", "drive_by": 6e-3}, "40,41", "0"),
-    "grouted, sawn": ("dam", SMALL | WORKS_ON_LIFTS, "30,40,50", "0"),
     "T, laws and water": (
         "monoliths",
         MONOLITHS | OF_BASES | {"uplift": ("flow", "cracked", "none")},
@@ -269,6 +265,10 @@ SEVERAL = {
     ),
 }
 HEAVY = {
+    "laws and water": ("dam", LIFTS | OF_LAWS | OF_WATER | SLOPES | SHAPE, "30,47", "2"),
+    "drains": ("dam", LIFTS | FLOW | WEAK | DRAINED, "30,49.3", "0,3"),
+    "crest driven": ("dam", LIFTS | WEAK | {"drive": "crest", "drive_by": 6e-3}, "40,41", "0"),
+    "grouted, sawn": ("dam", SMALL | WORKS_ON_LIFTS, "30,40,50", "0"),
     "lifts": ("lifts", SMALL | WEAK, "30,45,48.5", "0"),
     "flow": ("dam", LIFTS | FLOW | WEAK, "30,49.3", "0,3"),
     "heel driven": ("dam", LIFTS | WEAK | {"drive": "heel", "drive_by": 2e-4}, "40,46", "0"),

@@ -16,7 +16,7 @@ SMALL = ("--set", "n_joint=10", "--set", "h_dam=3", "--set", "h_found=4")
 BARE = (*SMALL, "--no-fields", "--no-picture")
 
 
-@pytest.mark.parametrize("engine", ["getdp", "condensed"])
+@pytest.mark.parametrize("engine", [pytest.param("getdp", marks=pytest.mark.heavy), "condensed"])
 def test_files_of_the_user_in_the_folder_stay(command, tmp_path, engine):
     """Also in work/ and fields/, beside an earlier run."""
     mine = [

@@ -91,6 +91,7 @@ levels() = {40, 46};
 """
 
 
+@pytest.mark.heavy
 def test_lifts_without_python(project):
     """Three joints with the same parameters: their resultants at each step, by the default
     engine.

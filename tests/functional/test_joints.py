@@ -245,7 +245,10 @@ def test_the_mesh_of_one_joint_does_not_depend_on_an_earlier_mesh_of_several():
 
 @pytest.mark.parametrize(
     ("number", "failure"),
-    [(271, "sliding on lift 3.109 m"), (317, "overturning on lift 12.21 m")],
+    [
+        pytest.param(271, "sliding on lift 3.109 m", marks=pytest.mark.heavy),
+        (317, "overturning on lift 12.21 m"),
+    ],
 )
 def test_the_joint_that_fails_is_named(number, failure, tmp_path):
     """Not one that slips on a hardening of its own, nor one that its tension holds."""

@@ -38,7 +38,8 @@ def test_monotone_filling_does_not_depend_on_the_steps(solve, law):
             np.testing.assert_allclose(other[name], rows[0][name], rtol=0, atol=1e-6 * size)
 
 
-@pytest.mark.parametrize("n_joint", [60, pytest.param(100, marks=pytest.mark.heavy)])
+@pytest.mark.heavy
+@pytest.mark.parametrize("n_joint", [60, 100])
 def test_a_dam_on_a_brittle_bond_is_followed_beyond_its_limit_point(solve, n_joint):
     """The level falls by almost 2 m while the crack grows, and rises again; the final state is in
     equilibrium.

@@ -270,6 +270,7 @@ def test_free_vibration_decays_as_rayleigh_damping_says(tmp_path):
     assert peaks[1] / peaks[0] == pytest.approx(expected, rel=2e-3)
 
 
+@pytest.mark.heavy
 def test_joint_dashpots_of_a_closed_joint(tmp_path):
     """A rigid block on springs and dashpots under a vertical record: a damped oscillator."""
     stiffness, dashpot, mass, length = 1e7, 8.8e4, 2400 * 16.0, 8.0
@@ -292,7 +293,10 @@ def test_joint_dashpots_of_a_closed_joint(tmp_path):
     assert opening == pytest.approx(exact, abs=1e-3 * np.abs(exact).max())
 
 
-@pytest.mark.parametrize("mode, uplift", [("zero", "imposed"), ("unchanged", "cracked")])
+@pytest.mark.parametrize(
+    "mode, uplift",
+    [("zero", "imposed"), pytest.param("unchanged", "cracked", marks=pytest.mark.heavy)],
+)
 def test_water_in_the_joint_during_an_earthquake(tmp_path, mode, uplift):
     """zero: less uplift while the joint is open; unchanged: the same at every step; by the crack:
     more while it is open.
@@ -352,7 +356,7 @@ def test_steps_solve_the_equations_of_all_unknowns(tmp_path, alpha):
     assert largest < 1e-8
 
 
-@pytest.mark.parametrize("other", ["Woodbury", "SuperLU"])
+@pytest.mark.parametrize("other", ["Woodbury", pytest.param("SuperLU", marks=pytest.mark.heavy)])
 def test_linear_solvers_agree(tmp_path, monkeypatch, other):
     """Dense matrices of small joints against the formula for large ones; MUMPS against SuperLU."""
     record = smooth_record(tmp_path / "r.csv", 6.0, duration=0.4)
@@ -637,6 +641,7 @@ def test_an_interrupted_run_continues_with_the_same_rows(command, case_file, tmp
     assert number == len(two.splitlines()) - 1
 
 
+@pytest.mark.heavy
 def test_a_run_under_way_of_another_case_is_not_continued(command, case_file, monkeypatch):
     add = QuakeHistory.add
 
@@ -653,6 +658,7 @@ def test_a_run_under_way_of_another_case_is_not_continued(command, case_file, mo
     assert one == two
 
 
+@pytest.mark.heavy
 @pytest.mark.usefixtures("no_pictures")
 def test_a_sweep_of_earthquakes(command, case_file, tmp_path):
     """A row fails by its residual slip, that of the single run; rows are not computed again."""

@@ -119,7 +119,8 @@ def test_the_end_of_an_earthquake_is_judged(files, tmp_path, statement, wrong):
     assert judge_quake(QuakeFiles(files.whole, tmp_path, 1))[0] == wrong
 
 
-@pytest.mark.parametrize("number, seed", [(1, 23), pytest.param(2, 2, marks=pytest.mark.heavy)])
+@pytest.mark.heavy
+@pytest.mark.parametrize("number, seed", [(1, 23), (2, 2)])
 def test_random_earthquakes_have_no_defect_and_leave_static_scenes_as_they_are(
     command, tmp_path, number, seed
 ):
@@ -208,14 +209,13 @@ def scene_of(tmp_path, kind, checks, **settings):
 ELASTIC = {"adhesion": 1e9, "quake_uplift": "unchanged", "dt": 0.005}
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize(
     "kind, checks, settings, expected",
     [
         ("elastic", ("reversed",), ELASTIC, {"asymmetry": (0, 1e-6)}),
         ("elastic", ("halved",), ELASTIC, {"order": (1.9, 2.1)}),
-        pytest.param(
-            *("dam", ("halved",), {}, {"change_by_dt": (1e-6, 0.1)}), marks=pytest.mark.heavy
-        ),
+        ("dam", ("halved",), {}, {"change_by_dt": (1e-6, 0.1)}),
         ("dam", ("stronger",), {}, {"slip_if_stronger": (0.01, 0.95)}),
         ("dam", ("getdp",), {"dt": 0.01}, {"engines": (1e-16, 1e-6)}),
     ],
@@ -230,6 +230,7 @@ def test_further_runs_of_a_scene(tmp_path, kind, checks, settings, expected):
         assert low <= float(found[name]) <= high, found
 
 
+@pytest.mark.heavy
 def test_a_joint_that_slides_is_not_taken_for_an_elastic_one(tmp_path):
     scene = scene_of(tmp_path, "elastic", ("reversed",))
     run = stress.run_of(scene, tmp_path)

@@ -74,6 +74,7 @@ def test_plot_of_a_run_with_displacement_control(command, tmp_path):
         assert (tmp_path / "out" / "k" / name).stat().st_size > 10_000
 
 
+@pytest.mark.heavy
 def test_plot_and_report_of_a_user_geometry(command, tmp_path):
     """A stepped base, with the ends of the joint read from the mesh; no gravity method, which needs
     a section by parameters.
@@ -323,6 +324,7 @@ def test_input_of_several_joints_is_in_the_report():
     assert any(words.endswith("(lift 15 m).") for words in sentences)
 
 
+@pytest.mark.heavy
 def test_report_of_several_joints_has_the_levels_of_each(command, tmp_path):
     lifts = "--set", "lift_heights=15", "--set", "law=bond,friction", "--levels", "30,40"
     command("run", "dam", *SMALL, *lifts, "--out", "dam")

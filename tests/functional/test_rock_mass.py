@@ -81,7 +81,8 @@ def errors(tmp_path, axis, size, **settings):
     return worst, after, np.interp(begin, times, energies) / whole, energies[-1] / whole
 
 
-@pytest.mark.parametrize("axis", [0, pytest.param(1, marks=pytest.mark.heavy)])
+@pytest.mark.heavy
+@pytest.mark.parametrize("axis", [0, 1])
 def test_a_wave_from_below_has_twice_its_velocity_at_the_surface_and_leaves(tmp_path, axis):
     """And at the base the velocity of the upward wave, later that of the reflected one."""
     coarse, _, _, _ = errors(tmp_path, axis, 4.0, dt=1e-3)
@@ -108,6 +109,7 @@ def test_the_reactions_of_the_static_state_remain(tmp_path):
     assert largest < 1e-10 < 1e-5 < np.abs(static.jump).max()
 
 
+@pytest.mark.heavy
 def test_what_the_dam_radiates_does_not_come_back(tmp_path):
     """After the record an elastic dam comes to rest, with no damping but that of the boundary; on
     massless rock it goes on.
@@ -129,6 +131,7 @@ def test_what_the_dam_radiates_does_not_come_back(tmp_path):
     assert most < most_massless
 
 
+@pytest.mark.heavy
 def test_a_section_of_any_thickness_is_in_plane_strain(tmp_path):
     """Both components of the record; the meshes of the section differ a little."""
     times = np.arange(0, 0.4, 0.01)

@@ -174,7 +174,7 @@ def test_an_impossible_section_is_refused(settings, message):
         load("dam", settings)
 
 
-@pytest.mark.parametrize("effectiveness", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("effectiveness", [pytest.param(0.0, marks=pytest.mark.heavy), 0.5, 1.0])
 def test_drains_in_the_uncracked_part(solve, effectiveness):
     """As in the gravity method, on a rigid dam; there is a node at the drains."""
     drains = {"drains": 1, "drain_x": 4, "drain_effectiveness": effectiveness}

@@ -94,6 +94,7 @@ def test_the_last_level_is_exact_to_the_smallest_step(solve):
     assert 7.45784 - 2 / 1024 < result.last["level"] < 7.4579
 
 
+@pytest.mark.heavy
 def test_a_dam_that_overturns_is_given_up_soon(solve, tmp_path):
     """The reference GetDP model ends strategies that diverge: 530 corrections, and 1980 where each
     takes all of its iterations. Its last level is that of the condensed engine.

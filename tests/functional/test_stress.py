@@ -70,6 +70,7 @@ def test_an_altered_column_of_a_joint_is_detected_there(
     assert any(line.startswith(f"{name}: {message}") for line in found), found
 
 
+@pytest.mark.heavy
 def test_scenes_have_one_to_four_joints_and_can_be_loaded():
     scenes = [random_scenes.random_scene(7, number) for number in range(40)]
     assert {len(scene.case.joints) for scene in scenes} == {1, 2, 3, 4}
@@ -227,6 +228,7 @@ def test_stress_is_reproducible_and_resumed_and_makes_a_page(command, monkeypatc
         trust.trust_section(Path("s.csv"))
 
 
+@pytest.mark.heavy
 def test_a_scene_beyond_its_time_limit_is_a_defect(tmp_path, monkeypatch):
     monkeypatch.setattr(stress, "TIME_LIMIT", 1)
     row = stress.run_and_verify(random_scenes.random_scene(7, 111), tmp_path)

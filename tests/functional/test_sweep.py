@@ -118,6 +118,7 @@ def test_the_row_of_a_dam_that_slides_has_its_verdict(command, tmp_path):
         )
 
 
+@pytest.mark.heavy
 @pytest.mark.usefixtures("no_pictures")
 def test_all_rows_of_close_levels_converge_and_their_openings_increase(command, tmp_path):
     """Without tensile strength the shear is lost on opening, a jump of the law."""

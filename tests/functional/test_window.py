@@ -446,6 +446,7 @@ def test_lift_joints_are_drawn(open_window, tmp_path):
     assert pytest.approx(20, abs=1e-6) in heights
 
 
+@pytest.mark.heavy
 def test_each_joint_of_a_case_with_several_is_shown_and_saved(open_window, command, tmp_path):
     """A changed value is that of all joints, and the heights can be changed; the saved case gives
     the same bytes.
@@ -663,6 +664,7 @@ def test_both_uplifts_of_a_published_case_are_run(open_window):
     assert len(user.session.scenes) == 2
 
 
+@pytest.mark.heavy
 def test_an_earthquake_follows_the_static_loads(open_window, command, tmp_path):
     """With the switch on its parameters appear; its results are those of the command, at the times
     chosen; without it nothing of it is left.
@@ -712,6 +714,7 @@ def test_an_earthquake_follows_the_static_loads(open_window, command, tmp_path):
     assert (tmp_path / "window" / "fields" / "bulk_t0.2.vtu").exists()
 
 
+@pytest.mark.heavy
 def test_stop_keeps_the_steps_of_an_earthquake(open_window, tmp_path):
     record = smooth_record(tmp_path / "wave.csv", 1.0, duration=20.0)
     user = open_window("dam", **DAM)
