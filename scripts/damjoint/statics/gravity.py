@@ -612,8 +612,8 @@ def pieces(case: Case, body: RigidBlock, level: float, tail: float) -> list[tupl
 #: Degree of the polynomial of `arrest_lengths`.
 DEGREE = 4
 #: Relative tolerances: imaginary part of a real root of it, over the length of its span; crack
-#: length, over that of the joint.
-REAL_ROOT, CRACK_TOLERANCE = 1e-6, 1e-12
+#: length, over that of the joint; distance within which a root is first looked for, over the same.
+REAL_ROOT, CRACK_TOLERANCE, REACH = 1e-6, 1e-12, 1e-11
 
 
 def arrest_lengths(
@@ -634,11 +634,13 @@ def arrest_lengths(
         turns = [a for a in rough if start < a < end]
         # between two roots, and beside the first and the last, the sign is known
         limits = [start, *((a + b) / 2 for a, b in itertools.pairwise(turns)), end]
-        for before, after in itertools.pairwise(limits):
+        for (before, after), root in itertools.zip_longest(itertools.pairwise(limits), turns):
             if excess(before) > 0 >= excess(after):
-                while (
-                    after - before > CRACK_TOLERANCE * length
-                ):  # scipy's roots are half of a run's start
+                if root is not None:
+                    low, high = root - REACH * length, root + REACH * length
+                    if before < low and high < after and excess(low) > 0 >= excess(high):
+                        before, after = low, high
+                while after - before > CRACK_TOLERANCE * length:  # scipy would have to be loaded
                     middle = (before + after) / 2
                     before, after = (middle, after) if excess(middle) > 0 else (before, middle)
                 lengths.append(float(after))
