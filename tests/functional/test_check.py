@@ -21,6 +21,7 @@ from damjoint.studies.check import (
     compare_joints,
     compare_methods,
     hand_calculation,
+    labelled_notes,
     picture_table,
     text_table,
 )
@@ -331,3 +332,11 @@ def test_picture_of_each_joint_of_a_dam_that_fails(solve, tmp_path):
         path = draw_check(result, k, method, picture_table(check), check.why, tmp_path)
         assert matplotlib.image.imread(path).std() > 0.1
         path.unlink()
+
+
+def test_a_note_on_all_joints_is_printed_once(solve):
+    joints = {"uplift": ("none", "flow"), "lift_heights": (15.0,), "mu": 1.0, "adhesion": 1e5}
+    (result,) = solve("dam", (30.0,), n_joint=24.0, order=1.0, law="friction", **joints)
+    of_all, of_lift = labelled_notes(compare_joints(result))
+    assert of_all.startswith("dam: not checked: the case sets none of required_SSF")
+    assert of_lift == "dam, lift 15 m: gravity method: full head in the crack, linear beyond it"

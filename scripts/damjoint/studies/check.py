@@ -372,12 +372,19 @@ def text_table(checks: list[SafetyCheck]) -> str:
         for scene, row in zip(scenes, rows, strict=True)
         if row["why"]
     ]
-    lines += [
-        f"{scene_label(checks, check.gravity.row)}: {note}"
-        for check in checks
-        for note in check.notes
-    ]
-    return "\n\n".join(filter(None, [table, "\n".join(lines)]))
+    return "\n\n".join(filter(None, [table, "\n".join([*lines, *labelled_notes(checks)])]))
+
+
+def labelled_notes(checks: list[SafetyCheck]) -> list[str]:
+    """Notes with the scene and joint of each; one that all of a case have, once with its name."""
+    lines = dict[str, None]()  # in their order
+    for check in checks:
+        row = check.gravity.row
+        same = [other for other in checks if other.gravity.row["case"] == row["case"]]
+        for note in check.notes:
+            common = all(note in other.notes for other in same)
+            lines[f"{row['case'] if common else scene_label(checks, row)}: {note}"] = None
+    return list(lines)
 
 
 def scene_label(checks: list[SafetyCheck], row: Row) -> str:
