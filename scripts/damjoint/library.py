@@ -22,6 +22,7 @@ import numpy as np
 from . import ROUND_OFF, InputError, accuracy
 from .arrays import Array, Table, Value
 from .engines import Outcome, engine_of
+from .engines.condensed.solve import threads_of
 from .laws import LAWS, Law
 from .model.case import Case, load
 from .model.fields import Solution
@@ -31,6 +32,7 @@ from .solver.load_stepper import LoadStepper
 from .solver.state import State
 from .statics.verdict import hints, statement, verdict
 from .studies.plan import Plan, Sample, column_of, in_file, listed, plan_with
+from .threads import limited_threads
 
 if TYPE_CHECKING:  # loaded when they are used, with what they draw with
     import pandas
@@ -346,8 +348,16 @@ def fill(source: Case | str | Path) -> Iterator[Step]:
         InputError: bad input.
         RunError: a step could not be computed.
     """
-    stepper = LoadStepper(as_case(source))
-    for state in stepper.steps():
+    case = as_case(source)
+    threads = threads_of(case)
+    with limited_threads(threads):
+        stepper = LoadStepper(case)
+    steps = stepper.steps()
+    while True:
+        with limited_threads(threads):  # not in the loop over the steps
+            state = next(steps, None)
+        if state is None:
+            return
         yield Step(state, stepper.history.last)
 
 

@@ -12,6 +12,9 @@ import numpy as np
 import pytest
 from damjoint import library
 from damjoint.post import stored
+from damjoint.solver.load_stepper import LoadStepper
+from damjoint.threads import limited_threads
+from threadpoolctl import threadpool_info
 
 PAGE = Path(__file__).parents[2] / "reference" / "python.md"
 CASE = {"levels": [30, 40], "n_joint": 20}
@@ -157,6 +160,24 @@ def test_steps_are_the_rows_of_the_history(run):
     for name in ("N", "T", "M", "crack_length", "crest_ux"):
         rows = [step.row[name] for step in steps]
         assert rows == pytest.approx(list(run.history[name]), rel=1e-12)  # other threads
+
+
+def test_steps_are_computed_in_one_thread_and_the_loop_over_them_is_not_limited(monkeypatch):
+    """Several threads take a hundred times as long beside other processes."""
+    steps, during = LoadStepper.steps, set()
+
+    def threads():
+        return {pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"}
+
+    def watched(stepper):
+        for state in steps(stepper):
+            during.update(threads())
+            yield state
+
+    monkeypatch.setattr(LoadStepper, "steps", watched)
+    with limited_threads(2):
+        assert all(threads() == {2} for _ in dj.fill(dj.case("dam", **CASE)))
+    assert during == {1}
 
 
 def test_a_run_that_stops_is_a_result():

@@ -41,9 +41,14 @@ def about(bulk: Condensed) -> dict[str, Any]:
     }
 
 
+def threads_of(case: Case) -> int | None:
+    """Number of threads that solve a case fastest; None: all."""
+    return 1 if case.geometry or joint_size(case) < THREADED_UNKNOWNS else None
+
+
 def solve(case: Case, on_step: OnStep, _fields: bool) -> Iterator[Outcome]:
     """The scenes of a case on one condensed mesh; see engines/__init__.py."""
-    with limited_threads(1 if case.geometry or joint_size(case) < THREADED_UNKNOWNS else None):
+    with limited_threads(threads_of(case)):
         start = time.perf_counter()
         bulk, made = cached(case)
         before = bulk.seconds if made else {"cache": time.perf_counter() - start}
