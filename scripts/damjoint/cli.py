@@ -825,7 +825,3 @@ def main(argv: list[str] | None = None) -> int:
         message, code = "damjoint: interrupted; results finished so far are saved", 130
     print(message, file=sys.stderr)
     return code
-
-
-if __name__ == "__main__":
-    sys.exit(main())

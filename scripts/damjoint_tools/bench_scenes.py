@@ -83,7 +83,7 @@ def run_cold(
     """
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder, "out")
-        words = "-m", "damjoint.cli", "run", *arguments, *options, "--out", str(out)
+        words = "-m", "damjoint", "run", *arguments, *options, "--out", str(out)
         wall = time_process(words, cache)
         record = json.loads((out / "run.json").read_text())
         for further in out.glob("*/run.json"):

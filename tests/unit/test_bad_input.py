@@ -221,7 +221,7 @@ def test_a_bad_setting_of_a_law_is_refused(command, tmp_path):
 def test_a_level_that_is_not_a_number_is_refused(tmp_path):
     """In a process of its own, as Gmsh's parser prints an error."""
     done = subprocess.run(
-        [sys.executable, "-m", "damjoint.cli", *RUN, "--levels", "3,nan"],
+        [sys.executable, "-m", "damjoint", *RUN, "--levels", "3,nan"],
         cwd=tmp_path,
         capture_output=True,
         text=True,
