@@ -330,6 +330,18 @@ def test_a_path_that_long_steps_lose_is_followed_by_short_ones(by_short_steps, m
     assert levels[0] == levels[1]
 
 
+def test_a_step_does_not_pass_over_the_highest_level(monkeypatch):
+    """A brittle bond, whose level falls by 6 % within a step from 48.8 m, and rises in shorter ones
+    to 49.62 m: the same level with steps of any length.
+    """
+    brittle = {"law": "bond", "sigma_max": 2e5, "adhesion": 3e5, "G_f": 20.0, "G_t": 50.0}
+    _, usual = found("dam", settings={"n_joint": 40.0} | brittle)
+    monkeypatch.setattr(path, "RISE", path.RISE / 2)
+    _, short = found("dam", settings={"n_joint": 40.0} | brittle)
+    assert usual.value == pytest.approx(short.value, rel=path.PRECISION)
+    assert usual.confirmed and usual.mode == short.mode == "sliding"
+
+
 @pytest.mark.parametrize("of", ["strength", "mu", "k_h", "G_f"])
 def test_the_gravity_method_of_a_trial_has_the_values_of_its_case(of):
     """Without Gmsh's parser, which computes what follows from other parameters."""

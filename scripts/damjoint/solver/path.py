@@ -41,6 +41,9 @@ FIRST, SHRINKING, GROWTH = 0.05, 0.25, 2.0
 #: the displacement so far; then over a snap-back, as these parts of it.
 PARTS, SMALLEST, JUMPS = (1, 1 / 4, 1 / 16), 1e-4, (0.01, 0.05, 0.25)
 
+#: Relative fall of the level over an increment, from which on shorter ones are tried.
+FALL = 0.02
+
 #: An increment of the process zone over what it moved in the last step.
 ZONE_GROWTH = 1.5
 
@@ -189,6 +192,8 @@ class EquilibriumPath:
         self.increment = FIRST * self.size
         #: relative rise of the level that an increment aims at
         self.rise = RISE
+        #: a far fall from an equilibrium, not taken yet: from, to, increment [m]
+        self.fall: tuple[Point, Point, float] | None = None
 
     def add(self, point: Point) -> None:
         """Append an equilibrium."""
@@ -290,17 +295,30 @@ class EquilibriumPath:
     # ----------------------------------------------------------------------------------------------
 
     def advance(self) -> None:
-        """Append the next equilibrium."""
-        last = self.points[-1]
+        """Append the next equilibrium. From the highest one an increment over which the level falls
+        far comes last, also after the path of shorter ones: it may pass over a higher one.
+        """
+        last, fall = self.points[-1], None
         for kind, by in self.increments():
             new = self.step(last, by, kind)
-            if new:
-                rise = max((new.level - last.level) / new.level, 1e-12)
-                self.increment = by * min(max(self.rise / rise, SHRINKING), GROWTH)
-                self.add(new)
-                self.ended = len(self.points) >= MOST_POINTS
+            if new and new.level < (1 - FALL) * last.level and last.level >= self.highest:
+                fall = fall or (last, new, by)
+            elif new:
+                self.fall = fall or self.fall
+                self.append(new, by)
                 return
-        self.ended = True
+        start, new, by = fall or self.fall or (None, last, 0.0)
+        self.fall, self.ended = None, True
+        if start is self.points[self.top]:
+            del self.points[self.top + 1 :]
+            self.append(new, by)
+
+    def append(self, new: Point, by: float) -> None:
+        """Append an equilibrium, reached by an increment [m], and choose the next increment."""
+        rise = max((new.level - self.points[-1].level) / new.level, 1e-12)
+        self.increment = by * min(max(self.rise / rise, SHRINKING), GROWTH)
+        self.add(new)
+        self.ended = len(self.points) >= MOST_POINTS
 
     def increments(self) -> Iterator[tuple[str, float]]:
         """The increments to try: of the crest; where it moves back, of the process zone, which

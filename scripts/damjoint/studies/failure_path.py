@@ -179,6 +179,7 @@ class FailurePath(EquilibriumPath):
         if self.points and self.rise > RISE and not self.decided(factor):
             self.points[:] = self.begin
             self.rise, self.increment, self.ended = RISE, self.first_increment, False
+            self.fall = None
             self.follow(factor)
         elif not self.reached:
             self.refine(self.target)
