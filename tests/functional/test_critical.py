@@ -342,6 +342,17 @@ def test_a_step_does_not_pass_over_the_highest_level(monkeypatch):
     assert usual.confirmed and usual.mode == short.mode == "sliding"
 
 
+def test_the_limit_of_a_joint_that_softens_and_slips_whole_is_between_the_steps(monkeypatch):
+    """The whole joint slips at the first point beyond the limit point, 0.1 % below it."""
+    weak = {"law": "bond", "uplift": "none", "sigma_max": 54e3, "adhesion": 29e3, "mu": 0.61}
+    settings = {"n_joint": 20.0, "G_f": 83.3, "G_t": 33.4} | weak
+    _, usual = found("dam", settings=settings)
+    monkeypatch.setattr(path, "RISE", path.RISE / 5)
+    _, short = found("dam", settings=settings)
+    assert usual.value == pytest.approx(short.value, rel=path.PRECISION / 2)
+    assert usual.confirmed and usual.mode == short.mode == "sliding"
+
+
 @pytest.mark.parametrize("of", ["strength", "mu", "k_h", "G_f"])
 def test_the_gravity_method_of_a_trial_has_the_values_of_its_case(of):
     """Without Gmsh's parser, which computes what follows from other parameters."""

@@ -374,7 +374,7 @@ class EquilibriumPath:
         """Where its highest level is uncertain: the number of a point, the fraction between it and
         the next one, and an upper bound of the level [m] there; the highest level if it is certain.
         """
-        if self.slides:
+        if self.slides and not self.points[self.top].model.equilibrium.path_dependent:
             return self.top, 0.5, self.highest
         inner = (i for i in (self.top - 1, self.top) if 0 <= i < len(self.points) - 1)
         sides = [(i, *self.summit(i)) for i in inner if self.points[i + 1].imposed]
