@@ -324,6 +324,16 @@ def test_mumps_out_of_memory_is_one_line(monkeypatch):
         factor.solve_symmetric(CsrMatrix.of_scipy(matrix), np.ones((3, 1)))
 
 
+def test_a_closed_pipe_is_an_error_also_after_gmsh_has_started():
+    """Gmsh sets SIGPIPE to the system's default, which ends the process without a word."""
+    code = (
+        "import os; from damjoint.model.parameters import start_gmsh; start_gmsh(); "
+        "end, pipe = os.pipe(); os.close(end); os.write(pipe, b'0')"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 1 and "BrokenPipeError" in done.stderr
+
+
 def test_a_getdp_run_that_exceeds_the_memory_is_refused(command, monkeypatch):
     """By an estimate before meshing, and by the mesh."""
     words = "run", "dam", "--engine", "getdp", "--levels", "30", "--no-fields", "--no-picture"

@@ -57,7 +57,8 @@ def start_gmsh() -> ModuleType:
     import gmsh
 
     if not gmsh.isInitialized():
-        handlers = {n: signal.getsignal(n) for n in (signal.SIGTERM, signal.SIGHUP)}
+        numbers = signal.SIGTERM, signal.SIGHUP, signal.SIGPIPE
+        handlers = {n: signal.getsignal(n) for n in numbers}
         gmsh.initialize(readConfigFiles=False, interruptible=False)
         if threading.current_thread() is threading.main_thread():
             for number, handler in handlers.items():  # Gmsh has reset them to the system's
