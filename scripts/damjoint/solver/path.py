@@ -48,8 +48,9 @@ FALL = 0.02
 ZONE_GROWTH = 1.5
 
 #: Relative rise of the level that an increment aims at: the limit point of a joint that softens
-#: depends on the steps by some hundredths of it. And where the state does not depend on them, which
-#: is used in the search for a critical value.
+#: depends on the steps, mostly by some hundredths of it, in one of thirty random dams by a tenth to
+#: a half. And where the state does not depend on them, which is used in the search for a critical
+#: value.
 RISE, LARGE_RISE = 0.005, 0.02
 
 #: How many times the displacement grows before a level counts as not rising any more: for a first
