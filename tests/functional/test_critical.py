@@ -330,6 +330,7 @@ def test_a_path_that_long_steps_lose_is_followed_by_short_ones(by_short_steps, m
     assert levels[0] == levels[1]
 
 
+@pytest.mark.heavy
 def test_a_step_does_not_pass_over_the_highest_level(monkeypatch):
     """A brittle bond, whose level falls by 6 % within a step from 48.8 m, and rises in shorter ones
     to 49.62 m: the same level with steps of any length.

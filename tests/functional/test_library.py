@@ -196,6 +196,7 @@ def test_a_new_law_needs_its_file_in_getdp(monkeypatch):
         dj.run(dj.case("dam", **CASE, law="springs"), engine="getdp")
 
 
+@pytest.mark.heavy
 @pytest.mark.usefixtures("no_pictures")
 def test_check_and_critical_are_those_of_the_commands(command, tmp_path):
     """The same numbers as check.csv and the same lines as damjoint critical."""

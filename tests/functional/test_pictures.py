@@ -95,6 +95,7 @@ def test_lines_of_a_panel_differ_without_colors(figures, name):
         assert len(styles) == len(lines)
 
 
+@pytest.mark.heavy
 def test_a_picture_in_3d(runs):
     """It fits a page upright; without fields there are no view and maps."""
     solution = dj.run(dj.case("d", n_joint=6, h_dam=3, h_found=4, levels=[6])).solution

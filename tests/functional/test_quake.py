@@ -69,6 +69,7 @@ def test_a_block_under_a_half_sine(tmp_path):
     assert mean_slip(quake) == pytest.approx(-half_sine_slip(8, 0.5, 0.3), rel=5e-4)
 
 
+@pytest.mark.heavy
 def test_a_rocking_block_against_its_equations_of_motion(tmp_path):
     """A rigid block on unilateral springs at the joint's Gauss points, by scipy's Radau."""
     dt, peak, end, stiffness = 0.001, 6.0, 0.1, 1e9
@@ -161,6 +162,7 @@ def test_momentum_is_balanced_at_every_step(tmp_path, alpha, vertical, rock_mass
     assert worst < 1e-9 * np.abs(static).max()
 
 
+@pytest.mark.heavy
 def test_energy_is_only_lost_after_the_shaking(tmp_path):
     """Kinetic energy, strain energy of bodies and joint, less the work of the static forces, of a
     dam that still slides and rocks: friction, damping and the time integration only take from it.
@@ -556,6 +558,7 @@ def test_a_joint_that_stays_closed_has_no_peak_of_its_opening(command, case_file
     assert "none of them halved" in page
 
 
+@pytest.mark.heavy
 def test_frames_are_states_of_the_bodies_and_the_joint(command, case_file, tmp_path):
     """Files for ParaView at the times asked for; the gap between the bodies is that of the joint,
     the stress that of the displacement.
@@ -613,6 +616,7 @@ def test_frames_are_at_most_200(steps, span):
     assert len(chosen) > min(90, count - 1)
 
 
+@pytest.mark.heavy
 def test_an_interrupted_run_continues_with_the_same_rows(command, case_file, tmp_path, monkeypatch):
     add, steps = QuakeHistory.add, []
 

@@ -634,6 +634,7 @@ def test_the_reason_of_a_stop_is_shown(open_window):
     assert user.entry(tree.STATUS)["attributes"]["Highlight"] == tree.WARN
 
 
+@pytest.mark.heavy
 def test_other_cases_and_files_can_be_opened(open_window, tmp_path):
     user = open_window("a", **SMALL)
     user.run()
