@@ -24,7 +24,7 @@ LARGE, LARGER = 100_000, 1_000_000
 
 
 def is_large(entries: int) -> bool:
-    """Whether a transposed matrix or a product with a vector is left to scipy."""
+    """Whether scipy computes a transposed matrix or a product with a vector."""
     return entries > (LARGE if "scipy.sparse" in sys.modules else LARGER)
 
 

@@ -25,7 +25,7 @@ FRICTION = DAM | {"law": "friction", "adhesion": 1e5}
 UNBONDED = {"law": "bond", "sigma_max": 0.0, "adhesion": 0.0}
 
 
-def found(case, of="level", settings=None, levels=None, tail_levels=None):
+def search_result(case, of="level", settings=None, levels=None, tail_levels=None):
     search = Search(load(case, settings, levels, tail_levels), of)
     return search, search.run()
 
@@ -33,7 +33,7 @@ def found(case, of="level", settings=None, levels=None, tail_levels=None):
 @pytest.mark.parametrize("uplift", ["none", "imposed"])
 def test_sliding_level(uplift):
     """T = mu N + c L, 7.45784 m dry and 6.63399 m with uplift, by both methods."""
-    _, answer = found("c", settings={"pena_tang": 0.0, "uplift": uplift})
+    _, answer = search_result("c", settings={"pena_tang": 0.0, "uplift": uplift})
     limit = slide_level(0.35, 1000, uplift == "imposed")
     assert answer.value == pytest.approx(limit, rel=path.PRECISION)
     assert answer.gravity == pytest.approx(limit, rel=path.PRECISION)
@@ -55,7 +55,7 @@ def test_overturning_level(wet):
 
     uplift = {"uplift": "imposed" if wet else "none"}
     settings = {"sigma_max": 0.0, "crest_water": 0.0, "n_joint": 20.0}
-    _, answer = found("i", settings=uplift | settings)
+    _, answer = search_result("i", settings=uplift | settings)
     arm = (1 - 1 / np.sqrt(3)) / 2 * BASE / 20
     assert answer.value == pytest.approx(brentq(moment, 5, 15, arm), rel=path.PRECISION)
     assert answer.gravity == pytest.approx(brentq(moment, 5, 15, 0.0), rel=path.PRECISION)
@@ -68,7 +68,7 @@ def test_overturning_level(wet):
 )
 def test_sliding_level_without_cohesion(mu, level, levels, tails):
     """Linear uplift, and a tailwater of 3 m that rises or is constant."""
-    _, answer = found("dam", "level", DAM | UNBONDED | {"mu": mu}, levels, tails)
+    _, answer = search_result("dam", "level", DAM | UNBONDED | {"mu": mu}, levels, tails)
     assert answer.value == pytest.approx(level, abs=1e-3)
     assert answer.gravity == pytest.approx(level, abs=1e-3)
 
@@ -76,7 +76,7 @@ def test_sliding_level_without_cohesion(mu, level, levels, tails):
 def test_strength_factor():
     """(mu N + c L) / T at 45 m: (12683 + 34 x 200) / 9888; fracture energies are divided, too."""
     settings = DAM | {"law": "friction", "mu": 1.0, "adhesion": 2e5}
-    search, answer = found("dam", "strength", settings, tail_levels="3")
+    search, answer = search_result("dam", "strength", settings, tail_levels="3")
     assert answer.value == pytest.approx((12683 + 34 * 200) / 9888, rel=2e-4)
     assert answer.point.level == pytest.approx(45, rel=path.PRECISION)
     ends = [t.value for t in search.trials if not t.stands]
@@ -87,7 +87,7 @@ def test_strength_factor():
 def test_critical_effectiveness_of_drains():
     """The less effective the drains, the less the dam holds."""
     settings = DAM | UNBONDED | {"mu": 0.7, "uplift": "drained"}
-    _, answer = found("dam", "uplift", settings, tail_levels="3")
+    _, answer = search_result("dam", "uplift", settings, tail_levels="3")
     assert 0 < answer.value < 0.5
     assert answer.value == pytest.approx(answer.gravity, rel=5e-4)
 
@@ -97,13 +97,17 @@ def test_critical_strength_with_partial_factors():
     """Sliding: (mu / 1.5 N + c / 3 L) / F = T, without a crack. The level does not use them."""
     settings = DAM | {"law": "friction", "mu": 0.9, "adhesion": 6e5, "uplift": "none"}
     partial = {"factor_mu": 1.5, "factor_c": 3.0}
-    search, answer = found("dam", "strength", settings | partial, levels="45", tail_levels="0")
+    search, answer = search_result(
+        "dam", "strength", settings | partial, levels="45", tail_levels="0"
+    )
     block = gravity.at(load("dam", settings, "45", "0"), 1)
     expected = (0.6 * block.N + 2e5 * block.body.length) / block.T
     assert answer.value == pytest.approx(expected, rel=2e-4)
     assert answer.gravity == pytest.approx(answer.value, rel=2e-4)
     assert "beyond the partial factors factor_mu = 1.5, factor_c = 3" in answer.lines(search)
-    _, level = found("dam", "level", DAM | UNBONDED | {"mu": 0.7} | partial, tail_levels="3")
+    _, level = search_result(
+        "dam", "level", DAM | UNBONDED | {"mu": 0.7} | partial, tail_levels="3"
+    )
     assert level.value == pytest.approx(43.161, rel=5e-4)
 
 
@@ -113,7 +117,7 @@ def test_critical_earthquake():
     whatever the crack.
     """
     settings = DAM | {"law": "friction", "mu": 0.6, "adhesion": 0.0, "uplift": "none"}
-    _, answer = found("dam", "k_h", settings, levels="30", tail_levels="0")
+    _, answer = search_result("dam", "k_h", settings, levels="30", tail_levels="0")
     assert answer.confirmed and answer.mode == "sliding"
     assert answer.value == pytest.approx(answer.gravity, rel=1e-3)
 
@@ -127,7 +131,7 @@ def test_a_level_before_the_earthquake_acts_in_full_does_not_count():
     assert path_of_dam.reached and path_of_dam.points[path_of_dam.arrival].control == "crest"
     levels = [point.level for point in path_of_dam.points]
     assert path_of_dam.levels[0] == -np.inf < levels[0]
-    search, answer = found("dam", settings=DAM | {"k_h": 0.45})
+    search, answer = search_result("dam", settings=DAM | {"k_h": 0.45})
     (trial,) = search.trials
     earlier = [p.level for p in trial.path.points if p.state.loading.part("quake") < 1]
     assert answer.value < max(earlier) and answer.point.state.loading.part("quake") == 1
@@ -136,10 +140,10 @@ def test_a_level_before_the_earthquake_acts_in_full_does_not_count():
 @pytest.mark.heavy
 def test_a_wrong_first_estimate_is_followed_by_a_wider_search(monkeypatch):
     """Paths given up where the level can be prescribed no more, far from the critical value."""
-    _, expected = found("dam", "k_h", DAM)
+    _, expected = search_result("dam", "k_h", DAM)
     follow = FailurePath.follow
     monkeypatch.setattr(FailurePath, "follow", lambda p, far: far < path.SURE or follow(p, far))
-    search, answer = found("dam", "k_h", DAM)
+    search, answer = search_result("dam", "k_h", DAM)
     first_estimate = next(t for t in search.trials if t.stands and t.path.points[-1].imposed)
     assert first_estimate.value < 0.8 * answer.value and search.factor == path.SURE
     assert answer.value == pytest.approx(expected.value, rel=2 * path.PRECISION)
@@ -147,7 +151,7 @@ def test_a_wrong_first_estimate_is_followed_by_a_wider_search(monkeypatch):
 
 
 def test_the_search_begins_beside_the_value_of_the_gravity_method():
-    search, answer = found("dam", "mu", DAM | UNBONDED, tail_levels="3")
+    search, answer = search_result("dam", "mu", DAM | UNBONDED, tail_levels="3")
     _, beyond, before, *_ = [trial.value for trial in search.trials]
     assert beyond < answer.gravity < before and before / beyond < 1.03
     assert answer.value == pytest.approx(answer.gravity, rel=2e-4)
@@ -156,7 +160,7 @@ def test_the_search_begins_beside_the_value_of_the_gravity_method():
 @pytest.mark.heavy
 def test_critical_value_of_a_parameter_that_must_not_be_less():
     """T = mu N at 45 m: no equilibrium with less."""
-    _, answer = found("dam", "mu", DAM | UNBONDED, tail_levels="3")
+    _, answer = search_result("dam", "mu", DAM | UNBONDED, tail_levels="3")
     assert answer.value == pytest.approx(9888 / 12683, rel=2e-4)
 
 
@@ -165,7 +169,7 @@ def brittle():
     """A search on a bond of high tensile strength and low fracture energy."""
     settings = {"law": "bond", "mu": 5.0, "dam_base": 30.0, "sigma_max": 2e6, "G_f": 100.0}
     settings |= {"adhesion": 5e6, "G_t": 1e5, "n_joint": 60.0}
-    return found("dam", settings=settings, levels="40,48")
+    return search_result("dam", settings=settings, levels="40,48")
 
 
 def test_the_gravity_method_without_tension(brittle):
@@ -203,15 +207,15 @@ def test_the_search_goes_on_over_unstable_crack_growth(brittle):
 
 def test_only_hardening_set_by_the_user_counts_as_strength():
     """It carries the dam beyond T = mu N + c L; the default one is left out."""
-    _, hard = found("c")
+    _, hard = search_result("c")
     assert hard.value > 1.4 * slide_level(0.35, 1000, True) and "mu N" not in hard.why
     settings = DAM | {"law": "friction", "mu": 0.6, "adhesion": 0.0}
-    _, answer = found("dam", settings=settings, tail_levels="3")
+    _, answer = search_result("dam", settings=settings, tail_levels="3")
     assert answer.value == pytest.approx(40.619, abs=1e-3)
 
 
 def test_critical_level_of_a_crushed_toe():
-    _, answer = found("dam", settings=DAM | {"f_c": 5e6}, tail_levels="3")
+    _, answer = search_result("dam", settings=DAM | {"f_c": 5e6}, tail_levels="3")
     assert answer.mode == "crushed toe" and "f_c = 5e+06" in answer.why
     assert 0.999 * 5e6 < answer.point.compression <= 5e6
 
@@ -244,17 +248,17 @@ def test_statics_confirms_a_level_near_its_bound(monkeypatch):
     """Only where the search does not progress; the value is that of an equilibrium."""
     monkeypatch.setattr(FailurePath, "increments", lambda self: ())
     settings = {"uplift": "imposed", "sigma_max": 0.0, "crest_water": 0.0, "n_joint": 20.0}
-    _, answer = found("i", settings=settings, levels="9,9.8,9.95,10.1")
+    _, answer = search_result("i", settings=settings, levels="9,9.8,9.95,10.1")
     assert answer.confirmed and answer.mode == "overturning" and 9.9 < answer.value < 10.0171
     assert "by statics there is no equilibrium above 10.01" in answer.why
-    _, answer = found("i", settings=settings, levels="7,12")
+    _, answer = search_result("i", settings=settings, levels="7,12")
     assert answer.value < 9.8 and not answer.confirmed
 
 
 def test_the_value_without_lasting_tension_is_given_too():
     """Tension c/mu of law = friction does not vanish on opening."""
     settings = {"law": "friction", "adhesion": 1e6, "n_joint": 20.0}
-    search, answer = found("dam", settings=settings)
+    search, answer = search_result("dam", settings=settings)
     lines = "\n".join(answer.lines(search))
     assert "kPa (" in lines and "% of the overturning moment), at any opening" in lines
     assert answer.gravity_with["without tension"] < answer.value
@@ -264,7 +268,7 @@ def test_the_value_without_lasting_tension_is_given_too():
 def test_a_rigid_block_that_opens_to_its_toe():
     """mu = 3 resists any shear; full head in the crack."""
     settings = UNBONDED | {"mu": 3.0, "uplift": "cracked", "n_joint": 40.0}
-    _, answer = found("dam", settings=settings)
+    _, answer = search_result("dam", settings=settings)
     assert answer.confirmed and answer.mode == "overturning"
     assert answer.value == pytest.approx(answer.gravity, rel=0.01)
 
@@ -283,7 +287,7 @@ def test_a_missing_limit_is_reported(command):
     ],
 )
 def test_a_parameter_without_effect_is_not_varied(case, of, message):
-    search, answer = found(case, of, levels="3")
+    search, answer = search_result(case, of, levels="3")
     assert len(search.trials) == 1 and answer.value is None
     assert answer.doubt == f"stands with any value: {message}"
 
@@ -309,11 +313,11 @@ def by_short_steps():
     """Friction that opens, then slides."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(failure_path, "LARGE_RISE", path.RISE)
-        return found("dam", settings=FRICTION)
+        return search_result("dam", settings=FRICTION)
 
 
 def test_long_steps_lead_to_the_same_critical_level(by_short_steps):
-    (search, long), (reference, short) = found("dam", settings=FRICTION), by_short_steps
+    (search, long), (reference, short) = search_result("dam", settings=FRICTION), by_short_steps
     assert long.value == pytest.approx(short.value, rel=1e-6)
     assert long.confirmed and long.mode == short.mode == "sliding"
     (coarse,), (fine,) = search.trials, reference.trials
@@ -324,7 +328,7 @@ def test_a_path_that_long_steps_lose_is_followed_by_short_ones(by_short_steps, m
     increments = FailurePath.increments
     lost = lambda p: iter(()) if p.rise > path.RISE and len(p.points) > 6 else increments(p)
     monkeypatch.setattr(FailurePath, "increments", lost)
-    (search, answer), (reference, short) = found("dam", settings=FRICTION), by_short_steps
+    (search, answer), (reference, short) = search_result("dam", settings=FRICTION), by_short_steps
     assert answer.value == short.value and answer.why == short.why
     levels = [table(s)["level"].tolist() for s in (search, reference)]
     assert levels[0] == levels[1]
@@ -336,9 +340,9 @@ def test_a_step_does_not_pass_over_the_highest_level(monkeypatch):
     to 49.62 m: the same level with steps of any length.
     """
     brittle = {"law": "bond", "sigma_max": 2e5, "adhesion": 3e5, "G_f": 20.0, "G_t": 50.0}
-    _, usual = found("dam", settings={"n_joint": 40.0} | brittle)
+    _, usual = search_result("dam", settings={"n_joint": 40.0} | brittle)
     monkeypatch.setattr(path, "RISE", path.RISE / 2)
-    _, short = found("dam", settings={"n_joint": 40.0} | brittle)
+    _, short = search_result("dam", settings={"n_joint": 40.0} | brittle)
     assert usual.value == pytest.approx(short.value, rel=path.PRECISION)
     assert usual.confirmed and usual.mode == short.mode == "sliding"
 
@@ -347,9 +351,9 @@ def test_the_limit_of_a_joint_that_softens_and_slips_whole_is_between_the_steps(
     """The whole joint slips at the first point beyond the limit point, 0.1 % below it."""
     weak = {"law": "bond", "uplift": "none", "sigma_max": 54e3, "adhesion": 29e3, "mu": 0.61}
     settings = {"n_joint": 20.0, "G_f": 83.3, "G_t": 33.4} | weak
-    _, usual = found("dam", settings=settings)
+    _, usual = search_result("dam", settings=settings)
     monkeypatch.setattr(path, "RISE", path.RISE / 5)
-    _, short = found("dam", settings=settings)
+    _, short = search_result("dam", settings=settings)
     assert usual.value == pytest.approx(short.value, rel=path.PRECISION / 2)
     assert usual.confirmed and usual.mode == short.mode == "sliding"
 
@@ -405,7 +409,7 @@ def test_the_table_has_the_resultants_of_each_joint():
     """T of each joint is the thrust of the water above it."""
     joints = {"lift_heights": (12.0, 25.0), "uplift": "none", "mu": (0.9, 1.0, 0.3)}
     dry = {"law": "friction", "adhesion": 0.0, "pena_tang": 0.0, "n_joint": 16.0, "order": 1.0}
-    search, answer = found("dam", settings=joints | dry, levels="30")
+    search, answer = search_result("dam", settings=joints | dry, levels="30")
     assert answer.mode == "sliding" and answer.joint == "lift 25 m"
     rows = table(search)
     assert list(rows)[-5:] == ["crack_length_3", "slip_length_3", "N_3", "T_3", "M_3"]

@@ -48,17 +48,15 @@ class GluedBodies:
         """
         from scipy import sparse
 
+        def boolean(rows: IntArray, columns: IntArray, shape: tuple[int, int]) -> Sparse:
+            return sparse.csr_matrix((np.ones(len(rows)), (rows, columns)), shape)
+
         motion = {}
         for name, own in gluing.bodies.items():
-            number, shape = self.numbers[name], (len(self.numbers[name]), self.size)
-            glued = sparse.csr_matrix(
-                (np.ones(len(number)), (np.arange(len(number)), number)), shape
-            )
-            places = own.dofs, np.arange(len(own.dofs))
-            placed = sparse.csr_matrix(
-                (np.ones(len(own.dofs)), places), (len(number), len(own.dofs))
-            )
-            carried = placed @ own.jumps.scipy()
+            number, count = self.numbers[name], len(self.numbers[name])
+            glued = boolean(np.arange(count), number, (count, self.size))
+            on_joints = np.arange(len(own.dofs))
+            carried = boolean(own.dofs, on_joints, (count, len(own.dofs))) @ own.jumps.scipy()
             motion[name] = sparse.hstack([glued[:, self.free], carried], format="csr")
         return motion
 
@@ -71,8 +69,8 @@ class GluedBodies:
             number = place[self.numbers[name]]
             rows = np.repeat(number, body.stiffness.counts)
             columns = number[body.stiffness.indices]
-            kept = (rows >= 0) & (columns >= 0)
-            parts.append((body.stiffness.data[kept], rows[kept], columns[kept]))
+            free = (rows >= 0) & (columns >= 0)
+            parts.append((body.stiffness.data[free], rows[free], columns[free]))
         values, rows, columns = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
         return CsrMatrix.of_entries(values, rows, columns, (len(self.free), len(self.free)))
 
