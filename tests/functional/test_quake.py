@@ -646,7 +646,11 @@ def test_an_interrupted_run_continues_with_the_same_rows(command, case_file, tmp
 
 
 @pytest.mark.heavy
-def test_a_run_under_way_of_another_case_is_not_continued(command, case_file, monkeypatch):
+@pytest.mark.parametrize("other", ["case", "shape"])
+def test_a_run_under_way_that_is_of_another_case_or_damaged_is_not_continued(
+    command, case_file, monkeypatch, other
+):
+    """shape: a changed bit in the head of an array, which zip does not notice if less is read."""
     add = QuakeHistory.add
 
     def interrupted(self, quake, step):
@@ -656,10 +660,18 @@ def test_a_run_under_way_of_another_case_is_not_continued(command, case_file, mo
     monkeypatch.setattr(QuakeHistory, "add", interrupted)
     assert command("quake", case_file, *LONG_STEPS, "--out", "one")[0] == 130
     monkeypatch.setattr(QuakeHistory, "add", add)
-    changed = "quake", case_file, "--no-picture", "--set", "mu=0.85", *LONG_STEPS
+    Path("one/my_quake.png").touch()  # of an earlier run
+    changed = ["quake", case_file, "--no-picture", *LONG_STEPS]
+    if other == "case":
+        changed += ["--set", "mu=0.85"]
+    else:
+        file = Path("one/quake_state.npz")
+        content = file.read_bytes()
+        place = content.index(b"'shape': (", content.index(b"variable_1.npy")) + 10
+        file.write_bytes(content[:place] + bytes([content[place] ^ 1]) + content[place + 1 :])
     assert command(*changed, "--out", "one")[0] == command(*changed, "--out", "two")[0] == 0
     one, two = (Path(n, "quake.csv").read_text() for n in ("one", "two"))
-    assert one == two
+    assert one == two and not Path("one/my_quake.png").exists()
 
 
 @pytest.mark.heavy

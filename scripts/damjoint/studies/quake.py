@@ -248,7 +248,7 @@ def run(
     check(case, span)
     folders.check_writable(out)
     key, path = checkpoint.fingerprint(case, span), out / CHECKPOINT
-    resumed = path.is_file()
+    resumed = checkpoint.exists(path, key)
     with single_thread(), folders.claim_output_folder(case, out, keep=resumed):
         try:
             under_way = QuakeRun(case, span)
@@ -256,8 +256,8 @@ def run(
             state = "failed" if isinstance(error, Exception) else "interrupted"
             folders.write_state(case, out, state, str(error) or "no step had converged")
             raise
-        if resumed and not checkpoint.read(path, key, under_way.quake, under_way.history):
-            folders.clear(out)
+        if resumed:
+            checkpoint.read(path, key, under_way.quake, under_way.history)
         try:
             follow(under_way, path, key, progress)
         except BaseException as error:
