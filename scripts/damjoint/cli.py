@@ -16,6 +16,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING
 
 from . import RUN_GEO, InputError, RunError, __version__
+from .storage import SAVED
 
 if TYPE_CHECKING:
     from argparse import _SubParsersAction as Commands
@@ -675,13 +676,13 @@ def do_sweep(arguments: argparse.Namespace) -> int:
 def report_sweep(case: str, plan: Plan, rows: list[Row], cases: list[Case], out: Path) -> None:
     """Print the statistics of a sweep and draw its chart beside its CSV file."""
     from .studies import chart
-    from .studies.plan import beside
+    from .studies.plan import CHART, beside
 
     if plan.sampled:
         from .studies import outcome
 
         print(outcome.report(plan, rows, out))
-    picture = beside(out, ".png")
+    picture = beside(out, CHART)
     reason = chart.draw(plan, rows, cases, f"{Path(case).stem}: {len(rows)} rows", picture)
     print(reason or picture)
 
@@ -807,6 +808,7 @@ def main(argv: list[str] | None = None) -> int:
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # µ and mathematical signs in a plain locale
     words = sys.argv[1:] if argv is None else argv
+    SAVED.clear()
     try:
         for word in words:
             check_encoding(word)
@@ -822,6 +824,7 @@ def main(argv: list[str] | None = None) -> int:
     except (RunError, OSError, ImportError) as error:
         message, code = one_line(error), 1
     except KeyboardInterrupt:
-        message, code = "damjoint: interrupted; results finished so far are saved", 130
+        kept = "; results finished so far are saved" if SAVED else ""
+        message, code = f"damjoint: interrupted{kept}", 130
     print(message, file=sys.stderr)
     return code

@@ -19,6 +19,9 @@ from . import InputError
 #: Prefix of the temporary file beside a file that is being written.
 PART = ".part."
 
+#: Tables of results, with rows, that this process has written: what an interrupt leaves.
+SAVED = set[Path]()
+
 
 @contextlib.contextmanager
 def atomic_write(path: Path) -> Iterator[Path]:

@@ -20,8 +20,8 @@ from pathlib import Path
 
 from damjoint import InputError, RunError
 from damjoint.progress import track
-from damjoint.storage import lock
-from damjoint.studies.sweep import pool_of, read_done
+from damjoint.studies.result_file import result_file
+from damjoint.studies.sweep import pool_of
 
 from .provenance import RECORDED, provenance
 from .quake_comparison import MEASURES, further_checks
@@ -170,29 +170,23 @@ def stress(
     records in a folder beside the file. Raises InputError, also if the rows in the file were
     computed by other code.
     """
-    if not out.parent.is_dir():
-        raise InputError(f"out = {out}: must be a file in an existing folder")
-    done = read_done(out, list(COLUMNS), ("dim", "seconds"))
     now = provenance()
-    for row in done.values():
-        if row["code"] != now["code"]:
-            other = f"damjoint {row['version']} ({row['commit'] or row['date']})"
-            raise InputError(
-                f"out = {out}: must be a new file; this file has rows of {other}, other code"
-            )
     names = [f"{seed}-{number}" for number in range(count)]
-    missing = [number for number, name in enumerate(names) if name not in done]
-    with out.open("a", newline="") as file:
-        lock(file.fileno(), out)
-        writer = csv.DictWriter(file, COLUMNS, restval="", lineterminator="\n")
-        if not file.tell():
-            writer.writeheader()
+    with result_file(out, COLUMNS, ("dim", "seconds")) as (file, done):
+        for row in done.values():
+            if row["code"] != now["code"]:
+                other = f"damjoint {row['version']} ({row['commit'] or row['date']})"
+                raise InputError(
+                    f"out = {out}: must be a new file; this file has rows of {other}, other code"
+                )
+        missing = [number for number, name in enumerate(names) if name not in done]
         records = out.resolve().with_name(f"{out.stem}_records") if quake else None
         rows = rows_as_completed(seed, missing, jobs or os.cpu_count() or 1, records)
         for row in track(rows, "stress", len(missing)):
-            writer.writerow(row | now)
-            file.flush()
-    return [row for row in read_rows(out) if row["scene"] in names]
+            cells = row | now
+            file.add([str(cells.get(name, "")) for name in COLUMNS])
+        done = file.read()
+    return [done[name] for name in names]
 
 
 def read_rows(path: Path) -> list[dict[str, str]]:

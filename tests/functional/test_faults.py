@@ -59,6 +59,20 @@ def test_sigterm_ends_a_run_as_ctrl_c_does(tmp_path):
         os.killpg(process.pid, 0)
 
 
+@pytest.mark.parametrize("words", [RUN, ("critical", "c"), ("check", "c"), ("plot", "out/c")])
+def test_an_interrupt_that_leaves_no_result_does_not_say_so(command, monkeypatch, words):
+    """Before the first step, also if an earlier command of the process has saved some; one line."""
+    assert command(*RUN)[0] == 0
+
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("damjoint.solver.model.Model.start", interrupted)
+    monkeypatch.setattr("damjoint.post.pictures.draw", interrupted)
+    code, _, err = command(*words)
+    assert (code, err) == (130, "damjoint: interrupted\n")
+
+
 def test_worker_processes_end_with_their_parent(tmp_path):
     script = """
 import os, time

@@ -52,12 +52,15 @@ def key_of(case: Case) -> tuple[object, ...]:
     return (shape, *(case[n] for n in PARAMETERS), *under_water, *thermal)
 
 
+@lru_cache(maxsize=1)
 def fingerprint(mesh: Mesh) -> str:
-    """Hash of a mesh: its bodies and faces."""
+    """Hash of a mesh: its bodies, faces and joints."""
     import hashlib
 
     surfaces = {name: face.surface for name, face in mesh.faces.items()}
-    digest = hashlib.sha256()
+    faces = [(face.body, face.side) for face in mesh.faces.values()]
+    joints = [(joint.name, joint.upper, joint.lower) for joint in mesh.joints]
+    digest = hashlib.sha256(repr([faces, joints]).encode())
     for name, body in (mesh.bodies | surfaces).items():
         digest.update(name.encode() + body.points.tobytes() + body.node_tags.tobytes())
         for (shape, table), region in zip(body.cells, body.regions, strict=True):

@@ -214,6 +214,10 @@ def numbers(rows: list[Row], column: str) -> Array:
     return np.array([float(row[column]) if row[column] else np.nan for row in rows])
 
 
+#: Endings of the files that are made of all rows of a result file, see `beside`.
+CHART, STATISTICS = ".png", ("_probability.csv", "_sensitivity.csv")
+
+
 def beside(out: Path, ending: str) -> Path:
     """The path of a file that belongs to a result file."""
     return out.with_name(out.stem + ending)
