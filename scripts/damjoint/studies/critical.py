@@ -652,6 +652,12 @@ def critical(
         except KeyboardInterrupt as caught:
             write(search, search.interrupted(caught), out, time.perf_counter() - start)
             raise
+        except InputError:  # an earlier run stays
+            raise
+        except Exception as error:
+            with folders.claim_output_folder(search.own, out):
+                folders.write_state(search.own, out, "failed", str(error))
+            raise
     write(search, answer, out, time.perf_counter() - start)
     return answer, answer.lines(search)
 
