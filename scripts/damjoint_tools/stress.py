@@ -6,6 +6,7 @@ The verification is independent of the engines and of laws/: see verification.py
 from __future__ import annotations
 
 import csv
+import ctypes
 import itertools
 import os
 import resource
@@ -88,7 +89,7 @@ def run_of(scene: RandomScene, folder: Path, *options: str, name: str = "out") -
             capture_output=True,
             text=True,
             timeout=LONGEST * TIME_LIMIT,
-            preexec_fn=limit_time,
+            preexec_fn=limit,
         )
     except subprocess.TimeoutExpired:
         raise RunError(f"not finished after {LONGEST * TIME_LIMIT} s") from None
@@ -103,9 +104,15 @@ def run_of(scene: RandomScene, folder: Path, *options: str, name: str = "out") -
     return run
 
 
-def limit_time() -> None:
-    """Limit the CPU time of this process."""
+#: Number of prctl's option by which a process gets a signal when its parent ends.
+SIGNAL_OF_PARENT = 1
+LIBC = ctypes.CDLL(None)
+
+
+def limit() -> None:
+    """Limit the CPU time of this process, and end it with its parent."""
     resource.setrlimit(resource.RLIMIT_CPU, (TIME_LIMIT, TIME_LIMIT + 1))
+    LIBC.prctl(SIGNAL_OF_PARENT, signal.SIGTERM)
 
 
 def with_further_checks(
@@ -143,10 +150,12 @@ def verified(run: RunFiles) -> dict[str, object]:
     }
 
 
-def row_of(seed: int, number: int, records: Path | None) -> dict[str, object]:
-    """Return the row of a scene; records: folder of the records of earthquakes."""
+def row_of(seed: int, number: int, records: Path | None, parent: Path) -> dict[str, object]:
+    """Return the row of a scene; records: folder of the records of earthquakes; parent: of the
+    folder of its runs.
+    """
     scene = random_quake(seed, number, records) if records else random_scene(seed, number)
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory(dir=parent) as folder:
         row = run_and_verify(scene, Path(folder))
     return {"scene": f"{seed}-{number}"} | row
 
@@ -155,8 +164,10 @@ def rows_as_completed(
     seed: int, numbers: list[int], jobs: int, records: Path | None
 ) -> Iterator[dict[str, object]]:
     """Compute the rows of scenes in parallel, in the order in which they are finished."""
-    with pool_of(jobs) as pool:
-        waiting = [pool.submit(row_of, seed, number, records) for number in numbers]
+    # removed by this process, as the others may be killed, with their commands
+    folder = tempfile.TemporaryDirectory(prefix="damjoint-", ignore_cleanup_errors=True)
+    with folder as name, pool_of(jobs) as pool:
+        waiting = [pool.submit(row_of, seed, number, records, Path(name)) for number in numbers]
         yield from (future.result() for future in as_completed(waiting))
 
 

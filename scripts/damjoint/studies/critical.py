@@ -277,7 +277,7 @@ class Search:
             return CriticalValue(
                 None, "", "", f"there is an equilibrium at {beyond}", path.points[-1]
             )
-        point = path.points[path.top] if path.points else None
+        point = path.points[path.top] if path.admissible else None
         return self.result(point and point.level, path, point)
 
     def value(self) -> CriticalValue:
@@ -435,6 +435,14 @@ class Search:
         doubt = "no further equilibrium is found, but no mechanism either"
         if not failing.points:
             doubt = "no equilibrium is found even in the first step"
+        elif value is None:
+            first = failing.points[0]
+            mode, limit = "", failing.case["f_c"]
+            doubt = (
+                f"already at level {first.level:.6g} m, the first equilibrium, the toe's "
+                f"compression, {first.compression:.4g} Pa, exceeds f_c = {limit:g} Pa; --levels "
+                "may begin lower"
+            )
         elif failing.crushed_at_top:
             why = f"beyond it the toe's compression passes f_c = {failing.case['f_c']:g} Pa"
         elif failing.slides:
@@ -453,7 +461,7 @@ class Search:
                 why += f"; there {f'on {where} ' if where else ''}{reached}"
         else:
             mode, why, joint = self.by_statics(failing)
-        events = events_on(failing.admissible) if failing.points else []
+        events = events_on(failing.admissible) if failing.admissible else []
         doubt = "" if why else doubt
         return CriticalValue(value, mode, why, doubt, point, joint=joint, events=events)
 

@@ -236,8 +236,8 @@ class ProcessKilled(RunError):
 
 @contextlib.contextmanager
 def pool_of(jobs: int) -> Iterator[ProcessPoolExecutor]:
-    """Processes that end with their parent, even if it is killed; after an error in a process or in
-    the caller no further task starts.
+    """Processes that end with their parent, even if it is killed, and after an error in a process
+    or in the caller. Raises ProcessKilled if one of them is killed.
     """
     with ProcessPoolExecutor(jobs, initializer=end_with_parent) as pool:
         try:
@@ -245,13 +245,18 @@ def pool_of(jobs: int) -> Iterator[ProcessPoolExecutor]:
         except BrokenProcessPool:
             raise ProcessKilled from None
         except BaseException:
-            pool.shutdown(cancel_futures=True)  # waits; without waiting nothing is cancelled
+            for process in list(pool._processes.values()):  # the pool would wait for their tasks
+                process.terminate()
             raise
 
 
 def end_with_parent() -> None:
-    """End this process when its parent ends, and at once and without words if it is interrupted."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    """End this process when its parent ends, and at once and without words if it is interrupted:
+    an exception would be taken for the result of its task, or leave the pool's queue locked. (The
+    other signals end a fork of a command so, see __main__.py.)
+    """
+    if signal.getsignal(signal.SIGINT) != signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
 
     def wait() -> None:
         if parent := multiprocessing.parent_process():
