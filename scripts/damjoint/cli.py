@@ -167,6 +167,12 @@ def water_options() -> Parser:
         "(default: those of the case)",
     )
     options.add_levels("--tail-levels", help=TAIL_LEVELS)
+    return options
+
+
+def accuracy_options() -> Parser:
+    """The option of the commands that choose the mesh."""
+    options = Parser(add_help=False)
     options.add_argument(
         "--accuracy",
         metavar="PERCENT",
@@ -227,7 +233,8 @@ def parser(word: str = "") -> Parser:
 def add_run(commands: Commands) -> None:
     """Add damjoint run."""
     summary = "fill the reservoir of a case; exit code 1 if the dam fails or the run stops early"
-    command = add_command(commands, do_run, summary, settings_options(), loading_options())
+    options = settings_options(), loading_options(), accuracy_options()
+    command = add_command(commands, do_run, summary, *options)
     command.add_argument("case", metavar="CASE", help=CASE)
     command.add_path("--out", "FOLDER", help="output folder (default: out/CASE)")
     command.add_argument(
@@ -291,7 +298,8 @@ def add_check(commands: Commands) -> None:
     summary = (
         "safety factors by finite elements and by the gravity method; exit code 1 if one is too low"
     )
-    command = add_command(commands, do_check, summary, settings_options(), water_options())
+    options = settings_options(), water_options(), accuracy_options()
+    command = add_command(commands, do_check, summary, *options)
     command.add_argument("cases", nargs="+", metavar="CASE", help=f"load combinations, each {CASE}")
     command.add_path(
         "--out",
@@ -552,7 +560,6 @@ def do_quake(arguments: argparse.Namespace) -> int:
         arguments.levels,
         arguments.tail_levels,
         arguments.steps,
-        arguments.accuracy,
         record=arguments.record,
     )
     engine_of(case, arguments.engine)
@@ -578,7 +585,8 @@ def do_quake(arguments: argparse.Namespace) -> int:
 def add_sweep(commands: Commands) -> None:
     """Add damjoint sweep."""
     summary = "run a case with many values of its parameters, listed or random; CSV and chart"
-    command = add_command(commands, do_sweep, summary, settings_options(), loading_options())
+    options = settings_options(), loading_options(), accuracy_options()
+    command = add_command(commands, do_sweep, summary, *options)
     command.add_argument("case", metavar="CASE", help=CASE)
     command.add_list(
         "--vary",

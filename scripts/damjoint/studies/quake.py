@@ -75,8 +75,6 @@ def span_of(name: str, text: str) -> tuple[float, float]:
 
 def check(case: Case, span: Span = None) -> None:
     """Raise InputError if an earthquake of a case can not be computed; span: of the frames."""
-    if case.accuracy:
-        raise InputError(f"accuracy = {100 * case.accuracy:g}%: must not be set for damjoint quake")
     if case["drive"] != "level":
         raise InputError(f"drive = {case['drive']}: must be level for damjoint quake")
     for name in ("k_h", "k_v"):
