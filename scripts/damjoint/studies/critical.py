@@ -22,6 +22,7 @@ from .. import InputError
 from ..arrays import Setting, Settings
 from ..engines import Outcome
 from ..engines.condensed.solve import about
+from ..fem.memory import sizes
 from ..joint.interface import interface_of
 from ..laws import Evidence
 from ..model.case import Case, load, resolve
@@ -653,7 +654,7 @@ def critical(
     out = out or Path("out") / f"{name}_critical"
     folders.check_writable(out)
     start = time.perf_counter()
-    with Progress(name, bar_format="{desc} {elapsed}", leave=False) as shown:
+    with Progress(sizes(search.own), bar_format="{desc} {elapsed}", leave=False) as shown:
         search.on_progress = lambda message: shown.describe(f"{name}: {message}")
         try:
             answer = search.run()

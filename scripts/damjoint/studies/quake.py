@@ -23,6 +23,7 @@ from ..engines.condensed.recover import recover
 from ..engines.condensed.solve import about
 from ..fem import factor
 from ..fem.bodies import Bodies
+from ..fem.memory import sizes
 from ..joint.interface import interface_of
 from ..model.case import Case
 from ..model.fields import Field, Solution
@@ -249,7 +250,8 @@ def run(
     resumed = checkpoint.exists(path, key)
     with single_thread(), folders.claim_output_folder(case, out, keep=resumed):
         try:
-            under_way = QuakeRun(case, span)
+            with Progress(sizes(case), None, progress, bar_format="{desc} {elapsed}", leave=False):
+                under_way = QuakeRun(case, span)
         except BaseException as error:
             state = "failed" if isinstance(error, Exception) else "interrupted"
             folders.write_state(case, out, state, str(error) or "no step had converged")

@@ -25,7 +25,7 @@ from ..joint.interface import Interface, interface_of
 from ..model.case import Case, equal_steps, first_mesh, resolve, with_drive_times
 from ..model.mesh import mesh_of
 from ..model.results import history_columns
-from ..progress import track
+from ..progress import Progress, track
 from ..solver.load_stepper import LoadStepper
 from ..statics.limit import mechanism
 from ..statics.verdict import failed, statement, verdict
@@ -331,9 +331,10 @@ def meshed(case: Case) -> tuple[Case, str]:
 
     Raises InputError, RunError.
     """
-    (outcome, *_) = accuracy.solve(
-        replace(case, also_uplift=()), engine_of(case, "auto"), lambda *_: None, False
-    )
+    with Progress(f"{case.name}, mesh of all rows", bar_format="{desc} {elapsed}", leave=False):
+        (outcome, *_) = accuracy.solve(
+            replace(case, also_uplift=()), engine_of(case, "auto"), lambda *_: None, False
+        )
     if outcome.error:
         raise outcome.error
     refined = {n: outcome.result.case[n] for n in accuracy.REFINED}
