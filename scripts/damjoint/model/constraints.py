@@ -30,7 +30,9 @@ USUAL = {
 #: there is an equilibrium, which would be taken for a property of the dam. (A modulus up to the
 #: limit makes a body rigid.)
 LARGEST = {
-    **dict.fromkeys(("E_dam", "E_found"), 1e20),
+    **dict.fromkeys(("E_dam", "E_found", "K_N", "K_T"), 1e20),
+    "grout_pressure": 1e10,
+    "saw_thickness": 1e2,
     **dict.fromkeys(("rho_dam", "rho_found", "rho_water", "rho_silt"), 1e5),
     "g": 1e3,
     **dict.fromkeys(("joint_head_offset", "silt_height"), 1e4),
@@ -46,6 +48,9 @@ LEAST_MODULUS = 1e6
 #: Value of added_mass: Zangar's pressure in place of Westergaard's.
 ZANGAR = 2
 
+#: Part of the dam's height by which its weight may press it into the joint at most.
+MOST_SUNK = 1 / 20
+
 #: Limits of the numbers of steps between two levels, and of levels, each of which has its table.
 MOST_STEPS, MOST_LEVELS = 100_000, 10_000
 
@@ -59,7 +64,8 @@ def check_values(
         parameter.check(case.values[name])
     check_moduli(case)
     check_magnitudes(case)
-    if by_parameters:
+    if by_parameters:  # else a joint may be vertical, and open
+        check_joint_stiffness(case)
         check_section(case, section)
         check_distances(case, section["joint_along"][0])
     elif case["temperature_linear"]:
@@ -86,6 +92,16 @@ def check_moduli(case: ParameterValues) -> None:
                 f"{name} = {case[name]:g}: must be >= {LEAST_MODULUS:g} Pa (a unit is a factor: "
                 "25*GPa)"
             )
+
+
+def check_joint_stiffness(case: ParameterValues) -> None:
+    """The joint's stiffness [Pa/m]: it carries a column of the dam as high as the dam."""
+    least = case["rho_dam"] * case["g"] / MOST_SUNK
+    if case["K_N"] < least:
+        raise InputError(
+            f"K_N = {case['K_N']:g}: must be >= {least:.3g} Pa/m (rho_dam g / {MOST_SUNK:g}): the "
+            "dam's weight would press it into the joint by more than a part of its height"
+        )
 
 
 def check_magnitudes(case: ParameterValues) -> None:
