@@ -319,16 +319,6 @@ def test_a_value_beyond_any_material_or_load_is_refused(command, setting, limit)
     assert f"{name} = " in err and f"between -{limit} and {limit} " in err
 
 
-def test_a_joint_into_which_the_dam_would_sink_is_refused(command):
-    """It is no failure of the dam; from the least stiffness on it stands."""
-    words = "run", "dam", "--set", "law=friction", "--set", "K_N=1e5"
-    code, out, err = command(*words)
-    assert (code, out) == (2, "") and "K_N = 100000: must be >= 4.71e+05 Pa/m (rho_dam g /" in err
-    sizes = {"n_joint": 10, "h_dam": 12, "h_found": 12}
-    least = dj.case("dam", levels=[30], law="friction", K_N=4.8e5, **sizes)
-    assert dj.run(least).verdict == "stands"
-
-
 @pytest.mark.parametrize("modulus", [1e6, 1e20])
 def test_within_the_range_of_moduli_a_dam_stands(modulus):
     """Also with a rigid body, as of a published foundation."""

@@ -48,9 +48,6 @@ LEAST_MODULUS = 1e6
 #: Value of added_mass: Zangar's pressure in place of Westergaard's.
 ZANGAR = 2
 
-#: Part of the dam's height by which its weight may press it into the joint at most.
-MOST_SUNK = 1 / 20
-
 #: Limits of the numbers of steps between two levels, and of levels, each of which has its table.
 MOST_STEPS, MOST_LEVELS = 100_000, 10_000
 
@@ -64,8 +61,7 @@ def check_values(
         parameter.check(case.values[name])
     check_moduli(case)
     check_magnitudes(case)
-    if by_parameters:  # else a joint may be vertical, and open
-        check_joint_stiffness(case)
+    if by_parameters:
         check_section(case, section)
         check_distances(case, section["joint_along"][0])
     elif case["temperature_linear"]:
@@ -92,16 +88,6 @@ def check_moduli(case: ParameterValues) -> None:
                 f"{name} = {case[name]:g}: must be >= {LEAST_MODULUS:g} Pa (a unit is a factor: "
                 "25*GPa)"
             )
-
-
-def check_joint_stiffness(case: ParameterValues) -> None:
-    """The joint's stiffness [Pa/m]: it carries a column of the dam as high as the dam."""
-    least = case["rho_dam"] * case["g"] / MOST_SUNK
-    if case["K_N"] < least:
-        raise InputError(
-            f"K_N = {case['K_N']:g}: must be >= {least:.3g} Pa/m (rho_dam g / {MOST_SUNK:g}): the "
-            "dam's weight would press it into the joint by more than a part of its height"
-        )
 
 
 def check_magnitudes(case: ParameterValues) -> None:
