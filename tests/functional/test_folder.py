@@ -343,9 +343,9 @@ def test_no_temporary_file_of_getdp_remains(command, tmp_path, monkeypatch):
 
 
 def test_a_run_that_fails_early_removes_the_results_of_an_earlier_one(command, tmp_path):
-    """The mesh is impossible: one line, also in run.json."""
+    """The bodies can not be eliminated: one line, also in run.json."""
     assert command("run", "c", *BARE, "--out", "out")[0] == 0
-    thin = "--set", "dim=3", "--set", "thickness=1e-6", "--set", "mesh_pattern=split"
+    thin = "--set", "dam_height=1e-12", "--levels", "0"
     code, _, err = command("run", "c", *BARE, *thin, "--out", "out")
     assert code == 1 and len(err.splitlines()) == 1
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["run.json"]
