@@ -36,23 +36,45 @@ def open_streams() -> None:
             setattr(sys, name, os.fdopen(number, mode, closefd=False))
 
 
+#: Number of this process; a fork has another one.
+PROCESS = os.getpid()
+
+
 def interrupt(number: int, frame: FrameType | None) -> None:
     """Raise KeyboardInterrupt, but not during an import: a module that is imported by half raises
-    other errors later. There the signal is sent again until the import is over.
+    other errors later. There the signal is sent again until the import is over. A fork ends.
     """
+    if os.getpid() != PROCESS:
+        os._exit(130)
     while frame:
         if frame.f_code.co_filename.startswith("<frozen importlib"):
-            signal.signal(signal.SIGALRM, interrupt)
-            signal.setitimer(signal.ITIMER_REAL, 0.001)
+            send_again()
             return
         frame = frame.f_back
     raise KeyboardInterrupt
+
+
+def send_again() -> None:
+    """Interrupt again after a millisecond."""
+    signal.signal(signal.SIGALRM, interrupt)
+    signal.setitimer(signal.ITIMER_REAL, 0.001)
+
+
+def unraisable(ignored: "sys.UnraisableHookArgs") -> None:
+    """Send an interrupt again that came where Python ignores exceptions, as around a fork or while
+    an object is deleted.
+    """
+    if ignored.exc_type is KeyboardInterrupt:
+        send_again()
+    else:
+        sys.__unraisablehook__(ignored)
 
 
 def handle_signals() -> None:
     """Let SIGTERM and SIGHUP (closed terminal) end a command as Ctrl-C does; signals that are
     ignored (nohup) stay ignored.
     """
+    sys.unraisablehook = unraisable
     for number in INTERRUPTS:
         if signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
             signal.signal(number, interrupt)
@@ -93,6 +115,7 @@ def leave(code: int) -> None:
 def main() -> int:
     """Run the command: 0 done, 1 failed, 2 bad input, 130 interrupted."""
     open_streams()
+    os.environ["MPLBACKEND"] = "agg"  # pictures are files; another one may not be installed
     gc.set_threshold(OBJECTS)
     try:
         handle_signals()

@@ -16,6 +16,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING
 
 from . import RUN_GEO, InputError, RunError, __version__
+from .storage import SAVED
 
 if TYPE_CHECKING:
     from argparse import _SubParsersAction as Commands
@@ -166,6 +167,12 @@ def water_options() -> Parser:
         "(default: those of the case)",
     )
     options.add_levels("--tail-levels", help=TAIL_LEVELS)
+    return options
+
+
+def accuracy_options() -> Parser:
+    """The option of the commands that choose the mesh."""
+    options = Parser(add_help=False)
     options.add_argument(
         "--accuracy",
         metavar="PERCENT",
@@ -226,7 +233,8 @@ def parser(word: str = "") -> Parser:
 def add_run(commands: Commands) -> None:
     """Add damjoint run."""
     summary = "fill the reservoir of a case; exit code 1 if the dam fails or the run stops early"
-    command = add_command(commands, do_run, summary, settings_options(), loading_options())
+    options = settings_options(), loading_options(), accuracy_options()
+    command = add_command(commands, do_run, summary, *options)
     command.add_argument("case", metavar="CASE", help=CASE)
     command.add_path("--out", "FOLDER", help="output folder (default: out/CASE)")
     command.add_argument(
@@ -290,7 +298,8 @@ def add_check(commands: Commands) -> None:
     summary = (
         "safety factors by finite elements and by the gravity method; exit code 1 if one is too low"
     )
-    command = add_command(commands, do_check, summary, settings_options(), water_options())
+    options = settings_options(), water_options(), accuracy_options()
+    command = add_command(commands, do_check, summary, *options)
     command.add_argument("cases", nargs="+", metavar="CASE", help=f"load combinations, each {CASE}")
     command.add_path(
         "--out",
@@ -551,7 +560,6 @@ def do_quake(arguments: argparse.Namespace) -> int:
         arguments.levels,
         arguments.tail_levels,
         arguments.steps,
-        arguments.accuracy,
         record=arguments.record,
     )
     engine_of(case, arguments.engine)
@@ -577,7 +585,8 @@ def do_quake(arguments: argparse.Namespace) -> int:
 def add_sweep(commands: Commands) -> None:
     """Add damjoint sweep."""
     summary = "run a case with many values of its parameters, listed or random; CSV and chart"
-    command = add_command(commands, do_sweep, summary, settings_options(), loading_options())
+    options = settings_options(), loading_options(), accuracy_options()
+    command = add_command(commands, do_sweep, summary, *options)
     command.add_argument("case", metavar="CASE", help=CASE)
     command.add_list(
         "--vary",
@@ -675,13 +684,13 @@ def do_sweep(arguments: argparse.Namespace) -> int:
 def report_sweep(case: str, plan: Plan, rows: list[Row], cases: list[Case], out: Path) -> None:
     """Print the statistics of a sweep and draw its chart beside its CSV file."""
     from .studies import chart
-    from .studies.plan import beside
+    from .studies.plan import CHART, beside
 
     if plan.sampled:
         from .studies import outcome
 
         print(outcome.report(plan, rows, out))
-    picture = beside(out, ".png")
+    picture = beside(out, CHART)
     reason = chart.draw(plan, rows, cases, f"{Path(case).stem}: {len(rows)} rows", picture)
     print(reason or picture)
 
@@ -807,6 +816,7 @@ def main(argv: list[str] | None = None) -> int:
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # µ and mathematical signs in a plain locale
     words = sys.argv[1:] if argv is None else argv
+    SAVED.clear()
     try:
         for word in words:
             check_encoding(word)
@@ -822,6 +832,7 @@ def main(argv: list[str] | None = None) -> int:
     except (RunError, OSError, ImportError) as error:
         message, code = one_line(error), 1
     except KeyboardInterrupt:
-        message, code = "damjoint: interrupted; results finished so far are saved", 130
+        kept = "; results finished so far are saved" if SAVED else ""
+        message, code = f"damjoint: interrupted{kept}", 130
     print(message, file=sys.stderr)
     return code

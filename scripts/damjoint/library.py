@@ -361,14 +361,14 @@ def fill(source: Case | str | Path) -> Iterator[Step]:
         yield Step(state, stepper.history.last)
 
 
-def check(cases: Sequence[Case | str | Path]) -> list[SafetyCheck]:
-    """Safety factors of load combinations, by the finite elements and by the gravity method.
+def check(cases: Case | str | Path | Sequence[Case | str | Path]) -> list[SafetyCheck]:
+    """Safety factors of a case or of several, by the finite elements and by the gravity method.
 
     Each is computed up to its last level. Of each check, `rows` are those of check.csv, `why` is
     the reason if it fails, else empty, and `notes` are remarks on the result.
 
     Args:
-        cases: the load combinations; cases, or their names or paths, see `case`.
+        cases: the load combinations, or a single one; cases, or their names or paths, see `case`.
 
     Raises:
         InputError: bad input, or a case for which there is no gravity method.
@@ -376,7 +376,8 @@ def check(cases: Sequence[Case | str | Path]) -> list[SafetyCheck]:
     """
     from .studies.check import check_has_section, compare_joints
 
-    combinations = [as_case(combination) for combination in cases]
+    listed = [cases] if isinstance(cases, Case | str | Path) else cases
+    combinations = [as_case(combination) for combination in listed]
     for combination in combinations:
         check_has_section(combination)
     return [

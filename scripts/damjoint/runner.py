@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from . import accuracy, versions
 from .engines import Outcome, engine_of
+from .fem.memory import sizes
 from .model.case import Case
 from .model.results import Results
 from .post import folder as folders
@@ -28,11 +29,13 @@ class RunProgress(Progress):
     def __init__(self, case: Case, show: bool) -> None:
         count = len(case.scenes())
         bar = "{desc} {percentage:3.0f}%|{bar}| {elapsed}"
-        super().__init__(case.name, count * case.times[-1], show, bar_format=bar, leave=False)
-        self.reached = [0.0] * count
+        super().__init__(sizes(case), count * case.times[-1], show, bar_format=bar, leave=False)
+        self.name, self.reached = case.name, [0.0] * count
 
     def step(self, scene: int, now: float) -> None:
         """Advance to the time of a converged step; called by the engines."""
+        if self.title != self.name:
+            self.describe(self.name)
         self.update(now - self.reached[scene])
         self.reached[scene] = now
 

@@ -1,4 +1,6 @@
-"""Cache folder, atomic writes, locks on files and folders, detection of truncated files."""
+"""Cache folder and its entries, atomic writes, locks on files and folders, detection of truncated
+files.
+"""
 
 from __future__ import annotations
 
@@ -10,12 +12,15 @@ import os
 import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from . import InputError
 
 #: Prefix of the temporary file beside a file that is being written.
 PART = ".part."
+
+#: Tables of results, with rows, that this process has written: what an interrupt leaves.
+SAVED = set[Path]()
 
 
 @contextlib.contextmanager
@@ -53,24 +58,67 @@ def cache_folder() -> Path | None:
     return Path(home) / "damjoint" if os.path.isabs(home) else None
 
 
+def checksum(file: BinaryIO) -> bytes:
+    """Checksum of the rest of a file, as a line of MARK bytes."""
+    total = 0
+    while block := file.read(BLOCK):
+        total = zlib.crc32(block, total)
+    return b"%08x\n" % total
+
+
+#: Bytes of the line with the checksum, and of the blocks that are read for it.
+MARK, BLOCK = 9, 1 << 20
+
+
+@contextlib.contextmanager
+def write_entry(path: Path, key: str) -> Iterator[BinaryIO]:
+    """Write an entry of the cache: the checksum of all that follows, a line; its key, all that it
+    depends on, a line; its content, which the block writes.
+
+    Raises OSError.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with atomic_write(path) as part, part.open("x+b") as file:  # never through a link
+        file.write(bytes(MARK) + json.dumps(key).encode() + b"\n")
+        yield file
+        file.seek(MARK)
+        mark = checksum(file)
+        file.seek(0)
+        file.write(mark)
+
+
+@contextlib.contextmanager
+def read_entry(path: Path, key: str) -> Iterator[BinaryIO]:
+    """Open an entry of the cache at its content.
+
+    Raises OSError if there is none; ValueError if any byte of it has changed, or if it has another
+    key.
+    """
+    if not path.is_file():  # a pipe would be waited for
+        raise FileNotFoundError(errno.ENOENT, "no file", str(path))
+    with path.open("rb") as file:
+        if file.read(MARK) != checksum(file):
+            raise ValueError(f"{path}: damaged")
+        file.seek(MARK)
+        if file.readline() != json.dumps(key).encode() + b"\n":
+            raise ValueError(f"{path}: of another key")
+        yield file
+
+
 def cached(kind: str, key: str, compute: Callable[[], Any]) -> Any:
     """A value of JSON from the cache folder, or computed and added to it; key: all that it depends
-    on. A file that cannot be read, or of another key, is replaced; one that cannot be written only
+    on. An entry that is damaged or of another key is replaced; one that cannot be written only
     costs the entry.
     """
     parent = cache_folder()
     if parent is None:
         return compute()
     path = parent / f"{kind}-{zlib.crc32(key.encode()):08x}.json"
-    with contextlib.suppress(OSError, ValueError, KeyError, TypeError):
-        stored = json.loads(path.read_text())
-        if stored["key"] == key:
-            return stored["value"]
+    with contextlib.suppress(OSError, ValueError), read_entry(path, key) as file:
+        return json.load(file)
     value = compute()
-    with contextlib.suppress(OSError):
-        parent.mkdir(parents=True, exist_ok=True)
-        with atomic_write(path) as part:
-            part.write_text(json.dumps({"key": key, "value": value}))
+    with contextlib.suppress(OSError), write_entry(path, key) as file:
+        file.write(json.dumps(value).encode())
     return value
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import os
 import platform
 import re
@@ -11,7 +12,7 @@ import sys
 from functools import lru_cache
 from pathlib import Path
 
-from . import __version__
+from . import __version__, data
 
 #: Folders of the checkout that hold the code.
 CODE_FOLDERS = "scripts", "pro", "geo", "cases"
@@ -23,6 +24,15 @@ def versions() -> dict[str, str]:
     """Return the versions of damjoint, Python and PACKAGES by name."""
     packages = {name: installed(name) for name in PACKAGES}
     return {"damjoint": __version__, **packages, "python": platform.python_version()}
+
+
+@lru_cache
+def code_fingerprint(*packages: Path) -> str:
+    """Return the hash of the source files of damjoint and of further packages."""
+    folders = Path(__file__).parent, *packages
+    files = [path for folder in folders for path in folder.rglob("*.py")]
+    files += [*data("pro").rglob("*.pro"), *data("geo").glob("*.geo")]
+    return hashlib.sha256(b"".join(path.read_bytes() for path in sorted(files))).hexdigest()
 
 
 @lru_cache(maxsize=1)

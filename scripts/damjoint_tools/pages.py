@@ -122,7 +122,8 @@ def results_page() -> str:
         quake,
         "## CASE_sweep.csv",
         "Written by `damjoint sweep`, a row per combination, in the order of computation: `key`, "
-        "by which an interrupted sweep continues; the varied, sampled and tied values (a level as "
+        "of all that decides the row (values, loading, mesh, record, code), by which an "
+        "interrupted sweep continues; the varied, sampled and tied values (a level as "
         "`level_asked`); the last row of "
         "history.csv; `failed` (1 where `damjoint run` ends with exit code 1), `verdict`, "
         "`statement`; with `--critical` the critical value, its `mode`, whether it is `confirmed` "

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import hashlib
 import platform
 from collections.abc import Mapping, Sequence
 from datetime import date
 from pathlib import Path
 
-import damjoint
-from damjoint import __version__, data, versions
+from damjoint import __version__, versions
 from damjoint.fem import factor
 
 #: Fields that are recorded with measured figures; code: fingerprint of all source files.
@@ -18,17 +16,9 @@ RECORDED = ("version", "commit", "code", "machine", "date")
 
 def provenance() -> dict[str, str]:
     """Return RECORDED of figures that are measured now."""
-    values = __version__, versions.commit(), code_fingerprint(), machine(), f"{date.today()}"
+    code = versions.code_fingerprint(Path(__file__).parent)
+    values = __version__, versions.commit(), code, machine(), f"{date.today()}"
     return dict(zip(RECORDED, values, strict=True))
-
-
-def code_fingerprint() -> str:
-    """Return the hash of all source files."""
-    packages = Path(damjoint.__file__).parent, Path(__file__).parent
-    files = [path for package in packages for path in package.rglob("*.py")]
-    files += data("pro").rglob("*.pro")
-    files += data("geo").glob("*.geo")
-    return hashlib.sha256(b"".join(path.read_bytes() for path in sorted(files))).hexdigest()
 
 
 def machine() -> str:

@@ -6,6 +6,7 @@ The verification is independent of the engines and of laws/: see verification.py
 from __future__ import annotations
 
 import csv
+import ctypes
 import itertools
 import os
 import resource
@@ -20,8 +21,8 @@ from pathlib import Path
 
 from damjoint import InputError, RunError
 from damjoint.progress import track
-from damjoint.storage import lock
-from damjoint.studies.sweep import pool_of, read_done
+from damjoint.studies.result_file import result_file
+from damjoint.studies.sweep import pool_of
 
 from .provenance import RECORDED, provenance
 from .quake_comparison import MEASURES, further_checks
@@ -88,7 +89,7 @@ def run_of(scene: RandomScene, folder: Path, *options: str, name: str = "out") -
             capture_output=True,
             text=True,
             timeout=LONGEST * TIME_LIMIT,
-            preexec_fn=limit_time,
+            preexec_fn=limit,
         )
     except subprocess.TimeoutExpired:
         raise RunError(f"not finished after {LONGEST * TIME_LIMIT} s") from None
@@ -103,9 +104,15 @@ def run_of(scene: RandomScene, folder: Path, *options: str, name: str = "out") -
     return run
 
 
-def limit_time() -> None:
-    """Limit the CPU time of this process."""
+#: Number of prctl's option by which a process gets a signal when its parent ends.
+SIGNAL_OF_PARENT = 1
+LIBC = ctypes.CDLL(None)
+
+
+def limit() -> None:
+    """Limit the CPU time of this process, and end it with its parent."""
     resource.setrlimit(resource.RLIMIT_CPU, (TIME_LIMIT, TIME_LIMIT + 1))
+    LIBC.prctl(SIGNAL_OF_PARENT, signal.SIGTERM)
 
 
 def with_further_checks(
@@ -143,10 +150,12 @@ def verified(run: RunFiles) -> dict[str, object]:
     }
 
 
-def row_of(seed: int, number: int, records: Path | None) -> dict[str, object]:
-    """Return the row of a scene; records: folder of the records of earthquakes."""
+def row_of(seed: int, number: int, records: Path | None, parent: Path) -> dict[str, object]:
+    """Return the row of a scene; records: folder of the records of earthquakes; parent: of the
+    folder of its runs.
+    """
     scene = random_quake(seed, number, records) if records else random_scene(seed, number)
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory(dir=parent) as folder:
         row = run_and_verify(scene, Path(folder))
     return {"scene": f"{seed}-{number}"} | row
 
@@ -155,8 +164,10 @@ def rows_as_completed(
     seed: int, numbers: list[int], jobs: int, records: Path | None
 ) -> Iterator[dict[str, object]]:
     """Compute the rows of scenes in parallel, in the order in which they are finished."""
-    with pool_of(jobs) as pool:
-        waiting = [pool.submit(row_of, seed, number, records) for number in numbers]
+    # removed by this process, as the others may be killed, with their commands
+    folder = tempfile.TemporaryDirectory(prefix="damjoint-", ignore_cleanup_errors=True)
+    with folder as name, pool_of(jobs) as pool:
+        waiting = [pool.submit(row_of, seed, number, records, Path(name)) for number in numbers]
         yield from (future.result() for future in as_completed(waiting))
 
 
@@ -170,29 +181,23 @@ def stress(
     records in a folder beside the file. Raises InputError, also if the rows in the file were
     computed by other code.
     """
-    if not out.parent.is_dir():
-        raise InputError(f"out = {out}: must be a file in an existing folder")
-    done = read_done(out, list(COLUMNS), ("dim", "seconds"))
     now = provenance()
-    for row in done.values():
-        if row["code"] != now["code"]:
-            other = f"damjoint {row['version']} ({row['commit'] or row['date']})"
-            raise InputError(
-                f"out = {out}: must be a new file; this file has rows of {other}, other code"
-            )
     names = [f"{seed}-{number}" for number in range(count)]
-    missing = [number for number, name in enumerate(names) if name not in done]
-    with out.open("a", newline="") as file:
-        lock(file.fileno(), out)
-        writer = csv.DictWriter(file, COLUMNS, restval="", lineterminator="\n")
-        if not file.tell():
-            writer.writeheader()
+    with result_file(out, COLUMNS, ("dim", "seconds")) as (file, done):
+        for row in done.values():
+            if row["code"] != now["code"]:
+                other = f"damjoint {row['version']} ({row['commit'] or row['date']})"
+                raise InputError(
+                    f"out = {out}: must be a new file; this file has rows of {other}, other code"
+                )
+        missing = [number for number, name in enumerate(names) if name not in done]
         records = out.resolve().with_name(f"{out.stem}_records") if quake else None
         rows = rows_as_completed(seed, missing, jobs or os.cpu_count() or 1, records)
         for row in track(rows, "stress", len(missing)):
-            writer.writerow(row | now)
-            file.flush()
-    return [row for row in read_rows(out) if row["scene"] in names]
+            cells = row | now
+            file.add([str(cells.get(name, "")) for name in COLUMNS])
+        done = file.read()
+    return [done[name] for name in names]
 
 
 def read_rows(path: Path) -> list[dict[str, str]]:

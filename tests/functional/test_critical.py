@@ -434,3 +434,24 @@ def test_an_interrupted_search_writes_its_results_so_far(monkeypatch, tmp_path):
     assert (tmp_path / "out/critical.csv").read_text().count("\n") > 4
     record = json.loads((tmp_path / "out/run.json").read_text())
     assert record["state"] == "interrupted" in record["statement"]
+
+
+@pytest.mark.parametrize("case", ["dam", "lifts"])
+def test_a_toe_that_is_crushed_at_the_first_equilibrium_is_reported(command, tmp_path, case):
+    """There is no critical level; a lower first level may have an equilibrium."""
+    words = "critical", case, "--set", "n_joint=10", "--set", "f_c=1e5", "--out", "out"
+    code, out, err = command(*words)
+    assert (code, err) == (1, "") and "no critical level found: already at level 30 m" in out
+    assert "exceeds f_c = 100000 Pa; --levels may begin lower" in out
+    assert json.loads((tmp_path / "out" / "run.json").read_text())["state"] == "complete"
+    with (tmp_path / "out" / "critical.csv").open() as file:
+        (row,) = csv.DictReader(file)
+    assert f"compression, {float(row['compression']):.4g} Pa" in out
+
+
+def test_a_trial_that_is_crushed_at_once_fails(command):
+    """The other quantities: the value before it stands."""
+    words = "--set", "n_joint=10", "--set", "f_c=5e5", "--levels", "30", "--out", "out"
+    code, out, err = command("critical", "dam", "--of", "dam_height", *words)
+    assert (code, err) == (0, "") and "(crushed toe)" in out
+    assert "beyond it the toe's compression passes f_c = 500000 Pa" in out

@@ -20,6 +20,7 @@ from damjoint.csr import CsrMatrix
 from damjoint.engines import engine_of
 from damjoint.fem import factor, memory
 from damjoint.storage import atomic_write, locked_folder
+from damjoint.studies.sweep import pool_of
 from processes import without_progress
 from scipy import sparse
 
@@ -59,6 +60,20 @@ def test_sigterm_ends_a_run_as_ctrl_c_does(tmp_path):
         os.killpg(process.pid, 0)
 
 
+@pytest.mark.parametrize("words", [RUN, ("critical", "c"), ("check", "c"), ("plot", "out/c")])
+def test_an_interrupt_that_leaves_no_result_does_not_say_so(command, monkeypatch, words):
+    """Before the first step, also if an earlier command of the process has saved some; one line."""
+    assert command(*RUN)[0] == 0
+
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("damjoint.solver.model.Model.start", interrupted)
+    monkeypatch.setattr("damjoint.post.pictures.draw", interrupted)
+    code, _, err = command(*words)
+    assert (code, err) == (130, "damjoint: interrupted\n")
+
+
 def test_worker_processes_end_with_their_parent(tmp_path):
     script = """
 import os, time
@@ -74,6 +89,93 @@ with pool_of(2) as pool:
     # ended processes (Z) may be listed until init has removed them
     alive = ["ps", "-o", "stat=", "--sid", str(process.pid)]
     wait_for(lambda: not subprocess.run(alive, capture_output=True).stdout.strip(b" Z\n"))
+
+
+def test_an_interrupt_where_python_ignores_exceptions_is_sent_again():
+    """As around a fork: the command would go on."""
+    script = """
+import os, signal, time
+from damjoint import __main__
+class Deleted:
+    def __del__(self):
+        os.kill(os.getpid(), signal.SIGTERM)
+        time.sleep(0.01)
+__main__.handle_signals()
+try:
+    Deleted()
+    time.sleep(60)
+    print("lost")
+except KeyboardInterrupt:
+    print("interrupted")
+"""
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert (done.stdout, done.stderr) == ("interrupted\n", "")
+
+
+def test_a_fork_of_a_command_ends_by_an_interrupt_without_words():
+    """Also before it has handlers of its own."""
+    script = """
+import os, signal, time
+from damjoint import __main__
+__main__.handle_signals()
+begun, begin = os.pipe()
+child = os.fork()
+if not child:
+    os.write(begin, b"1")
+    time.sleep(60)
+    os._exit(0)
+os.read(begun, 1)
+os.kill(child, signal.SIGTERM)
+print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+"""
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert (done.stdout, done.stderr) == ("130\n", "")
+
+
+def test_a_pool_does_not_wait_for_its_tasks_if_its_caller_is_interrupted():
+
+    def interrupted():
+        with pool_of(1) as pool:
+            pool.submit(time.sleep, 60)
+            raise KeyboardInterrupt
+
+    start = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    assert time.monotonic() - start < 30
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("after", [0.5, 1.0, 5.0])
+def test_stress_ends_at_once_by_a_signal_to_its_group(tmp_path, after):
+    """With its commands; no folder of them remains."""
+    words = "stress", "40", "--jobs", "2", "--out", str(tmp_path / "s.csv")
+    (tmp_path / "tmp").mkdir()
+    process = subprocess.Popen(
+        [sys.executable, "-m", "damjoint", *words],
+        env=os.environ | {"TMPDIR": str(tmp_path / "tmp")},
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    time.sleep(after)
+    os.killpg(process.pid, signal.SIGTERM)
+    _, error = process.communicate(timeout=60)
+    assert process.returncode == 130 and len(without_progress(error).splitlines()) == 1
+    assert not any((tmp_path / "tmp").iterdir())
+
+
+def test_a_backend_that_matplotlib_does_not_know_is_not_used(tmp_path):
+    """Pictures are files."""
+    done = subprocess.run(
+        [sys.executable, "-m", "damjoint", *RUN[:-3], "--levels", "6"],
+        cwd=tmp_path,
+        env=os.environ | {"MPLBACKEND": "nonsense"},
+        capture_output=True,
+        text=True,
+    )
+    assert (done.returncode, without_progress(done.stderr)) == (0, "")
+    assert (tmp_path / "out" / "c" / "c.png").stat().st_size > 10_000
 
 
 def test_a_full_disk_leaves_no_partial_file(command, tmp_path, monkeypatch):

@@ -8,8 +8,10 @@ from pathlib import Path
 import gmsh
 import numpy as np
 import pytest
+from damjoint import RunError
 from damjoint.engines.getdp import process
 from damjoint.model.case import CASES
+from damjoint.storage import locked_folder
 from test_output import read
 
 SMALL = ("--set", "n_joint=10", "--set", "h_dam=3", "--set", "h_found=4")
@@ -76,6 +78,76 @@ def test_bad_input_leaves_an_earlier_run_unchanged(command, tmp_path):
     before = {p: p.read_bytes() for p in (tmp_path / "out").iterdir()}
     assert command("run", "c", *BARE, "--levels", "60", "--out", "out")[0] == 2
     assert {p: p.read_bytes() for p in (tmp_path / "out").iterdir()} == before
+
+
+@pytest.mark.usefixtures("no_pictures")
+@pytest.mark.parametrize(
+    "newer", [("check", "c", "--out", "out"), ("run", "c", "--out", "out/c"), ("run", "c")]
+)
+def test_the_table_of_a_check_does_not_stay_beside_a_newer_run_that_fails(
+    command, tmp_path, monkeypatch, newer
+):
+    """Of the check, of one of its cases, or of another run into its folder."""
+    words = *BARE[:-2], "--levels", "6"
+    assert command("check", "c", *words, "--out", "out")[0] == 0
+    table = tmp_path / "out" / "check.csv"
+    assert command(*newer, *words[:-1], "600", "--out", "out")[0] == 2 and table.is_file()
+
+    def failing(*_):
+        raise RunError("no")
+
+    monkeypatch.setattr("damjoint.runner.accuracy.solve", failing)
+    assert command("run", "c", *words, "--out", "out/d")[0] == 1 and table.is_file()
+    out = newer[-2:] if len(newer) > 2 else ("--out", "out")
+    assert command(*newer[:2], *words, *out)[0] == 1 and not table.exists()
+
+
+def test_a_check_csv_of_the_user_stays(command, tmp_path):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "check.csv").write_text("case,mine\nc,1\n")
+    for out in "out/c", "out", "out":
+        assert command("run", "c", *BARE, "--levels", "6", "--out", out)[0] == 0
+        assert (tmp_path / "out" / "check.csv").read_text() == "case,mine\nc,1\n"
+
+
+def test_two_checks_into_one_folder_are_refused(command, tmp_path):
+    (tmp_path / "out").mkdir()
+    with locked_folder(tmp_path / "out"):
+        code, _, err = command("check", "c", "--out", "out")
+    assert code == 2 and "another damjoint is writing to it" in err
+
+
+def test_a_search_that_fails_removes_the_value_of_an_earlier_one(command, tmp_path, monkeypatch):
+    words = "critical", "c", "--set", "n_joint=10", "--out", "out"
+    assert command(*words)[0] == 0 and (tmp_path / "out" / "critical.csv").is_file()
+
+    def failing(*_):
+        raise RunError("no")
+
+    monkeypatch.setattr("damjoint.studies.critical.FailurePath", failing)
+    assert command(*words)[0] == 1
+    info = json.loads((tmp_path / "out" / "run.json").read_text())
+    assert (info["state"], info["statement"]) == ("failed", "no")
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["run.json"]
+
+
+def test_a_removal_that_is_interrupted_is_completed_by_the_next_run(command, tmp_path, monkeypatch):
+    """run.json, by which files are damjoint's, is removed last."""
+    words = "run", "c", *SMALL, "--levels", "6", "--out", "out"
+    assert command(*words)[0] == 0
+    unlink = Path.unlink
+
+    def killed(path, **options):
+        unlink(path, **options)
+        if path.name == "history.csv":
+            raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "unlink", killed)
+        assert command(*words)[0] == 130
+    assert (tmp_path / "out" / "run.json").is_file()
+    assert command("run", "a", *BARE, "--levels", "6", "--out", "out")[0] == 0
+    assert not list((tmp_path / "out").rglob("c*")) and not (tmp_path / "out" / "fields").exists()
 
 
 def test_only_files_of_damjoint_are_removed(command, tmp_path):
@@ -271,9 +343,9 @@ def test_no_temporary_file_of_getdp_remains(command, tmp_path, monkeypatch):
 
 
 def test_a_run_that_fails_early_removes_the_results_of_an_earlier_one(command, tmp_path):
-    """The mesh is impossible: one line, also in run.json."""
+    """The bodies can not be eliminated: one line, also in run.json."""
     assert command("run", "c", *BARE, "--out", "out")[0] == 0
-    thin = "--set", "dim=3", "--set", "thickness=1e-6", "--set", "mesh_pattern=split"
+    thin = "--set", "dam_height=1e-12", "--levels", "0"
     code, _, err = command("run", "c", *BARE, *thin, "--out", "out")
     assert code == 1 and len(err.splitlines()) == 1
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["run.json"]

@@ -270,3 +270,30 @@ def test_values_of_a_sweep_are_checked():
         dj.Sample(0, {"mu": "normal(1,0.1)"})
     with pytest.raises(dj.InputError, match="design = random: must be one of latin, monte-carlo"):
         dj.Sample(3, {"mu": "normal(1,0.1)"}, design="random")
+
+
+@pytest.mark.parametrize(
+    "words, message",
+    [
+        ({"distributions": {"nu_rock": "normal(1,0.1)"}}, "nu_rock"),
+        ({"distributions": {"mu": "gauss(1,0.1)"}}, "--sample mu=gauss.*; gauss is none"),
+        ({"distributions": {"mu": "normal(1"}}, "--sample mu=normal"),
+        ({"distributions": {"law": "normal(1,0.1)"}}, "law.*must be of a parameter that is a num"),
+        ({"distributions": {}}, "must have a distribution"),
+        ({"correlate": "mu,nu_dam=0.5"}, "correlate = mu,nu_dam=0.5: must be a list"),
+        ({"correlate": ["mu,rho=0.5"]}, "--correlate mu,rho=0.5: must be A,B=R"),
+        ({"seed": -1}, "seed = -1: must be an integer >= 0"),
+        ({"seed": 0.5}, "seed = 0.5: must be an integer >= 0"),
+    ],
+)
+def test_a_sample_is_checked_when_it_is_made(words, message):
+    with pytest.raises(dj.InputError, match=message):
+        dj.Sample(**{"number": 3, "distributions": {"mu": "normal(1,0.1)"}} | words)
+
+
+def test_a_check_of_a_single_case():
+    case = dj.case("dam", **CASE)
+    (alone,), (listed,) = dj.check(case), dj.check([case])
+    assert alone.rows[0]["SSF"] == listed.rows[0]["SSF"]
+    with pytest.raises(dj.InputError, match="case no: unknown"):  # not those of its letters
+        dj.check("no")

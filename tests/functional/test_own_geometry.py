@@ -185,6 +185,33 @@ def test_a_geo_file_is_not_run_without_run_geo(tmp_path, command, name):
     assert code == 2 and "--run-geo" in err and not (tmp_path / "run").exists()
 
 
+@pytest.mark.parametrize(
+    "name, content, message",
+    [
+        ("own.med", b"\x89HDF\r\n", "own.med: must be a mesh in Gmsh's format, which"),
+        (
+            "own.msh",
+            b"<xml>",
+            "own.msh: must be a mesh in Gmsh's format, which",
+        ),
+        ("own.geo", b"Point(1) = {0, 0, 0};", "is a program that Gmsh runs; if you trust it"),
+        *((f"own.{kind}", b"", "is empty") for kind in ("msh", "med", "geo")),
+    ],
+)
+@pytest.mark.parametrize("allowed", ["0", "1"])
+def test_a_file_is_called_what_it_is(tmp_path, monkeypatch, name, content, message, allowed):
+    """With --run-geo, too, an empty one is refused."""
+    monkeypatch.setenv("DAMJOINT_RUN_GEO", allowed)
+    (tmp_path / name).write_bytes(content)
+    (tmp_path / "own.case").write_text(f'geometry = "{name}";\nlevels() = {{1}};\n')
+    if content and allowed == "1":
+        assert load(str(tmp_path / "own.case")).geometry == tmp_path / name
+        return
+    with pytest.raises(InputError, match=message) as error:
+        load(str(tmp_path / "own.case"))
+    assert ("program that" in str(error.value)) == (name == "own.geo" and bool(content))
+
+
 def test_an_options_file_beside_a_mesh_is_not_run(draw, tmp_path):
     """Gmsh would read own.msh.opt after own.msh."""
     case = load(str(draw()))

@@ -1,5 +1,6 @@
 """Pictures of a run and the process that draws them."""
 
+import multiprocessing
 import os
 import signal
 import subprocess
@@ -265,3 +266,40 @@ def test_a_half_that_its_process_does_not_draw_is_drawn_by_the_other():
         return white - 100 * np.eye(2)[half]
 
     assert np.array_equal(joined(draw), 155 * np.ones((2, 2)))
+
+
+def test_a_half_whose_process_is_killed_while_it_sends_is_drawn_by_the_other():
+    mine = os.getpid()
+
+    def draw(half):
+        if not half:
+            time.sleep(0.5)  # the pipe is full
+            (child,) = multiprocessing.active_children()
+            child.kill()
+            child.join()
+        return np.full((2000, 2000), 5 - half if os.getpid() == mine else 0)
+
+    assert np.array_equal(joined(draw), np.full((2000, 2000), 4))
+
+
+@pytest.mark.parametrize("sending", [False, True])
+def test_a_drawing_process_that_is_killed_is_an_error(runs, tmp_path, monkeypatch, sending):
+    """Also while the process of its second half sends. The next picture is drawn."""
+
+    def killed(half):
+        if half:
+            return np.zeros((2000, 2000))
+        time.sleep(0.5)
+        return os.kill(os.getpid(), signal.SIGKILL)
+
+    def draw(_, folder, __):
+        if folder.name == "killed":
+            joined(killed) if sending else killed(0)
+
+    monkeypatch.setattr(pictures, "draw", draw)
+    with DrawingProcess() as drawing:
+        drawing.send(runs("flow").solution, tmp_path / "killed")
+        with pytest.raises(RunError, match="the process that draws it has ended"):
+            drawing.wait()
+        drawing.send(runs("flow").solution, tmp_path)
+        drawing.wait()

@@ -7,6 +7,8 @@ from contextlib import redirect_stderr
 
 import pytest
 from damjoint import progress
+from damjoint.fem.memory import joint_size, joints_size, sizes
+from damjoint.model.case import load
 from damjoint.progress import Progress, track
 
 SMALL = ("--set", "n_joint=10", "--set", "h_dam=15", "--set", "h_found=60")
@@ -94,3 +96,22 @@ def test_no_lines_before_the_interval_or_if_not_wanted(monkeypatch):
 def test_commands_print_lines(command, frequent, words, pattern):
     code, _, err = command(*words)
     assert code == 0 and re.search(pattern, err, re.MULTILINE), err
+
+
+@pytest.mark.parametrize("words", [("run", "dam", "--no-picture"), ("critical", "dam")])
+def test_before_the_first_step_the_lines_say_what_takes_the_time(command, frequent, words):
+    """Sizes, also of several joints; then the steps."""
+    lifts = ("--set", "lift_heights=15,30")
+    code, _, err = command(*words, *SMALL, *lifts, "--levels", "20,30")
+    assert code == 0
+    first, *rest = [line.split(", 00:")[0] for line in err.splitlines()]
+    assert first.startswith("dam, mesh and elimination of about ") and "126 of them on" in first
+    assert any(not line.startswith("dam, mesh") for line in rest)
+
+
+def test_the_memory_of_all_joints_is_estimated():
+    """119 lifts on the mesh of a joint, as the unknowns of each are condensed."""
+    lifts = tuple(45 * k / 120 for k in range(1, 120))
+    case = load("dam", {"lift_heights": lifts, "n_joint": 20.0})
+    assert 20 * joint_size(case) < joints_size(case) <= 120 * joint_size(case)
+    assert f"{joints_size(case)} of them on the joints" in sizes(case)

@@ -646,7 +646,11 @@ def test_an_interrupted_run_continues_with_the_same_rows(command, case_file, tmp
 
 
 @pytest.mark.heavy
-def test_a_run_under_way_of_another_case_is_not_continued(command, case_file, monkeypatch):
+@pytest.mark.parametrize("other", ["case", "shape"])
+def test_a_run_under_way_that_is_of_another_case_or_damaged_is_not_continued(
+    command, case_file, monkeypatch, other
+):
+    """shape: a changed bit in the head of an array, which zip does not notice if less is read."""
     add = QuakeHistory.add
 
     def interrupted(self, quake, step):
@@ -656,10 +660,18 @@ def test_a_run_under_way_of_another_case_is_not_continued(command, case_file, mo
     monkeypatch.setattr(QuakeHistory, "add", interrupted)
     assert command("quake", case_file, *LONG_STEPS, "--out", "one")[0] == 130
     monkeypatch.setattr(QuakeHistory, "add", add)
-    changed = "quake", case_file, "--no-picture", "--set", "mu=0.85", *LONG_STEPS
+    Path("one/my_quake.png").touch()  # of an earlier run
+    changed = ["quake", case_file, "--no-picture", *LONG_STEPS]
+    if other == "case":
+        changed += ["--set", "mu=0.85"]
+    else:
+        file = Path("one/quake_state.npz")
+        content = file.read_bytes()
+        place = content.index(b"'shape': (", content.index(b"variable_1.npy")) + 10
+        file.write_bytes(content[:place] + bytes([content[place] ^ 1]) + content[place + 1 :])
     assert command(*changed, "--out", "one")[0] == command(*changed, "--out", "two")[0] == 0
     one, two = (Path(n, "quake.csv").read_text() for n in ("one", "two"))
-    assert one == two
+    assert one == two and not Path("one/my_quake.png").exists()
 
 
 @pytest.mark.heavy
@@ -702,7 +714,7 @@ def test_a_sweep_of_earthquakes(command, case_file, tmp_path):
         (["--set", "drive=crest"], "drive = crest: must be level for damjoint quake"),
         (["--record", "nothing.csv"], "record = nothing.csv: No such file or directory"),
         (["--set", "record=wave.csv"], 'record: must be set in the case (record = "...";) or by'),
-        (["--accuracy", "1%"], "accuracy = 1%: must not be set for damjoint quake"),
+        (["--accuracy", "1%"], "unrecognized arguments: --accuracy 1%"),
         (["--fields", "2"], "--fields 2: must be two times FIRST:LAST"),
         (["--fields", "2:1"], "--fields 2:1: must be two times FIRST:LAST"),
         (["--fields", "3:4"], "fields = 3:4: must begin before the end of the record, 0.7 s"),

@@ -3,6 +3,7 @@
 import subprocess
 import sys
 
+import damjoint as dj
 import pytest
 
 RUN = "run", "a"
@@ -293,10 +294,70 @@ def test_a_mesh_that_exceeds_the_memory_is_refused_before_meshing(command, setti
     assert code == 1 and "need about" in err and len(err.splitlines()) == 1
 
 
-@pytest.mark.parametrize("setting", ["E=1e308", "dam_height=1e-12"])
-def test_values_whose_system_is_singular_are_reported(command, setting):
-    code, out, err = command("run", "a", "--set", setting, "--set", "h_found=4", "--levels", "0")
+def test_values_whose_system_is_singular_are_reported(command):
+    words = "--set", "dam_height=1e-12", "--set", "h_found=4", "--levels", "0"
+    code, out, err = command("run", "a", *words)
     assert (code, out) == (1, "") and len(err.splitlines()) == 1 and "eliminated" in err
+
+
+@pytest.mark.parametrize(
+    "setting, limit",
+    [
+        *((f"{name}=1e21", "1e+20") for name in ("E", "E_dam", "E_found")),
+        *((f"{name}=1e6", "100000") for name in ("rho_dam", "rho_found", "rho_water")),
+        *((f"{name}=-1e11", "1e+10") for name in ("force_x", "force_y")),
+        *((f"{name}=1e5", "10000") for name in ("temperature_dam", "joint_head_offset")),
+        ("g=1e4", "1000"),
+        ("ice_force=1e30", "1e+10"),
+    ],
+)
+def test_a_value_beyond_any_material_or_load_is_refused(command, setting, limit):
+    """With it rounding would decide whether there is an equilibrium."""
+    code, out, err = command("run", "dam", "--set", setting)
+    assert (code, out) == (2, "") and len(err.splitlines()) == 1
+    name = setting.partition("=")[0].replace("E", "E_dam").replace("E_dam_", "E_")
+    assert f"{name} = " in err and f"between -{limit} and {limit} " in err
+
+
+@pytest.mark.parametrize("modulus", [1e6, 1e20])
+def test_within_the_range_of_moduli_a_dam_stands(modulus):
+    """Also with a rigid body, as of a published foundation."""
+    for name in ("E", "E_dam", "E_found"):
+        case = dj.case("dam", levels=[20], n_joint=10, h_dam=12, h_found=12, **{name: modulus})
+        assert dj.run(case).verdict == "stands"
+
+
+@pytest.mark.parametrize(
+    "words, message",
+    [
+        (
+            "lift_heights=1e-9",
+            "lift_heights = 1e-09: each must be at least 4.5e-05 m (1e-06 of",
+        ),
+        ("lift_heights=1e-9,20", "lift_heights = 1e-09,20: each must be at least 4.5e-05 m"),
+        ("lift_heights=20,20.00000001", "must increase from above the first joint"),
+        ("lift_heights=44.99999999", "and below the crest"),
+        ("joint_height=1e-9", "joint_height = 1e-09: must be >= 4.5e-05 m"),
+        ("joint_height=44.99999999", "joint_height = 44.99999999: must be at least 4.5e-05 m"),
+        ("neck_height=1e-9", "neck_height = 1e-09: must be >= 4.5e-05 m"),
+        ("neck_height=44.99999999", "neck_height = 44.99999999: must be at least 4.5e-05 m"),
+        ("dam_crest=1e-9", "dam_crest = 1e-09: must be >= 4.5e-05 m"),
+        ("found_side=1e-9", "found_side = 1e-09: must be >= 4.5e-05 m"),
+        ("found_depth=1e-9", "found_depth = 1e-09: must be >= 4.5e-05 m"),
+        ("dam_base=1e-9", "dam_base = 1e-09: must be >= 4.5e-05 m"),
+    ],
+)
+def test_lengths_that_no_mesh_can_have_are_refused_before_meshing(command, words, message):
+    """Not in the mesh generator's words."""
+    code, out, err = command("run", "dam", "--set", words)
+    assert (code, out) == (2, "") and len(err.splitlines()) == 1 and message in err
+
+
+@pytest.mark.parametrize("setting", ["lift_heights=1e-4", "joint_height=1e-4", "dam_crest=1e-4"])
+def test_lengths_above_the_least_one_have_a_mesh(setting):
+    name, _, value = setting.partition("=")
+    case = dj.case("dam", levels=[20], n_joint=10, h_dam=12, h_found=12, **{name: value})
+    assert dj.run(case).verdict == "stands"
 
 
 def test_the_message_names_the_argument(command):

@@ -1,5 +1,5 @@
-"""Condensed bodies in the cache: complete, of this scene and version, or computed again; nothing in
-a file is executed.
+"""Entries of the cache: complete, of this scene and version, or computed again; nothing in a file
+is executed.
 """
 
 import json
@@ -10,6 +10,7 @@ import sys
 
 import numpy as np
 import pytest
+from damjoint import storage
 from damjoint.fem import cache
 from damjoint.model.case import load
 
@@ -24,14 +25,6 @@ def entry(tmp_path, monkeypatch):
     assert bodies is not None
     (file,) = tmp_path.glob("*.bin")
     return file, written
-
-
-def change(file, changed):
-    """Change the first line of an entry: changed(its content)."""
-    line, data = file.read_bytes().split(b"\n", 1)
-    about = json.loads(line)
-    changed(about)
-    file.write_bytes(json.dumps(about).encode() + b"\n" + data)
 
 
 def same(first, second):
@@ -90,30 +83,93 @@ def test_a_damaged_entry_is_computed_again(entry, tmp_path, damage):
     elif damage == "empty":
         file.write_bytes(b"")
     else:
-        change(file, lambda about: about.update(header="0.0.0"))
+        with storage.write_entry(file, "0.0.0") as other:
+            other.write(whole.split(b"\n", 2)[2])
     result, bodies = cache.cached(load("a", SMALL))
     assert bodies is not None and same(result, written)
     assert not (tmp_path / "trap").exists()
     assert cache.cached(load("a", SMALL))[1] is None  # stored again
 
 
-@pytest.mark.parametrize("place", [5, 1000, -1000, -1])
-def test_an_entry_with_a_changed_byte_is_replaced(entry, place):
-    """In its first line, or in an array."""
+def flipped(whole, step=1):
+    """The bytes with one bit changed: of all their bits, every step-th."""
+    for bit in range(0, 8 * len(whole), step):
+        damaged = bytearray(whole)
+        damaged[bit // 8] ^= 1 << bit % 8
+        yield bytes(damaged)
+
+
+def test_an_entry_with_a_changed_bit_is_not_read(entry, monkeypatch):
+    """Wherever it is: checksum, key, tree, the arrays' shapes and numbers."""
+    file, _ = entry
+    header = json.dumps([cache.__version__, cache.sources(), cache.key_of(load("a", SMALL))])
+    assert cache.read(file, header) is not None
+    whole = file.read_bytes()
+    heads = [i for i in range(len(whole)) if whole.startswith(b"\x93NUMPY", i)]
+    assert len(heads) > 20
+    for first in (0, *heads[:3]):  # every bit of the lines before the arrays, and of three heads
+        until = heads[0] if first == 0 else first + 128
+        for part in flipped(whole[first:until], 1 if first else 5):
+            file.write_bytes(whole[:first] + part + whole[until:])
+            assert cache.read(file, header) is None
+    for damaged in flipped(whole, 8 * len(whole) // 500):
+        file.write_bytes(damaged)
+        assert cache.read(file, header) is None
+
+
+def test_an_entry_with_a_changed_bit_is_replaced(entry):
     file, written = entry
-    data = bytearray(file.read_bytes())
-    data[place] ^= 64
-    file.write_bytes(data)
+    file.write_bytes(next(flipped(file.read_bytes()[::-1]))[::-1])
     result, bodies = cache.cached(load("a", SMALL))
     assert bodies is not None and same(result, written)
     assert cache.cached(load("a", SMALL))[1] is None  # replaced
 
 
-def test_an_entry_without_an_array_is_computed_again(entry):
-    file, written = entry
-    change(file, lambda about: about["tree"]["fields"]["dict"].pop("units"))
-    result, bodies = cache.cached(load("a", SMALL))
-    assert bodies is not None and result.units.keys() == written.units.keys()
+def test_a_value_with_a_changed_bit_is_computed_again(tmp_path, monkeypatch):
+    """Every bit of the entry, and every length."""
+    monkeypatch.setenv("DAMJOINT_CACHE", str(tmp_path))
+    value = {"mu": [0.5], "uplift": ["imposed"]}
+    assert storage.cached("variables", "key", lambda: value) == value
+    (file,) = tmp_path.iterdir()
+    whole = file.read_bytes()
+    assert storage.cached("variables", "key", pytest.fail) == value
+    for damaged in (*flipped(whole), *(whole[:length] for length in range(len(whole)))):
+        file.write_bytes(damaged)
+        assert storage.cached("variables", "key", lambda: value) is value
+        assert file.read_bytes() == whole  # replaced
+
+
+def test_a_value_of_another_key_or_in_a_pipe_is_computed_again(tmp_path, monkeypatch):
+    monkeypatch.setenv("DAMJOINT_CACHE", str(tmp_path))
+    monkeypatch.setattr(storage.zlib, "crc32", lambda *_: 1)  # the same file for all keys
+    assert [storage.cached("variables", key, lambda k=key: k) for key in "aba"] == ["a", "b", "a"]
+    (file,) = tmp_path.iterdir()
+    file.unlink()
+    os.mkfifo(file)
+    assert storage.cached("variables", "a", lambda: 1) == 1
+
+
+def test_a_run_with_any_damaged_entry_has_the_same_result(tmp_path, monkeypatch):
+    """All kinds of entries that a run leaves; a value of the case that is another valid one."""
+    small = [word for name, size in SMALL.items() for word in ("--set", f"{name}={size}")]
+    words = ["run", "a", *small, "--no-fields", "--no-picture", "--out", str(tmp_path / "out")]
+    environment = os.environ | {"DAMJOINT_CACHE": str(tmp_path / "cache")}
+
+    def run():
+        line = [sys.executable, "-m", "damjoint", *words]
+        done = subprocess.run(line, env=environment, capture_output=True, text=True)
+        assert (done.returncode, done.stderr) == (0, "")
+        return done.stdout, (tmp_path / "out" / "joint.csv").read_bytes()
+
+    first = run()
+    entries = list((tmp_path / "cache").iterdir())
+    kinds = {entry.name.split("-")[0] for entry in entries}
+    assert kinds - {"mumps"} == {"declarations", "variables", "bodies"}
+    for entry in entries:
+        content = entry.read_bytes()
+        digit = content.find(b'"sigma_max": [') + 15 if entry.suffix == ".json" else -100
+        entry.write_bytes(content[:digit] + bytes([content[digit] ^ 1]) + content[digit + 1 :])
+    assert run() == first
 
 
 def test_a_pipe_in_place_of_an_entry_is_not_read(entry):
@@ -128,7 +184,7 @@ def test_nothing_is_written_through_links(entry, tmp_path_factory):
     file, _ = entry
     mine = tmp_path_factory.mktemp("mine") / "mine"
     mine.write_text("mine")
-    file.with_suffix(f".{os.getpid()}").symlink_to(mine)
+    file.with_name(storage.PART + file.name).symlink_to(mine)
     file.write_bytes(b"")
     assert cache.cached(load("a", SMALL))[1] is not None
     assert mine.read_text() == "mine"
@@ -136,10 +192,11 @@ def test_nothing_is_written_through_links(entry, tmp_path_factory):
 
 
 def test_an_array_of_objects_is_not_loaded(entry, tmp_path):
+    """Though the checksum is right."""
     file, written = entry
-    line = file.read_bytes().split(b"\n", 1)[0]
-    with file.open("wb") as damaged:
-        damaged.write(line + b"\n")
+    header = json.dumps([cache.__version__, cache.sources(), cache.key_of(load("a", SMALL))])
+    with storage.write_entry(file, header) as damaged:
+        damaged.write(b'{"arrays": 1, "tree": {"array": 0}}\n')
         np.save(damaged, np.array([Trap(tmp_path / "trap")]), allow_pickle=True)
     result, bodies = cache.cached(load("a", SMALL))
     assert bodies is not None and same(result, written)

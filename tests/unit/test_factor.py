@@ -95,6 +95,12 @@ def test_a_library_that_does_not_load_is_compiled_anew(tmp_path, monkeypatch):
     monkeypatch.setenv("DAMJOINT_CACHE", str(tmp_path))
     factor.library.cache_clear()
     assert factor.library()._name == str(path) and path.stat().st_size > 1000
+    whole = path.read_bytes()
+    assert factor.is_whole(path)
+    copy = tmp_path / "copy.so"
+    for place in range(0, len(whole), 97):  # a library with a changed bit loads, or ends Python
+        copy.write_bytes(whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :])
+        assert not factor.is_whole(copy)
 
 
 def test_the_library_of_the_installation_is_used(tmp_path, monkeypatch):

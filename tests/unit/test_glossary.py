@@ -77,6 +77,18 @@ def test_every_command_is_in_the_page_on_usage():
     assert not [name for name in commands if f"damjoint {name}" not in text]
 
 
+@pytest.mark.parametrize("page", ["reference/theory.md", "CONTRIBUTING.md"])
+def test_every_section_that_is_named_is_a_link_to_its_title(page):
+    """So that a reference does not lead to another section after one is inserted."""
+    titles = re.findall(r"^## (\d+)\. (.*)$", (REFERENCE / "theory.md").read_text(), re.MULTILINE)
+    anchors = {n: f"#{n}-" + re.sub(r"\W", "-", title.lower()) for n, title in titles}
+    text = (REFERENCE.parent / page).read_text()
+    named = re.findall(
+        r"(?i)(\[?)sections?\s+(\d+)(?:\]\((?:reference/theory\.md)?([^)]*)\))?", text
+    )
+    assert named and all(begun and to == anchors[n] for begun, n, to in named), named
+
+
 def test_the_glossary_is_a_table_of_five_columns():
     rows = [row for row in (REFERENCE / "glossary.md").read_text().splitlines() if row[:1] == "|"]
     assert all(row.count("|") == 6 for row in rows)

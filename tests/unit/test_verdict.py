@@ -1,8 +1,10 @@
 """Verdicts from resultants, on both sides of each limit."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from damjoint.model.case import load
+from damjoint.model.case import OfJoint, load
 from damjoint.model.results import HISTORY, Results
 from damjoint.statics import verdict
 
@@ -94,3 +96,21 @@ def test_the_statement_gives_the_mechanism_found_on_the_path():
     statement = verdict.statement(result)
     assert statement.startswith("sliding: no equilibrium beyond level 2 m")
     assert "followed to 4.2 times that displacement, reaches 2.5 m at most" in statement
+
+
+@pytest.mark.parametrize(
+    "names", [("b10", "b1", "b1 and b"), ("b1", "b10", "b"), ("b", "b 1", "b1")]
+)
+@pytest.mark.parametrize("failing", [(0,), (1,), (2,), (1, 2), (0, 2)])
+def test_the_decisive_joint_is_the_one_of_that_name(monkeypatch, names, failing):
+    """Not one whose name begins the other's."""
+    result = stopped("friction")
+    case = result.case.with_joints(
+        [
+            OfJoint(name=n, upper="dam", lower="foundation", values={}, section=result.case.section)
+            for n in names
+        ]
+    )
+    result = replace(result, case=case)
+    monkeypatch.setattr(verdict, "failure", lambda _: ("sliding", case.named(failing)))
+    assert verdict.decisive_joint(result) == failing[0]

@@ -1,6 +1,6 @@
 """An earthquake under way on disk, from which an interrupted run continues.
 
-numpy's npz: arrays and a header, nothing that could be executed.
+An entry as in the cache (see storage.py) with numpy's npz: nothing that could be executed.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from .. import __version__
 from ..arrays import Array
 from ..fem.cache import key_of, sources
 from ..model.case import Case
-from ..storage import atomic_write
+from ..storage import read_entry, write_entry
 from .history import Peak, QuakeHistory
 from .scheme import Motion
 from .step import Moving
@@ -65,7 +65,6 @@ def write(path: Path, key: str, quake: Earthquake, history: QuakeHistory) -> Non
     now = quake.now
     variables = now.state.variables.joints, now.state.node_variables.joints
     content: dict[str, Any] = {
-        "key": np.array(key),
         "time": np.array(now.time),
         "jump": now.state.jump,
         "motion": np.array(list(leaves(now.motion))),
@@ -81,52 +80,53 @@ def write(path: Path, key: str, quake: Earthquake, history: QuakeHistory) -> Non
         "peak_states": np.array([peak.displacement for peak in history.peaks.values()]),
     }
     content |= {f"variable_{i}": leaf for i, leaf in enumerate(leaves(variables))}
-    with atomic_write(path) as part, part.open("wb") as file:
+    with write_entry(path, key) as file:
         np.savez(file, **content)
 
 
-def read(path: Path, key: str, quake: Earthquake, history: QuakeHistory) -> bool:
-    """Continue an earthquake from a file, with its rows; False if it is missing, damaged or of
-    another case.
-    """
+def exists(path: Path, key: str) -> bool:
+    """Whether a file has a run under way of this key, and is not damaged."""
     try:
-        with np.load(path, allow_pickle=False) as file:
-            if str(file["key"]) != key:
-                return False
-            stored = dict(file)
-        static = quake.problem.static
-        arrays = (stored[f"variable_{i}"] for i in itertools.count())
-        points, nodes = with_leaves((static.variables.joints, static.node_variables.joints), arrays)
-        state = replace(
-            static,
-            jump=stored["jump"],
-            variables=replace(static.variables, joints=points),
-            node_variables=replace(static.node_variables, joints=nodes),
-        )
-        rows = dict(zip(stored["columns"].tolist(), stored["rows"].tolist(), strict=True))
-        frame_rows = zip(history.frames.history.rows, stored["frame_rows"].tolist(), strict=True)
-        frames = replace(
-            history.frames,
-            history=replace(
-                history.frames.history,
-                rows=dict(frame_rows),
-                tables=[(table, extrapolated) for table, extrapolated in stored["frame_tables"]],
-            ),
-            displacement=list(stored["frames"]),
-        )
-        stress = list(stored["stress"])
-        names = stored["peaks"].tolist()
-        values = zip(stored["peak_values"].tolist(), stored["peak_states"], strict=True)
-        peaks = {n: Peak(v[0], v[1], w) for n, (v, w) in zip(names, values, strict=True)}
-        now = Moving(
-            time=float(stored["time"]),
-            state=state,
-            motion=Motion(*stored["motion"]),
-            forces=stored["forces"],
-        )
-    except Exception:  # a damaged byte can make numpy and zipfile raise anything
+        with read_entry(path, key):
+            return True
+    except (OSError, ValueError):
         return False
+
+
+def read(path: Path, key: str, quake: Earthquake, history: QuakeHistory) -> None:
+    """Continue an earthquake from a file that `exists`, with its rows."""
+    with read_entry(path, key) as file, np.load(file) as arrays_by_name:
+        stored = dict(arrays_by_name)
+    static = quake.problem.static
+    arrays = (stored[f"variable_{i}"] for i in itertools.count())
+    points, nodes = with_leaves((static.variables.joints, static.node_variables.joints), arrays)
+    state = replace(
+        static,
+        jump=stored["jump"],
+        variables=replace(static.variables, joints=points),
+        node_variables=replace(static.node_variables, joints=nodes),
+    )
+    rows = dict(zip(stored["columns"].tolist(), stored["rows"].tolist(), strict=True))
+    frame_rows = zip(history.frames.history.rows, stored["frame_rows"].tolist(), strict=True)
+    frames = replace(
+        history.frames,
+        history=replace(
+            history.frames.history,
+            rows=dict(frame_rows),
+            tables=[(table, extrapolated) for table, extrapolated in stored["frame_tables"]],
+        ),
+        displacement=list(stored["frames"]),
+    )
+    stress = list(stored["stress"])
+    names = stored["peaks"].tolist()
+    values = zip(stored["peak_values"].tolist(), stored["peak_states"], strict=True)
+    peaks = {n: Peak(v[0], v[1], w) for n, (v, w) in zip(names, values, strict=True)}
+    now = Moving(
+        time=float(stored["time"]),
+        state=state,
+        motion=Motion(*stored["motion"]),
+        forces=stored["forces"],
+    )
     history.rows, history.frames, history.stress, history.peaks = rows, frames, stress, peaks
     history.complete = len(stress), len(frames), now
     quake.now = now
-    return True

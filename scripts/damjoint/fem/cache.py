@@ -1,19 +1,18 @@
 """Condensed bodies on disk, by mesh and elasticity.
 
-A file is a line of JSON, then arrays in numpy's own format: nothing that could be executed. The
-line has a header, the version and the scene that the file belongs to; the values as a tree, with
-the numbers of arrays; and a checksum of the arrays. A foreign or damaged file or one of another
-version is ignored and replaced. (One file of many arrays, npz, takes several times as long.)
+The content of an entry (see storage.py) is a line of JSON, the values as a tree with the numbers of
+arrays; then the arrays in numpy's own format: nothing that could be executed. A foreign or damaged
+file or one of another version is ignored and replaced. (One file of many arrays, npz, takes several
+times as long.)
 """
 
 from __future__ import annotations
 
 import contextlib
 import json
-import os
 import zlib
 from dataclasses import fields
-from functools import lru_cache, reduce
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,7 +24,7 @@ from ..model.case import Case
 from ..model.loads import COMPLETE, overtopped, thermal_strains, wet_segments
 from ..model.mesh import Body, Face, JointMesh, Mesh, mesh_of, shares
 from ..model.scene import MATERIALS
-from ..storage import cache_folder
+from ..storage import cache_folder, read_entry, write_entry
 from .condensed import Condensed, CondensedJoint, JointDofs
 from .memory import check_size
 
@@ -53,12 +52,15 @@ def key_of(case: Case) -> tuple[object, ...]:
     return (shape, *(case[n] for n in PARAMETERS), *under_water, *thermal)
 
 
+@lru_cache(maxsize=1)
 def fingerprint(mesh: Mesh) -> str:
-    """Hash of a mesh: its bodies and faces."""
+    """Hash of a mesh: its bodies, faces and joints."""
     import hashlib
 
     surfaces = {name: face.surface for name, face in mesh.faces.items()}
-    digest = hashlib.sha256()
+    faces = [(face.body, face.side) for face in mesh.faces.values()]
+    joints = [(joint.name, joint.upper, joint.lower) for joint in mesh.joints]
+    digest = hashlib.sha256(repr([faces, joints]).encode())
     for name, body in (mesh.bodies | surfaces).items():
         digest.update(name.encode() + body.points.tobytes() + body.node_tags.tobytes())
         for (shape, table), region in zip(body.cells, body.regions, strict=True):
@@ -66,11 +68,15 @@ def fingerprint(mesh: Mesh) -> str:
     return digest.hexdigest()
 
 
+#: The files of the package that meshes and the stored classes depend on, beside those of fem/.
+MESHES = ("csr.py", "model/body.py", "model/cut.py", "model/mesh.py")
+
+
 @lru_cache(maxsize=1)
 def sources() -> str:
     """Checksum of the files by which condensed bodies are computed: meshes and elements."""
     package = Path(__file__).parents[1]
-    meshes = (package / name for name in ("csr.py", "model/cut.py", "model/mesh.py"))
+    meshes = (package / name for name in MESHES)
     code = *meshes, *sorted((package / "fem").glob("*.py"))
     shapes = data("pro") / "section.pro", *sorted(data("geo").glob("*.geo"))
     texts = [path.read_bytes() for path in (*shapes, *code)]
@@ -109,50 +115,31 @@ def cached(case: Case) -> tuple[Condensed, Bodies | None]:
 
 def read(path: Path, header: str) -> Condensed | None:
     """Condensed bodies in a file; None if it is missing, damaged or of another header."""
-    if not path.is_file():
-        return None
     try:
-        with path.open("rb") as file:
+        with read_entry(path, header) as file:
             about = json.loads(file.readline())
-            if about["header"] != header:
-                return None
             arrays = [np.load(file) for _ in range(about["arrays"])]
-        if checksum(arrays) != about["checksum"]:
-            return None
         condensed: Condensed = unpack(about["tree"], arrays)
         path.touch()
         return condensed
-    except Exception:  # a damaged byte can make JSON and numpy raise anything
+    except (OSError, ValueError):
         return None
-
-
-def checksum(arrays: list[Array]) -> int:
-    """Checksum of the numbers in arrays."""
-    return reduce(lambda total, array: zlib.crc32(array.ravel("A").data, total), arrays, 0)
 
 
 def write(condensed: Condensed, header: str, path: Path) -> None:
     """Write condensed bodies to a file, whole or not at all, and none above the limit of the cache;
     an OSError only costs the entry.
     """
-    part = path.with_suffix(f".{os.getpid()}")
     arrays: list[Array] = []
     tree = pack(condensed, arrays)
     if sum(array.nbytes for array in arrays) > LIMIT:
         return
-    about = {"header": header, "tree": tree, "arrays": len(arrays), "checksum": checksum(arrays)}
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        part.unlink(missing_ok=True)
-        with part.open("xb") as file:  # never through a link
-            file.write(json.dumps(about).encode() + b"\n")
+    with contextlib.suppress(OSError):
+        with write_entry(path, header) as file:
+            file.write(json.dumps({"tree": tree, "arrays": len(arrays)}).encode() + b"\n")
             for array in arrays:
                 np.save(file, array)
-        part.replace(path)
         prune(path.parent)
-    except OSError:
-        with contextlib.suppress(OSError):
-            part.unlink(missing_ok=True)
 
 
 #: The dataclasses of which condensed bodies are made.

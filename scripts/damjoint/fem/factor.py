@@ -17,6 +17,7 @@ import weakref
 import zlib
 from contextlib import AbstractContextManager
 from functools import cache
+from io import BytesIO
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, Literal
@@ -26,7 +27,7 @@ from threadpoolctl import ThreadpoolController
 
 from ..arrays import Array, IntArray, Sparse, mirror, others
 from ..csr import CsrMatrix
-from ..storage import cache_folder
+from ..storage import MARK, cache_folder, checksum
 from ..versions import installed
 from .memory import available, check_memory, dense_memory
 
@@ -54,8 +55,18 @@ def library() -> ctypes.CDLL | None:
     for folder in (INSTALLED, parent):
         # OSError: not compiled yet, or for a MUMPS that is no longer installed
         with contextlib.suppress(OSError):
-            return ctypes.CDLL(str(folder / file_name()))
+            if folder is INSTALLED or is_whole(folder / file_name()):
+                return ctypes.CDLL(str(folder / file_name()))
     return compile_into(parent)
+
+
+def is_whole(path: Path) -> bool:
+    """Whether a library in the cache is as it was compiled: it ends in its checksum.
+
+    Raises OSError.
+    """
+    content = path.read_bytes()
+    return content[-MARK:] == checksum(BytesIO(content[:-MARK]))
 
 
 def file_name() -> str:
@@ -72,6 +83,8 @@ def compile_into(folder: Path) -> ctypes.CDLL | None:
             part = Path(own) / path.name
             options = "-O2", "-shared", "-fPIC", SOURCE, "-ldmumps_seq", "-o", part
             subprocess.run(["cc", *options], check=True, capture_output=True)
+            with part.open("r+b") as file:  # what follows the sections is not loaded
+                file.write(checksum(file))
             part.replace(path)
         return ctypes.CDLL(str(path))
     except (OSError, subprocess.CalledProcessError):

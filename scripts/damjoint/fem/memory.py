@@ -29,8 +29,13 @@ def bulk_size(case: Case) -> float:
     return triangles * order**2 * (1 if dim == 2 else 1.5 * case["n_layers"])
 
 
+def joints_size(case: Case) -> int:
+    """Number of jump unknowns of all joints (free meshes of order 2 have a few less)."""
+    return sum(map(joint_size, case.joints))
+
+
 def joint_size(case: Case) -> int:
-    """Number of jump unknowns (free meshes of order 2 have a few less)."""
+    """Number of jump unknowns of a joint."""
     dim, order = int(case["dim"]), int(case["order"])
     return (
         dim
@@ -44,9 +49,19 @@ def dense_memory(unknowns: int) -> float:
     return 8.0 * unknowns**2 * 3
 
 
+def sizes(case: Case) -> str:
+    """What a computation begins with, for the line of its progress: it may take long without a
+    step.
+    """
+    if case.geometry:
+        return f"{case.name}, mesh and elimination of the bodies"
+    unknowns = f"about {bulk_size(case):.0f} unknowns, {joints_size(case)} of them on the joints"
+    return f"{case.name}, mesh and elimination of {unknowns}"
+
+
 def check_size(case: Case) -> None:
     """Raise RunError if the condensation of a case needs more memory than is available."""
-    joint, bulk = joint_size(case), bulk_size(case)
+    joint, bulk = joints_size(case), bulk_size(case)
     what = f"{bulk:.0f} unknowns, {joint} of them on the joint,"
     check_memory(dense_memory(joint) + PER_UNKNOWN * bulk, what)
 

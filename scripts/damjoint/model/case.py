@@ -672,13 +672,20 @@ def own_geometry(name: str) -> Path:
     path = Path(name)
     if not path.is_file():
         raise InputError(f"geometry = {name}: must be a file, a mesh that Gmsh reads or a .geo")
+    if not path.stat().st_size:
+        raise InputError(f"geometry = {name}: is empty; must be a mesh that Gmsh reads or a .geo")
     own = data("geo").resolve() in path.resolve().parents
-    if not (own or is_mesh(path)) and os.environ.get(RUN_GEO) != "1":
+    if own or is_mesh(path) or os.environ.get(RUN_GEO) == "1":
+        return path
+    if path.suffix == ".geo":
         raise InputError(
-            f"geometry = {name}: is a program that Gmsh runs (a mesh ends in .msh and begins with "
-            f"{MESH.decode()}); if you trust it, add --run-geo"
+            f"geometry = {name}: is a program that Gmsh runs; if you trust it, add --run-geo"
         )
-    return path
+    raise InputError(
+        f"geometry = {name}: must be a mesh in Gmsh's format, which ends in .msh and begins with "
+        f"{MESH.decode()} (gmsh FILE -save -o mesh.msh converts others), or a .geo. Gmsh might "
+        "run such a file as a program; if you trust it, add --run-geo"
+    )
 
 
 #: First bytes of a mesh in Gmsh's format.

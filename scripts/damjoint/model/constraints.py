@@ -26,6 +26,23 @@ USUAL = {
     "f_c": (1e5, 2e8),
     "ice_force": (1e3, 1e6),
 }
+#: Values of larger magnitude are those of no material or load: with them rounding decides whether
+#: there is an equilibrium, which would be taken for a property of the dam. (A modulus up to the
+#: limit makes a body rigid.)
+LARGEST = {
+    **dict.fromkeys(("E_dam", "E_found", "K_N", "K_T"), 1e20),
+    "grout_pressure": 1e10,
+    "saw_thickness": 1e2,
+    **dict.fromkeys(("rho_dam", "rho_found", "rho_water", "rho_silt"), 1e5),
+    "g": 1e3,
+    **dict.fromkeys(("joint_head_offset", "silt_height"), 1e4),
+    **dict.fromkeys(("ice_force", "anchor_force", "force_x", "force_y"), 1e10),
+    **dict.fromkeys(("temperature_dam", "temperature_linear", "temperature_found"), 1e4),
+    **dict.fromkeys(("expansion_dam", "expansion_found"), 1e-2),
+    **dict.fromkeys(("k_h", "k_v"), 1e2),
+}
+#: Length over the dam's height below which the mesh generator takes two points for one.
+LEAST_LENGTH = 1e-6
 #: The least Young's modulus [Pa], that of a soft soil.
 LEAST_MODULUS = 1e6
 #: Value of added_mass: Zangar's pressure in place of Westergaard's.
@@ -43,6 +60,7 @@ def check_values(
     for name, parameter in declared().items():
         parameter.check(case.values[name])
     check_moduli(case)
+    check_magnitudes(case)
     if by_parameters:
         check_section(case, section)
         check_distances(case, section["joint_along"][0])
@@ -72,6 +90,17 @@ def check_moduli(case: ParameterValues) -> None:
             )
 
 
+def check_magnitudes(case: ParameterValues) -> None:
+    """Values of materials and loads: at most LARGEST."""
+    for name, largest in LARGEST.items():
+        if abs(case[name]) > largest:
+            unit = declared()[name].unit
+            raise InputError(
+                f"{name} = {case[name]:g}: must be between {-largest:g} and {largest:g} {unit}, "
+                "beyond any material or load"
+            )
+
+
 def check_energies(case: ParameterValues) -> None:
     """Fracture energies: larger than the elastic energy at the strength (no snap-back)."""
     for name, (least, formula) in LAWS[case["law"]].least_energies(case.values).items():
@@ -91,8 +120,30 @@ def check_softening(joint: Group, twice: bool) -> None:
         )
 
 
+def check_lengths(case: ParameterValues) -> None:
+    """Lengths of the dam's section and of the foundation: none, or such that a mesh can have."""
+    height = case["dam_height"]
+    least = LEAST_LENGTH * height
+    names = ["dam_base", "dam_crest", "batter_height", "neck_height", "joint_height"]
+    names += ["found_side", "found_depth", *(["thickness"] if case["dim"] == 3 else [])]
+    for name in names:
+        if 0 < case[name] < least:
+            raise InputError(f"{name} = {case[name]:g}: must be >= {least:g} m ({OF_HEIGHT})")
+    for name in ("neck_height", "joint_height"):
+        if height - least < case[name] < height:
+            raise InputError(
+                f"{name} = {case[name]!r}: must be at least {least:g} m ({OF_HEIGHT}) below the "
+                f"crest ({height:g} m)"
+            )
+
+
+#: LEAST_LENGTH in words.
+OF_HEIGHT = f"{LEAST_LENGTH:g} of dam_height"
+
+
 def check_section(case: ParameterValues, section: Mapping[str, Sequence[float]]) -> None:
     """Lengths of the dam's section; places of line forces on it."""
+    check_lengths(case)
     dam, loads = case.dimensions, case.loads
     height = dam.dam_height
     for name, sign, holds in (
@@ -130,10 +181,16 @@ def check_section(case: ParameterValues, section: Mapping[str, Sequence[float]])
 def check_lift_heights(heights: Sequence[float], height: float) -> None:
     """Heights of the joints above the first one [m]: within the dam, of a height [m]."""
     listed = ",".join(f"{h:g}" for h in heights)
+    least = LEAST_LENGTH * height
     for lift in heights:
         if not 0 < lift < height:
             raise InputError(
                 f"lift_heights = {listed}: each must be > 0 and < dam_height ({height:g} m)"
+            )
+        if not least <= lift <= height - least:
+            raise InputError(
+                f"lift_heights = {listed}: each must be at least {least:g} m ({OF_HEIGHT}) above "
+                "the base and below the crest"
             )
 
 
@@ -149,7 +206,7 @@ def check_lifts(
     for lower, upper in itertools.pairwise(sections):
         for end in ("heel", "toe"):
             low, high = (section[f"{end}_y"][0] for section in (lower, upper))
-            if not low < high:
+            if not high - low >= LEAST_LENGTH * case["dam_height"]:
                 raise InputError(
                     f"lift_heights = {listed}: must increase from above the first joint; the {end} "
                     f"of a joint, at {high:g} m, is not above that of the one below it, {low:g} m"

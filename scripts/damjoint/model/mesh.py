@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import re
 import time
 from collections.abc import Mapping
 from dataclasses import field, replace
@@ -216,14 +217,31 @@ def heel_normal(joint: Body, heel: Body) -> Array:
 
 @dataclasses.dataclass(frozen=True)
 class OwnGeometry:
-    """The file of a user's own geometry in its present state, and all else its mesh depends on."""
+    """The files of a user's own geometry in their present state, and all else its mesh depends
+    on: the parameters of a section's mesh, and those that a .geo file names.
+    """
 
-    file: Path
-    changed: int
-    size: int
+    #: path, time of the last change, size
+    files: tuple[tuple[Path, int, int], ...]
     parameters: tuple[tuple[str, Setting], ...]
     #: for making the mesh
     case: Case = field(compare=False)
+
+
+#: A statement by which a .geo file takes in another file.
+INCLUDES = r"\b(?:Include|Merge)\s+\"([^\"]*)\""
+
+
+def files_of(path: Path, known: dict[Path, str]) -> dict[Path, str]:
+    """A .geo file and those that it includes, but for the declarations, with their text; added to
+    those that are known.
+    """
+    if path in known or data("pro").resolve() in path.resolve().parents or not path.is_file():
+        return known
+    known[path] = path.read_text(errors="replace")
+    for name in re.findall(INCLUDES, known[path]):
+        files_of(path.parent / name, known)
+    return known
 
 
 @lru_cache(maxsize=1)
@@ -238,9 +256,12 @@ def mesh_of(case: Case) -> Mesh:
     """
     if not case.geometry:
         return Mesh(case)
-    state = case.geometry.stat()
-    key = tuple(shares(case).items())
-    geometry = OwnGeometry(case.geometry, state.st_mtime_ns, state.st_size, key, case)
+    texts = files_of(case.geometry, {}) if case.geometry.suffix == ".geo" else {case.geometry: ""}
+    states = ((path, path.stat()) for path in texts)
+    files = tuple((path, state.st_mtime_ns, state.st_size) for path, state in states)
+    words = set(re.findall(r"\w+", " ".join(texts.values())))
+    used = shares(case) | {n: v for n, v in case.values.items() if n in words}
+    geometry = OwnGeometry(files, tuple(used.items()), case)
     mesh = mesh_of_own(geometry)
     if not mesh.is_current:
         mesh_of_own.cache_clear()

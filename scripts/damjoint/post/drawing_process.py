@@ -9,7 +9,8 @@ import os
 import signal
 from collections.abc import Callable
 from dataclasses import replace
-from multiprocessing.connection import Connection
+from multiprocessing.connection import Connection, wait
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -61,7 +62,7 @@ class DrawingProcess:
         try:
             error = self.pipe.recv()
         except (EOFError, OSError):
-            raise RunError("picture: the process that draws it has ended") from None
+            raise RunError(ENDED) from None
         if error:
             raise error
 
@@ -72,7 +73,7 @@ def serve(pipe: Connection, of_parent: Connection) -> None:
     gc.disable()  # a fork ends after a picture; searching the libraries' objects takes a quarter
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_DFL)
-    with contextlib.suppress(EOFError, ConnectionError):
+    with contextlib.suppress(EOFError, OSError):  # the parent has ended
         try:
             from matplotlib import artist
 
@@ -83,8 +84,25 @@ def serve(pipe: Connection, of_parent: Connection) -> None:
         except Exception as error:
             pipe.send(error)
             return
+        drawing = dict[int, BaseProcess]()  # by what is ready when it has ended
         while True:
-            FORK.Process(target=answer, args=(pipe, pictures.draw, *pipe.recv())).start()
+            for ready in wait([pipe, *drawing]):
+                if ready is pipe:
+                    process = FORK.Process(target=answer, args=(pipe, pictures.draw, *pipe.recv()))
+                    process.start()
+                    drawing[process.sentinel] = process
+                elif not has_answered(drawing.pop(ready)):
+                    pipe.send(RunError(ENDED))
+
+
+#: The message if a process is killed.
+ENDED = "picture: the process that draws it has ended"
+
+
+def has_answered(process: BaseProcess) -> bool:
+    """Whether a process that has ended was not killed."""
+    process.join()
+    return process.exitcode == 0
 
 
 def answer(pipe: Connection, draw: Callable[..., object], solution: Solution, folder: Path) -> None:
@@ -94,7 +112,8 @@ def answer(pipe: Connection, draw: Callable[..., object], solution: Solution, fo
         draw(solution, folder, joined if several else None)
     except Exception as raised:
         error = raised
-    pipe.send(error)
+    with contextlib.suppress(OSError):  # the first process has ended
+        pipe.send(error)
 
 
 def joined(draw: Callable[[int], np.ndarray]) -> np.ndarray:
@@ -102,13 +121,19 @@ def joined(draw: Callable[[int], np.ndarray]) -> np.ndarray:
     import numpy as np
 
     pipe, other = FORK.Pipe(duplex=False)
-    process = FORK.Process(target=lambda: other.send(draw(1)))
+
+    def send() -> None:
+        pipe.close()  # else its end would wait for itself
+        with contextlib.suppress(OSError):  # the first half's process has ended
+            other.send(draw(1))
+
+    process = FORK.Process(target=send)
     process.start()
     other.close()
     first = draw(0)
     try:
         second = pipe.recv()
-    except EOFError:  # it has ended: this process shows why
+    except (EOFError, OSError):  # it has ended, also in the middle of its answer
         second = draw(1)
     process.join()
     return np.minimum(first, second)

@@ -6,6 +6,7 @@ Removed are only files with the names that a run writes, and only beside a run.j
 from __future__ import annotations
 
 import contextlib
+import csv
 import json
 import os
 import re
@@ -22,10 +23,12 @@ from ..statics.verdict import hints, statement, verdict
 from ..storage import PART, atomic_write, locked_folder
 
 #: Files of a run: tables, pictures CASE....png, fields.
-TABLES = ("joint.csv", "history.csv", "curve.csv", "gravity.csv", "critical.csv", "run.json")
-TABLES += ("quake.csv", "quake_joint.csv", "quake_stress.npz", "quake_state.npz")
+TABLES = ("joint.csv", "history.csv", "curve.csv", "gravity.csv", "critical.csv")
+TABLES += ("quake.csv", "quake_joint.csv", "quake_stress.npz", "quake_state.npz", "run.json")
 PICTURES = ("", "_curve", "_check", "_critical", "_quake")
 FIELDS = r"(bulk|joint)(_t[\w.+-]+\.vtu|\.msh)|fields\.pvd"
+#: The table of a check, in the folder above those of its cases, and its first columns.
+CHECK, CHECK_HEAD = "check.csv", ["case", "joint", "answer", "uplift"]
 
 
 def check_writable(folder: Path) -> None:
@@ -44,7 +47,7 @@ def check_writable(folder: Path) -> None:
             if inner.is_symlink() or (inner.exists() and not inner.is_dir()):
                 name = inner.name
                 raise InputError(f"out = {folder}: its {name} must be a folder, and not a link")
-        for name in TABLES:
+        for name in (*TABLES, CHECK):
             if (folder / name).exists() and not (folder / name).is_file():
                 raise InputError(f"out = {folder}: its {name} must be a regular file")
     except OSError as error:  # a name too long, a loop of links
@@ -53,8 +56,8 @@ def check_writable(folder: Path) -> None:
 
 @contextlib.contextmanager
 def claim_output_folder(case: Case, folder: Path, keep: bool = False) -> Iterator[None]:
-    """Create and lock the output folder of a run, and remove an earlier run's results; keep: not
-    those of a run that is to be continued.
+    """Create and lock the output folder of a run, and remove an earlier run's results, also the
+    table of a check of which it was a part; keep: not those of a run that is to be continued.
 
     Raises InputError if the folder can not be written or is locked; an earlier run stays then.
     """
@@ -63,8 +66,43 @@ def claim_output_folder(case: Case, folder: Path, keep: bool = False) -> Iterato
     with locked_folder(folder):
         if not keep:
             clear(folder)
+        remove_check(folder)
+        if folder.resolve().name in cases_checked(folder.resolve().parent):
+            remove_check(folder.resolve().parent)
         write_state(case, folder, "running")
         yield
+
+
+@contextlib.contextmanager
+def claim_check_folder(folder: Path) -> Iterator[None]:
+    """Create and lock the folder of a check, and remove the table of an earlier one.
+
+    Raises InputError if the folder can not be written or is locked; an earlier table stays then.
+    """
+    check_writable(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    with locked_folder(folder):
+        remove_check(folder)
+        yield
+
+
+def cases_checked(folder: Path) -> set[str]:
+    """Names of the cases in the table of a check in a folder; empty if there is none."""
+    path = folder / CHECK
+    try:
+        if not path.is_file():
+            return set()
+        with path.open(newline="", encoding="utf-8", errors="replace") as file:
+            head, *rows = csv.reader(file)
+    except (OSError, ValueError, csv.Error):  # no line, or a foreign file
+        return set()
+    return {row[0] for row in rows if row} if head[: len(CHECK_HEAD)] == CHECK_HEAD else set()
+
+
+def remove_check(folder: Path) -> None:
+    """Remove the table of a check from a folder."""
+    if cases_checked(folder):
+        (folder / CHECK).unlink(missing_ok=True)
 
 
 def scene_folder(case: Case, scene: Case, out: Path) -> Path:
@@ -100,16 +138,16 @@ def clear(folder: Path) -> None:
         if inner.is_dir() and not inner.is_symlink():
             clear(inner)
             remove_if_empty(inner)
-    for name in (*TABLES, *(f"{info['case']}{end}.png" for end in PICTURES)):
-        if is_name(name):
-            for prefix in ("", PART):
-                (folder / (prefix + name)).unlink(missing_ok=True)
     fields = folder / "fields"
     if fields.is_dir() and not fields.is_symlink():
         for file in fields.iterdir():
             if re.fullmatch(FIELDS, file.name.removeprefix(PART)):
                 file.unlink()
         remove_if_empty(fields)
+    for name in (*(f"{info['case']}{end}.png" for end in PICTURES), *TABLES):  # run.json last
+        if is_name(name):
+            for prefix in (PART, ""):
+                (folder / (prefix + name)).unlink(missing_ok=True)
 
 
 def remove_if_empty(folder: Path) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..arrays import Table
 from ..model.results import Results
-from ..storage import atomic_write
+from ..storage import SAVED, atomic_write
 
 #: A column of a table: numbers or texts.
 Column = np.ndarray | Sequence[float | str]
@@ -35,6 +35,8 @@ def write_csv(target: Path | TextIO, table: Mapping[str, Column]) -> None:
     if isinstance(target, Path):
         with atomic_write(target) as path, path.open("w", newline="") as file:
             write_csv(file, table)
+        if any(len(column) for column in table.values()):
+            SAVED.add(target)
         return
     writer = csv.writer(target, lineterminator="\n")
     writer.writerow(table)

@@ -55,8 +55,9 @@ def decisive_joint(results: Results) -> int:
     if len(names) == 1:
         return 0
     _, joint = failure(results)
-    if joint:
-        return next(k for k, name in enumerate(names) if joint.startswith(name))
+    if joint:  # of several the first, see `Case.named`; a name may begin another one
+        named = [name for name in names if f"{joint} and ".startswith(f"{name} and ")]
+        return names.index(max(named, key=len))
     parts = [
         max(own.last[n] for n in ("crack_length", "slip_length")) / own.case.joint_along
         for own in results.joints

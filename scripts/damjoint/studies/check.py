@@ -436,18 +436,20 @@ def check_cases(cases: list[Case], out: Path) -> list[SafetyCheck]:
             raise InputError(f"case {case.name}: must be given once, and have its own name")
         check_has_section(case)
         engine_of(case, "auto")
-    checks = []
-    for case in cases:
-        for result in run(case, out / case.name):
-            of_joints, methods = compare_joints(result), list(map(hand_calculation, result.joints))
-            checks += of_joints
-            folder = folders.scene_folder(case, result.case, out / case.name)
-            write_csv(folder / "gravity.csv", loads_table(methods))
-            k = min(range(len(methods)), key=lambda k: of_joints[k].margin)
-            worst = of_joints[k]
-            draw_check(result, k, methods[k], picture_table(worst), worst.why, folder)
-        rows = [row for check in checks for row in check.rows]
-        write_csv(out / "check.csv", {name: [row[name] for row in rows] for name in CHECK})
+    checks = list[SafetyCheck]()
+    with folders.claim_check_folder(out):
+        for case in cases:
+            for result in run(case, out / case.name):
+                of_joints = compare_joints(result)
+                methods = [hand_calculation(own) for own in result.joints]
+                checks += of_joints
+                folder = folders.scene_folder(case, result.case, out / case.name)
+                write_csv(folder / "gravity.csv", loads_table(methods))
+                k = min(range(len(methods)), key=lambda k: of_joints[k].margin)
+                worst = of_joints[k]
+                draw_check(result, k, methods[k], picture_table(worst), worst.why, folder)
+            rows = [row for check in checks for row in check.rows]
+            write_csv(out / folders.CHECK, {name: [row[name] for row in rows] for name in CHECK})
     return checks
 
 

@@ -22,6 +22,7 @@ from .. import InputError
 from ..arrays import Setting, Settings
 from ..engines import Outcome
 from ..engines.condensed.solve import about
+from ..fem.memory import sizes
 from ..joint.interface import interface_of
 from ..laws import Evidence
 from ..model.case import Case, load, resolve
@@ -277,7 +278,7 @@ class Search:
             return CriticalValue(
                 None, "", "", f"there is an equilibrium at {beyond}", path.points[-1]
             )
-        point = path.points[path.top] if path.points else None
+        point = path.points[path.top] if path.admissible else None
         return self.result(point and point.level, path, point)
 
     def value(self) -> CriticalValue:
@@ -435,6 +436,14 @@ class Search:
         doubt = "no further equilibrium is found, but no mechanism either"
         if not failing.points:
             doubt = "no equilibrium is found even in the first step"
+        elif value is None:
+            first = failing.points[0]
+            mode, limit = "", failing.case["f_c"]
+            doubt = (
+                f"already at level {first.level:.6g} m, the first equilibrium, the toe's "
+                f"compression, {first.compression:.4g} Pa, exceeds f_c = {limit:g} Pa; --levels "
+                "may begin lower"
+            )
         elif failing.crushed_at_top:
             why = f"beyond it the toe's compression passes f_c = {failing.case['f_c']:g} Pa"
         elif failing.slides:
@@ -453,7 +462,7 @@ class Search:
                 why += f"; there {f'on {where} ' if where else ''}{reached}"
         else:
             mode, why, joint = self.by_statics(failing)
-        events = events_on(failing.admissible) if failing.points else []
+        events = events_on(failing.admissible) if failing.admissible else []
         doubt = "" if why else doubt
         return CriticalValue(value, mode, why, doubt, point, joint=joint, events=events)
 
@@ -645,12 +654,18 @@ def critical(
     out = out or Path("out") / f"{name}_critical"
     folders.check_writable(out)
     start = time.perf_counter()
-    with Progress(name, bar_format="{desc} {elapsed}", leave=False) as shown:
+    with Progress(sizes(search.own), bar_format="{desc} {elapsed}", leave=False) as shown:
         search.on_progress = lambda message: shown.describe(f"{name}: {message}")
         try:
             answer = search.run()
         except KeyboardInterrupt as caught:
             write(search, search.interrupted(caught), out, time.perf_counter() - start)
+            raise
+        except InputError:  # an earlier run stays
+            raise
+        except Exception as error:
+            with folders.claim_output_folder(search.own, out):
+                folders.write_state(search.own, out, "failed", str(error))
             raise
     write(search, answer, out, time.perf_counter() - start)
     return answer, answer.lines(search)

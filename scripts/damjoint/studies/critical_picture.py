@@ -48,7 +48,8 @@ def draw(content: Content, path: Path) -> None:
     draw_paths(of_paths, content)
     for axes in (*of_trials, of_paths):
         axes.grid(alpha=0.3)
-        axes.legend(fontsize=8)
+        if axes.get_legend_handles_labels()[0]:  # an interrupted search may have no trial
+            axes.legend(fontsize=8)
     write_picture(figure, path, 110)
 
 

@@ -156,8 +156,8 @@ class FailurePath(EquilibriumPath):
 
     @property
     def crushed_at_top(self) -> bool:
-        """Whether crushing ends it."""
-        return self.crushed and self.top + 2 == len(self.points)
+        """Whether crushing ends it; also at its first point."""
+        return self.crushed and self.top + 2 >= len(self.points)
 
     @property
     def mode(self) -> str:

@@ -11,7 +11,7 @@ from tabulate import tabulate
 from ..arrays import Value
 from ..storage import atomic_write
 from . import sampling
-from .plan import Plan, Row, beside, column_of, numbers
+from .plan import STATISTICS, Plan, Row, beside, column_of, numbers
 from .sweep import UNDECIDED
 
 #: Outcomes whose rank correlation with the inputs is computed: the failure over all rows, the
@@ -64,11 +64,10 @@ def report(plan: Plan, rows: list[Row], out: Path) -> str:
     """Both tables as text; writes OUT_probability.csv and OUT_sensitivity.csv beside the rows."""
     texts = []
     interval = f"low, high: {sampling.CONFIDENCE:.0%} interval"
-    for name, title, table in (
-        ("probability", f"Probability of failure ({interval})", probabilities(plan, rows)),
-        ("sensitivity", "Rank correlation with the outcome", sensitivities(plan, rows)),
-    ):
-        with atomic_write(beside(out, f"_{name}.csv")) as path, path.open("w", newline="") as file:
+    titles = f"Probability of failure ({interval})", "Rank correlation with the outcome"
+    tables = probabilities(plan, rows), sensitivities(plan, rows)
+    for ending, title, table in zip(STATISTICS, titles, tables, strict=True):
+        with atomic_write(beside(out, ending)) as path, path.open("w", newline="") as file:
             writer = csv.DictWriter(file, table[0], lineterminator="\n")
             writer.writeheader()
             writer.writerows(table)

@@ -49,6 +49,20 @@ class Sample:
             raise InputError(f"number = {self.number}: must be an integer from 1 to {MOST_ROWS}")
         if self.design not in DESIGNS:
             raise InputError(f"design = {self.design}: must be one of {', '.join(DESIGNS)}")
+        if not isinstance(self.seed, int) or self.seed < 0:
+            raise InputError(f"seed = {self.seed}: must be an integer >= 0")
+        if not self.distributions:
+            raise InputError("--sample: must have a distribution, such as mu=normal(1.0,0.15)")
+        if isinstance(self.correlate, str):
+            raise InputError(f"correlate = {self.correlate}: must be a list of texts")
+        from . import sampling  # loads scipy.stats
+
+        for name, text in self.distributions.items():
+            if name != "level" and has_no_number(parameters.parameter(name)):
+                raise InputError(f"--sample {name}={text}: must be of a parameter that is a number")
+            sampling.distribution(name, text)
+        for text in self.correlate:
+            sampling.correlation(text, [*self.distributions])
 
     def values(self) -> dict[str, list[Value]]:
         """The values by name.
@@ -70,6 +84,11 @@ class Sample:
                     "uniform or lognorm keep within bounds"
                 ) from None
         return values
+
+
+def has_no_number(parameter: parameters.Parameter) -> bool:
+    """Whether the values of a parameter are texts."""
+    return bool(parameter.text or parameter.choices)
 
 
 def checked(name: str, value: Value) -> Value:
@@ -212,6 +231,10 @@ def column_of(name: str) -> str:
 def numbers(rows: list[Row], column: str) -> Array:
     """A column as numbers; nan where it is empty."""
     return np.array([float(row[column]) if row[column] else np.nan for row in rows])
+
+
+#: Endings of the files that are made of all rows of a result file, see `beside`.
+CHART, STATISTICS = ".png", ("_probability.csv", "_sensitivity.csv")
 
 
 def beside(out: Path, ending: str) -> Path:

@@ -23,6 +23,7 @@ from ..engines.condensed.recover import recover
 from ..engines.condensed.solve import about
 from ..fem import factor
 from ..fem.bodies import Bodies
+from ..fem.memory import sizes
 from ..joint.interface import interface_of
 from ..model.case import Case
 from ..model.fields import Field, Solution
@@ -75,8 +76,6 @@ def span_of(name: str, text: str) -> tuple[float, float]:
 
 def check(case: Case, span: Span = None) -> None:
     """Raise InputError if an earthquake of a case can not be computed; span: of the frames."""
-    if case.accuracy:
-        raise InputError(f"accuracy = {100 * case.accuracy:g}%: must not be set for damjoint quake")
     if case["drive"] != "level":
         raise InputError(f"drive = {case['drive']}: must be level for damjoint quake")
     for name in ("k_h", "k_v"):
@@ -248,16 +247,17 @@ def run(
     check(case, span)
     folders.check_writable(out)
     key, path = checkpoint.fingerprint(case, span), out / CHECKPOINT
-    resumed = path.is_file()
+    resumed = checkpoint.exists(path, key)
     with single_thread(), folders.claim_output_folder(case, out, keep=resumed):
         try:
-            under_way = QuakeRun(case, span)
+            with Progress(sizes(case), None, progress, bar_format="{desc} {elapsed}", leave=False):
+                under_way = QuakeRun(case, span)
         except BaseException as error:
             state = "failed" if isinstance(error, Exception) else "interrupted"
             folders.write_state(case, out, state, str(error) or "no step had converged")
             raise
-        if resumed and not checkpoint.read(path, key, under_way.quake, under_way.history):
-            folders.clear(out)
+        if resumed:
+            checkpoint.read(path, key, under_way.quake, under_way.history)
         try:
             follow(under_way, path, key, progress)
         except BaseException as error:

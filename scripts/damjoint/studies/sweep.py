@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import csv
 import hashlib
 import multiprocessing
 import os
@@ -21,28 +20,41 @@ from typing import TypeAlias
 from .. import InputError, RunError, __version__, accuracy
 from ..arrays import Value, Values
 from ..engines import engine_of
+from ..fem.cache import fingerprint
 from ..joint.interface import Interface, interface_of
 from ..model.case import Case, equal_steps, first_mesh, resolve, with_drive_times
+from ..model.mesh import mesh_of
 from ..model.results import history_columns
-from ..post.tables import as_text
-from ..progress import track
+from ..progress import Progress, track
 from ..solver.load_stepper import LoadStepper
 from ..statics.limit import mechanism
 from ..statics.verdict import failed, statement, verdict
-from ..storage import lock
 from ..threads import limited_threads
+from ..versions import code_fingerprint
 from . import quake
-from .critical import Search
-from .plan import Plan, Row, cases_of, column_of, in_file
+from .critical import QUICK, Search
+from .plan import CHART, STATISTICS, Plan, Row, beside, cases_of, column_of, in_file
+from .result_file import result_file
 
 
-def key_of(case: Case, slip_limit: float | None = None) -> str:
-    """The key of a scene and its loading in a result file; slip_limit: as in Plan."""
-    of_joints = ((own.name, sorted(own.values.items())) for own in case.of_joints)
+def key_of(case: Case, plan: Plan | None = None) -> str:
+    """The key of a scene and its loading, and of what a plan computes of it, in a result file: of
+    all that decides its row, also the content of a mesh and the code.
+    """
+    of_joints = (
+        (own.name, own.hardening_asked, sorted(own.values.items())) for own in case.of_joints
+    )
     loading = case.levels, case.tail_levels, case.times
-    identity = sorted(case.values.items()), *loading, __version__, *of_joints
-    if slip_limit is not None and case.record:
-        identity += slip_limit, case.record.read_bytes()
+    identity = [sorted(case.values.items()), *loading, case.hardening_asked, *of_joints]
+    identity += __version__, code_fingerprint()
+    if case.geometry:
+        identity.append(fingerprint(mesh_of(case)))
+    if plan:
+        given = case.source.overrides if case.source else {}
+        quick = sorted(QUICK.keys() & given.keys()) if plan.critical else []
+        identity += bool(plan.sampled), plan.critical, quick, plan.slip_limit
+        if plan.slip_limit is not None and case.record:
+            identity.append(case.record.read_bytes())
     return hashlib.sha256(repr(identity).encode()).hexdigest()[:16]
 
 
@@ -187,7 +199,7 @@ def planned(case: Case, plan: Plan) -> Iterator[tuple[str, Values, Task]]:
         if limit is not None:
             quake.check(varied)
         task = Task(varied, bool(plan.sampled), search, plan.critical_columns, limit)
-        yield key_of(varied, limit), row, task
+        yield key_of(varied, plan), row, task
 
 
 def search_of(case: Case, quantity: str) -> Search:
@@ -212,59 +224,39 @@ def bundles(tasks: dict[str, Task]) -> list[list[str]]:
     ]
 
 
-def read_done(path: Path, columns: list[str], numeric: Sequence[str]) -> dict[str, Row]:
-    """The complete rows of a result file by key, its first column; an incomplete last line is
-    removed from the file.
+class ProcessKilled(RunError):
+    """A process of a pool has ended without a result; saved: number of the rows in the file."""
 
-    numeric: columns of numbers. Raises InputError.
-    """
-    if not path.exists() or not path.stat().st_size:
-        return {}
-    damaged = f"out = {path}: line {{}} is damaged; delete it, and its row is computed again"
-    try:
-        text = path.read_text()
-    except UnicodeDecodeError as error:
-        lines = path.read_bytes()[: error.start].count(b"\n")
-        raise InputError(damaged.format(lines + 1)) from None
-    complete = text[: text.rfind("\n") + 1]
-    rows = csv.DictReader(complete.splitlines(), restval=None, strict=True)
-    if rows.fieldnames != columns:
-        raise InputError(
-            f"out = {path}: must be a new file or of the same sweep (columns {','.join(columns)})"
+    def __init__(self, saved: int = 0) -> None:
+        kept = f"; {saved} rows are saved, the same command continues" if saved else ""
+        super().__init__(
+            f"a process was killed (out of memory?){kept}; --jobs 1 needs least memory"
         )
-    done = {}
-    try:
-        for row in rows:
-            if None in row or None in row.values():
-                raise ValueError
-            for name in numeric:
-                float(row[name] or "nan")
-            done[row[columns[0]]] = row
-    except ValueError:
-        raise InputError(damaged.format(rows.line_num)) from None
-    except csv.Error:  # of the row after the last one that was read
-        raise InputError(damaged.format(rows.line_num + 1)) from None
-    if complete != text:
-        path.write_text(complete)
-    return done
 
 
 @contextlib.contextmanager
 def pool_of(jobs: int) -> Iterator[ProcessPoolExecutor]:
-    """Processes that end with their parent, even if it is killed; after an error in a process or in
-    the caller no further task starts.
+    """Processes that end with their parent, even if it is killed, and after an error in a process
+    or in the caller. Raises ProcessKilled if one of them is killed.
     """
     with ProcessPoolExecutor(jobs, initializer=end_with_parent) as pool:
         try:
             yield pool
+        except BrokenProcessPool:
+            raise ProcessKilled from None
         except BaseException:
-            pool.shutdown(cancel_futures=True)  # waits; without waiting nothing is cancelled
+            for process in list(pool._processes.values()):  # the pool would wait for their tasks
+                process.terminate()
             raise
 
 
 def end_with_parent() -> None:
-    """End this process when its parent ends, and at once and without words if it is interrupted."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    """End this process when its parent ends, and at once and without words if it is interrupted:
+    an exception would be taken for the result of its task, or leave the pool's queue locked. (The
+    other signals end a fork of a command so, see __main__.py.)
+    """
+    if signal.getsignal(signal.SIGINT) != signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
 
     def wait() -> None:
         if parent := multiprocessing.parent_process():
@@ -312,14 +304,8 @@ def spread(
             waiting = {
                 pool.submit(last_rows, some): keys for keys, some in zip(work, chosen, strict=True)
             }
-            try:
-                for future in as_completed(waiting):
-                    yield from zip(waiting[future], future.result(), strict=True)
-            except BrokenProcessPool:
-                raise RunError(
-                    "sweep: a process was killed (out of memory?); finished rows are saved, the "
-                    "same command continues; --jobs 1 needs least memory"
-                ) from None
+            for future in as_completed(waiting):
+                yield from zip(waiting[future], future.result(), strict=True)
 
 
 def compute(
@@ -345,9 +331,10 @@ def meshed(case: Case) -> tuple[Case, str]:
 
     Raises InputError, RunError.
     """
-    (outcome, *_) = accuracy.solve(
-        replace(case, also_uplift=()), engine_of(case, "auto"), lambda *_: None, False
-    )
+    with Progress(f"{case.name}, mesh of all rows", bar_format="{desc} {elapsed}", leave=False):
+        (outcome, *_) = accuracy.solve(
+            replace(case, also_uplift=()), engine_of(case, "auto"), lambda *_: None, False
+        )
     if outcome.error:
         raise outcome.error
     refined = {n: outcome.result.case[n] for n in accuracy.REFINED}
@@ -378,25 +365,26 @@ def sweep(
     InputError, RunError.
     """
     check_jobs(jobs)
-    if not out.parent.is_dir():
-        raise InputError(f"out = {out}: must be a file in an existing folder")
     rows = list(planned(case, plan))
     values = {key: row for key, row, _ in rows}
     of_steps = list(history_columns(case))
     of_quake = QUAKE_COLUMNS if plan.slip_limit is not None else ()
     results = [*of_steps, *of_quake, *OUTCOME, *plan.critical_columns]
     columns = ["key", *map(column_of, plan.names), *results]
-    done = read_done(out, columns, (*of_steps, "failed"))
-    missing = {key: task for key, _, task in rows if key not in done}
-    computed = compute(missing, jobs, scheduler)
-    with out.open("a", newline="") as file:
-        lock(file.fileno(), out)
-        writer = csv.writer(file, lineterminator="\n")
-        if not file.tell():
-            writer.writerow(columns)
-        for key, result in track(computed, f"sweep {case.name}", len(missing)):
-            cells = *values[key].values(), *(result[c] for c in results)
-            writer.writerow([key, *(as_text(in_file(cell)) for cell in cells)])
-            file.flush()
-    done = read_done(out, columns, ())
+    with result_file(out, columns, (*of_steps, "failed")) as (file, done):
+        missing = {key: task for key, _, task in rows if key not in done}
+        computed = compute(missing, jobs, scheduler)
+        count = 0
+        try:
+            for key, result in track(computed, f"sweep {case.name}", len(missing)):
+                if not count:  # of the rows before
+                    for ending in (CHART, *STATISTICS):
+                        beside(out, ending).unlink(missing_ok=True)
+                cells = *values[key].values(), *(result[c] for c in results)
+                file.add([key, *(in_file(cell) for cell in cells)])
+                count += 1
+        except ProcessKilled:
+            raise ProcessKilled(count) from None
+        file.check_exists()
+        done = file.read()
     return len(missing), [done[key] for key, *_ in rows]

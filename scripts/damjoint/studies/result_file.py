@@ -1,0 +1,151 @@
+"""A CSV to which a sweep adds a row at a time, so that it can be interrupted and continued."""
+
+from __future__ import annotations
+
+import contextlib
+import csv
+import io
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from .. import InputError, RunError
+from ..post.tables import as_text
+from ..storage import SAVED, lock
+from .plan import Row
+
+
+@dataclass(frozen=True)
+class ResultFile:
+    """An open result file, which no other process writes to."""
+
+    path: Path
+    columns: Sequence[str]
+    #: its number as an open file
+    number: int
+
+    @property
+    def head(self) -> str:
+        """Its first line."""
+        return line_of(self.columns)
+
+    def text(self) -> str:
+        """Its content.
+
+        Raises InputError with the line if it is not text.
+        """
+        size = os.fstat(self.number).st_size
+        content = os.pread(self.number, size, 0)
+        try:
+            return content.decode()
+        except UnicodeDecodeError as error:
+            raise self.damaged(content[: error.start].count(b"\n") + 1) from None
+
+    def damaged(self, line: int) -> InputError:
+        """The error of a damaged line."""
+        return InputError(
+            f"out = {self.path}: line {line} is damaged; delete it, and its row is computed again"
+        )
+
+    def read(self, numeric: Sequence[str] = ()) -> dict[str, Row]:
+        """The complete rows by key, their first column; numeric: columns of numbers. A last line
+        without an end was interrupted.
+
+        Raises InputError.
+        """
+        text = self.text()
+        if self.head.startswith(text):
+            return {}
+        complete = io.StringIO(text[: text.rfind("\n") + 1], newline="")
+        rows = csv.DictReader(complete, restval=None, strict=True)
+        if rows.fieldnames != list(self.columns):
+            raise InputError(
+                f"out = {self.path}: must be a new file or of the same sweep (columns "
+                f"{','.join(self.columns)})"
+            )
+        done = {}
+        try:
+            for row in rows:
+                if None in row or None in row.values():
+                    raise ValueError
+                for name in numeric:
+                    float(row[name] or "nan")
+                done[row[self.columns[0]]] = row
+        except ValueError:
+            raise self.damaged(rows.line_num) from None
+        except csv.Error:  # of the row after the last one that was read
+            raise self.damaged(rows.line_num + 1) from None
+        return done
+
+    def repair(self) -> None:
+        """Remove an incomplete last line, and nothing else whenever it is interrupted."""
+        text = self.text()
+        os.ftruncate(self.number, len(text[: text.rfind("\n") + 1].encode()))
+
+    def add(self, cells: Sequence[str]) -> None:
+        """Add a row, whole or, on a full disk, to be repaired later; the first one after the names
+        of the columns.
+
+        Raises RunError if the file has been deleted or replaced; OSError.
+        """
+        self.check_exists()
+        head = "" if os.fstat(self.number).st_size else self.head
+        rest = (head + line_of([as_text(cell) for cell in cells])).encode()
+        try:
+            while rest:
+                rest = rest[os.write(self.number, rest) :]
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, str(self.path)) from None
+        SAVED.add(self.path)
+
+    @property
+    def exists(self) -> bool:
+        """Whether the path still leads to this file."""
+        try:
+            return os.path.samestat(os.fstat(self.number), self.path.stat())
+        except OSError:
+            return False
+
+    def check_exists(self) -> None:
+        """Raise RunError if the path does not lead to this file any more."""
+        if not self.exists:
+            raise RunError(
+                f"out = {self.path}: has been deleted or replaced meanwhile; its rows are lost, "
+                "the same command computes them again"
+            )
+
+
+@contextlib.contextmanager
+def result_file(
+    path: Path, columns: Sequence[str], numeric: Sequence[str]
+) -> Iterator[tuple[ResultFile, dict[str, Row]]]:
+    """Open and lock a result file, and repair its end; yields it with its complete rows by key. A
+    file to which no row is added is not created.
+
+    Raises InputError if it is of another sweep, damaged, or being written by another process.
+    """
+    if not path.parent.is_dir():
+        raise InputError(f"out = {path}: must be a file in an existing folder")
+    if path.exists() and not path.is_file():
+        raise InputError(f"out = {path}: must be a regular file")
+    number = os.open(path, os.O_RDWR | os.O_APPEND | os.O_CREAT, 0o666)
+    try:
+        lock(number, path)
+        file = ResultFile(path, columns, number)
+        try:
+            done = file.read(numeric)
+            file.repair()
+            yield file, done
+        finally:
+            if file.exists and not os.fstat(number).st_size:
+                path.unlink()
+    finally:
+        os.close(number)
+
+
+def line_of(cells: Sequence[str]) -> str:
+    """A line of a CSV."""
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerow(cells)
+    return text.getvalue()
