@@ -17,6 +17,7 @@ from . import casefile
 from .arithmetic import number
 from .constraints import (
     USUAL,
+    check_acting,
     check_also_uplift,
     check_distances,
     check_drive,
@@ -81,6 +82,26 @@ class Source:
     tail_levels: str | Sequence[float] | None = None
     steps: int | None = None
     accuracy: str | None = None
+
+    @property
+    def settings(self) -> dict[str, Setting]:
+        """The parameters that case file and overrides set, checked."""
+        overrides = {name: checked(name, value) for name, value in self.overrides.items()}
+        return {**self.text.defaults, **self.text.of_joints, **overrides}
+
+    @property
+    def joint_names(self) -> list[str]:
+        """The names of the joints of its own geometry, by the mesh without lists of values.
+
+        Raises InputError.
+        """
+        from .mesh import mesh_of
+
+        text = replace(self.text, of_joints={})
+        single: dict[str, Setting]
+        single = {n: v for n, v in self.overrides.items() if not isinstance(v, tuple)}
+        case = resolve(replace(self, text=text, overrides=single, accuracy=None))
+        return [joint.name for joint in mesh_of(case).joints]
 
     def with_overrides(self, overrides: Settings) -> Source:
         """The source with further overrides, which win."""
@@ -158,13 +179,15 @@ class Case(ParameterValues):
 
     @property
     def given(self) -> dict[str, Setting]:
-        """The parameters that a user has set: in a case file of their own, or beside it."""
+        """The parameters that a user has set: in a case file of their own, or beside it; not what a
+        case or preset of the package sets.
+        """
         if self.source is None:
             return {}
-        packaged = self.source.path.resolve().parent == CASES.resolve()
         text, known = self.source.text, declared()
-        of_file = {} if packaged else {**text.defaults, **text.of_joints}
-        return {n: v for n, v in {**of_file, **self.source.overrides}.items() if n in known}
+        of_file = {**text.defaults, **text.of_joints}
+        of_user = {n: v for n, v in of_file.items() if n in text.of_user}
+        return {n: v for n, v in {**of_user, **self.source.overrides}.items() if n in known}
 
     @property
     def ineffective(self) -> tuple[str, ...]:
@@ -241,10 +264,7 @@ class Case(ParameterValues):
         same = [replace(joint, hardening_asked=self.hardening_asked) for joint in joints]
         known = self.of_joints or same
         if len(known) != len(joints):
-            raise InputError(
-                f"case {self.name}: lists of {len(known)} values: must have one for each joint of "
-                f"the geometry ({len(joints)}: {', '.join(joint.name for joint in joints)})"
-            )
+            check_lists(self.source.settings if self.source else {}, [j.name for j in joints])
         ends = [self.section | joint.section for joint in joints]
         of_joints = (
             replace(joint, values=own.values, section=section, hardening_asked=own.hardening_asked)
@@ -500,7 +520,10 @@ def resolve(source: Source) -> Case:
         given = overrides.pop("lift_heights")
         lifts = levels_of("lift_heights", given) if given else ()
     geometry = own_geometry(file.texts["geometry"]) if "geometry" in file.texts else None
-    values = settings_of_joints({**file.defaults, **file.of_joints, **overrides}, lifts, geometry)
+    settings = {**file.defaults, **file.of_joints, **overrides}
+    if geometry and len(set(map(len, lists_of_joints(settings).values()))) > 1:
+        check_lists(settings, replace(source, overrides=overrides).joint_names)
+    values = settings_of_joints(settings, lifts, geometry)
     listed = "".join(listing(n, v) for n, v in lists.items())
     variables, *of_joints = parsed_by_joint(values, listed, lifts)
     if accuracy is not None and geometry and geometry.suffix != ".geo":
@@ -536,6 +559,21 @@ def resolve(source: Source) -> Case:
     return with_drive_times(result)
 
 
+def lists_of_joints(settings: Settings) -> dict[str, tuple[Value, ...]]:
+    """The settings that are lists, with a value for each joint."""
+    return {n: v for n, v in settings.items() if isinstance(v, tuple)}
+
+
+def check_lists(settings: Settings, joints: Sequence[str]) -> None:
+    """Raise InputError if a list has not one value for each joint of a geometry, by their names."""
+    for name, values in lists_of_joints(settings).items():
+        if len(values) != len(joints):
+            raise InputError(
+                f"{name} = {','.join(map(str, values))}: must be one value, or one for each joint "
+                f"of the geometry ({len(joints)}: {', '.join(joints)})"
+            )
+
+
 def settings_of_joints(
     settings: Settings, lifts: tuple[float, ...], geometry: Path | None
 ) -> list[dict[str, Value]]:
@@ -544,8 +582,8 @@ def settings_of_joints(
     lifts: heights of the joints above the first [m]. Raises InputError if a list has another length
     than there are joints.
     """
+    lists = lists_of_joints(settings)
     single = {n: v for n, v in settings.items() if not isinstance(v, tuple)}
-    lists = {n: v for n, v in settings.items() if isinstance(v, tuple)}
     if geometry and lifts:
         raise InputError(
             "lift_heights: must not be set for a geometry of one's own, whose mesh has the joints"
@@ -627,6 +665,7 @@ def check_joints(case: Case) -> None:
     for joint, name in zip(case.joints, case.joint_names, strict=True):
         try:
             check_values(joint, joint.section, joint.geometry is None)
+            check_acting(joint, joint.times[-1])
         except InputError as error:  # of a value for all joints the first one
             where = "" if joint is case.joints[0] else f"{name}: "
             raise InputError(f"{where}{error}") from None

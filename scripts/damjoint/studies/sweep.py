@@ -23,6 +23,7 @@ from ..arrays import Value, Values
 from ..engines import engine_of
 from ..joint.interface import Interface, interface_of
 from ..model.case import Case, equal_steps, first_mesh, resolve, with_drive_times
+from ..model.notes import notes_on_settings
 from ..model.results import history_columns
 from ..post.tables import as_text
 from ..progress import track
@@ -188,6 +189,16 @@ def planned(case: Case, plan: Plan) -> Iterator[tuple[str, Values, Task]]:
             quake.check(varied)
         task = Task(varied, bool(plan.sampled), search, plan.critical_columns, limit)
         yield key_of(varied, limit), row, task
+
+
+def notes_on_rows(case: Case, rows: Sequence[Case]) -> list[str]:
+    """The notes on rows that their case does not have, the first one on each parameter."""
+    own, lines = notes_on_settings(case), dict[str, str]()
+    for row in rows:
+        for note in notes_on_settings(row):
+            if note not in own:
+                lines.setdefault(note.split()[0], note)
+    return list(lines.values())
 
 
 def search_of(case: Case, quantity: str) -> Search:
@@ -369,8 +380,10 @@ def sweep(
     out: Path,
     jobs: int | None = None,
     scheduler: str | None = None,
+    on_note: Callable[[str], None] = lambda note: None,
 ) -> tuple[int, list[Row]]:
-    """Compute the rows of a plan that are missing in out (CSV).
+    """Compute the rows of a plan that are missing in out (CSV); on_note: called with each note on
+    rows before.
 
     Returns their number, and all rows of the plan. Columns: key, the plan's names (level as
     level_asked), the columns of history.csv, of an earthquake, OUTCOME, the critical value. Each
@@ -389,6 +402,8 @@ def sweep(
     done = read_done(out, columns, (*of_steps, "failed"))
     missing = {key: task for key, _, task in rows if key not in done}
     computed = compute(missing, jobs, scheduler)
+    for note in notes_on_rows(case, [task.case for _, _, task in rows]):
+        on_note(note)
     with out.open("a", newline="") as file:
         lock(file.fileno(), out)
         writer = csv.writer(file, lineterminator="\n")
