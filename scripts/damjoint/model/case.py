@@ -83,25 +83,17 @@ class Source:
     steps: int | None = None
     accuracy: str | None = None
 
-    @property
-    def settings(self) -> dict[str, Setting]:
-        """The parameters that case file and overrides set, checked."""
-        overrides = {name: checked(name, value) for name, value in self.overrides.items()}
-        return {**self.text.defaults, **self.text.of_joints, **overrides}
-
-    @property
-    def joint_names(self) -> list[str]:
-        """The names of the joints of its own geometry, by the mesh without lists of values.
-
-        Raises InputError.
+    def check_lists(self, joints: Sequence[str]) -> None:
+        """Raise InputError if a list has not one value for each joint of a geometry, by their
+        names.
         """
-        from .mesh import mesh_of
-
-        text = replace(self.text, of_joints={})
-        single: dict[str, Setting]
-        single = {n: v for n, v in self.overrides.items() if not isinstance(v, tuple)}
-        case = resolve(replace(self, text=text, overrides=single, accuracy=None))
-        return [joint.name for joint in mesh_of(case).joints]
+        overrides = {name: checked(name, value) for name, value in self.overrides.items()}
+        for name, values in lists_of_joints({**self.text.of_joints, **overrides}).items():
+            if len(values) != len(joints):
+                raise InputError(
+                    f"{name} = {','.join(map(str, values))}: must be one value, or one for each "
+                    f"joint of the geometry ({len(joints)}: {', '.join(joints)})"
+                )
 
     def with_overrides(self, overrides: Settings) -> Source:
         """The source with further overrides, which win."""
@@ -258,13 +250,10 @@ class Case(ParameterValues):
     def with_joints(self, joints: Sequence[OfJoint]) -> Case:
         """The case of a user's own geometry, with the names and ends of its joints.
 
-        Raises InputError if the case has lists of another length, or drains or a waterstop beyond
-        the end of a joint.
+        Raises InputError if the case has drains or a waterstop beyond the end of a joint.
         """
         same = [replace(joint, hardening_asked=self.hardening_asked) for joint in joints]
         known = self.of_joints or same
-        if len(known) != len(joints):
-            check_lists(self.source.settings if self.source else {}, [j.name for j in joints])
         ends = [self.section | joint.section for joint in joints]
         of_joints = (
             replace(joint, values=own.values, section=section, hardening_asked=own.hardening_asked)
@@ -520,10 +509,7 @@ def resolve(source: Source) -> Case:
         given = overrides.pop("lift_heights")
         lifts = levels_of("lift_heights", given) if given else ()
     geometry = own_geometry(file.texts["geometry"]) if "geometry" in file.texts else None
-    settings = {**file.defaults, **file.of_joints, **overrides}
-    if geometry and len(set(map(len, lists_of_joints(settings).values()))) > 1:
-        check_lists(settings, replace(source, overrides=overrides).joint_names)
-    values = settings_of_joints(settings, lifts, geometry)
+    values = settings_of_joints({**file.defaults, **file.of_joints, **overrides}, lifts, geometry)
     listed = "".join(listing(n, v) for n, v in lists.items())
     variables, *of_joints = parsed_by_joint(values, listed, lifts)
     if accuracy is not None and geometry and geometry.suffix != ".geo":
@@ -564,23 +550,14 @@ def lists_of_joints(settings: Settings) -> dict[str, tuple[Value, ...]]:
     return {n: v for n, v in settings.items() if isinstance(v, tuple)}
 
 
-def check_lists(settings: Settings, joints: Sequence[str]) -> None:
-    """Raise InputError if a list has not one value for each joint of a geometry, by their names."""
-    for name, values in lists_of_joints(settings).items():
-        if len(values) != len(joints):
-            raise InputError(
-                f"{name} = {','.join(map(str, values))}: must be one value, or one for each joint "
-                f"of the geometry ({len(joints)}: {', '.join(joints)})"
-            )
-
-
 def settings_of_joints(
     settings: Settings, lifts: tuple[float, ...], geometry: Path | None
 ) -> list[dict[str, Value]]:
     """The settings of each joint, from the lowest.
 
     lifts: heights of the joints above the first [m]. Raises InputError if a list has another length
-    than there are joints.
+    than there are joints; of a geometry of one's own the mesh has them: until it is read, see
+    `Source.check_lists`, there are as many as the longest list has values.
     """
     lists = lists_of_joints(settings)
     single = {n: v for n, v in settings.items() if not isinstance(v, tuple)}
@@ -590,11 +567,12 @@ def settings_of_joints(
         )
     number = max([1, *map(len, lists.values())]) if geometry else 1 + len(lifts)
     for name, values in lists.items():
-        if len(values) != number:
+        if len(values) != number and not geometry:
             raise InputError(
                 f"{name} = {','.join(map(str, values))}: must be one value, or as many as there "
                 f"are joints ({number})"
             )
+        lists[name] = values + values[-1:] * (number - len(values))
     heights = {} if geometry else {"joint_height": lifts}
     return [
         {

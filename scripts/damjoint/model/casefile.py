@@ -58,7 +58,7 @@ class CaseText:
     texts: dict[str, str] = field(default_factory=dict)
     #: values of each joint, by parameter
     of_joints: dict[str, tuple[Value, ...]] = field(default_factory=dict)
-    #: parameters that a file of the user sets last, not one of the package
+    #: parameters and lists that a file of the user sets last, not one of the package
     of_user: set[str] = field(default_factory=set, compare=False)
     #: number of files read
     files: int = field(default=0, compare=False)
@@ -154,6 +154,7 @@ def add_statement(case: CaseText, statement: list[Token], path: Path, where: str
         read_into(case, file)
     elif name in LISTS and tokens[1:4] == ("(", ")", "="):
         case.lists[name] = numbers(items_of(kinds[4:], tokens[4:], where), case, where)
+        note_owner(case, name, path)
     elif name in TEXTS and tokens[1:2] == ("=",):
         if kinds[2:] != ("text",):
             raise InputError(f'{where}: must be {name} = "words"')
@@ -195,7 +196,7 @@ def add_statement(case: CaseText, statement: list[Token], path: Path, where: str
 
 
 def note_owner(case: CaseText, name: str, path: Path) -> None:
-    """Note whether a parameter is set by a file of the user or by one of the package."""
+    """Note whether a parameter or list is set by a file of the user or by one of the package."""
     if data("cases").resolve() in path.resolve().parents:
         case.of_user.discard(name)
     else:

@@ -271,7 +271,7 @@ def mesh_of(case: Case) -> Mesh:
 
 def check_loads(case: Case, mesh: Mesh) -> None:
     """Raise InputError if the mesh of a user's own geometry lacks what a load or support of the
-    case acts on, or if its levels are not those of this dam.
+    case acts on, or if its levels or lists of values are not those of this dam.
     """
     for name, region in LOADED.items():
         needed = case[name] and (name != "hold_z" or mesh.dim == 3)
@@ -281,6 +281,8 @@ def check_loads(case: Case, mesh: Mesh) -> None:
                 f"{name} = {case[name]:g}: must be 0, or geometry = {case.geometry} have the "
                 f"region {own}"
             )
+    if case.source:
+        case.source.check_lists([joint.name for joint in mesh.joints])
     heights = mesh.user_geometry.concrete[:, 1]
     low, high = float(heights.min()), float(heights.max())
     if case["face_load"] == "hydrostatic":

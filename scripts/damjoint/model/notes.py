@@ -77,8 +77,6 @@ def unusual_values(case: Case) -> Iterator[str]:
 
 def loads_in_part(case: Case) -> Iterator[str]:
     """Yield the loads that do not act in full, or not at all, by time, level or another value."""
-    if case.published:
-        return
     last, highest = case.times[-1], case.reached
     for name, values in (STAGED | WORKS).items():
         for joint in case.joints:
@@ -90,8 +88,9 @@ def loads_in_part(case: Case) -> Iterator[str]:
                 )
             if name not in WORKS:
                 break  # of all joints
+    own_times = case.source and "times" in case.source.text.of_user
     for time, level in enumerate(case.levels, 1):
-        if case["drive"] == "level" and time not in case.times:
+        if own_times and time not in case.times:
             yield f"the level {level:g} m at t = {time} is no load step: times() leaves it out"
     if case["ice_force"] and case["ice_level"] > highest and not case.geometry:
         yield f"ice_level = {case['ice_level']:g} m is above the water, {highest:g} m at most"
