@@ -174,7 +174,12 @@ def notes_on_geometry(case: Case, mesh: Mesh) -> Iterator[str]:
         yield f"silt_height = {case['silt_height']:g} m reaches no face upstream: no silt acts"
     for where in geometry.gaps_of_support:
         yield f"fixed: has a gap at {where}, where the rock is free"
+    if fixed := geometry.fixed_concrete:
+        yield f"fixed holds {fixed:.4g} {unit} of the dam's own surface"
+    if where := geometry.coincident:
+        yield f"two nodes lie at {where}: what meets there is not connected"
     if cavities := geometry.cavities:
-        yield f"the mesh has {len(cavities)} cavities, one at {cavities[0]}"
+        several = f"{len(cavities)} cavities, one" if len(cavities) > 1 else "a cavity"
+        yield f"the mesh has {several} at {cavities[0]}"
     if geometry.height < LOWEST:
         yield f"the dam is {geometry.height:g} m high; is the mesh in another unit?"

@@ -48,8 +48,12 @@ CONCRETE = ("dam", "lower")
 HIGHEST, LOWEST = 1000.0, 0.5
 #: Distance from the origin, over the size of the mesh, from which on coordinates lack digits.
 FARTHEST = 1e4
-#: Part of a normal along x from which on a side faces upstream or downstream.
-FACING = 1e-3
+#: Part of a normal along an axis from which on it faces along it, and from which on mostly.
+FACING, MOSTLY = 1e-3, 0.9
+#: Relative size below which an extent or size is 0.
+FLAT = 1e-9
+#: Axis and sign of the normals of a face as a whole, by its side.
+DIRECTIONS = {UP: (0, -1), DOWN: (0, 1), TOP: (1, 1), FLOOR: (1, 1), BED: (1, 1)}
 
 #: Faces that water presses on together: what only these bound is a hole in them.
 RESERVOIR, TAILWATER = frozenset({UP, TOP, FLOOR}), frozenset({DOWN, BED})
@@ -369,6 +373,24 @@ class UserGeometry:
         """A position on each part of the surface that only fixed elements bound."""
         return [self.on_part(part) for part in self.unnamed if part.names == {"fixed"}]
 
+    @property
+    def fixed_concrete(self) -> float:
+        """Length or area of the dam's surface that is fixed [m, m2]."""
+        is_dam = np.array([name != "foundation" for name in self.solids])
+        sizes, names = sizes_of(self.surface), np.array(self.name_of_skin)
+        own = is_dam[self.body_of[self.owners[self.skin]]] & (names == "fixed")
+        return float(sizes[own].sum())
+
+    @property
+    def coincident(self) -> str:
+        """The position of two nodes at the same place, which do not connect what meets there; empty
+        if there are none.
+        """
+        points = self.points[1]
+        whole = np.round(points / (FLAT * np.ptp(points))).astype(int)
+        _, first, count = np.unique(whole, axis=0, return_index=True, return_counts=True)
+        return at(points[first[np.argmax(count > 1)]]) if (count > 1).any() else ""
+
     def on_part(self, part: Part) -> str:
         """The position of an element of a part of the surface, for messages."""
         return at(self.surface.middles()[part.elements[0]])
@@ -378,6 +400,7 @@ class UserGeometry:
 
     def check(self) -> None:
         """Raise InputError if the mesh is not complete."""
+        self.check_elements()
         self.check_doubled()
         self.check_overlaps()
         self.check_contacts()
@@ -385,8 +408,23 @@ class UserGeometry:
             self.check_joint(joint)
         self.check_faces()
         self.check_connected()
+        self.check_directions()
         self.check_holes()
         self.check_size()
+
+    def check_elements(self) -> None:
+        """Raise InputError if coordinates are no numbers, if a plane mesh is not in the plane of x
+        and y, or if an element has no size.
+        """
+        points = self.points[1]
+        if not np.isfinite(points).all():
+            raise self.bad("it has coordinates that are not finite")
+        if self.dim == 2 and np.ptp(points[:, 2]) > FLAT * np.ptp(points):
+            raise self.bad("its z must be the same everywhere with dim = 2 (y points up)")
+        sizes = np.concatenate([sizes_of(solid) for solid in self.solids.values()])
+        flat = sizes <= FLAT**2 * np.median(sizes)
+        if flat.any():
+            raise self.bad(f"an element has no size, at {at(self.middles[np.argmax(flat)])}")
 
     def check_doubled(self) -> None:
         """Raise InputError if an element occurs twice in bodies, in joints or in faces."""
@@ -398,9 +436,11 @@ class UserGeometry:
             if (count > 1).any():
                 twice = int(np.argmax(count > 1))
                 names = [n for (n, _), own in zip(group, numbers, strict=True) if twice in own]
+                number = int((count > 1).sum())
+                occur = f"{number} elements occur" if number > 1 else "1 element occurs"
                 raise self.bad(
-                    f"{' and '.join(names)}: {(count > 1).sum()} elements occur twice; each must "
-                    "be there once, and in one region"
+                    f"{' and '.join(names)}: {occur} twice; each must be there once, and in one "
+                    "region"
                 )
 
     def check_overlaps(self) -> None:
@@ -563,6 +603,43 @@ class UserGeometry:
             number = len(self.regions["crest"].node_tags)
             raise self.bad(f"crest: must be one point, not {number}")
 
+    def check_directions(self) -> None:
+        """Raise InputError if a face looks the other way than its name says, as a whole, or if the
+        rock lies above the dam.
+        """
+        normals, sizes = self.surface.normals, sizes_of(self.surface)
+        for face, numbers in zip(self.faces, self.of_faces, strict=True):
+            own = np.isin(self.sides[self.skin], numbers)
+            axis, sign = DIRECTIONS[face.side]
+            along = sign * (normals[own, axis] * sizes[own]).sum()
+            if along < -FACING * sizes[own].sum():
+                raise self.bad(
+                    f"{face.name}: looks along {'-' if sign > 0 else ''}{'xy'[axis]}: x must point "
+                    "downstream, y up"
+                )
+        across, total = np.zeros(3), 0.0
+        for joint, numbers in zip(self.joints, self.of_joints, strict=True):
+            if joint.lower == "foundation" != joint.upper:
+                sizes = sizes_of(self.regions[joint.region])
+                across += sizes @ self.normals_from_rock(joint, numbers)
+                total += sizes.sum()
+        if across[1] < -FACING * total:
+            raise self.bad("the rock lies above the dam: y must point up")
+        if abs(across[2]) > MOSTLY * total:
+            raise self.bad("the joint on the rock faces along z: y must point up, z along the dam")
+
+    def normals_from_rock(self, joint: Joint, numbers: IntArray) -> Array:
+        """Unit normals of a joint's elements, by their numbers as sides, into its upper body."""
+        surface = self.regions[joint.region]
+        upper = self.body_of[self.owners] == list(self.solids).index(joint.upper)
+        sides, owners = self.sides[upper], self.owners[upper]
+        order = np.argsort(sides)
+        above = owners[order][np.searchsorted(sides[order], numbers)]
+        normals = surface.unit_normals()
+        out = self.middles[above] - surface.middles()
+        normals[np.einsum("ij,ij->i", normals, out) < 0] *= -1
+        return normals
+
     def check_holes(self) -> None:
         """Raise InputError if elements of the surface are in no face, though only one face, or
         several that the same water presses on, are around them.
@@ -579,10 +656,10 @@ class UserGeometry:
                 )
                 if (faces and not rest) or (faces - {TOP} and to_end):
                     listed = " and ".join(names[side] for side in sorted(faces))
-                    raise self.bad(
-                        f"{listed}: has a hole; {len(part.elements)} elements of the surface are "
-                        f"in no face, one at {self.on_part(part)}"
-                    )
+                    number = len(part.elements)
+                    are = f"{number} elements are" if number > 1 else "1 element is"
+                    where = self.on_part(part)
+                    raise self.bad(f"{listed}: has a hole; {are} in no face, at {where}")
 
     def check_size(self) -> None:
         """Raise InputError if the geometry has a size that no dam has."""
