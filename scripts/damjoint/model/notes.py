@@ -124,7 +124,7 @@ def understood(case: Case) -> str:
         for joint in mesh.joints
     )
     parts = [
-        f"dam from y = {low:.5g} to {high:.5g} m",
+        f"dam {high - low:.5g} m high, from y = {low:.9g} to {high:.9g} m",
         f"joint{'s' if len(mesh.joints) > 1 else ''} {', '.join(joints)} from heel to toe",
         f"weight {weight / 1e6:.5g} {'MN' if mesh.dim == 3 else 'MN/m'}",
     ]
