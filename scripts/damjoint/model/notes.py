@@ -154,7 +154,7 @@ def notes_on_geometry(case: Case, mesh: Mesh) -> Iterator[str]:
         if side not in sides:
             water = "reservoir" if side == UP else "tailwater"
             yield f"no face {FACES[side]}: no pressure of the {water} on it"
-        elif case["face_load"] == "hydrostatic" and surface <= lowest[side]:
+        elif case["face_load"] == "hydrostatic" and surface < lowest[side]:
             yield (
                 f"the {what}, {surface:g} m, does not reach the dam's face {FACES[side]}, which "
                 f"begins at y = {lowest[side]:g} m"
