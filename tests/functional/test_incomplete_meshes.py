@@ -309,8 +309,8 @@ def test_a_complete_mesh_is_understood(plane, written):
     assert notes(case) == []
     slope = np.hypot(29, 41)
     assert understood(case) == (
-        "dam 45 m high, from y = 0 to 45 m; joint 38 m from heel to toe; weight 20.519 MN/m; under water: "
-        f"upstream 44 of 45 m, downstream {slope / 2:.4g} of {slope:.4g} m, "
+        "dam 45 m high, from y = 0 to 45 m; joint 38 m from heel to toe; weight 20.519 MN/m; "
+        f"under water: upstream 44 of 45 m, downstream {slope / 2:.4g} of {slope:.4g} m, "
         "crest surface 0 of 5 m"
     )
 

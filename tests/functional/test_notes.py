@@ -85,6 +85,8 @@ def test_settings_of_a_preset_cause_no_note(command, mine):
     preset = 'Include "presets/usace_uplift.case"; levels() = {9};'
     mine(preset)
     assert command(*COMMANDS["run"])[2] == "" and notes(load("mine.case")) == []
+    mine(preset + "levels() = {0};")  # empty: drains that never act
+    assert notes(load("mine.case")) == []
     mine(preset + "default_aperture_min = 1e-4;")
     assert notes(load("mine.case")) == ["aperture_min has no effect; it needs uplift = flow"]
     mine('default_quake_uplift = "zero";' + preset)

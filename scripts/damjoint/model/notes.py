@@ -95,7 +95,7 @@ def loads_in_part(case: Case) -> Iterator[str]:
     if case["ice_force"] and case["ice_level"] > highest and not case.geometry:
         yield f"ice_level = {case['ice_level']:g} m is above the water, {highest:g} m at most"
     for joint, name in zip(case.joints, case.joint_names, strict=True):
-        if has_drains(joint) and joint["drain_level"] >= highest:
+        if has_drains(joint) and joint["drain_level"] >= highest > 0:
             where = f"{name}: " if case.of_joints else ""
             yield (
                 f"{where}drain_level = {joint['drain_level']:g} m: the drains never act, the water "
