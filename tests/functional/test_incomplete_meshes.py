@@ -1,4 +1,4 @@
-"""Meshes of the user with a defect: each is refused, or what is missing is said."""
+"""Meshes of the user with a defect: each is refused, or a note names it."""
 
 from dataclasses import replace
 
@@ -143,7 +143,7 @@ def in_two_faces(mesh):
 
 FACES = "upstream", "downstream", "crest surface", "joint"
 OVERLAP = "its elements overlap at"
-#: Defects that are refused, and what is said.
+#: Defects that are refused, and the message.
 REFUSED = {
     "joint element": (without("joint", [4]), "dam and foundation also meet beside the joint, at"),
     "end of the joint": (without("joint", [0]), "also meet beside the joint"),
@@ -232,8 +232,8 @@ def with_slit(mesh):
     return with_elements(replace(mesh, points=points), "dam", cut)
 
 
-#: Defects that are said, since they may be meant.
-SAID = {
+#: Defects that a note names, since they may be intended.
+NOTED = {
     "upstream": (without("upstream"), LEVELS, "no face upstream: no pressure of the reservoir"),
     "lower half of upstream": (
         lambda mesh: with_elements(
@@ -295,9 +295,9 @@ SAID = {
 }
 
 
-@pytest.mark.parametrize("name", SAID)
-def test_what_a_mesh_lacks_is_said(plane, written, name):
-    defect, more, message = SAID[name]
+@pytest.mark.parametrize("name", NOTED)
+def test_what_a_mesh_lacks_is_noted(plane, written, name):
+    defect, more, message = NOTED[name]
     found = notes(load(written(defect(plane), more)))
     assert [note for note in found if message in note], found
     assert len(found) == 1 + (name == "slit"), found  # which is a cavity, too
@@ -376,7 +376,7 @@ def test_a_mesh_in_3d_with_a_defect_is_refused(solid, written, name):
     assert message in str(error.value)
 
 
-def test_what_a_mesh_in_3d_lacks_is_said(solid, written):
+def test_what_a_mesh_in_3d_lacks_is_noted(solid, written):
     assert notes(load(written(solid, SPACE))) == []
     (found,) = notes(load(written(without("upstream")(solid), SPACE)))
     assert "no face upstream" in found

@@ -5,6 +5,7 @@ import json
 import pytest
 from damjoint import InputError
 from damjoint import library as dj
+from damjoint.gui.numbers import warnings
 from damjoint.model.case import load
 from damjoint.model.constraints import STAGED, WORKS
 from damjoint.model.notes import notes
@@ -78,6 +79,23 @@ def test_notes_are_stored_and_reported(command, mine, tmp_path):
         assert json.loads((tmp_path / "out" / "run.json").read_text())["notes"] == [note]
     command("report", "out", "--to", "report.html")
     assert note in (tmp_path / "report.html").read_text()
+
+
+def test_the_window_shows_the_notes(mine):
+    mine("default_G_t = 500; levels() = {9};")
+    with pytest.warns(UserWarning, match="G_t has no effect"):
+        results = dj.run("mine.case").results
+    assert "G_t has no effect; it needs law = bond" in warnings(results)
+
+
+def test_a_run_prints_what_it_understood_of_a_geometry(command, tmp_path):
+    words = "--set", "n_joint=6", "--set", "h_dam=15", "--set", "h_found=60", "--levels", "30"
+    words = *words, "--tail-levels", "4", "--no-fields", "--no-picture"
+    code, _, err = command("run", "stepped", *words)
+    line = "geometry: dam 45 m high, from y = 0 to 45 m; joint 38 m from heel to toe; weight 20.5"
+    assert code == 0 and err.startswith(f"damjoint: stepped: {line}") and err.count("\n") == 1
+    (note,) = json.loads((tmp_path / "out" / "stepped" / "run.json").read_text())["notes"]
+    assert err == f"damjoint: stepped: {note}\n" and "upstream 30 of 45 m" in note
 
 
 def test_settings_of_a_preset_cause_no_note(command, mine):
@@ -174,7 +192,7 @@ def test_a_row_of_a_sweep_in_which_a_load_never_acts_is_refused(command, mine):
         ("times() = {1, 1.5};", "the level 9 m at t = 2 is no load step"),
     ],
 )
-def test_what_acts_in_part_or_not_at_all_is_said(mine, text, note):
+def test_what_acts_in_part_or_not_at_all_is_noted(mine, text, note):
     mine(text + "levels() = {6, 9};")
     (found,) = notes(load("mine.case"))
     assert note in found
