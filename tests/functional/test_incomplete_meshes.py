@@ -322,6 +322,14 @@ def test_a_complete_mesh_may_be_elsewhere(plane, written, by):
     assert notes(case) == [] and mesh_of(case).user_geometry.height == pytest.approx(45)
 
 
+def test_the_critical_level_of_a_complete_mesh(plane, written, command):
+    """The search has no highest level. The heel is at 560 m above the sea."""
+    path = written(plane.moved((0, 560, 0)), "default_pena_tang = 0; default_order = 1;")
+    code, out, err = command("critical", path, "--levels", "590,600")
+    assert code == 0 and "own: geometry: dam 45 m high, from y = 560 to 605 m" in err
+    assert "overturning" in out and 605 < float(out.split()[3]) < 650
+
+
 SPACE = "default_dim = 3; levels() = {40};"
 
 

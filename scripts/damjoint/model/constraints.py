@@ -226,11 +226,11 @@ def check_levels(name: str, levels: Sequence[float], highest: float) -> None:
 
 def check_levels_on_mesh(name: str, levels: Sequence[float], low: float, high: float) -> None:
     """Water levels [m] at a dam of one's own geometry between two heights [m]: as of a section, at
-    most twice its height above its lowest point.
+    most twice its height above its lowest point. (Infinite: the search of a critical level.)
     """
     limit = low + constants()["highest_level"][0] * (high - low)
     for level in levels:
-        if level > limit:
+        if limit < level < math.inf:
             raise InputError(
                 f"{name} = {level:g}: must be at most {limit:g} m, twice the dam's height above "
                 f"its lowest point (the geometry's dam is from y = {low:g} to {high:g} m)"
