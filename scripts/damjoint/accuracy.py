@@ -21,6 +21,7 @@ from . import RunError
 from .classes import dataclass
 from .engines import OnStep, Outcome
 from .model.case import Case, has_plane_fields
+from .model.notes import remarks
 from .model.results import Results
 from .statics.verdict import stiffness_ratio
 
@@ -110,8 +111,18 @@ def solve(case: Case, engine: ModuleType, on_step: OnStep, fields: bool) -> Iter
     """Yield the outcomes of a case's scenes, each on the mesh that the case's accuracy requires; on
     the case's own mesh if it requires none.
 
-    Adds `error_estimate` to the content of run.json. Raises RunError.
+    Adds `notes` and `error_estimate` to the content of run.json. Raises RunError.
     """
+    known = {"notes": remarks(case)}
+    for outcome in solve_scenes(case, engine, on_step, fields):
+        outcome.result.info |= known
+        yield outcome
+
+
+def solve_scenes(
+    case: Case, engine: ModuleType, on_step: OnStep, fields: bool
+) -> Iterator[Outcome]:
+    """See `solve`."""
     if not case.accuracy:
         yield from engine.solve(case, on_step, fields)
         return

@@ -256,21 +256,11 @@ def do_run(arguments: argparse.Namespace) -> int:
 
 def run_and_print(arguments: argparse.Namespace, drawing: DrawingProcess | None) -> int:
     """Run a case and print its results; drawing: draws its pictures (None: there are none)."""
-    from .model import parameters
-    from .model.case import load
     from .post import summary
     from .runner import run
     from .statics.verdict import failed, hints, path_statement, statement, verdict
 
-    case = load(
-        arguments.case,
-        parameters.settings(arguments.settings),
-        arguments.levels,
-        arguments.tail_levels,
-        arguments.steps,
-        arguments.accuracy,
-    )
-    note_settings(case)
+    case = load_case(arguments, arguments.case)
     out = arguments.out or Path("out") / case.name
     fields, picture = not arguments.no_fields, drawing is not None
     code = 0
@@ -311,15 +301,9 @@ def add_check(commands: Commands) -> None:
 
 def do_check(arguments: argparse.Namespace) -> int:
     """Run damjoint check; 1 if a safety factor is too low."""
-    from .model import parameters
-    from .model.case import load
     from .studies.check import check_cases, text_table
 
-    settings = parameters.settings(arguments.settings)
-    water = arguments.levels, arguments.tail_levels
-    cases = [load(name, settings, *water, accuracy=arguments.accuracy) for name in arguments.cases]
-    for case in cases:
-        note_settings(case)
+    cases = [load_case(arguments, name) for name in arguments.cases]
     if any(case["dim"] == 3 for case in cases):
         warn_if_slow()
     checks = check_cases(cases, arguments.out)
@@ -390,21 +374,23 @@ def do_gui(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def note_settings(case: Case) -> None:
-    """Print notes on the parameters that a case sets in vain, and on unusual values."""
-    from .model.constraints import USUAL
-    from .model.parameters import declared
+def load_case(arguments: argparse.Namespace, name: str) -> Case:
+    """Load a case with the options of a command, and print the remarks on it."""
+    from .model import parameters
+    from .model.case import load
+    from .model.notes import remarks
 
-    known, ineffective = declared(), case.ineffective
-    notes = [f"{name} has no effect; it needs {known[name].matters}" for name in ineffective]
-    notes += [
-        f"{name} = {value:g} {known[name].unit} is unusual ({USUAL[name][0]:g} to "
-        f"{USUAL[name][1]:g}); is it in another unit?"
-        for name, value in case.unusual.items()
-        if name not in ineffective
-    ]
-    for note in notes:
-        print(f"damjoint: {case.name}: {note}", file=sys.stderr)
+    options = ("levels", "tail_levels", "steps", "accuracy", "record")
+    given = {option: getattr(arguments, option, None) for option in options}
+    case = load(name, parameters.settings(arguments.settings), **given)
+    for remark in remarks(case):
+        print_note(case, remark)
+    return case
+
+
+def print_note(case: Case, note: str) -> None:
+    """Print a note on a case to standard error."""
+    print(f"damjoint: {case.name}: {note}", file=sys.stderr)
 
 
 def warn_if_slow() -> None:
@@ -501,17 +487,10 @@ def add_critical(commands: Commands) -> None:
 
 def do_critical(arguments: argparse.Namespace) -> int:
     """Run damjoint critical; 1 if there is no critical value or it is not confirmed."""
-    from .model import parameters
     from .studies.critical import critical
 
-    answer, lines = critical(
-        arguments.case,
-        arguments.of,
-        parameters.settings(arguments.settings),
-        arguments.levels,
-        arguments.tail_levels,
-        arguments.out,
-    )
+    case = load_case(arguments, arguments.case)
+    answer, lines = critical(case, arguments.of, arguments.out)
     print("\n".join(lines))
     return int(not answer.confirmed)
 
@@ -549,21 +528,11 @@ def add_quake(commands: Commands) -> None:
 def do_quake(arguments: argparse.Namespace) -> int:
     """Run damjoint quake; 1 if there is no static equilibrium after the earthquake."""
     from .engines import engine_of
-    from .model import parameters
-    from .model.case import load
     from .studies import quake, quake_getdp
     from .studies.quake_result import QuakeResult, text
 
-    case = load(
-        arguments.case,
-        parameters.settings(arguments.settings),
-        arguments.levels,
-        arguments.tail_levels,
-        arguments.steps,
-        record=arguments.record,
-    )
+    case = load_case(arguments, arguments.case)
     engine_of(case, arguments.engine)
-    note_settings(case)
     if arguments.engine == "getdp" and arguments.fields:
         raise InputError("--fields: must not be given with --engine getdp")
     if case["dim"] == 3 and arguments.engine != "getdp":
@@ -650,7 +619,6 @@ def add_sweep(commands: Commands) -> None:
 def do_sweep(arguments: argparse.Namespace) -> int:
     """Run damjoint sweep."""
     from .model import parameters
-    from .model.case import load
     from .studies.plan import cases_of, plan_of, sample_of
     from .studies.sweep import meshed, sweep
 
@@ -662,18 +630,12 @@ def do_sweep(arguments: argparse.Namespace) -> int:
     sample = sample_of(arguments.sample, **options) if arguments.sample else None
     plan = plan_of(arguments.vary, arguments.tie, sample, settings, arguments.critical)
     plan = dataclasses.replace(plan, slip_limit=arguments.quake)
-    case = load(
-        arguments.case,
-        settings,
-        arguments.levels,
-        arguments.tail_levels,
-        arguments.steps,
-        arguments.accuracy,
-    )
+    case = load_case(arguments, arguments.case)
     if case.accuracy:
         case, estimate = meshed(case)
         print(f"mesh of all rows, refined for the unchanged case: {estimate}")
-    count, rows = sweep(case, plan, out, arguments.jobs, arguments.scheduler)
+    on_note = partial(print_note, case)
+    count, rows = sweep(case, plan, out, arguments.jobs, arguments.scheduler, on_note)
     print(f"{count} rows computed; {out}")
     loaded = () if plan.sampled else cases_of(case, plan)
     cases = [row_case for _, row_case in loaded]

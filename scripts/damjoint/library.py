@@ -10,6 +10,7 @@ Only `Run.save` writes to disk.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from html import escape
@@ -26,6 +27,7 @@ from .engines.condensed.solve import threads_of
 from .laws import LAWS, Law
 from .model.case import Case, load
 from .model.fields import Solution
+from .model.notes import notes
 from .model.results import HISTORY, Results, joint_columns
 from .progress import track
 from .solver.load_stepper import LoadStepper
@@ -95,6 +97,13 @@ def case(
 def as_case(source: Case | str | Path) -> Case:
     """A case as it is, or that of a name or path."""
     return source if isinstance(source, Case) else case(source)
+
+
+def noted(case: Case) -> Case:
+    """The case, after a warning for each note on it: settings without effect, loads in part, ..."""
+    for note in notes(case):
+        warnings.warn(f"{case.name}: {note}", stacklevel=3)
+    return case
 
 
 def as_list(levels: Sequence[float] | float | None) -> list[float] | None:
@@ -307,7 +316,12 @@ def run(source: Case | str | Path, *, engine: str = "auto") -> Run:
         InputError: the engine can not run the case.
         RunError: the case could not be computed.
     """
-    single = replace(as_case(source), also_uplift=())
+    return solved(noted(as_case(source)), engine)
+
+
+def solved(case: Case, engine: str = "auto") -> Run:
+    """See `run`; without notes."""
+    single = replace(case, also_uplift=())
     scenes = accuracy.solve(single, engine_of(single, engine), lambda scene, time: None, True)
     outcome = next(scenes)
     if outcome.error:
@@ -348,7 +362,7 @@ def fill(source: Case | str | Path) -> Iterator[Step]:
         InputError: bad input.
         RunError: a step could not be computed.
     """
-    case = as_case(source)
+    case = noted(as_case(source))
     threads = threads_of(case)
     with limited_threads(threads):
         stepper = LoadStepper(case)
@@ -380,9 +394,9 @@ def check(cases: Case | str | Path | Sequence[Case | str | Path]) -> list[Safety
     combinations = [as_case(combination) for combination in listed]
     for combination in combinations:
         check_has_section(combination)
-    return [
-        check for combination in combinations for check in compare_joints(run(combination).results)
-    ]
+        noted(combination)
+    runs = map(solved, combinations)
+    return [check for run in runs for check in compare_joints(run.results)]
 
 
 @dataclass(frozen=True, repr=False)
@@ -446,7 +460,8 @@ def critical(
     """
     from .studies.critical import Search
 
-    chosen = as_case(source).varied(parameters, as_list(levels), as_list(tail_levels))
+    varied = as_case(source).varied(parameters, as_list(levels), as_list(tail_levels))
+    chosen = noted(varied)
     search = Search(on_fixed_mesh(chosen), of)
     return Critical(search.run(), search)
 
@@ -553,16 +568,19 @@ def sweep(
         InputError: bad input.
         RunError: the mesh for an accuracy could not be computed, or a process was killed.
     """
-    from .studies.sweep import check_jobs, compute, planned
+    from .studies.sweep import check_jobs, compute, notes_on_rows, planned
 
     check_jobs(jobs)
     if not values and not sample:
         raise InputError("sweep: must have values or a sample, such as mu=[0.8, 1.0]")
     axes = [(name, listed(name, np.atleast_1d(v).tolist())) for name, v in values.items()]
     plan = plan_with(axes, list((tie or {}).items()), sample, {}, critical)
-    rows = list(planned(on_fixed_mesh(as_case(source)), plan))
+    base = noted(as_case(source))
+    rows = list(planned(on_fixed_mesh(base), plan))
     tasks = {key: task for key, _, task in rows}
     computed = compute(tasks, jobs)
+    for note in notes_on_rows(base, [task.case for task in tasks.values()]):
+        warnings.warn(f"{base.name}: {note}", stacklevel=2)
     results = dict(track(computed, "sweep", len(tasks)) if progress else computed)
     cells = [{column_of(n): v for n, v in row.items()} | results[key] for key, row, _ in rows]
     return Sweep(plan, by_column(cells))

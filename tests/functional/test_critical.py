@@ -430,7 +430,7 @@ def test_an_interrupted_search_writes_its_results_so_far(monkeypatch, tmp_path):
 
     monkeypatch.setattr(FailurePath, "advance", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        critical("c", "level", {"pena_tang": 0.0}, out=tmp_path / "out")
+        critical(load("c", {"pena_tang": 0.0}), "level", tmp_path / "out")
     assert (tmp_path / "out/critical.csv").read_text().count("\n") > 4
     record = json.loads((tmp_path / "out/run.json").read_text())
     assert record["state"] == "interrupted" in record["statement"]

@@ -78,7 +78,7 @@ def laws_agree(law_name, seed, works):
         }
         | OWN.get(law_name, {})
     )
-    case = load("ssnp142", changed | {"law": law_name})
+    case = load("ssnp142", changed | {"law": law_name}, [0.0] * 200)
     jumps = random_path(law_name, seed, case)
     expected = law.evaluate(law_name, jumps, settings=changed)
     model, variables = case.law, case.law.initial(1)
@@ -118,7 +118,7 @@ def test_the_tangent_is_the_derivative(law_name, works):
         }
         | OWN.get(law_name, {})
     )
-    case = load("ssnp142", settings | {"law": law_name})
+    case = load("ssnp142", settings | {"law": law_name}, [0.0] * 200)
     model = case.law
     jumps = random_path(law_name, 7, case)
     before = 0.1 * jumps * [-1, 1, 1]
@@ -350,7 +350,7 @@ def test_a_face_that_is_not_divided_where_bodies_meet_is_refused(tmp_path):
     """Its elements are those of a single curve of the mesh."""
     path, joints = tmp_path / "own.msh", {"base": (0, 0, 10, 0), "lift": (0, 5, 10, 5)}
     write_blocks(path, {"low": (0, 0, 10, 5), "high": (0, 5, 10, 12)}, joints)
-    (tmp_path / "own.case").write_text('geometry = "own.msh";')
+    (tmp_path / "own.case").write_text('geometry = "own.msh"; levels() = {5};')
     solve.check(load(str(tmp_path / "own.case")))
     lines = path.read_text().splitlines()
     (upstream,) = (line.split()[1] for line in lines if line.endswith('"upstream"'))

@@ -227,7 +227,11 @@ def test_water_in_a_contraction_joint_up_to_its_waterstop(waterstop, order):
         (CONTRACTION, {}, "also meet beside the joint"),
         (BASES | CONTRACTION | {"free": (0, 8, 0, 2)}, {}, "joint free: must lie between two"),
         (BASES | CONTRACTION | {"edge": (0, 5, 5, 5)}, {}, "inside a body it must not touch"),
-        (BASES | CONTRACTION, {"mu": (0.5, 0.6)}, "lists of 2 values: must have one for each"),
+        (
+            BASES | CONTRACTION,
+            {"mu": (0.5, 0.6)},
+            "mu = 0.5,0.6: must be one value, or one for each joint of the geometry (3: ",
+        ),
         (BASES | CONTRACTION, {"lift_heights": (5.0,)}, "lift_heights: must not be set"),
         (
             BASES | CONTRACTION,

@@ -55,6 +55,14 @@ def test_path_of_a_grouted_joint(command, tmp_path):
     assert_allclose(table["thickness"], [0, 1.00005e-3, 1.00005e-3], rtol=1e-12)
 
 
+def test_works_after_the_end_of_the_path_are_refused(command, tmp_path):
+    (tmp_path / "path.csv").write_text("delta_n,delta_t1,delta_t2\n1e-3,0,0\n1e-3,0,0\n")
+    words = "--set", "saw_thickness=1e-3", "--set", "saw_t=3"
+    code, out, err = command("law", "rupture", "--path", "path.csv", *words)
+    assert (code, out) == (2, "") and "saw_t = 3: must be < 3" in err
+    assert command("law", "rupture", "--path", "path.csv", *words[:3], "saw_t=2")[0] == 0
+
+
 def test_friction_without_a_pressure_column(command, tmp_path):
     (tmp_path / "path.csv").write_text("delta_n, delta_t1, delta_t2\n-1e-8, 3e-9, 0\n")
     settings = "K_N=1e12", "K_T=2e12", "mu=0.35", "adhesion=1000", "pena_tang=0"

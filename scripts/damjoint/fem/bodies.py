@@ -13,8 +13,8 @@ from ..classes import dataclass
 from ..csr import CsrMatrix
 from ..model.case import Case
 from ..model.loads import COMPLETE, across, thermal_strains, wet
-from ..model.mesh import LINES, Body, Mesh, mesh_of
-from ..model.scene import MATERIALS
+from ..model.mesh import Body, Mesh, mesh_of
+from ..model.scene import LINES, MATERIALS
 from .elasticity import (
     Distribution,
     Material,

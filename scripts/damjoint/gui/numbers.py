@@ -200,7 +200,8 @@ def table_of_levels(result: Results) -> Table:
 
 
 def warnings(result: Results) -> list[str]:
-    """The hints that the command line prints below its table."""
+    """The remarks and hints that the command line prints before and below its table."""
     path = [path_statement(result)] if result.case["drive"] != "level" else []
     accuracy = result.info.get("error_estimate", {}).get("statement")
-    return [*path, *hints(result), *([accuracy] if accuracy else [])]
+    notes = result.info.get("notes", [])
+    return [*notes, *path, *hints(result), *([accuracy] if accuracy else [])]

@@ -28,3 +28,15 @@ class Body:
     def middles(self) -> Array:
         """The middle of each element (elements, 3)."""
         return np.concatenate([self.points[table].mean(axis=1) for _, table in self.cells])
+
+    def unit_normals(self) -> Array:
+        """Unit normals (elements, 3) of a surface, by the order of its elements' nodes."""
+        directions = [np.zeros((0, 3))]
+        for _, table in self.cells:
+            edges = self.points[table[:, 1:3]] - self.points[table[:, :1]]
+            if table.shape[1] == 2:  # a line in the plane
+                across = np.column_stack([edges[:, 0, 1], -edges[:, 0, 0], np.zeros(len(table))])
+            else:
+                across = np.cross(edges[:, 0], edges[:, 1])
+            directions.append(across / np.linalg.norm(across, axis=1)[:, None])
+        return np.concatenate(directions)

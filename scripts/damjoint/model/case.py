@@ -17,6 +17,7 @@ from . import casefile
 from .arithmetic import number
 from .constraints import (
     USUAL,
+    check_acting,
     check_also_uplift,
     check_distances,
     check_drive,
@@ -81,6 +82,18 @@ class Source:
     tail_levels: str | Sequence[float] | None = None
     steps: int | None = None
     accuracy: str | None = None
+
+    def check_lists(self, joints: Sequence[str]) -> None:
+        """Raise InputError if a list has not one value for each joint of a geometry, by their
+        names.
+        """
+        overrides = {name: checked(name, value) for name, value in self.overrides.items()}
+        for name, values in lists_of_joints({**self.text.of_joints, **overrides}).items():
+            if len(values) != len(joints):
+                raise InputError(
+                    f"{name} = {','.join(map(str, values))}: must be one value, or one for each "
+                    f"joint of the geometry ({len(joints)}: {', '.join(joints)})"
+                )
 
     def with_overrides(self, overrides: Settings) -> Source:
         """The source with further overrides, which win."""
@@ -158,13 +171,15 @@ class Case(ParameterValues):
 
     @property
     def given(self) -> dict[str, Setting]:
-        """The parameters that a user has set: in a case file of their own, or beside it."""
+        """The parameters that a user has set: in a case file of their own, or beside it; not what a
+        case or preset of the package sets.
+        """
         if self.source is None:
             return {}
-        packaged = self.source.path.resolve().parent == CASES.resolve()
         text, known = self.source.text, declared()
-        of_file = {} if packaged else {**text.defaults, **text.of_joints}
-        return {n: v for n, v in {**of_file, **self.source.overrides}.items() if n in known}
+        of_file = {**text.defaults, **text.of_joints}
+        of_user = {n: v for n, v in of_file.items() if n in text.of_user}
+        return {n: v for n, v in {**of_user, **self.source.overrides}.items() if n in known}
 
     @property
     def ineffective(self) -> tuple[str, ...]:
@@ -235,16 +250,10 @@ class Case(ParameterValues):
     def with_joints(self, joints: Sequence[OfJoint]) -> Case:
         """The case of a user's own geometry, with the names and ends of its joints.
 
-        Raises InputError if the case has lists of another length, or drains or a waterstop beyond
-        the end of a joint.
+        Raises InputError if the case has drains or a waterstop beyond the end of a joint.
         """
         same = [replace(joint, hardening_asked=self.hardening_asked) for joint in joints]
         known = self.of_joints or same
-        if len(known) != len(joints):
-            raise InputError(
-                f"case {self.name}: lists of {len(known)} values: must have one for each joint of "
-                f"the geometry ({len(joints)}: {', '.join(joint.name for joint in joints)})"
-            )
         ends = [self.section | joint.section for joint in joints]
         of_joints = (
             replace(joint, values=own.values, section=section, hardening_asked=own.hardening_asked)
@@ -536,27 +545,34 @@ def resolve(source: Source) -> Case:
     return with_drive_times(result)
 
 
+def lists_of_joints(settings: Settings) -> dict[str, tuple[Value, ...]]:
+    """The settings that are lists, with a value for each joint."""
+    return {n: v for n, v in settings.items() if isinstance(v, tuple)}
+
+
 def settings_of_joints(
     settings: Settings, lifts: tuple[float, ...], geometry: Path | None
 ) -> list[dict[str, Value]]:
     """The settings of each joint, from the lowest.
 
     lifts: heights of the joints above the first [m]. Raises InputError if a list has another length
-    than there are joints.
+    than there are joints; of a geometry of one's own the mesh has them: until it is read, see
+    `Source.check_lists`, there are as many as the longest list has values.
     """
+    lists = lists_of_joints(settings)
     single = {n: v for n, v in settings.items() if not isinstance(v, tuple)}
-    lists = {n: v for n, v in settings.items() if isinstance(v, tuple)}
     if geometry and lifts:
         raise InputError(
             "lift_heights: must not be set for a geometry of one's own, whose mesh has the joints"
         )
     number = max([1, *map(len, lists.values())]) if geometry else 1 + len(lifts)
     for name, values in lists.items():
-        if len(values) != number:
+        if len(values) != number and not geometry:
             raise InputError(
                 f"{name} = {','.join(map(str, values))}: must be one value, or as many as there "
                 f"are joints ({number})"
             )
+        lists[name] = values + values[-1:] * (number - len(values))
     heights = {} if geometry else {"joint_height": lifts}
     return [
         {
@@ -627,6 +643,7 @@ def check_joints(case: Case) -> None:
     for joint, name in zip(case.joints, case.joint_names, strict=True):
         try:
             check_values(joint, joint.section, joint.geometry is None)
+            check_acting(joint, joint.times[-1])
         except InputError as error:  # of a value for all joints the first one
             where = "" if joint is case.joints[0] else f"{name}: "
             raise InputError(f"{where}{error}") from None

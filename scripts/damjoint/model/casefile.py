@@ -58,6 +58,8 @@ class CaseText:
     texts: dict[str, str] = field(default_factory=dict)
     #: values of each joint, by parameter
     of_joints: dict[str, tuple[Value, ...]] = field(default_factory=dict)
+    #: parameters and lists that a file of the user sets last, not one of the package
+    of_user: set[str] = field(default_factory=set, compare=False)
     #: number of files read
     files: int = field(default=0, compare=False)
 
@@ -152,6 +154,7 @@ def add_statement(case: CaseText, statement: list[Token], path: Path, where: str
         read_into(case, file)
     elif name in LISTS and tokens[1:4] == ("(", ")", "="):
         case.lists[name] = numbers(items_of(kinds[4:], tokens[4:], where), case, where)
+        note_owner(case, name, path)
     elif name in TEXTS and tokens[1:2] == ("=",):
         if kinds[2:] != ("text",):
             raise InputError(f'{where}: must be {name} = "words"')
@@ -167,6 +170,7 @@ def add_statement(case: CaseText, statement: list[Token], path: Path, where: str
         value = value_in((kinds[2:], tokens[2:]), known, case, where)
         with located(where):
             case.defaults[name] = known.check(value)
+        note_owner(case, name, path)
     elif tokens[1:4] == ("(", ")", "=") and name in declared():
         items = items_of(kinds[4:], tokens[4:], where)
         values = tuple(value_in(item, parameter(name), case, where) for item in items)
@@ -174,6 +178,7 @@ def add_statement(case: CaseText, statement: list[Token], path: Path, where: str
             checked(name, values)
         case.defaults.pop(name, None)
         case.of_joints[name] = values
+        note_owner(case, name, path)
     else:
         import difflib
 
@@ -188,6 +193,14 @@ def add_statement(case: CaseText, statement: list[Token], path: Path, where: str
             + ", ".join(f"{n}() = {{...}}" for n in LISTS)
             + ", <parameter of a joint>() = {...}"
         )
+
+
+def note_owner(case: CaseText, name: str, path: Path) -> None:
+    """Note whether a parameter or list is set by a file of the user or by one of the package."""
+    if data("cases").resolve() in path.resolve().parents:
+        case.of_user.discard(name)
+    else:
+        case.of_user.add(name)
 
 
 @contextlib.contextmanager

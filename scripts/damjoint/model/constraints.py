@@ -48,6 +48,18 @@ LEAST_MODULUS = 1e6
 #: Value of added_mass: Zangar's pressure in place of Westergaard's.
 ZANGAR = 2
 
+#: Loads that grow linearly from t = <name>_t - 1 to <name>_t, by the parameters that are 0 without
+#: them; and works on the joint, which do so, too.
+STAGED = {
+    "silt": ("silt_height",),
+    "ice": ("ice_force",),
+    "force": ("force_x", "force_y"),
+    "anchor": ("anchor_force",),
+    "quake": ("k_h", "k_v"),
+    "temperature": ("temperature_dam", "temperature_linear", "temperature_found"),
+}
+WORKS = {"grout": ("grout_pressure",), "saw": ("saw_thickness",)}
+
 #: Limits of the numbers of steps between two levels, and of levels, each of which has its table.
 MOST_STEPS, MOST_LEVELS = 100_000, 10_000
 
@@ -266,6 +278,31 @@ def check_levels(name: str, levels: Sequence[float], highest: float) -> None:
             limit = f"between 0 and {highest:g} m, twice the dam's height"
             raise InputError(
                 f"{name} = {level:g}: must be {limit if highest < math.inf else '>= 0'}"
+            )
+
+
+def check_levels_on_mesh(name: str, levels: Sequence[float], low: float, high: float) -> None:
+    """Water levels [m] at a dam of one's own geometry between two heights [m]: as of a section, at
+    most twice its height above its lowest point. (Infinite: the search of a critical level.)
+    """
+    limit = low + constants()["highest_level"][0] * (high - low)
+    for level in levels:
+        if limit < level < math.inf:
+            raise InputError(
+                f"{name} = {level:g}: must be at most {limit:g} m, twice the dam's height above "
+                f"its lowest point (the geometry's dam is from y = {low:g} to {high:g} m)"
+            )
+
+
+def check_acting(case: ParameterValues, end: float) -> None:
+    """Loads and works: not such as begin only when the loading ends, at a time."""
+    for name, values in (STAGED | WORKS).items():
+        acting, time = [n for n in values if case[n]], case[f"{name}_t"]
+        if acting and time - 1 >= end:
+            raise InputError(
+                f"{name}_t = {time:g}: must be < {end + 1:g}, as the loading ends at t = {end:g} "
+                f"(level number i is reached at t = i): {acting[0]} = {case[acting[0]]:g}, which "
+                f"begins at {name}_t - 1, would never act"
             )
 
 

@@ -13,12 +13,9 @@ import numpy as np
 
 from ..arrays import Array
 from .case import Case, flows
-from .constraints import ZANGAR
+from .constraints import STAGED, ZANGAR
 from .parameters import TINY
 from .scene import DOWN, SIDES, TAILWATER, TOP, UP
-
-#: Loads that grow linearly from t = <name>_t - 1 to t = <name>_t.
-STAGED = ("silt", "ice", "force", "anchor", "quake", "temperature")
 
 
 @dataclass(frozen=True)
@@ -42,7 +39,7 @@ class Loading:
 
     def part(self, name: str) -> float:
         """The factor of a load of STAGED."""
-        return self.grown[STAGED.index(name)]
+        return self.grown[list(STAGED).index(name)]
 
 
 def heads_at_ends(

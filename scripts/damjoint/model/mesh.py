@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import itertools
 import re
 import time
 from collections.abc import Mapping
@@ -21,9 +20,23 @@ from ..csr import CsrMatrix
 from ..storage import check_end
 from .body import Body as Body
 from .case import Case, OfJoint, has_drains
+from .constraints import check_levels_on_mesh
 from .cut import cut
 from .parameters import assignments, constants, listing, start_gmsh
-from .scene import BED, DOWN, FLOOR, SIDES, TAILWATER, TOP, UP, Joint, numbered, stacked
+from .scene import (
+    BED,
+    DOWN,
+    FLOOR,
+    LINES,
+    SIDES,
+    TAILWATER,
+    TOP,
+    UP,
+    Joint,
+    numbered,
+    stacked,
+)
+from .user_geometry import NamedFace, UserGeometry
 
 #: Parameters that the mesh always depends on.
 GEOMETRY = (
@@ -37,6 +50,15 @@ MARKS = {
     "anchor_force": ("anchor_at",),
     "force_x": ("force_face", "force_at"),
     "force_y": ("force_face", "force_at"),
+}
+
+#: Regions of a user's own geometry by the parameters that need them.
+LOADED = {
+    "hold_z": "sides",
+    "ice_force": "ice",
+    "anchor_force": "anchor",
+    "force_x": "force",
+    "force_y": "force",
 }
 
 #: Codimension of the regions; their numbers are in pro/parameters.pro.
@@ -56,8 +78,6 @@ REGIONS = {
 }
 #: Regions of which each joint has its own.
 OF_JOINTS = ("dam", "joint", "heel", "toe")
-#: Regions of line forces.
-LINES = ("ice", "force", "anchor")
 #: Regions that every geometry has.
 NEEDED = ("dam", "foundation", "joint", "fixed", "heel", "toe", "crest")
 
@@ -266,7 +286,29 @@ def mesh_of(case: Case) -> Mesh:
     if not mesh.is_current:
         mesh_of_own.cache_clear()
         mesh = mesh_of_own(geometry)
+    check_loads(case, mesh)
     return mesh
+
+
+def check_loads(case: Case, mesh: Mesh) -> None:
+    """Raise InputError if the mesh of a user's own geometry lacks what a load or support of the
+    case acts on, or if its levels or lists of values are not those of this dam.
+    """
+    for name, region in LOADED.items():
+        needed = case[name] and (name != "hold_z" or mesh.dim == 3)
+        if needed and region not in mesh.bodies:
+            own = {what: n for n, what in OWN_NAMES.items()}[region]
+            raise InputError(
+                f"{name} = {case[name]:g}: must be 0, or geometry = {case.geometry} have the "
+                f"region {own}"
+            )
+    if case.source:
+        case.source.check_lists([joint.name for joint in mesh.joints])
+    heights = mesh.user_geometry.concrete[:, 1]
+    low, high = float(heights.min()), float(heights.max())
+    if case["face_load"] == "hydrostatic":
+        for name, levels in (("levels", case.levels), ("tail_levels", case.tail_levels)):
+            check_levels_on_mesh(name, levels, low, high)
 
 
 #: Options of Gmsh by which geo/dam2d.geo chooses where element sizes come from; 1: the default.
@@ -305,7 +347,12 @@ def generate(case: Case) -> None:
                 gmsh.finalize()  # else Gmsh remains busy with a file that it could not read
                 raise InputError(f"geometry = {own}: {error}") from None
             raise RunError(f"mesh: {error}") from None
-    if own:  # tags from 1 on, for small tables by tag and small keys in GetDP
+    if own:
+        # format MSH 2.2 has an element once for each of its groups: a point that is heel and toe
+        ends = [e for d in range(int(case["dim"]) - 1) for e in gmsh.model.getEntities(d)]
+        if ends:  # else of all entities
+            gmsh.model.mesh.removeDuplicateElements(ends)
+        # tags from 1 on, for small tables by tag and small keys in GetDP
         gmsh.model.mesh.renumberNodes()
         gmsh.model.mesh.renumberElements()
 
@@ -348,6 +395,10 @@ class Mesh:
             name: self._body(dimension(name, self.dim), parts) for name, parts in groups.items()
         }
         self.solids = {name: self.bodies[name] for name in solids}
+        scene = self._own_scene(names) if self.own else stacked(names)
+        surfaces = [self._body(self.dim - 1, [(f"face{i}", f.tag)]) for i, f in enumerate(faces)]
+        if self.own:
+            self.user_geometry = self._checked(self.own, scene, faces, surfaces)
         self.joints = [
             JointMesh(
                 dim=self.dim,
@@ -359,11 +410,10 @@ class Mesh:
                 name=joint.name,
                 upper_tags=self._cut(joint),
             )
-            for joint in (self._own_scene(names) if self.own else stacked(names))
+            for joint in scene
         ]
         self.faces: dict[str, Face] = {}
-        for i, face in enumerate(faces):
-            surface = self._body(self.dim - 1, [(f"face{i}", face.tag)])
+        for face, surface in zip(faces, surfaces, strict=True):
             for body, part in self._by_body(surface, face.body):
                 self.faces[f"face{len(self.faces)}"] = Face(part, body, *face[2:])
         #: whether a face of a user's own geometry is part of several bodies
@@ -469,6 +519,18 @@ class Mesh:
             gmsh.model.addPhysicalGroup(d, entities, tag)
         return tuple(own or "joint" for own in joints), bodies, faces
 
+    def _checked(
+        self, file: Path, scene: list[Joint], faces: list[FaceRegion], surfaces: list[Body]
+    ) -> UserGeometry:
+        """The regions of a user's own geometry, complete."""
+        kinds = {what: name for name, what in OWN_FACES.items()}
+        named = [
+            NamedFace(kinds[face.body, face.side], face.body, face.side, surface)
+            for face, surface in zip(faces, surfaces, strict=True)
+        ]
+        regions = {name: body for name, body in self.bodies.items() if name not in self.solids}
+        return UserGeometry(file, self.dim, regions, self.solids, scene, named)
+
     def _own_scene(self, names: tuple[str, ...]) -> list[Joint]:
         """The joints of a user's own geometry, each between the two bodies that share it.
 
@@ -518,7 +580,7 @@ class Mesh:
             same = name in (joint.upper, joint.region, joint.heel, joint.toe)
             if not same and np.isin(surface.node_tags, other.node_tags).any():
                 raise self._bad(f"joint {joint.name}: inside a body it must not touch {name}")
-        normals = normals_of(surface)
+        normals = surface.unit_normals()
         heel, toe = (self.bodies[name].points.mean(axis=0) for name in (joint.heel, joint.toe))
         if self.dim == 2:
             way = toe - heel
@@ -598,8 +660,6 @@ class Mesh:
         its body.
         """
         gmsh = start_gmsh()
-        if self.own:
-            self._check_joints()
         kinds = {kind: name for name, kind in OWN_FACES.items()}
         surfaces = [("joint", joint.surface, self.solids[joint.lower]) for joint in self.joints]
         for face in self.faces.values():
@@ -612,30 +672,6 @@ class Mesh:
             surface.normals, turned = normals
             if self.own and turned.any():  # for GetDP, which goes by the elements
                 gmsh.model.mesh.reverseElements(surface.element_tags[turned])
-
-    def _check_joints(self) -> None:
-        """Raise InputError if the joints of a user's own geometry are unsuitable."""
-        on_joints = np.concatenate([joint.surface.node_tags for joint in self.joints])
-        for (name, body), (other, solid) in itertools.combinations(self.solids.items(), 2):
-            shared = np.intersect1d(body.node_tags, solid.node_tags)
-            apart = np.setdiff1d(shared, on_joints)
-            if len(apart):
-                x, y, z = self._coordinates[self._place[apart[0]]]
-                raise self._bad(
-                    f"{name} and {other} also meet beside the joint, at {x:g}, {y:g}, {z:g}"
-                )
-        for joint in self.joints:
-            heel, toe = (joint.ends[name][0] for name in ("heel_x", "toe_x"))
-            if toe < heel - 1e-9 * np.ptp(self._coordinates):
-                raise self._bad(
-                    f"toe at x = {toe:g}, heel at {heel:g}: x must point downstream (mirror it)"
-                )
-            if np.isin(joint.surface.node_tags, self.bodies["fixed"].node_tags).any():
-                raise self._bad("fixed: must not touch the joint")
-            if not sides(joint.surface, self.solids[joint.upper]).all():
-                raise self._bad(
-                    "joint: its elements must be sides of the dam's (a conforming mesh)"
-                )
 
     def bearer(self, line: str) -> str:
         """The first body, from the highest, that has all nodes of the crest or of a region of
@@ -738,25 +774,12 @@ def outward(surface: Body, body: Body) -> tuple[Array, BoolArray] | None:
     inside = cells_inside(surface, body)
     if (inside < 0).any():
         return None
-    normals = normals_of(surface)
+    normals = surface.unit_normals()
     from_body = surface.middles() - body.middles()[inside]
     inwards = np.einsum("ij,ij->i", normals, from_body) < 0
     normals[inwards] *= -1
     # without the mesh generator's rounding: a level joint's normal is (0, 1, 0)
     return np.round(normals, 12) + 0.0, inwards
-
-
-def normals_of(surface: Body) -> Array:
-    """Unit normals (elements, 3) of a surface, by the order of its nodes."""
-    directions = []
-    for _, table in surface.cells:
-        edges = surface.points[table[:, 1:3]] - surface.points[table[:, :1]]
-        if table.shape[1] == 2:  # a line in the plane
-            across = np.column_stack([edges[:, 0, 1], -edges[:, 0, 0], np.zeros(len(table))])
-        else:
-            across = np.cross(edges[:, 0], edges[:, 1])
-        directions.append(across / np.linalg.norm(across, axis=1)[:, None])
-    return np.concatenate(directions)
 
 
 def is_inside(surface: Body, body: Body) -> bool:

@@ -42,3 +42,6 @@ def stacked(names: Sequence[str]) -> list[Joint]:
 SIDES = UP, DOWN, TOP, FLOOR, BED = "up", "down", "top", "floor", "bed"
 #: Sides on which tailwater presses, not the reservoir.
 TAILWATER = DOWN, BED
+
+#: Regions of line forces.
+LINES = ("ice", "force", "anchor")

@@ -19,13 +19,14 @@ import numpy as np
 from scipy.optimize import bisect
 
 from .. import InputError
-from ..arrays import Setting, Settings
+from ..arrays import Setting
 from ..engines import Outcome
 from ..engines.condensed.solve import about
 from ..fem.memory import sizes
 from ..joint.interface import interface_of
 from ..laws import Evidence
-from ..model.case import Case, load, resolve
+from ..model.case import Case, resolve
+from ..model.notes import remarks
 from ..model.parameters import independent, parameter
 from ..model.results import Results, column_of, row_of_joint
 from ..post import folder as folders
@@ -636,21 +637,14 @@ def outwards(value: float, end: float) -> Iterator[float]:
 # --------------------------------------------------------------------------------------------------
 
 
-def critical(
-    case: str,
-    of: str,
-    settings: Settings | None = None,
-    levels: str | None = None,
-    tail_levels: str | None = None,
-    out: Path | None = None,
-) -> tuple[CriticalValue, list[str]]:
-    """Find a critical value and write its files below out (default out/CASE_critical).
+def critical(case: Case, of: str, out: Path | None = None) -> tuple[CriticalValue, list[str]]:
+    """Find a critical value of a case and write its files below out (default out/CASE_critical).
 
     Returns the result, and its lines of text. An interrupted search writes its trials.
     Raises InputError, RunError.
     """
-    search = Search(load(case, settings, levels, tail_levels), of)
-    name = search.own.name
+    search = Search(case, of)
+    name = case.name
     out = out or Path("out") / f"{name}_critical"
     folders.check_writable(out)
     start = time.perf_counter()
@@ -705,6 +699,7 @@ def write(search: Search, answer: CriticalValue, out: Path, seconds: float) -> N
         if answer.point:
             result = last_state(search, answer.point)
             entries = {"critical": as_json(search, answer), "wall_seconds": {"search": seconds}}
+            entries["notes"] = remarks(case)
             result.info = about(answer.point.model.equilibrium.bulk) | entries
             save(Outcome(result, lambda: None, dict, answer.error), case, out)
         write_csv(out / "critical.csv", table(search))

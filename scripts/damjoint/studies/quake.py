@@ -27,6 +27,7 @@ from ..fem.memory import sizes
 from ..joint.interface import interface_of
 from ..model.case import Case
 from ..model.fields import Field, Solution
+from ..model.notes import remarks
 from ..model.results import column_of
 from ..post import folder as folders
 from ..post import tables
@@ -162,6 +163,7 @@ class QuakeRun:
         quake, history, static = self.quake, self.history, self.static.results()
         static.info |= about(quake.problem.model.equilibrium.bulk)
         seconds = {name: value for name, value in self.seconds.items() if name != "steps"}
+        static.info |= {"notes": remarks(quake.case)}
         static.info |= {"quake": found, "versions": versions(), "wall_seconds": seconds}
         if not state:  # a joint that has slipped everywhere is no failure here
             static.info["verdict"] = "stands" if stands else "no equilibrium"

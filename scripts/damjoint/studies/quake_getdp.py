@@ -16,6 +16,7 @@ from ..engines.getdp import quake as engine
 from ..fem.bodies import Bodies
 from ..joint.interface import interface_of
 from ..model.case import Case
+from ..model.notes import remarks
 from ..post import folder as folders
 from ..post import tables
 from ..progress import Progress
@@ -144,6 +145,7 @@ def write(result: GetdpQuakeResult, found: engine.GetdpQuake, out: Path, state: 
     tables.write_csv(out / quake.ROWS, result.rows)
     getdp = static.info.pop("getdp")
     static.info |= {
+        "notes": remarks(result.case),
         "quake": result.summary,
         "versions": versions() | {"getdp": getdp["version"] or ""},
         "peak_memory_mb": getdp["peak_memory_mb"],

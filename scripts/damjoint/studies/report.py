@@ -260,6 +260,7 @@ def run_section(folder: Path, solution: Solution) -> RunSection:
         failures=failures,
         hints=[
             *filter(None, [which_joint(result), critical, earthquake(info), *info["hints"]]),
+            *info.get("notes", []),
             *filter(None, [discretisation_error(result)]),
         ],
         pictures=pictures_of(solution) if len(result.joint["time"]) else [],

@@ -24,6 +24,7 @@ from ..fem.cache import fingerprint
 from ..joint.interface import Interface, interface_of
 from ..model.case import Case, equal_steps, first_mesh, resolve, with_drive_times
 from ..model.mesh import mesh_of
+from ..model.notes import notes_on_settings
 from ..model.results import history_columns
 from ..progress import Progress, track
 from ..solver.load_stepper import LoadStepper
@@ -202,6 +203,16 @@ def planned(case: Case, plan: Plan) -> Iterator[tuple[str, Values, Task]]:
         yield key_of(varied, plan), row, task
 
 
+def notes_on_rows(case: Case, rows: Sequence[Case]) -> list[str]:
+    """The notes on rows that their case does not have, the first one on each parameter."""
+    own, lines = notes_on_settings(case), dict[str, str]()
+    for row in rows:
+        for note in notes_on_settings(row):
+            if note not in own:
+                lines.setdefault(note.split()[0], note)
+    return list(lines.values())
+
+
 def search_of(case: Case, quantity: str) -> Search:
     """The search of a row's critical value, with one step per level."""
     levels = {"levels": case.levels, "tail_levels": case.tail_levels}
@@ -356,8 +367,10 @@ def sweep(
     out: Path,
     jobs: int | None = None,
     scheduler: str | None = None,
+    on_note: Callable[[str], None] = lambda note: None,
 ) -> tuple[int, list[Row]]:
-    """Compute the rows of a plan that are missing in out (CSV).
+    """Compute the rows of a plan that are missing in out (CSV); on_note: called with each note on
+    rows before.
 
     Returns their number, and all rows of the plan. Columns: key, the plan's names (level as
     level_asked), the columns of history.csv, of an earthquake, OUTCOME, the critical value. Each
@@ -374,6 +387,8 @@ def sweep(
     with result_file(out, columns, (*of_steps, "failed")) as (file, done):
         missing = {key: task for key, _, task in rows if key not in done}
         computed = compute(missing, jobs, scheduler)
+        for note in notes_on_rows(case, [task.case for _, _, task in rows]):
+            on_note(note)
         count = 0
         try:
             for key, result in track(computed, f"sweep {case.name}", len(missing)):

@@ -10,6 +10,7 @@ import numpy as np
 from ... import RunError, data
 from ...arrays import Values
 from ...model.case import load
+from ...model.constraints import WORKS, check_acting
 from ...model.parameters import assignments, listing, parameter
 from ...storage import check_end
 from . import process
@@ -43,7 +44,12 @@ def evaluate(
     parameter("law").check(law)
     jumps = np.asarray(jumps, float).reshape(-1, 3)
     pressure = np.zeros(len(jumps)) if pressure is None else np.asarray(pressure, float)
-    values = load("dam", {**(settings or {}), "law": law}).values
+    given = {**(settings or {}), "law": law}
+    works = {f"{name}_t" for name in WORKS} & given.keys()  # their t are rows of the path
+    case = load("dam", {name: given[name] for name in given.keys() - works})
+    case = case.with_values({name: parameter(name).check(given[name]) for name in works})
+    check_acting(case, len(jumps))
+    values = case.values
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "line.msh").write_text(LINE_MESH)

@@ -16,9 +16,9 @@ from ... import InputError, RunError, data
 from ...arrays import Value
 from ...model.case import Case
 from ...model.chord import Chord
-from ...model.mesh import LINES, Mesh, area, heel_normal
+from ...model.mesh import Mesh, area, heel_normal
 from ...model.parameters import assignments, constants, declared, listing, quoted
-from ...model.scene import SIDES
+from ...model.scene import LINES, SIDES
 from ...storage import check_end
 
 #: Oldest suitable version of GetDP.

@@ -1,0 +1,185 @@
+"""What a user should know of a case before it is computed: settings without effect, unusual values,
+loads that act in part or not at all; of a geometry of one's own, what is understood of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from .case import Case, has_drains
+from .constraints import STAGED, USUAL, WORKS
+from .mesh import GEOMETRY, Mesh, mesh_of
+from .parameters import declared
+from .scene import BED, DOWN, FLOOR, TAILWATER, TOP, UP
+from .user_geometry import LOWEST, size_below
+
+#: Parameters of the section and its mesh that a user's .geo file may use and a mesh does not.
+OF_SECTION = (
+    *(n for n in GEOMETRY if n not in ("dim", "n_joint")),
+    *("ice_level", "force_face", "force_at", "anchor_at"),
+)
+#: Names of the faces, for messages.
+FACES = {
+    UP: "upstream",
+    DOWN: "downstream",
+    TOP: "crest surface",
+    FLOOR: "reservoir floor",
+    BED: "tailwater bed",
+}
+
+
+def remarks(case: Case) -> list[str]:
+    """What is understood of a case's own geometry, then the notes on the case.
+
+    Raises InputError if the geometry is unsuitable.
+    """
+    sizes = understood(case)
+    return [*([f"geometry: {sizes}"] if sizes else []), *notes(case)]
+
+
+def notes(case: Case) -> list[str]:
+    """Sentences on the settings and loads of a case, and on its own geometry.
+
+    Raises InputError if that is unsuitable.
+    """
+    of_mesh = notes_on_geometry(case, mesh_of(case)) if case.geometry else ()
+    return [*notes_on_settings(case), *of_mesh]
+
+
+def notes_on_settings(case: Case) -> list[str]:
+    """Those that need no mesh: on settings without effect, unusual values, and loads."""
+    return [*settings_in_vain(case), *unusual_values(case), *loads_in_part(case)]
+
+
+def settings_in_vain(case: Case) -> Iterator[str]:
+    """Yield the parameters that a user has set and that have no effect."""
+    known, ineffective = declared(), case.ineffective
+    for name in ineffective:
+        yield f"{name} has no effect; it needs {known[name].matters}"
+    if case.geometry and case.geometry.suffix != ".geo":
+        for name in case.given:
+            if name in OF_SECTION and name not in ineffective:
+                yield f"{name} has no effect; the geometry is a mesh, {case.geometry.name}"
+
+
+def unusual_values(case: Case) -> Iterator[str]:
+    """Yield the parameters whose values may be in another unit."""
+    for name, value in case.unusual.items():
+        if name not in case.ineffective:
+            usual = "{:g} to {:g}".format(*USUAL[name])
+            yield (
+                f"{name} = {value:g} {declared()[name].unit} is unusual ({usual}); is it in "
+                "another unit?"
+            )
+
+
+def loads_in_part(case: Case) -> Iterator[str]:
+    """Yield the loads that do not act in full, or not at all, by time, level or another value."""
+    last, highest = case.times[-1], case.reached
+    for name, values in (STAGED | WORKS).items():
+        for joint in case.joints:
+            late = joint[f"{name}_t"] > last
+            for load in (n for n in values if late and joint[n]):
+                yield (
+                    f"{load} = {joint[load]:g} acts in part: in full at {name}_t = "
+                    f"{joint[f'{name}_t']:g}, and the loading ends at t = {last:g}"
+                )
+            if name not in WORKS:
+                break  # of all joints
+    own_times = case.source and "times" in case.source.text.of_user
+    for time, level in enumerate(case.levels, 1):
+        if own_times and time not in case.times:
+            yield f"the level {level:g} m at t = {time} is no load step: times() leaves it out"
+    if case["ice_force"] and case["ice_level"] > highest and not case.geometry:
+        yield f"ice_level = {case['ice_level']:g} m is above the water, {highest:g} m at most"
+    for joint, name in zip(case.joints, case.joint_names, strict=True):
+        if has_drains(joint) and joint["drain_level"] >= highest > 0:
+            where = f"{name}: " if case.of_joints else ""
+            yield (
+                f"{where}drain_level = {joint['drain_level']:g} m: the drains never act, the water "
+                f"reaches {highest:g} m"
+            )
+    if case["silt_height"] and not case["rho_silt"] * (case["silt_K0"] + case["silt_weight"]):
+        yield f"silt_height = {case['silt_height']:g}: no load, by rho_silt, silt_K0, silt_weight"
+    for body, changes in (("dam", ("dam", "linear")), ("found", ("found",))):
+        for change in changes:
+            if case[f"temperature_{change}"] and not case[f"expansion_{body}"]:
+                yield f"temperature_{change} has no effect: expansion_{body} = 0"
+
+
+def understood(case: Case) -> str:
+    """Sizes and weight of the geometry of one's own of a case, and what is under water; empty for
+    a section by parameters.
+    """
+    if not case.geometry:
+        return ""
+    mesh = mesh_of(case)
+    geometry, unit = mesh.user_geometry, "m2" if mesh.dim == 3 else "m"
+    low, high = geometry.concrete[:, 1].min(), geometry.concrete[:, 1].max()
+    weight = case["rho_dam"] * case["g"] * geometry.volume
+    joints = (
+        f"{f'{joint.name} ' if len(mesh.joints) > 1 else ''}{joint.ends['joint_along'][0]:.5g} m"
+        for joint in mesh.joints
+    )
+    parts = [
+        f"dam {high - low:.5g} m high, from y = {low:.9g} to {high:.9g} m",
+        f"joint{'s' if len(mesh.joints) > 1 else ''} {', '.join(joints)} from heel to toe",
+        f"weight {weight / 1e6:.5g} {'MN' if mesh.dim == 3 else 'MN/m'}",
+    ]
+    under = []
+    for side, name in FACES.items():
+        surfaces = [face.surface for face in mesh.faces.values() if face.side == side]
+        if surfaces and (case["floor_water"] or side not in (FLOOR, BED)):
+            level = max(case.tail_levels) if side in TAILWATER else max(case.levels)
+            wet = sum(size_below(surface, level).sum() for surface in surfaces)
+            whole = sum(size_below(surface, np.inf).sum() for surface in surfaces)
+            under.append(f"{name} {wet:.4g} of {whole:.4g} {unit}")
+    return "; ".join([*parts, f"under water: {', '.join(under) or 'no face'}"])
+
+
+def notes_on_geometry(case: Case, mesh: Mesh) -> Iterator[str]:
+    """Yield what of the loads finds no face, and what of the mesh may be a mistake."""
+    geometry, sides = mesh.user_geometry, {face.side for face in mesh.faces.values()}
+    lowest = {s: min(f.lowest for f in mesh.faces.values() if f.side == s) for s in sides}
+    level, tail = max(case.levels), max(case.tail_levels)
+    if case.source and case.source.levels is None and "levels" not in case.source.text.lists:
+        listed = ", ".join(f"{h:g}" for h in case.levels)
+        yield f"no levels are set: {listed} m are those of the default section"
+    unit = "m2" if mesh.dim == 3 else "m"
+    for side, surface, what in ((UP, level, "highest level"), (DOWN, tail, "highest tailwater")):
+        if not case["rho_water"] or surface <= 0:
+            continue
+        if side not in sides:
+            water = "reservoir" if side == UP else "tailwater"
+            yield f"no face {FACES[side]}: no pressure of the {water} on it"
+        elif case["face_load"] == "hydrostatic" and surface < lowest[side]:
+            yield (
+                f"the {what}, {surface:g} m, does not reach the dam's face {FACES[side]}, which "
+                f"begins at y = {lowest[side]:g} m"
+            )
+        elif bare := geometry.open_parts(side, surface):
+            yield (
+                f"{bare:.4g} {unit} of the dam's surface below the {what} point {FACES[side]} and "
+                "are in no face: no water presses on them"
+            )
+    if case["rho_water"]:
+        top = geometry.concrete[:, 1].max()
+        if level > top and case["crest_water"] and TOP not in sides:
+            yield f"no face crest surface: no pressure on the crest (y = {top:g} m) below the water"
+        if case["floor_water"] and not sides & {FLOOR, BED}:
+            yield "floor_water = 1 has no effect: no face reservoir floor or tailwater bed"
+    if case["silt_height"] > 0 and (UP not in sides or case["silt_height"] <= lowest[UP]):
+        yield f"silt_height = {case['silt_height']:g} m reaches no face upstream: no silt acts"
+    for where in geometry.gaps_of_support:
+        yield f"fixed: has a gap at {where}, where the rock is free"
+    if fixed := geometry.fixed_concrete:
+        yield f"fixed holds {fixed:.4g} {unit} of the dam's own surface"
+    if where := geometry.coincident:
+        yield f"two nodes lie at {where}: what meets there is not connected"
+    if cavities := geometry.cavities:
+        several = f"{len(cavities)} cavities, one" if len(cavities) > 1 else "a cavity"
+        yield f"the mesh has {several} at {cavities[0]}"
+    if geometry.height < LOWEST:
+        yield f"the dam is {geometry.height:g} m high; is the mesh in another unit?"
