@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import damjoint as dj
 import matplotlib.image
+import numpy as np
 import pytest
 from damjoint.post import folder as folders
 from damjoint.post.check_picture import draw_check, draw_joint
@@ -25,6 +26,7 @@ from damjoint.studies.check import (
     picture_table,
     text_table,
 )
+from damjoint.studies.critical import last_state
 from matplotlib.figure import Figure
 
 #: Parameters common to all load combinations: SSNP142's dam on a coarse mesh.
@@ -317,9 +319,35 @@ def test_partial_factors_on_friction_and_adhesion():
     check = check_of({"mu": 0.9, "adhesion": 3e5, "factor_mu": 1.5, "factor_c": 3.0}, "30")
     for result in check.results:
         numbers = result.numbers
-        resistance = 0.6 * numbers["N"] + 1e5 * (34 - numbers["crack_length"])
+        resistance = 0.6 * numbers["N"] + numbers["cohesion"]
+        assert numbers["cohesion"] == pytest.approx(1e5 * 34)
         assert numbers["SSF"] == pytest.approx(resistance / numbers["T"], rel=1e-9)
     assert "SSF with the partial factors factor_mu = 1.5, factor_c = 3" in check.notes
+
+
+def test_the_sliding_factor_counts_the_cohesion_that_is_left(solve):
+    """After an overload D is above 0.99 on half of the closed joint: c (1 - D) over the length."""
+    (result,) = solve("dam", "50,40", law="bond", n_joint=20.0, mu=1.0, adhesion=2e5, G_t=10.0)
+    check, rows, last = compare_methods(result), result.at(), result.last
+    left = np.trapezoid(2e5 * (1 - rows["damage"]), rows["s"])
+    assert last["crack_length"] == 0 and left < 0.8 * 2e5 * 34
+    numbers = check.finite_elements.numbers
+    assert numbers["cohesion"] == pytest.approx(left, rel=0.02)
+    assert numbers["cohesion_undamaged"] == pytest.approx(2e5 * 34)
+    assert numbers["SSF"] == (last["N"] + numbers["cohesion"]) / last["T"]
+    assert last["N"] + numbers["cohesion_undamaged"] > numbers["SSF"] * last["T"]
+    table = text_table([check])
+    assert "cohesion" in table and "undamaged" in table
+
+
+def test_friction_keeps_its_cohesion_where_the_joint_is_open():
+    """Where the joint slides as a whole, with an open part, the factor is 1."""
+    settings = {"law": "friction", "adhesion": 3e5, "mu": 0.9, "n_joint": 20.0}
+    found = dj.critical(dj.case("dam", **settings))
+    (check,) = compare_joints(last_state(found.search, found.answer.point))
+    numbers = check.finite_elements.numbers
+    assert numbers["crack_length"] > 20
+    assert numbers["SSF"] == pytest.approx(1, rel=1e-4)
 
 
 def test_picture_of_each_joint_of_a_dam_that_fails(solve, tmp_path):

@@ -24,14 +24,14 @@ FACTORS = (
     (
         "SSF",
         "SSF with mu, adhesion",
-        "sliding safety factor (mu N' + adhesion (length - crack)) / T, whatever the joint law",
+        "sliding safety factor (mu N' + the adhesion that is left) / T, whatever the joint law",
     ),
     ("OSF", "OSF", "overturning safety factor: stabilising over overturning moments about the toe"),
 )
 #: What the gravity method computes.
 BY_GRAVITY = "N", "T", "M", "U", "x_resultant", "crack_length", "SSF", "OSF"
 #: Columns that are not shown where they are zero.
-OPTIONAL = "tail_level", "U", "flux", "process_zone"
+OPTIONAL = "tail_level", "U", "flux", "process_zone", "broken_length"
 #: Numbers of an earthquake: column of quake.csv, heading, units.
 ACCELERATIONS: Units = (("m/s2", 1),)
 SECONDS: Units = (("s", 1),)
@@ -41,14 +41,15 @@ QUAKE_SHOWN: tuple[tuple[str, str, Units], ...] = (
     ("crest_ux", "crest movement", LENGTHS),
     ("heel_opening", "heel opening", LENGTHS),
     ("toe_opening", "toe opening", LENGTHS),
-    ("open_length", "open or broken", LENGTHS[:1]),
+    ("open_length", "crack", LENGTHS[:1]),
+    ("broken_length", "broken", LENGTHS[:1]),
     ("slip_mean", "slip", LENGTHS),
     ("N", "N'", FORCES),
     ("T", "T", FORCES),
     ("shear_reserve", "strength - |T|", FORCES),
 )
 #: Those of which the largest size is shown; residual values of run.json, their headings and units.
-PEAKS = QUAKE_SHOWN[:7]
+PEAKS = QUAKE_SHOWN[:8]
 RESIDUAL: tuple[tuple[str, str, Units], ...] = (
     ("slip", "residual slip", LENGTHS),
     ("tilt", "residual tilt", (("rad", 1), ("mrad", 1e3), ("µrad", 1e6))),

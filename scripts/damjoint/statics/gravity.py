@@ -352,12 +352,16 @@ def drained_head(case: Case, undrained: float, outlet: float) -> float:
     return undrained - case["drain_effectiveness"] * max(undrained - outlet, 0.0)
 
 
-def sliding_factor(case: Case, normal: float, shear: float, uncracked: float) -> float:
-    """SSF = (mu N' + c (L - a)) / |T|: shear friction factor, cohesion on the uncracked joint; with
-    mu and c divided by their partial factors.
+def cohesion(case: Case, bonded: float) -> float:
+    """Shear force [N/m] by the cohesion, divided by its partial factor, on a length [m]."""
+    return case["adhesion"] / case["factor_c"] * bonded
+
+
+def sliding_factor(case: Case, normal: float, shear: float, bonded: float) -> float:
+    """SSF = (mu N' + c B) / |T|: shear friction factor, with mu and c divided by their partial
+    factors; bonded: length B [m] on which cohesion is left, weighted with the part that is left.
     """
-    mu, cohesion = case["mu"] / case["factor_mu"], case["adhesion"] / case["factor_c"]
-    resistance = mu * normal + cohesion * uncracked
+    resistance = case["mu"] / case["factor_mu"] * normal + cohesion(case, bonded)
     return resistance / abs(shear) if shear else math.inf
 
 
@@ -478,6 +482,16 @@ class GravityMethod:
         return sliding_factor(self.case, self.N, self.T, self.uncracked)
 
     @property
+    def cohesion(self) -> float:
+        """Shear force by the cohesion of the uncracked joint [N/m]."""
+        return cohesion(self.case, self.uncracked)
+
+    @property
+    def cohesion_undamaged(self) -> float:
+        """Shear force by the cohesion of the joint without a crack [N/m]."""
+        return cohesion(self.case, self.body.length)
+
+    @property
     def OSF(self) -> float:
         """Overturning safety factor."""
         return overturning_factor(self.loads, self.uplift.moment)
@@ -521,13 +535,14 @@ class GravityMethod:
 
 
 def factors_of_state(method: GravityMethod, state: Mapping[str, float]) -> dict[str, float]:
-    """SSF and OSF of a state of the finite elements, a row of the history: with its resultants and
-    crack, and the loads of the gravity method.
+    """SSF, its cohesion and OSF of a state of the finite elements, a row of the history: with its
+    resultants and the cohesion that is left, and the loads of the gravity method.
     """
-    uncracked = method.body.length - state["crack_length"]
     uplift_moment = method.resultant.moment - state["M"]
     return {
-        "SSF": sliding_factor(method.case, state["N"], state["T"], uncracked),
+        "cohesion": cohesion(method.case, state["bonded_length"]),
+        "cohesion_undamaged": cohesion(method.case, method.case.joint_along),
+        "SSF": sliding_factor(method.case, state["N"], state["T"], state["bonded_length"]),
         "OSF": overturning_factor(method.loads, uplift_moment),
     }
 

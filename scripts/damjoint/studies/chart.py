@@ -23,7 +23,7 @@ from .plan import Plan, Row, column_of, numbers
 
 #: Quantities drawn: label and units.
 DRAWN: dict[str, tuple[str, Units]] = {
-    "crack_length": ("open or broken joint", LENGTHS[:1]),
+    "crack_length": ("crack", LENGTHS[:1]),
     "max_opening": ("largest opening", LENGTHS),
     "crest_ux": ("crest, downstream", LENGTHS),
 }
@@ -51,10 +51,10 @@ class Table(NamedTuple):
         """A column of the rows, or their SSF; nan where there is no value."""
         if column != FACTOR:
             return numbers(self.rows, column)
-        sizes = zip(*(numbers(self.rows, n) for n in ("N", "T", "crack_length")), strict=True)
+        sizes = zip(*(numbers(self.rows, n) for n in ("N", "T", "bonded_length")), strict=True)
         factors = [
-            sliding_factor(case, normal, shear, case.joint_length - crack)
-            for case, (normal, shear, crack) in zip(self.cases, sizes, strict=True)
+            sliding_factor(case, normal, shear, bonded)
+            for case, (normal, shear, bonded) in zip(self.cases, sizes, strict=True)
         ]
         return np.where(np.isfinite(factors), factors, np.nan)
 

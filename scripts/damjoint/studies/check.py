@@ -55,7 +55,9 @@ CHECK = {
     "sigma_n_eff_heel": ("Pa", "effective normal stress at the heel, compression < 0; 0: cracked"),
     "sigma_n_eff_toe": ("Pa", "effective normal stress at the toe, compression < 0"),
     "crack_length": HISTORY["crack_length"],
-    "SSF": ("-", "sliding: (mu N + adhesion (length - crack_length)) / T"),
+    "cohesion": ("N/m", "shear force by the cohesion that is left; gravity: uncracked joint"),
+    "cohesion_undamaged": ("N/m", "shear force by the cohesion of the undamaged joint"),
+    "SSF": ("-", "sliding: (mu N + cohesion) / T"),
     "OSF": ("-", "overturning: stabilising over overturning moments about the toe"),
     "position": ("", "where N acts: middle third, middle half, within base, outside"),
     "required_SSF": ("-", "required factor against sliding; 0: none"),
@@ -84,6 +86,7 @@ SHOWN: tuple[tuple[Units, dict[str, str]], ...] = (
     ((("m", 1),), {"x_resultant": "N' at x"}),
     (STRESSES, {"sigma_n_eff_heel": "eff. heel", "sigma_n_eff_toe": "eff. toe"}),
     ((("m", 1),), {"crack_length": "crack"}),
+    (FORCES, {"cohesion": "cohesion", "cohesion_undamaged": "undamaged"}),
     ((("-", 1),), {"SSF": "SSF", "OSF": "OSF"}),
 )
 

@@ -414,7 +414,7 @@ def pictures_of(solution: Solution) -> list[Picture]:
 def drawn(solution: Solution, time: float, at_level: str) -> Iterator[tuple[str, str, Figure]]:
     """Yield the figures of a run: CSS class of the size, caption, figure."""
     result = solution.result
-    colors = "Red: open or broken; violet: softening; orange: slipped."
+    colors = "Red: broken; violet: softening; orange: slipped."
     has_fields = bool(solution.fields)
     if has_fields:
         section = figure_of(*HALF)
