@@ -365,20 +365,18 @@ def check(cases: Sequence[Case | str | Path]) -> list[SafetyCheck]:
     """Safety factors of load combinations, by the finite elements and by the gravity method.
 
     Each is computed up to its last level. Of each check, `rows` are those of check.csv, `why` is
-    the reason if it fails, else empty, and `notes` are remarks on the result.
+    the reason if it fails or is not judged, else empty, and `notes` are remarks on the result.
 
     Args:
         cases: the load combinations; cases, or their names or paths, see `case`.
 
     Raises:
-        InputError: bad input, or a case for which there is no gravity method.
+        InputError: bad input.
         RunError: a case could not be computed.
     """
-    from .studies.check import check_has_section, compare_joints
+    from .studies.check import compare_joints
 
     combinations = [as_case(combination) for combination in cases]
-    for combination in combinations:
-        check_has_section(combination)
     return [
         check for combination in combinations for check in compare_joints(run(combination).results)
     ]

@@ -28,6 +28,7 @@ from damjoint.studies.check import (
 )
 from damjoint.studies.critical import last_state
 from matplotlib.figure import Figure
+from own_mesh import OwnMesh
 
 #: Parameters common to all load combinations: SSNP142's dam on a coarse mesh.
 COMMON = """
@@ -119,8 +120,8 @@ def test_without_required_factors_the_verdict_is_not_checked(command, combinatio
     for row in rows(tmp_path / "here/check.csv").values():
         assert row["answer"] == "difference" or float(row["SSF"]) < 0.8
         assert row["verdict"] == ("" if row["answer"] == "difference" else "not checked")
-    assert out.count("not checked") == 3 and "pass" not in out  # two rows and a note
-    assert "not checked: the case sets none of required_SSF, required_OSF, f_c" in out
+    assert out.count("not checked") == 2 and "pass" not in out
+    assert "only equilibrium is judged: required_SSF, required_OSF, f_c" in out
     assert not re.search(r"usual +required", out)
     # law = friction requires 1 by default: less fails, more is not checked
     code, out, _ = command("check", "usual.case", *words, "--set", "law=friction", "--out", "here")
@@ -336,8 +337,8 @@ def test_the_sliding_factor_counts_the_cohesion_that_is_left(solve):
     assert numbers["cohesion_undamaged"] == pytest.approx(2e5 * 34)
     assert numbers["SSF"] == (last["N"] + numbers["cohesion"]) / last["T"]
     assert last["N"] + numbers["cohesion_undamaged"] > numbers["SSF"] * last["T"]
-    table = text_table([check])
-    assert "cohesion" in table and "undamaged" in table
+    shown = {head: cell for head, cell, *_ in picture_table(check)}
+    assert (shown["c B [MN/m]"], shown["c L [MN/m]"]) == (f"{numbers['cohesion'] / 1e6:.5g}", "6.8")
 
 
 def test_friction_keeps_its_cohesion_where_the_joint_is_open():
@@ -348,6 +349,76 @@ def test_friction_keeps_its_cohesion_where_the_joint_is_open():
     numbers = check.finite_elements.numbers
     assert numbers["crack_length"] > 20
     assert numbers["SSF"] == pytest.approx(1, rel=1e-4)
+
+
+@pytest.mark.parametrize("order, slope", [(1.0, 2.0), (2.0, 0.0)])
+def test_a_mesh_of_ones_own_has_the_factors_of_its_section(solve, tmp_path, order, slope):
+    """The gravity method on the loads of the finite elements, and the requirements that N, T, M
+    suffice for; OSF needs the loads one by one.
+    """
+    settings = {"n_joint": 20.0, "h_dam": 15.0, "h_found": 60.0, "law": "bond", "order": order}
+    settings |= {"uplift": "cracked", "sigma_max": 1e4, "G_f": 5.0, "adhesion": 2e5, "G_t": 300.0}
+    shape = {"batter": 3.0, "joint_slope": slope}
+    required = {"required_SSF": 1.9, "required_OSF": 1.1, "required_position": "middle half"}
+    section = dj.case("dam", levels=[45.0], tail_levels=3.0, **settings | shape | required)
+    OwnMesh.of(section).write(tmp_path / "own.msh")
+    (tmp_path / "own.case").write_text('geometry = "own.msh";')
+    own = dj.case(tmp_path / "own.case", levels=[45.0], tail_levels=3.0, **settings | required)
+    (mine,), (other,) = dj.check([own]), dj.check([section])
+    assert other.gravity.numbers["crack_length"] > 1
+    for one, two in zip(mine.results, other.results, strict=True):
+        for name, value in two.numbers.items():
+            if name == "OSF":
+                assert math.isnan(one.numbers[name])
+            elif not name.startswith("sigma") or one.method == "gravity method":
+                assert one.numbers[name] == pytest.approx(value, rel=1e-6, abs=1e-3), name
+        assert one.not_judged == ["required_OSF is not judged: OSF is not known"]
+        unmet = [why for why in two.failures if not why.startswith("OSF")]
+        assert one.failures == unmet and (not unmet or one.verdict == "fail")
+    assert other.gravity.verdict == "fail"
+
+
+def test_a_requirement_that_can_not_be_judged_is_not_passed(command, tmp_path):
+    """A stepped joint has no gravity method; SSF is judged, OSF not."""
+    stepped = ("stepped", "--levels", "30", "--tail-levels", "0", "--set", "required_SSF=1.2")
+    code, out, _ = command("check", *stepped)
+    assert code == 0 and "pass" in out and "no gravity method" in out
+    code, out, _ = command("check", *stepped, "--set", "required_OSF=1.1")
+    assert code == 1 and "required_OSF is not judged: OSF is not known" in out
+    (row,) = rows(tmp_path / "out/check/check.csv").values()
+    assert row["verdict"] == "not judged" and float(row["SSF"]) > 1.2
+    assert math.isnan(float(row["OSF"]))
+    code, out, _ = command("check", *stepped[:-1], "required_SSF=9")
+    assert code == 1 and re.search(r"fails, SSF [\d.]+ < 9", out)
+
+
+@pytest.mark.heavy
+def test_joints_between_bodies_that_others_hold_are_not_limited():
+    """A contraction joint may slip; the bases are judged one by one."""
+    checks = dj.check([dj.case("monoliths", levels=[45.0], required_SSF=1.2)])
+    assert [check.finite_elements.joint for check in checks] == [
+        "upstream base",
+        "downstream base",
+        "contraction",
+    ]
+    assert [check.finite_elements.verdict for check in checks] == ["pass", "pass", "not checked"]
+    assert checks[2].finite_elements.numbers["SSF"] < 1.2
+    assert all(check.gravity is None for check in checks)
+
+
+def test_only_the_joint_that_fails_fails(solve):
+    """Another one is not judged beyond the loads that the run has reached."""
+    weak = {"law": "bond", "mu": 0.3, "adhesion": 1e5, "lift_heights": (15.0,)}
+    (result,) = solve("dam", (45.0,), n_joint=24.0, order=1.0, **weak)
+    assert verdict(result) == "sliding on base" and result.partial_load
+    base, lift = (check.finite_elements for check in compare_joints(result))
+    assert base.verdict == "fail" and not base.not_judged
+    assert lift.verdict == "not judged" and not lift.failures
+    assert re.fullmatch(
+        "not judged beyond t = 0[.].* of 1, where the run ended: sliding on base", lift.row["why"]
+    )
+    lines = text_table(compare_joints(result)).splitlines()
+    assert not [line for line in lines if "lift 15 m, finite elements: fails" in line]
 
 
 def test_picture_of_each_joint_of_a_dam_that_fails(solve, tmp_path):
@@ -366,5 +437,5 @@ def test_a_note_on_all_joints_is_printed_once(solve):
     joints = {"uplift": ("none", "flow"), "lift_heights": (15.0,), "mu": 1.0, "adhesion": 1e5}
     (result,) = solve("dam", (30.0,), n_joint=24.0, order=1.0, law="friction", **joints)
     of_all, of_lift = labelled_notes(compare_joints(result))
-    assert of_all.startswith("dam: not checked: the case sets none of required_SSF")
+    assert of_all.startswith("dam: only equilibrium is judged: required_SSF")
     assert of_lift == "dam, lift 15 m: gravity method: full head in the crack, linear beyond it"

@@ -284,7 +284,8 @@ def test_report_of_a_critical_value(command, tmp_path):
     level = json.loads((tmp_path / "limit/run.json").read_text())["critical"]["value"]
     assert command("report", "limit")[0] == 0
     page = (tmp_path / "report.html").read_text()
-    assert ">not checked<" in page and ">fail<" not in page
+    assert 'class="verdict not-judged">not judged<' in page and ">fail<" not in page
+    assert '<p class="fail">required_SSF: not judged in the state before failure</p>' in page
     assert f"critical level {level:.6g} m" in words_of(page)
     both = rows_below(page, "Finite elements and gravity method, at the last level")
     assert_allclose(column(both, "level")[:2], level, rtol=1e-3)

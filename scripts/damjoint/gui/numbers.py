@@ -76,10 +76,11 @@ class Numbers:
         """The numbers at a requested time."""
         case, state = result.case, result.state(time)
         state["max_opening"] = max(state["max_opening"], 0.0)  # below 0 in a closed joint
+        factors = gravity.factors_of_state(case, state)
+        state |= {name: value for name, value in factors.items() if not math.isnan(value)}
         if case.geometry:
             return Numbers(state, {}, case.joint_length)
         method = gravity.at(case, state["time"], state["level"])
-        state |= gravity.factors_of_state(method, state)
         rigid = {name: float(getattr(method, name)) for name in BY_GRAVITY}
         return Numbers(state, rigid, case.joint_length)
 
@@ -190,14 +191,13 @@ def three_digits(value: float) -> str:
 def table_of_levels(result: Results) -> Table:
     """Table of the requested levels, with safety factors."""
     table = levels_table(result)
-    if result.case.geometry:
-        return table
     times = result.history["time"][requested_rows(result)]
     numbers = [Numbers.at(result, time).elements for time in times]
-    columns = [[three_digits(row[name]) for row in numbers] for name, *_ in FACTORS]
+    factors = [name for name, *_ in FACTORS if all(name in row for row in numbers)]
+    columns = [[three_digits(row[name]) for row in numbers] for name in factors]
     rows = [(*row[:-1], *more, row[-1]) for row, *more in zip(table.rows, *columns, strict=True)]
-    names = [*table.names[:-1], *(name for name, *_ in FACTORS), table.names[-1]]
-    return Table(names, [*table.units, *("" for _ in FACTORS)], rows)
+    names = [*table.names[:-1], *factors, table.names[-1]]
+    return Table(names, [*table.units, *("" for _ in factors)], rows)
 
 
 def warnings(result: Results) -> list[str]:

@@ -123,7 +123,7 @@ def draw_cells(axes: Axes, cells: list[tuple[str, ...]]) -> None:
             text.set_horizontalalignment("left")
         if row == 0:
             text.set_fontweight("bold")
-        if text.get_text() == "fail":
+        if text.get_text() in ("fail", "not judged"):
             text.set_color(RED)
 
 

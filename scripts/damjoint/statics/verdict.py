@@ -65,6 +65,17 @@ def decisive_joint(results: Results) -> int:
     return int(np.argmax(parts)) if parts else 0
 
 
+def failing_joints(results: Results) -> tuple[int, ...]:
+    """The numbers of the joints that the failure of a run names, of a single joint that one; empty
+    if the dam stands, or if no joint is named.
+    """
+    mode, joint = failure(results)
+    if not results.case.of_joints:
+        return (0,) if mode else ()
+    parts = {joint, *joint.split(" and ")}
+    return tuple(k for k, name in enumerate(results.case.joint_names) if name in parts)
+
+
 def slipped_joints(results: Results) -> tuple[int, ...]:
     """The numbers of joints that have slipped along all of their length and alone hold what is
     above them; empty if there are none.
