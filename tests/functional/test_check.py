@@ -6,6 +6,7 @@ import csv
 import math
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import damjoint as dj
 import matplotlib.image
@@ -193,7 +194,11 @@ def test_a_second_crack_in_equilibrium_has_its_own_row(command, tmp_path):
     assert code == 1 and longer["verdict"] == "fail" and longer["why"] == "SSF 1.162 < 1.2"
     assert table["dam", "gravity method"]["verdict"] == "pass"
     assert float(table["dam", "finite elements"]["crack_length"]) > 6
-    assert "past the drains (6 m): crack 12.4 m" in out
+    assert re.search(
+        r"gravity method: crack [\d.]+ m before the drains \(6 m\), SSF [\d.]+, OSF [\d.]+; "
+        r"if it grows further, crack 12.4 m past the drains \(6 m\), SSF 1.162",
+        out,
+    )
     code, *_ = command("report", tmp_path / "out/check/dam")
     page = (tmp_path / "report.html").read_text()
     assert "longer crack" in page and "past the drains (6 m)" in page
@@ -203,6 +208,41 @@ def test_a_note_gives_the_crack_without_tensile_strength(solve):
     (result,) = solve("dam", "45", law="rupture", sigma_max=2e6, G_f=100.0, n_joint=20.0)
     (note,) = (note for note in compare_methods(result).notes if "tension" in note)
     assert "below the strength of 2000 kPa; without tension: crack 0." in note
+
+
+#: A dam whose elastic crack passes the drains, while that of the rigid block ends before them.
+DRAINED = {"dam_height": 80.0, "dam_base": 60.0, "uplift": "cracked", "drains": 1.0, "drain_x": 6.0}
+DRAINED |= {"drain_effectiveness": 2 / 3, "law": "bond", "sigma_max": 0.0, "n_joint": 20.0}
+
+
+def test_a_note_without_tension_gives_the_shortest_and_the_longest_crack():
+    """Each with its side of the drains: the longest alone would hide that the dam stands."""
+    strong = DRAINED | {"sigma_max": 2e6, "G_f": 500.0}
+    method = gravity.at(dj.case("dam", levels=[85.45], **strong), 1.0)
+    free = gravity.at(method.case, 1.0, tension=False)
+    assert 3 < free.crack_length < 4 and [state.stands for state in free.further] == [False]
+    (note,) = method.notes
+    assert note.endswith(
+        f"without tension: crack {free.crack_length:.4g} m before the drains (6 m), SSF "
+        f"{free.SSF:.4g}, OSF {free.OSF:.4g}; if it grows further, overturning past the drains "
+        "(6 m)"
+    )
+
+
+def test_a_note_says_which_crack_passes_the_drains(command):
+    """In check, critical and report; with what each method assumes."""
+    words = [w for name, value in DRAINED.items() for w in ("--set", f"{name}={value}")]
+    _, out, _ = command("check", "dam", *words, "--levels", "60,84")
+    passes = re.compile(
+        r"drains at 6 m, full head in the crack: finite elements \(stress of the elastic dam, "
+        r"largest at the heel\): a crack of 2\d[.\d]* m has passed them: the full head acts, no "
+        r"drainage; gravity method \(stress linear along the joint\): no crack: they lower the head"
+    )
+    assert passes.search(out)
+    _, out, _ = command("critical", "dam", *words, "--levels", "60,75")
+    assert passes.search(out)
+    assert command("report", "out/dam_critical")[0] == 0
+    assert passes.search(Path("report.html").read_text())
 
 
 def test_bad_input_writes_no_file(command, combinations, tmp_path):

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Table
-from ..model.case import Case, freezes_uplift
+from ..model.case import Case, freezes_uplift, has_drains
 from ..model.constraints import ZANGAR
 from ..model.loads import Loading, heads_at_ends, line_forces, zangar_column, zangar_share
 from ..model.parameters import constants
@@ -527,31 +527,35 @@ class GravityMethod:
         return cracked(self.case, self.body, self.loads, self.time, self.level, tension=False)
 
     @property
+    def beside_drains(self) -> str:
+        """On which side of the drains the crack ends; empty without drains or crack."""
+        at = self.case["drain_x"]
+        if not (has_drains(self.case) and at < self.body.length and self.crack_length):
+            return ""
+        side = "past" if self.crack_length > at else "before"
+        return f" {side} the drains ({at:g} m)"
+
+    @property
     def description(self) -> str:
         """Crack and safety factors."""
         if not self.stands:
-            return "overturning"
+            return f"overturning{self.beside_drains}"
+        crack = f"crack {self.crack_length:.4g} m{self.beside_drains}"
         overturns = "" if math.isnan(self.OSF) else f", OSF {self.OSF:.4g}"
-        return f"crack {self.crack_length:.4g} m, SSF {self.SSF:.4g}{overturns}"
+        return f"{crack}, SSF {self.SSF:.4g}{overturns}"
 
     @property
     def notes(self) -> list[str]:
         """Longer cracks in equilibrium; the result without tension, if it matters."""
         case, notes = self.case, []
-        for state in self.further:
-            passed = self.crack_length <= case["drain_x"] < state.crack_length
-            which = f"past the drains ({case['drain_x']:g} m)" if passed else "beyond it"
-            notes.append(
-                "gravity method: the shortest crack in equilibrium is "
-                f"{self.crack_length:.4g} m; once {which}: {state.description}"
-            )
+        if self.further:
+            notes.append(f"gravity method: {alternatives(self)}")
         if not self.crack_length and self.tip_stress > 0:
-            free = self.without_tension
             strength = case.law.tensile_strength
             notes.append(
                 f"gravity method: uncracked, as its {self.tip_stress / 1e3:.4g} kPa at the heel "
                 f"are below the strength of {strength / 1e3:.4g} kPa; without tension: "
-                f"{(free, *free.further)[-1].description}"
+                f"{alternatives(self.without_tension)}"
             )
         return notes
 
@@ -563,6 +567,14 @@ class GravityMethod:
         rows.append(resultant_of("sum", rows))
         cells = [(row.name, row.fx, row.fy, row.moment) for row in rows]
         return dict(zip(LOADS, map(list, zip(*cells, strict=True)), strict=True))
+
+
+def alternatives(shortest: GravityMethod) -> str:
+    """The shortest crack in equilibrium and, if it grows past the drains or another limit, the
+    longer ones.
+    """
+    longer = (f"; if it grows further, {state.description}" for state in shortest.further)
+    return "".join([shortest.description, *longer])
 
 
 def factors_of_state(case: Case, state: Mapping[str, float]) -> dict[str, float]:

@@ -304,6 +304,33 @@ def reason_of_stop(results: Results) -> str:
     )
 
 
+def cracks_and_drains(case: Case, crack: float, block: gravity.GravityMethod) -> str:
+    """On which side of the drains the crack ends by each method, and what follows, with the uplift
+    that has the full head in the crack; empty with another uplift, or if neither crack passes them.
+
+    case: of the joint; crack: its length [m] by the finite elements; block: the gravity method.
+    """
+    at = case["drain_x"]
+    blocks = (block, *block.further)
+    if case["uplift"] != "cracked" or not has_drains(case):
+        return ""
+    if max(crack, *(state.crack_length for state in blocks)) <= at:
+        return ""
+
+    def ends(length: float) -> str:
+        if length > at:
+            return f"a crack of {length:.4g} m has passed them: the full head acts, no drainage"
+        where = f"a crack of {length:.4g} m ends before them" if length else "no crack"
+        return f"{where}: they lower the head"
+
+    by_hand = "; or, if it grows further, ".join(ends(state.crack_length) for state in blocks)
+    return (
+        f"drains at {at:g} m, full head in the crack: finite elements (stress of the elastic dam, "
+        f"largest at the heel): {ends(crack)}; gravity method (stress linear along the joint): "
+        f"{by_hand}"
+    )
+
+
 #: K_N h/E beyond which a joint is stiff for its mesh: the published points make its node stresses
 #: oscillate, and convergence is hard.
 STIFF_JOINT = 100

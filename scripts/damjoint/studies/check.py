@@ -262,8 +262,14 @@ def compare_methods(
         by_gravity(method, partial=partial) if method else None,
         result.info.get("error_estimate", {}).get("statement", ""),
         [by_gravity(longer, LONGER, partial) for longer in method.further] if method else (),
-        method.notes if method else (),
+        [*method.notes, *beside_drains(result, method)] if method else (),
     )
+
+
+def beside_drains(result: Results, method: GravityMethod) -> list[str]:
+    """The note on crack and drains by both methods, see `verdict.cracks_and_drains`."""
+    crack = result.last["crack_length"] if result.last else 0.0
+    return list(filter(None, [verdict.cracks_and_drains(result.case, crack, method)]))
 
 
 def compare_joints(result: Results) -> list[SafetyCheck]:

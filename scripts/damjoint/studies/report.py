@@ -268,6 +268,7 @@ def run_section(folder: Path, solution: Solution) -> RunSection:
         failures=failures,
         hints=[
             *filter(None, [which_joint(result), critical, earthquake(info), *info["hints"]]),
+            *(info.get("critical") or {}).get("gravity_method_notes", ()),
             *filter(None, [discretisation_error(result)]),
         ],
         pictures=pictures_of(solution) if len(result.joint["time"]) else [],
@@ -470,7 +471,10 @@ def critical_value(info: dict[str, Any] | None) -> str:
     parts = [f"{info['value']:.6g} {unit}".strip(), info["mode"]]
     if info["doubt"]:
         parts.append(f"not confirmed: {info['doubt']}")
-    by_hand = {"gravity method": info["gravity_method"]} | info.get("gravity_method_with", {})
+    on = f" on {joint}" if (joint := info.get("gravity_method_joint")) else ""
+    by_hand = {f"gravity method{on}": info["gravity_method"]}
+    by_hand[f"on {info.get('joint')}"] = info.get("gravity_method_there")
+    by_hand |= info.get("gravity_method_with", {})
     parts += [f"{n} {v:.6g} {unit}".strip() for n, v in by_hand.items() if v is not None]
     return f"the last state before failure, critical {info['of']} {'; '.join(parts)}"
 
