@@ -304,6 +304,11 @@ def test_limits_of_the_model_follow_the_case():
     assert "expansion_found" not in report_input.other_input(loaded)
     assert "pseudo-static" in sentences and "Joint law bond: coupled" in sentences
     assert "Drains 3.4 m from the heel" in sentences
+    assert "independent of the opening" in sentences  # then not that of the crack at each moment
+    assert "uplift: as before the earthquake." in sentences and "at each moment" not in sentences
+    follows = load("dam", {"k_h": 0.1, "uplift": ("cracked", "none"), "lift_heights": (15.0,)})
+    both = "uplift: that of the crack at each moment (base); no water pressure (lift 15 m)."
+    assert both in " ".join(report_input.limits(follows))
     assert "Loads that are zero: silt, post-tensioning." in sentences
     solid = " ".join(report_input.limits(load("b")))
     assert "Three dimensions: the section over 1 m" in solid and "Plane strain" not in solid

@@ -190,6 +190,8 @@ def caption(scene: SolvedScene, step: int) -> tuple[str, str, str]:
     opening = now["max_opening"]
     state = f"opening {with_unit(opening, LENGTHS, 3)}" if opening > 0 else "closed"
     state += f", crack {now['crack_length']:.3g} m"
+    if now["broken_length"] > now["crack_length"]:
+        state += f", broken {now['broken_length']:.3g} m"
     if now["process_zone"] > 0:
         state += f", softening {now['process_zone']:.3g} m"
     resultant = f"N' at {three_digits(now['x_resultant'])} m"

@@ -130,14 +130,14 @@ def is_marked(plan: Plan, rows: list[Row]) -> np.ndarray:
 
 
 def panels_of(figure: Figure, table: Table) -> Iterator[tuple[Axes, str, tuple[str, Units]]]:
-    """Create axes for the quantities drawn, with column, label and units: DRAWN and SSF (which a
-    mesh of one's own does not have), or the critical value alone.
+    """Create axes for the quantities drawn, with column, label and units: DRAWN and SSF, or the
+    critical value alone.
     """
     plan, drawn = table.plan, dict(DRAWN)
     if plan.critical:
         words, size = quantity(plan.critical)
         drawn = {plan.critical_columns[0]: (f"critical {words}", ((size, 1),))}
-    elif not any(case.geometry for case in table.cases):
+    else:
         drawn[FACTOR] = FACTOR_LABEL, (("-", 1),)
     shape = (2, 2) if len(drawn) > 1 else (1, 1)
     panels = figure.subplots(*shape, squeeze=False).ravel()

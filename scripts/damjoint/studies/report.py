@@ -17,7 +17,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from matplotlib.figure import Figure
 
 from .. import ROUND_OFF, InputError, RunError, __version__
-from ..model.case import Case, flows, is_name
+from ..model.case import Case, is_name
 from ..model.fields import Solution
 from ..model.results import Results
 from ..post import pictures, stored
@@ -277,7 +277,7 @@ def run_section(folder: Path, solution: Solution) -> RunSection:
         methods=methods_table(case, checks, judged=judged),
         loads=loads_table(rigid) if rigid else None,
         formulas=formulas(rigid) if rigid and rigid.stands else [],
-        notes=check.notes,
+        notes=notes_of(checks),
         summary=summary_of(own, check),
         computation=computation(result),
         materials=report_input.materials(case),
@@ -313,6 +313,16 @@ def worst_verdict(result: Results, checks: list[SafetyCheck]) -> str:
     if result.info["state"] in UNFINISHED:
         return "fail"
     return next(v for v in ("fail", NOT_JUDGED, "pass", UNCHECKED) if v in verdicts)
+
+
+def notes_of(checks: list[SafetyCheck]) -> list[str]:
+    """Notes on the methods: those of all joints once, others with the name of their joint."""
+    lines = dict[str, None]()  # in their order
+    for check in checks:
+        for note in check.notes:
+            common = all(note in other.notes for other in checks)
+            lines[note if common else f"{check.finite_elements.joint}: {note}"] = None
+    return list(lines)
 
 
 def describe_scene(case: Case) -> str:
@@ -501,15 +511,13 @@ def earthquake_section(folder: Path, case: Case, info: dict[str, Any]) -> Earthq
         address = "data:image/png;base64," + base64.b64encode(path.read_bytes()).decode()
         caption = "Earthquake: relative to the ground, since the static state before it."
         pictures.append(Picture("full", caption, address))
-    follows = found["quake_uplift"] == "zero" or any(map(flows, case.joints))
-    uplift = report_input.QUAKE_UPLIFTS[found["quake_uplift"] if follows else "unchanged"]
     halved = "none of them halved"
     if found["halvings"]:
         halved = f"halved up to {found['halvings']} times where they did not converge"
     notes = [
         f"{quake_result.modes(found)}.",
         f"{found['steps']} steps of {found['dt']:g} s over {found['time']:g} s, {halved}.",
-        f"Water pressure in the joint: {uplift}.",
+        f"Water pressure in the joint: {report_input.uplift_in_earthquake(case)}.",
     ]
     tables = [quake_result.peaks_table(found, case), quake_result.residual_table(found, case)]
     return Earthquake(pictures, tables, [note[0].upper() + note[1:] for note in notes])
