@@ -377,6 +377,7 @@ def test_the_sliding_factor_counts_the_cohesion_that_is_left(solve):
     assert numbers["cohesion_undamaged"] == pytest.approx(2e5 * 34)
     assert numbers["SSF"] == (last["N"] + numbers["cohesion"]) / last["T"]
     assert last["N"] + numbers["cohesion_undamaged"] > numbers["SSF"] * last["T"]
+    assert f"the run has destroyed {1 - left / 6.8e6:.0%} of the cohesion" in "; ".join(check.notes)
     shown = {head: cell for head, cell, *_ in picture_table(check)}
     assert (shown["c B [MN/m]"], shown["c L [MN/m]"]) == (f"{numbers['cohesion'] / 1e6:.5g}", "6.8")
 

@@ -68,6 +68,9 @@ CHECK = {
     "why": ("", "failure, or each requirement that is not met or not judged"),
 }
 
+#: Part of the cohesion that a run has to destroy for a note.
+DESTROYED = 0.01
+
 #: Columns of check.csv with the numbers of both methods.
 NUMBERS = tuple(CHECK)[list(CHECK).index("level") : list(CHECK).index("OSF") + 1]
 
@@ -396,6 +399,16 @@ class SafetyCheck:
                 "the finite elements' SSF has the cohesion of the open part, which the law "
                 f"{case['law']} keeps with its tension of adhesion/mu = "
                 f"{case.law.open_tension / 1e3:.4g} kPa; the gravity method's has none there"
+            )
+        left, undamaged = (
+            self.finite_elements.numbers[name] for name in ("cohesion", "cohesion_undamaged")
+        )
+        if self.gravity and left < (1 - DESTROYED) * min(
+            undamaged, self.gravity.numbers["cohesion"]
+        ):
+            notes.append(
+                f"the run has destroyed {1 - left / undamaged:.0%} of the cohesion; the gravity "
+                "method has no history: its c B is that of an undamaged joint beyond the crack"
             )
         if case["f_c"]:
             notes.append("the finite elements' stress at the toe, a corner, depends on the mesh")
