@@ -286,7 +286,8 @@ def run_and_print(arguments: argparse.Namespace, drawing: DrawingProcess | None)
 def add_check(commands: Commands) -> None:
     """Add damjoint check."""
     summary = (
-        "safety factors by finite elements and by the gravity method; exit code 1 if one is too low"
+        "safety factors by finite elements and by the gravity method; exit code 1 if one is too "
+        "low or not judged"
     )
     options = settings_options(), water_options(), accuracy_options()
     command = add_command(commands, do_check, summary, *options)
@@ -300,16 +301,16 @@ def add_check(commands: Commands) -> None:
 
 
 def do_check(arguments: argparse.Namespace) -> int:
-    """Run damjoint check; 1 if a safety factor is too low."""
-    from .studies.check import check_cases, text_table
+    """Run damjoint check; 1 if a safety factor is too low or not judged."""
+    from .studies.check import NOT_JUDGED, check_cases, text_table
 
     cases = [load_case(arguments, name) for name in arguments.cases]
     if any(case["dim"] == 3 for case in cases):
         warn_if_slow()
     checks = check_cases(cases, arguments.out)
-    errors = [f"{check.gravity.case.name}: {check.accuracy}" for check in checks if check.accuracy]
+    errors = [f"{check.case.name}: {check.accuracy}" for check in checks if check.accuracy]
     print("\n\n".join([text_table(checks), *errors, str(arguments.out / "check.csv")]))
-    return int(any(result.failures for check in checks for result in check.results))
+    return int(any(result.verdict in ("fail", NOT_JUDGED) for c in checks for result in c.results))
 
 
 def add_plot(commands: Commands) -> None:

@@ -379,21 +379,20 @@ def check(cases: Case | str | Path | Sequence[Case | str | Path]) -> list[Safety
     """Safety factors of a case or of several, by the finite elements and by the gravity method.
 
     Each is computed up to its last level. Of each check, `rows` are those of check.csv, `why` is
-    the reason if it fails, else empty, and `notes` are remarks on the result.
+    the reason if it fails or is not judged, else empty, and `notes` are remarks on the result.
 
     Args:
         cases: the load combinations, or a single one; cases, or their names or paths, see `case`.
 
     Raises:
-        InputError: bad input, or a case for which there is no gravity method.
+        InputError: bad input.
         RunError: a case could not be computed.
     """
-    from .studies.check import check_has_section, compare_joints
+    from .studies.check import compare_joints
 
     listed = [cases] if isinstance(cases, Case | str | Path) else cases
     combinations = [as_case(combination) for combination in listed]
     for combination in combinations:
-        check_has_section(combination)
         noted(combination)
     runs = map(solved, combinations)
     return [check for run in runs for check in compare_joints(run.results)]

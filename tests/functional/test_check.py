@@ -6,9 +6,11 @@ import csv
 import math
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import damjoint as dj
 import matplotlib.image
+import numpy as np
 import pytest
 from damjoint.post import folder as folders
 from damjoint.post.check_picture import draw_check, draw_joint
@@ -25,7 +27,9 @@ from damjoint.studies.check import (
     picture_table,
     text_table,
 )
+from damjoint.studies.critical import last_state
 from matplotlib.figure import Figure
+from own_mesh import OwnMesh
 
 #: Parameters common to all load combinations: SSNP142's dam on a coarse mesh.
 COMMON = """
@@ -117,8 +121,8 @@ def test_without_required_factors_the_verdict_is_not_checked(command, combinatio
     for row in rows(tmp_path / "here/check.csv").values():
         assert row["answer"] == "difference" or float(row["SSF"]) < 0.8
         assert row["verdict"] == ("" if row["answer"] == "difference" else "not checked")
-    assert out.count("not checked") == 3 and "pass" not in out  # two rows and a note
-    assert "not checked: the case sets none of required_SSF, required_OSF, f_c" in out
+    assert out.count("not checked") == 2 and "pass" not in out
+    assert "only equilibrium is judged: required_SSF, required_OSF, f_c" in out
     assert not re.search(r"usual +required", out)
     # law = friction requires 1 by default: less fails, more is not checked
     code, out, _ = command("check", "usual.case", *words, "--set", "law=friction", "--out", "here")
@@ -190,7 +194,11 @@ def test_a_second_crack_in_equilibrium_has_its_own_row(command, tmp_path):
     assert code == 1 and longer["verdict"] == "fail" and longer["why"] == "SSF 1.162 < 1.2"
     assert table["dam", "gravity method"]["verdict"] == "pass"
     assert float(table["dam", "finite elements"]["crack_length"]) > 6
-    assert "past the drains (6 m): crack 12.4 m" in out
+    assert re.search(
+        r"gravity method: crack [\d.]+ m before the drains \(6 m\), SSF [\d.]+, OSF [\d.]+; "
+        r"if it grows further, crack 12.4 m past the drains \(6 m\), SSF 1.162",
+        out,
+    )
     code, *_ = command("report", tmp_path / "out/check/dam")
     page = (tmp_path / "report.html").read_text()
     assert "longer crack" in page and "past the drains (6 m)" in page
@@ -200,6 +208,41 @@ def test_a_note_gives_the_crack_without_tensile_strength(solve):
     (result,) = solve("dam", "45", law="rupture", sigma_max=2e6, G_f=100.0, n_joint=20.0)
     (note,) = (note for note in compare_methods(result).notes if "tension" in note)
     assert "below the strength of 2000 kPa; without tension: crack 0." in note
+
+
+#: A dam whose elastic crack passes the drains, while that of the rigid block ends before them.
+DRAINED = {"dam_height": 80.0, "dam_base": 60.0, "uplift": "cracked", "drains": 1.0, "drain_x": 6.0}
+DRAINED |= {"drain_effectiveness": 2 / 3, "law": "bond", "sigma_max": 0.0, "n_joint": 20.0}
+
+
+def test_a_note_without_tension_gives_the_shortest_and_the_longest_crack():
+    """Each with its side of the drains: the longest alone would hide that the dam stands."""
+    strong = DRAINED | {"sigma_max": 2e6, "G_f": 500.0}
+    method = gravity.at(dj.case("dam", levels=[85.45], **strong), 1.0)
+    free = gravity.at(method.case, 1.0, tension=False)
+    assert 3 < free.crack_length < 4 and [state.stands for state in free.further] == [False]
+    (note,) = method.notes
+    assert note.endswith(
+        f"without tension: crack {free.crack_length:.4g} m before the drains (6 m), SSF "
+        f"{free.SSF:.4g}, OSF {free.OSF:.4g}; if it grows further, overturning past the drains "
+        "(6 m)"
+    )
+
+
+def test_a_note_says_which_crack_passes_the_drains(command):
+    """In check, critical and report; with what each method assumes."""
+    words = [w for name, value in DRAINED.items() for w in ("--set", f"{name}={value}")]
+    _, out, _ = command("check", "dam", *words, "--levels", "60,84")
+    passes = re.compile(
+        r"drains at 6 m, full head in the crack: finite elements \(stress of the elastic dam, "
+        r"largest at the heel\): a crack of 2\d[.\d]* m has passed them: the full head acts, no "
+        r"drainage; gravity method \(stress linear along the joint\): no crack: they lower the head"
+    )
+    assert passes.search(out)
+    _, out, _ = command("critical", "dam", *words, "--levels", "60,75")
+    assert passes.search(out)
+    assert command("report", "out/dam_critical")[0] == 0
+    assert passes.search(Path("report.html").read_text())
 
 
 def test_bad_input_writes_no_file(command, combinations, tmp_path):
@@ -317,9 +360,118 @@ def test_partial_factors_on_friction_and_adhesion():
     check = check_of({"mu": 0.9, "adhesion": 3e5, "factor_mu": 1.5, "factor_c": 3.0}, "30")
     for result in check.results:
         numbers = result.numbers
-        resistance = 0.6 * numbers["N"] + 1e5 * (34 - numbers["crack_length"])
+        resistance = 0.6 * numbers["N"] + numbers["cohesion"]
+        assert numbers["cohesion"] == pytest.approx(1e5 * 34)
         assert numbers["SSF"] == pytest.approx(resistance / numbers["T"], rel=1e-9)
     assert "SSF with the partial factors factor_mu = 1.5, factor_c = 3" in check.notes
+
+
+def test_the_sliding_factor_counts_the_cohesion_that_is_left(solve):
+    """After an overload D is above 0.99 on half of the closed joint: c (1 - D) over the length."""
+    (result,) = solve("dam", "50,40", law="bond", n_joint=20.0, mu=1.0, adhesion=2e5, G_t=10.0)
+    check, rows, last = compare_methods(result), result.at(), result.last
+    left = np.trapezoid(2e5 * (1 - rows["damage"]), rows["s"])
+    assert last["crack_length"] == 0 and left < 0.8 * 2e5 * 34
+    numbers = check.finite_elements.numbers
+    assert numbers["cohesion"] == pytest.approx(left, rel=0.02)
+    assert numbers["cohesion_undamaged"] == pytest.approx(2e5 * 34)
+    assert numbers["SSF"] == (last["N"] + numbers["cohesion"]) / last["T"]
+    assert last["N"] + numbers["cohesion_undamaged"] > numbers["SSF"] * last["T"]
+    assert f"the run has destroyed {1 - left / 6.8e6:.0%} of the cohesion" in "; ".join(check.notes)
+    shown = {head: cell for head, cell, *_ in picture_table(check)}
+    assert (shown["c B [MN/m]"], shown["c L [MN/m]"]) == (f"{numbers['cohesion'] / 1e6:.5g}", "6.8")
+
+
+def test_friction_keeps_its_cohesion_where_the_joint_is_open():
+    """Where the joint slides as a whole, with an open part, the factor is 1."""
+    settings = {"law": "friction", "adhesion": 3e5, "mu": 0.9, "n_joint": 20.0}
+    found = dj.critical(dj.case("dam", **settings))
+    (check,) = compare_joints(last_state(found.search, found.answer.point))
+    numbers = check.finite_elements.numbers
+    assert numbers["crack_length"] > 20
+    assert numbers["SSF"] == pytest.approx(1, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    "solid, order, slope",
+    [
+        ({}, 1.0, 2.0),
+        ({}, 2.0, 0.0),
+        pytest.param(
+            {"dim": 3.0, "mesh_pattern": "split", "thickness": 20.0, "n_layers": 2.0},
+            *(1.0, 2.0),
+            marks=pytest.mark.heavy,
+        ),
+    ],
+)
+def test_a_mesh_of_ones_own_has_the_factors_of_its_section(tmp_path, solid, order, slope):
+    """The gravity method on the loads of the finite elements, and the requirements that N, T, M
+    suffice for; OSF needs the loads one by one.
+    """
+    settings = {"n_joint": 20.0, "h_dam": 15.0, "h_found": 60.0, "law": "bond", "order": order}
+    settings |= {"uplift": "cracked", "sigma_max": 1e4, "G_f": 5.0, "adhesion": 2e5, "G_t": 300.0}
+    settings |= {"dim": solid.get("dim", 2.0)}
+    shape = {"batter": 3.0, "joint_slope": slope} | solid
+    required = {"required_SSF": 1.9, "required_OSF": 1.1, "required_position": "middle half"}
+    section = dj.case("dam", levels=[45.0], tail_levels=3.0, **settings | shape | required)
+    OwnMesh.of(section).write(tmp_path / "own.msh")
+    (tmp_path / "own.case").write_text('geometry = "own.msh";')
+    own = dj.case(tmp_path / "own.case", levels=[45.0], tail_levels=3.0, **settings | required)
+    (mine,), (other,) = dj.check([own]), dj.check([section])
+    assert other.gravity.numbers["crack_length"] > 1
+    for one, two in zip(mine.results, other.results, strict=True):
+        for name, value in two.numbers.items():
+            if name == "OSF":
+                assert math.isnan(one.numbers[name])
+            elif not name.startswith("sigma") or one.method == "gravity method":
+                assert one.numbers[name] == pytest.approx(value, rel=1e-6, abs=1e-3), name
+        assert one.not_judged == ["required_OSF is not judged: OSF is not known"]
+        unmet = [why for why in two.failures if not why.startswith("OSF")]
+        assert one.failures == unmet and (not unmet or one.verdict == "fail")
+    assert other.gravity.verdict == "fail"
+
+
+def test_a_requirement_that_can_not_be_judged_is_not_passed(command, tmp_path):
+    """A stepped joint has no gravity method; SSF is judged, OSF not."""
+    stepped = ("stepped", "--levels", "30", "--tail-levels", "0", "--set", "required_SSF=1.2")
+    code, out, _ = command("check", *stepped)
+    assert code == 0 and "pass" in out and "no gravity method" in out
+    code, out, _ = command("check", *stepped, "--set", "required_OSF=1.1")
+    assert code == 1 and "required_OSF is not judged: OSF is not known" in out
+    (row,) = rows(tmp_path / "out/check/check.csv").values()
+    assert row["verdict"] == "not judged" and float(row["SSF"]) > 1.2
+    assert math.isnan(float(row["OSF"]))
+    code, out, _ = command("check", *stepped[:-1], "required_SSF=9")
+    assert code == 1 and re.search(r"fails, SSF [\d.]+ < 9", out)
+
+
+@pytest.mark.heavy
+def test_joints_between_bodies_that_others_hold_are_not_limited():
+    """A contraction joint may slip; the bases are judged one by one."""
+    checks = dj.check([dj.case("monoliths", levels=[45.0], required_SSF=1.2)])
+    assert [check.finite_elements.joint for check in checks] == [
+        "upstream base",
+        "downstream base",
+        "contraction",
+    ]
+    assert [check.finite_elements.verdict for check in checks] == ["pass", "pass", "not checked"]
+    assert checks[2].finite_elements.numbers["SSF"] < 1.2
+    assert all(check.gravity is None for check in checks)
+
+
+def test_only_the_joint_that_fails_fails(solve):
+    """Another one is not judged beyond the loads that the run has reached."""
+    weak = {"law": "bond", "mu": 0.3, "adhesion": 1e5, "lift_heights": (15.0,)}
+    (result,) = solve("dam", (45.0,), n_joint=24.0, order=1.0, **weak)
+    assert verdict(result) == "sliding on base" and result.partial_load
+    base, lift = (check.finite_elements for check in compare_joints(result))
+    assert base.verdict == "fail" and not base.not_judged
+    assert lift.verdict == "not judged" and not lift.failures
+    assert re.fullmatch(
+        "not judged beyond t = 0[.].* of 1, where the run ended: sliding on base", lift.row["why"]
+    )
+    lines = text_table(compare_joints(result)).splitlines()
+    assert not [line for line in lines if "lift 15 m, finite elements: fails" in line]
 
 
 def test_picture_of_each_joint_of_a_dam_that_fails(solve, tmp_path):
@@ -338,5 +490,5 @@ def test_a_note_on_all_joints_is_printed_once(solve):
     joints = {"uplift": ("none", "flow"), "lift_heights": (15.0,), "mu": 1.0, "adhesion": 1e5}
     (result,) = solve("dam", (30.0,), n_joint=24.0, order=1.0, law="friction", **joints)
     of_all, of_lift = labelled_notes(compare_joints(result))
-    assert of_all.startswith("dam: not checked: the case sets none of required_SSF")
+    assert of_all.startswith("dam: only equilibrium is judged: required_SSF")
     assert of_lift == "dam, lift 15 m: gravity method: full head in the crack, linear beyond it"

@@ -181,6 +181,19 @@ def test_the_gravity_method_without_tension(brittle):
     assert "(n_joint = 60), " in lines and "kPa, exceeds the strength of 2000 kPa" in lines
 
 
+def test_the_value_of_the_gravity_method_names_its_joint():
+    """It is often another joint than that of the finite elements, whose value is beside it."""
+    settings = {"law": "bond", "n_joint": 20.0, "lift_heights": (9.0,), "mu": (1.0, 0.6)}
+    search = Search(load("dam", settings | {"adhesion": (1e5, 2e5)}), "level")
+    answer = search.run()
+    assert (answer.joint, answer.gravity_joint) == ("base", "lift 9 m")
+    base, lift = search.own.joints
+    for joint, level in ((lift, answer.gravity), (base, answer.gravity_there)):
+        assert gravity.at(joint, 1.0, level).SSF == pytest.approx(1, rel=1e-3)
+    shown = f"gravity method on lift 9 m: {answer.gravity:.6g} m; on base: "
+    assert shown + f"{answer.gravity_there:.6g} m" in "\n".join(answer.lines(search))
+
+
 def test_the_gravity_method_with_a_crack_past_the_drains():
     """The short crack is in equilibrium up to the drains; mu N = T with the crack past them."""
     drains = {"dam_base": 30.0, "uplift": "cracked", "drains": 1.0, "drain_x": 6.0, "mu": 1.0}

@@ -392,4 +392,9 @@ def agree(case, tmp_path):
             scale = np.abs([one.last["N"], one.last["T"], one.last["U"]]).max()
             for name in "NTU":
                 assert one.last[name] == pytest.approx(other.last[name], abs=1e-6 * scale)
+            moment = pytest.approx(other.last["M_U"], abs=1e-6 * scale * one.case.joint_along)
+            assert one.last["M_U"] == moment
+            for name in ("crack_length", "process_zone", "broken_length", "bonded_length"):
+                reach = 1e-6 * one.case.joint_along
+                assert one.last[name] == pytest.approx(other.last[name], abs=reach), name
     return fast

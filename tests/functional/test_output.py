@@ -22,7 +22,7 @@ JOINT = (
 )
 HISTORY = (
     "time,level,load_factor,iterations,cuts,residual,crack_length,process_zone,slip_length,max_opening,"
-    "crest_ux,N,T,M,flux,tail_level,U,x_resultant"
+    "crest_ux,N,T,M,flux,tail_level,U,x_resultant,M_U,broken_length,bonded_length"
 )
 
 

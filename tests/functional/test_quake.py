@@ -535,7 +535,7 @@ def test_the_command_writes_rows_summary_and_picture(command, case_file, tmp_pat
 
 def test_a_joint_that_stays_closed_has_no_peak_of_its_opening(command, case_file, tmp_path):
     """Neither a value nor a picture of it; its water does not follow a crack."""
-    weak = "--set", "record_scale=0.05", "--set", "record_rest=0"
+    weak = "--set", "record_scale=0.05", "--set", "record_rest=0", "--set", "required_SSF=1.2"
     code, out, _ = command("quake", case_file, *weak, "--no-picture")
     folder = tmp_path / "out" / "my_quake"
     found = json.loads((folder / "run.json").read_text())
@@ -556,6 +556,9 @@ def test_a_joint_that_stays_closed_has_no_peak_of_its_opening(command, case_file
     page = Path("report.html").read_text()
     assert "Water pressure in the joint: as before the earthquake." in page
     assert "none of them halved" in page
+    # nor is what is required of the static loads judged after the record
+    assert '<p class="fail">required_SSF: not judged in the state after the earthquake</p>' in page
+    assert 'class="verdict not-judged">not judged<' in page
 
 
 @pytest.mark.heavy

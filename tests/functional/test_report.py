@@ -284,7 +284,8 @@ def test_report_of_a_critical_value(command, tmp_path):
     level = json.loads((tmp_path / "limit/run.json").read_text())["critical"]["value"]
     assert command("report", "limit")[0] == 0
     page = (tmp_path / "report.html").read_text()
-    assert ">not checked<" in page and ">fail<" not in page
+    assert 'class="verdict not-judged">not judged<' in page and ">fail<" not in page
+    assert '<p class="fail">required_SSF: not judged in the state before failure</p>' in page
     assert f"critical level {level:.6g} m" in words_of(page)
     both = rows_below(page, "Finite elements and gravity method, at the last level")
     assert_allclose(column(both, "level")[:2], level, rtol=1e-3)
@@ -303,6 +304,11 @@ def test_limits_of_the_model_follow_the_case():
     assert "expansion_found" not in report_input.other_input(loaded)
     assert "pseudo-static" in sentences and "Joint law bond: coupled" in sentences
     assert "Drains 3.4 m from the heel" in sentences
+    assert "independent of the opening" in sentences  # then not that of the crack at each moment
+    assert "uplift: as before the earthquake." in sentences and "at each moment" not in sentences
+    follows = load("dam", {"k_h": 0.1, "uplift": ("cracked", "none"), "lift_heights": (15.0,)})
+    both = "uplift: that of the crack at each moment (base); no water pressure (lift 15 m)."
+    assert both in " ".join(report_input.limits(follows))
     assert "Loads that are zero: silt, post-tensioning." in sentences
     solid = " ".join(report_input.limits(load("b")))
     assert "Three dimensions: the section over 1 m" in solid and "Plane strain" not in solid

@@ -476,7 +476,7 @@ def test_two_cracks_in_equilibrium():
     assert (longer.crack_length, longer.SSF) == pytest.approx((12.401, 1.162), abs=1e-3)
     assert longer.tip_stress == pytest.approx(0, abs=1) and not longer.further
     (note,) = found.notes
-    assert "2.088 m; once past the drains (6 m): crack 12.4 m, SSF 1.162" in note
+    assert "if it grows further, crack 12.4 m past the drains (6 m), SSF 1.162" in note
     better = settings | {"drain_x": 4.0, "drain_effectiveness": 1.0}
     stopped = gravity.at(load("dam", better, "46.8", "3"), 1)
     (through,) = stopped.further

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from damjoint.model.case import load
 from damjoint.model.fields import (
+    BROKEN,
     CLOSED,
-    OPEN,
     SLIPPED,
     SOFTENING,
     along,
@@ -113,13 +114,50 @@ def test_surface_of_a_solid():
 
 
 def test_states_of_the_joint():
-    """Closed, slipped, softening (slipped or not), open; law = friction has no softening: values
-    between 0 and 1 are means over z.
+    """Closed, slipped, softening (slipped or not), broken; law = friction has no softening: values
+    between 0 and 1 are means over z. The damage of endo stays below 1.
     """
     rows = {"damage": np.array([0, 0, 0.2, 0.2, 1]), "slip": np.array([0, 1e-3, 0, 1e-3, 1e-3])}
-    assert state_of(rows).tolist() == [CLOSED, SLIPPED, SOFTENING, SOFTENING, OPEN]
-    friction = rows | {"lambda": rows["slip"]}
-    assert state_of(friction).tolist() == [CLOSED, SLIPPED, CLOSED, SLIPPED, OPEN]
+    expected = [CLOSED, SLIPPED, SOFTENING, SOFTENING, BROKEN]
+    assert state_of(rows, load("dam", {"law": "bond"}).law).tolist() == expected
+    friction = [CLOSED, SLIPPED, CLOSED, SLIPPED, BROKEN]
+    assert state_of(rows, load("dam", {"law": "friction"}).law).tolist() == friction
+    endo = rows | {"damage": np.array([0, 0, 0.7, 0.72, 0.73])}
+    assert state_of(endo, ENDO).tolist() == expected
+
+
+#: Laws by name, with parameters for which tension breaks them.
+ENDO = load("dam", {"law": "endo", "sigma_max": 2e5, "mu": 0.8, "adhesion": 1.9e5}).law
+BREAKING = {n: load("dam", {"law": n, "sigma_max": 2e5}).law for n in ("rupture", "bond")}
+BREAKING |= {"endo": ENDO, "friction": load("dam", {"law": "friction"}).law}
+
+
+@pytest.mark.parametrize("name", BREAKING)
+def test_a_broken_joint_has_one_meaning(name):
+    """Opened far and closed again: broken in the colours exactly where the law says so, which does
+    not heal but for friction; no cohesion is left, but friction keeps all of it.
+    """
+    law = BREAKING[name]
+    far, closed = (np.array([[jump, 0.0, 0.0]]) for jump in (1e-2, -1e-6))
+    before = law.initial(1)
+    assert not law.is_broken(closed, before)[0] and law.cohesion_left(closed, before)[0] == 1
+    after = law.update_internal_variables(far, before)
+    heals = name == "friction"
+    for jump, broken in ((far, True), (closed, not heals)):
+        rows = {"damage": law.damage(jump, after), "slip": law.slip(after, 1)}
+        assert law.is_broken(jump, after)[0] == broken == (state_of(rows, law)[0] == BROKEN)
+        assert not law.in_process_zone(jump, after)[0]
+        assert law.cohesion_left(jump, after)[0] == pytest.approx(float(heals), abs=2e-3)
+
+
+def test_endo_is_broken_where_linear_softening_would_end():
+    """In tension at a plastic opening of 2 G_f/sigma_max, to the elastic part."""
+    openings = np.linspace(0.9, 1.1, 201) * ENDO.delta_c
+    jumps = np.column_stack([openings, *np.zeros((2, 201))])
+    after = ENDO.update_internal_variables(jumps, ENDO.initial(201))
+    first = np.argmax(ENDO.is_broken(jumps, after))
+    assert after.plastic[first, 2] == pytest.approx(ENDO.delta_c, rel=2e-3)
+    assert ENDO.cohesion_left(jumps, after)[first] == pytest.approx(0.0875, abs=2e-3)
 
 
 def test_rows_of_a_stepped_joint():

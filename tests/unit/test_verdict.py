@@ -102,7 +102,7 @@ def test_the_statement_gives_the_mechanism_found_on_the_path():
     "names", [("b10", "b1", "b1 and b"), ("b1", "b10", "b"), ("b", "b 1", "b1")]
 )
 @pytest.mark.parametrize("failing", [(0,), (1,), (2,), (1, 2), (0, 2)])
-def test_the_decisive_joint_is_the_one_of_that_name(monkeypatch, names, failing):
+def test_the_failing_joints_are_those_of_these_names(monkeypatch, names, failing):
     """Not one whose name begins the other's."""
     result = stopped("friction")
     case = result.case.with_joints(
@@ -113,4 +113,5 @@ def test_the_decisive_joint_is_the_one_of_that_name(monkeypatch, names, failing)
     )
     result = replace(result, case=case)
     monkeypatch.setattr(verdict, "failure", lambda _: ("sliding", case.named(failing)))
+    assert verdict.failing_joints(result) == failing
     assert verdict.decisive_joint(result) == failing[0]

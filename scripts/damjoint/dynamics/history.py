@@ -44,6 +44,7 @@ def row_of_joint(quake: Earthquake, state: State, number: int) -> dict[str, floa
         **{name: row[name] for name in ("N", "T", "M", "U")},
         "shear_reserve": strength - abs(row["T"]),
         "open_length": row["crack_length"],
+        "broken_length": row["broken_length"],
     }
 
 

@@ -24,14 +24,14 @@ FACTORS = (
     (
         "SSF",
         "SSF with mu, adhesion",
-        "sliding safety factor (mu N' + adhesion (length - crack)) / T, whatever the joint law",
+        "sliding safety factor (mu N' + the adhesion that is left) / T, whatever the joint law",
     ),
     ("OSF", "OSF", "overturning safety factor: stabilising over overturning moments about the toe"),
 )
 #: What the gravity method computes.
 BY_GRAVITY = "N", "T", "M", "U", "x_resultant", "crack_length", "SSF", "OSF"
 #: Columns that are not shown where they are zero.
-OPTIONAL = "tail_level", "U", "flux", "process_zone"
+OPTIONAL = "tail_level", "U", "flux", "process_zone", "broken_length"
 #: Numbers of an earthquake: column of quake.csv, heading, units.
 ACCELERATIONS: Units = (("m/s2", 1),)
 SECONDS: Units = (("s", 1),)
@@ -41,14 +41,15 @@ QUAKE_SHOWN: tuple[tuple[str, str, Units], ...] = (
     ("crest_ux", "crest movement", LENGTHS),
     ("heel_opening", "heel opening", LENGTHS),
     ("toe_opening", "toe opening", LENGTHS),
-    ("open_length", "open or broken", LENGTHS[:1]),
+    ("open_length", "crack", LENGTHS[:1]),
+    ("broken_length", "broken", LENGTHS[:1]),
     ("slip_mean", "slip", LENGTHS),
     ("N", "N'", FORCES),
     ("T", "T", FORCES),
     ("shear_reserve", "strength - |T|", FORCES),
 )
 #: Those of which the largest size is shown; residual values of run.json, their headings and units.
-PEAKS = QUAKE_SHOWN[:7]
+PEAKS = QUAKE_SHOWN[:8]
 RESIDUAL: tuple[tuple[str, str, Units], ...] = (
     ("slip", "residual slip", LENGTHS),
     ("tilt", "residual tilt", (("rad", 1), ("mrad", 1e3), ("µrad", 1e6))),
@@ -75,10 +76,11 @@ class Numbers:
         """The numbers at a requested time."""
         case, state = result.case, result.state(time)
         state["max_opening"] = max(state["max_opening"], 0.0)  # below 0 in a closed joint
+        factors = gravity.factors_of_state(case, state)
+        state |= {name: value for name, value in factors.items() if not math.isnan(value)}
         if case.geometry:
             return Numbers(state, {}, case.joint_length)
         method = gravity.at(case, state["time"], state["level"])
-        state |= gravity.factors_of_state(method, state)
         rigid = {name: float(getattr(method, name)) for name in BY_GRAVITY}
         return Numbers(state, rigid, case.joint_length)
 
@@ -189,14 +191,13 @@ def three_digits(value: float) -> str:
 def table_of_levels(result: Results) -> Table:
     """Table of the requested levels, with safety factors."""
     table = levels_table(result)
-    if result.case.geometry:
-        return table
     times = result.history["time"][requested_rows(result)]
     numbers = [Numbers.at(result, time).elements for time in times]
-    columns = [[three_digits(row[name]) for row in numbers] for name, *_ in FACTORS]
+    factors = [name for name, *_ in FACTORS if all(name in row for row in numbers)]
+    columns = [[three_digits(row[name]) for row in numbers] for name in factors]
     rows = [(*row[:-1], *more, row[-1]) for row, *more in zip(table.rows, *columns, strict=True)]
-    names = [*table.names[:-1], *(name for name, *_ in FACTORS), table.names[-1]]
-    return Table(names, [*table.units, *("" for _ in FACTORS)], rows)
+    names = [*table.names[:-1], *factors, table.names[-1]]
+    return Table(names, [*table.units, *("" for _ in factors)], rows)
 
 
 def warnings(result: Results) -> list[str]:

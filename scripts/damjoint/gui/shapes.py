@@ -8,14 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from .. import ROUND_OFF
 from ..arrays import Table
+from ..laws import Law
 from ..model.case import Case
 from ..model.fields import (
-    OPEN,
+    BROKEN,
     SLIPPED,
     SOFTENING,
     distance,
@@ -222,9 +224,10 @@ BODIES = "dam", "foundation"
 @dataclass(frozen=True)
 class NearSide:
     """The nodes of a joint on the side towards the viewer, from heel to toe (n,): their tags and
-    rows; names of the bodies above and below, rows of the joint by step.
+    rows; its law, names of the bodies above and below, rows of the joint by step.
     """
 
+    law: Law[Any]
     bodies: tuple[str, str]
     tags: np.ndarray
     row: np.ndarray
@@ -233,6 +236,11 @@ class NearSide:
     def along(self, values: Callable[[Table], np.ndarray]) -> np.ndarray:
         """Evaluate a function of the joint's rows on the near side, (steps, n)."""
         return np.array([values(rows)[self.row] for rows in self.rows])
+
+    @property
+    def states(self) -> np.ndarray:
+        """The states on the near side, (steps, n)."""
+        return self.along(lambda rows: state_of(rows, self.law))
 
 
 @dataclass
@@ -276,7 +284,7 @@ class Deformed:
         order = order[np.unique([*range(0, len(order), every), len(order) - 1])]
         of_joints = self.scene.result.case.of_joints
         names = (of_joints[number].upper, of_joints[number].lower) if of_joints else BODIES
-        return NearSide(names, joint.node_tags[near][order], row[order], rows)
+        return NearSide(result.case.law, names, joint.node_tags[near][order], row[order], rows)
 
     def bodies(self) -> list[Pieces]:
         """Faces of dam and foundation with their displacement [m]."""
@@ -320,16 +328,16 @@ class Deformed:
 
     def occurring(self) -> np.ndarray:
         """The states of the joints on the near side."""
-        return np.unique(np.concatenate([np.ravel(joint.along(state_of)) for joint in self.joints]))
+        return np.unique(np.concatenate([np.ravel(joint.states) for joint in self.joints]))
 
     def marks(self) -> dict[int, Pieces]:
-        """Both faces of each joint, by state: open or broken, softening, slipped.
+        """Both faces of each joint, by state: broken, softening, slipped.
 
         A segment that is not in that state at a step collapses to a point.
         """
         ends, moved, of_segments = [], [], []
         for joint in self.joints:
-            state = joint.along(state_of)
+            state = joint.states
             for name in joint.bodies:
                 points, displacement = self.joint_face(name, joint)
                 ends.append(np.stack([points[:-1], points[1:]], axis=1))
@@ -341,7 +349,7 @@ class Deformed:
             values[:, :, 0] - values[:, :, 1] + (segments[:, 0] - segments[:, 1]) / self.scale
         )
         marks = {}
-        for number in (OPEN, SOFTENING, SLIPPED):
+        for number in (BROKEN, SOFTENING, SLIPPED):
             shown, in_state = values.copy(), segment_states == number
             shown[:, :, 1] += np.where(in_state[:, :, None], 0.0, collapse)
             marks[number] = Pieces(segments, shown)
@@ -460,7 +468,7 @@ class Deformed:
         above, below = joint.bodies
         lower, lower_displacement = self.joint_face(below, joint)
         upper, upper_displacement = self.joint_face(above, joint)
-        wet = joint.along(lambda rows: (state_of(rows) == OPEN) & (rows["p"] > 0))
+        wet = (joint.states == BROKEN) & (joint.along(lambda rows: rows["p"]) > 0)
         wet = (wet[:, :-1] & wet[:, 1:])[..., None, None]
         low = lower + self.scale * lower_displacement
         high = upper + self.scale * upper_displacement

@@ -15,8 +15,8 @@ import numpy as np
 
 from ..model.case import Case
 from ..model.fields import (
+    BROKEN,
     CLOSED,
-    OPEN,
     SLIPPED,
     SOFTENING,
     distance,
@@ -77,7 +77,7 @@ class Display:
 Entry = tuple[Color, str]
 #: States of the joint that are marked, with their legend.
 STATES: dict[int, Entry] = {
-    OPEN: (RED, "joint open or broken"),
+    BROKEN: (RED, "joint broken"),
     SOFTENING: (VIOLET, "joint softening"),
     SLIPPED: (ORANGE, "joint slipped"),
 }
@@ -190,6 +190,8 @@ def caption(scene: SolvedScene, step: int) -> tuple[str, str, str]:
     opening = now["max_opening"]
     state = f"opening {with_unit(opening, LENGTHS, 3)}" if opening > 0 else "closed"
     state += f", crack {now['crack_length']:.3g} m"
+    if now["broken_length"] > now["crack_length"]:
+        state += f", broken {now['broken_length']:.3g} m"
     if now["process_zone"] > 0:
         state += f", softening {now['process_zone']:.3g} m"
     resultant = f"N' at {three_digits(now['x_resultant'])} m"
@@ -287,13 +289,13 @@ def show_strips(gallery: Gallery, deformed: Deformed, display: Display) -> None:
     tag = add(0, f"opening [{name}]", opening, BALANCED, {**color_bar(1), "RangeType": 2})
     largest = np.max([np.abs(values).max(axis=(1, 2, 3)) for values in opening], axis=0)
     gallery.balance_about_zero(tag, largest, display.common)
-    states = np.array([state_of(r) for r in rows], float)[:, nearest]
+    states = np.array([state_of(r, case.law) for r in rows], float)[:, nearest]
     # one state an element: between nodes of different states others would appear
     of_elements = [
         np.repeat(states[:, table].min(axis=2, keepdims=True), table.shape[1], axis=2)[..., None]
         for _, table in joint.cells
     ]
-    discrete = {"RangeType": 2, "CustomMin": CLOSED, "CustomMax": OPEN, "IntervalsType": 3}
+    discrete = {"RangeType": 2, "CustomMin": CLOSED, "CustomMax": BROKEN, "IntervalsType": 3}
     colors = (STONE[0], ORANGE, VIOLET, RED)
     add(1, "state: as in the legend", of_elements, colors, {**discrete, "ShowScale": 0})
     if case["uplift"] != "none":

@@ -62,6 +62,8 @@ class Law(Generic[V]):
     open_tension = 0.0
     #: whether opening releases the shear stiffness
     releases_shear = False
+    #: damage from which on a point counts as broken
+    broken_damage = 1.0
 
     def __init__(self, parameters: Mapping[str, Any]) -> None:
         """parameters: of pro/parameters.pro, by name."""
@@ -139,6 +141,14 @@ class Law(Generic[V]):
         """Whether a point belongs to the crack."""
         return jump[:, 0] > 0
 
+    def is_broken(self, jump: Array, variables: V) -> BoolArray:
+        """Whether the damage of a point is `broken_damage` or more, whether it is open or not."""
+        return self.damage(jump, variables) >= self.broken_damage
+
+    def cohesion_left(self, jump: Array, variables: V) -> Array:
+        """Part of the cohesion that a point has left (q,), 1 to 0; here 1 until it is broken."""
+        return np.where(self.is_broken(jump, variables), 0.0, 1.0)
+
     def opening_of_crack(self, variables: V, points: int) -> Array:
         """The opening [m] beyond which a point belongs to the crack."""
         return np.zeros(points)
@@ -152,9 +162,8 @@ class Law(Generic[V]):
         return self.slip(variables, points) > 0
 
     def in_process_zone(self, jump: Array, variables: V) -> BoolArray:
-        """Whether a point softens: it is damaged, and neither broken nor open."""
-        damage = self.damage(jump, variables)
-        return (damage > 0) & (damage < 1) & ~self.is_open(jump, variables)
+        """Whether a point softens: it is damaged and not broken."""
+        return (self.damage(jump, variables) > 0) & ~self.is_broken(jump, variables)
 
     def added_thickness(self, variables: V, points: int) -> Array:
         """Thickness that grout adds to the joint and the saw takes off, < 0 (q,) [m]."""

@@ -173,6 +173,10 @@ class Bond(Law[BondVariables]):
         """See `Law`: open, and broken."""
         return (jump[:, 0] > 0) & ((variables.damage >= 1) | (self.tensile_strength == 0))
 
+    def cohesion_left(self, jump: Array, variables: BondVariables) -> Array:
+        """See `Law`."""
+        return 1 - variables.damage
+
     def opening_of_crack(self, variables: BondVariables, points: int) -> Array:
         """See `Law`."""
         bonded = (variables.damage < 1) & (self.tensile_strength > 0)

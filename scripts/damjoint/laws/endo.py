@@ -21,6 +21,10 @@ from .base import Law
 PEAK = (np.sqrt(1.5 / 3.5) - 0.5) / 2.5
 #: Damage at which a point snaps back first: the maximum of 2 S'^2/S'' - S, which K/B has to exceed.
 STEEPEST = 0.2
+#: Damage from which on a point counts as broken: -S' is the minimum of S^2/(-S'). In tension the
+#: plastic opening is then 2 G_f/sigma_max, where linear softening would end; 9 % of the strengths
+#: are left.
+BROKEN = 0.7203615675
 #: Range of the damage of a point that has yielded.
 LEAST, LARGEST = 1e-18, 1 - 1e-12
 #: Iterations for the damage, as in pro/law_endo.pro, and where they end: change of
@@ -66,6 +70,7 @@ class Endo(Law[EndoVariables]):
 
     variable_names = ("alpha", "plastic_1", "plastic_2", "plastic_n")
     softens = stands_slipped = True
+    broken_damage = BROKEN
 
     def __init__(self, parameters: Mapping[str, Any]) -> None:
         p = parameters
@@ -212,6 +217,15 @@ class Endo(Law[EndoVariables]):
         """See `Law`: in tension, and open by 2 G_f/sigma_max, where linear softening would end."""
         return jump[:, 0] > np.maximum(variables.plastic[:, 2], self.delta_c)
 
+    def cohesion_left(self, jump: Array, variables: EndoVariables) -> Array:
+        """See `Law`."""
+        return self.strength_left(variables.alpha)
+
+    def strength_left(self, damage: Array | float) -> Array:
+        """Part of tensile strength and cohesion at a damage (q,): 1 up to the peak."""
+        S, dS, _ = degradation(np.maximum(damage, PEAK))
+        return np.asarray(S * np.sqrt(self.peak / -dS))
+
     def opening_of_crack(self, variables: EndoVariables, points: int) -> Array:
         """See `Law`."""
         return np.full(points, self.delta_c)
@@ -228,8 +242,7 @@ class Endo(Law[EndoVariables]):
 
     def shear_strength(self, sigma_n: Array, damage: Array | float, slip: Array | float) -> Array:
         """See `Law`: C - mu sigma_n, C the cohesion at the damage, adhesion at the peak."""
-        S, dS, _ = degradation(np.maximum(damage, PEAK))
-        return self.cohesion * S * np.sqrt(self.peak / -dS) - self.mu * sigma_n
+        return self.cohesion * self.strength_left(damage) - self.mu * sigma_n
 
     shear_strength_formula = "c S/S_max + mu |sigma'|"
 

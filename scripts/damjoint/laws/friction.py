@@ -156,6 +156,10 @@ class Friction(Law[FrictionVariables]):
         """See `Law`: beyond the opening at which the tension reaches c/mu."""
         return self.opening(jump, variables) > self.cap_opening
 
+    def cohesion_left(self, jump: Array, variables: FrictionVariables) -> Array:
+        """See `Law`: all of it, also where the point is open."""
+        return np.ones(len(jump))
+
     def opening_of_crack(self, variables: FrictionVariables, points: int) -> Array:
         """See `Law`."""
         return np.full(points, self.cap_opening)

@@ -119,7 +119,7 @@ class Rupture(Law[RuptureVariables]):
         """The opening beyond the thickness that grout and saw leave (q,) [m]."""
         return np.minimum(self.gap(jump, variables), variables.largest)
 
-    def is_broken(self, opening: Array, variables: RuptureVariables) -> BoolArray:
+    def opening_breaks(self, opening: Array, variables: RuptureVariables) -> BoolArray:
         """Whether a point has lost its tensile strength."""
         return self.was_broken(variables) | (opening >= self.L_C)
 
@@ -144,7 +144,7 @@ class Rupture(Law[RuptureVariables]):
     ) -> tuple[Array, Array]:
         """Normal stress, and its tangent or a secant stiffness that is positive (q,)."""
         v, weak = variables, self.artificial * self.K_N
-        closed, broken = opening <= 0, self.is_broken(opening, v)
+        closed, broken = opening <= 0, self.opening_breaks(opening, v)
         unloads = self.unloads(opening, v)
         with np.errstate(divide="ignore", invalid="ignore"):
             unloading = self.sigma_c * (1 - v.kappa / self.L_C) / v.kappa
@@ -207,7 +207,8 @@ class Rupture(Law[RuptureVariables]):
 
     def is_open(self, jump: Array, variables: RuptureVariables) -> BoolArray:
         """See `Law`: whether it is broken."""
-        return self.is_broken(self.opening(jump, variables), variables) & (variables.kappa > 0)
+        breaks = self.opening_breaks(self.opening(jump, variables), variables)
+        return breaks & (variables.kappa > 0)
 
     def opening_of_crack(self, variables: RuptureVariables, points: int) -> Array:
         """See `Law`."""
@@ -234,7 +235,7 @@ class FrozenRupture(Rupture):
         vars(self).update(vars(law))
         self.share = share
 
-    def is_broken(self, opening: Array, variables: RuptureVariables) -> BoolArray:
+    def opening_breaks(self, opening: Array, variables: RuptureVariables) -> BoolArray:
         """See `Rupture`."""
         return self.was_broken(variables)
 

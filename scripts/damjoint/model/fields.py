@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from ..arrays import Array, IntArray, Table
 from ..classes import dataclass
-from ..laws import COLUMNS
+from ..laws import COLUMNS, Law
 from .mesh import Body
 from .results import FLUX, THICKNESS, Results
 from .scene import numbered
@@ -69,15 +71,18 @@ def along(rows: Table) -> Table:
 
 
 #: States of the joint.
-CLOSED, SLIPPED, SOFTENING, OPEN = range(4)
+CLOSED, SLIPPED, SOFTENING, BROKEN = range(4)
 
 
-def state_of(rows: Table) -> IntArray:
-    """The state at each row of the joint's table: OPEN (or broken), SOFTENING, SLIPPED, CLOSED."""
-    # friction (rows with lambda) does not soften: values between 0 and 1 are means over z
-    softening = (rows["damage"] > 0) & ("lambda" not in rows)
+def state_of(rows: Table, law: Law[Any]) -> IntArray:
+    """The state at each row of a joint's table: BROKEN, whether open or not, SOFTENING, SLIPPED,
+    CLOSED.
+    """
+    # a law that does not soften has damage 0 or 1: values between are means over z
+    softening = (rows["damage"] > 0) & law.softens
     unbroken = np.where(rows["slip"] > 0, SLIPPED, CLOSED)
-    return np.where(rows["damage"] >= 1, OPEN, np.where(softening, SOFTENING, unbroken))
+    broken = rows["damage"] >= law.broken_damage
+    return np.where(broken, BROKEN, np.where(softening, SOFTENING, unbroken))
 
 
 def nearest_rows(points: Array, rows: Table) -> IntArray:

@@ -51,8 +51,8 @@ HISTORY = {
         "-",
         "norm of the out-of-balance forces over that of the loads at the highest water",
     ),
-    "crack_length": ("m", "length of joint broken (rupture) or open (other laws)"),
-    "process_zone": ("m", "length of softening joint: 0 < damage < 1, not open; friction: 0"),
+    "crack_length": ("m", "length of joint that is broken and open (rupture: that is broken)"),
+    "process_zone": ("m", "length of softening joint: damaged and not broken; friction: 0"),
     "slip_length": ("m", "length of joint with released shear (rupture) or slip (other laws)"),
     "max_opening": ("m", "largest opening of a node"),
     "crest_ux": ("m", "displacement of the upstream edge of the crest along x"),
@@ -63,11 +63,14 @@ HISTORY = {
     "tail_level": ("m", "tailwater level above the base"),
     "U": ("N/m", "uplift: resultant of the water pressure in the joint"),
     "x_resultant": ("m", "position of N on the joint, from the heel"),
+    "M_U": ("N m/m", "moment of U about the toe, lifting > 0"),
+    "broken_length": ("m", "length of joint that is broken: D = 1; endo: D > 0.72; friction: open"),
+    "bonded_length": ("m", "length of joint, weighted with the part of the cohesion that is left"),
 }
 #: Those of a joint. With several joints: of the first one; of joint 2, 3, ... by `column_of`.
 HISTORY_OF_JOINTS = (
     *("crack_length", "process_zone", "slip_length", "max_opening"),
-    *("N", "T", "M", "flux", "U", "x_resultant"),
+    *("N", "T", "M", "flux", "U", "x_resultant", "M_U", "broken_length", "bonded_length"),
 )
 
 
@@ -123,7 +126,8 @@ QUAKE = {
     "N_inertia": ("N/m", "the same part of N"),
     "M_inertia": ("N m/m", "the same part of M"),
     "shear_reserve": ("N/m", "largest shear force that the joint transmits, mu N + c L, minus |T|"),
-    "open_length": ("m", "length of joint that is open or broken"),
+    "open_length": HISTORY["crack_length"],
+    "broken_length": HISTORY["broken_length"],
     "iterations": ("-", "Newton iterations of the step"),
     "dt": ("s", "length of the step"),
     "residual": ("-", "norm of the out-of-balance forces over that of the static loads"),
@@ -131,7 +135,8 @@ QUAKE = {
 #: Those of a joint. With several joints: of the first one; of joint 2, 3, ... by `column_of`.
 QUAKE_OF_JOINTS = (
     *("heel_opening", "toe_opening", "slip_mean", "slip_heel", "slip_toe"),
-    *("N", "T", "M", "U", "T_inertia", "N_inertia", "M_inertia", "shear_reserve", "open_length"),
+    *("N", "T", "M", "U", "T_inertia", "N_inertia", "M_inertia", "shear_reserve"),
+    *("open_length", "broken_length"),
 )
 
 

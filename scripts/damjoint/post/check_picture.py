@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 
-from ..model.fields import SOFTENING, along, state_of
+from ..model.fields import BROKEN, SOFTENING, along, state_of
 from ..model.parameters import constants
 from ..model.results import Results
 from ..statics.gravity import GravityMethod
@@ -123,7 +123,7 @@ def draw_cells(axes: Axes, cells: list[tuple[str, ...]]) -> None:
             text.set_horizontalalignment("left")
         if row == 0:
             text.set_fontweight("bold")
-        if text.get_text() == "fail":
+        if text.get_text() in ("fail", "not judged"):
             text.set_color(RED)
 
 
@@ -216,7 +216,7 @@ def draw_joint(axes: Axes, result: Results, method: GravityMethod) -> None:
     s = (x - x[0]) / np.ptp(x) if rows else none
     draw_lines(axes, under, method)
     if rows:
-        draw_states(axes, under, s, rows, bool(last["crack_length"]), label)
+        draw_states(axes, under, s, state_of(rows, result.case.law), label)
     uplift = method.uplift.s / under.length, method.uplift.p
     computed_p, computed_stress = (rows.get(name, none) for name in ("p", "sigma_n_eff"))
     stress = f"effective stress, {SIGN}"
@@ -248,22 +248,14 @@ def draw_lines(axes: Axes, under: UnderJoint, method: GravityMethod) -> None:
 
 
 def draw_states(
-    axes: Axes,
-    under: UnderJoint,
-    s: np.ndarray,
-    rows: dict[str, np.ndarray],
-    cracked: bool,
-    label: str,
+    axes: Axes, under: UnderJoint, s: np.ndarray, states: np.ndarray, label: str
 ) -> None:
-    """Draw crack and softening part of the joint by the finite elements."""
-    if cracked:
-        line = under.place(s, np.where(rows["damage"] >= 1, 0, np.nan))
-        axes.plot(*line, color=RED, linewidth=3, label=f"crack, {label}", zorder=4)
-    if (softening := state_of(rows) == SOFTENING).any():
-        line = under.place(s, np.where(softening, 0, np.nan))
-        style = STATES[SOFTENING]
-        look = {"color": style.color, "linestyle": style.line, "linewidth": 3, "zorder": 2}
-        axes.plot(*line, **look, label=f"{style.label}, {label}")
+    """Draw broken and softening part of the joint by the finite elements."""
+    for number, order in ((BROKEN, 4), (SOFTENING, 2)):
+        if (states == number).any():
+            line, style = under.place(s, np.where(states == number, 0, np.nan)), STATES[number]
+            look = {"color": style.color, "linestyle": style.line, "linewidth": 3, "zorder": order}
+            axes.plot(*line, **look, label=f"{style.label}, {label}")
 
 
 def draw_diagram(axes: Axes, under: UnderJoint, diagram: Diagram, label: str) -> None:

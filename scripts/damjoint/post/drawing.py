@@ -16,7 +16,7 @@ from matplotlib.figure import Figure, FigureBase
 from matplotlib.image import imsave
 from matplotlib.patches import Patch
 
-from ..model.fields import OPEN, SLIPPED, SOFTENING
+from ..model.fields import BROKEN, SLIPPED, SOFTENING
 from ..storage import atomic_write
 
 matplotlib.rcdefaults()  # a matplotlibrc in the current folder must not change the pictures
@@ -49,7 +49,7 @@ class StateStyle(NamedTuple):
 
 #: The joint's states that are marked, those that hide others first.
 STATES = {
-    OPEN: StateStyle("open or broken", RED, "-", "///"),
+    BROKEN: StateStyle("broken", RED, "-", "///"),
     SOFTENING: StateStyle("softening", VIOLET, (0, (3, 1)), "xxx"),
     SLIPPED: StateStyle("slipped", ORANGE, (0, (1, 0.6)), "..."),
 }

@@ -195,7 +195,7 @@ def draw_curves(figure: FigureBase, result: Results, time: float) -> None:
     values, or without any the stress of the gravity method.
     """
     case, curves = result.case, along(result.at(time))
-    s, states = curves["s"], state_of(curves)
+    s, states = curves["s"], state_of(curves, case.law)
     jumps, normals, shears = panels(figure, 3, 1, bottom=0.62, top=0.28, down=0.32).flat
     draw_jumps(jumps, case, curves)
     factor = draw_normal_stress(normals, case, curves)
@@ -352,7 +352,7 @@ def draw_history(figure: FigureBase, result: Results) -> None:
 
 def history_panels(result: Results) -> list[tuple[str, Units, list[Line]]]:
     """Panels of the history: quantity, units, lines."""
-    lengths = [Line("crack_length", RED, "open"), Line("slip_length", ORANGE, "slipped")]
+    lengths = [Line("broken_length", RED, "broken"), Line("slip_length", ORANGE, "slipped")]
     if result.history["process_zone"].any():
         lengths.append(Line("process_zone", VIOLET, "softening"))
     shown: list[tuple[str, Units, list[Line]]] = [
@@ -366,13 +366,13 @@ def history_panels(result: Results) -> list[tuple[str, Units, list[Line]]]:
 
 
 def draw_shares(figure: FigureBase, result: Results, time: float) -> None:
-    """Draw which share of each joint is open and has slipped at a requested time."""
+    """Draw which share of each joint is broken and has slipped at a requested time."""
     names = result.case.joint_names
     left = LABEL + PER_LETTER * max(map(len, names))
     (axes,) = panels(figure, left=left, bottom=0.42, top=0.25).flat
     for column, color, label, thick in (
         ("slip_length", ORANGE, "slipped", 0.8),
-        ("crack_length", RED, "open", 0.4),
+        ("broken_length", RED, "broken", 0.4),
     ):
         shares = [100 * own.state(time)[column] / own.case.joint_along for own in result.joints]
         axes.barh(range(len(names)), shares, thick, color=color, label=label)

@@ -16,7 +16,7 @@ from matplotlib.patches import Patch
 
 from ..arrays import Table
 from ..model.case import has_drains
-from ..model.fields import OPEN, Solution, distance, nearest_rows, state_of
+from ..model.fields import BROKEN, Solution, distance, nearest_rows, state_of
 from ..model.loads import Loading, line_forces
 from ..model.parameters import constants
 from .drawing import (
@@ -224,7 +224,8 @@ class SectionDrawing:
     def faces(self, joint: int) -> set[int]:
         """Draw both faces of a joint, and water in its crack; the states of the lower face."""
         faces = []
-        states = state_of(self.rows[joint])
+        case = self.joints[joint].case
+        states = state_of(self.rows[joint], case.law)
         for body, face in self.section.joint_faces[joint]:
             state = states[self.rows_at(body.points[face], joint)]
             both_ends = np.minimum(state[:-1], state[1:])
@@ -234,8 +235,8 @@ class SectionDrawing:
             for number, first, end in runs_of(both_ends):
                 if number in STATES:
                     self.axes.plot(*line[first : end + 1].T, **self.joint_style(number), zorder=3)
-        if self.joints[joint].case["uplift"] != "none" and (both_ends == OPEN).any():
-            crack = np.concatenate([faces[0], faces[1][:, ::-1]], axis=1)[both_ends == OPEN]
+        if case["uplift"] != "none" and (both_ends == BROKEN).any():
+            crack = np.concatenate([faces[0], faces[1][:, ::-1]], axis=1)[both_ends == BROKEN]
             self.axes.add_collection(PolyCollection(crack, color=WATER, zorder=2), autolim=False)
         return set(both_ends.tolist())
 

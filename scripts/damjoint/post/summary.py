@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .. import ROUND_OFF
 from ..model.results import Results
 from ..statics import gravity
 from .units import FLUXES, FORCES, LENGTHS, MOMENTS, Units, unit
@@ -22,7 +23,8 @@ SHOWN: tuple[tuple[str, str, Units], ...] = (
     ("M", "M", MOMENTS),
     ("U", "uplift U", FORCES),
     ("x_resultant", "N' at x", LENGTHS[:1]),
-    ("crack_length", "open or broken", LENGTHS[:1]),
+    ("crack_length", "crack", LENGTHS[:1]),
+    ("broken_length", "broken", LENGTHS[:1]),
     ("process_zone", "softening", LENGTHS[:1]),
     ("slip_length", "slipped", LENGTHS[:1]),
     ("max_opening", "largest opening", LENGTHS),
@@ -76,11 +78,17 @@ def levels_table(result: Results) -> Table:
             for name, head, units in SHOWN
             if (name != "flux" or case["uplift"] == "flow")
             and (name not in ("tail_level", "process_zone") or history[name].any())
+            and (name != "broken_length" or differs(history[name], history["crack_length"]))
         ]
     )
     thirds = (gravity.position(x, case.joint_length) for x in history["x_resultant"][rows])
     cells = [(*row, third) for row, third in zip(cells, thirds, strict=True)]
     return Table([*names, "N' in"], [*sizes, ""], cells)
+
+
+def differs(broken: np.ndarray, crack: np.ndarray) -> bool:
+    """Whether the joint was broken where it was closed, or open where it was not broken."""
+    return not np.allclose(broken, crack, ROUND_OFF, 0)
 
 
 def requested_rows(result: Results) -> np.ndarray:

@@ -48,16 +48,20 @@ def joint_row(equilibrium: Equilibrium, state: State, number: int) -> dict[str, 
     N, T, M = joint.chord.resultants(weights, joint.points.positions, along_axes)
     wetted = equilibrium.water[number].wetted.points
     normals = joint.surface.normals[wetted.elements]
-    uplift = wetted.weights * pressure.water_points / joint.width
+    water = -pressure.water_points[:, None] * normals
+    U, _, M_U = joint.chord.resultants(wetted.weights / joint.width, wetted.positions, water)
     return {
         "crack_length": weights @ law.is_open(at_points, variables),
         "process_zone": weights @ law.in_process_zone(at_points, variables),
         "slip_length": weights @ law.has_slipped(variables, len(weights)),
+        "broken_length": weights @ law.is_broken(at_points, variables),
+        "bonded_length": weights @ law.cohesion_left(at_points, variables),
         "max_opening": joint.jumps(joint.at_nodes, state.jump)[:, 0].max(),
         "N": N,
         "T": T,
         "M": M,
-        "U": uplift @ (normals @ joint.chord.plane.T) @ joint.chord.normal,
+        "U": U,
+        "M_U": M_U,
         "flux": pressure.leakage,
         "heel": joint.heel @ state.jump,
     }

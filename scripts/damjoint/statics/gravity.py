@@ -19,10 +19,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..model.case import Case, freezes_uplift
+from ..arrays import Table
+from ..model.case import Case, freezes_uplift, has_drains
 from ..model.constraints import ZANGAR
 from ..model.loads import Loading, heads_at_ends, line_forces, zangar_column, zangar_share
 from ..model.parameters import constants
+
+#: Distance from a plane, over the length of a joint, within which a node lies in it.
+PLANE = 1e-6
 
 #: Columns of gravity.csv: a row per load on the body above the joint, and their sum.
 LOADS = {
@@ -133,8 +137,8 @@ class Segment(NamedTuple):
         )
 
 
-class RigidBlock:
-    """The part of the section above the joint: outline, faces, marks, from the joint's toe [m]."""
+class JointLine:
+    """A joint as the straight line from heel to toe (x, y) [m]."""
 
     def __init__(self, case: Case) -> None:
         section = case.section
@@ -143,7 +147,23 @@ class RigidBlock:
         self.length = section["joint_length"][0]
         #: the joint's direction, from heel to toe
         self.along = tuple((t - h) / self.length for t, h in zip(self.toe, self.heel, strict=True))
-        x, y = self.toe
+
+    def is_plane(self, rows: Table) -> bool:
+        """Whether the joint is plane, in 3D a rectangle with sides along z; rows: of its table."""
+        (tx, ty), reach = self.along, PLANE * self.length
+        x, y, z = rows["x"] - self.heel[0], rows["y"] - self.heel[1], rows["z"]
+        s, away = tx * x + ty * y, ty * x - tx * y
+        ends = np.abs(s) < reach, np.abs(s - self.length) < reach
+        wide = all(end.any() and np.ptp(z) - np.ptp(z[end]) < reach for end in ends)
+        return bool(wide and (np.abs(away) < reach).all())
+
+
+class RigidBlock(JointLine):
+    """The part of the section above the joint: outline, faces, marks, from the joint's toe [m]."""
+
+    def __init__(self, case: Case) -> None:
+        super().__init__(case)
+        section, (x, y) = case.section, self.toe
         ends = zip(*(section[f"seg_{n}"] for n in ("x0", "y0", "x1", "y1")), strict=True)
         self.all_segments = [Segment(x0 - x, y0 - y, x1 - x, y1 - y) for x0, y0, x1, y1 in ends]
         self.sides, self.bodies = section["seg_side"], section["seg_body"]
@@ -268,7 +288,7 @@ class Uplift:
     def __init__(
         self,
         case: Case,
-        body: RigidBlock,
+        body: JointLine,
         level: float,
         tail: float,
         crack: float,
@@ -352,12 +372,16 @@ def drained_head(case: Case, undrained: float, outlet: float) -> float:
     return undrained - case["drain_effectiveness"] * max(undrained - outlet, 0.0)
 
 
-def sliding_factor(case: Case, normal: float, shear: float, uncracked: float) -> float:
-    """SSF = (mu N' + c (L - a)) / |T|: shear friction factor, cohesion on the uncracked joint; with
-    mu and c divided by their partial factors.
+def cohesion(case: Case, bonded: float) -> float:
+    """Shear force [N/m] by the cohesion, divided by its partial factor, on a length [m]."""
+    return case["adhesion"] / case["factor_c"] * bonded
+
+
+def sliding_factor(case: Case, normal: float, shear: float, bonded: float) -> float:
+    """SSF = (mu N' + c B) / |T|: shear friction factor, with mu and c divided by their partial
+    factors; bonded: length B [m] on which cohesion is left, weighted with the part that is left.
     """
-    mu, cohesion = case["mu"] / case["factor_mu"], case["adhesion"] / case["factor_c"]
-    resistance = mu * normal + cohesion * uncracked
+    resistance = case["mu"] / case["factor_mu"] * normal + cohesion(case, bonded)
     return resistance / abs(shear) if shear else math.inf
 
 
@@ -385,7 +409,8 @@ class GravityMethod:
     """The rigid block at one time of a case. Stresses [Pa]: tension > 0, as in joint.csv."""
 
     case: Case
-    body: RigidBlock
+    #: the block above the joint; of a user's own geometry only the joint
+    body: JointLine
     time: float
     level: float
     tail_level: float
@@ -478,35 +503,59 @@ class GravityMethod:
         return sliding_factor(self.case, self.N, self.T, self.uncracked)
 
     @property
+    def cohesion(self) -> float:
+        """Shear force by the cohesion of the uncracked joint [N/m]."""
+        return cohesion(self.case, self.uncracked)
+
+    @property
+    def cohesion_undamaged(self) -> float:
+        """Shear force by the cohesion of the joint without a crack [N/m]."""
+        return cohesion(self.case, self.body.length)
+
+    @property
     def OSF(self) -> float:
-        """Overturning safety factor."""
+        """Overturning safety factor; nan if only the resultant of the loads is known."""
+        if not isinstance(self.body, RigidBlock):
+            return math.nan
         return overturning_factor(self.loads, self.uplift.moment)
+
+    @property
+    def without_tension(self) -> GravityMethod:
+        """The same loads on a joint without tensile strength."""
+        if isinstance(self.body, RigidBlock):
+            return at(self.case, self.time, self.level, tension=False)
+        return cracked(self.case, self.body, self.loads, self.time, self.level, tension=False)
+
+    @property
+    def beside_drains(self) -> str:
+        """On which side of the drains the crack ends; empty without drains or crack."""
+        at = self.case["drain_x"]
+        if not (has_drains(self.case) and at < self.body.length and self.crack_length):
+            return ""
+        side = "past" if self.crack_length > at else "before"
+        return f" {side} the drains ({at:g} m)"
 
     @property
     def description(self) -> str:
         """Crack and safety factors."""
         if not self.stands:
-            return "overturning"
-        return f"crack {self.crack_length:.4g} m, SSF {self.SSF:.4g}, OSF {self.OSF:.4g}"
+            return f"overturning{self.beside_drains}"
+        crack = f"crack {self.crack_length:.4g} m{self.beside_drains}"
+        overturns = "" if math.isnan(self.OSF) else f", OSF {self.OSF:.4g}"
+        return f"{crack}, SSF {self.SSF:.4g}{overturns}"
 
     @property
     def notes(self) -> list[str]:
         """Longer cracks in equilibrium; the result without tension, if it matters."""
         case, notes = self.case, []
-        for state in self.further:
-            passed = self.crack_length <= case["drain_x"] < state.crack_length
-            which = f"past the drains ({case['drain_x']:g} m)" if passed else "beyond it"
-            notes.append(
-                "gravity method: the shortest crack in equilibrium is "
-                f"{self.crack_length:.4g} m; once {which}: {state.description}"
-            )
+        if self.further:
+            notes.append(f"gravity method: {alternatives(self)}")
         if not self.crack_length and self.tip_stress > 0:
-            free = at(case, self.time, self.level, tension=False)
             strength = case.law.tensile_strength
             notes.append(
                 f"gravity method: uncracked, as its {self.tip_stress / 1e3:.4g} kPa at the heel "
                 f"are below the strength of {strength / 1e3:.4g} kPa; without tension: "
-                f"{(free, *free.further)[-1].description}"
+                f"{alternatives(self.without_tension)}"
             )
         return notes
 
@@ -520,16 +569,46 @@ class GravityMethod:
         return dict(zip(LOADS, map(list, zip(*cells, strict=True)), strict=True))
 
 
-def factors_of_state(method: GravityMethod, state: Mapping[str, float]) -> dict[str, float]:
-    """SSF and OSF of a state of the finite elements, a row of the history: with its resultants and
-    crack, and the loads of the gravity method.
+def alternatives(shortest: GravityMethod) -> str:
+    """The shortest crack in equilibrium and, if it grows past the drains or another limit, the
+    longer ones.
     """
-    uncracked = method.body.length - state["crack_length"]
-    uplift_moment = method.resultant.moment - state["M"]
+    longer = (f"; if it grows further, {state.description}" for state in shortest.further)
+    return "".join([shortest.description, *longer])
+
+
+def factors_of_state(case: Case, state: Mapping[str, float]) -> dict[str, float]:
+    """SSF, its cohesion and OSF of a state of the finite elements at a case's only joint, a row of
+    the history: with its resultants, the cohesion that is left and, for OSF, the loads of the
+    gravity method; it is nan for a user's own geometry, whose loads are known only in sum.
+    """
+    overturning = math.nan
+    if not case.geometry:
+        block = with_crack(case, state["time"], state["level"], 0.0)
+        overturning = overturning_factor(block.loads, block.resultant.moment - state["M"])
     return {
-        "SSF": sliding_factor(method.case, state["N"], state["T"], uncracked),
-        "OSF": overturning_factor(method.loads, uplift_moment),
+        "cohesion": cohesion(case, state["bonded_length"]),
+        "cohesion_undamaged": cohesion(case, case.joint_along),
+        "SSF": sliding_factor(case, state["N"], state["T"], state["bonded_length"]),
+        "OSF": overturning,
     }
+
+
+def of_state(case: Case, rows: Table, state: Mapping[str, float]) -> GravityMethod | None:
+    """The gravity method at the only joint of a user's own geometry, which alone holds what is
+    above it, at a state of the finite elements, a row of the history: the resultant of the loads
+    follows from N, T, M and the uplift. None if the joint is not plane, or if the water in it
+    follows from a crack before a pseudo-static earthquake.
+
+    rows: of the joint's table.
+    """
+    joint = JointLine(case)
+    if freezes_uplift(case) or not joint.is_plane(rows):
+        return None
+    (tx, ty), normal, shear = joint.along, state["N"] + state["U"], state["T"]
+    moment = state["M"] + state["M_U"]
+    loads = Load("all loads", tx * shear + ty * normal, ty * shear - tx * normal, 0.0, moment)
+    return cracked(case, joint, (loads,), state["time"], state["level"])
 
 
 def with_crack(case: Case, time: float, level: float, crack: float) -> GravityMethod:
@@ -546,11 +625,24 @@ def at(case: Case, time: float, level: float | None = None, tension: bool = True
     level: of the reservoir [m], by default the prescribed one; tension: whether the joint has its
     tensile strength.
     """
-    body, tail = RigidBlock(case), case.tail_at(time)
     level = case.level_at(time) if level is None else level
-    loads = loads_on(case, body, time, level, tail)
-
+    body = RigidBlock(case)
+    loads = loads_on(case, body, time, level, case.tail_at(time))
     before = crack_before_earthquake(case, time, level, tension)
+    return cracked(case, body, loads, time, level, tension, before)
+
+
+def cracked(
+    case: Case,
+    body: JointLine,
+    loads: tuple[Load, ...],
+    time: float,
+    level: float,
+    tension: bool = True,
+    before: float | None = None,
+) -> GravityMethod:
+    """As `at`, under given loads; before: see `crack_before_earthquake`."""
+    tail = case.tail_at(time)
 
     def state(crack: float) -> GravityMethod:
         wet = crack if before is None else before
@@ -594,7 +686,7 @@ def spans_between(ends: list[float]) -> list[tuple[float, float]]:
     return [(np.nextafter(a, b), b) for a, b in itertools.pairwise(ends) if b > a]
 
 
-def pieces(case: Case, body: RigidBlock, level: float, tail: float) -> list[tuple[float, float]]:
+def pieces(case: Case, body: JointLine, level: float, tail: float) -> list[tuple[float, float]]:
     """Crack lengths [m], from and to, between which the uplift follows one formula: the drains'
     effect begins where the crack raises the head above their outlet, and ends behind them.
     """

@@ -51,19 +51,32 @@ def decisive_joint(results: Results) -> int:
     """The number of the joint at which the dam fails; of a dam that stands, of the one that is
     cracked or has slipped over the largest part of its length.
     """
-    names = results.case.joint_names
-    if len(names) == 1:
+    if len(results.case.joint_names) == 1:
         return 0
-    _, joint = failure(results)
-    if joint:  # of several the first, see `Case.named`; a name may begin another one
-        named = [name for name in names if f"{joint} and ".startswith(f"{name} and ")]
-        return names.index(max(named, key=len))
+    if failing := failing_joints(results):
+        return failing[0]
     parts = [
         max(own.last[n] for n in ("crack_length", "slip_length")) / own.case.joint_along
         for own in results.joints
         if results.last
     ]
     return int(np.argmax(parts)) if parts else 0
+
+
+def failing_joints(results: Results) -> tuple[int, ...]:
+    """The numbers of the joints that the failure of a run names, of a single joint that one; empty
+    if the dam stands, or if no joint is named.
+    """
+    mode, joints = failure(results)
+    if not results.case.of_joints:
+        return (0,) if mode else ()
+    names, numbers = results.case.joint_names, list[int]()
+    rest = joints and f"{joints} and "  # see `Case.named`; a name may begin another one
+    while named := [name for name in names if rest.startswith(f"{name} and ")]:
+        longest = max(named, key=len)
+        numbers.append(names.index(longest))
+        rest = rest.removeprefix(f"{longest} and ")
+    return tuple(numbers)
 
 
 def slipped_joints(results: Results) -> tuple[int, ...]:
@@ -291,6 +304,33 @@ def reason_of_stop(results: Results) -> str:
     return (
         f"no equilibrium is found beyond {where}, and no mechanism either{stiff_joint(results)}; "
         f"there the resultant is {arm:.3g} m from the toe, T/N' = {last['T'] / last['N']:.3g}"
+    )
+
+
+def cracks_and_drains(case: Case, crack: float, block: gravity.GravityMethod) -> str:
+    """On which side of the drains the crack ends by each method, and what follows, with the uplift
+    that has the full head in the crack; empty with another uplift, or if neither crack passes them.
+
+    case: of the joint; crack: its length [m] by the finite elements; block: the gravity method.
+    """
+    at = case["drain_x"]
+    blocks = (block, *block.further)
+    if case["uplift"] != "cracked" or not has_drains(case):
+        return ""
+    if max(crack, *(state.crack_length for state in blocks)) <= at:
+        return ""
+
+    def ends(length: float) -> str:
+        if length > at:
+            return f"a crack of {length:.4g} m has passed them: the full head acts, no drainage"
+        where = f"a crack of {length:.4g} m ends before them" if length else "no crack"
+        return f"{where}: they lower the head"
+
+    by_hand = "; or, if it grows further, ".join(ends(state.crack_length) for state in blocks)
+    return (
+        f"drains at {at:g} m, full head in the crack: finite elements (stress of the elastic dam, "
+        f"largest at the heel): {ends(crack)}; gravity method (stress linear along the joint): "
+        f"{by_hand}"
     )
 
 

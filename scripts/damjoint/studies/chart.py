@@ -23,7 +23,7 @@ from .plan import Plan, Row, column_of, numbers
 
 #: Quantities drawn: label and units.
 DRAWN: dict[str, tuple[str, Units]] = {
-    "crack_length": ("open or broken joint", LENGTHS[:1]),
+    "crack_length": ("crack", LENGTHS[:1]),
     "max_opening": ("largest opening", LENGTHS),
     "crest_ux": ("crest, downstream", LENGTHS),
 }
@@ -51,10 +51,10 @@ class Table(NamedTuple):
         """A column of the rows, or their SSF; nan where there is no value."""
         if column != FACTOR:
             return numbers(self.rows, column)
-        sizes = zip(*(numbers(self.rows, n) for n in ("N", "T", "crack_length")), strict=True)
+        sizes = zip(*(numbers(self.rows, n) for n in ("N", "T", "bonded_length")), strict=True)
         factors = [
-            sliding_factor(case, normal, shear, case.joint_length - crack)
-            for case, (normal, shear, crack) in zip(self.cases, sizes, strict=True)
+            sliding_factor(case, normal, shear, bonded)
+            for case, (normal, shear, bonded) in zip(self.cases, sizes, strict=True)
         ]
         return np.where(np.isfinite(factors), factors, np.nan)
 
@@ -130,14 +130,14 @@ def is_marked(plan: Plan, rows: list[Row]) -> np.ndarray:
 
 
 def panels_of(figure: Figure, table: Table) -> Iterator[tuple[Axes, str, tuple[str, Units]]]:
-    """Create axes for the quantities drawn, with column, label and units: DRAWN and SSF (which a
-    mesh of one's own does not have), or the critical value alone.
+    """Create axes for the quantities drawn, with column, label and units: DRAWN and SSF, or the
+    critical value alone.
     """
     plan, drawn = table.plan, dict(DRAWN)
     if plan.critical:
         words, size = quantity(plan.critical)
         drawn = {plan.critical_columns[0]: (f"critical {words}", ((size, 1),))}
-    elif not any(case.geometry for case in table.cases):
+    else:
         drawn[FACTOR] = FACTOR_LABEL, (("-", 1),)
     shape = (2, 2) if len(drawn) > 1 else (1, 1)
     panels = figure.subplots(*shape, squeeze=False).ravel()

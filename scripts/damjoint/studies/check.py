@@ -29,11 +29,11 @@ from ..statics.gravity import GravityMethod
 FINITE_ELEMENTS, GRAVITY = "finite elements", "gravity method"
 LONGER = "gravity method, longer crack"
 DIFFERENCE, REQUIRED = "difference", "required"
-#: Verdict if nothing fails and nothing is required; parameters that set requirements.
-UNCHECKED, REQUIREMENTS = (
-    "not checked",
-    ("required_SSF", "required_OSF", "f_c", "required_position"),
-)
+#: Verdicts: nothing fails and nothing is required; nothing fails, but not all that is required
+#: could be judged.
+UNCHECKED, NOT_JUDGED = "not checked", "not judged"
+#: Parameters that set requirements.
+REQUIREMENTS = ("required_SSF", "required_OSF", "f_c", "required_position")
 #: Value of a requirement that requires nothing.
 NOTHING = 0.0, "any"
 
@@ -55,16 +55,21 @@ CHECK = {
     "sigma_n_eff_heel": ("Pa", "effective normal stress at the heel, compression < 0; 0: cracked"),
     "sigma_n_eff_toe": ("Pa", "effective normal stress at the toe, compression < 0"),
     "crack_length": HISTORY["crack_length"],
-    "SSF": ("-", "sliding: (mu N + adhesion (length - crack_length)) / T"),
+    "cohesion": ("N/m", "c B: shear force by the cohesion that is left; gravity: uncracked joint"),
+    "cohesion_undamaged": ("N/m", "c L: shear force by the cohesion of the undamaged joint"),
+    "SSF": ("-", "sliding: (mu N + cohesion) / T"),
     "OSF": ("-", "overturning: stabilising over overturning moments about the toe"),
     "position": ("", "where N acts: middle third, middle half, within base, outside"),
     "required_SSF": ("-", "required factor against sliding; 0: none"),
     "required_OSF": ("-", "required factor against overturning; 0: none"),
     "f_c": ("Pa", "compressive strength at the toe; 0: not checked"),
     "required_position": ("", "required position of N; any: none"),
-    "verdict": ("", "pass or fail; not checked: nothing fails, and nothing is required"),
-    "why": ("", "failure, or each requirement that is not met"),
+    "verdict": ("", "pass; fail; not judged, at all or in part; not checked: nothing required"),
+    "why": ("", "failure, or each requirement that is not met or not judged"),
 }
+
+#: Part of the cohesion that a run has to destroy for a note.
+DESTROYED = 0.01
 
 #: Columns of check.csv with the numbers of both methods.
 NUMBERS = tuple(CHECK)[list(CHECK).index("level") : list(CHECK).index("OSF") + 1]
@@ -84,6 +89,7 @@ SHOWN: tuple[tuple[Units, dict[str, str]], ...] = (
     ((("m", 1),), {"x_resultant": "N' at x"}),
     (STRESSES, {"sigma_n_eff_heel": "eff. heel", "sigma_n_eff_toe": "eff. toe"}),
     ((("m", 1),), {"crack_length": "crack"}),
+    (FORCES, {"cohesion": "c B", "cohesion_undamaged": "c L"}),
     ((("-", 1),), {"SSF": "SSF", "OSF": "OSF"}),
 )
 
@@ -104,6 +110,10 @@ class MethodResult:
     statement: str = ""
     #: whether only a part of the case's loads acts
     partial: bool = False
+    #: why nothing can be judged though the joint does not fail; empty if it can
+    unjudged: str = ""
+    #: whether it lies between bodies that other joints hold: its resultant is not limited
+    internal: bool = False
 
     @property
     def failures(self) -> list[str]:
@@ -112,19 +122,38 @@ class MethodResult:
         unmet = [
             f"{name} {numbers[name]:.4g} < {value:g}"
             for name, value in required(case).items()
-            if numbers[name] < value
+            if numbers[name] < value and not self.internal
         ]
         if case["f_c"] and -numbers["sigma_n_toe"] > case["f_c"]:
             compression = f"compression {-numbers['sigma_n_toe']:.4g} Pa at the toe"
             unmet.append(f"{compression} > f_c = {case['f_c']:g} Pa")
-        if not math.isnan(numbers["x_resultant"]) and not self.position_allowed:
+        placed = self.internal or math.isnan(numbers["x_resultant"])
+        if not placed and not self.position_allowed:
             unmet.append(f"N {self.position}: must be in {case['required_position']}")
         return [self.statement, *unmet] if self.statement else unmet
 
     @property
+    def not_judged(self) -> list[str]:
+        """Why requirements could not be judged."""
+        if self.unjudged:
+            return [self.unjudged]
+        known = dict(zip(REQUIREMENTS, ("SSF", "OSF", "sigma_n_toe", "x_resultant"), strict=True))
+        missing = [n for n in self.requirements if math.isnan(self.numbers[known[n]])]
+        return [f"{name} is {NOT_JUDGED}: {known[name]} is not known" for name in missing]
+
+    @property
+    def requirements(self) -> list[str]:
+        """The requirements that apply to the joint: between bodies only that on its stress."""
+        return [n for n in requirements(self.case) if n == "f_c" or not self.internal]
+
+    @property
     def verdict(self) -> str:
-        """fail; pass if the case requires something; else not checked."""
-        return "fail" if self.failures else "pass" if requires(self.case) else UNCHECKED
+        """fail; not judged; pass if the case requires something; else not checked."""
+        if self.failures:
+            return "fail"
+        if self.not_judged:
+            return NOT_JUDGED
+        return "pass" if self.requirements else UNCHECKED
 
     @property
     def position(self) -> str:
@@ -152,13 +181,13 @@ class MethodResult:
             "position": self.position,
             **{name: self.case[name] for name in REQUIREMENTS},
             "verdict": self.verdict,
-            "why": "; ".join(self.failures),
+            "why": "; ".join([*self.failures, *self.not_judged]),
         }
 
 
-def requires(case: Case) -> bool:
-    """Whether a case requires a safety factor or limits the compression at the toe."""
-    return any(case[name] not in NOTHING for name in REQUIREMENTS)
+def requirements(case: Case) -> list[str]:
+    """Those of REQUIREMENTS that a case sets."""
+    return [name for name in REQUIREMENTS if case[name] not in NOTHING]
 
 
 def least_sliding_factor(case: Case) -> float:
@@ -166,20 +195,26 @@ def least_sliding_factor(case: Case) -> float:
     return max(case["required_SSF"], 1.0 if case.law.limits_shear else 0.0)
 
 
-def by_gravity(method: GravityMethod, name: str = GRAVITY) -> MethodResult:
-    """Result of the gravity method."""
+def by_gravity(method: GravityMethod, name: str = GRAVITY, partial: bool = False) -> MethodResult:
+    """Result of the gravity method; partial: whether only a part of the case's loads acts."""
     statement = "" if method.stands else "overturning: no part of the joint is under compression"
     numbers = {name: float(getattr(method, name)) for name in NUMBERS}
     (joint,) = method.case.joint_names
-    return MethodResult(method.case, joint, name, method.time, numbers, statement)
+    unjudged = f"{NOT_JUDGED} under a part of the loads" if partial else ""
+    return MethodResult(
+        method.case, joint, name, method.time, numbers, statement, partial, unjudged
+    )
 
 
-def by_finite_elements(result: Results, statement: str | None = None) -> MethodResult:
+def by_finite_elements(
+    result: Results, statement: str | None = None, unjudged: str = ""
+) -> MethodResult:
     """Result of a run for a joint, the only one of `result`, at the last level it reached, with
     safety factors from its resultants.
 
-    statement: why it fails, or empty; by default that of the result. Stresses are node values at
-    the ends of the joint; those of an elastic body depend on the mesh.
+    statement: why it fails, or empty; by default that of the result; unjudged: why a joint that
+    does not fail can not be judged. Stresses are node values at the ends of the joint; those of an
+    elastic body depend on the mesh.
     """
     case, last, partial = result.case, result.last, result.partial_load
     (joint,) = case.joint_names
@@ -188,53 +223,78 @@ def by_finite_elements(result: Results, statement: str | None = None) -> MethodR
     if not last:
         nothing = dict.fromkeys(NUMBERS, math.nan)
         return MethodResult(case, joint, FINITE_ELEMENTS, math.nan, nothing, statement, partial)
-    if partial and not statement:
+    if partial and not (statement or unjudged):
         statement = f"ended at t = {last['time']:.6g} of {case.times[-1]:g}"
-    method, rows = gravity.at(case, last["time"], last["level"]), along(result.at())
+    rows = along(result.at())
     numbers = {name: last[name] for name in NUMBERS if name in last}
     for name in ("sigma_n", "sigma_n_eff"):
         numbers |= {f"{name}_heel": rows[name][0], f"{name}_toe": rows[name][-1]}
-    numbers |= gravity.factors_of_state(method, last)
+    numbers |= gravity.factors_of_state(case, last)
     numbers = {name: float(numbers[name]) for name in NUMBERS}
-    return MethodResult(case, joint, FINITE_ELEMENTS, last["time"], numbers, statement, partial)
+    return MethodResult(
+        case, joint, FINITE_ELEMENTS, last["time"], numbers, statement, partial, unjudged
+    )
 
 
-def hand_calculation(result: Results) -> GravityMethod:
+def hand_calculation(result: Results, alone: bool = True) -> GravityMethod | None:
     """The gravity method for a joint, the only one of `result`, at a case's last level with all
     loads; at the last state of a run under displacement control or beyond the last level, up to a
-    critical one.
+    critical one, and of a user's own geometry, whose loads are those of the finite elements. None
+    if it does not apply there, see `gravity.of_state`.
+
+    alone: whether this joint alone holds what is above it.
     """
     case, last = result.case, result.last
+    if case.geometry:
+        return gravity.of_state(case, result.at(), last) if last and alone else None
     if last and (case["drive"] != "level" or last["time"] > case.times[-1]):
         return gravity.at(case, last["time"], last["level"])
     return gravity.at(case, case.times[-1])
 
 
-def compare_methods(result: Results, statement: str | None = None) -> SafetyCheck:
-    """Apply both methods to a joint, the only one of `result`; statement: see
-    `by_finite_elements`.
+def compare_methods(
+    result: Results, statement: str | None = None, unjudged: str = "", alone: bool = True
+) -> SafetyCheck:
+    """Apply both methods to a joint, the only one of `result`; arguments as in `by_finite_elements`
+    and `hand_calculation`.
     """
-    method = hand_calculation(result)
+    method = hand_calculation(result, alone)
+    partial = bool(result.case.geometry) and result.partial_load
     return SafetyCheck(
-        by_finite_elements(result, statement),
-        by_gravity(method),
+        by_finite_elements(result, statement, unjudged),
+        by_gravity(method, partial=partial) if method else None,
         result.info.get("error_estimate", {}).get("statement", ""),
-        [by_gravity(longer, LONGER) for longer in method.further],
-        method.notes,
+        [by_gravity(longer, LONGER, partial) for longer in method.further] if method else (),
+        [*method.notes, *beside_drains(result, method)] if method else (),
     )
+
+
+def beside_drains(result: Results, method: GravityMethod) -> list[str]:
+    """The note on crack and drains by both methods, see `verdict.cracks_and_drains`."""
+    crack = result.last["crack_length"] if result.last else 0.0
+    return list(filter(None, [verdict.cracks_and_drains(result.case, crack, method)]))
 
 
 def compare_joints(result: Results) -> list[SafetyCheck]:
     """Apply both methods to each joint of the scene of a run.
 
-    A run that stopped fails for all joints; a joint that has slipped, only for itself.
+    A run that failed fails at the joints that its verdict names, at all if it names none; the
+    others are not judged if a part of the loads is missing.
     """
     why = verdict.statement(result) if verdict.failed(result) else ""
-    slipped = () if result.stopped else verdict.slipped_joints(result)
-    return [
-        compare_methods(own, why if k in slipped or not slipped else "")
-        for k, own in enumerate(result.joints)
-    ]
+    failing = verdict.failing_joints(result) if why else ()
+    case, checks = result.case, []
+    for k, own in enumerate(result.joints):
+        fails, last = k in failing or not failing, result.last
+        ended = ""
+        if not fails and result.partial_load:
+            end = f"t = {last['time']:.6g} of {case.times[-1]:g}"
+            ended = f"{NOT_JUDGED} beyond {end}, where the run ended: {verdict.verdict(result)}"
+        alone = case.separates((k,))
+        internal = not alone and case.of_joints[k].lower != "foundation"
+        check = compare_methods(own, why if fails else "", ended, alone)
+        checks.append(check.at_joint(case.joint_names[k], internal))
+    return checks
 
 
 @dataclass(frozen=True)
@@ -242,7 +302,8 @@ class SafetyCheck:
     """Results of both methods for a joint of a scene."""
 
     finite_elements: MethodResult
-    gravity: MethodResult
+    #: None where the gravity method does not apply
+    gravity: MethodResult | None
     #: message on the estimated errors, if the case requires an accuracy
     accuracy: str = ""
     #: results of the gravity method with longer cracks that are in equilibrium, too
@@ -253,19 +314,36 @@ class SafetyCheck:
     @property
     def results(self) -> list[MethodResult]:
         """All results; each of them is judged."""
-        return [self.finite_elements, self.gravity, *self.longer]
+        return [r for r in (self.finite_elements, self.gravity, *self.longer) if r]
+
+    @property
+    def case(self) -> Case:
+        """The case of the joint."""
+        return self.finite_elements.case
+
+    def at_joint(self, name: str, internal: bool) -> SafetyCheck:
+        """The same with the name of the joint; internal: see `MethodResult`."""
+        own = lambda result: replace(result, joint=name, internal=internal)
+        return replace(
+            self,
+            finite_elements=own(self.finite_elements),
+            gravity=self.gravity and own(self.gravity),
+            longer=[own(result) for result in self.longer],
+        )
 
     @property
     def margin(self) -> float:
         """The smallest safety factor of both methods; below 0 if one of them fails."""
         factors = [r.numbers[name] for r in self.results for name in ("SSF", "OSF")]
         least = min([f for f in factors if not math.isnan(f)], default=0.0)
-        return least - 1e9 * bool(self.why)
+        return least - 1e9 * any(result.failures for result in self.results)
 
     @property
     def comparable(self) -> bool:
         """Whether both methods have the same load: the same t, by which loads grow, and level."""
         elements, rigid = self.finite_elements, self.gravity
+        if rigid is None:
+            return False
         pairs = (elements.time, rigid.time), (elements.numbers["level"], rigid.numbers["level"])
         return all(math.isclose(*pair, abs_tol=ROUND_OFF) for pair in pairs)
 
@@ -274,7 +352,7 @@ class SafetyCheck:
         """Rows of check.csv: the results and, if they have the same load, their difference."""
         elements, rigid = self.finite_elements, self.gravity
         rows = [result.row for result in self.results]
-        if not self.comparable:
+        if rigid is None or not self.comparable:
             return rows
         numbers = {n: difference(elements.numbers[n], rigid.numbers[n]) for n in NUMBERS}
         row = replace(elements, method=DIFFERENCE, numbers=numbers, partial=False).row
@@ -283,27 +361,29 @@ class SafetyCheck:
     @property
     def printed_rows(self) -> list[Row]:
         """Rows of the printed table: those of check.csv and the required factors."""
-        case = self.gravity.case
-        factors, where = required_by_case(case), position_by_case(case)
-        if all(map(math.isnan, factors.values())) and not where:
+        factors, where = required_by_case(self.case), position_by_case(self.case)
+        nothing = all(map(math.isnan, factors.values())) and not where
+        if nothing or self.finite_elements.internal:
             return self.rows
-        scene = {n: self.gravity.row[n] for n in ("case", "joint", "uplift")}
+        scene = {n: self.finite_elements.row[n] for n in ("case", "joint", "uplift")}
         blank = dict.fromkeys(NUMBERS, math.nan)
         row = scene | {"answer": REQUIRED} | blank | factors | NO_VERDICT | {"position": where}
         return [*self.rows, row]
 
     @property
     def why(self) -> str:
-        """All failures, each with its method."""
-        failing = (result for result in self.results if result.failures)
-        return "; ".join(f"{result.method}: {'; '.join(result.failures)}" for result in failing)
+        """All failures and what is not judged, each with its method."""
+        reasons = ((result.method, result.row["why"]) for result in self.results)
+        return "; ".join(f"{method}: {why}" for method, why in reasons if why)
 
     @property
     def notes(self) -> list[str]:
         """Notes on the comparison of the two methods."""
-        case, notes = self.gravity.case, []
-        if not requires(case):
-            notes.append(f"not checked: the case sets none of {', '.join(REQUIREMENTS)}")
+        case, notes = self.case, []
+        if self.finite_elements.internal:
+            notes.append("between bodies that other joints hold: N and T are not limited")
+        if not requirements(case):
+            notes.append(f"only equilibrium is judged: {', '.join(REQUIREMENTS)} are not set")
         if not case.law.limits_shear:
             strength = f"mu = {case['mu']:g}, adhesion = {case['adhesion']:g} Pa"
             notes.append(f"SSF with {strength}, which the law {case['law']} does not have")
@@ -313,9 +393,31 @@ class SafetyCheck:
             notes.append(f"SSF with the partial factors {listed}")
         if case["uplift"] == "flow":
             notes.append("gravity method: full head in the crack, linear beyond it")
+        cracked = any(r.numbers["crack_length"] > 0 for r in self.results)
+        if self.gravity and cracked and case.law.open_tension:
+            notes.append(
+                "the finite elements' SSF has the cohesion of the open part, which the law "
+                f"{case['law']} keeps with its tension of adhesion/mu = "
+                f"{case.law.open_tension / 1e3:.4g} kPa; the gravity method's has none there"
+            )
+        left, undamaged = (
+            self.finite_elements.numbers[name] for name in ("cohesion", "cohesion_undamaged")
+        )
+        if self.gravity and left < (1 - DESTROYED) * min(
+            undamaged, self.gravity.numbers["cohesion"]
+        ):
+            notes.append(
+                f"the run has destroyed {1 - left / undamaged:.0%} of the cohesion; the gravity "
+                "method has no history: its c B is that of an undamaged joint beyond the crack"
+            )
         if case["f_c"]:
             notes.append("the finite elements' stress at the toe, a corner, depends on the mesh")
-        if not self.comparable:
+        if self.gravity is None:
+            notes.append(
+                "no gravity method: it needs a plane joint that alone holds what is above it, and "
+                "water that does not follow from a crack before an earthquake"
+            )
+        elif not self.comparable:
             reached, last = self.finite_elements.time, self.gravity.time
             note = "no differences: the finite elements did not reach the last level with all loads"
             notes.append(note + ("" if math.isnan(reached) else f", t = {reached:.5g} of {last:g}"))
@@ -368,7 +470,7 @@ def text_table(checks: list[SafetyCheck]) -> str:
         colalign=("left", "left", *("right" for _ in columns), "left", "left"),
     )
     lines = [
-        f"{scene}, {row['answer']}: fails, {row['why']}"
+        f"{scene}, {row['answer']}: {'fails, ' * (row['verdict'] == 'fail')}{row['why']}"
         for scene, row in zip(scenes, rows, strict=True)
         if row["why"]
     ]
@@ -379,8 +481,8 @@ def labelled_notes(checks: list[SafetyCheck]) -> list[str]:
     """Notes with the scene and joint of each; one that all of a case have, once with its name."""
     lines = dict[str, None]()  # in their order
     for check in checks:
-        row = check.gravity.row
-        same = [other for other in checks if other.gravity.row["case"] == row["case"]]
+        row = check.finite_elements.row
+        same = [other for other in checks if other.case.name == check.case.name]
         for note in check.notes:
             common = all(note in other.notes for other in same)
             lines[f"{row['case'] if common else scene_label(checks, row)}: {note}"] = None
@@ -391,7 +493,7 @@ def scene_label(checks: list[SafetyCheck], row: Row) -> str:
     """Name of a row's case, with its uplift if the case has several scenes, and its joint if it has
     several.
     """
-    same = [c.gravity for c in checks if c.gravity.case.name == row["case"]]
+    same = [c.finite_elements for c in checks if c.case.name == row["case"]]
     joints = list(dict.fromkeys(result.joint for result in same))
     scenes = {result.case["uplift"] for result in same if result.joint == joints[0]}
     parts = [row["case"]]
@@ -411,38 +513,30 @@ def number_cell(value: float) -> str:
 
 
 def signed_cell(value: float) -> str:
-    """Format a difference with its sign and three digits."""
-    return f"{value:+.3g}" if value else "0"
-
-
-def check_has_section(case: Case) -> None:
-    """Raise InputError if the gravity method does not apply to a case."""
-    if case.geometry:
-        raise InputError(
-            f"case {case.name}: must have a section by parameters, which the gravity method needs; "
-            "damjoint critical finds the limits of any geometry"
-        )
+    """Format a difference with its sign and three digits; empty if it is nan."""
+    return "" if math.isnan(value) else f"{value:+.3g}" if value else "0"
 
 
 def check_cases(cases: list[Case], out: Path) -> list[SafetyCheck]:
     """Run cases, each into its folder below out, and check them.
 
     Writes check.csv into out after each case; gravity.csv and CASE_check.png into each scene's
-    folder. Raises InputError, RunError.
+    folder, but not for a user's own geometry. Raises InputError, RunError.
     """
     names = [case.name for case in cases]
     for case in cases:
         if names.count(case.name) > 1:
             raise InputError(f"case {case.name}: must be given once, and have its own name")
-        check_has_section(case)
         engine_of(case, "auto")
     checks = list[SafetyCheck]()
     with folders.claim_check_folder(out):
         for case in cases:
             for result in run(case, out / case.name):
                 of_joints = compare_joints(result)
-                methods = [hand_calculation(own) for own in result.joints]
                 checks += of_joints
+                if case.geometry:
+                    continue
+                methods = [method for own in result.joints if (method := hand_calculation(own))]
                 folder = folders.scene_folder(case, result.case, out / case.name)
                 write_csv(folder / "gravity.csv", loads_table(methods))
                 k = min(range(len(methods)), key=lambda k: of_joints[k].margin)
@@ -467,7 +561,7 @@ def picture_table(check: SafetyCheck) -> list[tuple[str, ...]]:
     """Table beside the picture: a row per quantity."""
     longer = ["longer"] * len(check.longer)
     cells = [(f"stress: {SIGN}", "FE", "gravity", *longer, "required")]
-    least = required_by_case(check.gravity.case)
+    least = required_by_case(check.case)
     for units, names in SHOWN:
         values = [[result.numbers[name] for result in check.results] for name in names]
         size, factor = unit([np.array(values)[np.isfinite(values)]], units)
@@ -475,7 +569,7 @@ def picture_table(check: SafetyCheck) -> list[tuple[str, ...]]:
             numbers = (number_cell(v * factor) for v in line)
             head = title if size == "-" else f"{title} [{size}]"
             cells.append((head, *numbers, number_cell(least.get(name, math.nan))))
-    if where := position_by_case(check.gravity.case):
+    if where := position_by_case(check.case):
         cells.append(("N' in", *(result.position for result in check.results), where))
     if check.finite_elements.partial:
         cells.insert(1, ("load", "partial", "full", *("full" for _ in longer), ""))

@@ -36,7 +36,13 @@ from ..runner import save
 from ..solver.path import PRECISION, ROUGH, SURE, Point
 from ..statics import gravity
 from ..statics.limit import elastic_heel_stress
-from ..statics.verdict import bound, highest_by_statics, statement, tension_share
+from ..statics.verdict import (
+    bound,
+    cracks_and_drains,
+    highest_by_statics,
+    statement,
+    tension_share,
+)
 from ..threads import limited_threads
 from .failure_path import FailurePath, Trial, critical_columns, row
 
@@ -54,7 +60,11 @@ QUICK = {"smallest_step": 1.0, "max_iterations": 15.0, "burst_iterations": 15.0}
 DRIVE = ("drive", "drive_begin", "drive_end", "drive_by")
 
 #: Further assumptions of the gravity method: tension, longest crack.
-ASSUMPTIONS = {"with the crack past the drains": (True, True), "without tension": (False, True)}
+ASSUMPTIONS = {
+    "with the crack past the drains": (True, True),
+    "without tension": (False, False),
+    "without tension, with the crack past the drains": (False, True),
+}
 
 #: Relative distance within which the bound of statics confirms a critical level below it.
 NEAR_BOUND = 0.02
@@ -87,10 +97,14 @@ class CriticalValue:
     point: Point | None
     #: critical value of the gravity method; None if it has none
     gravity: float | None = None
-    #: the same with other assumptions, if they change it, {assumption: value}
+    #: the joint that fails by the gravity method, if there are several, and the value of the joint
+    #: that fails by the finite elements, if that is another one
+    gravity_joint: str = ""
+    gravity_there: float | None = None
+    #: the critical value with other assumptions, if they change it, {assumption: value}
     gravity_with: Mapping[str, float] = field(default_factory=dict)
-    #: a note on the gravity method's values
-    note: str = ""
+    #: notes on the gravity method's values
+    notes: Sequence[str] = ()
     #: the joint that fails, if there are several, and the events on the way
     joint: str = ""
     events: Sequence[str] = ()
@@ -101,6 +115,16 @@ class CriticalValue:
     def confirmed(self) -> bool:
         """Whether there is a critical value, and a mechanism or bound of statics beyond it."""
         return self.value is not None and bool(self.why)
+
+    def by_gravity(self, unit: str) -> list[str]:
+        """The values of the gravity method, each with its joint or assumption."""
+        if self.gravity is None:
+            return []
+        where = f" on {self.gravity_joint}" if self.gravity_joint else ""
+        values = {f"gravity method{where}": self.gravity}
+        if self.gravity_there is not None:
+            values[f"on {self.joint}"] = self.gravity_there
+        return [f"{n}: {v:.6g}{unit}" for n, v in (values | {**self.gravity_with}).items()]
 
     def lines(self, search: Search) -> list[str]:
         """The printed lines."""
@@ -120,11 +144,8 @@ class CriticalValue:
         asked = any(joint.hardening_asked for joint in search.own.joints)
         if any(law.hardens for law in laws) and asked:
             lines += filter(None, [statement(last_state(search, self.point))])
-        if self.gravity is not None:
-            values = {"gravity method": self.gravity} | self.gravity_with
-            lines.append("; ".join(f"{n}: {v:.6g}{unit}" for n, v in values.items()))
-        if self.note:
-            lines.append(self.note)
+        lines += filter(None, ["; ".join(self.by_gravity(unit))])
+        lines += self.notes
         case = self.point.model.case if self.point else search.own
         for k, joint in enumerate(case.joints if self.point else ()):
             last, name = row_of_joint(self.point.last, k), case.named((k,))
@@ -469,16 +490,23 @@ class Search:
 
     def beside_gravity(self, result: CriticalValue) -> CriticalValue:
         """A result with the values of the gravity method, and a note on them."""
-        value = result.value
+        value, point = result.value, result.point
         if value is None or (by_hand := self.by_gravity(value)) is None:
             return result
+        joint, names = self.failing_block(by_hand), self.own.joint_names
+        there = None
+        if joint != result.joint and result.joint in names and self.own.of_joints:
+            there = self.by_gravity(value, joint=names.index(result.joint))
         others: dict[str, float] = {}
         for name, assumptions in ASSUMPTIONS.items():
             other = self.by_gravity(value, *assumptions)
             known = by_hand, *others.values()
             if other is not None and not np.isclose(other, known, PRECISION, 0).any():
-                others[name] = other
-        return replace(result, gravity=by_hand, gravity_with=others, note=self.tension(value))
+                where = self.failing_block(other, *assumptions)
+                others[f"{name} on {where}" if where else name] = other
+        notes = filter(None, [self.tension(value), *(self.drains(value, point) if point else ())])
+        of_joint = {"gravity_joint": joint, "gravity_there": there}
+        return replace(result, gravity=by_hand, gravity_with=others, notes=[*notes], **of_joint)
 
     def by_statics(self, failing: FailurePath) -> tuple[str, str, str]:
         """How an unconfirmed path fails, why, and at which joint, if there are several: its
@@ -520,14 +548,43 @@ class Search:
             f"{elastic / 1e3:.4g} kPa, exceeds the strength of {strength / 1e3:.4g} kPa"
         )
 
-    def by_gravity(self, value: float, tension: bool = True, longest: bool = False) -> float | None:
+    def drains(self, value: float, point: Point) -> Iterator[str]:
+        """Which crack passes the drains at a critical value, for each joint: of the finite elements
+        at the last equilibrium, or beyond it on the way to failure.
+        """
+        beyond = [p for p in self.trials[-1].path.points if p.imposed > point.imposed]
+        for k, method in enumerate(self.rigid_blocks(value)):
+            name, at = self.own.named((k,)), method.case["drain_x"]
+            cracks = [p.last[column_of("crack_length", k)] for p in (point, *beyond)]
+            grown = next((crack for crack in cracks if crack > at), cracks[0])
+            if note := cracks_and_drains(method.case, grown, method):
+                yield f"{name}: {note}" if name else note
+
+    def failing_block(self, value: float, tension: bool = True, longest: bool = False) -> str:
+        """The joints that fail by the gravity method beyond its critical value, if there are
+        several; arguments as in `by_gravity`.
+        """
+        for beyond in (value * (1 + PRECISION), value * (1 - PRECISION)):
+            methods = self.rigid_blocks(beyond, tension)
+            failing = [k for k, m in enumerate(methods) if not block_stands(m, longest)]
+            if failing:
+                return self.own.named(failing)
+        return ""
+
+    def by_gravity(
+        self,
+        value: float,
+        tension: bool = True,
+        longest: bool = False,
+        joint: int | None = None,
+    ) -> float | None:
         """The critical value of the gravity method nearest to that of the finite elements; None if
         there is none within DISTANCES.
 
         tension: whether the joint has its tensile strength; longest: whether the longest of several
-        cracks in equilibrium decides.
+        cracks in equilibrium decides; joint: the number of the only joint that is considered.
         """
-        stands = lambda value: self.rigid_block_stands(value, tension, longest)
+        stands = lambda value: self.rigid_block_stands(value, tension, longest, joint)
         at_value = stands(value)
         for share in DISTANCES:
             for other in (value * (1 + share), value * (1 - share)):
@@ -561,11 +618,15 @@ class Search:
             return [joint.with_values(self.reduced(joint, value)) for joint in self.base.joints]
         return self.case_at(value).joints
 
-    def rigid_block_stands(self, value: float, tension: bool, longest: bool) -> bool | None:
-        """Whether the gravity method finds an equilibrium of all joints, with friction if the law
-        has it, and toes that are not crushed; None if there is no gravity method.
+    def rigid_block_stands(
+        self, value: float, tension: bool, longest: bool, joint: int | None = None
+    ) -> bool | None:
+        """Whether the gravity method finds an equilibrium of all joints, or of one by its number,
+        with friction if the law has it, and toes that are not crushed; None if there is no gravity
+        method.
         """
         methods = self.rigid_blocks(value, tension)
+        methods = methods if joint is None else methods[joint : joint + 1]
         return all(block_stands(method, longest) for method in methods) if methods else None
 
 
@@ -718,6 +779,9 @@ def as_json(search: Search, answer: CriticalValue) -> dict[str, Any]:
         "confirmed": answer.why,
         "doubt": answer.doubt,
         "gravity_method": answer.gravity,
+        "gravity_method_joint": answer.gravity_joint,
+        "gravity_method_there": answer.gravity_there,
+        "gravity_method_notes": list(answer.notes),
         "gravity_method_with": answer.gravity_with,
         "trials": len(search.trials),
     }

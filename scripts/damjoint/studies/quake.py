@@ -63,7 +63,7 @@ BAR = "{desc} {n:.2f} of {total:.2f} s|{bar}| {elapsed}, {remaining} left"
 
 #: Table of which the largest size is reported.
 PEAKS = ("ground_ax", "crest_ux", "crest_ax")
-PEAKS_OF_JOINTS = ("heel_opening", "toe_opening", "slip_mean", "open_length")
+PEAKS_OF_JOINTS = ("heel_opening", "toe_opening", "slip_mean", "open_length", "broken_length")
 
 
 def span_of(name: str, text: str) -> tuple[float, float]:
@@ -140,7 +140,7 @@ class QuakeRun:
             static.history.add(replace(after, state=state), 0)
             static.history.save(state)
             last = static.history.last
-            names = "crest_ux", "N", "T", "M", "crack_length"
+            names = "crest_ux", "N", "T", "M", "crack_length", "broken_length"
             found["after"] |= {name: last[name] for name in names}
         full = self.stands_with_full_uplift()
         if full is not None:

@@ -17,7 +17,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from matplotlib.figure import Figure
 
 from .. import ROUND_OFF, InputError, RunError, __version__
-from ..model.case import Case, flows, is_name
+from ..model.case import Case, is_name
 from ..model.fields import Solution
 from ..model.results import Results
 from ..post import pictures, stored
@@ -25,10 +25,11 @@ from ..post.drawing import figure_of
 from ..post.summary import Table, levels_table, table_of
 from ..post.units import FORCES, MOMENTS, Units, unit
 from ..statics.gravity import GravityMethod, force, resultant_of
-from ..statics.verdict import decisive_joint, failed, statement, stiffness_ratio
+from ..statics.verdict import decisive_joint, stiffness_ratio
 from ..storage import atomic_write
 from . import quake_result, report_input
 from .check import (
+    NOT_JUDGED,
     REQUIRED,
     SHOWN,
     UNCHECKED,
@@ -37,6 +38,7 @@ from .check import (
     compare_joints,
     hand_calculation,
     required_by_case,
+    requirements,
 )
 from .report_input import Entry, by_runs, in_table
 
@@ -96,7 +98,7 @@ class RunSection:
     uplift: str
     #: time of the run
     made: str
-    #: pass, fail or not checked
+    #: pass, fail, not judged or not checked
     verdict: str
     #: verdict of the run itself: stands, sliding, ...
     run_verdict: str
@@ -108,8 +110,9 @@ class RunSection:
     levels: dict[str, Table]
     #: of an earthquake: its picture, peaks and residual values, modes; else None
     earthquake: Earthquake | None
-    #: both methods, loads and formulas of the gravity method; None for a user's own geometry
-    methods: Table | None
+    #: both methods
+    methods: Table
+    #: loads and formulas of the gravity method; None for a user's own geometry
     loads: Table | None
     formulas: list[str]
     #: notes on the comparison of both methods
@@ -237,17 +240,22 @@ def run_section(folder: Path, solution: Solution) -> RunSection:
     """Make the section of a run."""
     result = solution.result
     case, info = result.case, result.info
-    # the gravity method needs a section by parameters
-    checks = [] if case.geometry else compare_joints(result)
+    checks = compare_joints(result)
     number = decisive_joint(result)
-    own, check = result.joints[number], checks[number] if checks else None
+    own, check = result.joints[number], checks[number]
+    # the loads one by one need a section by parameters
     rigid = None if case.geometry else hand_calculation(own)
     critical = critical_value(info.get("critical"))
     # requirements do not apply to the last state before a failure, nor to that after an earthquake,
     # in which the whole joint has slipped
     judged = not (critical or "quake" in info)
-    failures = failures_of(result, checks) if judged else []
-    verdict = check.finite_elements.verdict if check and judged else UNCHECKED
+    failures, verdict = [], UNCHECKED
+    if judged:
+        failures, verdict = failures_of(result, checks), worst_verdict(result, checks)
+    elif required := requirements(case):
+        state = "before failure" if critical else "after the earthquake"
+        verdict = NOT_JUDGED
+        failures = [f"{', '.join(required)}: {NOT_JUDGED} in the state {state}"]
     made = datetime.fromtimestamp((folder / "run.json").stat().st_mtime)
     return RunSection(
         folder=str(folder),
@@ -255,21 +263,22 @@ def run_section(folder: Path, solution: Solution) -> RunSection:
         scene=describe_scene(case),
         uplift=str(case["uplift"]),
         made=f"{made:{MINUTE}}",
-        verdict="fail" if failures else verdict,
+        verdict=verdict,
         run_verdict="critical value" if critical else info["verdict"],
         failures=failures,
         hints=[
             *filter(None, [which_joint(result), critical, earthquake(info), *info["hints"]]),
             *info.get("notes", []),
+            *(info.get("critical") or {}).get("gravity_method_notes", ()),
             *filter(None, [discretisation_error(result)]),
         ],
         pictures=pictures_of(solution) if len(result.joint["time"]) else [],
         levels={result.case.named((k,)): levels_table(o) for k, o in enumerate(result.joints)},
         earthquake=earthquake_section(folder, case, info),
-        methods=methods_table(case, checks, judged=judged) if checks else None,
+        methods=methods_table(case, checks, judged=judged),
         loads=loads_table(rigid) if rigid else None,
         formulas=formulas(rigid) if rigid and rigid.stands else [],
-        notes=check.notes if check else [],
+        notes=notes_of(checks),
         summary=summary_of(own, check),
         computation=computation(result),
         materials=report_input.materials(case),
@@ -286,16 +295,35 @@ def which_joint(result: Results) -> str:
     return f"{shown}: {name}" if name else ""
 
 
+#: States of a run that has not ended by itself.
+UNFINISHED = "failed", "interrupted"
+
+
 def failures_of(result: Results, checks: list[SafetyCheck]) -> list[str]:
-    """Messages on a run that failed and on requirements that are not met."""
+    """Messages on a run that failed and on requirements that are not met or not judged."""
     info = result.info
-    messages = [info["statement"]] if info["state"] in ("failed", "interrupted") else []
-    if checks:
-        judged = [r for check in checks for r in check.results]
-        messages += [f"{label(r, result.case)}: {why}" for r in judged for why in r.failures]
-    elif failed(result):
-        messages.append(statement(result))
-    return messages
+    messages = [info["statement"]] if info["state"] in UNFINISHED else []
+    judged = [r for check in checks for r in check.results]
+    reasons = ((label(r, result.case), why) for r in judged for why in (*r.failures, *r.not_judged))
+    return [*messages, *(f"{name}: {why}" for name, why in reasons)]
+
+
+def worst_verdict(result: Results, checks: list[SafetyCheck]) -> str:
+    """The worst verdict on a joint by a method; fail for a run that has not ended by itself."""
+    verdicts = {r.verdict for check in checks for r in check.results}
+    if result.info["state"] in UNFINISHED:
+        return "fail"
+    return next(v for v in ("fail", NOT_JUDGED, "pass", UNCHECKED) if v in verdicts)
+
+
+def notes_of(checks: list[SafetyCheck]) -> list[str]:
+    """Notes on the methods: those of all joints once, others with the name of their joint."""
+    lines = dict[str, None]()  # in their order
+    for check in checks:
+        for note in check.notes:
+            common = all(note in other.notes for other in checks)
+            lines[note if common else f"{check.finite_elements.joint}: {note}"] = None
+    return list(lines)
 
 
 def describe_scene(case: Case) -> str:
@@ -308,14 +336,14 @@ def describe_scene(case: Case) -> str:
     return f"{size}; {plane}; joint law {law}; water in the joint: {water}"
 
 
-def summary_of(result: Results, check: SafetyCheck | None) -> dict[str, float]:
+def summary_of(result: Results, check: SafetyCheck) -> dict[str, float]:
     """Values of the columns SUMMARY in SI units."""
-    if not check:
-        return result.last
     factors = required_by_case(result.case)
     values = dict(check.finite_elements.numbers)
     for name, factor in factors.items():
-        values |= {f"{name}_gravity": check.gravity.numbers[name], f"{name}_required": factor}
+        values[f"{name}_required"] = factor
+        if check.gravity:
+            values[f"{name}_gravity"] = check.gravity.numbers[name]
     return values
 
 
@@ -330,7 +358,7 @@ def methods_table(case: Case, checks: list[SafetyCheck], judged: bool) -> Table:
     """
     results = [result for check in checks for result in check.results]
     rows = [(label(r, case), r.numbers, r.verdict if judged else "") for r in results]
-    factors = required_by_case(checks[0].gravity.case)
+    factors = required_by_case(case)
     if np.isfinite([*factors.values()]).any():
         rows.append((REQUIRED, factors, ""))
     columns = []
@@ -415,7 +443,7 @@ def pictures_of(solution: Solution) -> list[Picture]:
 def drawn(solution: Solution, time: float, at_level: str) -> Iterator[tuple[str, str, Figure]]:
     """Yield the figures of a run: CSS class of the size, caption, figure."""
     result = solution.result
-    colors = "Red: open or broken; violet: softening; orange: slipped."
+    colors = "Red: broken; violet: softening; orange: slipped."
     has_fields = bool(solution.fields)
     if has_fields:
         section = figure_of(*HALF)
@@ -454,7 +482,10 @@ def critical_value(info: dict[str, Any] | None) -> str:
     parts = [f"{info['value']:.6g} {unit}".strip(), info["mode"]]
     if info["doubt"]:
         parts.append(f"not confirmed: {info['doubt']}")
-    by_hand = {"gravity method": info["gravity_method"]} | info.get("gravity_method_with", {})
+    on = f" on {joint}" if (joint := info.get("gravity_method_joint")) else ""
+    by_hand = {f"gravity method{on}": info["gravity_method"]}
+    by_hand[f"on {info.get('joint')}"] = info.get("gravity_method_there")
+    by_hand |= info.get("gravity_method_with", {})
     parts += [f"{n} {v:.6g} {unit}".strip() for n, v in by_hand.items() if v is not None]
     return f"the last state before failure, critical {info['of']} {'; '.join(parts)}"
 
@@ -481,15 +512,13 @@ def earthquake_section(folder: Path, case: Case, info: dict[str, Any]) -> Earthq
         address = "data:image/png;base64," + base64.b64encode(path.read_bytes()).decode()
         caption = "Earthquake: relative to the ground, since the static state before it."
         pictures.append(Picture("full", caption, address))
-    follows = found["quake_uplift"] == "zero" or any(map(flows, case.joints))
-    uplift = report_input.QUAKE_UPLIFTS[found["quake_uplift"] if follows else "unchanged"]
     halved = "none of them halved"
     if found["halvings"]:
         halved = f"halved up to {found['halvings']} times where they did not converge"
     notes = [
         f"{quake_result.modes(found)}.",
         f"{found['steps']} steps of {found['dt']:g} s over {found['time']:g} s, {halved}.",
-        f"Water pressure in the joint: {uplift}.",
+        f"Water pressure in the joint: {report_input.uplift_in_earthquake(case)}.",
     ]
     tables = [quake_result.peaks_table(found, case), quake_result.residual_table(found, case)]
     return Earthquake(pictures, tables, [note[0].upper() + note[1:] for note in notes])

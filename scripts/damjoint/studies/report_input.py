@@ -9,7 +9,7 @@ import numpy as np
 
 from .. import ROUND_OFF
 from ..arrays import Value
-from ..model.case import Case, equal_steps, has_drains
+from ..model.case import Case, equal_steps, flows, has_drains
 from ..model.parameters import (
     Parameter,
     constants,
@@ -233,6 +233,21 @@ def limits_of_joint(joint: Case) -> Iterator[str]:
         )
 
 
+def uplift_in_earthquake(case: Case) -> str:
+    """What the water pressure in the joints follows during an earthquake, by `quake_uplift`: of the
+    opening only where it depends on it.
+    """
+    of_joints: dict[str, list[int]] = {}
+    for number, joint in enumerate(case.joints):
+        mode = joint["quake_uplift"]
+        text = QUAKE_UPLIFTS[mode if mode == "zero" or flows(joint) else "unchanged"]
+        text = UPLIFTS["none"] if joint["uplift"] == "none" else text
+        of_joints.setdefault(text, []).append(number)
+    if len(of_joints) == 1:
+        return next(iter(of_joints))
+    return "; ".join(f"{text} ({case.named(numbers)})" for text, numbers in of_joints.items())
+
+
 def limits(case: Case, earthquake: bool = False) -> Iterator[str]:
     """Yield what the model of a case includes and what it does not, a sentence each; earthquake:
     whether a record follows the static loads.
@@ -273,7 +288,7 @@ def limits(case: Case, earthquake: bool = False) -> Iterator[str]:
         yield (
             "The earthquake is pseudo-static: seismic coefficients times the weight"
             f"{f', added water pressure after {pressure}' if pressure else ''}; uplift: "
-            f"{QUAKE_UPLIFTS[case['quake_uplift']]}."
+            f"{uplift_in_earthquake(case)}."
         )
     if any(case[name] for name in LOADS["temperature"]):
         yield "Changes of temperature are prescribed: no conduction of heat is computed."

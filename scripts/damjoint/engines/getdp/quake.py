@@ -30,7 +30,7 @@ from .solve import check_sizes
 ROWS = ["time", "ground_ax", "ground_ay", "crest_ux", "crest_ax", "iterations", "dt", "residual"]
 ROWS_OF_JOINTS = [
     *("heel_opening", "toe_opening", "slip_mean", "slip_heel", "slip_toe"),
-    *("N", "T", "M", "U", "shear_reserve", "open_length"),
+    *("N", "T", "M", "U", "shear_reserve", "open_length", "broken_length"),
 ]
 #: Those that count from the static state, the first row.
 FROM_STATIC = "slip_mean", "slip_heel", "slip_toe"
