@@ -70,7 +70,8 @@ def fingerprint(mesh: Mesh) -> str:
 def sources() -> str:
     """Checksum of the files by which condensed bodies are computed: meshes and elements."""
     package = Path(__file__).parents[1]
-    meshes = (package / name for name in ("csr.py", "model/cut.py", "model/mesh.py"))
+    names = "csr.py", *(f"model/{name}.py" for name in ("body", "cut", "mesh", "skin"))
+    meshes = (package / name for name in names)
     code = *meshes, *sorted((package / "fem").glob("*.py"))
     shapes = data("pro") / "section.pro", *sorted(data("geo").glob("*.geo"))
     texts = [path.read_bytes() for path in (*shapes, *code)]

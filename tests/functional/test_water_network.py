@@ -1,0 +1,214 @@
+"""Water in joints that meet: one network, whose heads follow from its ends on the surface."""
+
+import numpy as np
+import pytest
+from blocks import write_blocks
+from damjoint import InputError
+from damjoint.engines.condensed.solve import check
+from damjoint.joint.interface import interface_of
+from damjoint.model.case import load
+from damjoint.model.loads import Loading
+from damjoint.solver.load_stepper import LoadStepper
+from damjoint.solver.model import Model
+
+WATER = 9810.0
+#: A long block beside a short one: bases of 10 and 5 m, a contraction joint of 10 m above x = 10.
+BLOCKS = {"left": (0, 0, 10, 10), "right": (10, 0, 15, 10)}
+BASES = {"left base": (0, 0, 10, 0), "right base": (10, 0, 15, 0)}
+CONTRACTION = {"contraction": (10, 10, 10, 0)}
+LENGTHS = np.array([10.0, 5.0, 10.0])
+SETTINGS = {"law": "friction", "adhesion": 1e30, "pena_tang": 0.0, "E": 2e10, "order": 1.0}
+
+
+@pytest.fixture
+def model(tmp_path):
+    """model(uplift, **settings): the blocks as a Model, with a mesh of 1 m."""
+
+    def build(uplift, levels=(5.0,), tails=(0.0,), joints=None, blocks=None, **settings):
+        write_blocks(tmp_path / "own.msh", blocks or BLOCKS, joints or BASES | CONTRACTION)
+        (tmp_path / "own.case").write_text('geometry = "own.msh";')
+        settings = SETTINGS | {"uplift": uplift} | settings
+        case = load(str(tmp_path / "own.case"), settings, levels, tails)
+        check(case)
+        return Model(case)
+
+    return build
+
+
+def pressures(model, level, tail=0.0, jump=None):
+    """Pressure at the nodes of each joint over the weight of the water, and their places (x, y)."""
+    equilibrium, start = model.equilibrium, model.start()
+    jump = start.jump if jump is None else jump
+    found = equilibrium.pressures(jump, start.variables, Loading(level, tail))
+    places = [joint.space.locations[:, :2] for joint in equilibrium.interface.joints]
+    return [own.nodes / WATER for own in found], places, found
+
+
+def opened(model, sizes):
+    """Unknowns for which each joint is open by some measure [m], with a wave along it."""
+    equilibrium = model.equilibrium
+    jump, width = np.zeros(len(model.start().jump)), model.case["dim"]
+    for joint, size in zip(equilibrium.interface.joints, sizes, strict=True):
+        normals = joint.surface.normals[0][: int(width)]
+        x = joint.space.locations @ [1.0, 0.7, 0.3]
+        wanted = (size * (1 + 0.5 * np.sin(x)))[:, None] * normals
+        jump += np.linalg.lstsq(joint.unknowns.toarray(), wanted.ravel(), rcond=None)[0]
+    return jump
+
+
+@pytest.mark.parametrize("flip", [False, True])
+def test_two_blocks_have_the_uplift_of_one(flip):
+    """The example: one line from heel to toe, and the drained one alike."""
+    mu = {"mu": (0.8, 0.8, 0.6)}
+    case = load("monoliths", {"n_joint": 20.0, **mu}, [40.0], [3.0 if flip else 0.0])
+    results = LoadStepper(case, interface_of(case)).run()
+    first, last = 40.0, 3.0 if flip else 0.0
+    middle = first + (last - first) * 14 / 34
+    uplift = [WATER * (first + middle) / 2 * 14, WATER * (middle + last) / 2 * 20]
+    assert [own.last["U"] for own in results.joints[:2]] == pytest.approx(uplift, rel=1e-12)
+    if not flip:
+        assert uplift == pytest.approx([4.363e6, 2.308e6], rel=3e-4)
+    for own in results.joints[:2]:
+        rows = own.at()
+        assert rows["p"] == pytest.approx(WATER * (first + (last - first) * rows["x"] / 34))
+
+
+@pytest.mark.parametrize("reference", ["linear", "reservoir"])
+def test_drains_lower_the_head_of_the_whole_path(model, reference):
+    """Linear between heel, drains and toe, across the joint where the blocks meet."""
+    drains = {"drain_x": (4.0, 2.0, 2.0), "drain_effectiveness": (0.5, 0.4, 0.0)}
+    settings = drains | {"drain_reference": reference}
+    for modes, knots in (
+        (("drained", "imposed"), [4.0]),
+        (("imposed", "drained"), [12.0]),
+        (("drained", "drained"), [4.0, 12.0]),
+    ):
+        heads, places, _ = pressures(model((*modes, "none"), **settings), 9.0)
+        effect = {4.0: 0.5, 12.0: 0.4}
+        undrained = lambda x: 9 * (1 - x / 15) if reference == "linear" else 9.0
+        at = [(1 - effect[x]) * undrained(x) for x in knots]
+        for own, place in zip(heads[:2], places[:2], strict=True):
+            expected = np.interp(place[:, 0], [0, *knots, 15], [9, *at, 0])
+            assert own == pytest.approx(expected, abs=1e-12)
+
+
+@pytest.mark.parametrize("uplift", ["flow", "cracked"])
+def test_closed_joints_in_series_have_the_imposed_pressure(model, uplift):
+    heads, places, _ = pressures(model((uplift, uplift, "none")), 9.0, 3.0)
+    for own, place in zip(heads[:2], places[:2], strict=True):
+        assert own == pytest.approx(9 - 6 * place[:, 0] / 15, rel=1e-12)
+
+
+@pytest.mark.parametrize("apertures", [(1e-4, 3e-4), (3e-4, 1e-4), (1e-3, 1e-8), (1e-8, 1e-3)])
+def test_two_apertures_in_series(model, apertures):
+    """Resistances L/w^3: the same flux in both, and the head between them."""
+    built = model(("flow", "flow", "none"), aperture_min=(*apertures, 1e-4))
+    heads, places, found = pressures(built, 9.0, 3.0)
+    resistance = LENGTHS[:2] / np.array(apertures) ** 3
+    middle = 9 - 6 * resistance[0] / resistance.sum()
+    for own, place in zip(heads[:2], places[:2], strict=True):
+        assert own == pytest.approx(np.interp(place[:, 0], [0, 10, 15], [9, middle, 3]), rel=1e-12)
+    flux = 1000 * WATER * 6 / (12 * built.case["visc"] * resistance.sum())
+    assert [own.leakage for own in found[:2]] == pytest.approx([flux, flux], rel=1e-12)
+    assert np.concatenate([own.flux for own in found[:2]]) == pytest.approx(flux, rel=1e-12)
+
+
+@pytest.mark.parametrize("mode", ["imposed", "flow"])
+@pytest.mark.parametrize("apertures", [(1e-4, 2e-4, 3e-4), (1e-8, 1e-3, 1e-8), (1e-3, 1e-8, 1e-3)])
+def test_three_joints_at_a_node(model, mode, apertures):
+    """The fluxes balance: H = sum(H_k w_k^3/L_k) / sum(w_k^3/L_k); imposed with equal w."""
+    level, tail = 12.0, 3.0
+    built = model(mode, [level], [tail], aperture_min=apertures)
+    heads, places, found = pressures(built, level, tail)
+    conductance = np.array(apertures if mode == "flow" else (1, 1, 1)) ** 3 / LENGTHS
+    ends = np.array([level, tail, level])
+    middle = ends @ conductance / conductance.sum()
+    for own, place in zip(heads[:2], places[:2], strict=True):
+        line = np.interp(place[:, 0], [0, 10, 15], [level, middle, tail])
+        assert own == pytest.approx(line, rel=1e-12)
+    y = places[2][:, 1]
+    assert heads[2] + y == pytest.approx(np.interp(y, [0, 10], [middle, level]), rel=1e-12)
+    if mode == "flow":
+        left, right, down = (own.leakage for own in found)
+        assert left + down == pytest.approx(right, rel=1e-12)
+        drop = conductance @ (ends - ends[1]) / conductance.sum()
+        assert right == pytest.approx(
+            1000 * WATER * conductance[1] * drop / (12 * built.case["visc"]), rel=1e-12
+        )
+
+
+def test_water_leaves_at_a_dry_end_but_does_not_enter(model):
+    """The crest is dry above the junction's head; the toe lets water out, and none is in a dry
+    network.
+    """
+    built = model("flow", [6.0])
+    heads, places, found = pressures(built, 6.0)
+    assert heads[0] == pytest.approx(6 * (1 - places[0][:, 0] / 15), abs=1e-12)
+    assert heads[2] == pytest.approx(np.maximum(2 - places[2][:, 1], 0), abs=1e-12)
+    assert abs(found[2].leakage) < 1e-12 * found[0].leakage
+    for own in pressures(built, 0.0)[0]:
+        assert not own.any()
+
+
+@pytest.mark.parametrize(
+    "uplift, left, right",
+    [
+        (("imposed", "none", "none"), 7.0, 0.0),
+        (("none", "imposed", "none"), 0.0, 2.0),
+        (("waterstop", "imposed", "none"), None, 2.0),
+    ],
+)
+def test_a_path_ends_at_a_joint_without_water(model, uplift, left, right):
+    """And at a waterstop: the head is that of the end that the water reaches."""
+    heads, places, _ = pressures(model(uplift, [7.0], [2.0], waterstop=4.0), 7.0, 2.0)
+    if left is None:
+        assert np.array_equal(heads[0] > 0, places[0][:, 0] <= 4)
+    else:
+        assert heads[0] == pytest.approx(left, abs=1e-12)
+    assert heads[1] == pytest.approx(right, abs=1e-12)
+
+
+@pytest.mark.parametrize("uplift", [("flow", "flow", "none"), ("flow",) * 3])
+def test_derivative_of_the_pressure(model, uplift):
+    """By finite differences, at random openings."""
+    built = model(uplift, [12.0], aperture_min=(1e-4, 2e-4, 3e-4))
+    variables, loading = built.start().variables, Loading(12.0, 1.0)
+    (system,) = built.equilibrium.flowing
+    jump = opened(built, [2e-3, 3e-3, 4e-3])
+    solution = system.solve(jump, variables, loading)
+    derivative = system.derivative(jump, variables, solution, None)
+    way = np.random.default_rng(1).normal(size=len(jump)) * 1e-8
+    above, below = (system.solve(jump + s * way, variables, loading).pressure for s in (1, -1))
+    expected = derivative.pressure @ way[derivative.columns]
+    assert np.abs(expected).max() > 1e-3
+    assert (above - below) / 2 == pytest.approx(expected, rel=1e-4, abs=1e-6 * np.ptp(expected))
+
+
+@pytest.mark.parametrize("opening", [1e-6, 1e-3])
+def test_fluxes_balance_beside_open_joints(model, opening):
+    """However much better one of them conducts, in each direction."""
+    for sizes in ((opening, 0, 0), (0, opening, 0), (0, 0, opening), (opening, 0, opening)):
+        built = model("flow", [12.0], aperture_min=1e-8)
+        _, _, found = pressures(built, 12.0, 1.0, opened(built, sizes))
+        left, right, down = (own.leakage for own in found)
+        assert left + down == pytest.approx(right, rel=1e-9)
+        assert right > 0
+
+
+@pytest.mark.parametrize(
+    "uplift, settings, words",
+    [
+        (("imposed", "flow", "none"), {}, "uplift = imposed, flow: must be the same in joints"),
+        (
+            ("flow", "flow", "none"),
+            {"drains": 1.0, "drain_x": 2.0, "drain_effectiveness": (0.5, 0.6, 0.5)},
+            "drain_effectiveness = 0.5, 0.6: must be the same in joints that meet (left base and",
+        ),
+        ("drained", {"drain_x": 2.0}, "uplift = drained: must be another one where"),
+        (("imposed", "waterstop", "none"), {"waterstop": 2.0}, "uplift = waterstop: must be"),
+    ],
+)
+def test_settings_of_joints_that_meet(model, uplift, settings, words):
+    with pytest.raises(InputError) as error:
+        model(uplift, **settings)
+    assert words in str(error.value)
