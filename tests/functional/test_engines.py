@@ -346,6 +346,50 @@ def test_runs_of_both_engines_agree_where_four_bodies_meet(tmp_path):
     assert len(result.joints) == 6 and sum(map(changed, result.joints)) > 2
 
 
+BLOCKS = {"left": (0, 0, 10, 10), "right": (10, 0, 15, 10)}
+BLOCK_JOINTS = {
+    "left base": (0, 0, 10, 0),
+    "right base": (10, 0, 15, 0),
+    "contraction": (10, 10, 10, 0),
+}
+#: Uplift of these joints, and other settings.
+NETWORKS = {
+    "apertures in series": (("flow", "flow", "none"), {"K_N": (1e12, 2e12, 1e12)}),
+    "three joints": (("flow", "flow", "flow"), {}),
+    "cracked": (("cracked", "cracked", "cracked"), {}),
+    "imposed": (("imposed", "imposed", "imposed"), {}),
+    "mixed": (("flow", "imposed", "cracked"), {}),
+    "up to a waterstop": (("waterstop", "flow", "none"), {"waterstop": 2.0}),
+    "up to a dry joint": (("imposed", "none", "imposed"), {}),
+    "driven": (("flow", "cracked", "none"), {"drive": "crest", "drive_by": 5e-4}),
+}
+
+
+@pytest.mark.parametrize("scene", NETWORKS)
+def test_runs_of_both_engines_agree_on_water_where_joints_meet(scene, tmp_path):
+    write_blocks(tmp_path / "own.msh", BLOCKS, BLOCK_JOINTS)
+    (tmp_path / "own.case").write_text('geometry = "own.msh";')
+    uplift, more = NETWORKS[scene]
+    settings = {"law": "bond", "sigma_max": 1e4, "adhesion": (5e3, 5e3, 1e4), "G_f": 30.0}
+    settings |= {"mu": (0.5, 0.4, 0.3), "order": 1.0, "tolerance": 1e-10, "uplift": uplift}
+    settings |= {"aperture_min": (1e-4, 2e-4, 3e-4)} | more
+    case = load(str(tmp_path / "own.case"), settings, "6,9", "1,2")
+    (result,) = agree(case, tmp_path)
+    assert any(map(changed, result.joints))
+
+
+def test_networks_that_one_engine_can_not_compute_are_refused(tmp_path):
+    write_blocks(tmp_path / "own.msh", BLOCKS, BLOCK_JOINTS)
+    (tmp_path / "own.case").write_text('geometry = "own.msh";')
+    for settings, words in (
+        ({"uplift": "flow"}, "and water reaches more than one heel or toe"),
+        ({"uplift": ("drained", "imposed", "none")}, "in series and one is drained"),
+    ):
+        case = load(str(tmp_path / "own.case"), settings | {"drain_x": 2.0}, "12")
+        with pytest.raises(InputError, match=words):
+            solve.check(case)
+
+
 def test_a_face_that_is_not_divided_where_bodies_meet_is_refused(tmp_path):
     """Its elements are those of a single curve of the mesh."""
     path, joints = tmp_path / "own.msh", {"base": (0, 0, 10, 0), "lift": (0, 5, 10, 5)}

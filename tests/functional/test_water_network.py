@@ -113,6 +113,18 @@ def test_two_apertures_in_series(model, apertures):
     assert np.concatenate([own.flux for own in found[:2]]) == pytest.approx(flux, rel=1e-12)
 
 
+@pytest.mark.parametrize("modes", [("flow", "imposed"), ("imposed", "flow"), ("cracked", "flow")])
+def test_imposed_beside_flow_conducts_as_if_closed(model, modes):
+    """By its aperture_min, also where it is open; cracked likewise where there is no crack."""
+    sizes = [0.0 if mode == "flow" else 1e-3 * (mode == "imposed") for mode in modes]
+    built = model((*modes, "none"), aperture_min=(1e-4, 2e-4, 1e-4))
+    heads, places, _ = pressures(built, 9.0, 3.0, opened(built, [*sizes, 0.0]))
+    resistance = LENGTHS[:2] / np.array([1.0, 8.0])
+    middle = 9 - 6 * resistance[0] / resistance.sum()
+    for own, place in zip(heads[:2], places[:2], strict=True):
+        assert own == pytest.approx(np.interp(place[:, 0], [0, 10, 15], [9, middle, 3]), rel=1e-12)
+
+
 @pytest.mark.parametrize("mode", ["imposed", "flow"])
 @pytest.mark.parametrize("apertures", [(1e-4, 2e-4, 3e-4), (1e-8, 1e-3, 1e-8), (1e-3, 1e-8, 1e-3)])
 def test_three_joints_at_a_node(model, mode, apertures):
@@ -198,7 +210,7 @@ def test_fluxes_balance_beside_open_joints(model, opening):
 @pytest.mark.parametrize(
     "uplift, settings, words",
     [
-        (("imposed", "flow", "none"), {}, "uplift = imposed, flow: must be the same in joints"),
+        (("drained", "flow", "none"), {"drain_x": 2.0}, "uplift = drained, flow: must not be"),
         (
             ("flow", "flow", "none"),
             {"drains": 1.0, "drain_x": 2.0, "drain_effectiveness": (0.5, 0.6, 0.5)},

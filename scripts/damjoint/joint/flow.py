@@ -72,15 +72,16 @@ class JointFields:
         self.at_locations = space.interpolation(1)
         self.ends = np.concatenate([heel, toe])
         self.inside = np.arange(number) if branched else others(number, self.ends)
+        #: matrix of the Laplace equation on the joint
+        self.laplace = added([g.T @ g.scaled(points.weights) for g in self.slopes])
         if branched:
             return
-        laplace = added([g.T @ g.scaled(points.weights) for g in self.slopes])
         y = surface.points[:, 1]
-        self.xi = harmonic(laplace, self.ends, np.isin(self.ends, toe).astype(float))
+        self.xi = harmonic(self.laplace, self.ends, np.isin(self.ends, toe).astype(float))
         self.heel_y, self.toe_y = (
             np.full(number, y[nodes[0]])
             if np.ptp(y[nodes]) < 1e-9 * np.abs(surface.points).max()
-            else harmonic(laplace, nodes, y[nodes])
+            else harmonic(self.laplace, nodes, y[nodes])
             for nodes in (heel, toe)
         )
 

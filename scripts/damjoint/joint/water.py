@@ -68,7 +68,9 @@ class JointWater:
         self.dry_crack = self.freezes_uplift and case["quake_uplift"] == "zero"
         #: distance from the heel beyond which there is no water [m]
         self.waterstop = case["waterstop"] if case["uplift"] == "waterstop" else None
-        self.wet, self.flowing = case["uplift"] != "none" and self.waterstop != 0, flows(case)
+        self.wet = case["uplift"] != "none" and self.waterstop != 0
+        #: whether the flow is computed, here or in a joint that exchanges water with this one
+        self.flowing = flows(case)
         #: nodes and points of the drains of flowing water
         drained = self.flowing and has_drains(case)
         self.drains = joint.drains(case["drain_x"]) if drained else None
@@ -101,7 +103,8 @@ class JointWater:
             nodal = self.system.heads(loading)[self.nodes]
             return nodal if matrix is None else matrix @ nodal
         heel, toe, xi = self.places(matrix)
-        first, last = heads_at_ends(self.case, loading.level, loading.tail, heel, toe)
+        levels = loading.level, loading.tail
+        first, last = heads_at_ends(self.case, *levels, heel, toe, self.flowing)
         knots: list[tuple[float, Array]] = [(0.0, first)]
         for at, case, ends in self.drain_lines:
             drained = first + (last - first) * (at if case["drain_reference"] == "linear" else 0)
@@ -164,8 +167,10 @@ class JointWater:
         the opening.
 
         flow: cubic law. cracked: the same, but of the opening beyond that of a crack, and bounded
-        where an open point has practically the full head.
+        where an open point has practically the full head. Others: closed, whatever the opening.
         """
+        if not flows(self.case):
+            return np.ones(len(self.joint.points.weights)), np.zeros(len(self.joint.points.weights))
         opening = self.joint.flow.opening @ jump
         narrowest, most = self.narrowest, np.inf
         if self.case["uplift"] != "flow":
@@ -444,8 +449,8 @@ def water_systems(waters: Sequence[JointWater], interface: Interface) -> list[Wa
     for network in networks_of(meshes, cases):
         members = tuple(waters[k] for k in network.numbers)
         systems.append(WaterSystem(members, network, interface))
-        for water, nodes in zip(members, network.nodes, strict=True):
-            water.system, water.nodes = systems[-1], nodes
-            water.scale = (water.narrowest / members[0].narrowest) ** 3
+        for k, water in enumerate(members):
+            water.system, water.nodes = systems[-1], network.nodes[k]
+            water.flowing, water.scale = network.flowing, network.transmissivities[k]
     alone = [water.system for water in waters if not water.system.network]
     return [*alone, *systems]

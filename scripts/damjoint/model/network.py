@@ -33,6 +33,10 @@ class Network:
     in_series: bool
     #: nodes where it ends at a joint without water
     closed: IntArray
+    #: whether the flow is computed; then each joint's transmissivity where it is closed, over the
+    #: first one's
+    flowing: bool
+    transmissivities: tuple[float, ...]
 
 
 def carries_water(case: Case) -> bool:
@@ -56,9 +60,11 @@ def networks_of(joints: Sequence[JointMesh], cases: Sequence[Case]) -> list[Netw
             joined = [g for g in groups if i in g or k in g]
             groups = [g for g in groups if g not in joined] + [set().union(*joined)]
     groups = [g for g in groups if len(g) > 1 or len(joints[min(g)].inner_ends)]
-    networks = [connected([joints[k] for k in sorted(g)], tuple(sorted(g))) for g in groups]
-    for network in networks:
-        check(network, [joints[k] for k in network.numbers], [cases[k] for k in network.numbers])
+    networks = []
+    for numbers in (tuple(sorted(group)) for group in groups):
+        members, own = [joints[k] for k in numbers], [cases[k] for k in numbers]
+        networks.append(connected(members, own, numbers))
+        check(networks[-1], members, own)
     check_waterstops(joints, cases)
     return networks
 
@@ -68,8 +74,10 @@ def ends_of(joint: JointMesh) -> IntArray:
     return np.concatenate([joint.heel.node_tags, joint.toe.node_tags])
 
 
-def connected(joints: Sequence[JointMesh], numbers: tuple[int, ...]) -> Network:
-    """The network of some joints that meet."""
+def connected(
+    joints: Sequence[JointMesh], cases: Sequence[Case], numbers: tuple[int, ...]
+) -> Network:
+    """The network of some joints that meet, from their meshes, cases and numbers."""
     first, dim = joints[0], joints[0].dim
     surfaces = [joint.surface for joint in joints]
     all_tags = np.concatenate([s.node_tags for s in surfaces])
@@ -96,6 +104,9 @@ def connected(joints: Sequence[JointMesh], numbers: tuple[int, ...]) -> Network:
     heel, toe = outer([j.heel for j in joints]), outer([j.toe for j in joints])
     closed = distinct(np.searchsorted(tags, inner)) if len(inner) else np.zeros(0, int)
     closed = closed[count[closed] == 1]
+    # that of a crack does not depend on aperture_min
+    by_aperture = any(case["uplift"] == "flow" for case in cases)
+    apertures = [case["aperture_min"] if by_aperture else 1.0 for case in cases]
     single = len(heel.node_tags) == len(toe.node_tags) == 1 or dim == 3
     ends = len(heel.node_tags) > 0 and len(toe.node_tags) > 0 and single
     return Network(
@@ -105,6 +116,8 @@ def connected(joints: Sequence[JointMesh], numbers: tuple[int, ...]) -> Network:
         branched=bool(not ends or len(closed) or most_sides(surface) > 2),
         in_series=len(inner) > len(closed),
         closed=closed,
+        flowing=any(map(flows, cases)),
+        transmissivities=tuple((a / apertures[0]) ** 3 for a in apertures),
     )
 
 
@@ -122,17 +135,17 @@ def check(network: Network, joints: Sequence[JointMesh], cases: Sequence[Case]) 
     """Raise InputError if the joints of a network can not have one flow of water."""
     names = " and ".join(joint.name for joint in joints)
     modes = list(dict.fromkeys(case["uplift"] for case in cases))
-    if len(modes) > 1 and any(map(flows, cases)):
+    if "drained" in modes and any(map(flows, cases)):
         raise InputError(
-            f"uplift = {', '.join(modes)}: must be the same in joints that meet ({names}), but for "
-            "none and waterstop, imposed and drained"
+            f"uplift = {', '.join(modes)}: must not be drained in one of the joints that meet "
+            f"({names}) and flow or cracked in another; there drains = 1"
         )
-    drained = [case for case in cases if flows(case) and has_drains(case)]
-    for name, of_cases in (("joint_head_offset", cases), ("drain_effectiveness", drained)):
-        values = dict.fromkeys(case[name] for case in of_cases)
-        if len(values) > 1:
-            listed = ", ".join(f"{value:g}" for value in values)
-            raise InputError(f"{name} = {listed}: must be the same in joints that meet ({names})")
+    effects = dict.fromkeys(c["drain_effectiveness"] for c in cases if flows(c) and has_drains(c))
+    if len(effects) > 1:
+        raise InputError(
+            f"drain_effectiveness = {', '.join(f'{value:g}' for value in effects)}: must be the "
+            f"same in joints that meet ({names}) with uplift = {modes[0]}"
+        )
     if "drained" in modes and (network.branched or (network.mesh.dim == 3 and network.in_series)):
         raise InputError(
             f"uplift = drained: must be another one where the joints that meet ({names}) are not "

@@ -19,6 +19,7 @@ from ...model.case import Case, flows, freezes_uplift, has_drains
 from ...model.mesh import Mesh, mesh_of
 from .. import OnStep, Outcome
 from . import process, tables
+from .paths import values_of_paths
 
 #: Mesh patterns in 3D: GetDP has no suitable quadrature for prisms and hexahedra.
 SOLID = ("free", "split")
@@ -67,6 +68,7 @@ def check_own(mesh: Mesh, case: Case) -> None:
         raise InputError(f"geometry = {case.geometry}: must have tetrahedra with engine = getdp")
     if mesh.divided:
         mesh.face_entities()
+    values_of_paths(mesh, case)
     for joint, own in zip(mesh.joints, case.joints, strict=True):
         if joint.upper == joint.lower:
             raise InputError(
