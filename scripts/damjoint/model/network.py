@@ -5,11 +5,12 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from .. import InputError
-from ..arrays import IntArray, distinct
+from ..arrays import Array, IntArray, distinct
 from ..classes import dataclass
 from .body import Body
 from .case import Case, flows, has_drains
@@ -162,3 +163,158 @@ def check_waterstops(joints: Sequence[JointMesh], cases: Sequence[Case]) -> None
                 f"uplift = waterstop: must be another one in joint {joint.name}, whose heel is at "
                 "another joint, not on the upstream face"
             )
+
+
+# -- paths in the plane
+
+#: Height of an end that a path does not have [m].
+NOWHERE = 1e30
+
+
+@dataclass(frozen=True, kw_only=True)
+class WaterPath:
+    """The way of the water through a joint in 2D, which may go on in other joints; in branches off
+    it the water is at rest.
+    """
+
+    #: heights of its ends at reservoir and tailwater [m], NOWHERE if it has none; head of water at
+    #: rest where both are dry, at most
+    heel_y: float
+    toe_y: float
+    rest_y: float
+    #: normalised path coordinate of heel and toe of the joint
+    begin: float = 0.0
+    end: float = 1.0
+    #: whether no water enters at a dry end, even if the flow is not computed
+    exits: bool = False
+    #: whether the path ends at heel and toe of the joint
+    open_heel: bool = True
+    open_toe: bool = True
+    #: drains of uplift = drained on a path through several joints
+    drains: tuple[PathDrains, ...] = ()
+
+    @staticmethod
+    def of(case: Case) -> WaterPath | None:
+        """That of the case of a joint; None if there is more than one, or in 3D."""
+        section = case.section
+        if "path" not in section:
+            heel, toe = section["heel_y"][0], section["toe_y"][0]
+            return WaterPath(heel_y=heel, toe_y=toe, rest_y=min(heel, toe))
+        if not section["path"]:
+            return None
+        numbers, flags, rows = section["path"][:5], section["path"][5:], section["path_drains"]
+        heel_y, toe_y, rest_y, begin, end = numbers
+        exits, open_heel, open_toe = map(bool, flags)
+        width = len(PathDrains._fields)
+        drains = (PathDrains(*rows[i : i + width]) for i in range(0, len(rows), width))
+        return WaterPath(
+            heel_y=heel_y,
+            toe_y=toe_y,
+            rest_y=rest_y,
+            begin=begin,
+            end=end,
+            exits=exits,
+            open_heel=open_heel,
+            open_toe=open_toe,
+            drains=tuple(drains),
+        )
+
+    @property
+    def section(self) -> dict[str, list[float]]:
+        """The path in the section of a case, from which `of` reads it."""
+        numbers = [self.heel_y, self.toe_y, self.rest_y, self.begin, self.end]
+        flags = [float(flag) for flag in (self.exits, self.open_heel, self.open_toe)]
+        drains = [value for row in self.drains for value in row]
+        return {"path": numbers + flags, "path_drains": drains}
+
+
+class PathDrains(NamedTuple):
+    """Drains of uplift = drained on a path: path coordinate; height of their outlet [m], that of
+    the joint there or of the gallery; effectiveness; path coordinate of the head that it counts
+    from.
+    """
+
+    at: float
+    outlet: float
+    effectiveness: float
+    reference: float
+
+
+def with_paths(case: Case, joints: Sequence[JointMesh]) -> Case:
+    """The case of a user's own geometry with the paths of the water through joints that meet.
+
+    Raises InputError if joints that meet have settings that do not go together.
+    """
+    networks = networks_of(joints, case.joints)
+    paths: dict[int, dict[str, list[float]]] = {}
+    for network in networks:
+        for k in network.numbers:
+            paths[k] = {"path": [], "path_drains": []}
+        if network.mesh.dim == 2:
+            paths |= {k: path.section for k, path in plane_paths(network, joints, case).items()}
+    if not paths:
+        return case
+    of_joints = tuple(
+        replace(own, section=own.section | paths.get(k, {})) for k, own in enumerate(case.of_joints)
+    )
+    return replace(case, of_joints=of_joints)
+
+
+def plane_paths(network: Network, joints: Sequence[JointMesh], case: Case) -> dict[int, WaterPath]:
+    """The path through each joint of a network in 2D, by its number; empty if water may reach more
+    than one heel or toe at the levels of the case.
+    """
+    mesh, y = network.mesh, network.mesh.surface.points[:, 1]
+    ends = [mesh.heel_nodes, mesh.toe_nodes]
+    if network.branched:
+        reservoir = max(case.levels) if case["drive"] == "level" else np.inf
+        highest = max(reservoir + case["joint_head_offset"], *case.tail_levels)
+        ends = [nodes[y[nodes] < highest] for nodes in ends]
+    if max(map(len, ends)) > 1:
+        return {}
+    along = path_coordinate(mesh.surface, *ends)
+    rest = y[[*mesh.heel_nodes, *mesh.toe_nodes, *network.closed]].min()
+    heel_y, toe_y = (float(y[nodes[0]]) if len(nodes) else NOWHERE for nodes in ends)
+    paths, drains = {}, []
+    for k, nodes in zip(network.numbers, network.nodes, strict=True):
+        own = [nodes[places[0]] for places in (joints[k].heel_nodes, joints[k].toe_nodes)]
+        paths[k] = WaterPath(
+            heel_y=heel_y,
+            toe_y=toe_y,
+            rest_y=float(rest),
+            begin=float(along[own[0]]),
+            end=float(along[own[1]]),
+            exits=network.branched,
+            open_heel=own[0] in ends[0],
+            open_toe=own[1] in ends[1],
+        )
+        of_joint = case.joints[k]
+        if of_joint["uplift"] == "drained":
+            share = of_joint["drain_x"] / of_joint.joint_along
+            at, height = ((1 - share) * v[own[0]] + share * v[own[1]] for v in (along, y))
+            outlet = max(of_joint["drain_level"], float(height))
+            reference = float(at) if of_joint["drain_reference"] == "linear" else 0.0
+            effect = of_joint["drain_effectiveness"]
+            drains.append(PathDrains(float(at), outlet, effect, reference))
+    return {k: replace(path, drains=tuple(sorted(drains))) for k, path in paths.items()}
+
+
+def path_coordinate(surface: Body, heel: IntArray, toe: IntArray) -> Array:
+    """Normalised path coordinate at the nodes of lines in the plane: 0 at the heel, 1 at the toe,
+    linear along the way from one to the other, constant on branches; 0 or 1 with one of them only.
+    """
+    fixed = np.concatenate([heel, toe])
+    along = np.zeros(len(surface.points))
+    along[toe] = 1
+    if not len(fixed):
+        return along
+    table = np.concatenate([own for _, own in surface.cells])
+    lengths = np.linalg.norm(np.diff(surface.points[table], axis=1)[:, 0], axis=1)
+    laplace = np.zeros((len(along),) * 2)
+    for (a, b), length in zip(table, lengths, strict=True):
+        laplace[[a, b, a, b], [a, b, b, a]] += np.array([1, 1, -1, -1]) / length
+    free = np.setdiff1d(np.arange(len(along)), fixed)
+    along[free] = np.linalg.solve(
+        laplace[np.ix_(free, free)], -laplace[np.ix_(free, fixed)] @ along[fixed]
+    )
+    return along

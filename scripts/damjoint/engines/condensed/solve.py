@@ -13,7 +13,7 @@ from ...fem.memory import joint_size
 from ...joint.interface import Interface
 from ...model.case import Case
 from ...model.mesh import mesh_of
-from ...model.network import networks_of
+from ...model.network import with_paths
 from ...solver.load_stepper import LoadStepper
 from ...threads import limited_threads
 from .. import OnStep, Outcome
@@ -30,7 +30,7 @@ def check(case: Case) -> None:
     """Raise InputError if a user's own geometry is unsuitable; all other cases are suitable."""
     if case.geometry:
         joints = mesh_of(case).joints
-        networks_of(joints, case.with_joints([joint.of_case for joint in joints]).joints)
+        with_paths(case.with_joints([joint.of_case for joint in joints]), joints)
 
 
 def about(bulk: Condensed) -> dict[str, Any]:

@@ -109,12 +109,10 @@ def numbers(mesh: Mesh) -> dict[str, float]:
     return {name: float(b) for b, name in enumerate(reversed(mesh.solids))}
 
 
-def values_of_joint(
-    case: Case, mesh: Mesh | None, number: int, path: dict[str, Value] | None = None
-) -> str:
+def values_of_joint(case: Case, mesh: Mesh | None, number: int, path: str = "") -> str:
     """The macro of pro/joints.pro that sets the values of a joint, by its number from 0.
 
-    mesh, path: of a user's own geometry and of the water in it.
+    mesh: of a user's own geometry; path: see `values_of_paths`.
     """
     own, vectors = case.joints[number], ""
     values: dict[str, Value] = {n: own[n] for n, known in declared().items() if known.of_joints}
@@ -129,9 +127,8 @@ def values_of_joint(
         }
         vectors += listing("chord", chord.plane.T @ chord.along)
         vectors += listing("upwards", chord.plane.T @ chord.normal)
-    values |= path or {}
     lines = "".join(f"{name} = {quoted(value)};\n" for name, value in values.items())
-    return f"Macro Joint_{number}\n{lines}{vectors}Return\n"
+    return f"Macro Joint_{number}\n{lines}{vectors}{path}Return\n"
 
 
 def write_problem(
@@ -158,7 +155,7 @@ def write_problem(
     lists |= more_lists or {}
     if mesh or case.of_joints:
         number = len(case.joints)
-        paths = values_of_paths(mesh, case) if mesh else [None] * number
+        paths = values_of_paths(mesh, case) if mesh else [""] * number
         macros = (values_of_joint(case, mesh, k, paths[k]) for k in range(number))
         of_joints = "of_joints = 1;\n" + "".join(macros)
     if case.lift_heights:
