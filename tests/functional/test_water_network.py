@@ -10,6 +10,7 @@ from damjoint.model.case import load
 from damjoint.model.loads import Loading
 from damjoint.solver.load_stepper import LoadStepper
 from damjoint.solver.model import Model
+from damjoint.statics import gravity
 
 WATER = 9810.0
 #: A long block beside a short one: bases of 10 and 5 m, a contraction joint of 10 m above x = 10.
@@ -224,3 +225,62 @@ def test_settings_of_joints_that_meet(model, uplift, settings, words):
     with pytest.raises(InputError) as error:
         model(uplift, **settings)
     assert words in str(error.value)
+
+
+@pytest.mark.parametrize(
+    "uplift, settings",
+    [
+        (("imposed", "imposed", "none"), {}),
+        (("imposed", "imposed", "imposed"), {}),
+        (("drained", "drained", "none"), {"drain_x": (4.0, 2.0, 1.0)}),
+        (("imposed", "drained", "none"), {"drain_x": 2.0, "drain_reference": "reservoir"}),
+        (("imposed", "none", "none"), {}),
+        (("none", "imposed", "imposed"), {}),
+        (("waterstop", "imposed", "none"), {"waterstop": 3.0}),
+    ],
+)
+def test_the_gravity_method_has_the_same_uplift(model, uplift, settings):
+    """Of each joint, its moment about the toe, too; the contraction joint's crest is dry."""
+    built = model(uplift, [9.0], [2.0], **settings)
+    level, tail = 9.0, 2.0
+    for number, own in enumerate(built.case.joints):
+        body = gravity.RigidBlock(own)
+        found = gravity.Uplift(own, body, level, tail, 0.0)
+        water = built.equilibrium.water[number]
+        points, joint = water.wetted.points, water.joint
+        pressure = built.equilibrium.pressures(
+            built.start().jump, built.start().variables, Loading(level, tail)
+        )[number].water_points
+        toe = np.array([*body.toe, 0.0])
+        arm = np.linalg.norm(points.positions - toe, axis=1)
+        sizes = points.weights * pressure
+        # the pressure of the water at rest ends between two nodes of the contraction joint
+        kink = WATER * (1.0 if joint.mesh.name == "contraction" else 1e-9)
+        assert found.force == pytest.approx(sizes.sum(), abs=kink)
+        assert found.moment == pytest.approx(sizes @ arm, abs=10 * kink)
+
+
+def test_the_gravity_method_of_a_crack_on_a_path(model):
+    """A crack of 5 m at the inner heel conducts freely: of 15 m of the path 10 m are left."""
+    built = model(("cracked", "cracked", "none"), [9.0], [0.0])
+    first, second, _ = built.case.joints
+    found = gravity.Uplift(second, gravity.RigidBlock(second), 9.0, 0.0, 2.5)
+    middle = 9 * (1 - 10 / 12.5)
+    assert found.p[0] == pytest.approx(WATER * middle)
+    assert found.force == pytest.approx(WATER * (middle * 2.5 + middle * 2.5 / 2))
+    found = gravity.Uplift(first, gravity.RigidBlock(first), 9.0, 0.0, 5.0)
+    assert found.force == pytest.approx(WATER * (9 * 5 + (9 + 4.5) / 2 * 5))
+    drained = model(("cracked",) * 2 + ("none",), drains=(1.0, 0.0, 0.0), drain_x=6.0)
+    first, second, _ = drained.case.joints
+    found = gravity.Uplift(first, gravity.RigidBlock(first), 9.0, 0.0, 3.0)
+    at = 0.5 * 9 * 9 / 12
+    assert found.force == pytest.approx(
+        WATER * (9 * 3 + (9 + at) / 2 * 3 + (at + at * 5 / 9) / 2 * 4)
+    )
+
+
+def test_there_is_no_gravity_method_of_several_heels(model):
+    built = model("imposed", [12.0])
+    own = built.case.joints[0]
+    with pytest.raises(InputError, match="uplift = imposed: has no gravity method where joints"):
+        gravity.Uplift(own, gravity.RigidBlock(own), 12.0, 0.0, 0.0)

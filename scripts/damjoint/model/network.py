@@ -220,6 +220,11 @@ class WaterPath:
         )
 
     @property
+    def goes_on(self) -> bool:
+        """Whether it goes on in another joint, or does not reach heel or toe."""
+        return not (self.open_heel and self.open_toe and (self.begin, self.end) == (0, 1))
+
+    @property
     def section(self) -> dict[str, list[float]]:
         """The path in the section of a case, from which `of` reads it."""
         numbers = [self.heel_y, self.toe_y, self.rest_y, self.begin, self.end]

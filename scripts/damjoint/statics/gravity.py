@@ -19,9 +19,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..model.case import Case, freezes_uplift
+from .. import InputError
+from ..model.case import Case, flows, freezes_uplift
 from ..model.constraints import ZANGAR
 from ..model.loads import Loading, heads_at_ends, line_forces, zangar_column, zangar_share
+from ..model.network import WaterPath
 from ..model.parameters import constants
 
 #: Columns of gravity.csv: a row per load on the body above the joint, and their sum.
@@ -277,9 +279,16 @@ class Uplift:
         """dry_until: end of the part behind the crack [m] that an earthquake has opened, without
         pressure.
         """
-        self.length, mode = body.length, case["uplift"]
-        ends = heads_at_ends(case, level, tail, body.heel[1], body.toe[1])
-        #: heads at heel and toe [m]
+        self.length, mode, path = body.length, case["uplift"], WaterPath.of(case)
+        if path is None:
+            raise InputError(
+                f"uplift = {mode}: has no gravity method where joints meet and water reaches more "
+                "than one heel or toe"
+            )
+        flowing = path.exits or flows(case)
+        heights = path.heel_y, path.toe_y, flowing, path.rest_y
+        ends = heads_at_ends(case, level, tail, *heights)
+        #: heads at both ends of the path through the joint: heel and toe if it meets no other [m]
         self.first, self.last = first, last = float(ends[0]), float(ends[1])
         #: distance from the heel and head of the outlet [m] of drains that the crack has not passed
         self.drains: tuple[float, float] | None = None
@@ -289,7 +298,9 @@ class Uplift:
             first = last = level + case["joint_head_offset"]
         places, heads = [0.0, crack, self.length], [first, first, last]
         at = case["drain_x"]
-        if drained and crack <= at < self.length:
+        if path.goes_on:
+            places, heads = self._on_path(case, body, path, tail, crack)
+        elif drained and crack <= at < self.length:
             outlet = max(case["drain_level"], tail, body.heel[1] + at * body.along[1])
             self.drains = at, outlet
             undrained = float(np.interp(at, places[1:], heads[1:]))
@@ -306,6 +317,41 @@ class Uplift:
             self.stop(min(case["waterstop"], self.length))
         if dry_until > wet_crack:
             self.dry(wet_crack, dry_until)
+
+    def _on_path(
+        self, case: Case, body: RigidBlock, path: WaterPath, tail: float, crack: float
+    ) -> tuple[list[float], list[float]]:
+        """Places [m] and heads [m] in a joint whose path goes on in others, which are not cracked:
+        linear between the ends and the drains of the path without the crack, which conducts freely.
+        """
+        length, share = self.length, abs(path.end - path.begin)
+        if not share:  # a branch in which the water is at rest
+            head = self.first + (self.last - self.first) * path.begin
+            return [0.0, length], [head, head]
+        whole, forwards = length / share, path.end > path.begin
+        start = path.begin * whole - (0 if forwards else crack)
+
+        def along(s: float) -> float:
+            return start + (1 if forwards else -1) * max(s - crack, 0.0)
+
+        drains = [
+            (whole * line.at, line.outlet, line.effectiveness, whole * line.reference)
+            for line in path.drains
+        ]
+        at = case["drain_x"]
+        if case["uplift"] == "cracked" and case["drains"] and crack <= at < length:
+            outlet = max(case["drain_level"], body.heel[1] + at * body.along[1])
+            drains = [(along(at), outlet, case["drain_effectiveness"], along(at))]
+        ends = [0.0, whole - crack], [self.first, self.last]
+        knots, places = dict(zip(*ends, strict=True)), [0.0, crack, length]
+        for place, outlet, effect, reference in drains:
+            undrained = float(np.interp(reference, *ends))
+            knots[place] = undrained - effect * max(undrained - max(outlet, tail), 0.0)
+            own = (place - start) * (1 if forwards else -1) + crack
+            places += [own] if crack < own < length else []
+        places, way = sorted(places), sorted(knots)
+        heads = np.interp([along(s) for s in places], way, [knots[x] for x in way])
+        return places, heads.tolist()
 
     def cut_off_suction(self) -> None:
         """Set negative pressures to zero."""
