@@ -11,6 +11,7 @@ from damjoint.model.loads import Loading
 from damjoint.solver.load_stepper import LoadStepper
 from damjoint.solver.model import Model
 from damjoint.statics import gravity
+from damjoint.studies.report_input import limits
 
 WATER = 9810.0
 #: A long block beside a short one: bases of 10 and 5 m, a contraction joint of 10 m above x = 10.
@@ -150,6 +151,49 @@ def test_three_joints_at_a_node(model, mode, apertures):
         )
 
 
+@pytest.mark.parametrize("mode", ["imposed", "flow"])
+@pytest.mark.parametrize("third", [True, False])
+def test_joints_that_meet_in_3d(mode, third):
+    """Two blocks 1 m thick, bases of 5 m, a vertical joint of 10 m with its heel on top: as in the
+    plane, with two or three joints at a line.
+    """
+    uplift = (mode, mode, mode if third else "none")
+    apertures = (1e-4, 2e-4, 3e-4)
+    settings = {"dim": 3.0, "uplift": uplift, "aperture_min": apertures}
+    built = Model(load("ssnp143", settings, [12.0], [3.0]))
+    heads, _, found = pressures(built, 12.0, 3.0)
+    width = np.array(apertures if mode == "flow" else (1, 1, 1)) ** 3
+    conductance = width / [5, 5, 10] * [1, 1, third]
+    middle = conductance @ [12, 3, 12] / conductance.sum()
+    for k, joint in enumerate(built.equilibrium.interface.joints[: 2 + third]):
+        x, y, _ = joint.space.locations.T
+        bases = np.interp(x, [-5, 0, 5], [12, middle, 3])
+        expected = bases if k < 2 else np.interp(y, [0, 10], [middle, 12])
+        assert heads[k] + y == pytest.approx(expected, rel=1e-11)
+    if mode == "flow":
+        into = 1000 * WATER * conductance * [12 - middle, middle - 3, 12 - middle]
+        flux = [own.leakage for own in found[: 2 + third]]
+        assert flux == pytest.approx(into[: 2 + third] / (12 * built.case["visc"]), rel=1e-9)
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("level", [25.0, 45.0])
+def test_the_bases_of_blocks_have_the_uplift_of_one_base(level):
+    """Of the dam across a valley, in one piece and in blocks of 15 m; by the meshes to 2e-4."""
+    total = {}
+    for name in ("valley", "valley_blocks"):
+        coarse = {"n_joint": 8.0, "h_dam": 10.0, "h_found": 40.0, "order": 1.0}
+        built = Model(load(name, coarse, [level]))
+        start = built.start()
+        found = built.equilibrium.pressures(start.jump, start.variables, Loading(level, 0.0))
+        total[name] = sum(
+            water.wetted.points.weights @ own.water_points
+            for water, own in zip(built.equilibrium.water, found, strict=True)
+            if not water.joint.mesh.name.startswith("contraction")
+        )
+    assert total["valley_blocks"] == pytest.approx(total["valley"], rel=2e-4)
+
+
 def test_water_leaves_at_a_dry_end_but_does_not_enter(model):
     """The crest is dry above the junction's head; the toe lets water out, and none is in a dry
     network.
@@ -277,6 +321,13 @@ def test_the_gravity_method_of_a_crack_on_a_path(model):
     assert found.force == pytest.approx(
         WATER * (9 * 3 + (9 + at) / 2 * 3 + (at + at * 5 / 9) / 2 * 4)
     )
+
+
+def test_the_report_says_that_water_passes_between_joints(model):
+    words = "Water passes between joints that meet"
+    for uplift in ("imposed", ("none", "none", "imposed"), "none"):
+        sentences = limits(model(uplift).case)
+        assert any(words in sentence for sentence in sentences) == (uplift != "none")
 
 
 def test_there_is_no_gravity_method_of_several_heels(model):
