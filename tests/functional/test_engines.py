@@ -367,6 +367,8 @@ NETWORKS = {
     "imposed": (("imposed", "imposed", "imposed"), {}),
     "mixed": (("flow", "imposed", "cracked"), {}),
     "up to a waterstop": (("waterstop", "flow", "none"), {"waterstop": 2.0}),
+    "waterstop behind a joint": (("flow", "waterstop", "none"), {"waterstop": 2.3}),
+    "imposed up to a waterstop": (("imposed", "waterstop", "imposed"), {"waterstop": 2.3}),
     "up to a dry joint": (("imposed", "none", "imposed"), {}),
     "drained": (("drained", "drained", "none"), {"drain_x": (3.0, 1.0, 1.0)}),
     "drained, driven": (
@@ -393,9 +395,13 @@ def test_runs_of_both_engines_agree_on_water_where_joints_meet(scene, tmp_path):
 def test_networks_that_one_engine_can_not_compute_are_refused(tmp_path):
     write_blocks(tmp_path / "own.msh", BLOCKS, BLOCK_JOINTS)
     (tmp_path / "own.case").write_text('geometry = "own.msh";')
+    words = r"uplift = flow: must be none in one of .* \(left base and right base and contraction\)"
     case = load(str(tmp_path / "own.case"), {"uplift": "flow"}, "12")
-    with pytest.raises(InputError, match="and water reaches more than one heel or toe"):
+    with pytest.raises(InputError, match=f"{words}.*as water reaches more than one heel or toe"):
         solve.check(case)
+    water = {"dim": 3.0, "uplift": "imposed", "n_joint": 6.0, "h_dam": 12.0, "h_found": 40.0}
+    with pytest.raises(InputError, match="as they do not lie side by side"):
+        solve.check(load("monoliths", water))
 
 
 def test_a_face_that_is_not_divided_where_bodies_meet_is_refused(tmp_path):

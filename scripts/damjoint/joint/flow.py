@@ -218,15 +218,19 @@ class Flow:
         self,
         fields: JointFields,
         points: elements.Points,
-        wetted: Wetted,
+        weights: Array,
+        wet_opening: CsrMatrix,
+        wet_fields: CsrMatrix,
         at_points: CsrMatrix,
     ) -> None:
-        """points: Gauss points of the law; at_points: jump there from the unknowns."""
+        """points: Gauss points of the law; weights, wet_opening, wet_fields: see `Wetted`;
+        at_points: jump at the points of the law from the unknowns.
+        """
         self.fields, self.points, self.dim = fields, points, fields.dim
         self.inside, number = fields.inside, fields.nodes
         #: nodal forces of the pressure at the inner nodes
-        inner = wetted.fields.columns(self.inside).scaled(wetted.points.weights)
-        self.lift = wetted.opening.T @ inner
+        inner = wet_fields.columns(self.inside).scaled(weights)
+        self.lift = wet_opening.T @ inner
         self.opening = at_points[:: fields.dim]
         self.inner_slopes = [g.columns(self.inside) for g in fields.slopes]
         if fields.dim == 2:

@@ -165,7 +165,9 @@ class JointInterface:
     @cached_property
     def flow(self) -> Flow:
         """Operators of water that flows in the joint."""
-        return Flow(self.fields, self.points, self.wetted, self.at_points)
+        wet = self.wetted
+        fields, weights = wet.fields, wet.points.weights
+        return Flow(self.fields, self.points, weights, wet.opening, fields, self.at_points)
 
     @cached_property
     def fields(self) -> JointFields:
@@ -232,22 +234,25 @@ class Interface:
             self._lift = flowing, stacked([flow.lift.T for flow in flowing]).T
         return self._lift[1]
 
-    def flow_of(self, network: Network) -> Flow:
-        """Operators of water that flows in joints that meet; kept."""
-        key = network.numbers, network.branched
+    def flow_of(self, network: Network, waterstops: tuple[float | None, ...]) -> Flow:
+        """Operators of water that flows in joints that meet; kept. waterstops: distance from the
+        heel of each joint beyond which there is none.
+        """
+        key = network.numbers, network.branched, waterstops
         if key not in self._flows:
-            linear = elements.Space(network.mesh.surface, 1)
+            linear, size = elements.Space(network.mesh.surface, 1), len(network.mesh.surface.points)
             joints = [self.joints[k] for k in network.numbers]
-            rule, parts = joints[0].rule, [joint.wetted for joint in joints]
-            on_whole = elements.points_of(linear, elements.WATER)
+            parts = [
+                joint.wetted_within(at) if at else joint.wetted
+                for joint, at in zip(joints, waterstops, strict=True)
+            ]
+            fields = zip(parts, network.nodes, strict=True)
             self._flows[key] = Flow(
-                JointFields(network.mesh, linear, rule, network.branched),
-                elements.points_of(linear, rule),
-                Wetted(
-                    points=on_whole,
-                    opening=stacked([part.opening for part in parts]),
-                    fields=on_whole.values,
-                ),
+                JointFields(network.mesh, linear, joints[0].rule, network.branched),
+                elements.points_of(linear, joints[0].rule),
+                np.concatenate([part.points.weights for part in parts]),
+                stacked([part.opening for part in parts]),
+                stacked([part.fields.renumbered(nodes, size) for part, nodes in fields]),
                 stacked([joint.at_points for joint in joints]),
             )
         return self._flows[key]

@@ -91,12 +91,12 @@ class JointWater:
         """Head [m] in a joint of uniform transmissivity, at the joint's nodes or at the places that
         an interpolation matrix of `JointFields` leads to: linear along the joint between the heads
         of `heads_at_ends`, along the whole path where joints meet. With a waterstop: that of the
-        reservoir.
+        reservoir, or of the joint from which the water comes.
 
         Drains reduce the head above their outlet, the tailwater or their own height, by their
         effectiveness (EM 1110-2-2200); USBR counts the reduction from the reservoir's head.
         """
-        if self.waterstop is not None:
+        if self.waterstop is not None and not self.system.network:
             number = len(self.nodes) if matrix is None else matrix.shape[0]
             return np.full(number, loading.level + self.case["joint_head_offset"])
         if self.system.branched:
@@ -306,7 +306,8 @@ class WaterSystem:
     def flow(self) -> Flow:
         """Operators of the flow."""
         if self.network and self.interface:
-            return self.interface.flow_of(self.network)
+            waterstops = tuple(water.waterstop for water in self.members)
+            return self.interface.flow_of(self.network, waterstops)
         return self.members[0].joint.flow
 
     @property

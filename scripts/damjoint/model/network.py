@@ -40,9 +40,22 @@ class Network:
     transmissivities: tuple[float, ...]
 
 
-def carries_water(case: Case) -> bool:
-    """Whether water passes through a joint, from its case: a waterstop ends the path."""
-    return case["uplift"] not in ("none", "waterstop")
+def starts_inside(joint: JointMesh, case: Case) -> bool:
+    """Whether the water before the waterstop of a joint comes from another joint."""
+    at_joint = bool(np.isin(joint.heel.node_tags, joint.inner_ends).any())
+    return case["uplift"] == "waterstop" and case["waterstop"] > 0 and at_joint
+
+
+def sealed(joint: JointMesh, number: int) -> JointMesh:
+    """A joint, by its number, that meets no other one at its toe: its waterstop ends the path."""
+    tags, toe = joint.surface.node_tags.astype(int), joint.toe.node_tags.astype(int)
+    own = np.where(np.isin(tags, toe), (number + 1 << 40) + tags, tags)
+    return replace(
+        joint,
+        surface=replace(joint.surface, node_tags=own),
+        toe=replace(joint.toe, node_tags=(number + 1 << 40) + toe),
+        inner_ends=np.union1d(joint.inner_ends.astype(int), (number + 1 << 40) + toe),
+    )
 
 
 def networks_of(joints: Sequence[JointMesh], cases: Sequence[Case]) -> list[Network]:
@@ -52,7 +65,11 @@ def networks_of(joints: Sequence[JointMesh], cases: Sequence[Case]) -> list[Netw
     """
     if not any(joint.meets for joint in joints):
         return []
-    wet = [k for k, case in enumerate(cases) if carries_water(case)]
+    inside = [k for k, case in enumerate(cases) if starts_inside(joints[k], case)]
+    check_waterstops([joints[k] for k in inside])
+    joints = [sealed(joint, k) if k in inside else joint for k, joint in enumerate(joints)]
+    passable = [k for k, case in enumerate(cases) if case["uplift"] not in ("none", "waterstop")]
+    wet = sorted([*passable, *inside])
     open_ends = {k: np.setdiff1d(ends_of(joints[k]), joints[k].inner_ends) for k in wet}
     groups = [{k} for k in wet]
     for i, k in itertools.combinations(wet, 2):
@@ -66,7 +83,6 @@ def networks_of(joints: Sequence[JointMesh], cases: Sequence[Case]) -> list[Netw
         members, own = [joints[k] for k in numbers], [cases[k] for k in numbers]
         networks.append(connected(members, own, numbers))
         check(networks[-1], members, own)
-    check_waterstops(joints, cases)
     return networks
 
 
@@ -135,7 +151,7 @@ def most_sides(surface: Body) -> int:
 def check(network: Network, joints: Sequence[JointMesh], cases: Sequence[Case]) -> None:
     """Raise InputError if the joints of a network can not have one flow of water."""
     names = " and ".join(joint.name for joint in joints)
-    modes = list(dict.fromkeys(case["uplift"] for case in cases))
+    modes = dict.fromkeys(case["uplift"] for case in cases)
     if "drained" in modes and any(map(flows, cases)):
         raise InputError(
             f"uplift = {', '.join(modes)}: must not be drained in one of the joints that meet "
@@ -145,7 +161,7 @@ def check(network: Network, joints: Sequence[JointMesh], cases: Sequence[Case]) 
     if len(effects) > 1:
         raise InputError(
             f"drain_effectiveness = {', '.join(f'{value:g}' for value in effects)}: must be the "
-            f"same in joints that meet ({names}) with uplift = {modes[0]}"
+            f"same in joints that meet ({names})"
         )
     if "drained" in modes and (network.branched or (network.mesh.dim == 3 and network.in_series)):
         raise InputError(
@@ -154,11 +170,12 @@ def check(network: Network, joints: Sequence[JointMesh], cases: Sequence[Case]) 
         )
 
 
-def check_waterstops(joints: Sequence[JointMesh], cases: Sequence[Case]) -> None:
-    """Raise InputError if the heel of a joint with a waterstop is not on the upstream face."""
-    for joint, case in zip(joints, cases, strict=True):
-        inner = np.isin(joint.heel.node_tags, joint.inner_ends).any()
-        if case["uplift"] == "waterstop" and inner:
+def check_waterstops(joints: Sequence[JointMesh]) -> None:
+    """Raise InputError if one of some joints with a waterstop and their heel at another joint is in
+    3D.
+    """
+    for joint in joints:
+        if joint.dim == 3:
             raise InputError(
                 f"uplift = waterstop: must be another one in joint {joint.name}, whose heel is at "
                 "another joint, not on the upstream face"

@@ -294,7 +294,7 @@ class Uplift:
         self.drains: tuple[float, float] | None = None
         wet_crack, crack = crack, crack if mode in ("cracked", "flow") else 0.0
         drained = mode == "drained" or (mode == "cracked" and case["drains"])
-        if mode == "waterstop":
+        if mode == "waterstop" and not path.goes_on:
             first = last = level + case["joint_head_offset"]
         places, heads = [0.0, crack, self.length], [first, first, last]
         at = case["drain_x"]

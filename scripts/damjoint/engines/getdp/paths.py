@@ -27,6 +27,7 @@ def values_of_paths(mesh: Mesh, case: Case) -> list[str]:
                 "network": float(network.numbers[0]),
                 "network_K_N": first["K_N"],
                 "network_aperture": first["aperture_min"],
+                "in_network": 1.0,
                 "in_flow": float(network.flowing),
                 "closed_conductivity": scale,
                 "joint_path": float(network.numbers[0] if solid else k),
@@ -49,19 +50,23 @@ def lines(values: dict[str, float]) -> str:
     return "".join(f"{name} = {value!r};\n" for name, value in values.items())
 
 
-def refused(network: Network, mesh: Mesh, why: str) -> InputError:
+def refused(network: Network, mesh: Mesh, case: Case, why: str) -> InputError:
     """The error of a network."""
     names = " and ".join(mesh.joints[k].name for k in network.numbers)
-    return InputError(f"uplift: must be none with engine = getdp where joints meet ({names}) {why}")
+    modes = ", ".join(dict.fromkeys(case.joints[k]["uplift"] for k in network.numbers))
+    return InputError(
+        f"uplift = {modes}: must be none in one of the joints that meet ({names}) with engine = "
+        f"getdp, {why}"
+    )
 
 
 def side_by_side(network: Network, mesh: Mesh, case: Case) -> dict[int, WaterPath]:
     """The path through the joints of a network in 3D, which have heel and toe on the surface."""
     heel, toe = (end.points[:, 1] for end in (network.mesh.heel, network.mesh.toe))
     if network.branched or network.in_series:
-        raise refused(network, mesh, "in 3D, unless they lie side by side")
+        raise refused(network, mesh, case, "as they do not lie side by side")
     if max(np.ptp(heel), np.ptp(toe)) > 1e-9 * case.size:
-        raise refused(network, mesh, "and their heels or toes are not level")
+        raise refused(network, mesh, case, "as their heels or toes are not level")
     ends = float(heel[0]), float(toe[0])
     path = WaterPath(heel_y=ends[0], toe_y=ends[1], rest_y=min(ends))
     return dict.fromkeys(network.numbers, path)
@@ -71,5 +76,5 @@ def in_plane(network: Network, mesh: Mesh, case: Case) -> dict[int, WaterPath]:
     """The path through each joint of a network in 2D."""
     paths = plane_paths(network, mesh.joints, case)
     if not paths:
-        raise refused(network, mesh, "and water reaches more than one heel or toe")
+        raise refused(network, mesh, case, "as water reaches more than one heel or toe")
     return paths
