@@ -1,5 +1,7 @@
 """Water in joints that meet: one network, whose heads follow from its ends on the surface."""
 
+import itertools
+
 import numpy as np
 import pytest
 from blocks import write_blocks
@@ -86,9 +88,12 @@ def test_drains_lower_the_head_of_the_whole_path(model, reference):
         (("drained", "drained"), [4.0, 12.0]),
     ):
         heads, places, _ = pressures(model((*modes, "none"), **settings), 9.0)
-        effect = {4.0: 0.5, 12.0: 0.4}
-        undrained = lambda x: 9 * (1 - x / 15) if reference == "linear" else 9.0
-        at = [(1 - effect[x]) * undrained(x) for x in knots]
+        effect, at = {4.0: 0.5, 12.0: 0.4}, list[float]()
+        for x in knots:
+            undrained = 9 * (1 - x / 15) if reference == "linear" else 9.0
+            if at:  # what the drains before leave
+                undrained = at[0] * (15 - x) / (15 - knots[0])
+            at.append((1 - effect[x]) * undrained)
         for own, place in zip(heads[:2], places[:2], strict=True):
             expected = np.interp(place[:, 0], [0, *knots, 15], [9, *at, 0])
             assert own == pytest.approx(expected, abs=1e-12)
@@ -153,27 +158,30 @@ def test_three_joints_at_a_node(model, mode, apertures):
 
 @pytest.mark.parametrize("mode", ["imposed", "flow"])
 @pytest.mark.parametrize("third", [True, False])
-def test_joints_that_meet_in_3d(mode, third):
-    """Two blocks 1 m thick, bases of 5 m, a vertical joint of 10 m with its heel on top: as in the
-    plane, with two or three joints at a line.
+@pytest.mark.parametrize("level", [8.0, 12.0])
+def test_joints_that_meet_in_3d(mode, third, level):
+    """Two blocks 1 m thick, bases of 5 m, a vertical joint of 10 m with its heel on top, dry or
+    under water: as in the plane, with two or three joints at a line.
     """
     uplift = (mode, mode, mode if third else "none")
     apertures = (1e-4, 2e-4, 3e-4)
     settings = {"dim": 3.0, "uplift": uplift, "aperture_min": apertures}
-    built = Model(load("ssnp143", settings, [12.0], [3.0]))
-    heads, _, found = pressures(built, 12.0, 3.0)
+    built = Model(load("ssnp143", settings, [level], [3.0]))
+    heads, _, found = pressures(built, level, 3.0)
     width = np.array(apertures if mode == "flow" else (1, 1, 1)) ** 3
-    conductance = width / [5, 5, 10] * [1, 1, third]
-    middle = conductance @ [12, 3, 12] / conductance.sum()
+    conductance = width / [5, 5, 10] * [1, 1, third and level > 10]
+    middle = conductance @ [level, 3, level] / conductance.sum()
+    top = level if level > 10 else middle
     for k, joint in enumerate(built.equilibrium.interface.joints[: 2 + third]):
         x, y, _ = joint.space.locations.T
-        bases = np.interp(x, [-5, 0, 5], [12, middle, 3])
-        expected = bases if k < 2 else np.interp(y, [0, 10], [middle, 12])
-        assert heads[k] + y == pytest.approx(expected, rel=1e-11)
+        bases = np.interp(x, [-5, 0, 5], [level, middle, 3])
+        expected = bases if k < 2 else np.interp(y, [0, 10], [middle, top])
+        assert heads[k] == pytest.approx(np.maximum(expected - y, 0), abs=1e-9)
     if mode == "flow":
-        into = 1000 * WATER * conductance * [12 - middle, middle - 3, 12 - middle]
+        into = 1000 * WATER * conductance * [level - middle, middle - 3, level - middle]
         flux = [own.leakage for own in found[: 2 + third]]
-        assert flux == pytest.approx(into[: 2 + third] / (12 * built.case["visc"]), rel=1e-9)
+        expected = into[: 2 + third] / (12 * built.case["visc"])
+        assert flux == pytest.approx(expected, rel=1e-9, abs=1e-9 * expected.max())
 
 
 @pytest.mark.heavy
@@ -194,17 +202,31 @@ def test_the_bases_of_blocks_have_the_uplift_of_one_base(level):
     assert total["valley_blocks"] == pytest.approx(total["valley"], rel=2e-4)
 
 
-def test_water_leaves_at_a_dry_end_but_does_not_enter(model):
-    """The crest is dry above the junction's head; the toe lets water out, and none is in a dry
-    network.
-    """
-    built = model("flow", [6.0])
+@pytest.mark.parametrize("mode", ["imposed", "flow"])
+def test_no_water_enters_at_a_dry_end(model, mode):
+    """The crest is dry above the head where the joints meet; none is in a dry network."""
+    built = model(mode, [6.0])
     heads, places, found = pressures(built, 6.0)
     assert heads[0] == pytest.approx(6 * (1 - places[0][:, 0] / 15), abs=1e-12)
     assert heads[2] == pytest.approx(np.maximum(2 - places[2][:, 1], 0), abs=1e-12)
-    assert abs(found[2].leakage) < 1e-12 * found[0].leakage
+    if mode == "flow":
+        assert abs(found[2].leakage) < 1e-12 * found[0].leakage
     for own in pressures(built, 0.0)[0]:
         assert not own.any()
+
+
+@pytest.mark.parametrize("mode", ["imposed", "flow"])
+def test_water_leaves_at_a_dry_end(model, mode):
+    """At the head of its elevation: the toe of the contraction joint is at y = 10 on the crest."""
+    joints = BASES | {"contraction": (10, 0, 10, 10)}
+    heads, places, found = pressures(model(mode, [40.0], joints=joints), 40.0)
+    middle = (40 / 10 + 0 / 5 + 10 / 10) / (1 / 10 + 1 / 5 + 1 / 10)
+    assert heads[0] == pytest.approx(40 + (middle - 40) * places[0][:, 0] / 10, rel=1e-12)
+    y = places[2][:, 1]
+    assert heads[2] == pytest.approx((middle - 10) * (1 - y / 10) + 10 - y, abs=1e-11)
+    if mode == "flow":
+        left, right, out = (own.leakage for own in found)
+        assert out > 0 and left == pytest.approx(right + out, rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -352,3 +374,48 @@ def test_there_is_no_gravity_method_of_several_heels(model):
     own = built.case.joints[0]
     with pytest.raises(InputError, match="uplift = imposed: has no gravity method where joints"):
         gravity.Uplift(own, gravity.RigidBlock(own), 12.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    "uplift, tail, settings",
+    [
+        ("imposed", 2.0, {}),
+        ("drained", 1.0, {"drain_x": (2.0, 2.0), "drain_effectiveness": (0.6, 0.0)}),
+        ("flow", 0.0, {"aperture_min": 1e-5}),
+        ("cracked", 2.0, {}),
+        ("cracked", 0.0, {"drains": (1.0, 0.0), "drain_x": 6.0}),
+        ("flow", 0.0, {"drains": (0.0, 1.0), "drain_x": (2.0, 1.0)}),
+    ],
+)
+def test_a_joint_in_two_parts_is_one_joint(tmp_path, uplift, tail, settings):
+    """A block opens one joint, or two in series: the same water and jumps."""
+    block, ends, found = {"block": (0, 0, 15, 24)}, (0, 10, 15), []
+    for number in (1, 2):
+        places = ends if number == 2 else (ends[0], ends[-1])
+        joints = {f"part {x}": (x, 0, x1, 0) for x, x1 in itertools.pairwise(places)}
+        write_blocks(tmp_path / "own.msh", block, joints | {"_line": (0, 0, 10, 0)})
+        (tmp_path / "own.case").write_text('geometry = "own.msh";')
+        own = {
+            n: v if number == 2 or not isinstance(v, tuple) else v[0] for n, v in settings.items()
+        }
+        if number == 1 and own.get("drains") == 0:
+            own |= {"drains": 1.0, "drain_x": ends[1] + settings["drain_x"][1]}
+        law = {"law": "bond", "sigma_max": 1e4, "adhesion": 1e5, "G_f": 20.0, "order": 1.0}
+        case = load(
+            str(tmp_path / "own.case"),
+            law | {"uplift": uplift, "E": 2e10, "tolerance": 1e-12} | own,
+            [20.0, 23.5],
+            [tail],
+        )
+        results = LoadStepper(case, interface_of(case)).run()
+        assert not results.stopped
+        rows = [joint.at() for joint in results.joints]
+        table = {n: np.concatenate([own[n] for own in rows]) for n in ("x", "p", "delta_n")}
+        order = np.unique(np.round(table["x"], 6), return_index=True)[1]
+        found.append({n: values[order] for n, values in table.items()})
+        found[-1]["U"] = sum(joint.last["U"] for joint in results.joints)
+        found[-1]["flux"] = results.joints[-1].last["flux"]
+    one, two = found
+    assert one["delta_n"].max() > 1e-5
+    for name, values in one.items():
+        assert two[name] == pytest.approx(values, rel=1e-6, abs=1e-9 * np.abs(values).max())

@@ -107,7 +107,9 @@ class JointWater:
         first, last = heads_at_ends(self.case, *levels, heel, toe, self.flowing)
         knots: list[tuple[float, Array]] = [(0.0, first)]
         for at, case, ends in self.drain_lines:
-            drained = first + (last - first) * (at if case["drain_reference"] == "linear" else 0)
+            before, head = knots[-1]
+            reference = at if case["drain_reference"] == "linear" or before else 0.0
+            drained = head + (last - head) * ((reference - before) / (1 - before))
             low, high, share = ends or (heel, toe, at)
             outlet = np.maximum(low + (high - low) * share, max(case["drain_level"], loading.tail))
             drained = drained - case["drain_effectiveness"] * np.maximum(drained - outlet, 0)

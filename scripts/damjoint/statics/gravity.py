@@ -344,9 +344,12 @@ class Uplift:
             drains = [(along(at), outlet, case["drain_effectiveness"], along(at))]
         ends = [0.0, whole - crack], [self.first, self.last]
         knots, places = dict(zip(*ends, strict=True)), [0.0, crack, length]
+        before, head = 0.0, self.first
         for place, outlet, effect, reference in drains:
-            undrained = float(np.interp(reference, *ends))
+            share = (place - before if before else reference) / (whole - crack - before)
+            undrained = head + (self.last - head) * share
             knots[place] = undrained - effect * max(undrained - max(outlet, tail), 0.0)
+            before, head = place, knots[place]
             own = (place - start) * (1 if forwards else -1) + crack
             places += [own] if crack < own < length else []
         places, way = sorted(places), sorted(knots)
