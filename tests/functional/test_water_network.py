@@ -372,8 +372,13 @@ def test_the_report_says_that_water_passes_between_joints(model):
 def test_there_is_no_gravity_method_of_several_heels(model):
     built = model("imposed", [12.0])
     own = built.case.joints[0]
-    with pytest.raises(InputError, match="uplift = imposed: has no gravity method where joints"):
+    words = "uplift = imposed: has no gravity method where joints"
+    with pytest.raises(InputError, match=words):
         gravity.Uplift(own, gravity.RigidBlock(own), 12.0, 0.0, 0.0)
+    own = model("imposed", [9.0]).case.joints[0]
+    assert gravity.Uplift(own, gravity.RigidBlock(own), 10.0, 0.0, 0.0).force > 0
+    with pytest.raises(InputError, match=words):
+        gravity.Uplift(own, gravity.RigidBlock(own), 10.1, 0.0, 0.0)
 
 
 @pytest.mark.parametrize(

@@ -202,6 +202,8 @@ class WaterPath:
     #: normalised path coordinate of heel and toe of the joint
     begin: float = 0.0
     end: float = 1.0
+    #: level [m] above which the water reaches a further heel or toe
+    highest: float = NOWHERE
     #: whether no water enters at a dry end, even if the flow is not computed
     exits: bool = False
     #: whether the path ends at heel and toe of the joint
@@ -219,8 +221,8 @@ class WaterPath:
             return WaterPath(heel_y=heel, toe_y=toe, rest_y=min(heel, toe))
         if not section["path"]:
             return None
-        numbers, flags, rows = section["path"][:5], section["path"][5:], section["path_drains"]
-        heel_y, toe_y, rest_y, begin, end = numbers
+        numbers, flags, rows = section["path"][:6], section["path"][6:], section["path_drains"]
+        heel_y, toe_y, rest_y, begin, end, highest = numbers
         exits, open_heel, open_toe = map(bool, flags)
         width = len(PathDrains._fields)
         drains = (PathDrains(*rows[i : i + width]) for i in range(0, len(rows), width))
@@ -230,6 +232,7 @@ class WaterPath:
             rest_y=rest_y,
             begin=begin,
             end=end,
+            highest=highest,
             exits=exits,
             open_heel=open_heel,
             open_toe=open_toe,
@@ -244,7 +247,7 @@ class WaterPath:
     @property
     def section(self) -> dict[str, list[float]]:
         """The path in the section of a case, from which `of` reads it."""
-        numbers = [self.heel_y, self.toe_y, self.rest_y, self.begin, self.end]
+        numbers = [self.heel_y, self.toe_y, self.rest_y, self.begin, self.end, self.highest]
         flags = [float(flag) for flag in (self.exits, self.open_heel, self.open_toe)]
         drains = [value for row in self.drains for value in row]
         return {"path": numbers + flags, "path_drains": drains}
@@ -287,7 +290,7 @@ def plane_paths(network: Network, joints: Sequence[JointMesh], case: Case) -> di
     than one heel or toe at the levels of the case.
     """
     mesh, y = network.mesh, network.mesh.surface.points[:, 1]
-    ends = [mesh.heel_nodes, mesh.toe_nodes]
+    ends = all_ends = [mesh.heel_nodes, mesh.toe_nodes]
     if network.branched:
         reservoir = max(case.levels) if case["drive"] == "level" else np.inf
         highest = max(reservoir + case["joint_head_offset"], *case.tail_levels)
@@ -295,6 +298,7 @@ def plane_paths(network: Network, joints: Sequence[JointMesh], case: Case) -> di
     if max(map(len, ends)) > 1:
         return {}
     along = path_coordinate(mesh.surface, *ends)
+    dry = np.setdiff1d(np.concatenate(all_ends), np.concatenate(ends))
     rest = y[[*mesh.heel_nodes, *mesh.toe_nodes, *network.closed]].min()
     heel_y, toe_y = (float(y[nodes[0]]) if len(nodes) else NOWHERE for nodes in ends)
     paths, drains = {}, []
@@ -306,6 +310,7 @@ def plane_paths(network: Network, joints: Sequence[JointMesh], case: Case) -> di
             rest_y=float(rest),
             begin=float(along[own[0]]),
             end=float(along[own[1]]),
+            highest=float(y[dry].min(initial=NOWHERE)),
             exits=network.branched,
             open_heel=own[0] in ends[0],
             open_toe=own[1] in ends[1],

@@ -280,7 +280,7 @@ class Uplift:
         pressure.
         """
         self.length, mode, path = body.length, case["uplift"], WaterPath.of(case)
-        if path is None:
+        if path is None or max(level + case["joint_head_offset"], tail) > path.highest:
             raise InputError(
                 f"uplift = {mode}: has no gravity method where joints meet and water reaches more "
                 "than one heel or toe"
