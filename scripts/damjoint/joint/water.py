@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cached_property, lru_cache
-from typing import Any, TypeAlias
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -16,13 +16,10 @@ from ..csr import CsrMatrix
 from ..laws import Law
 from ..model.case import Case, flows, freezes_uplift, has_drains
 from ..model.loads import Loading, heads_at_ends
-from ..model.network import Network, networks_of
+from ..model.network import Network, WaterPath, networks_of
 from .flow import NO_NODES, Flow, FlowDerivative, FlowSolution, JointFields
 from .interface import Interface, JointInterface
 from .joint_laws import JointVariables
-
-#: See `JointWater.drain_lines`.
-DrainLine: TypeAlias = tuple[float, Case, tuple[float, float, float] | None]
 
 
 @dataclass(frozen=True)
@@ -102,17 +99,26 @@ class JointWater:
         if self.system.branched:
             nodal = self.system.heads(loading)[self.nodes]
             return nodal if matrix is None else matrix @ nodal
-        heel, toe, xi = self.places(matrix)
+        case, (heel, toe, xi) = self.case, self.places(matrix)
         levels = loading.level, loading.tail
-        first, last = heads_at_ends(self.case, *levels, heel, toe, self.flowing)
+        first, last = heads_at_ends(case, *levels, heel, toe, self.flowing)
+        drains: Sequence[tuple[float, Array | float, float, float]] = ()
+        path = WaterPath.of(case) if self.system.in_series else None
+        if path:
+            drains = path.drains
+        elif case["uplift"] == "drained":
+            at = case["drain_x"] / self.joint.length
+            outlet = np.maximum(heel + (toe - heel) * at, case["drain_level"])
+            reference = at if case["drain_reference"] == "linear" else 0.0
+            drains = [(at, outlet, case["drain_effectiveness"], reference)]
         knots: list[tuple[float, Array]] = [(0.0, first)]
-        for at, case, ends in self.drain_lines:
+        for at, outlet, effectiveness, reference in drains:
             before, head = knots[-1]
-            reference = at if case["drain_reference"] == "linear" or before else 0.0
-            drained = head + (last - head) * ((reference - before) / (1 - before))
-            low, high, share = ends or (heel, toe, at)
-            outlet = np.maximum(low + (high - low) * share, max(case["drain_level"], loading.tail))
-            drained = drained - case["drain_effectiveness"] * np.maximum(drained - outlet, 0)
+            counted = at if before else reference
+            drained = head + (last - head) * ((counted - before) / (1 - before))
+            drained = drained - effectiveness * np.maximum(
+                drained - np.maximum(outlet, loading.tail), 0
+            )
             knots.append((at, drained))
         values, (start, head) = first, knots[0]
         for end, following in [*knots[1:], (1.0, last)]:
@@ -120,23 +126,6 @@ class JointWater:
             values = np.where(xi < start, values, along) if start else along
             start, head = end, following
         return values
-
-    @cached_property
-    def drain_lines(self) -> list[DrainLine]:
-        """Drains of uplift = drained on the path through the joint: path coordinate, case of their
-        joint, heights of its ends and place between them (0 to 1); None: those of the whole path.
-        """
-        in_series, lines = self.system.in_series, list[DrainLine]()
-        for water in self.system.members if in_series else (self,):
-            if water.case["uplift"] == "drained":
-                at, mesh = water.case["drain_x"] / water.joint.length, water.joint.mesh
-                if not in_series:
-                    return [(at, water.case, None)]
-                ends = [nodes[0] for nodes in (mesh.heel_nodes, mesh.toe_nodes)]
-                low, high = mesh.surface.points[ends, 1]
-                begin, end = self.system.fields.xi[water.nodes[ends]]
-                lines.append((begin + (end - begin) * at, water.case, (low, high, at)))
-        return sorted(lines, key=lambda line: line[0])
 
     def uplift(self, loading: Loading, matrix: CsrMatrix, y: Array, beyond: Array | float) -> Array:
         """Pressure [Pa], not below zero, at places of height y that an interpolation matrix of
