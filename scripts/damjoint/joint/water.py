@@ -311,12 +311,10 @@ class WaterSystem:
         ends, where water leaves at the head of their own elevation, but does not enter.
         """
         assert self.network
-        mesh, reservoir = (
-            self.network.mesh,
-            loading.level + self.members[0].case["joint_head_offset"],
-        )
+        mesh, ends = self.network.mesh, self.fields.ends
+        reservoir = loading.level + self.members[0].case["joint_head_offset"]
         y = mesh.surface.points[:, 1]
-        heads, ends = y.copy(), self.fields.ends
+        heads = y.copy()
         for nodes, level in ((mesh.heel_nodes, reservoir), (mesh.toe_nodes, loading.tail)):
             heads[nodes] = np.maximum(heads[nodes], level)
         dry = ends[heads[ends] <= y[ends]]
