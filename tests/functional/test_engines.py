@@ -392,12 +392,25 @@ def test_runs_of_both_engines_agree_on_water_where_joints_meet(scene, tmp_path):
     assert any(map(changed, result.joints))
 
 
-def test_networks_that_one_engine_can_not_compute_are_refused(tmp_path):
+@pytest.mark.parametrize("uplift", ["imposed", "flow", ("flow", "imposed", "cracked")])
+def test_runs_of_both_engines_agree_while_water_reaches_a_second_heel(uplift, tmp_path):
+    """That of the contraction joint, on the crest."""
     write_blocks(tmp_path / "own.msh", BLOCKS, BLOCK_JOINTS)
+    (tmp_path / "own.case").write_text('geometry = "own.msh";')
+    settings = {"law": "bond", "sigma_max": (1e4, 1e4, 1e6), "adhesion": 1e6, "G_f": 300.0}
+    settings |= {"order": 1.0, "tolerance": 1e-10, "uplift": uplift}
+    settings |= {"aperture_min": (1e-4, 2e-4, 3e-4)}
+    agree(load(str(tmp_path / "own.case"), settings, "5,9,12", "1,1,2"), tmp_path)
+
+
+def test_networks_that_one_engine_can_not_compute_are_refused(tmp_path):
+    """A second toe, on the crest; joints in 3D that do not lie side by side."""
+    joints = BLOCK_JOINTS | {"contraction": (10, 0, 10, 10)}
+    write_blocks(tmp_path / "own.msh", BLOCKS, joints)
     (tmp_path / "own.case").write_text('geometry = "own.msh";')
     words = r"uplift = flow: must be none in one of .* \(left base and right base and contraction\)"
     case = load(str(tmp_path / "own.case"), {"uplift": "flow"}, "12")
-    with pytest.raises(InputError, match=f"{words}.*as water reaches more than one heel or toe"):
+    with pytest.raises(InputError, match=f"{words}.*as water leaves at more than one toe"):
         solve.check(case)
     water = {"dim": 3.0, "uplift": "imposed", "n_joint": 6.0, "h_dam": 12.0, "h_found": 40.0}
     with pytest.raises(InputError, match="as they do not lie side by side"):

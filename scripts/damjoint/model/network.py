@@ -188,6 +188,16 @@ def check_waterstops(joints: Sequence[JointMesh]) -> None:
 NOWHERE = 1e30
 
 
+class PathStage(NamedTuple):
+    """A path while the reservoir is above a level [m] and has reached further heels: normalised
+    path coordinate of heel and toe of the joint.
+    """
+
+    level: float
+    begin: float
+    end: float
+
+
 @dataclass(frozen=True, kw_only=True)
 class WaterPath:
     """The way of the water through a joint in 2D, which may go on in other joints; in branches off
@@ -202,13 +212,15 @@ class WaterPath:
     #: normalised path coordinate of heel and toe of the joint
     begin: float = 0.0
     end: float = 1.0
-    #: level [m] above which the water reaches a further heel or toe
-    highest: float = NOWHERE
+    #: levels of the tailwater [m] up to which it is the path
+    highest_tail: float = NOWHERE
     #: whether no water enters at a dry end, even if the flow is not computed
     exits: bool = False
     #: whether the path ends at heel and toe of the joint
     open_heel: bool = True
     open_toe: bool = True
+    #: higher heels, from below
+    stages: tuple[PathStage, ...] = ()
     #: drains of uplift = drained on a path through several joints
     drains: tuple[PathDrains, ...] = ()
 
@@ -221,23 +233,27 @@ class WaterPath:
             return WaterPath(heel_y=heel, toe_y=toe, rest_y=min(heel, toe))
         if not section["path"]:
             return None
-        numbers, flags, rows = section["path"][:6], section["path"][6:], section["path_drains"]
-        heel_y, toe_y, rest_y, begin, end, highest = numbers
+        heel_y, toe_y, rest_y, begin, end, highest_tail, *flags = section["path"]
         exits, open_heel, open_toe = map(bool, flags)
-        width = len(PathDrains._fields)
-        drains = (PathDrains(*rows[i : i + width]) for i in range(0, len(rows), width))
+        stages, drains = section["path_stages"], section["path_drains"]
         return WaterPath(
             heel_y=heel_y,
             toe_y=toe_y,
             rest_y=rest_y,
             begin=begin,
             end=end,
-            highest=highest,
+            highest_tail=highest_tail,
             exits=exits,
             open_heel=open_heel,
             open_toe=open_toe,
-            drains=tuple(drains),
+            stages=tuple(PathStage(*stages[k : k + 3]) for k in range(0, len(stages), 3)),
+            drains=tuple(PathDrains(*drains[k : k + 4]) for k in range(0, len(drains), 4)),
         )
+
+    def at(self, reservoir: float) -> WaterPath:
+        """The path for a head of the reservoir [m]."""
+        reached = [stage for stage in self.stages if reservoir > stage.level]
+        return replace(self, begin=reached[-1].begin, end=reached[-1].end) if reached else self
 
     @property
     def goes_on(self) -> bool:
@@ -247,10 +263,13 @@ class WaterPath:
     @property
     def section(self) -> dict[str, list[float]]:
         """The path in the section of a case, from which `of` reads it."""
-        numbers = [self.heel_y, self.toe_y, self.rest_y, self.begin, self.end, self.highest]
+        numbers = [self.heel_y, self.toe_y, self.rest_y, self.begin, self.end, self.highest_tail]
         flags = [float(flag) for flag in (self.exits, self.open_heel, self.open_toe)]
-        drains = [value for row in self.drains for value in row]
-        return {"path": numbers + flags, "path_drains": drains}
+        return {
+            "path": numbers + flags,
+            "path_stages": [value for stage in self.stages for value in stage],
+            "path_drains": [value for drains in self.drains for value in drains],
+        }
 
 
 class PathDrains(NamedTuple):
@@ -274,7 +293,7 @@ def with_paths(case: Case, joints: Sequence[JointMesh]) -> Case:
     paths: dict[int, dict[str, list[float]]] = {}
     for network in networks:
         for k in network.numbers:
-            paths[k] = {"path": [], "path_drains": []}
+            paths[k] = {"path": [], "path_stages": [], "path_drains": []}
         if network.mesh.dim == 2:
             paths |= {k: path.section for k, path in plane_paths(network, joints, case).items()}
     if not paths:
@@ -286,44 +305,57 @@ def with_paths(case: Case, joints: Sequence[JointMesh]) -> Case:
 
 
 def plane_paths(network: Network, joints: Sequence[JointMesh], case: Case) -> dict[int, WaterPath]:
-    """The path through each joint of a network in 2D, by its number; empty if water may reach more
-    than one heel or toe at the levels of the case.
+    """The path through each joint of a network in 2D, by its number; empty if water may leave at
+    more than one toe, or at a heel, at the levels of the case.
     """
     mesh, y = network.mesh, network.mesh.surface.points[:, 1]
-    ends = all_ends = [mesh.heel_nodes, mesh.toe_nodes]
+    heels, toes = mesh.heel_nodes[np.argsort(y[mesh.heel_nodes])], mesh.toe_nodes
+    reservoir = max(case.levels) if case["drive"] == "level" else np.inf
+    reservoir += case["joint_head_offset"]
     if network.branched:
-        reservoir = max(case.levels) if case["drive"] == "level" else np.inf
-        highest = max(reservoir + case["joint_head_offset"], *case.tail_levels)
-        ends = [nodes[y[nodes] < highest] for nodes in ends]
-    if max(map(len, ends)) > 1:
+        toes = toes[y[toes] < max(reservoir, *case.tail_levels)]
+    higher = heels[y[heels] > y[heels].min(initial=NOWHERE)]
+    highest_tail = float(y[higher].min(initial=NOWHERE))
+    if len(toes) > 1 or max(case.tail_levels) > highest_tail:
         return {}
-    along = path_coordinate(mesh.surface, *ends)
-    dry = np.setdiff1d(np.concatenate(all_ends), np.concatenate(ends))
+    first = np.setdiff1d(heels, higher)
+    levels = distinct_heights(y[higher])
+    alongs = [path_coordinate(mesh.surface, first, toes)]
+    alongs += [path_coordinate(mesh.surface, heels[y[heels] <= level], toes) for level in levels]
     rest = y[[*mesh.heel_nodes, *mesh.toe_nodes, *network.closed]].min()
-    heel_y, toe_y = (float(y[nodes[0]]) if len(nodes) else NOWHERE for nodes in ends)
+    heel_y, toe_y = (float(y[nodes[0]]) if len(nodes) else NOWHERE for nodes in (first, toes))
     paths, drains = {}, []
     for k, nodes in zip(network.numbers, network.nodes, strict=True):
         own = [nodes[places[0]] for places in (joints[k].heel_nodes, joints[k].toe_nodes)]
+        (begin, end), *further = ((float(along[own[0]]), float(along[own[1]])) for along in alongs)
         paths[k] = WaterPath(
             heel_y=heel_y,
             toe_y=toe_y,
             rest_y=float(rest),
-            begin=float(along[own[0]]),
-            end=float(along[own[1]]),
-            highest=float(y[dry].min(initial=NOWHERE)),
+            begin=begin,
+            end=end,
+            highest_tail=highest_tail,
             exits=network.branched,
-            open_heel=own[0] in ends[0],
-            open_toe=own[1] in ends[1],
+            open_heel=own[0] in first,
+            open_toe=own[1] in toes,
+            stages=tuple(
+                PathStage(level, *ends) for level, ends in zip(levels, further, strict=True)
+            ),
         )
         of_joint = case.joints[k]
         if of_joint["uplift"] == "drained":
             share = of_joint["drain_x"] / of_joint.joint_along
-            at, height = ((1 - share) * v[own[0]] + share * v[own[1]] for v in (along, y))
+            at, height = ((1 - share) * v[own[0]] + share * v[own[1]] for v in (alongs[0], y))
             outlet = max(of_joint["drain_level"], float(height))
             reference = float(at) if of_joint["drain_reference"] == "linear" else 0.0
             effect = of_joint["drain_effectiveness"]
             drains.append(PathDrains(float(at), outlet, effect, reference))
     return {k: replace(path, drains=tuple(sorted(drains))) for k, path in paths.items()}
+
+
+def distinct_heights(y: Array) -> list[float]:
+    """Heights in ascending order, each once."""
+    return sorted(set(y.tolist()))
 
 
 def path_coordinate(surface: Body, heel: IntArray, toe: IntArray) -> Array:

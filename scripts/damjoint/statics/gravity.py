@@ -280,11 +280,12 @@ class Uplift:
         pressure.
         """
         self.length, mode, path = body.length, case["uplift"], WaterPath.of(case)
-        if path is None or max(level + case["joint_head_offset"], tail) > path.highest:
+        if path is None or tail > path.highest_tail:
             raise InputError(
-                f"uplift = {mode}: has no gravity method where joints meet and water reaches more "
-                "than one heel or toe"
+                f"uplift = {mode}: has no gravity method where joints meet and water leaves at "
+                "more than one toe or at a heel"
             )
+        path = path.at(level + case["joint_head_offset"])
         flowing = path.exits or flows(case)
         heights = path.heel_y, path.toe_y, flowing, path.rest_y
         ends = heads_at_ends(case, level, tail, *heights)

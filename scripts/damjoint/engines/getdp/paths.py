@@ -6,8 +6,8 @@ import numpy as np
 
 from ... import InputError
 from ...model.case import Case
-from ...model.mesh import Mesh
-from ...model.network import Network, PathDrains, WaterPath, networks_of, plane_paths
+from ...model.mesh import JointMesh, Mesh
+from ...model.network import Network, PathDrains, PathStage, WaterPath, networks_of, plane_paths
 from ...model.parameters import listing
 
 
@@ -30,6 +30,7 @@ def values_of_paths(mesh: Mesh, case: Case) -> list[str]:
                 "in_network": 1.0,
                 "in_flow": float(network.flowing),
                 "closed_conductivity": scale,
+                "late_heel": float(reached_late(mesh.joints[k], paths[k])),
                 "joint_path": float(network.numbers[0] if solid else k),
             }
             texts[k] = text_of(paths[k]) + lines(values)
@@ -41,8 +42,20 @@ def text_of(path: WaterPath) -> str:
     values = {f"path_{name}": getattr(path, name) for name in ("heel_y", "toe_y", "rest_y")}
     values |= {"path_begin": path.begin, "path_end": path.end, "path_exits": float(path.exits)}
     values |= {"open_heel": float(path.open_heel), "open_toe": float(path.open_toe)}
-    lists = zip(PathDrains._fields, zip(*path.drains, strict=True), strict=False)
-    return lines(values) + "".join(listing(f"path_drain_{n}", v) for n, v in lists)
+    text = lines(values)
+    for name, kind, rows in (
+        ("drain", PathDrains, path.drains),
+        ("stage", PathStage, path.stages),
+    ):
+        columns = zip(kind._fields, zip(*rows, strict=True), strict=False)
+        text += "".join(listing(f"path_{name}_{column}", own) for column, own in columns)
+    return text
+
+
+def reached_late(joint: JointMesh, path: WaterPath) -> bool:
+    """Whether the heel of a joint is one that the reservoir reaches above a level only."""
+    outer = not np.isin(joint.heel.node_tags, joint.inner_ends).any()
+    return bool(path.stages) and outer and not path.open_heel
 
 
 def lines(values: dict[str, float]) -> str:
@@ -76,5 +89,5 @@ def in_plane(network: Network, mesh: Mesh, case: Case) -> dict[int, WaterPath]:
     """The path through each joint of a network in 2D."""
     paths = plane_paths(network, mesh.joints, case)
     if not paths:
-        raise refused(network, mesh, case, "as water reaches more than one heel or toe")
+        raise refused(network, mesh, case, "as water leaves at more than one toe or at a heel")
     return paths
