@@ -188,9 +188,9 @@ def check_waterstops(joints: Sequence[JointMesh]) -> None:
 NOWHERE = 1e30
 
 
-class PathStage(NamedTuple):
-    """A path while the reservoir is above a level [m] and has reached further heels: normalised
-    path coordinate of heel and toe of the joint.
+class HigherHeel(NamedTuple):
+    """A heel above the lowest one: level of the reservoir [m] above which water enters there, and
+    the path coordinate of the joint's own heel and toe from then on.
     """
 
     level: float
@@ -220,7 +220,7 @@ class WaterPath:
     open_heel: bool = True
     open_toe: bool = True
     #: higher heels, from below
-    stages: tuple[PathStage, ...] = ()
+    higher_heels: tuple[HigherHeel, ...] = ()
     #: drains of uplift = drained on a path through several joints
     drains: tuple[PathDrains, ...] = ()
 
@@ -235,7 +235,7 @@ class WaterPath:
             return None
         heel_y, toe_y, rest_y, begin, end, highest_tail, *flags = section["path"]
         exits, open_heel, open_toe = map(bool, flags)
-        stages, drains = section["path_stages"], section["path_drains"]
+        heels, drains = section["path_higher_heels"], section["path_drains"]
         return WaterPath(
             heel_y=heel_y,
             toe_y=toe_y,
@@ -246,13 +246,13 @@ class WaterPath:
             exits=exits,
             open_heel=open_heel,
             open_toe=open_toe,
-            stages=tuple(PathStage(*stages[k : k + 3]) for k in range(0, len(stages), 3)),
+            higher_heels=tuple(HigherHeel(*heels[k : k + 3]) for k in range(0, len(heels), 3)),
             drains=tuple(PathDrains(*drains[k : k + 4]) for k in range(0, len(drains), 4)),
         )
 
     def at(self, reservoir: float) -> WaterPath:
         """The path for a head of the reservoir [m]."""
-        reached = [stage for stage in self.stages if reservoir > stage.level]
+        reached = [heel for heel in self.higher_heels if reservoir > heel.level]
         return replace(self, begin=reached[-1].begin, end=reached[-1].end) if reached else self
 
     @property
@@ -267,7 +267,7 @@ class WaterPath:
         flags = [float(flag) for flag in (self.exits, self.open_heel, self.open_toe)]
         return {
             "path": numbers + flags,
-            "path_stages": [value for stage in self.stages for value in stage],
+            "path_higher_heels": [value for heel in self.higher_heels for value in heel],
             "path_drains": [value for drains in self.drains for value in drains],
         }
 
@@ -293,7 +293,7 @@ def with_paths(case: Case, joints: Sequence[JointMesh]) -> Case:
     paths: dict[int, dict[str, list[float]]] = {}
     for network in networks:
         for k in network.numbers:
-            paths[k] = {"path": [], "path_stages": [], "path_drains": []}
+            paths[k] = {"path": [], "path_higher_heels": [], "path_drains": []}
         if network.mesh.dim == 2:
             paths |= {k: path.section for k, path in plane_paths(network, joints, case).items()}
     if not paths:
@@ -338,8 +338,8 @@ def plane_paths(network: Network, joints: Sequence[JointMesh], case: Case) -> di
             exits=network.branched,
             open_heel=own[0] in first,
             open_toe=own[1] in toes,
-            stages=tuple(
-                PathStage(level, *ends) for level, ends in zip(levels, further, strict=True)
+            higher_heels=tuple(
+                HigherHeel(level, *ends) for level, ends in zip(levels, further, strict=True)
             ),
         )
         of_joint = case.joints[k]

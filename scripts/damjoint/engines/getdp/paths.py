@@ -7,7 +7,7 @@ import numpy as np
 from ... import InputError
 from ...model.case import Case
 from ...model.mesh import JointMesh, Mesh
-from ...model.network import Network, PathDrains, PathStage, WaterPath, networks_of, plane_paths
+from ...model.network import HigherHeel, Network, PathDrains, WaterPath, networks_of, plane_paths
 from ...model.parameters import listing
 
 
@@ -45,7 +45,7 @@ def text_of(path: WaterPath) -> str:
     text = lines(values)
     for name, kind, rows in (
         ("drain", PathDrains, path.drains),
-        ("stage", PathStage, path.stages),
+        ("higher", HigherHeel, path.higher_heels),
     ):
         columns = zip(kind._fields, zip(*rows, strict=True), strict=False)
         text += "".join(listing(f"path_{name}_{column}", own) for column, own in columns)
@@ -55,7 +55,7 @@ def text_of(path: WaterPath) -> str:
 def reached_late(joint: JointMesh, path: WaterPath) -> bool:
     """Whether the heel of a joint is one that the reservoir reaches above a level only."""
     outer = not np.isin(joint.heel.node_tags, joint.inner_ends).any()
-    return bool(path.stages) and outer and not path.open_heel
+    return bool(path.higher_heels) and outer and not path.open_heel
 
 
 def lines(values: dict[str, float]) -> str:
