@@ -274,6 +274,13 @@ HEAVY = {
     "heel driven": ("dam", LIFTS | WEAK | {"drive": "heel", "drive_by": 2e-4}, "40,46", "0"),
     "T": ("monoliths", MONOLITHS, "45", "0"),
     "T, solid": ("monoliths", SOLID_BLOCKS, "45", "0"),
+    "T, solid, flow": (
+        "monoliths",
+        SOLID_BLOCKS
+        | {"uplift": ("flow", "flow", "none"), "aperture_min": (1e-4, 2e-4, 1e-4), "order": 1.0},
+        "45",
+        "0",
+    ),
     "T, solid, laws": (
         "monoliths",
         SOLID_BLOCKS | OF_BASES | {"uplift": "none", "order": 1.0},
@@ -344,6 +351,70 @@ def test_runs_of_both_engines_agree_where_four_bodies_meet(tmp_path):
     case = load(str(tmp_path / "own.case"), settings, "10,18")
     (result,) = agree(case, tmp_path)
     assert len(result.joints) == 6 and sum(map(changed, result.joints)) > 2
+
+
+BLOCKS = {"left": (0, 0, 10, 10), "right": (10, 0, 15, 10)}
+BLOCK_JOINTS = {
+    "left base": (0, 0, 10, 0),
+    "right base": (10, 0, 15, 0),
+    "contraction": (10, 10, 10, 0),
+}
+#: Uplift of these joints, and other settings.
+NETWORKS = {
+    "apertures in series": (("flow", "flow", "none"), {"K_N": (1e12, 2e12, 1e12)}),
+    "three joints": (("flow", "flow", "flow"), {}),
+    "cracked": (("cracked", "cracked", "cracked"), {}),
+    "imposed": (("imposed", "imposed", "imposed"), {}),
+    "mixed": (("flow", "imposed", "cracked"), {}),
+    "up to a waterstop": (("waterstop", "flow", "none"), {"waterstop": 2.0}),
+    "waterstop behind a joint": (("flow", "waterstop", "none"), {"waterstop": 2.3}),
+    "imposed up to a waterstop": (("imposed", "waterstop", "imposed"), {"waterstop": 2.3}),
+    "up to a dry joint": (("imposed", "none", "imposed"), {}),
+    "drained": (("drained", "drained", "none"), {"drain_x": (3.0, 1.0, 1.0)}),
+    "drained, driven": (
+        ("imposed", "drained", "none"),
+        {"drain_x": 1.0, "drive": "crest", "drive_by": 5e-4},
+    ),
+    "driven": (("flow", "cracked", "none"), {"drive": "crest", "drive_by": 5e-4}),
+}
+
+
+@pytest.mark.parametrize("scene", NETWORKS)
+def test_runs_of_both_engines_agree_on_water_where_joints_meet(scene, tmp_path):
+    write_blocks(tmp_path / "own.msh", BLOCKS, BLOCK_JOINTS)
+    (tmp_path / "own.case").write_text('geometry = "own.msh";')
+    uplift, more = NETWORKS[scene]
+    settings = {"law": "bond", "sigma_max": 1e4, "adhesion": (5e3, 5e3, 1e4), "G_f": 30.0}
+    settings |= {"mu": (0.5, 0.4, 0.3), "order": 1.0, "tolerance": 1e-10, "uplift": uplift}
+    settings |= {"aperture_min": (1e-4, 2e-4, 3e-4)} | more
+    case = load(str(tmp_path / "own.case"), settings, "6,9", "1,2")
+    (result,) = agree(case, tmp_path)
+    assert any(map(changed, result.joints))
+
+
+@pytest.mark.parametrize("uplift", ["imposed", "flow", ("flow", "imposed", "cracked")])
+def test_runs_of_both_engines_agree_while_water_reaches_a_second_heel(uplift, tmp_path):
+    """That of the contraction joint, on the crest."""
+    write_blocks(tmp_path / "own.msh", BLOCKS, BLOCK_JOINTS)
+    (tmp_path / "own.case").write_text('geometry = "own.msh";')
+    settings = {"law": "bond", "sigma_max": (1e4, 1e4, 1e6), "adhesion": 1e6, "G_f": 300.0}
+    settings |= {"order": 1.0, "tolerance": 1e-10, "uplift": uplift}
+    settings |= {"aperture_min": (1e-4, 2e-4, 3e-4)}
+    agree(load(str(tmp_path / "own.case"), settings, "5,9,12", "1,1,2"), tmp_path)
+
+
+def test_networks_that_one_engine_can_not_compute_are_refused(tmp_path):
+    """A second toe, on the crest; joints in 3D that do not lie side by side."""
+    joints = BLOCK_JOINTS | {"contraction": (10, 0, 10, 10)}
+    write_blocks(tmp_path / "own.msh", BLOCKS, joints)
+    (tmp_path / "own.case").write_text('geometry = "own.msh";')
+    words = r"uplift = flow: must be none in one of .* \(left base and right base and contraction\)"
+    case = load(str(tmp_path / "own.case"), {"uplift": "flow"}, "12")
+    with pytest.raises(InputError, match=f"{words}.*as water leaves at more than one toe"):
+        solve.check(case)
+    water = {"dim": 3.0, "uplift": "imposed", "n_joint": 6.0, "h_dam": 12.0, "h_found": 40.0}
+    with pytest.raises(InputError, match="as they do not lie side by side"):
+        solve.check(load("monoliths", water))
 
 
 def test_a_face_that_is_not_divided_where_bodies_meet_is_refused(tmp_path):

@@ -78,11 +78,12 @@ def test_solution_of_the_linear_system(interface, flowing, bordered, few, monkey
     matrix = interface.bulk.stiffness + interface.stiffness(tangent, np.arange(number)).toarray()
     if flowing:
         columns = np.sort(rng.permutation(size)[: size // 4])
-        lift = interface.lift((0,))
+        flowing = (interface.joints[0].flow,)
+        lift = interface.lift(flowing)
         pressure = 1e10 * rng.normal(size=(lift.shape[1], size // 4))
         matrix[:, columns] -= lift @ pressure
         flow = FlowDerivative(pressure=pressure, columns=columns)
-        change = replace(change, flow=flow, flowing=(0,))
+        change = replace(change, flow=flow, flowing=flowing)
     right, slope, row = rng.normal(size=(3, size))
     gap = 0.7e-12  # of the size of x
     border = Border(slope, row, 0.3e-12, gap) if bordered else None

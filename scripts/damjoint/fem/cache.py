@@ -69,7 +69,7 @@ def fingerprint(mesh: Mesh) -> str:
 
 
 #: The files of the package that meshes and the stored classes depend on, beside those of fem/.
-MESHES = ("csr.py", "model/body.py", "model/cut.py", "model/mesh.py")
+MESHES = ("csr.py", *(f"model/{n}.py" for n in ("body", "cut", "mesh", "skin", "user_geometry")))
 
 
 @lru_cache(maxsize=1)

@@ -22,7 +22,7 @@ from .flow import FlowDerivative, FlowSolution
 from .interface import Interface
 from .joint_laws import TANGENT, JointLaws, JointVariables, Mode
 from .linear_system import Change
-from .water import BeforeQuake, JointWater, Pressure
+from .water import BeforeQuake, JointWater, Pressure, water_systems
 from .wet_faces import WetFace
 
 
@@ -54,8 +54,9 @@ class Equilibrium:
             JointWater(own, joint, number)
             for number, (own, joint) in enumerate(zip(case.joints, interface.joints, strict=True))
         ]
-        #: numbers of the joints in which water flows
-        self.flowing = tuple(k for k, water in enumerate(self.water) if water.flowing)
+        #: where water flows
+        systems = water_systems(self.water, interface)
+        self.flowing = tuple(system for system in systems if system.members[0].flowing)
         self.unit_weight = case["rho_water"] * case["g"]
         self.laws = JointLaws([own.law for own in case.joints])
         #: whether the state under rising water depends on the steps that lead to it; in a crack
@@ -177,14 +178,15 @@ class Equilibrium:
         loading: Loading,
         before_quake: BeforeQuake | None = None,
     ) -> tuple[Array, list[FlowSolution]]:
-        """Forces of flowing water on the faces of the joints (j,), and the solutions of its flow in
-        each joint where it flows; before_quake: see `residual`.
+        """Forces of flowing water on the faces of the joints (j,), and the solution of each of
+        `flowing`; before_quake: see `residual`.
         """
         total, solutions = np.zeros(len(jump)), []
-        for k in self.flowing:
-            opened = self.water[k].opened(jump, variables.joints[k], before_quake)
-            lift, solution = self.water[k].flowing_lift(*opened, loading)
-            total += lift
+        for system in self.flowing:
+            solution = system.solve(jump, variables, loading, before_quake)
+            beyond = system.expand_to_nodes(solution)
+            for water in system.members:
+                total += water.lift(loading, water.wetted.fields @ beyond[water.nodes])
             solutions.append(solution)
         return total, solutions
 
@@ -225,13 +227,13 @@ class Equilibrium:
             if dry_before:
                 stiffness = stiffness + lost_rate
             change = interface.change(stiffness, self.undamaged)
-            following = {
-                k: self.water[k].derivative(jump, variables.joints[k], solution)
-                for k, solution in zip(self.flowing, solutions, strict=False)
-                if not (before_quake and self.water[k].freezes_uplift)
-            }
-            flow = FlowDerivative.joined(list(following.values()))
-            return replace(change, flow=flow, flowing=tuple(following))
+            following = [
+                (system.flow, derivative)
+                for system, solution in zip(self.flowing, solutions, strict=False)
+                if (derivative := system.derivative(jump, variables, solution, before_quake))
+            ]
+            flow = FlowDerivative.joined([derivative for _, derivative in following])
+            return replace(change, flow=flow, flowing=tuple(flow for flow, _ in following))
 
         def by_level() -> Array:
             slope = -self.rate(self._loads, loading)
@@ -266,8 +268,7 @@ class Equilibrium:
         before_quake: BeforeQuake | None = None,
     ) -> tuple[Pressure, ...]:
         """The water pressure in each joint at a jump; before_quake: see `residual`."""
-        pairs = zip(self.water, variables.joints, strict=True)
-        return tuple(water.pressure(jump, own, loading, before_quake) for water, own in pairs)
+        return tuple(water.pressure(jump, variables, loading, before_quake) for water in self.water)
 
     def crest(self, jump: Array, loading: Loading) -> float:
         """The crest's displacement along x [m]."""

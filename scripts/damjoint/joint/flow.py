@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
-from ..arrays import Array, IntArray, distinct, others
+from ..arrays import Array, BoolArray, IntArray, distinct, others
 from ..classes import dataclass
 from ..csr import CsrMatrix, added
 from ..fem import elements
@@ -21,6 +22,9 @@ DENSE = 300
 
 #: No drains.
 NO_NODES = np.zeros(0, int)
+
+#: Water that enters at an exit, over the most at a node, up to which it counts as rounding.
+ENTERS = 1e-12
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,28 +43,45 @@ class JointFields:
 
     xi: at the nodes, 0 at the heel, 1 at the toe, harmonic in between: in the plane the distance
     along the joint over its length. heel_y, toe_y: height [m] of the point of the heel and of the
-    toe that corresponds to a node: harmonic, too, and constant where they are level.
+    toe that corresponds to a node: harmonic, too, and constant where they are level. A network of
+    joints that branches has none of the three.
     """
 
-    def __init__(self, joint: JointMesh, space: elements.Space, rule: dict[str, int]) -> None:
+    def __init__(
+        self,
+        joint: JointMesh,
+        space: elements.Space,
+        rule: dict[str, int],
+        branched: bool = False,
+    ) -> None:
         surface, heel, toe = joint.surface, joint.heel_nodes, joint.toe_nodes
         linear, number = elements.Space(surface, 1), len(surface.points)
         points = elements.points_of(linear, rule, gradients=True)
         self.joint, self.dim, self.nodes, self.toe = joint, joint.dim, number, toe
-        #: fields at the Gauss points, their slopes there along x, y, z, and fields at the locations
-        #: of the joint's space, from their values at the nodes
+        self.branched = branched
+        #: fields at the Gauss points, their slopes there along those of x, y, z (axes) in which the
+        #: joint extends, and fields at the locations of its space, from their values at the nodes;
+        #: the nodes whose pressure may be unknown
         self.at_points = points.values
-        self.slopes = [g for g in points.gradients[: joint.dim] if np.abs(g.data).max() > 1e-12]
+        self.axes = [
+            axis
+            for axis, g in enumerate(points.gradients[: joint.dim])
+            if np.abs(g.data).max() > 1e-12
+        ]
+        self.slopes = [points.gradients[axis] for axis in self.axes]
         self.at_locations = space.interpolation(1)
-        laplace = added([g.T @ g.scaled(points.weights) for g in self.slopes])
         self.ends = np.concatenate([heel, toe])
-        self.inside = others(number, self.ends)
+        self.inside = np.arange(number) if branched else others(number, self.ends)
+        #: matrix of the Laplace equation on the joint
+        self.laplace = added([g.T @ g.scaled(points.weights) for g in self.slopes])
+        if branched:
+            return
         y = surface.points[:, 1]
-        self.xi = harmonic(laplace, self.ends, np.isin(self.ends, toe).astype(float))
+        self.xi = harmonic(self.laplace, self.ends, np.isin(self.ends, toe).astype(float))
         self.heel_y, self.toe_y = (
             np.full(number, y[nodes[0]])
             if np.ptp(y[nodes]) < 1e-9 * np.abs(surface.points).max()
-            else harmonic(laplace, nodes, y[nodes])
+            else harmonic(self.laplace, nodes, y[nodes])
             for nodes in (heel, toe)
         )
 
@@ -147,9 +168,47 @@ class FlowDerivative:
         return FlowDerivative(pressure=pressure, columns=columns)
 
 
+def junction_heads(
+    heads: Array, known: BoolArray, ends: IntArray, conductances: Array
+) -> tuple[Array, Array]:
+    """Heads (n,) of a network at its branchings and closed ends, for known ones elsewhere, and the
+    differences of heads along its pieces (last less first) of these ends (p, 2) and conductances.
+
+    Node by node is eliminated (star and mesh): sums and products of positive numbers only, so that
+    no conductance is lost beside a large one. The differences are weighted ones of known heads.
+    """
+    differences = heads[ends[:, 1]] - heads[ends[:, 0]]
+    terminals = distinct(ends.ravel())
+    free = np.flatnonzero(~known[terminals])
+    if not len(free):
+        return heads, differences
+    pairs = np.searchsorted(terminals, ends)
+    mesh = np.zeros((len(terminals),) * 2)
+    np.add.at(mesh, (pairs[:, 0], pairs[:, 1]), conductances)
+    mesh += mesh.T
+    np.fill_diagonal(mesh, 0)
+    shares = []
+    for k in free:
+        share = mesh[k] / mesh[k].sum()
+        mesh += np.outer(mesh[k], share)
+        mesh[k] = mesh[:, k] = 0
+        np.fill_diagonal(mesh, 0)
+        shares.append(share)
+    values = heads[terminals]
+    between = values[:, None] - values
+    for k, share in zip(free[::-1], shares[::-1], strict=True):
+        values[k] = share @ values
+        between[k] = share @ between
+        between[:, k] = -between[k]
+        between[k, k] = 0
+    heads = heads.copy()
+    heads[terminals] = values
+    return heads, between[pairs[:, 1], pairs[:, 0]]
+
+
 class Flow:
-    """Water that flows in the joint: pressure beyond the imposed one, unknown at the nodes between
-    heel and toe.
+    """Water that flows in the joint, or in joints that meet: pressure beyond the imposed one,
+    unknown at the nodes between the ends; in a network that branches at all nodes.
 
     q = -rho w^3/(12 visc) grad (p + rho g y) (cubic law), div q = 0; the conductivities may have
     any common factor.
@@ -159,29 +218,28 @@ class Flow:
         self,
         fields: JointFields,
         points: elements.Points,
-        wetted: Wetted,
+        weights: Array,
+        wet_opening: CsrMatrix,
+        wet_fields: CsrMatrix,
         at_points: CsrMatrix,
     ) -> None:
-        """points: Gauss points of the law; at_points: jump there from the unknowns."""
+        """points: Gauss points of the law; weights, wet_opening, wet_fields: see `Wetted`;
+        at_points: jump at the points of the law from the unknowns.
+        """
         self.fields, self.points, self.dim = fields, points, fields.dim
         self.inside, number = fields.inside, fields.nodes
         #: nodal forces of the pressure at the inner nodes
-        inner = wetted.fields.columns(self.inside).scaled(wetted.points.weights)
-        self.lift = wetted.opening.T @ inner
+        inner = wet_fields.columns(self.inside).scaled(weights)
+        self.lift = wet_opening.T @ inner
         self.opening = at_points[:: fields.dim]
         self.inner_slopes = [g.columns(self.inside) for g in fields.slopes]
-        slopes = [g @ fields.xi for g in fields.slopes]
-        size = np.sqrt(sum(t**2 for t in slopes))
-        #: unit vectors towards the toe at the Gauss points
-        self.towards = [t / size for t in slopes]
         if fields.dim == 2:
-            #: the elements and the nodes from heel to toe; position of each inner node there
-            (_, table), *_ = fields.joint.surface.cells
-            self.order = np.argsort(fields.xi[table].mean(axis=1))
-            self.chain = np.argsort(fields.xi)
-            self.position = np.argsort(self.chain)[self.inside]
+            #: 2D: lines of elements and of their nodes, from heel to toe or between branchings
+            self.lines = self._branches() if fields.branched else [self._from_heel_to_toe()]
             self.lengths = np.bincount(points.elements, points.weights)
-        else:
+        #: unit vectors along the lines or towards the toe at the Gauss points
+        self.towards = self._along_lines() if fields.branched else self._towards_toe()
+        if fields.dim == 3:
             # the flow matrix is linear in the conductivities: products of slopes of each point, and
             # their entries in the matrix
             self.products, entries_of = [], []
@@ -197,72 +255,153 @@ class Flow:
                 entries_of.append((number * nodes[:, :, None] + nodes[:, None, :]).ravel())
             self.entries = np.concatenate(entries_of)
 
+    def _towards_toe(self) -> list[Array]:
+        slopes = [g @ self.fields.xi for g in self.fields.slopes]
+        size = np.sqrt(sum(t**2 for t in slopes))
+        return [t / size for t in slopes]
+
+    def _along_lines(self) -> list[Array]:
+        if self.dim == 3:
+            return []
+        points, along = self.fields.joint.surface.points, np.zeros((len(self.lengths), 3))
+        for cells, nodes in self.lines:
+            along[cells] = np.diff(points[nodes], axis=0) / self.lengths[cells, None]
+        return [along[self.points.elements, axis] for axis in self.fields.axes]
+
+    @cached_property
+    def _table(self) -> IntArray:
+        """2D: nodes of the elements."""
+        return np.concatenate([table for _, table in self.fields.joint.surface.cells])
+
+    def _from_heel_to_toe(self) -> tuple[IntArray, IntArray]:
+        xi = self.fields.xi
+        return np.argsort(xi[self._table].mean(axis=1)), np.argsort(xi)
+
+    def _branches(self) -> list[tuple[IntArray, IntArray]]:
+        """The lines of a network between its ends and the nodes where it branches."""
+        table, lines = self._table, []
+        elements_at = [
+            np.flatnonzero((table == node).any(axis=1)) for node in range(table.max() + 1)
+        ]
+        terminal = np.array([len(at) != 2 for at in elements_at])
+        terminal[self.fields.ends] = True
+        free = np.ones(len(table), bool)
+        for start in np.flatnonzero(terminal):
+            for first in elements_at[start]:
+                cells, nodes, cell = [], [start], first
+                while free[cell]:
+                    free[cell] = False
+                    cells.append(cell)
+                    nodes.append(table[cell].sum() - nodes[-1])
+                    if not terminal[nodes[-1]]:
+                        cell = elements_at[nodes[-1]].sum() - cell
+                if cells:
+                    lines.append((np.array(cells), np.array(nodes)))
+        return lines
+
     def solve(
         self,
         conductivity: Array,
         imposed: Array,
         drains: IntArray = NO_NODES,
         drained: Array | float = 0.0,
+        exits: IntArray = NO_NODES,
     ) -> FlowSolution:
         """Solve for conductivities times weights (q,) and the imposed head times the water's weight
         at the nodes [Pa].
 
-        drains: inner nodes whose head times weight is `drained` [Pa].
+        drains: inner nodes whose head times weight is `drained` [Pa]; exits: ends at which water
+        leaves the joint, but does not enter it.
         """
-        solve = self._in_series if self.dim == 2 else self._on_surface
-        return solve(conductivity, imposed, drains, drained)
+        solve = self._in_lines if self.dim == 2 else self._on_surface
+        heads, known = imposed.copy(), np.zeros(len(imposed), bool)
+        heads[drains] = drained
+        known[self.fields.ends] = known[drains] = True
+        while True:  # one that is closed lowers all heads: none of these opens again
+            solution, inflow = solve(conductivity, imposed, heads, known)
+            entering = exits[known[exits] & (inflow[exits] > ENTERS * np.abs(inflow).max())]
+            if not len(entering):
+                return solution
+            known[entering] = False
 
     def resistances(self, conductivity: Array) -> Array:
-        """2D: of the elements from heel to toe, for conductivities times weights (q,)."""
+        """2D: of the elements, for conductivities times weights (q,)."""
         by_element = np.bincount(self.points.elements, conductivity)
-        return (self.lengths**2 / by_element)[self.order]
+        return self.lengths**2 / by_element
 
-    def known(self, drains: IntArray) -> IntArray:
-        """2D: positions in the chain of ends and drains, whose heads are known."""
-        return np.flatnonzero(np.isin(self.chain, [*self.fields.ends, *drains]))
+    def pieces(self, known: BoolArray) -> list[tuple[IntArray, IntArray]]:
+        """2D: elements and nodes of the lines, cut where the heads are known."""
+        pieces = []
+        for cells, nodes in self.lines:
+            cuts = np.flatnonzero(known[nodes])
+            cuts = np.unique([0, *cuts, len(cells)])
+            pieces += [(cells[i:k], nodes[i : k + 1]) for i, k in itertools.pairwise(cuts)]
+        return pieces
 
-    def _in_series(
-        self, conductivity: Array, imposed: Array, drains: IntArray, drained: Array | float
-    ) -> FlowSolution:
-        """2D: the elements are resistances in series, between ends and drains of known heads.
+    def _in_lines(
+        self, conductivity: Array, imposed: Array, heads: Array, known: BoolArray
+    ) -> tuple[FlowSolution, Array]:
+        """2D: the elements are resistances in series, between nodes of known heads and, in a
+        network, branchings. The solution, and what enters at the nodes.
 
         No differences of nearly equal numbers, however large the ratio of the conductivities (a
         factorised matrix loses the closed joint beside the open one).
         """
-        resistance, known, chain = self.resistances(conductivity), self.known(drains), self.chain
-        heads = np.where(np.isin(chain[known], drains), drained, imposed[chain[known]])
-        total, drops, parts = np.empty(len(chain)), np.empty(len(resistance)), []
-        for i, k, first, last in zip(known[:-1], known[1:], heads[:-1], heads[1:], strict=True):
-            of_part = resistance[i:k]
+        resistance, pieces = self.resistances(conductivity), self.pieces(known)
+        ends = np.array([nodes[[0, -1]] for _, nodes in pieces])
+        wholes = np.array([np.cumsum(resistance[cells])[-1] for cells, _ in pieces])
+        heads, differences = junction_heads(heads, known, ends, 1 / wholes)
+        total, drops, parts = heads.copy(), np.zeros(len(resistance)), []
+        for (cells, nodes), whole, difference in zip(pieces, wholes, differences, strict=True):
+            of_part = resistance[cells]
             before = np.concatenate([[0], np.cumsum(of_part)])
             behind = np.concatenate([np.cumsum(of_part[::-1])[::-1], [0]])
-            whole = before[-1]
-            total[i : k + 1] = first * behind / whole + last * before / whole
-            drops[i:k] = (last - first) * of_part / whole
-            parts.append((i, k, before, behind, whole))
-        steepness = np.empty_like(drops)
-        steepness[self.order] = drops
-        steepness = (steepness / self.lengths)[self.points.elements]
+            first, last = heads[nodes[[0, -1]]]
+            total[nodes] = first * behind / whole + last * before / whole
+            drops[cells] = difference * of_part / whole
+            parts.append((nodes, before, behind, whole))
+        steepness = (drops / self.lengths)[self.points.elements]
 
         def inverse(coupling: Array) -> Array:
             """By the Green's function of each part; only Newton's tangent needs it."""
-            green = np.zeros((len(chain),) * 2)
-            for i, k, before, behind, whole in parts:
+            green = np.zeros((len(total),) * 2)
+            for nodes, before, behind, whole in parts:
                 products = np.minimum.outer(before, before) * np.minimum.outer(behind, behind)
-                green[i : k + 1, i : k + 1] += products / whole
-            return green[np.ix_(self.position, self.position)] @ coupling
+                green[np.ix_(nodes, nodes)] += products / whole
+            green += self._green_of_junctions(parts, known)
+            return green[np.ix_(self.inside, self.inside)] @ coupling
 
-        gradients = [steepness * t for t in self.towards]
-        return FlowSolution(
-            pressure=total[self.position] - imposed[self.inside],
-            systems=[FlowSystem(gradients=gradients, inverse=inverse)],
+        inflow = np.zeros(len(total))
+        np.add.at(inflow, ends, np.outer(differences / wholes, [-1, 1]))
+        solution = FlowSolution(
+            pressure=total[self.inside] - imposed[self.inside],
+            systems=[FlowSystem(gradients=[steepness * t for t in self.towards], inverse=inverse)],
         )
+        return solution, inflow
+
+    def _green_of_junctions(
+        self, parts: list[tuple[IntArray, Array, Array, float]], known: BoolArray
+    ) -> Array:
+        """The part of the Green's function by the heads at branchings and closed ends (n, n)."""
+        number = len(known)
+        free = np.zeros(number, bool)
+        free[[node for nodes, *_ in parts for node in nodes[[0, -1]]]] = True
+        free &= ~known
+        if not free.any():
+            return np.zeros((number, number))
+        shapes, laplace = np.zeros((number, number)), np.zeros((number, number))
+        for nodes, before, behind, whole in parts:
+            pair = nodes[[0, -1]]
+            laplace[np.ix_(pair, pair)] += np.array([[1, -1], [-1, 1]]) / whole
+            shapes[nodes, pair[0]], shapes[nodes, pair[1]] = behind / whole, before / whole
+        shapes = shapes[:, free]
+        return np.asarray(shapes @ np.linalg.solve(laplace[np.ix_(free, free)], shapes.T))
 
     def _on_surface(
-        self, conductivity: Array, imposed: Array, drains: IntArray, drained: Array | float
-    ) -> FlowSolution:
+        self, conductivity: Array, imposed: Array, heads: Array, known: BoolArray
+    ) -> tuple[FlowSolution, Array]:
         """3D: one symmetric positive definite system; nan if the ratio of the conductivities is too
-        large for it.
+        large for it. The solution, and what enters at the nodes.
         """
         number = self.fields.nodes
         values = np.concatenate(
@@ -272,16 +411,16 @@ class Flow:
             ]
         )
         matrix = np.bincount(self.entries, values, number**2).reshape(number, number)
-        free = np.flatnonzero(~np.isin(self.inside, drains))
+        free = np.flatnonzero(~known[self.inside])
         nodes = self.inside[free]
-        total = imposed.copy()
-        total[drains] = drained
+        total = np.where(known, heads, imposed)
         linalg = scipy_linalg()
         try:
             factor = linalg.cho_factor(matrix[np.ix_(nodes, nodes)])
             total[nodes] -= linalg.cho_solve(factor, matrix[nodes] @ total)
         except (np.linalg.LinAlgError, ValueError):
-            return FlowSolution(pressure=np.full(len(self.inside), np.nan), systems=[])
+            nothing = np.full(len(self.inside), np.nan)
+            return FlowSolution(pressure=nothing, systems=[]), np.zeros(number)
 
         def inverse(coupling: Array) -> Array:
             solution = np.zeros_like(coupling)
@@ -289,10 +428,11 @@ class Flow:
             return solution
 
         gradients = [g @ total for g in self.fields.slopes]
-        return FlowSolution(
+        solution = FlowSolution(
             pressure=(total - imposed)[self.inside],
             systems=[FlowSystem(gradients=gradients, inverse=inverse)],
         )
+        return solution, np.asarray(matrix @ total, float)
 
     def derivative(self, solution: FlowSolution, rate: Array) -> FlowDerivative:
         """Derivative of a pressure that is a number.
@@ -327,17 +467,28 @@ class Flow:
         points = self.points
         if self.dim == 2:  # constant between ends and drains: the drop over resistances in series
             resistance = self.resistances(points.weights * conductivity)
-            known = self.known(drains)
-            drop = -np.diff(total[self.chain[known]])
-            of_parts = drop / np.add.reduceat(resistance, known[:-1])
+            (cells, nodes), ends = self.lines[0], [*self.fields.ends, *drains]
+            known = np.flatnonzero(np.isin(nodes, ends))
+            drop = -np.diff(total[nodes[known]])
+            of_parts = drop / np.add.reduceat(resistance[cells], known[:-1])
             flux = np.empty(len(resistance))
-            flux[self.order] = np.repeat(of_parts, np.diff(known))
+            flux[cells] = np.repeat(of_parts, np.diff(known))
             return flux, float(of_parts[-1])
-        slopes = self.fields.slopes
+        return self.flux_by([g @ total for g in self.fields.slopes], conductivity, width)
+
+    def flux_by(
+        self, gradients: list[Array], conductivity: Array, width: float
+    ) -> tuple[Array, float]:
+        """The same from the gradient of the total head times the water's weight at the Gauss points
+        along each of JointFields.slopes.
+        """
+        points, slopes = self.points, self.fields.slopes
+        along = sum(d * t for d, t in zip(gradients, self.towards, strict=True))
+        whole = np.bincount(points.elements, -points.weights * conductivity * along)
+        means = np.asarray(whole / np.bincount(points.elements, points.weights), float)
+        if self.dim == 2:
+            return means, float(means[self.lines[0][0][-1]])
         at_toe: Array = np.isin(np.arange(self.fields.nodes), self.fields.toe).astype(float)
         # tested with the function that is 1 at the toe: consistent with the weak form
-        out = sum((g @ total) * (g @ at_toe) for g in slopes)
-        leakage = -float(points.weights @ (conductivity * out)) / width
-        along = sum((g @ total) * t for g, t in zip(slopes, self.towards, strict=True))
-        means = np.bincount(points.elements, -points.weights * conductivity * along)
-        return means / np.bincount(points.elements, points.weights), leakage
+        out = sum(d * (g @ at_toe) for d, g in zip(gradients, slopes, strict=True))
+        return means, -float(points.weights @ (conductivity * out)) / width

@@ -17,6 +17,7 @@ from ..fem.condensed import Condensed, CondensedJoint
 from ..model.case import Case, OfJoint
 from ..model.chord import Chord
 from ..model.mesh import heel_normal
+from ..model.network import Network
 from ..model.scene import UP
 from .assembly import MOST_TERMS, Assembly, number_of_terms
 from .flow import Flow, JointFields, Wetted
@@ -164,7 +165,9 @@ class JointInterface:
     @cached_property
     def flow(self) -> Flow:
         """Operators of water that flows in the joint."""
-        return Flow(self.fields, self.points, self.wetted, self.at_points)
+        wet = self.wetted
+        fields, weights = wet.fields, wet.points.weights
+        return Flow(self.fields, self.points, weights, wet.opening, fields, self.at_points)
 
     @cached_property
     def fields(self) -> JointFields:
@@ -213,7 +216,8 @@ class Interface:
         #: height of the reservoir floor [m]
         self.floor = min(upstream, default=0.0)
         self._undamaged: UndamagedSystem | None = None
-        self._lift: tuple[tuple[int, ...], CsrMatrix] | None = None
+        self._lift: tuple[tuple[Flow, ...], CsrMatrix] | None = None
+        self._flows: dict[tuple[object, ...], Flow] = {}
 
     def jumps(self, matrix: CsrMatrix, unknowns: Array) -> Array:
         """delta_n, delta_t1, delta_t2 (q, 3) by at_points or at_nodes."""
@@ -224,11 +228,34 @@ class Interface:
         weighted = self.weights[:, None] * traction[:, : self.dim]
         return self.from_points @ weighted.ravel()
 
-    def lift(self, flowing: tuple[int, ...]) -> CsrMatrix:
-        """Nodal forces of the pressures of the joints of these numbers; the last ones are kept."""
+    def lift(self, flowing: tuple[Flow, ...]) -> CsrMatrix:
+        """Nodal forces of the pressures of flowing water; the last ones are kept."""
         if self._lift is None or flowing != self._lift[0]:
-            self._lift = flowing, stacked([self.joints[k].flow.lift.T for k in flowing]).T
+            self._lift = flowing, stacked([flow.lift.T for flow in flowing]).T
         return self._lift[1]
+
+    def flow_of(self, network: Network, waterstops: tuple[float | None, ...]) -> Flow:
+        """Operators of water that flows in joints that meet; kept. waterstops: distance from the
+        heel of each joint beyond which there is none.
+        """
+        key = network.numbers, network.branched, waterstops
+        if key not in self._flows:
+            linear, size = elements.Space(network.mesh.surface, 1), len(network.mesh.surface.points)
+            joints = [self.joints[k] for k in network.numbers]
+            parts = [
+                joint.wetted_within(at) if at else joint.wetted
+                for joint, at in zip(joints, waterstops, strict=True)
+            ]
+            fields = zip(parts, network.nodes, strict=True)
+            self._flows[key] = Flow(
+                JointFields(network.mesh, linear, joints[0].rule, network.branched),
+                elements.points_of(linear, joints[0].rule),
+                np.concatenate([part.points.weights for part in parts]),
+                stacked([part.opening for part in parts]),
+                stacked([part.fields.renumbered(nodes, size) for part, nodes in fields]),
+                stacked([joint.at_points for joint in joints]),
+            )
+        return self._flows[key]
 
     @property
     def of_joints(self) -> list[OfJoint]:

@@ -22,18 +22,18 @@ from ..arrays import Array, IntArray, distinct, mirror
 from ..classes import dataclass
 from ..csr import CsrMatrix
 from ..threads import limited_threads, scipy_linalg
-from .flow import FlowDerivative
+from .flow import Flow, FlowDerivative
 
 
 @dataclass(frozen=True, kw_only=True)
 class Change:
-    """L (rows, j), without its zero rows, and P if water flows, in joints of these numbers."""
+    """L (rows, j), without its zero rows, and P if water flows, and where."""
 
     #: a CsrMatrix; dense in the steps of a small model, see dynamics/small_joints.py
     law: Any
     rows: IntArray
     flow: FlowDerivative | None = None
-    flowing: tuple[int, ...] = ()
+    flowing: tuple[Flow, ...] = ()
 
 
 @dataclass(frozen=True)

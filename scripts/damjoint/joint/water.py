@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from .. import ROUND_OFF
-from ..arrays import Array
+from ..arrays import Array, IntArray
 from ..classes import dataclass
 from ..csr import CsrMatrix
 from ..laws import Law
 from ..model.case import Case, flows, freezes_uplift, has_drains
 from ..model.loads import Loading, heads_at_ends
-from .flow import FlowDerivative, FlowSolution
-from .interface import JointInterface
+from ..model.network import Network, WaterPath, networks_of
+from .flow import NO_NODES, Flow, FlowDerivative, FlowSolution, JointFields
+from .interface import Interface, JointInterface
 from .joint_laws import JointVariables
 
 
@@ -50,13 +53,21 @@ class JointWater:
     def __init__(self, case: Case, joint: JointInterface, number: int) -> None:
         """case: of the joint, see `Case.joints`; number: of the joint, from 0."""
         self.case, self.joint, self.number = case, joint, number
+        #: the joints that exchange water with this one, itself included, and the numbers of its
+        #: nodes among theirs
+        self.system = WaterSystem((self,))
+        self.nodes: IntArray = np.arange(len(joint.surface.points))
+        #: transmissivity of the closed joint over that of the first of these joints
+        self.scale = 1.0
         #: whether the water follows from the joint before a pseudo-static earthquake, and whether
         #: it is absent in the crack that the earthquake opens
         self.freezes_uplift = freezes_uplift(case)
         self.dry_crack = self.freezes_uplift and case["quake_uplift"] == "zero"
         #: distance from the heel beyond which there is no water [m]
         self.waterstop = case["waterstop"] if case["uplift"] == "waterstop" else None
-        self.wet, self.flowing = case["uplift"] != "none" and self.waterstop != 0, flows(case)
+        self.wet = case["uplift"] != "none" and self.waterstop != 0
+        #: whether the flow is computed, here or in a joint that exchanges water with this one
+        self.flowing = flows(case)
         #: nodes and points of the drains of flowing water
         drained = self.flowing and has_drains(case)
         self.drains = joint.drains(case["drain_x"]) if drained else None
@@ -68,34 +79,53 @@ class JointWater:
         self.places = lru_cache(maxsize=4)(self._places)
 
     def _places(self, matrix: CsrMatrix | None) -> tuple[Array, Array, Array]:
-        along = self.joint.fields
-        if matrix is None:
-            return along.heel_y, along.toe_y, along.xi
-        return matrix @ along.heel_y, matrix @ along.toe_y, matrix @ along.xi
+        along = self.system.fields
+        values = [field[self.nodes] for field in (along.heel_y, along.toe_y, along.xi)]
+        heel, toe, xi = values if matrix is None else [matrix @ field for field in values]
+        return heel, toe, xi
 
     def head(self, loading: Loading, matrix: CsrMatrix | None = None) -> Array:
         """Head [m] in a joint of uniform transmissivity, at the joint's nodes or at the places that
         an interpolation matrix of `JointFields` leads to: linear along the joint between the heads
-        of `heads_at_ends`. With a waterstop: that of the reservoir.
+        of `heads_at_ends`, along the whole path where joints meet. With a waterstop: that of the
+        reservoir, or of the joint from which the water comes.
 
         Drains reduce the head above their outlet, the tailwater or their own height, by their
         effectiveness (EM 1110-2-2200); USBR counts the reduction from the reservoir's head.
         """
+        if self.waterstop is not None and not self.system.network:
+            number = len(self.nodes) if matrix is None else matrix.shape[0]
+            return np.full(number, loading.level + self.case["joint_head_offset"])
+        if self.system.branched:
+            nodal = self.system.heads(loading)[self.nodes]
+            return nodal if matrix is None else matrix @ nodal
         case, (heel, toe, xi) = self.case, self.places(matrix)
-        if self.waterstop is not None:
-            return np.full(len(xi), loading.level + case["joint_head_offset"])
-        first, last = heads_at_ends(case, loading.level, loading.tail, heel, toe)
-        if case["uplift"] != "drained":
-            return first + (last - first) * xi
-        at = case["drain_x"] / self.joint.length
-        drained = first + (last - first) * (at if case["drain_reference"] == "linear" else 0)
-        outlet = np.maximum(heel + (toe - heel) * at, max(case["drain_level"], loading.tail))
-        drained = drained - case["drain_effectiveness"] * np.maximum(drained - outlet, 0)
-        return np.where(
-            xi < at,
-            first + (drained - first) * xi / at,
-            drained + (last - drained) * (xi - at) / (1 - at),
-        )
+        levels = loading.level, loading.tail
+        first, last = heads_at_ends(case, *levels, heel, toe, self.flowing)
+        drains: Sequence[tuple[float, Array | float, float, float]] = ()
+        path = WaterPath.of(case) if self.system.in_series else None
+        if path:
+            drains = path.drains
+        elif case["uplift"] == "drained":
+            at = case["drain_x"] / self.joint.length
+            outlet = np.maximum(heel + (toe - heel) * at, case["drain_level"])
+            reference = at if case["drain_reference"] == "linear" else 0.0
+            drains = [(at, outlet, case["drain_effectiveness"], reference)]
+        knots: list[tuple[float, Array]] = [(0.0, first)]
+        for at, outlet, effectiveness, reference in drains:
+            before, head = knots[-1]
+            counted = at if before else reference
+            drained = head + (last - head) * ((counted - before) / (1 - before))
+            drained = drained - effectiveness * np.maximum(
+                drained - np.maximum(outlet, loading.tail), 0
+            )
+            knots.append((at, drained))
+        values, (start, head) = first, knots[0]
+        for end, following in [*knots[1:], (1.0, last)]:
+            along = head + (following - head) * (xi - start) / (end - start)
+            values = np.where(xi < start, values, along) if start else along
+            start, head = end, following
+        return values
 
     def uplift(self, loading: Loading, matrix: CsrMatrix, y: Array, beyond: Array | float) -> Array:
         """Pressure [Pa], not below zero, at places of height y that an interpolation matrix of
@@ -117,76 +147,55 @@ class JointWater:
         forces: Array = self.wetted.opening.T @ (self.wetted.points.weights * pressure)
         return forces
 
-    def expand_to_nodes(self, inner: Array) -> Array:
-        """A pressure at all nodes of the joint from that at the inner ones; zero at the ends."""
-        pressure = np.zeros(self.joint.fields.nodes)
-        pressure[self.joint.fields.inside] = inner
-        return pressure
+    @property
+    def narrowest(self) -> float:
+        """The aperture of the closed joint [m]."""
+        flow = self.case["uplift"] == "flow"
+        return self.case["aperture_min"] if flow else self.case.shared["crack_aperture"][0]
 
-    def aperture(self, jump: Array, variables: Any) -> tuple[Array, Array, float]:
-        """Conductivity at the law's points over that of the closed joint, its derivative with the
-        opening, and the aperture of the closed joint [m].
+    def aperture(self, jump: Array, variables: Any) -> tuple[Array, Array]:
+        """Conductivity at the law's points over that of the closed joint, and its derivative with
+        the opening.
 
         flow: cubic law. cracked: the same, but of the opening beyond that of a crack, and bounded
-        where an open point has practically the full head.
+        where an open point has practically the full head. Others: closed, whatever the opening.
         """
+        if not flows(self.case):
+            return np.ones(len(self.joint.points.weights)), np.zeros(len(self.joint.points.weights))
         opening = self.joint.flow.opening @ jump
-        if self.case["uplift"] == "flow":
-            narrowest, most = self.case["aperture_min"], np.inf
-        else:
-            shared = self.case.shared
-            narrowest, most = (shared[f"crack_{n}"][0] for n in ("aperture", "most"))
+        narrowest, most = self.narrowest, np.inf
+        if self.case["uplift"] != "flow":
+            most = self.case.shared["crack_most"][0]
             opening = opening - self.law.opening_of_crack(variables, len(opening))
         wider = np.maximum(opening, 0) / narrowest
         factor = 1 + np.minimum(wider, most)
         growing = (wider > 0) & (wider < most)
-        return factor**3, np.where(growing, 3 / narrowest * factor**2, 0), narrowest
+        return factor**3, np.where(growing, 3 / narrowest * factor**2, 0)
 
-    def solve_flow(self, jump: Array, variables: Any, loading: Loading) -> FlowSolution:
-        """Pressure beyond the imposed one at the inner nodes.
-
-        Drains reduce the head above their outlet, the tailwater or their own height, by their
-        effectiveness e: the pressure is e times that with the outlet's head at the drains, plus
-        1 - e times that without drains. A crack that reaches the drains ends their effect
-        (EM 1110-2-2200).
+    def outlets(self, loading: Loading) -> tuple[IntArray, Array]:
+        """Nodes of the drains of flowing water, by their numbers in `system`, and heads of their
+        outlets [m]: the tailwater or their own height.
         """
-        case, flow = self.case, self.joint.flow
-        factor = self.aperture(jump, variables)[0]
-        conductivity = factor * self.joint.points.weights
-        head = self.head(loading)
-        free = flow.solve(conductivity, self.unit_weight * head)
-        if self.drains is None:
-            return free
-        nodes, points = self.drains
+        assert self.drains
+        nodes, _ = self.drains
         own = self.joint.surface.points[nodes, 1]
-        outlet = np.maximum(own, max(case["drain_level"], loading.tail))
-        at_drains = head[nodes] + self.expand_to_nodes(free.pressure)[nodes] / self.unit_weight
-        cracked = case["uplift"] == "cracked" and (factor[points] > 1).any()
-        effect = case["drain_effectiveness"]
-        if cracked or not (at_drains > outlet).all() or effect == 0:
-            return free
-        drained = flow.solve(
-            conductivity, self.unit_weight * head, nodes, self.unit_weight * outlet
-        )
-        return free.mixed(effect, drained)
+        outlet = np.maximum(own, max(self.case["drain_level"], loading.tail))
+        return self.nodes[nodes], outlet
 
-    def flowing_lift(
-        self, jump: Array, variables: Any, loading: Loading
-    ) -> tuple[Array, FlowSolution]:
-        """Forces of flowing water on the faces of the joint (j,), and its flow's solution."""
-        solution = self.solve_flow(jump, variables, loading)
-        beyond = self.wetted.fields @ self.expand_to_nodes(solution.pressure)
-        return self.lift(loading, beyond), solution
+    def cracked_to_drains(self, factor: Array) -> bool:
+        """Whether a crack has reached the drains, by the `aperture` (q,)."""
+        assert self.drains
+        return self.case["uplift"] == "cracked" and bool((factor[self.drains[1]] > 1).any())
 
     def opened(
-        self, jump: Array, variables: Any, before_quake: BeforeQuake | None
+        self, jump: Array, variables: JointVariables, before_quake: BeforeQuake | None
     ) -> tuple[Array, Any]:
-        """Jump and internal variables that the water follows: the present ones, or those before an
-        earthquake.
+        """Jump and internal variables of the joint that the water follows: the present ones, or
+        those before an earthquake.
         """
         if before_quake and self.freezes_uplift:
             return before_quake.jump, before_quake.variables.joints[self.number]
-        return jump, variables
+        return jump, variables.joints[self.number]
 
     def lost_pressure(
         self, opening: Array, variables: Any, loading: Loading, before_quake: BeforeQuake
@@ -202,11 +211,11 @@ class JointWater:
         if not self.dry_crack:
             return traction, rate
         fields, joint = self.joint.fields, self.joint
-        jump, before_variables = self.opened(before_quake.jump, None, before_quake)
+        jump, before_variables = before_quake.jump, before_quake.variables.joints[self.number]
         beyond: Array | float = 0.0
         if self.flowing:
-            solution = self.solve_flow(jump, before_variables, loading)
-            beyond = fields.at_points @ self.expand_to_nodes(solution.pressure)
+            solution = self.system.solve(jump, before_quake.variables, loading, before_quake)
+            beyond = fields.at_points @ self.system.expand_to_nodes(solution)[self.nodes]
         y = joint.points.positions[:, 1]
         full = self.uplift(loading, fields.at_points, y, beyond)
         before = joint.jumps(joint.at_points, jump)[:, 0]
@@ -216,21 +225,21 @@ class JointWater:
         rate[:, 0, 0] = np.where((wider > 0) & (K_N * wider < full), K_N, 0)
         return traction, rate
 
-    def derivative(self, jump: Array, variables: Any, solution: FlowSolution) -> FlowDerivative:
-        """Derivative of the pressure of flowing water with the unknowns."""
-        growing = self.aperture(jump, variables)[1] * self.joint.points.weights
-        return self.joint.flow.derivative(solution, growing)
-
     def pressure(
-        self, jump: Array, variables: Any, loading: Loading, before_quake: BeforeQuake | None = None
+        self,
+        jump: Array,
+        variables: JointVariables,
+        loading: Loading,
+        before_quake: BeforeQuake | None = None,
     ) -> Pressure:
-        """The water pressure in the joint at a jump; before_quake: see `Equilibrium.residual`."""
+        """The water pressure in the joint at a jump, for the internal variables of all joints;
+        before_quake: see `Equilibrium.residual`.
+        """
         joint, fields = self.joint, self.joint.fields
-        opened = self.opened(jump, variables, before_quake)
-        inner: Array | float = 0.0
+        beyond = np.zeros(fields.nodes)
         if self.flowing:
-            inner = self.solve_flow(*opened, loading).pressure
-        beyond = self.expand_to_nodes(np.asarray(inner))
+            solution = self.system.solve(jump, variables, loading, before_quake)
+            beyond = self.system.expand_to_nodes(solution)[self.nodes]
 
         def at(matrix: CsrMatrix, positions: Array) -> Array:
             if not self.wet:
@@ -239,17 +248,22 @@ class JointWater:
 
         flux, leakage = None, 0.0
         if self.case["uplift"] == "flow":
-            factor, _, narrowest = self.aperture(*opened)
-            conductivity = self.case["rho_water"] * narrowest**3 * factor / (12 * self.case["visc"])
-            total = self.unit_weight * self.head(loading) + beyond
-            drains = () if self.drains is None else (self.drains[0],)
-            flux, leakage = joint.flow.flux(conductivity, total, joint.width, *drains)
+            factor, _ = self.aperture(*self.opened(jump, variables, before_quake))
+            closed = self.case["rho_water"] * self.narrowest**3
+            conductivity = closed * factor / (12 * self.case["visc"])
+            if self.system.network:
+                gradients = self.system.gradients(solution, self)
+                flux, leakage = joint.flow.flux_by(gradients, conductivity, joint.width)
+            else:
+                total = self.unit_weight * self.head(loading) + beyond
+                drains = () if self.drains is None else (self.drains[0],)
+                flux, leakage = joint.flow.flux(conductivity, total, joint.width, *drains)
         points = at(fields.at_points, joint.points.positions)
         water_points = at(self.wetted.fields, self.wetted.points.positions)
         nodes = at(fields.at_locations, joint.space.locations)
         if before_quake and self.dry_crack:
-            opening = joint.jumps(joint.at_points, jump)[:, 0]
-            lost_at_points = self.lost_pressure(opening, variables, loading, before_quake)[0][:, 0]
+            opening, own = joint.jumps(joint.at_points, jump)[:, 0], variables.joints[self.number]
+            lost_at_points = self.lost_pressure(opening, own, loading, before_quake)[0][:, 0]
             weights = joint.points.weights  # at the nodes so that the resultant is the same
             spread = fields.at_points.T @ (weights * lost_at_points)
             lost_at_nodes = spread / (fields.at_points.T @ weights)
@@ -259,3 +273,174 @@ class JointWater:
         return Pressure(
             points=points, water_points=water_points, nodes=nodes, flux=flux, leakage=leakage
         )
+
+
+class WaterSystem:
+    """The water of a joint, or of joints that meet and exchange it."""
+
+    def __init__(
+        self,
+        members: tuple[JointWater, ...],
+        network: Network | None = None,
+        interface: Interface | None = None,
+    ) -> None:
+        """network: that of the joints if they meet, in the interface."""
+        self.members, self.network, self.interface = members, network, interface
+        self.branched = network is not None and network.branched
+        #: whether the path through a joint goes on in another one
+        self.in_series = network is not None and network.in_series
+        self.unit_weight = members[0].case["rho_water"] * members[0].case["g"]
+        #: of the last loadings, see `_heads`
+        self.heads = lru_cache(maxsize=4)(self._heads)
+
+    @property
+    def flow(self) -> Flow:
+        """Operators of the flow."""
+        if self.network and self.interface:
+            waterstops = tuple(water.waterstop for water in self.members)
+            return self.interface.flow_of(self.network, waterstops)
+        return self.members[0].joint.flow
+
+    @property
+    def fields(self) -> JointFields:
+        """Scalar fields on the joints."""
+        return self.flow.fields if self.network else self.members[0].joint.fields
+
+    def _ends(self, loading: Loading) -> tuple[Array, IntArray]:
+        """Of a network that branches: heads [m] at its ends, in an array of all nodes, and the dry
+        ends, where water leaves at the head of their own elevation, but does not enter.
+        """
+        assert self.network
+        mesh, ends = self.network.mesh, self.fields.ends
+        reservoir = loading.level + self.members[0].case["joint_head_offset"]
+        y = mesh.surface.points[:, 1]
+        heads = y.copy()
+        for nodes, level in ((mesh.heel_nodes, reservoir), (mesh.toe_nodes, loading.tail)):
+            heads[nodes] = np.maximum(heads[nodes], level)
+        dry = ends[heads[ends] <= y[ends]]
+        if len(dry) < len(ends):
+            return heads, dry
+        lowest = y[[*ends, *self.network.closed]].min()
+        return np.full(len(y), min(lowest, max(reservoir, loading.tail))), NO_NODES
+
+    def _heads(self, loading: Loading) -> Array:
+        """Heads [m] at the nodes in joints of uniform transmissivity."""
+        heads = np.empty(self.fields.nodes)
+        if not self.branched:
+            for water in self.members:
+                heads[water.nodes] = water.head(loading)
+            return heads
+        at_ends, exits = self._ends(loading)
+        if not len(self.fields.ends):
+            return at_ends
+        return at_ends + self.flow.solve(self.flow.points.weights, at_ends, exits=exits).pressure
+
+    def expand_to_nodes(self, solution: FlowSolution) -> Array:
+        """The pressure of flowing water beyond the imposed one at all nodes."""
+        pressure = np.zeros(self.fields.nodes)
+        pressure[self.fields.inside] = solution.pressure
+        return pressure
+
+    def solve(
+        self,
+        jump: Array,
+        variables: JointVariables,
+        loading: Loading,
+        before_quake: BeforeQuake | None = None,
+    ) -> FlowSolution:
+        """Pressure of flowing water beyond the imposed one at the inner nodes, for the internal
+        variables of all joints; before_quake: see `Equilibrium.residual`.
+
+        Drains reduce the head above their outlet, the tailwater or their own height, by their
+        effectiveness e: the pressure is e times that with the outlet's head at the drains, plus
+        1 - e times that without drains. A crack that reaches the drains ends their effect
+        (EM 1110-2-2200).
+        """
+        opened = [water.opened(jump, variables, before_quake) for water in self.members]
+        factors = [water.aperture(*own)[0] for water, own in zip(self.members, opened, strict=True)]
+        conductivity = np.concatenate(
+            [
+                water.scale * factor * water.joint.points.weights
+                for water, factor in zip(self.members, factors, strict=True)
+            ]
+        )
+        head, weight, exits = self.heads(loading), self.unit_weight, NO_NODES
+        imposed = at_ends = weight * head
+        if self.branched:
+            ends, exits = self._ends(loading)
+            at_ends = weight * ends
+
+        def solved(nodes: IntArray, outlet: Array) -> FlowSolution:
+            solution = self.flow.solve(conductivity, at_ends, nodes, weight * outlet, exits)
+            if self.branched:
+                beyond = solution.pressure + (at_ends - imposed)[self.fields.inside]
+                return replace(solution, pressure=beyond)
+            return solution
+
+        free = solved(NO_NODES, np.zeros(0))
+        drained = [
+            water
+            for water, factor in zip(self.members, factors, strict=True)
+            if water.drains and not water.cracked_to_drains(factor)
+        ]
+        if not drained:
+            return free
+        lines = [water.outlets(loading) for water in drained]
+        nodes, outlet = (np.concatenate(parts) for parts in zip(*lines, strict=True))
+        at_drains = head[nodes] + self.expand_to_nodes(free)[nodes] / weight
+        effect = drained[0].case["drain_effectiveness"]
+        if not (at_drains > outlet).all() or effect == 0:
+            return free
+        return free.mixed(effect, solved(nodes, outlet))
+
+    def gradients(self, solution: FlowSolution, water: JointWater) -> list[Array]:
+        """Gradient of the total head times the water's weight at the Gauss points of one of the
+        joints, along the axes of its `JointFields`.
+        """
+        sizes = [len(member.joint.points.weights) for member in self.members]
+        first = sum(sizes[: self.members.index(water)])
+        own = slice(first, first + len(water.joint.points.weights))
+        by_axis = {
+            axis: sum(system.share * system.gradients[k][own] for system in solution.systems)
+            for k, axis in enumerate(self.fields.axes)
+        }
+        return [np.asarray(by_axis[axis]) for axis in water.joint.fields.axes]
+
+    def derivative(
+        self,
+        jump: Array,
+        variables: JointVariables,
+        solution: FlowSolution,
+        before_quake: BeforeQuake | None,
+    ) -> FlowDerivative | None:
+        """Derivative of the pressure of flowing water with the unknowns; None if it follows from
+        the joints before an earthquake.
+        """
+        frozen = [bool(before_quake and water.freezes_uplift) for water in self.members]
+        if all(frozen):
+            return None
+        rates = [
+            (0 if unchanged else water.scale)
+            * water.aperture(*water.opened(jump, variables, before_quake))[1]
+            * water.joint.points.weights
+            for water, unchanged in zip(self.members, frozen, strict=True)
+        ]
+        return self.flow.derivative(solution, np.concatenate(rates))
+
+
+def water_systems(waters: Sequence[JointWater], interface: Interface) -> list[WaterSystem]:
+    """The water of joints: of each alone, or of those that meet and exchange it; each joint knows
+    its own.
+
+    Raises InputError if joints that meet have settings that do not go together.
+    """
+    meshes, cases = [w.joint.mesh for w in waters], [w.case for w in waters]
+    systems = []
+    for network in networks_of(meshes, cases):
+        members = tuple(waters[k] for k in network.numbers)
+        systems.append(WaterSystem(members, network, interface))
+        for k, water in enumerate(members):
+            water.system, water.nodes = systems[-1], network.nodes[k]
+            water.flowing, water.scale = network.flowing, network.transmissivities[k]
+    alone = [water.system for water in waters if not water.system.network]
+    return [*alone, *systems]

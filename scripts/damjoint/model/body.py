@@ -9,6 +9,23 @@ import numpy as np
 from ..arrays import Array, IntArray
 from ..classes import dataclass
 
+#: Corners of the sides of a cell, by its shape.
+SIDES: dict[str, tuple[list[int], ...]] = {
+    "line": ([0], [1]),
+    "triangle": ([0, 1], [1, 2], [2, 0]),
+    "quad": ([0, 1], [1, 2], [2, 3], [3, 0]),
+    "tetra": ([0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]),
+    "wedge": ([0, 1, 2], [3, 4, 5], [0, 1, 4, 3], [1, 2, 5, 4], [0, 2, 5, 3]),
+    "hexahedron": (
+        [0, 1, 2, 3],
+        [4, 5, 6, 7],
+        [0, 1, 5, 4],
+        [1, 2, 6, 5],
+        [2, 3, 7, 6],
+        [3, 0, 4, 7],
+    ),
+}
+
 
 @dataclass
 class Body:

@@ -43,20 +43,28 @@ class Loading:
 
 
 def heads_at_ends(
-    case: Case, level: float, tail: float, heel_y: Array | float, toe_y: Array | float
+    case: Case,
+    level: float,
+    tail: float,
+    heel_y: Array | float,
+    toe_y: Array | float,
+    flowing: bool | None = None,
+    rest_y: float = math.inf,
 ) -> tuple[Array, Array]:
     """Heads [m] of the water in a joint at its heel and toe of these elevations [m], for levels of
     reservoir and tailwater.
 
-    A dry end has its own elevation as head: no pressure. Of water whose flow is computed this is an
-    exit, and no water enters there: a head on the other side that is lower holds here, too.
+    A dry end has its own elevation as head: no pressure. Of water whose flow is computed (flowing;
+    None: as the case says) this is an exit, and no water enters there: a head on the other side
+    that is lower holds here, too. Where both are dry, water is at rest below the lower one, or
+    below rest_y.
     """
     reservoir = level + case["joint_head_offset"]
     wet_heel, wet_toe = reservoir > heel_y, tail > toe_y
     exit_heel, exit_toe = heel_y, toe_y
-    if flows(case):
+    if flows(case) if flowing is None else flowing:
         exit_heel, exit_toe = np.minimum(heel_y, tail), np.minimum(toe_y, reservoir)
-    at_rest = np.minimum(np.minimum(heel_y, toe_y), max(reservoir, tail))  # below both ends
+    at_rest = np.minimum(np.minimum(heel_y, toe_y), min(max(reservoir, tail), rest_y))
     return (
         np.where(wet_heel, reservoir, np.where(wet_toe, exit_heel, at_rest)),
         np.where(wet_toe, tail, np.where(wet_heel, exit_toe, at_rest)),

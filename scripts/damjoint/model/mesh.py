@@ -36,6 +36,7 @@ from .scene import (
     numbered,
     stacked,
 )
+from .skin import inner_ends
 from .user_geometry import NamedFace, UserGeometry
 
 #: Parameters that the mesh always depends on.
@@ -167,6 +168,10 @@ class JointMesh:
     name: str
     #: tags of the surface's nodes in the upper body; in the lower one they are the surface's
     upper_tags: IntArray
+    #: whether it has nodes of other joints; tags of the nodes of heel and toe that lie at another
+    #: joint, not on the surface of the dam and its rock
+    meets: bool = False
+    inner_ends: IntArray = field(default_factory=lambda: np.zeros(0, int))
 
     def face(self, above: bool) -> Body:
         """The surface as a part of the body above or below it."""
@@ -412,6 +417,8 @@ class Mesh:
             )
             for joint in scene
         ]
+        if self.own:
+            self._mark_junctions()
         self.faces: dict[str, Face] = {}
         for face, surface in zip(faces, surfaces, strict=True):
             for body, part in self._by_body(surface, face.body):
@@ -596,6 +603,23 @@ class Mesh:
             raise self._bad(f"joint {joint.name}: inside a body it must not touch its surface")
         self.bodies[joint.upper] = self.solids[joint.upper] = body
         return tags
+
+    def _mark_junctions(self) -> None:
+        """Mark the joints that meet, and their ends that lie at other joints."""
+        surfaces = [joint.surface for joint in self.joints]
+        count = np.bincount(np.concatenate([s.node_tags for s in surfaces]).astype(int))
+        ends = [end for joint in self.joints for end in (joint.heel, joint.toe)]
+        if count.max() == 1:
+            return
+        inner = inner_ends(ends, surfaces, self.user_geometry.surface)
+        self.joints = [
+            replace(
+                joint,
+                meets=bool((count[joint.surface.node_tags] > 1).any()),
+                inner_ends=np.union1d(*inner[2 * k : 2 * k + 2]),
+            )
+            for k, joint in enumerate(self.joints)
+        ]
 
     def _by_body(self, surface: Body, body: str) -> list[tuple[str, Body]]:
         """A surface of the bodies of a kind, dam or foundation, divided by the body that it is a

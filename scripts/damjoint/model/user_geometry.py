@@ -16,21 +16,9 @@ import numpy as np
 
 from .. import InputError
 from ..arrays import Array, BoolArray, IntArray, distinct
-from .body import Body
+from .body import SIDES, Body
 from .scene import BED, DOWN, FLOOR, LINES, TOP, UP, Joint
 
-#: Corners of the sides of an element.
-SIDES_OF = {
-    "line": ((0,), (1,)),
-    "triangle": ((0, 1), (1, 2), (2, 0)),
-    "quad": ((0, 1), (1, 2), (2, 3), (3, 0)),
-    "tetra": ((0, 1, 2), (0, 1, 3), (0, 2, 3), (1, 2, 3)),
-    "hexahedron": (
-        *((0, 1, 2, 3), (4, 5, 6, 7), (0, 1, 5, 4)),
-        *((1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)),
-    ),
-    "wedge": ((0, 1, 2), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
-}
 #: Shape of a side by its number of corners.
 SHAPE_OF_SIDE = {2: "line", 3: "triangle", 4: "quad"}
 #: Simplices that make up an element.
@@ -83,7 +71,7 @@ def sides_of(body: Body) -> tuple[list[IntArray], list[IntArray]]:
     """
     rows, owners, start = list[IntArray](), list[IntArray](), 0
     for shape, table in body.cells:
-        for corners in SIDES_OF[shape]:
+        for corners in SIDES[shape]:
             rows.append(body.node_tags[table[:, corners]].astype(int))
             owners.append(start + np.arange(len(table)))
         start += len(table)

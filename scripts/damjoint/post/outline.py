@@ -10,6 +10,7 @@ import numpy as np
 
 from .. import ROUND_OFF
 from ..arrays import Table
+from ..model.body import SIDES
 from ..model.case import Case
 from ..model.fields import distance
 from ..model.mesh import Body
@@ -20,21 +21,8 @@ LEVEL = 1e-6
 #: Largest displacement drawn, over the dam's size.
 DISPLACEMENT = 0.06
 
-#: Corners of the faces of a cell, by its shape.
-FACES: dict[str, tuple[list[int], ...]] = {
-    "triangle": ([0, 1, 2],),
-    "quad": ([0, 1, 2, 3],),
-    "tetra": ([0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]),
-    "wedge": ([0, 1, 2], [3, 4, 5], [0, 1, 4, 3], [1, 2, 5, 4], [0, 2, 5, 3]),
-    "hexahedron": (
-        [0, 1, 2, 3],
-        [4, 5, 6, 7],
-        [0, 1, 5, 4],
-        [1, 2, 6, 5],
-        [2, 3, 7, 6],
-        [3, 0, 4, 7],
-    ),
-}
+#: Corners of what is drawn of a cell, by its shape: its faces.
+FACES = {**SIDES, "triangle": ([0, 1, 2],), "quad": ([0, 1, 2, 3],)}
 
 
 def exaggeration(displacement: dict[str, np.ndarray], size: float) -> float:

@@ -21,6 +21,7 @@ from ..joint.linear_system import Border
 from ..joint.water import BeforeQuake
 from ..model.case import Case, freezes_uplift
 from ..model.loads import COMPLETE, Loading
+from ..model.network import with_paths
 from .controls import Control, DisplacementControl, LevelControl
 from .newton import Convergence, Diverged, Iterate, Strategy, newton
 from .state import Frozen, State
@@ -51,6 +52,7 @@ class Model:
         interface = interface or interface_of(case)
         if case.geometry:
             case = case.with_joints(interface.of_joints)
+            case = with_paths(case, [joint.mesh for joint in interface.joints])
         self.case, self.equilibrium = case, Equilibrium(case, interface)
         self.reference = self.unbalanced()
 

@@ -19,10 +19,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .. import InputError
 from ..arrays import Table
-from ..model.case import Case, freezes_uplift, has_drains
+from ..model.case import Case, flows, freezes_uplift, has_drains
 from ..model.constraints import ZANGAR
 from ..model.loads import Loading, heads_at_ends, line_forces, zangar_column, zangar_share
+from ..model.network import WaterPath
 from ..model.parameters import constants
 
 #: Distance from a plane, over the length of a joint, within which a node lies in it.
@@ -274,6 +276,14 @@ def loads_on(
     return force("weight", 0.0, -weight, centroid), *(p for p in loads if any(p[1:]))
 
 
+def path_of(case: Case, tail: float) -> WaterPath | None:
+    """The path of the water through a joint at a level of the tailwater [m]; None if it leaves at
+    more than one toe or at a heel, and in 3D where joints meet.
+    """
+    path = WaterPath.of(case)
+    return path if path and tail <= path.highest_tail else None
+
+
 class Uplift:
     """The water in the joint for a crack of length a from the heel: pressure [Pa] linear between
     places s [m].
@@ -297,19 +307,29 @@ class Uplift:
         """dry_until: end of the part behind the crack [m] that an earthquake has opened, without
         pressure.
         """
-        self.length, mode = body.length, case["uplift"]
-        ends = heads_at_ends(case, level, tail, body.heel[1], body.toe[1])
-        #: heads at heel and toe [m]
+        self.length, mode, path = body.length, case["uplift"], path_of(case, tail)
+        if not path:
+            raise InputError(
+                f"uplift = {mode}: has no gravity method where joints meet and water leaves at "
+                "more than one toe or at a heel"
+            )
+        path = path.at(level + case["joint_head_offset"])
+        flowing = path.exits or flows(case)
+        heights = path.heel_y, path.toe_y, flowing, path.rest_y
+        ends = heads_at_ends(case, level, tail, *heights)
+        #: heads at both ends of the path through the joint: heel and toe if it meets no other [m]
         self.first, self.last = first, last = float(ends[0]), float(ends[1])
         #: distance from the heel and head of the outlet [m] of drains that the crack has not passed
         self.drains: tuple[float, float] | None = None
         wet_crack, crack = crack, crack if mode in ("cracked", "flow") else 0.0
         drained = mode == "drained" or (mode == "cracked" and case["drains"])
-        if mode == "waterstop":
+        if mode == "waterstop" and not path.goes_on:
             first = last = level + case["joint_head_offset"]
         places, heads = [0.0, crack, self.length], [first, first, last]
         at = case["drain_x"]
-        if drained and crack <= at < self.length:
+        if path.goes_on:
+            places, heads = self._on_path(case, body, path, tail, crack)
+        elif drained and crack <= at < self.length:
             outlet = max(case["drain_level"], tail, body.heel[1] + at * body.along[1])
             self.drains = at, outlet
             undrained = float(np.interp(at, places[1:], heads[1:]))
@@ -326,6 +346,45 @@ class Uplift:
             self.stop(min(case["waterstop"], self.length))
         if dry_until > wet_crack:
             self.dry(wet_crack, dry_until)
+
+    def _on_path(
+        self, case: Case, body: JointLine, path: WaterPath, tail: float, crack: float
+    ) -> tuple[list[float], list[float]]:
+        """Places [m] and heads [m] in a joint whose path goes on in others, which are not cracked:
+        linear between the ends and the drains of the path without the crack, which conducts freely.
+        """
+        length, share = self.length, abs(path.end - path.begin)
+        if not share:  # a branch in which the water is at rest
+            head = self.first + (self.last - self.first) * path.begin
+            return [0.0, length], [head, head]
+        whole, forwards = length / share, path.end > path.begin
+        start = path.begin * whole - (0 if forwards else crack)
+
+        def along(s: float) -> float:
+            return start + (1 if forwards else -1) * max(s - crack, 0.0)
+
+        drains = [
+            (whole * line.at, line.outlet, line.effectiveness, whole * line.reference)
+            for line in path.drains
+        ]
+        at = case["drain_x"]
+        if case["uplift"] == "cracked" and case["drains"] and crack <= at < length:
+            outlet = max(case["drain_level"], body.heel[1] + at * body.along[1])
+            self.drains = at, max(outlet, tail)
+            drains = [(along(at), outlet, case["drain_effectiveness"], along(at))]
+        ends = [0.0, whole - crack], [self.first, self.last]
+        knots, places = dict(zip(*ends, strict=True)), [0.0, crack, length]
+        before, head = 0.0, self.first
+        for place, outlet, effect, reference in drains:
+            share = (place - before if before else reference) / (whole - crack - before)
+            undrained = head + (self.last - head) * share
+            knots[place] = undrained - effect * max(undrained - max(outlet, tail), 0.0)
+            before, head = place, knots[place]
+            own = (place - start) * (1 if forwards else -1) + crack
+            places += [own] if crack < own < length else []
+        places, way = sorted(places), sorted(knots)
+        heads = np.interp([along(s) for s in places], way, [knots[x] for x in way])
+        return places, heads.tolist()
 
     def cut_off_suction(self) -> None:
         """Set negative pressures to zero."""
@@ -597,13 +656,13 @@ def factors_of_state(case: Case, state: Mapping[str, float]) -> dict[str, float]
 def of_state(case: Case, rows: Table, state: Mapping[str, float]) -> GravityMethod | None:
     """The gravity method at the only joint of a user's own geometry, which alone holds what is
     above it, at a state of the finite elements, a row of the history: the resultant of the loads
-    follows from N, T, M and the uplift. None if the joint is not plane, or if the water in it
-    follows from a crack before a pseudo-static earthquake.
+    follows from N, T, M and the uplift. None if the joint is not plane, if the water has no path
+    (see `path_of`), or if it follows from a crack before a pseudo-static earthquake.
 
     rows: of the joint's table.
     """
-    joint = JointLine(case)
-    if freezes_uplift(case) or not joint.is_plane(rows):
+    joint, path = JointLine(case), path_of(case, case.tail_at(state["time"]))
+    if freezes_uplift(case) or not (path and joint.is_plane(rows)):
         return None
     (tx, ty), normal, shear = joint.along, state["N"] + state["U"], state["T"]
     moment = state["M"] + state["M_U"]

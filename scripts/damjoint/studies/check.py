@@ -414,8 +414,9 @@ class SafetyCheck:
             notes.append("the finite elements' stress at the toe, a corner, depends on the mesh")
         if self.gravity is None:
             notes.append(
-                "no gravity method: it needs a plane joint that alone holds what is above it, and "
-                "water that does not follow from a crack before an earthquake"
+                "no gravity method: it needs a plane joint that alone holds what is above it, "
+                "water that leaves at one toe, and none that follows from a crack before an "
+                "earthquake"
             )
         elif not self.comparable:
             reached, last = self.finite_elements.time, self.gravity.time

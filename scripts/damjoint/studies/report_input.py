@@ -253,6 +253,11 @@ def limits(case: Case, earthquake: bool = False) -> Iterator[str]:
     whether a record follows the static loads.
     """
     yield "Displacements and strains are small: equilibrium is that of the undeformed geometry."
+    if any("path" in joint.section for joint in case.joints):
+        yield (
+            "Water passes between joints that meet unless one has none or a waterstop. Its head "
+            "is that of reservoir and tailwater where they end on the surface."
+        )
     yield (
         "Dam and foundation are homogeneous, isotropic and linear elastic. Only the joint opens, "
         "cracks and slides; cracks elsewhere and other sliding planes are not modelled."

@@ -13,6 +13,7 @@ from ...fem.memory import joint_size
 from ...joint.interface import Interface
 from ...model.case import Case
 from ...model.mesh import mesh_of
+from ...model.network import with_paths
 from ...solver.load_stepper import LoadStepper
 from ...threads import limited_threads
 from .. import OnStep, Outcome
@@ -28,7 +29,8 @@ THREADED_UNKNOWNS = 2000
 def check(case: Case) -> None:
     """Raise InputError if a user's own geometry is unsuitable; all other cases are suitable."""
     if case.geometry:
-        case.with_joints([joint.of_case for joint in mesh_of(case).joints])
+        joints = mesh_of(case).joints
+        with_paths(case.with_joints([joint.of_case for joint in joints]), joints)
 
 
 def about(bulk: Condensed) -> dict[str, Any]:

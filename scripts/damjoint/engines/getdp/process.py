@@ -20,6 +20,7 @@ from ...model.mesh import Mesh, area, heel_normal
 from ...model.parameters import assignments, constants, declared, listing, quoted
 from ...model.scene import LINES, SIDES
 from ...storage import check_end
+from .paths import values_of_paths
 
 #: Oldest suitable version of GetDP.
 OLDEST = (3, 2)
@@ -108,10 +109,10 @@ def numbers(mesh: Mesh) -> dict[str, float]:
     return {name: float(b) for b, name in enumerate(reversed(mesh.solids))}
 
 
-def values_of_joint(case: Case, mesh: Mesh | None, number: int) -> str:
+def values_of_joint(case: Case, mesh: Mesh | None, number: int, path: str = "") -> str:
     """The macro of pro/joints.pro that sets the values of a joint, by its number from 0.
 
-    mesh: of a user's own geometry.
+    mesh: of a user's own geometry; path: see `values_of_paths`.
     """
     own, vectors = case.joints[number], ""
     values: dict[str, Value] = {n: own[n] for n, known in declared().items() if known.of_joints}
@@ -127,7 +128,7 @@ def values_of_joint(case: Case, mesh: Mesh | None, number: int) -> str:
         vectors += listing("chord", chord.plane.T @ chord.along)
         vectors += listing("upwards", chord.plane.T @ chord.normal)
     lines = "".join(f"{name} = {quoted(value)};\n" for name, value in values.items())
-    return f"Macro Joint_{number}\n{lines}{vectors}Return\n"
+    return f"Macro Joint_{number}\n{lines}{vectors}{path}Return\n"
 
 
 def write_problem(
@@ -153,7 +154,9 @@ def write_problem(
         lists |= own_lists(mesh)
     lists |= more_lists or {}
     if mesh or case.of_joints:
-        macros = (values_of_joint(case, mesh, k) for k in range(len(case.joints)))
+        number = len(case.joints)
+        paths = values_of_paths(mesh, case) if mesh else [""] * number
+        macros = (values_of_joint(case, mesh, k, paths[k]) for k in range(number))
         of_joints = "of_joints = 1;\n" + "".join(macros)
     if case.lift_heights:
         lists["lift_heights"] = case.lift_heights

@@ -17,8 +17,10 @@ from ... import InputError, RunError, data
 from ...fem.memory import bulk_size, check_memory
 from ...model.case import Case, flows, freezes_uplift, has_drains
 from ...model.mesh import Mesh, mesh_of
+from ...model.network import with_paths
 from .. import OnStep, Outcome
 from . import process, tables
+from .paths import values_of_paths
 
 #: Mesh patterns in 3D: GetDP has no suitable quadrature for prisms and hexahedra.
 SOLID = ("free", "split")
@@ -67,6 +69,7 @@ def check_own(mesh: Mesh, case: Case) -> None:
         raise InputError(f"geometry = {case.geometry}: must have tetrahedra with engine = getdp")
     if mesh.divided:
         mesh.face_entities()
+    values_of_paths(mesh, case)
     for joint, own in zip(mesh.joints, case.joints, strict=True):
         if joint.upper == joint.lower:
             raise InputError(
@@ -113,6 +116,8 @@ def solve(case: Case, on_step: OnStep, fields: bool) -> Iterator[Outcome]:
         mesh_file = Path(name) / "scene.msh"
         mesh.write(mesh_file)
         case = case.with_joints([joint.of_case for joint in mesh.joints])
+        if case.geometry:
+            case = with_paths(case, mesh.joints)
         scenes, running, runner = case.scenes(), [], process.Runner()
         for number, scene in enumerate(scenes):
             folder = Path(name) / scene["uplift"]

@@ -1,0 +1,93 @@
+"""Joints that meet, for pro/joints.pro: the path of the water through them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ... import InputError
+from ...model.case import Case
+from ...model.mesh import JointMesh, Mesh
+from ...model.network import HigherHeel, Network, PathDrains, WaterPath, networks_of, plane_paths
+from ...model.parameters import listing
+
+
+def values_of_paths(mesh: Mesh, case: Case) -> list[str]:
+    """The values of pro/joints.pro for the water in each joint of a user's own geometry, as text.
+
+    Raises InputError for networks that this engine can not compute.
+    """
+    alone = [WaterPath.of(own) for own in case.joints]
+    texts = [text_of(path) if path else "" for path in alone]
+    for network in networks_of(mesh.joints, case.joints):
+        solid = mesh.dim == 3
+        paths = side_by_side(network, mesh, case) if solid else in_plane(network, mesh, case)
+        first = case.joints[network.numbers[0]]
+        for k, scale in zip(network.numbers, network.transmissivities, strict=True):
+            values = {
+                "network": float(network.numbers[0]),
+                "network_K_N": first["K_N"],
+                "network_aperture": first["aperture_min"],
+                "in_network": 1.0,
+                "in_flow": float(network.flowing),
+                "closed_conductivity": scale,
+                "late_heel": float(reached_late(mesh.joints[k], paths[k])),
+                "joint_path": float(network.numbers[0] if solid else k),
+            }
+            texts[k] = text_of(paths[k]) + lines(values)
+    return texts
+
+
+def text_of(path: WaterPath) -> str:
+    """The values of pro/joints.pro of a path."""
+    values = {f"path_{name}": getattr(path, name) for name in ("heel_y", "toe_y", "rest_y")}
+    values |= {"path_begin": path.begin, "path_end": path.end, "path_exits": float(path.exits)}
+    values |= {"open_heel": float(path.open_heel), "open_toe": float(path.open_toe)}
+    text = lines(values)
+    for name, kind, rows in (
+        ("drain", PathDrains, path.drains),
+        ("higher", HigherHeel, path.higher_heels),
+    ):
+        columns = zip(kind._fields, zip(*rows, strict=True), strict=False)
+        text += "".join(listing(f"path_{name}_{column}", own) for column, own in columns)
+    return text
+
+
+def reached_late(joint: JointMesh, path: WaterPath) -> bool:
+    """Whether the heel of a joint is one that the reservoir reaches above a level only."""
+    outer = not np.isin(joint.heel.node_tags, joint.inner_ends).any()
+    return bool(path.higher_heels) and outer and not path.open_heel
+
+
+def lines(values: dict[str, float]) -> str:
+    """Lines of GetDP's language that set values."""
+    return "".join(f"{name} = {value!r};\n" for name, value in values.items())
+
+
+def refused(network: Network, mesh: Mesh, case: Case, why: str) -> InputError:
+    """The error of a network."""
+    names = " and ".join(mesh.joints[k].name for k in network.numbers)
+    modes = ", ".join(dict.fromkeys(case.joints[k]["uplift"] for k in network.numbers))
+    return InputError(
+        f"uplift = {modes}: must be none in one of the joints that meet ({names}) with engine = "
+        f"getdp, {why}"
+    )
+
+
+def side_by_side(network: Network, mesh: Mesh, case: Case) -> dict[int, WaterPath]:
+    """The path through the joints of a network in 3D, which have heel and toe on the surface."""
+    heel, toe = (end.points[:, 1] for end in (network.mesh.heel, network.mesh.toe))
+    if network.branched or network.in_series:
+        raise refused(network, mesh, case, "as they do not lie side by side")
+    if max(np.ptp(heel), np.ptp(toe)) > 1e-9 * case.size:
+        raise refused(network, mesh, case, "as their heels or toes are not level")
+    ends = float(heel[0]), float(toe[0])
+    path = WaterPath(heel_y=ends[0], toe_y=ends[1], rest_y=min(ends))
+    return dict.fromkeys(network.numbers, path)
+
+
+def in_plane(network: Network, mesh: Mesh, case: Case) -> dict[int, WaterPath]:
+    """The path through each joint of a network in 2D."""
+    paths = plane_paths(network, mesh.joints, case)
+    if not paths:
+        raise refused(network, mesh, case, "as water leaves at more than one toe or at a heel")
+    return paths
