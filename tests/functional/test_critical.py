@@ -142,10 +142,10 @@ def test_a_level_before_the_earthquake_acts_in_full_does_not_count():
 @pytest.mark.heavy
 def test_a_wrong_first_estimate_is_followed_by_a_wider_search(monkeypatch):
     """Paths given up where the level can be prescribed no more, far from the critical value."""
-    _, expected = search_result("dam", "k_h", DAM)
+    _, expected = search_result("dam", "k_h", RUPTURE)
     follow = FailurePath.follow
     monkeypatch.setattr(FailurePath, "follow", lambda p, far: far < path.SURE or follow(p, far))
-    search, answer = search_result("dam", "k_h", DAM)
+    search, answer = search_result("dam", "k_h", RUPTURE)
     first_estimate = next(t for t in search.trials if t.stands and t.path.points[-1].imposed)
     assert first_estimate.value < 0.8 * answer.value and search.factor == path.SURE
     assert answer.value == pytest.approx(expected.value, rel=2 * path.PRECISION)
