@@ -185,7 +185,7 @@ def test_endless_inclusion_is_refused(command, tmp_path, text):
     os.mkfifo(tmp_path / "pipe.case")
     code, _, err = command("run", write(tmp_path, text))
     assert code == 2 and len(err.splitlines()) == 1
-    assert "must be a file" in err or "more than 50 files" in err
+    assert "must be a regular file" in err or "more than 50 files" in err
 
 
 def test_without_times_each_level_is_a_step(tmp_path):
