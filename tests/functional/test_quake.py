@@ -531,7 +531,7 @@ def case_file(tmp_path):
 
 
 #: Where the accuracy does not matter.
-LONG_STEPS = "--set", "dt=0.01"
+LONG_STEPS = "--set", "dt=0.01", "--set", "record_rest=2"
 
 
 def test_the_command_writes_rows_summary_and_picture(command, case_file, tmp_path):

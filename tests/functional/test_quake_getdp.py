@@ -57,7 +57,7 @@ MORE = {
 
 def both(tmp_path, settings, levels="30"):
     """quake.csv of the reference GetDP model and of the condensed engine, and the latter."""
-    times = np.arange(0, 0.2001, 0.005)
+    times = np.arange(0, 0.2001, max(settings.get("dt", 0.0), 0.005))
     wave = 5 * np.sin(np.pi * times / 0.2) ** 2 * np.sin(10 * np.pi * times)
     record = write_record(tmp_path / "r.csv", times, wave, -0.7 * wave)
     quake = earthquake(record, SHORT | settings, levels)

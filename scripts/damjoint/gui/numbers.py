@@ -124,6 +124,7 @@ class QuakeNumbers(Numbers):
             k = row_of_peak(name, rows[name])
             value = with_unit(rows[name][k], units, 3)
             peaks.append((f"largest {head}", f"{value} at {rows['time'][k]:.2f} s", QUAKE[name][1]))
+        peaks += [("Note", note, note) for note in found.summary["notes"]]
         if not found.summary["at_rest"]:
             peaks.append(("At rest", "no", "at the end: no residual slip"))
         for name, head, units in RESIDUAL:

@@ -31,6 +31,9 @@ BROKEN = 0.99
 PEAKS = ("ground_ax", "crest_ux", "crest_ax")
 PEAKS_OF_JOINTS = ("heel_opening", "toe_opening", "slip_mean", "open_length")
 
+#: Slip over the length of a joint beyond which displacements are not small.
+LARGE_SLIP = 0.01
+
 #: Verdicts besides those of a static state.
 STANDS, NO_EQUILIBRIUM, NOT_AT_REST = "stands", "no equilibrium", "not at rest"
 NO_FRICTION = "broken without friction"
@@ -67,6 +70,13 @@ def summary(quake: Earthquake, rows: Table, halvings: int) -> dict[str, Any]:
     for name in (*PEAKS, *(column_of(name, k) for k in joints for name in PEAKS_OF_JOINTS)):
         row = row_of_peak(name, rows[name])
         peaks[name] = {"value": float(rows[name][row]), "time": float(rows["time"][row])}
+    for k, joint in enumerate(quake.case.joints):
+        slip = abs(peaks[column_of("slip_mean", k)]["value"])
+        if slip > LARGE_SLIP * joint.joint_length:
+            result["notes"].append(
+                f"the slip reaches {slip:.3g} m{of(quake.case, k)}: equilibrium is that of the "
+                "undeformed dam, and the drains through the joint are taken as intact"
+            )
     return result | {"peaks": peaks} | values_at_end(quake.case, rows, 1 / quake.frequencies[0])
 
 
@@ -142,22 +152,27 @@ def broken_shares(case: Case, found: dict[str, Any]) -> dict[int, float]:
     }
 
 
+def of(case: Case, joint: int) -> str:
+    """The name of a joint, by its number, in brackets; empty if there is only one."""
+    name = case.named((joint,))
+    return f" ({name})" if name else ""
+
+
 def statement(case: Case, found: dict[str, Any]) -> str:
     """What a summary says of the end of an earthquake."""
-    of = lambda k: f" ({name})" if (name := case.named((k,))) else ""
     joints = range(len(case.joints))
     parts = [
-        f"law = {case.joints[k]['law']}{of(k)} has no friction, and the joint has broken over "
-        f"{share:.0%} of its length (law = bond keeps the friction)"
+        f"law = {case.joints[k]['law']}{of(case, k)} has no friction, and the joint has broken "
+        f"over {share:.0%} of its length (law = bond keeps the friction)"
         for k, share in broken_shares(case, found).items()
     ]
     millimetres = lambda values, name, k: f"{1e3 * values[column_of(name, k)]:.3g} mm"
     if found["at_rest"]:
-        slips = [millimetres(found["residual"], "slip", k) + of(k) for k in joints]
+        slips = [millimetres(found["residual"], "slip", k) + of(case, k) for k in joints]
         parts.append(f"residual slip {', '.join(slips)}")
     else:
         ends = [
-            f"{millimetres(found['end'], 'slip', k)}{of(k)}, changed by "
+            f"{millimetres(found['end'], 'slip', k)}{of(case, k)}, changed by "
             f"{millimetres(found['end'], 'change', k)}"
             for k in joints
         ]
