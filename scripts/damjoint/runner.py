@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import re
-import resource
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -98,16 +96,7 @@ def save(outcome: Outcome, case: Case, out: Path) -> None:
     start, result = time.perf_counter(), outcome.result
     tables.write(result, folder)
     result.info["wall_seconds"]["post"] = time.perf_counter() - start
-    numbers, getdp = versions.versions(), result.info.pop("getdp", {})
-    if getdp.get("version"):
-        numbers["getdp"] = getdp["version"]
-    memory = max(peak_memory(), getdp.get("peak_memory_mb") or 0.0)
-    result.info |= {
-        "peak_memory_mb": round(memory, 1),
-        "versions": numbers,
-        "commit": versions.commit(),
-        "machine": versions.machine(),
-    }
+    result.info |= versions.provenance(result.info.pop("getdp", {}))
     folders.write_info(result, folder, *early_end(outcome))
 
 
@@ -160,11 +149,3 @@ def added_seconds(result: Results) -> Iterator[None]:
     start = time.perf_counter()
     yield
     result.info["wall_seconds"]["post"] += time.perf_counter() - start
-
-
-def peak_memory() -> float:
-    """Peak resident memory of this process [MB]."""
-    with contextlib.suppress(OSError):  # getrusage includes memory of the parent before exec
-        if match := re.search(r"VmHWM:\s+(\d+)", Path("/proc/self/status").read_text()):
-            return float(match[1]) / 1024
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024

@@ -122,6 +122,23 @@ def cached(kind: str, key: str, compute: Callable[[], Any]) -> Any:
     return value
 
 
+def text_of(path: Path, name: str, most: int) -> str:
+    """The text of a regular file of at most `most` bytes; name: of the file in a message.
+
+    Raises InputError.
+    """
+    try:
+        if path.exists() and not path.is_file():  # reading a pipe or a device may not end
+            raise InputError(f"{name}: must be a regular file, not a folder, pipe or device")
+        if path.stat().st_size > most:
+            raise InputError(f"{name}: must be a text of at most {most} bytes")
+        return path.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise InputError(f"{name}: {error.strerror}") from None
+    except UnicodeDecodeError as error:
+        raise InputError(f"{name}: {error}") from None
+
+
 def check_end(path: Path, *ends: str) -> None:
     """Raise OSError (ENOSPC) if a file is missing or ends in none of `ends`.
 

@@ -1,4 +1,4 @@
-"""Versions of the code and of what it uses, and the machine, as run.json records them."""
+"""Versions of the code and of what it uses, the machine, and memory, as run.json records them."""
 
 from __future__ import annotations
 
@@ -7,10 +7,13 @@ import hashlib
 import os
 import platform
 import re
+import resource
 import subprocess
 import sys
+from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 from . import __version__, data
 
@@ -33,6 +36,28 @@ def code_fingerprint(*packages: Path) -> str:
     files = [path for folder in folders for path in folder.rglob("*.py")]
     files += [*data("pro").rglob("*.pro"), *data("geo").glob("*.geo")]
     return hashlib.sha256(b"".join(path.read_bytes() for path in sorted(files))).hexdigest()
+
+
+def provenance(getdp: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the entries of run.json on memory, versions, commit and machine; getdp: version and
+    peak_memory_mb of GetDP, if it was used.
+    """
+    numbers = versions() | ({"getdp": getdp["version"]} if getdp.get("version") else {})
+    memory = max(peak_memory(), getdp.get("peak_memory_mb") or 0.0)
+    return {
+        "peak_memory_mb": round(memory, 1),
+        "versions": numbers,
+        "commit": commit(),
+        "machine": machine(),
+    }
+
+
+def peak_memory() -> float:
+    """Return the peak resident memory of this process [MB]."""
+    with contextlib.suppress(OSError):  # getrusage includes memory of the parent before exec
+        if match := re.search(r"VmHWM:\s+(\d+)", Path("/proc/self/status").read_text()):
+            return float(match[1]) / 1024
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
 @lru_cache(maxsize=1)

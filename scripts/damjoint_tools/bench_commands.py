@@ -34,12 +34,12 @@ NUMPY = "interpreter and numpy"
 
 #: Searches of a critical value: quantity and settings of the case `dam`.
 SEARCHES = {
-    "level": ("level", {}),
-    "k_h": ("k_h", {}),
+    "level, law rupture": ("level", {"law": "rupture"}),
+    "k_h, law rupture": ("k_h", {"law": "rupture"}),
     "strength, law bond": ("strength", {"law": "bond"}),
     "strength, bond, flow": ("strength", {"law": "bond", "uplift": "flow"}),
     "level, bond, cracked": ("level", {"law": "bond", "uplift": "cracked"}),
-    "level, 20 elements": ("level", {"n_joint": 20.0}),
+    "rupture, 20 elements": ("level", {"law": "rupture", "n_joint": 20.0}),
 }
 
 

@@ -128,14 +128,15 @@ def results_page() -> str:
         "history.csv; `failed` (1 where `damjoint run` ends with exit code 1), `verdict`, "
         "`statement`; with `--critical` the critical value, its `mode`, whether it is `confirmed` "
         "and by what; with `--quake` `peak_ground_ax` [m/s2], `residual_slip` [m], "
-        "`residual_tilt`, `rigid_block_slip` [m]. In a sample, a row whose loads exceed the "
-        "largest possible strength of the joint is not computed; its `statement` gives this "
-        "reason. Further files:",
+        "`residual_tilt` (both empty if the dam is not at rest), `rigid_block_slip` [m]. In a "
+        "sample, a row whose loads exceed the largest possible strength of the joint is not "
+        "computed; its `statement` gives this reason. Further files:",
         "- `_probability.csv`: probability of failure with the interval of Clopper and Pearson. "
         "Rows without a result are `undecided`; they count as failures, except for the lower "
         "limit.\n"
         "- `_sensitivity.csv`: Spearman's rank correlation of each sampled input with `failed` "
-        "and, over the rows that stand, with `crack_length`, `max_opening` and `crest_ux`.\n"
+        "and, over the rows that stand, with `crack_length`, `max_opening` and `crest_ux`; of "
+        "earthquakes, over the rows at rest, with `residual_slip` and `residual_tilt`.\n"
         "- `.png`: a chart of one or two varied parameters, or of the sample.",
         "## fields/",
         "`bulk.msh` and `joint.msh` for Gmsh (a view per field with all levels as its steps); "

@@ -33,11 +33,16 @@ from .verification import (
 MOMENTUM_TOLERANCE = 1e-6
 #: Tolerance of motions relative to their largest value: twelve digits, summed over the steps.
 MOTION_TOLERANCE = 1e-6
+#: A dam at rest stays within this share of its largest slip, or this slip [m]; a joint without
+#: friction is broken beyond this share of its length.
+AT_REST, LEAST_MOTION, BROKEN = 0.01, 1e-5, 0.99
+#: Value of damping_mass: of the concrete, not of the water that moves with it.
+OF_CONCRETE = 1
 #: Standard gravity [m/s2], of records in g.
 STANDARD_GRAVITY = 9.80665
 #: Share of the dam's height from which a slip is not a small displacement, about.
 LARGE_SLIP = 0.05
-#: Seconds over which residual values are a mean.
+#: Largest time over which residual values are a mean [s].
 MEAN_OVER = 1.0
 
 
@@ -58,10 +63,13 @@ class QuakeFiles(RunFiles):
 
     @property
     def residual_slip(self) -> float:
-        """Mean slip over the last part of the rest [m]."""
+        """Mean slip over the last half of the rest, at most MEAN_OVER [m]."""
         rows = self.history
-        last = rows["time"] > rows["time"][-1] - MEAN_OVER * (1 - DIGITS_TOLERANCE)
-        return float(rows["slip_mean"][last].mean())
+        shaken = np.abs([rows["ground_ax"], rows["ground_ay"]]).max(axis=0) > 0
+        rest = rows["time"][-1] - rows["time"][shaken].max(initial=0.0)
+        over = min(MEAN_OVER, rest / 2) * (1 - DIGITS_TOLERANCE)
+        last = rows["time"] > rows["time"][-1] - over
+        return float(rows["slip_mean"][last].mean()) if rest else float(rows["slip_mean"][-1])
 
     @property
     def water(self) -> tuple[float, float]:
@@ -124,7 +132,13 @@ def bookkeeping(run: QuakeFiles) -> Iterator[str]:
     over = rows["time"][-1] - end
     if not run.stopped and not -DIGITS_TOLERANCE < over < (1 + DIGITS_TOLERANCE) * rows["dt"].max():
         yield f"quake.csv: ends at {rows['time'][-1]:g} s, the record at {end:g} s"
-    stands = not run.stopped and record["quake"]["after"]["equilibrium"]
+    found = record["quake"]
+    stands = not run.stopped and found["after"]["equilibrium"] and found["at_rest"]
+    stands &= not any(
+        joint.case["law"] == "rupture"
+        and joint.history["broken_length"][-1] > BROKEN * joint.length
+        for joint in run.joints
+    )
     if run.exit_code != int(not stands):
         yield f"exit code {run.exit_code} with state {record['state']}, verdict {record['verdict']}"
 
@@ -195,11 +209,11 @@ def unit_loads(run: QuakeFiles) -> np.ndarray:
 
 
 def mass_damping(run: QuakeFiles) -> float:
-    """Return a0 [1/s] of Rayleigh's damping a0 M + a1 K."""
+    """Return a0 [1/s] of Rayleigh's damping, 0 without the part of the mass."""
     case, frequencies = run.case, run.record["quake"]["frequencies"]
     ends = (case["damping_f1"], frequencies[0]), (case["damping_f2"], frequencies[-1])
     w1, w2 = (2 * np.pi * (own if given == -1 else given) for given, own in ends)
-    return float(case["damping_mass"] * 2 * case["damping"] * w1 * w2 / (w1 + w2))
+    return float((case["damping_mass"] > 0) * 2 * case["damping"] * w1 * w2 / (w1 + w2))
 
 
 def momentum(run: QuakeFiles) -> Iterator[str]:
@@ -207,10 +221,13 @@ def momentum(run: QuakeFiles) -> Iterator[str]:
     = static load + inertia + damping by the mass, in which the ground's acceleration and the
     damping are weighted, too. No part of the damping by the stiffness is left in these sums.
 
-    Dashpots are not in the tables: with them the equations of all unknowns are verified instead.
+    Dashpots, and the velocity of the concrete without the water, are not in the tables: with them
+    the equations of all unknowns are verified instead.
     """
     rows, case = run.history, run.case
     if case["joint_damping_n"] or case["joint_damping_t"]:
+        return
+    if case["damping_mass"] == OF_CONCRETE and case["added_mass"]:
         return
     alpha = case["hht_alpha"] if case["time_integration"] == "HHT" else 0.0
     weighted = lambda values, before: (
@@ -263,6 +280,13 @@ def after(run: QuakeFiles) -> Iterator[str]:
             yield f"after the earthquake {name} = {value:.6g} N/m, by hand {exact:.6g}"
 
 
+def elastic_slip(run: QuakeFiles) -> float:
+    """Return the largest elastic part of the slip in the last half of the record and rest [m]."""
+    rows = run.history
+    late = rows["time"] > rows["time"][-1] / 2
+    return float(np.ptp(rows["T"][late])) / (run.case["K_T"] * run.length)
+
+
 def judge_quake(run: QuakeFiles) -> tuple[bool, str]:
     """Judge an earthquake that has not reached its end.
 
@@ -282,7 +306,11 @@ def summary(run: QuakeFiles) -> Iterator[str]:
     suffix = f"_{run.number + 1}" if run.number else ""
     slip, largest = run.residual_slip, np.abs(rows["slip_mean"]).max()
     room = DIGITS_TOLERANCE * max(largest, 1e-9)
-    if abs(found["residual"][f"slip{suffix}"] - slip) > room:
-        yield "run.json: the residual slip is not the mean of the last rows"
+    if found["at_rest"]:
+        if abs(found["residual"][f"slip{suffix}"] - slip) > room:
+            yield "run.json: the residual slip is not the mean of the last rows"
+        moved = abs(rows["slip_mean"][-1] - slip)
+        if moved > AT_REST * largest + LEAST_MOTION + elastic_slip(run):
+            yield f"run.json: at rest, but {moved:.3g} m off its residual slip at the end"
     if abs(abs(found["peaks"][f"slip_mean{suffix}"]["value"]) - largest) > room:
         yield "run.json: the peak of the slip is not that of the rows"

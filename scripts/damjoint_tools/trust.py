@@ -44,8 +44,8 @@ QUAKES_VERIFIED = """\
   travel time of the wave.
 - *Momentum*: $T$, $N + U$ and, if the water does not change, $M$ of every joint at every step equal
   the static loads, the inertia of all that is above the joint, the mass of the water included, and
-  the damping by the mass, to 1e-6 of the weight (times the base). Loads and masses by the gravity
-  method.
+  the damping by the mass (of concrete and water), to 1e-6 of the weight (times the base). Loads
+  and masses by the gravity method.
 - *Water, joint law*: as above, at every node of up to 200 frames.
 - *End*: the static state after the earthquake by hand, and that there is one if the rigid block
   certainly stands; peaks and residual slip are those of the rows; the exit code."""
@@ -145,7 +145,7 @@ SLOWEST = "Seconds of the complete command, while other scenes run in parallel."
 FEATURES = {
     "rock with mass": "rock_mass=1",
     "dashpots in the joint": "joint_damping_n=",
-    "damping by the mass": "damping_mass=1",
+    "damping by the mass": "damping_mass=",
     "published scheme": "time_integration=published",
 }
 

@@ -21,6 +21,8 @@ from scipy.optimize import brentq
 DAM = {"E_dam": 2e10, "E_found": 3e10, "n_joint": 20.0}
 #: A dam of 45 m on a joint with friction and cohesion.
 FRICTION = DAM | {"law": "friction", "adhesion": 1e5}
+#: A joint that can not slide.
+RUPTURE = DAM | {"law": "rupture"}
 #: Friction without cohesion.
 UNBONDED = {"law": "bond", "sigma_max": 0.0, "adhesion": 0.0}
 
@@ -126,12 +128,12 @@ def test_a_level_before_the_earthquake_acts_in_full_does_not_count():
     """On the way to the last level a lower coefficient acts, and higher levels have an equilibrium:
     they end neither the path of a dam that stands nor are the critical level.
     """
-    search = Search(load("dam", DAM), "k_h")
+    search = Search(load("dam", RUPTURE), "k_h")
     path_of_dam = search.trial(0.2).path
     assert path_of_dam.reached and path_of_dam.points[path_of_dam.arrival].control == "crest"
     levels = [point.level for point in path_of_dam.points]
     assert path_of_dam.levels[0] == -np.inf < levels[0]
-    search, answer = search_result("dam", settings=DAM | {"k_h": 0.45})
+    search, answer = search_result("dam", settings=RUPTURE | {"k_h": 0.45})
     (trial,) = search.trials
     earlier = [p.level for p in trial.path.points if p.state.loading.part("quake") < 1]
     assert answer.value < max(earlier) and answer.point.state.loading.part("quake") == 1
@@ -140,10 +142,10 @@ def test_a_level_before_the_earthquake_acts_in_full_does_not_count():
 @pytest.mark.heavy
 def test_a_wrong_first_estimate_is_followed_by_a_wider_search(monkeypatch):
     """Paths given up where the level can be prescribed no more, far from the critical value."""
-    _, expected = search_result("dam", "k_h", DAM)
+    _, expected = search_result("dam", "k_h", RUPTURE)
     follow = FailurePath.follow
     monkeypatch.setattr(FailurePath, "follow", lambda p, far: far < path.SURE or follow(p, far))
-    search, answer = search_result("dam", "k_h", DAM)
+    search, answer = search_result("dam", "k_h", RUPTURE)
     first_estimate = next(t for t in search.trials if t.stands and t.path.points[-1].imposed)
     assert first_estimate.value < 0.8 * answer.value and search.factor == path.SURE
     assert answer.value == pytest.approx(expected.value, rel=2 * path.PRECISION)
@@ -228,7 +230,7 @@ def test_only_hardening_set_by_the_user_counts_as_strength():
 
 
 def test_critical_level_of_a_crushed_toe():
-    _, answer = search_result("dam", settings=DAM | {"f_c": 5e6}, tail_levels="3")
+    _, answer = search_result("dam", settings=RUPTURE | {"f_c": 5e6}, tail_levels="3")
     assert answer.mode == "crushed toe" and "f_c = 5e+06" in answer.why
     assert 0.999 * 5e6 < answer.point.compression <= 5e6
 

@@ -4,6 +4,7 @@ import csv
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from damjoint import RunError
 from damjoint.dynamics import step as step_module
 from damjoint.dynamics.frames import MOST_FRAMES, Frames, interval_of
 from damjoint.dynamics.history import QuakeHistory
+from damjoint.dynamics.record import read
 from damjoint.dynamics.scheme import Motion
 from damjoint.dynamics.step import TimeStep
 from damjoint.fem import factor
@@ -18,6 +20,8 @@ from damjoint.fem.bodies import Bodies, material_of
 from damjoint.fem.elasticity import stress
 from damjoint.model.case import load
 from damjoint.solver.history import joint_row
+from damjoint.studies import chart, outcome, quake_summary, sweep
+from damjoint.studies.plan import Plan
 from damjoint.studies.quake import QuakeRun
 from quakes import BLOCK, DAM, earthquake, joint_of, mean_slip, smooth_record, write_record
 from scipy.integrate import solve_ivp
@@ -214,7 +218,7 @@ ELASTIC = DAM | {"adhesion": 1e12}
 
 @pytest.mark.parametrize("alpha", [-0.05, pytest.param(0.0, marks=pytest.mark.heavy)])
 def test_the_error_falls_with_the_square_of_the_step(tmp_path, alpha):
-    record = smooth_record(tmp_path / "r.csv", 2.0, duration=0.64, interval=0.00125)
+    record = smooth_record(tmp_path / "r.csv", 2.0, duration=0.64)
     ends = []
     for dt in (0.01, 0.005, 0.0025, 0.00125):
         settings = ELASTIC | {"dt": dt, "hht_alpha": alpha, "record_rest": 0.0}
@@ -241,11 +245,14 @@ def test_frequencies_against_a_dense_eigenvalue_solution(tmp_path):
     assert quake.frequencies == pytest.approx(expected, rel=1e-7)
 
 
-def test_free_vibration_decays_as_rayleigh_damping_says(tmp_path):
-    """In the first mode, at the damping's first frequency: amplitude exp(-xi omega t)."""
-    settings = ELASTIC | {"damping": 0.05, "damping_mass": 1.0, "hht_alpha": 0.0}
-    quake = earthquake(smooth_record(tmp_path / "r.csv", 1.0), settings, "40")
-    assert [quake.damping.ratio(f) for f in quake.frequencies[[0, 2]]] == pytest.approx([0.05] * 2)
+@pytest.mark.parametrize("braked", [2.0, 1.0])
+def test_free_vibration_decays_as_rayleigh_damping_says(tmp_path, braked):
+    """In the first mode, at the damping's first frequency: amplitude exp(-xi omega t); braked by
+    its mass part with the added water (2), or without (1).
+    """
+    settings = ELASTIC | {"damping": 0.05, "damping_mass": braked, "hht_alpha": 0.0}
+    record = smooth_record(tmp_path / "r.csv", 1.0)
+    quake = earthquake(record, settings, "40")
     problem, system = quake.problem, quake.system
     interface = problem.model.equilibrium.interface
     points = np.arange(len(interface.weights))
@@ -255,7 +262,15 @@ def test_free_vibration_decays_as_rayleigh_damping_says(tmp_path):
     mode = 1e-3 * mode / (system.crest @ mode)[0]
     # the joint's stiffness is not damped: the part of K of the bodies in this mode
     share = mode @ system.stiffness @ mode / (omega**2 * (mode @ system.mass @ mode))
-    xi = quake.damping.a0 / (2 * omega) + quake.damping.a1 * omega / 2 * share
+    dry = earthquake(record, settings | {"added_mass": 0.0}, "40").system
+    of_mass = dry.mass if braked == 1 else system.mass
+    mass_share = mode @ of_mass @ mode / (mode @ system.mass @ mode)
+    assert (mass_share == 1) == (braked == 2) and mass_share > 0.5
+    xi = quake.damping.a0 / (2 * omega) * mass_share + quake.damping.a1 * omega / 2 * share
+    assert quake.modes[0].damping == pytest.approx(xi, rel=1e-6)
+    assert quake.modes[0].frequency == pytest.approx(frequencies[0])
+    nominal = quake.damping.a0 / (2 * omega) + quake.damping.a1 * omega / 2
+    assert nominal == pytest.approx(0.05)
     dt = 2 * np.pi / omega / 200
     start = Motion(mode, np.zeros(len(mode)), -(omega**2) * mode)
     forces = of_joints @ mode[system.jumps]
@@ -270,6 +285,22 @@ def test_free_vibration_decays_as_rayleigh_damping_says(tmp_path):
     peaks = [max(crest[k * 200 - 60 : k * 200 + 60]) for k in (1, 2)]
     expected = np.exp(-2 * np.pi * xi / np.sqrt(1 - xi**2))
     assert peaks[1] / peaks[0] == pytest.approx(expected, rel=2e-3)
+
+
+def test_modes_are_named_by_the_mass_that_moves_along_each_axis(tmp_path):
+    """The first one of a dam sways; all modes of a block on a soft joint move its whole mass along
+    one axis each.
+    """
+    record = smooth_record(tmp_path / "r.csv", 1.0)
+    first = earthquake(record, ELASTIC, "40").modes[0]
+    assert first.along_x > 0.5 > 5 * first.along_y
+    soft = {"dam_height": 8.0, "K_N": 1e7, "K_T": 1e5, "adhesion": 1e12}
+    modes = earthquake(record, BLOCK | soft).modes
+    assert sum(mode.along_x for mode in modes) == pytest.approx(1, rel=1e-2)
+    assert max(mode.along_y for mode in modes) == pytest.approx(1, rel=1e-2)
+    assert modes[0].along_x == pytest.approx(1, rel=1e-2)
+    mass, length = 2400 * 64, 8.0
+    assert modes[0].frequency == pytest.approx(np.sqrt(1e5 * length / mass) / 2 / np.pi, rel=2e-2)
 
 
 @pytest.mark.heavy
@@ -481,7 +512,7 @@ def case_file(tmp_path):
     """A case with a record beside it."""
     smooth_record(tmp_path / "wave.csv", 5.0, duration=0.5)
     path = tmp_path / "my.case"
-    settings = {n: v for n, v in DAM.items() if n != "record_unit"}
+    settings = {n: v for n, v in DAM.items() if n != "record_unit"} | {"record_rest": 0.5}
     lines = [
         f'default_{n} = "{v}";' if isinstance(v, str) else f"default_{n} = {v};"
         for n, v in settings.items()
@@ -500,7 +531,7 @@ def case_file(tmp_path):
 
 
 #: Where the accuracy does not matter.
-LONG_STEPS = "--set", "dt=0.01"
+LONG_STEPS = "--set", "dt=0.01", "--set", "record_rest=2"
 
 
 def test_the_command_writes_rows_summary_and_picture(command, case_file, tmp_path):
@@ -512,7 +543,7 @@ def test_the_command_writes_rows_summary_and_picture(command, case_file, tmp_pat
     rows = np.genfromtxt(folder / "quake.csv", delimiter=",", names=True)
     assert (info["state"], info["verdict"]) == ("complete", "stands")
     assert "residual slip" in info["statement"]
-    assert len(rows) == found["steps"] and rows["time"][-1] == pytest.approx(0.7)
+    assert len(rows) == found["steps"] and rows["time"][-1] == pytest.approx(1.0)
     peak = found["peaks"]["crest_ux"]
     assert abs(peak["value"]) == pytest.approx(np.abs(rows["crest_ux"]).max())
     assert rows["crest_ux"][rows["time"] == peak["time"]] == pytest.approx(peak["value"])
@@ -533,9 +564,114 @@ def test_the_command_writes_rows_summary_and_picture(command, case_file, tmp_pat
     assert "earthquake wave.csv, " in page and "data:image/png" in page
 
 
+def test_run_json_has_what_that_of_a_run_has(command, case_file, tmp_path):
+    """But for the estimate of the discretisation error and what only load steps have."""
+    short = "--set", "dt=0.01", "--no-picture", "--set", "record_rest=0.3"
+    assert command("quake", case_file, *short)[0] in (0, 1)
+    assert command("run", case_file, "--no-picture", "--no-fields")[0] == 0
+    run, quake = (
+        json.loads((tmp_path / "out" / name / "run.json").read_text())
+        for name in ("my", "my_quake")
+    )
+    assert run.keys() <= quake.keys()
+    for name in ("commit", "machine", "versions"):
+        assert quake[name] == run[name] and quake[name]
+    assert quake["peak_memory_mb"] > 10
+
+
+def values_of(rest, law="friction", slip=0.0, opening=0.0, broken=0.0, K_T=1e9):
+    """values_at_end of a dam whose joint, since the ground is at rest, slips by a part of its
+    slip of 10 mm and opens by a part of its largest opening of 1 mm; it vibrates all the time.
+    """
+    case = load("dam", {"law": law, "K_T": K_T})
+    time = np.arange(0.01, 2 + rest + 1e-6, 0.01)
+    wave, shaken = np.sin(2 * np.pi * 5 * time), time < 2
+    late = np.clip((time - 2) / max(rest, 0.01), 0, 1)
+    rows = {name: np.where(shaken, wave, 0.0) for name in ("ground_ax", "ground_ay")}
+    shear = 1e6 * wave
+    plastic = 0.01 * np.clip(time / 1.5, 0, 1) + slip * 0.01 * late
+    rows |= {"time": time, "crest_ux": wave, "crest_ax": wave, "T": shear}
+    rows["slip_mean"] = plastic + shear / (K_T * case.joint_length)
+    rows["heel_opening"] = np.where(shaken, 1e-3, -1e-4) * wave
+    rows["toe_opening"] = np.where(shaken, -1e-4, opening * 1e-3) * wave
+    rows["open_length"] = np.zeros(len(time))
+    rows["broken_length"] = np.full(len(time), broken * case.joint_length)
+    return case, quake_summary.values_at_end(case, rows, 0.2)
+
+
+@pytest.mark.parametrize(
+    "rest, change, at_rest",
+    [
+        (2.0, {}, True),  # though the elastic part of the slip varies by 0.06 mm
+        (2.0, {"slip": 0.015}, True),
+        (2.0, {"slip": 0.05}, False),
+        (2.0, {"opening": 0.05}, True),
+        (2.0, {"opening": 0.5}, False),
+        (0.5, {}, True),
+        (0.3, {}, False),  # shorter than twice the first period
+        (0.0, {}, False),
+    ],
+)
+def test_a_residual_slip_is_one_at_rest(rest, change, at_rest):
+    case, found = values_of(rest, **change)
+    found["after"] = {"equilibrium": True}
+    words = quake_summary.statement(case, found)
+    verdict = "stands" if at_rest else "not at rest"
+    assert quake_summary.verdict(case, found) == verdict
+    assert found["at_rest"] == at_rest == ("slip" in found["residual"])
+    assert words.startswith("residual slip 1" if at_rest else "not at rest in the last ")
+    assert words.endswith(
+        "the dam stands after the earthquake" if at_rest else "whether the dam stands is not known"
+    )
+    if not change and at_rest:
+        assert found["residual"]["slip"] == pytest.approx(0.01, rel=1e-3)
+    assert ("set a longer record_rest" in words) != at_rest
+
+
+@pytest.mark.parametrize(
+    "law, broken, verdict, begin",
+    [
+        ("rupture", 1.0, "broken without friction", "law = rupture has no friction"),
+        ("rupture", 0.6, "stands", "law = rupture has no friction"),
+        ("rupture", 0.0, "stands", "residual slip"),
+        ("bond", 1.0, "stands", "residual slip"),
+    ],
+)
+def test_a_broken_joint_without_friction_is_said_first(law, broken, verdict, begin):
+    case, found = values_of(2.0, law=law, broken=broken)
+    found["after"] = {"equilibrium": True}
+    words = quake_summary.statement(case, found)
+    assert quake_summary.verdict(case, found) == verdict and words.startswith(begin)
+    assert words.endswith("; the dam stands after the earthquake") == (verdict == "stands")
+
+
+@pytest.mark.usefixtures("no_pictures")
+def test_a_dam_that_flies_away_does_not_stand(command, case_file):
+    """Broken by a law without friction; exit code 1, and the sentence is first."""
+    weak = "--set", "law=rupture", "--set", "sigma_max=1e3", "--set", "G_f=1"
+    code, out, _ = command("quake", case_file, *weak, "--set", "record_scale=2")
+    assert code == 1
+    assert out.startswith("my: law = rupture has no friction, and the joint has broken over 100%")
+    info = json.loads(Path("out/my_quake/run.json").read_text())
+    assert info["verdict"] in ("broken without friction", "no equilibrium")
+
+
+@pytest.mark.usefixtures("no_pictures")
+def test_notes_come_before_the_numbers(command, case_file):
+    """Steps that do not resolve the first period; an offset of the record."""
+    rows, _ = read(smooth_record(Path("wave.csv"), 5.0, duration=0.5, frequency=4.0))
+    write_record(Path("wave.csv"), rows[:, 0], rows[:, 1] + 0.3)
+    _, out, _ = command("quake", case_file, *LONG_STEPS)
+    assert [line.startswith("note: ") for line in out.splitlines()[:5]].count(True) == 2
+    assert "the horizontal record leaves the ground with 0.15" in out
+    assert "dt = 0.01 s is longer than a thirtieth of the first period, 0.00537 s" in out
+    better = "--set", "record_baseline=corrected", "--set", "dt=0.005"
+    assert "note: " not in command("quake", case_file, *better)[1]
+
+
 def test_a_joint_that_stays_closed_has_no_peak_of_its_opening(command, case_file, tmp_path):
     """Neither a value nor a picture of it; its water does not follow a crack."""
-    weak = "--set", "record_scale=0.05", "--set", "record_rest=0", "--set", "required_SSF=1.2"
+    weak = "--set", "record_scale=0.05", "--set", "required_SSF=1.2"
     code, out, _ = command("quake", case_file, *weak, "--no-picture")
     folder = tmp_path / "out" / "my_quake"
     found = json.loads((folder / "run.json").read_text())
@@ -545,7 +681,7 @@ def test_a_joint_that_stays_closed_has_no_peak_of_its_opening(command, case_file
         assert largest == pytest.approx(rows[name].max()) and largest < 0
     assert code == 0 and out.count("closed") == 3  # and of the frequencies: joint closed
     case = load(
-        "dam", DAM | {"record_rest": 0.0, "record_scale": 0.05}, "30", record=Path("wave.csv")
+        "dam", DAM | {"record_rest": 0.5, "record_scale": 0.05}, "30", record=Path("wave.csv")
     )
     under_way = QuakeRun(case)
     for _ in under_way.steps():
@@ -699,6 +835,87 @@ def test_a_sweep_of_earthquakes(command, case_file, tmp_path):
     assert code == 2 and "--quake 0: must be a slip > 0 m" in err
 
 
+def quake_rows(name, values, slips, verdicts):
+    """Rows of a sweep of earthquakes."""
+    return [
+        {
+            name: f"{value:g}",
+            "residual_slip": "" if slip is None else f"{slip:g}",
+            "residual_tilt": "" if slip is None else "1e-5",
+            "rigid_block_slip": "0.01",
+            "peak_ground_ax": "2",
+            "failed": "0" if verdict == "stands" else "1",
+            "verdict": verdict,
+            "crack_length": "0",
+            "max_opening": "0",
+            "crest_ux": "1",
+        }
+        for value, slip, verdict in zip(values, slips, verdicts, strict=True)
+    ]
+
+
+def drawn_panels(monkeypatch, plan, rows):
+    """The axes of a chart by the label of their vertical axis."""
+    figures = []
+    monkeypatch.setattr(chart, "write_picture", lambda figure, *_: figures.append(figure))
+    case = load("dam")
+    assert chart.draw(plan, rows, [case] * len(rows), "earthquakes", Path("chart.png")) == ""
+    return {axes.get_ylabel(): axes for axes in figures[0].axes}
+
+
+def test_the_chart_of_earthquakes_shows_their_slip(monkeypatch):
+    """Also of the rows that fail by it; the limit; where a row has none a cross at the edge."""
+    scales = [1.0, 2.0, 3.0]
+    verdicts = ["stands", "residual slip", "not at rest"]
+    rows = quake_rows("record_scale", scales, [-0.02, 0.08, None], verdicts)
+    panels = drawn_panels(monkeypatch, Plan({"record_scale": scales}, {}, {}, "", 0.05), rows)
+    assert set(panels) == {
+        "residual slip [mm]",
+        "residual tilt [µrad]",
+        "slip of a rigid block [mm]",
+        "largest acceleration of the ground [m/s$^2$]",
+    }
+    lines = panels["residual slip [mm]"].lines
+    good, crosses, edges = (line.get_ydata() for line in lines[:3])
+    assert good[0] == pytest.approx(-20) and np.isnan(good[1:]).all()
+    assert crosses == pytest.approx([80]) and len(edges) == 1
+    limits = [line.get_ydata()[0] for line in lines if line.get_linestyle() == "--"]
+    assert limits == pytest.approx([50, -50])
+
+
+def test_statistics_of_earthquakes_are_those_of_their_slip(monkeypatch):
+    """The rank correlation is over all rows at rest; a dam that is not is undecided."""
+    draws = [0.6, 0.7, 0.8, 0.9]
+    slips, verdicts = [0.3, 0.2, 0.1, None], [*3 * ["residual slip"], "not at rest"]
+    rows = quake_rows("mu", draws, slips, verdicts)
+    plan = Plan({}, {"mu": draws}, {}, "", 0.05)
+    (row,) = outcome.sensitivities(plan, rows)
+    assert row["residual_slip"] == pytest.approx(-1) and "max_opening" not in row
+    (share,) = outcome.probabilities(plan, rows)
+    assert (share["fail"], share["undecided"]) == (3, 1)
+    panels = drawn_panels(monkeypatch, plan, rows)
+    assert any("residual slip" in axes.get_title() for axes in panels.values())
+
+
+def test_a_row_is_judged_by_its_slip_at_rest(monkeypatch):
+    """Not at rest: by the slip at the end, or undecided."""
+    case, found = values_of(2.0)
+    found |= {"peaks": {"ground_ax": {"value": -2.0}}, "after": {"equilibrium": True}}
+    static = SimpleNamespace(results=lambda: SimpleNamespace(last={}))
+    monkeypatch.setattr(sweep.quake, "outcome_of", lambda case: (static, found))
+    judged = lambda limit: sweep.quake_row(sweep.Task(case, False, slip_limit=limit))
+    assert (judged(0.05)["verdict"], judged(0.05)["failed"]) == ("stands", 0)
+    assert judged(0.005)["verdict"] == "residual slip"
+    assert judged(0.005)["residual_slip"] == pytest.approx(0.01, rel=1e-3)
+    _, moving = values_of(2.0, slip=0.5)
+    found |= moving
+    row = judged(0.05)
+    assert (row["verdict"], row["failed"], row["residual_slip"]) == ("not at rest", 1, "")
+    assert "not at rest" in row["statement"] and "limit 50 mm" in row["statement"]
+    assert judged(0.01)["verdict"] == "residual slip"
+    assert {"not at rest", "broken without friction"} <= set(sweep.UNDECIDED)
+
+
 @pytest.mark.parametrize(
     "options, message",
     [
@@ -708,6 +925,10 @@ def test_a_sweep_of_earthquakes(command, case_file, tmp_path):
         (["--set", "record_component=vertical"], "must have an acceleration other than zero"),
         (["--set", "hht_alpha=-0.5"], "hht_alpha = -0.5: must be"),
         (["--set", "dt=0"], "dt = 0: must be"),
+        (["--set", "dt=7"], "dt = 7: must be <= 0.01 s, the shortest interval of"),
+        (["--set", "dt=1e30"], "dt = 1e+30: must be <= 0.01 s"),
+        (["--set", "record_rest=1e30"], "record_rest = 1e+30: must lead to at most 1000000 time"),
+        (["--record", "/dev/zero"], "record = /dev/zero: must be a regular file"),
         (["--set", "rock_mass=1"], "rho_found = 0: must be > 0 with rock_mass = 1"),
         (["--set", "rock_mass=2"], "rock_mass = 2: must be one of 0, 1"),
         (
@@ -720,7 +941,7 @@ def test_a_sweep_of_earthquakes(command, case_file, tmp_path):
         (["--accuracy", "1%"], "unrecognized arguments: --accuracy 1%"),
         (["--fields", "2"], "--fields 2: must be two times FIRST:LAST"),
         (["--fields", "2:1"], "--fields 2:1: must be two times FIRST:LAST"),
-        (["--fields", "3:4"], "fields = 3:4: must begin before the end of the record, 0.7 s"),
+        (["--fields", "3:4"], "fields = 3:4: must begin before the end of the record, 1 s"),
     ],
 )
 def test_bad_input_is_one_line_and_writes_nothing(command, case_file, options, message):

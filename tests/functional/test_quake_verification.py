@@ -32,7 +32,7 @@ def files(tmp_path_factory):
     record = smooth_record(folder / "wave.csv", 6.0, duration=0.6)
     settings = {"lift_heights": (20.0,), "law": ("friction", "bond"), "batter": 2.0}
     settings |= {"batter_height": 30.0, "added_mass": 2.0, "adhesion": (1e4, 1e5), "G_t": (50, 50)}
-    settings["damping_mass"] = 1.0
+    settings |= {"damping_mass": 2.0, "record_rest": 0.6}
     case = load("dam", DAM | settings, "35", record=record)
     quake.run(case, folder / "out", picture=False, progress=False)
     return QuakeFiles(case, folder / "out", 0)

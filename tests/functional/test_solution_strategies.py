@@ -10,7 +10,7 @@ from damjoint.solver.load_stepper import LoadStepper
 from damjoint.statics.verdict import verdict
 
 #: A dam of realistic stiffness; the shear release of its joint is far shorter than its jumps.
-RELEASED = {"dam_height": 40, "dam_base": 30, "E": 1e10, "sigma_max": 0}
+RELEASED = {"law": "rupture", "dam_height": 40, "dam_base": 30, "E": 1e10, "sigma_max": 0}
 
 
 @pytest.mark.parametrize("uplift", ["imposed", "flow"])

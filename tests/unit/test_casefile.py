@@ -185,7 +185,7 @@ def test_endless_inclusion_is_refused(command, tmp_path, text):
     os.mkfifo(tmp_path / "pipe.case")
     code, _, err = command("run", write(tmp_path, text))
     assert code == 2 and len(err.splitlines()) == 1
-    assert "must be a file" in err or "more than 50 files" in err
+    assert "must be a regular file" in err or "more than 50 files" in err
 
 
 def test_without_times_each_level_is_a_step(tmp_path):
@@ -210,8 +210,10 @@ def test_defaults_are_a_realistic_dam():
     """Concrete on rock; dependent defaults follow the geometry."""
     case = load("dam")
     assert 1e10 <= case["E"] <= 5e10 and case["dam_height"] == 45
-    energy = case["sigma_max"] ** 2 * (1 + case["pena_rupture"]) / (2 * case["K_N"])
-    assert 50 <= energy <= 200  # N/m
+    assert case["law"] == "bond" and 50 <= case["G_f"] <= 200 <= case["G_t"]  # N/m
+    brittle = load("dam", {"law": "rupture"})
+    energy = case["sigma_max"] ** 2 * (1 + brittle["pena_rupture"]) / (2 * case["K_N"])
+    assert energy == pytest.approx(case["G_f"])
     assert (case["found_side"], case["found_depth"]) == (90, 90)
     assert case.levels[-1] == 45
     taller = load("dam", {"dam_height": 60.0, "E": 3e10})

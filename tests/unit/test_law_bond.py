@@ -113,8 +113,8 @@ def test_impossible_fracture_energies_are_refused(settings, message):
 
 def test_fracture_energy_of_the_rupture_law():
     """From pena_rupture, or the other way round: sigma_max^2 (1 + P)/(2 K_N)."""
-    assert load("dam", {"G_f": 50.0})["pena_rupture"] == pytest.approx(249)
-    assert load("dam", {"pena_rupture": 249.0})["G_f"] == pytest.approx(50)
+    assert load("dam", {"law": "rupture", "G_f": 50.0})["pena_rupture"] == pytest.approx(249)
+    assert load("dam", {"law": "rupture", "pena_rupture": 249.0})["G_f"] == pytest.approx(50)
     assert load("a")["G_f"] == pytest.approx(100**2 * 1.2 / 2e12)
     assert load("dam", {"sigma_max": 0.0})["G_f"] == 100
 

@@ -4,7 +4,6 @@ there is a third one, vertical acceleration.
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -12,14 +11,28 @@ from pathlib import Path
 import numpy as np
 
 from .. import ROUND_OFF, InputError
-from ..arrays import Array
+from ..arrays import Array, IntArray
 from ..model.case import Case
+from ..model.parameters import TINY
+from ..storage import text_of
 
 #: Standard gravity [m/s2], for records in g.
 STANDARD_GRAVITY = 9.80665
 
-#: Limit of the rows of a record.
-MOST_ROWS = 1_000_000
+#: Limits of a record: rows, bytes of its file; largest acceleration [m/s2], largest time and
+#: shortest interval [s].
+MOST_ROWS, LONGEST = 1_000_000, 200_000_000
+LARGEST, LATEST, SHORTEST = 1e4, 1e10, 1e-9
+
+#: Differences of intervals by the digits of the times in a file, relative.
+DIGITS = 0.01
+
+#: Limit of the time steps of an earthquake.
+MOST_STEPS = 1_000_000
+
+#: Velocity of the ground at the end of a record over its largest one, beyond which the record has
+#: an offset.
+OFFSET_SHARE = 0.1
 
 
 @dataclass(frozen=True)
@@ -33,10 +46,12 @@ class Record:
 
     @staticmethod
     def of(case: Case) -> Record:
-        """The record of a case: scaled, from record_start on, followed by a rest.
+        """The record of a case: scaled, from record_start on, its baseline corrected if required,
+        followed by a rest.
 
         A record that does not start at zero gets a row of zeros one interval before: a load that is
-        there at the start would be counted half. Raises InputError.
+        there at the start would be counted half. Raises InputError, also if the time step does not
+        resolve it or leads to more than MOST_STEPS steps.
         """
         if case.record is None:
             raise InputError(
@@ -47,12 +62,18 @@ class Record:
                 "record_unit = unstated: must be m/s2 or g, the unit of the accelerations in "
                 f"{case.record}"
             )
-        rows = read(case.record)
+        rows, lines = read(case.record)
         unit = STANDARD_GRAVITY if case["record_unit"] == "g" else 1.0
         parts = {"both": (1, 1), "horizontal": (1, 0), "vertical": (0, 1)}
         scale = unit * case["record_scale"] * np.array(parts[case["record_component"]])
         start, rest = case["record_start"], case["record_rest"]
         times, acceleration = rows[:, 0], rows[:, 1:] * scale
+        large = np.flatnonzero(np.abs(acceleration).max(axis=1) > LARGEST)
+        if len(large):
+            raise InputError(
+                f"record = {case.record}, row {lines[large[0]]}: must be at most {LARGEST:g} m/s2 "
+                f"(record_unit = {case['record_unit']}, record_scale = {case['record_scale']:g})"
+            )
         if not times[0] <= start < times[-1]:
             raise InputError(
                 f"record_start = {start:g}: must be >= {times[0]:g} and < {times[-1]:g} s, the "
@@ -65,10 +86,14 @@ class Record:
                 f"{case['record_scale']:g})"
             )
         interval = float(np.diff(times).min())
+        check_steps(case, times, lines)
         first = at(times, acceleration, start)
         later = times > start + ROUND_OFF * interval
         times = np.concatenate([[start], times[later]])
         acceleration = np.vstack([first, acceleration[later]])
+        if case["record_baseline"] == "corrected":
+            acceleration = acceleration - baseline(times, acceleration)
+            first = acceleration[0]
         if first.any():
             times = np.concatenate([[start - interval], times])
             acceleration = np.vstack([np.zeros(2), acceleration])
@@ -88,6 +113,10 @@ class Record:
         """The shortest interval between two rows [s]."""
         return float(np.diff(self.times).min())
 
+    def time_step(self, case: Case) -> float:
+        """The longest time step [s]: dt, by default half the shortest interval."""
+        return float(self.interval / 2 if case["dt"] == -1 else case["dt"])
+
     def at(self, time: float) -> Array:
         """Acceleration along x and y (2,) [m/s2] at a time."""
         return at(self.times, self.acceleration, time)
@@ -104,8 +133,22 @@ class Record:
     @cached_property
     def _velocities(self) -> Array:
         """Velocity at the times (n, 2)."""
-        means = (self.acceleration[1:] + self.acceleration[:-1]) / 2
-        return np.vstack([np.zeros(2), np.cumsum(np.diff(self.times)[:, None] * means, axis=0)])
+        return integral(self.times, self.acceleration)
+
+    def offsets(self) -> list[str]:
+        """What remains of the ground's velocity at the end, in words, a text for each component in
+        which it is more than OFFSET_SHARE of the largest velocity.
+        """
+        texts = []
+        for axis, velocity in zip(("horizontal", "vertical"), self._velocities.T, strict=True):
+            last, largest = velocity[-1], np.abs(velocity).max()
+            if abs(last) > OFFSET_SHARE * largest:
+                texts.append(
+                    f"the {axis} record leaves the ground with {last:.3g} m/s, its largest "
+                    f"velocity is {largest:.3g} m/s: it may have an offset, which moves the dam "
+                    '(record_baseline = "corrected" removes it)'
+                )
+        return texts
 
     def delayed(self, time: float) -> Record:
         """The record later by a time [s], after rest."""
@@ -114,41 +157,104 @@ class Record:
         )
 
 
+def check_steps(case: Case, times: Array, lines: IntArray) -> None:
+    """Raise InputError if the time steps of a case do not resolve its record, or are too many;
+    lines: of the times (n,) in its file.
+    """
+    name, intervals, dt = f"record = {case.record}", np.diff(times), case["dt"]
+    k, typical = int(intervals.argmin()), float(np.median(intervals))
+    shortest, rest = float(intervals[k]), case["record_rest"]
+    if shortest < SHORTEST:
+        raise InputError(
+            f"{name}, row {lines[k + 1]}: t = {times[k + 1]:g} s: must be >= {SHORTEST:g} s after "
+            "the time before"
+        )
+    own = f"the shortest interval of {case.record}"
+    if shortest < typical * (1 - DIGITS):
+        own += f" (before row {lines[k + 1]}; half of its intervals are >= {typical:g} s)"
+    if dt > shortest * (1 + DIGITS):
+        raise InputError(f"dt = {dt:g}: must be <= {shortest:g} s, {own}")
+    duration = float(times[-1]) - case["record_start"]
+    step = shortest / 2 if dt == -1 else dt
+    number = (duration + rest) / max(step, TINY)
+    if number <= MOST_STEPS:
+        return
+    cause = f"dt = {dt:g}" + (f", half {own}" if dt == -1 else "")
+    if duration + rest > typical / 2 * MOST_STEPS:
+        longest = f"{name}, row {lines[-1]}: t = {times[-1]:g} s"
+        cause = f"record_rest = {rest:g}" if rest > duration else longest
+    raise InputError(
+        f"{cause}: must lead to at most {MOST_STEPS} time steps, not {number:.3g} of {step:.3g} s"
+    )
+
+
+def integral(times: Array, acceleration: Array) -> Array:
+    """Velocity (n, 2) [m/s] at the times (n,) of an acceleration (n, 2) that is linear between
+    them, from rest.
+    """
+    means = (acceleration[1:] + acceleration[:-1]) / 2
+    return np.vstack([np.zeros(2), np.cumsum(np.diff(times)[:, None] * means, axis=0)])
+
+
+def baseline(times: Array, acceleration: Array) -> Array:
+    """The line in time (n, 2) [m/s2] without which the velocity is zero at the end and has the
+    smallest mean square [after Berg and Housner 1961, there a parabola].
+    """
+    t, velocity = times - times[0], integral(times, acceleration)
+    duration, weights = t[-1], np.gradient(t)
+    mean = velocity[-1] / duration
+    curve = t * (t - duration) / 2  # velocity of an acceleration t - duration/2
+    slope = (weights * curve) @ (velocity - np.outer(t, mean)) / (weights @ curve**2)
+    return mean + np.outer(t - duration / 2, slope)
+
+
 def at(times: Array, values: Array, time: float | Array) -> Array:
     """Values (n, 2) at times (n,), linear between them, at a time (2,) or at times (m, 2)."""
     return np.stack([np.interp(time, times, column) for column in values.T], axis=-1)
 
 
-def read(path: Path) -> Array:
-    """The rows of a record (n, 3): time, horizontal and vertical acceleration, 0 if it has none.
+def read(path: Path) -> tuple[Array, IntArray]:
+    """The rows of a record (n, 3): time, horizontal and vertical acceleration, 0 if it has none;
+    and their numbers (n,) among the lines of the file.
 
     Lines that begin with # are comments; the first line may be a heading. Raises InputError.
     """
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            lines = [line for line in file if line.strip() and not line.startswith("#")]
-    except OSError as error:
-        raise InputError(f"record = {path}: {error.strerror}") from None
-    except UnicodeDecodeError as error:
-        raise InputError(f"record = {path}: {error}") from None
-    table = [[cell.strip() for cell in row] for row in csv.reader(lines[: MOST_ROWS + 2])]
-    rows = []
-    for number, row in enumerate(table):
+    name, meaning = f"record = {path}", "time [s], horizontal and, if any, vertical acceleration"
+    lines = text_of(path, name, LONGEST).splitlines()
+    rows, numbers = list[list[float]](), list[int]()
+    heading = True  # the first line that is none
+    for number, line in enumerate(lines, start=1):
+        if not line.strip() or line.startswith("#"):
+            continue
+        if len(rows) == MOST_ROWS:
+            raise InputError(f"{name}, row {number}: must have at most {MOST_ROWS} rows")
         try:
-            rows.append([float(cell) for cell in row])
+            row = [float(cell) for cell in line.split(",")]
         except ValueError:
-            if number:
+            if not heading:
                 raise InputError(
-                    f"record = {path}, row {number + 1}: {','.join(row)[:60]}: must be numbers: "
-                    "time [s], horizontal and, if any, vertical acceleration"
+                    f"{name}, row {number}: {line.strip()[:60]}: must be numbers: {meaning}"
                 ) from None
-    widths = {len(row) for row in rows}
-    if not 2 <= len(rows) <= MOST_ROWS or widths not in ({2}, {3}):
-        raise InputError(
-            f"record = {path}: must have 2 to {MOST_ROWS} rows of time [s], horizontal and, if "
-            "any, vertical acceleration"
-        )
-    values = np.pad(np.array(rows), ((0, 0), (0, 3 - widths.pop())))
-    if not np.isfinite(values).all() or not (np.diff(values[:, 0]) > 0).all():
-        raise InputError(f"record = {path}: must have finite numbers, and times that increase")
-    return values
+        else:
+            if len(row) not in (2, 3) or (rows and len(row) != len(rows[0])):
+                raise InputError(
+                    f"{name}, row {number}: {line.strip()[:60]}: must have 2 or 3 numbers, as many "
+                    f"as the others: {meaning}"
+                )
+            if not (np.isfinite(row).all() and abs(row[0]) <= LATEST):
+                raise InputError(
+                    f"{name}, row {number}: {line.strip()[:60]}: must be finite numbers, the time "
+                    f"within {LATEST:g} s"
+                )
+            if rows and not row[0] > rows[-1][0]:
+                raise InputError(
+                    f"{name}, row {number}: t = {row[0]:g} s: must be > {rows[-1][0]:g} s, the "
+                    "time before: times that increase"
+                )
+            rows.append(row)
+            numbers.append(number)
+        heading = False
+    if len(rows) < 2:
+        raise InputError(f"{name}: must have 2 to {MOST_ROWS} rows of {meaning}")
+    values = np.array(rows)
+    return np.pad(values, ((0, 0), (0, 3 - values.shape[1]))), np.array(numbers)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .. import ROUND_OFF, RunError
-from ..arrays import Array
+from ..arrays import Array, Sparse
 from ..fem.bodies import Bodies
 from ..model.case import Case
 from ..solver.model import LARGEST_JUMP, Model
@@ -28,15 +28,22 @@ from .uplift import pressures_in_motion
 MOST_HALVINGS = 10
 
 
+#: Values of damping_mass.
+WITHOUT, OF_CONCRETE, WITH_WATER = range(3)
+
+
 @dataclass(frozen=True)
 class Damping:
-    """Rayleigh's damping a0 M + a1 K of the bodies, a0 = 0 without its mass part."""
+    """Rayleigh's damping a0 M + a1 K of the bodies, a0 = 0 without its mass part; M is that of the
+    concrete or, if required, also of the added water.
+    """
 
     #: the two frequencies [Hz], and the coefficients [1/s], [s]
     first: float
     second: float
     a0: float
     a1: float
+    with_water: bool = False
 
     @staticmethod
     def of(case: Case, frequencies: Array) -> Damping:
@@ -45,12 +52,37 @@ class Damping:
         f1, f2 = (float(own if given == -1 else given) for given, own in ends)
         w1, w2 = 2 * math.pi * f1, 2 * math.pi * f2
         a1 = 2 * case["damping"] / (w1 + w2)
-        return Damping(f1, f2, a1 * w1 * w2 * case["damping_mass"], a1)
+        a0 = a1 * w1 * w2 if case["damping_mass"] != WITHOUT else 0.0
+        return Damping(f1, f2, a0, a1, case["damping_mass"] == WITH_WATER)
 
-    def ratio(self, frequency: float) -> float:
-        """Damping ratio at a frequency [Hz]."""
-        w = 2 * math.pi * frequency
-        return self.a0 / (2 * w) + self.a1 * w / 2
+    def matrix(self, system: System) -> Sparse:
+        """The damping (n, n) of a system's mass and stiffness."""
+        return self.a0 * (system.mass if self.with_water else system.solid) + (
+            self.a1 * system.stiffness
+        )
+
+
+@dataclass(frozen=True)
+class Mode:
+    """A natural mode, undamped: with undamaged joints, the water's mass and massless rock."""
+
+    #: [Hz]
+    frequency: float
+    #: damping ratio
+    damping: float
+    #: effective modal masses along x and y, over the whole mass
+    along_x: float
+    along_y: float
+
+    @staticmethod
+    def of(system: System, damping: Damping, frequencies: Array, shapes: Array) -> list[Mode]:
+        """The modes of frequencies (k,) [Hz] and shapes (n, k)."""
+        masses = np.einsum("nk,nk->k", shapes, system.mass @ shapes)
+        damped = np.einsum("nk,nk->k", shapes, damping.matrix(system) @ shapes)
+        ratios = damped / (4 * math.pi * frequencies * masses)
+        shares = (shapes.T @ system.inertia) ** 2 / masses[:, None] / system.total
+        values = np.column_stack([frequencies, ratios, shares])
+        return [Mode(*map(float, row)) for row in values]
 
 
 @dataclass(frozen=True)
@@ -87,19 +119,24 @@ class Earthquake:
         undamaged = model.equilibrium.undamaged
         of_joints = interface.stiffness(undamaged, np.arange(len(interface.weights)))
         #: natural frequencies [Hz] with undamaged joints, the water's mass and massless rock
-        self.frequencies = system.frequencies(of_joints, FREQUENCIES)[0]
+        self.frequencies, shapes = system.frequencies(of_joints, FREQUENCIES)
         self.damping = Damping.of(case, self.frequencies)
+        self.modes = Mode.of(system, self.damping, self.frequencies, shapes)
         normal, tangential = case["joint_damping_n"], case["joint_damping_t"]
-        a0, a1 = self.damping.a0, self.damping.a1
-        damping = a0 * system.mass + a1 * system.stiffness
+        damping = self.damping.matrix(system)
         #: the rock, if it has mass
         self.rock: AbsorbingRock | None = None
         if case["rock_mass"]:
             self.record = self.record.delayed(travel_time(case, self.record.interval))
             self.system = system = System.of(case, bodies, interface)
             self.rock = rock = AbsorbingRock.of(case, bodies, system.motion, self.record)
-            damping = a0 * (system.mass - rock.mass) + a1 * (system.stiffness - rock.stiffness)
-            damping += rock.dashpots
+            of_dam = replace(
+                system,
+                mass=system.mass - rock.mass,
+                solid=system.solid - rock.mass,
+                stiffness=system.stiffness - rock.stiffness,
+            )
+            damping = self.damping.matrix(of_dam) + rock.dashpots
         self.problem = Problem(
             model=model,
             static=static,
@@ -108,9 +145,8 @@ class Earthquake:
             damping=damping,
             dashpots=np.array([normal, tangential, tangential]),
         )
-        given = case["dt"]
         #: longest step [s]
-        self.dt = self.record.interval / 2 if given == -1 else given
+        self.dt = self.record.time_step(case)
         self.now = self.problem.at_rest
         self.steps_of_length: dict[int, TimeStep] = {}
 

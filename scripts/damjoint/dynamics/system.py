@@ -45,12 +45,16 @@ class System:
     """The matrices over w (n,), of which the last ones, `jumps`, are those of the joints."""
 
     mass: Sparse
+    #: mass without the added water
+    solid: Sparse
     stiffness: Sparse
     #: T_b (degrees of freedom, n) and function space of each body
     motion: dict[str, Sparse]
     spaces: dict[str, Space]
     #: mass times a unit acceleration of the ground along x and y (n, 2)
     inertia: Array
+    #: total mass that moves along x and y (2,)
+    total: Array
     #: displacement of the crest along x and y (2, n)
     crest: Sparse
     jumps: IntArray
@@ -72,23 +76,28 @@ class System:
         glued = GluedBodies.of(bodies.by_name, gluing)
         dim, size = bodies.mesh.dim, len(glued.free) + gluing.unknowns
         stiffness: Sparse = sparse.csr_matrix((size, size))
-        of_mass, inertia = stiffness, np.zeros((size, 2))
+        solid, water, inertia, total = stiffness, stiffness, np.zeros((size, 2)), np.zeros(2)
         motion = glued.motion(gluing)
         for name, body in bodies.by_name.items():
             moved = motion[name]
             of_solid = mass(body.space, dim, densities)
             of_water = added_mass(case, interface, body)
             stiffness = stiffness + moved.T @ body.stiffness.scipy() @ moved
-            of_mass = of_mass + moved.T @ (of_solid + of_water) @ moved
+            solid = solid + moved.T @ of_solid @ moved
+            water = water + moved.T @ of_water @ moved
             x, y = (nodal(body.space, dim, uniform(axis)) for axis in np.eye(3)[:2])
             # the water follows a vertical motion of the ground
-            inertia += moved.T @ np.column_stack([(of_solid + of_water) @ x, of_solid @ y])
+            forces = np.column_stack([(of_solid + of_water) @ x, of_solid @ y])
+            inertia += moved.T @ forces
+            total += np.array([x @ forces[:, 0], y @ forces[:, 1]])
         return System(
-            mass=of_mass.tocsr(),
+            mass=(solid + water).tocsr(),
+            solid=solid.tocsr(),
             stiffness=stiffness.tocsr(),
             motion=motion,
             spaces={name: body.space for name, body in bodies.by_name.items()},
             inertia=inertia,
+            total=total,
             crest=crest_rows(bodies, motion),
             jumps=np.arange(len(glued.free), size),
         )

@@ -16,7 +16,8 @@ from ..post.summary import SHOWN, Table, levels_table, requested_rows, table_of
 from ..post.units import FORCES, LENGTHS, Units, unit, with_unit
 from ..statics import gravity
 from ..statics.verdict import hints, path_statement
-from ..studies.quake_result import QuakeResult, row_of_peak
+from ..studies.quake_result import QuakeResult
+from ..studies.quake_summary import row_of_peak
 
 NUMBER: Units = (("-", 1),)
 #: Safety factors: column, heading, meaning.
@@ -125,10 +126,13 @@ class QuakeNumbers(Numbers):
             k = row_of_peak(name, rows[name])
             value = with_unit(rows[name][k], units, 3)
             peaks.append((f"largest {head}", f"{value} at {rows['time'][k]:.2f} s", QUAKE[name][1]))
+        peaks += [("Note", note, note) for note in found.summary["notes"]]
+        if not found.summary["at_rest"]:
+            peaks.append(("At rest", "no", "at the end: no residual slip"))
         for name, head, units in RESIDUAL:
             value = found.summary["residual"].get(column_of(name, joint))
             if value is not None:
-                peaks.append((head, with_unit(value, units, 3), "mean of the last second"))
+                peaks.append((head, with_unit(value, units, 3), "mean over the end of the rest"))
         times = frames.history["time"]
         shown = f"{len(times)} times, {len(rows['time'])} steps"
         peaks.append(("Shown", shown, "the curves over time have all steps"))

@@ -93,7 +93,7 @@ class SolvedScene:
                 result=found.frames,
                 bodies=found.mesh.bodies,
                 fields=fields,
-                verdict="stands" if found.stands else "no equilibrium",
+                verdict=found.static.info["verdict"],
                 end_state=found.state,
                 message="" if found.stands else found.statement,
                 statement=found.statement,

@@ -26,6 +26,7 @@ from typing import TypeAlias
 
 from .. import InputError, data
 from ..arrays import Value
+from ..storage import text_of
 from .arithmetic import arithmetic_value, explained
 from .parameters import TEXTS, Parameter, assignments, checked, declared, parameter
 
@@ -97,7 +98,7 @@ def read_into(case: CaseText, path: Path) -> None:
     if case.files > MOST_FILES:
         raise InputError(f"case {path}: includes itself, or is one of more than {MOST_FILES} files")
     statement: list[Token] = []
-    text, first = text_of(path), 0
+    text, first = text_of(path, f"case {path}", LONGEST), 0
     for match in TOKEN.finditer(text):
         kind, token = match.lastgroup or "", match[0]
         if kind == "nothing":
@@ -120,18 +121,6 @@ def included(name: str, path: Path) -> Path:
     """The file that a case file includes: beside it, else that of the package."""
     beside, packaged = path.parent / name, data("cases") / name
     return packaged if packaged.is_file() and not beside.exists() else beside
-
-
-def text_of(path: Path) -> str:
-    """The text of a case file, not longer than LONGEST."""
-    try:
-        if path.exists() and not path.is_file():  # reading a pipe or a device may not end
-            raise InputError(f"case {path}: must be a file")
-        if path.stat().st_size > LONGEST:
-            raise InputError(f"case {path}: must be a text of at most {LONGEST} bytes")
-        return path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"case {path}: {error}") from None
 
 
 def excerpt(statement: list[Token]) -> str:

@@ -27,7 +27,7 @@ tail_levels() = {{0, 0, 3}};
 #: Parameters that differ from dam to dam.
 COMMON = (
     *("law", "uplift", "dam_base", "dam_crest", "dam_height", "E_dam", "E_found", "nu", "rho_dam"),
-    *("K_N", "K_T", "sigma_max", "mu", "adhesion", "G_f"),
+    *("K_N", "K_T", "sigma_max", "mu", "adhesion", "G_f", "G_t"),
 )
 
 
@@ -45,7 +45,7 @@ def line(parameter: Parameter, value: str) -> str:
 
 #: Values of the example: of parameters that are -1 by default, and with units.
 EXAMPLE = {"E_dam": "25*GPa", "E_found": "25*GPa", "G_f": "100*N/m", "rho_dam": "2.4*t/m3"}
-EXAMPLE |= {"sigma_max": "0.2*MPa", "adhesion": "0.2*MPa"}
+EXAMPLE |= {"sigma_max": "0.2*MPa", "adhesion": "0.2*MPa", "G_t": "1000*N/m"}
 
 
 def text(name: str, title: str) -> str:

@@ -22,6 +22,7 @@ TextName: TypeAlias = Literal[
     "required_position",
     "record_unit",
     "record_component",
+    "record_baseline",
     "time_integration",
 ]
 
@@ -82,6 +83,7 @@ class EarthquakeGroup(Group):
 
     record_unit: str
     record_component: str
+    record_baseline: str
     time_integration: str
 
 

@@ -27,6 +27,14 @@ DRAWN: dict[str, tuple[str, Units]] = {
     "max_opening": ("largest opening", LENGTHS),
     "crest_ux": ("crest, downstream", LENGTHS),
 }
+#: Those of earthquakes.
+SLIP = "residual_slip"
+DRAWN_OF_QUAKES: dict[str, tuple[str, Units]] = {
+    SLIP: ("residual slip", LENGTHS),
+    "residual_tilt": ("residual tilt", (("rad", 1), ("mrad", 1e3), ("µrad", 1e6))),
+    "rigid_block_slip": ("slip of a rigid block", LENGTHS),
+    "peak_ground_ax": ("largest acceleration of the ground", (("m/s$^2$", 1),)),
+}
 #: The safety factor, which is no column of the rows.
 FACTOR, FACTOR_LABEL = "SSF", "safety factor against sliding"
 #: Most values of a parameter that are drawn as single curves or ticks.
@@ -129,15 +137,20 @@ def is_marked(plan: Plan, rows: list[Row]) -> np.ndarray:
     return fails(rows)
 
 
+def drawn_of(plan: Plan) -> dict[str, tuple[str, Units]]:
+    """The quantities of the rows that are drawn: label and units by column."""
+    return dict(DRAWN if plan.slip_limit is None else DRAWN_OF_QUAKES)
+
+
 def panels_of(figure: Figure, table: Table) -> Iterator[tuple[Axes, str, tuple[str, Units]]]:
-    """Create axes for the quantities drawn, with column, label and units: DRAWN and SSF, or the
-    critical value alone.
+    """Create axes for the quantities drawn, with column, label and units: DRAWN and SSF, those of
+    earthquakes, or the critical value alone.
     """
-    plan, drawn = table.plan, dict(DRAWN)
+    plan, drawn = table.plan, drawn_of(table.plan)
     if plan.critical:
         words, size = quantity(plan.critical)
         drawn = {plan.critical_columns[0]: (f"critical {words}", ((size, 1),))}
-    else:
+    elif plan.slip_limit is None:
         drawn[FACTOR] = FACTOR_LABEL, (("-", 1),)
     shape = (2, 2) if len(drawn) > 1 else (1, 1)
     panels = figure.subplots(*shape, squeeze=False).ravel()
@@ -158,9 +171,11 @@ def draw_curves(figure: Figure, table: Table, names: list[str]) -> None:
         key = ", ".join(f"{o} {table.rows[i][column_of(o)]}" for o in others)
         curves.setdefault(key, []).append(i)
     bad = is_marked(plan, table.rows)
+    # of a static row that fails the last state is at another level: it would set the scale
+    valued = bool(plan.critical) or plan.slip_limit is not None
     for panel, drawn, (words, units) in panels_of(figure, table):
         values = table.values(drawn)
-        shown = values if plan.critical else values[~bad]
+        shown = values if valued else values[~bad]
         size, factor = unit([np.nan_to_num(shown)], units)
         for number, (key, own) in enumerate(sorted(curves.items(), key=lambda item: item[1])):
             color, mark = CURVES[number % len(CURVES)]
@@ -168,11 +183,11 @@ def draw_curves(figure: Figure, table: Table, names: list[str]) -> None:
             style = {"color": color, "markersize": 4.5, "linestyle": "none" if categories else "-"}
             panel.plot(x[own], good, mark, **style, label=key)
             failing, cross = [i for i in own if bad[i]], color if others else RED
-            if plan.critical:
-                panel.plot(x[failing], values[failing] * factor, "x", color=cross)
-            else:  # at the edge: its last state, at another level, would set the scale
-                edge = {"transform": panel.get_xaxis_transform(), "color": cross}
-                panel.plot(x[failing], np.full(len(failing), EDGE * (1 + number)), "x", **edge)
+            at_value = [i for i in failing if valued and np.isfinite(values[i])]
+            panel.plot(x[at_value], values[at_value] * factor, "x", color=cross)
+            at_edge = [i for i in failing if i not in at_value]
+            edge = {"transform": panel.get_xaxis_transform(), "color": cross}
+            panel.plot(x[at_edge], np.full(len(at_edge), EDGE * (1 + number)), "x", **edge)
         if categories:
             panel.set_xticks(range(len(categories)), categories)
             panel.set_xlim(-0.5, len(categories) - 0.5)
@@ -187,6 +202,8 @@ def draw_curves(figure: Figure, table: Table, names: list[str]) -> None:
             panel.text(0.5, 0.6, text, ha="center", transform=panel.transAxes)
         if drawn == FACTOR:
             draw_verdicts(panel, table, x, values)
+        if drawn == SLIP:
+            draw_limit(panel, plan.slip_limit * factor, np.nanmin(values, initial=0.0) < 0)
     handles, labels = panel.get_legend_handles_labels()
     named = {text: handle for text, handle in zip(labels, handles, strict=True) if text in curves}
     if bad.any():
@@ -213,6 +230,14 @@ def draw_verdicts(panel: Axes, table: Table, x: np.ndarray, values: np.ndarray) 
     panel.legend(*zip(*shown, strict=True), fontsize=8)
 
 
+def draw_limit(panel: Axes, limit: float, both: bool) -> None:
+    """Draw the slip beyond which a row fails, in the panel's unit; both: in both directions."""
+    for side in (1, -1)[: 1 + both]:
+        words = {"label": "limit"} if side == 1 else {}
+        panel.axhline(side * limit, color="black", linestyle="--", lw=0.9, **words)
+    panel.legend(*[parts[-1:] for parts in panel.get_legend_handles_labels()], fontsize=8)
+
+
 def draw_maps(figure: Figure, table: Table, names: list[str]) -> None:
     """Draw each quantity over two varied parameters, with crosses where the dam fails."""
     plan, rows = table.plan, table.rows
@@ -220,7 +245,8 @@ def draw_maps(figure: Figure, table: Table, names: list[str]) -> None:
     (across, i), (up, j) = (np.unique(v, return_inverse=True) for v in (x, y))
     bad = is_marked(plan, rows)
     for panel, column, (words, units) in panels_of(figure, table):
-        values = np.where(bad, np.nan, table.values(column))
+        hidden = bad & (plan.slip_limit is None)
+        values = np.where(hidden, np.nan, table.values(column))
         size, factor = unit([np.nan_to_num(values)], units)
         grid = np.full((len(up), len(across)), np.nan)
         grid[j, i] = values * factor
@@ -263,7 +289,9 @@ def draw_sample(figure: Figure, table: Table, names: list[str]) -> None:
 
     plan, rows = table.plan, table.rows
     inputs = sensitivities(plan, rows)
-    outcome = "failed" if 0 < fails(rows).sum() < len(rows) else "max_opening"
+    drawn = drawn_of(plan)
+    other = "max_opening" if plan.slip_limit is None else SLIP
+    outcome = "failed" if 0 < fails(rows).sum() < len(rows) else other
     ranks = np.nan_to_num([row[outcome] for row in inputs])
     strongest = [inputs[i]["input"] for i in np.argsort(-np.abs(ranks))]
     points, bars = figure.subplots(1, 2, width_ratios=(1.3, 1))
@@ -277,7 +305,7 @@ def draw_sample(figure: Figure, table: Table, names: list[str]) -> None:
     bars.invert_yaxis()
     bars.axvline(0, color="black", linewidth=0.5)
     bars.set(xlim=(-1, 1), xticks=(-1, -0.5, 0, 0.5, 1), xlabel="Spearman's rank correlation [-]")
-    explained = "failure" if outcome == "failed" else DRAWN[outcome][0]
+    explained = "failure" if outcome == "failed" else drawn[outcome][0]
     bars.set_title(f"influence on the {explained}", fontsize=10)
     bars.grid(alpha=0.3, axis="x")
 

@@ -13,8 +13,11 @@ from ..arrays import Value
 from ..engines.getdp.law import evaluate
 from ..model.parameters import parameter
 from ..post.tables import write_csv
+from ..storage import text_of
 
 JUMPS = ("delta_n", "delta_t1", "delta_t2")
+#: Longest file of a path [bytes].
+LONGEST = 100_000_000
 
 
 def read_path(path: Path) -> dict[str, np.ndarray]:
@@ -22,12 +25,11 @@ def read_path(path: Path) -> dict[str, np.ndarray]:
 
     Raises InputError.
     """
+    lines = text_of(path, f"path = {path}", LONGEST).splitlines()
     try:
-        with path.open(newline="") as file:
-            rows = list(csv.DictReader(file, skipinitialspace=True))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        reason = error.strerror if isinstance(error, OSError) else error
-        raise InputError(f"path = {path}: must be a readable CSV file ({reason})") from None
+        rows = list(csv.DictReader(lines, skipinitialspace=True))
+    except csv.Error as error:
+        raise InputError(f"path = {path}: must be a readable CSV file ({error})") from None
     names = [name for name in (*JUMPS, "p") if rows and name in rows[0]]
     if not rows or not set(JUMPS) <= set(names):
         raise InputError(

@@ -14,9 +14,11 @@ from . import sampling
 from .plan import STATISTICS, Plan, Row, beside, column_of, numbers
 from .sweep import UNDECIDED
 
-#: Outcomes whose rank correlation with the inputs is computed: the failure over all rows, the
-#: others over the rows that stand.
-OUTCOMES = ("failed", "crack_length", "max_opening", "crest_ux")
+#: Outcomes whose rank correlation with the inputs is computed: the failure over all rows, others
+#: over the rows that stand, or of earthquakes over all that are at rest.
+FAILED = "failed"
+STATIC = ("crack_length", "max_opening", "crest_ux")
+OF_QUAKES = ("residual_slip", "residual_tilt")
 
 
 def groups(plan: Plan, rows: list[Row]) -> list[tuple[Row, list[Row]]]:
@@ -49,8 +51,9 @@ def sensitivities(plan: Plan, rows: list[Row]) -> list[dict[str, Value]]:
     table: list[dict[str, Value]] = []
     for values, sample in groups(plan, rows):
         stand = np.array([row["failed"] == "0" for row in sample])
-        results = {o: numbers(sample, o) for o in OUTCOMES}
-        for outcome in OUTCOMES[1:]:
+        static = plan.slip_limit is None
+        results = {o: numbers(sample, o) for o in (FAILED, *(STATIC if static else OF_QUAKES))}
+        for outcome in STATIC if static else ():
             results[outcome][~stand] = np.nan
         results |= {c: numbers(sample, c) for c in plan.critical_columns[:1]}
         for name in plan.sampled:

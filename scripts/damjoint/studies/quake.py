@@ -5,13 +5,13 @@ from __future__ import annotations
 import contextlib
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
 
-from .. import ROUND_OFF, InputError, RunError
+from .. import InputError, RunError
 from ..arrays import Array, Table
 from ..dynamics import absorbing, checkpoint
 from ..dynamics.frames import at_nodes
@@ -41,8 +41,9 @@ from ..solver.state import State
 from ..statics.verdict import statement
 from ..storage import atomic_write
 from ..threads import limited_threads
-from ..versions import versions
-from .quake_result import QuakeResult, row_of_peak
+from ..versions import provenance
+from . import quake_summary
+from .quake_result import QuakeResult
 
 #: Files of an earthquake: rows, tables of the joints in the frames, stress along the first joint in
 #: time, the run under way.
@@ -55,15 +56,8 @@ Span: TypeAlias = tuple[float, float] | None
 #: Wall seconds between two writes of a run under way.
 BETWEEN_WRITES = 10.0
 
-#: The last part of the rest over which the residual values are a mean [s].
-MEAN_OVER = 1.0
-
 #: Format of the progress bar: seconds of the record.
 BAR = "{desc} {n:.2f} of {total:.2f} s|{bar}| {elapsed}, {remaining} left"
-
-#: Table of which the largest size is reported.
-PEAKS = ("ground_ax", "crest_ux", "crest_ax")
-PEAKS_OF_JOINTS = ("heel_opening", "toe_opening", "slip_mean", "open_length", "broken_length")
 
 
 def span_of(name: str, text: str) -> tuple[float, float]:
@@ -130,7 +124,7 @@ class QuakeRun:
         history.
         """
         quake, static = self.quake, self.static
-        found = summary(quake, self.history)
+        found = self.summary()
         found["seconds"] = {name: round(value, 3) for name, value in self.seconds.items()}
         after = self.static_state_after()
         found["after"] = {"equilibrium": after is not None}
@@ -145,8 +139,7 @@ class QuakeRun:
         full = self.stands_with_full_uplift()
         if full is not None:
             found["after"]["equilibrium_with_full_uplift_in_the_crack"] = full
-        words = statement_of(quake.case, found)
-        return self._result_of(found, after is not None, "", words)
+        return self._result_of(found, "", quake_summary.statement(quake.case, found))
 
     def result_so_far(self, error: BaseException) -> QuakeResult:
         """The result up to an error or interrupt."""
@@ -154,19 +147,27 @@ class QuakeRun:
         state = "failed" if isinstance(error, Exception) else "interrupted"
         reached = f"{state} after t = {self.quake.now.time:.6g} s of the record"
         words = f"{reached}: {error}" if str(error) else reached
-        return self._result_of(summary(self.quake, self.history), False, state, words)
+        return self._result_of(self.summary(), state, words)
 
-    def _result_of(
-        self, found: dict[str, Any], stands: bool, state: str, statement: str
-    ) -> QuakeResult:
+    def summary(self) -> dict[str, Any]:
+        """See `quake_summary`, of the rows so far; with the slip of the rigid blocks."""
+        quake = self.quake
+        found = quake_summary.summary(quake, self.history.table, quake.halvings)
+        for k, joint in enumerate(quake.case.joints if len(self.history) else ()):
+            block = rigid_block(quake, k).slip(quake.record) if joint.law.limits_shear else None
+            if block is not None:
+                found["residual"][column_of("rigid_block", k)] = block
+        return found
+
+    def _result_of(self, found: dict[str, Any], state: str, statement: str) -> QuakeResult:
         """The result with a summary, an end and its statement."""
         quake, history, static = self.quake, self.history, self.static.results()
         static.info |= about(quake.problem.model.equilibrium.bulk)
         seconds = {name: value for name, value in self.seconds.items() if name != "steps"}
-        static.info |= {"notes": remarks(quake.case)}
-        static.info |= {"quake": found, "versions": versions(), "wall_seconds": seconds}
-        if not state:  # a joint that has slipped everywhere is no failure here
-            static.info["verdict"] = "stands" if stands else "no equilibrium"
+        static.info |= {"notes": remarks(quake.case), "quake": found, "wall_seconds": seconds}
+        static.info |= provenance({})
+        verdict = state or quake_summary.verdict(quake.case, found)
+        static.info["verdict"] = verdict  # a joint that has slipped everywhere is no failure here
         return QuakeResult(
             case=quake.case,
             rows=history.table,
@@ -181,7 +182,7 @@ class QuakeRun:
             shapes=self.shapes(),
             mesh=quake.bodies.mesh,
             summary=found,
-            stands=stands,
+            stands=verdict == quake_summary.STANDS,
             state=state,
             statement=statement,
         )
@@ -282,9 +283,8 @@ def single_thread() -> Iterator[None]:
         yield
 
 
-def outcome_of(case: Case) -> tuple[LoadStepper, bool, dict[str, Any]]:
-    """The earthquake of a case without files: static loading, whether there is an equilibrium after
-    the earthquake, summary.
+def outcome_of(case: Case) -> tuple[LoadStepper, dict[str, Any]]:
+    """The earthquake of a case without files: static loading, summary.
 
     Raises RunError.
     """
@@ -293,7 +293,7 @@ def outcome_of(case: Case) -> tuple[LoadStepper, bool, dict[str, Any]]:
         for _ in under_way.steps():
             pass
         after = under_way.static_state_after()
-    return under_way.static, after is not None, summary(under_way.quake, under_way.history)
+    return under_way.static, under_way.summary() | {"after": {"equilibrium": after is not None}}
 
 
 def follow(under_way: QuakeRun, path: Path, key: str, progress: bool) -> None:
@@ -307,65 +307,6 @@ def follow(under_way: QuakeRun, path: Path, key: str, progress: bool) -> None:
             if time.perf_counter() - written > BETWEEN_WRITES:
                 checkpoint.write(path, key, quake, under_way.history)
                 written = time.perf_counter()
-
-
-def summary(quake: Earthquake, history: QuakeHistory) -> dict[str, Any]:
-    """Peaks with their times, residual values, frequencies, damping and the rigid block."""
-    case, rows, record = quake.case, history.table, quake.record
-    result: dict[str, Any] = {
-        "record": str(case.record),
-        "duration": record.duration,
-        "time": quake.now.time,
-        "steps": len(history),
-        "dt": quake.dt,
-        "halvings": quake.halvings,
-        "iterations": float(np.sum(rows["iterations"])),
-        "frequencies": quake.frequencies.tolist(),
-        "damping": asdict(quake.damping)
-        | {"ratios": [quake.damping.ratio(f) for f in quake.frequencies]},
-        "quake_uplift": case["quake_uplift"],
-    }
-    if not len(history):
-        return result
-    result |= peaks_and_rest(case, rows)
-    for k, joint in enumerate(case.joints):
-        block = rigid_block(quake, k).slip(record) if joint.law.limits_shear else None
-        if block is not None:
-            result["residual"][column_of("rigid_block", k)] = block
-    return result
-
-
-def peaks_and_rest(case: Case, rows: Table) -> dict[str, Any]:
-    """Largest values with their times, and residual slip and tilt, from the rows of quake.csv."""
-    joints = range(len(case.joints))
-    peaks = {}
-    for name in (*PEAKS, *(column_of(name, k) for k in joints for name in PEAKS_OF_JOINTS)):
-        row = row_of_peak(name, rows[name])
-        peaks[name] = {"value": rows[name][row], "time": rows["time"][row]}
-    last = rows["time"] > rows["time"][-1] - MEAN_OVER * (1 - ROUND_OFF)
-    residual = {}
-    for k in joints:
-        heel, toe, slip = (
-            rows[column_of(name, k)][last].mean()
-            for name in ("heel_opening", "toe_opening", "slip_mean")
-        )
-        residual[column_of("slip", k)] = slip
-        residual[column_of("tilt", k)] = (heel - toe) / case.joints[k].joint_along
-    return {"peaks": peaks, "residual": residual}
-
-
-def statement_of(case: Case, found: dict[str, Any]) -> str:
-    """What a summary says of the end of an earthquake."""
-    slips = []
-    for k in range(len(case.joints)):
-        slip, name = 1e3 * found["residual"][column_of("slip", k)], case.named((k,))
-        slips.append(f"{slip:.3g} mm" + (f" ({name})" if name else ""))
-    end = (
-        "the dam stands after the earthquake"
-        if found["after"]["equilibrium"]
-        else "no static equilibrium is found after the earthquake"
-    )
-    return f"residual slip {', '.join(slips)}; {end}"
 
 
 def rigid_block(quake: Earthquake, number: int) -> RigidBlock:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -22,8 +22,8 @@ from ..post import tables
 from ..progress import Progress
 from ..solver.model import Model
 from ..statics.verdict import statement
-from ..versions import versions
-from . import quake
+from ..versions import provenance
+from . import quake, quake_summary
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,7 +34,7 @@ class GetdpQuakeResult:
     rows: Table
     #: for run.json
     summary: dict[str, Any]
-    #: whether the dam is in static equilibrium after the earthquake
+    #: whether the verdict is that it stands after the earthquake
     stands: bool
     statement: str
 
@@ -113,29 +113,18 @@ def solve(vibrations: Earthquake, progress: bool) -> engine.GetdpQuake:
 
 def result_of(vibrations: Earthquake, found: engine.GetdpQuake, words: str) -> GetdpQuakeResult:
     """The result; words: on an early end."""
-    case, rows, damping = vibrations.case, found.rows, vibrations.damping
+    case, rows = vibrations.case, found.rows
     number = len(rows["time"])
-    summary: dict[str, Any] = {
-        "record": str(case.record),
-        "duration": vibrations.record.duration,
-        "time": float(rows["time"][-1]) if number else 0.0,
-        "steps": number,
-        "dt": vibrations.dt,
-        "halvings": round(np.log2(vibrations.dt / rows["dt"].min())) if number else 0,
-        "iterations": float(rows["iterations"].sum()),
-        "frequencies": vibrations.frequencies.tolist(),
-        "damping": asdict(damping) | {"ratios": [damping.ratio(f) for f in vibrations.frequencies]},
-        "quake_uplift": case["quake_uplift"],
-        "seconds": {n: round(value, 3) for n, value in found.seconds.items()} | {"steps": number},
-    }
-    if number:
-        summary |= quake.peaks_and_rest(case, rows)
+    halvings = round(np.log2(vibrations.dt / rows["dt"].min())) if number else 0
+    summary = quake_summary.summary(vibrations, rows, halvings)
+    seconds = {name: round(value, 3) for name, value in found.seconds.items()}
+    summary["seconds"] = seconds | {"steps": number}
+    stands = False
     if not words:
         summary["after"] = {"equilibrium": bool(found.stands)}
-        words = quake.statement_of(case, summary)
-    return GetdpQuakeResult(
-        case=case, rows=rows, summary=summary, stands=bool(found.stands), statement=words
-    )
+        words = quake_summary.statement(case, summary)
+        stands = quake_summary.verdict(case, summary) == quake_summary.STANDS
+    return GetdpQuakeResult(case=case, rows=rows, summary=summary, stands=stands, statement=words)
 
 
 def write(result: GetdpQuakeResult, found: engine.GetdpQuake, out: Path, state: str) -> None:
@@ -143,13 +132,8 @@ def write(result: GetdpQuakeResult, found: engine.GetdpQuake, out: Path, state: 
     static = found.static
     tables.write(static, out)
     tables.write_csv(out / quake.ROWS, result.rows)
-    getdp = static.info.pop("getdp")
-    static.info |= {
-        "notes": remarks(result.case),
-        "quake": result.summary,
-        "versions": versions() | {"getdp": getdp["version"] or ""},
-        "peak_memory_mb": getdp["peak_memory_mb"],
-    }
-    if not state:  # a joint that has slipped everywhere is no failure here
-        static.info["verdict"] = "stands" if result.stands else "no equilibrium"
+    static.info |= {"notes": remarks(result.case), "quake": result.summary}
+    static.info |= provenance(static.info.pop("getdp"))
+    # a joint that has slipped everywhere is no failure here
+    static.info["verdict"] = state or quake_summary.verdict(result.case, result.summary)
     folders.write_info(static, out, state, result.statement)

@@ -40,7 +40,7 @@ class QuakeResult:
     mesh: Mesh
     #: for run.json
     summary: dict[str, Any]
-    #: whether the dam is in static equilibrium after the earthquake
+    #: whether the verdict is that it stands after the earthquake
     stands: bool
     #: interrupted or failed; empty if it has reached its end
     state: str
@@ -48,8 +48,8 @@ class QuakeResult:
 
     @property
     def joint(self) -> int:
-        """The number of the joint with the largest residual slip."""
-        slips = [self.summary["residual"][column_of("slip", k)] for k in self.joints]
+        """The number of the joint with the largest slip at the end."""
+        slips = [self.summary["end"][column_of("slip", k)] for k in self.joints]
         return int(np.argmax(np.abs(slips)))
 
     @property
@@ -61,11 +61,6 @@ class QuakeResult:
         """The rows of a joint, by its number, with the columns of QUAKE."""
         own = {name: column_of(name, joint) for name in QUAKE_OF_JOINTS}
         return {name: self.rows[own.get(name, name)] for name in QUAKE}
-
-
-def row_of_peak(name: str, values: Array) -> int:
-    """The row in which a column of quake.csv is largest; an overlap of a joint is no opening."""
-    return int(np.argmax(values if "opening" in name else np.abs(values)))
 
 
 def peaks_table(found: dict[str, Any], case: Case) -> Table:
@@ -80,12 +75,17 @@ def peaks_table(found: dict[str, Any], case: Case) -> Table:
     return Table(["peak of", "unit", "value", "at t"], ["", "", "", "s"], rows)
 
 
-#: Residual values of a summary: meaning, unit.
-RESIDUAL = {
-    "slip": ("residual slip", "m"),
-    "tilt": ("residual tilt", "-"),
-    "rigid_block": ("rigid block, slip", "m"),
-}
+#: Values of a summary at rest, and at the end of a dam that is not: group, name, meaning, unit.
+AT_REST = [
+    ("residual", "slip", "residual slip", "m"),
+    ("residual", "tilt", "residual tilt", "-"),
+    ("residual", "rigid_block", "rigid block, slip", "m"),
+]
+MOVING = [
+    ("end", "slip", "slip, not at rest", "m"),
+    ("end", "change", "its change without shaking", "m"),
+    ("residual", "rigid_block", "rigid block, slip", "m"),
+]
 
 
 def residual_table(found: dict[str, Any], case: Case) -> Table:
@@ -93,21 +93,35 @@ def residual_table(found: dict[str, Any], case: Case) -> Table:
     rows = []
     for k in range(len(case.joints)):
         of = f" ({case.named((k,))})" if case.of_joints else ""
-        for name, (meaning, unit) in RESIDUAL.items():
-            if (value := found["residual"].get(column_of(name, k))) is not None:
+        for group, name, meaning, unit in AT_REST if found["at_rest"] else MOVING:
+            if (value := found[group].get(column_of(name, k))) is not None:
                 rows.append((meaning + of, unit, f"{value:.4g}"))
-    return Table(["at rest", "unit", "value"], ["", "", ""], rows)
+    head = "at rest" if found["at_rest"] else "not at rest"
+    return Table([head, "unit", "value"], ["", "", ""], rows)
 
 
 def modes(found: dict[str, Any]) -> str:
-    """Natural frequencies and damping ratios of a summary."""
-    frequencies = ", ".join(f"{f:.3g}" for f in found["frequencies"])
-    ratios = ", ".join(f"{r:.1%}" for r in found["damping"]["ratios"])
-    return f"natural frequencies, joint closed, with the water: {frequencies} Hz; damping {ratios}"
+    """Natural modes of a summary with their damping, and the frequencies of the damping."""
+    texts = []
+    for mode in found["modes"]:
+        axis, share = max((mode[f"along_{a}"], a) for a in "xy")[::-1]
+        texts.append(
+            f"{mode['frequency']:.3g} Hz ({share:.0%} of the mass along {axis}, damping "
+            f"{mode['damping']:.1%})"
+        )
+    damping = found["damping"]
+    part = "stiffness"
+    if damping["a0"]:
+        part += " and mass of concrete" + (" and water" if damping["with_water"] else "")
+    return (
+        f"natural modes, joint closed, with the water: {', '.join(texts)}; Rayleigh damping by "
+        f"{part}, set at {damping['first']:.3g} and {damping['second']:.3g} Hz"
+    )
 
 
 def text(case: Case, found: dict[str, Any]) -> str:
-    """Peaks and residual values of a summary as printed tables."""
+    """Notes, peaks and residual values of a summary as printed tables."""
     tables = peaks_table(found, case), residual_table(found, case)
     parts = [tabulate(table.rows, table.heads, disable_numparse=True) for table in tables]
-    return "\n\n".join([modes(found), *parts])
+    lines = [*(f"note: {note}" for note in found["notes"]), modes(found)]
+    return "\n\n".join(["\n".join(lines), *parts])

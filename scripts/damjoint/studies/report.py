@@ -493,19 +493,19 @@ def critical_value(info: dict[str, Any] | None) -> str:
 def earthquake(info: dict[str, Any]) -> str:
     """Statement of `damjoint quake`, if run.json has it."""
     found = info.get("quake")
-    if not found or "peaks" not in found:
+    if not found or "at_rest" not in found:
         return ""
     ground = abs(found["peaks"]["ground_ax"]["value"])
     return (
-        f"earthquake {Path(found['record']).name}, {ground:.3g} m/s2: {info['statement']}; N', T, "
-        "the verdict and the last row of the levels are those of the static state after it"
+        f"earthquake {Path(found['record']).name}, {ground:.3g} m/s2: {info['statement']}; N', T "
+        "and the last row of the levels are those of the static state after it"
     )
 
 
 def earthquake_section(folder: Path, case: Case, info: dict[str, Any]) -> Earthquake | None:
     """The section on `damjoint quake`, if run.json has its results."""
     found = info.get("quake")
-    if not found or "peaks" not in found:
+    if not found or "at_rest" not in found:
         return None
     pictures, path = [], folder / f"{info['case']}_quake.png"
     if path.is_file():
@@ -516,6 +516,7 @@ def earthquake_section(folder: Path, case: Case, info: dict[str, Any]) -> Earthq
     if found["halvings"]:
         halved = f"halved up to {found['halvings']} times where they did not converge"
     notes = [
+        *(f"{note}." for note in found["notes"]),
         f"{quake_result.modes(found)}.",
         f"{found['steps']} steps of {found['dt']:g} s over {found['time']:g} s, {halved}.",
         f"Water pressure in the joint: {report_input.uplift_in_earthquake(case)}.",

@@ -25,6 +25,7 @@ from ..joint.interface import Interface, interface_of
 from ..model.case import Case, equal_steps, first_mesh, resolve, with_drive_times
 from ..model.mesh import mesh_of
 from ..model.notes import notes_on_settings
+from ..model.results import column_of as column_of_joint
 from ..model.results import history_columns
 from ..progress import Progress, track
 from ..solver.load_stepper import LoadStepper
@@ -32,9 +33,10 @@ from ..statics.limit import mechanism
 from ..statics.verdict import failed, statement, verdict
 from ..threads import limited_threads
 from ..versions import code_fingerprint
-from . import quake
+from . import quake, quake_summary
 from .critical import QUICK, Search
 from .plan import CHART, STATISTICS, Plan, Row, beside, cases_of, column_of, in_file
+from .quake_summary import NO_FRICTION, NOT_AT_REST
 from .result_file import result_file
 
 
@@ -67,7 +69,7 @@ OUTCOME = ("failed", "verdict", "statement")
 ERROR = "failed"
 
 #: Verdicts from which it is not known whether there is an equilibrium.
-UNDECIDED = (ERROR, "not converged", "interrupted")
+UNDECIDED = (ERROR, "not converged", "interrupted", NOT_AT_REST, NO_FRICTION)
 
 #: Limit of the rows that are computed together: they share the steps up to their common level.
 MOST_TOGETHER = 8
@@ -144,30 +146,35 @@ def last_row(task: Task, solved: Solved) -> dict[str, Value]:
 #: Columns of an earthquake in a row: largest ground acceleration along x [m/s2]; of the joint with
 #: the largest residual slip: slip [m], tilt, slip of the rigid block [m].
 QUAKE_COLUMNS = ("peak_ground_ax", "residual_slip", "residual_tilt", "rigid_block_slip")
+#: Those by their names in the summary of an earthquake; empty if the dam is not at rest.
+RESIDUAL = dict(zip(("slip", "tilt", "rigid_block"), QUAKE_COLUMNS[1:], strict=True))
+#: The verdict of a row whose slip exceeds the limit.
+EXCEEDED = "residual slip"
 
 
 def quake_row(task: Task) -> dict[str, Value]:
     """The row of a case whose last level is followed by an earthquake: it fails if the residual
-    slip exceeds the limit, or if there is no static equilibrium after it.
+    slip (or, if the dam is not at rest, that at the end) exceeds the limit, or if the dam does not
+    stand after it.
     """
     case = task.case
     row: dict[str, Value] = dict.fromkeys([*history_columns(case), *QUAKE_COLUMNS], "")
     try:
-        static, after, found = quake.outcome_of(case)
+        static, found = quake.outcome_of(case)
     except Exception as error:
         return row | dict(zip(OUTCOME, (1.0, ERROR, message_of(error)), strict=True))
+    joints = range(len(case.joints))
+    worst = max(joints, key=lambda k: abs(found["end"][column_of_joint("slip", k)]))
     residual = found["residual"]
-    suffixes = [name.removeprefix("slip") for name in residual if name.startswith("slip")]
-    worst = max(suffixes, key=lambda suffix: abs(residual[f"slip{suffix}"]))
-    values = (residual.get(f"{name}{worst}", "") for name in ("slip", "tilt", "rigid_block"))
-    peak = abs(found["peaks"]["ground_ax"]["value"])
-    row |= static.results().last | dict(zip(QUAKE_COLUMNS, (peak, *values), strict=True))
-    slip = abs(residual[f"slip{worst}"])
-    verdict = "stands" if after else "no equilibrium"
-    if after and slip > task.slip_limit:
-        verdict = "residual slip"
-    words = f"residual slip {1e3 * slip:.3g} mm, limit {1e3 * task.slip_limit:.3g} mm"
-    return row | dict(zip(OUTCOME, (float(verdict != "stands"), verdict, words), strict=True))
+    row |= static.results().last | {"peak_ground_ax": abs(found["peaks"]["ground_ax"]["value"])}
+    row |= {column: residual.get(column_of_joint(n, worst), "") for n, column in RESIDUAL.items()}
+    slip = abs(found["residual" if found["at_rest"] else "end"][column_of_joint("slip", worst)])
+    verdict, words = quake_summary.verdict(case, found), quake_summary.statement(case, found)
+    if slip > task.slip_limit and verdict in (quake_summary.STANDS, NOT_AT_REST):
+        verdict = EXCEEDED
+    words = f"{words}; limit {1e3 * task.slip_limit:.3g} mm"
+    fails = float(verdict != quake_summary.STANDS)
+    return row | dict(zip(OUTCOME, (fails, verdict, words), strict=True))
 
 
 def message_of(error: Exception) -> str:

@@ -1,0 +1,194 @@
+"""What an earthquake amounts to, of either engine: peaks, rest, residual values, verdict, notes."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from .. import ROUND_OFF
+from ..arrays import Array, Table
+from ..dynamics.stepper import Earthquake
+from ..model.case import Case
+from ..model.results import column_of
+
+#: Time over which the residual values are a mean [s]: the last half of the rest, at most this.
+MEAN_OVER = 1.0
+
+#: A joint is at rest if in this time its plastic slip changes at most by this share of its largest
+#: slip, and its openings by this share of their largest value, or all by LEAST_MOTION [m].
+REST_OF_SLIP, REST_OF_OPENING = 0.01, 0.1
+LEAST_MOTION = 1e-5
+
+#: Time steps in the first period that resolve a joint which opens and slips.
+STEPS_OF_PERIOD = 30
+
+#: Broken part of a joint without friction beyond which nothing holds what is above it.
+BROKEN = 0.99
+
+#: Table of which the largest size is reported.
+PEAKS = ("ground_ax", "crest_ux", "crest_ax")
+PEAKS_OF_JOINTS = ("heel_opening", "toe_opening", "slip_mean", "open_length", "broken_length")
+
+#: Slip over the length of a joint beyond which displacements are not small.
+LARGE_SLIP = 0.01
+
+#: Verdicts besides those of a static state.
+STANDS, NO_EQUILIBRIUM, NOT_AT_REST = "stands", "no equilibrium", "not at rest"
+NO_FRICTION = "broken without friction"
+
+
+def row_of_peak(name: str, values: Array) -> int:
+    """The row in which a column of quake.csv is largest; an overlap of a joint is no opening."""
+    return int(np.argmax(values if "opening" in name else np.abs(values)))
+
+
+def summary(quake: Earthquake, rows: Table, halvings: int) -> dict[str, Any]:
+    """Peaks with their times, values at the end and at rest, modes, damping, notes; rows: columns
+    of quake.csv.
+    """
+    number = len(rows["time"])
+    result: dict[str, Any] = {
+        "record": str(quake.case.record),
+        "duration": quake.record.duration,
+        "time": float(rows["time"][-1]) if number else 0.0,
+        "steps": number,
+        "dt": quake.dt,
+        "halvings": halvings,
+        "iterations": float(rows["iterations"].sum()),
+        "frequencies": quake.frequencies.tolist(),
+        "modes": [asdict(mode) for mode in quake.modes],
+        "damping": asdict(quake.damping),
+        "quake_uplift": quake.case["quake_uplift"],
+        "notes": notes(quake),
+    }
+    if not number:
+        return result
+    joints = range(len(quake.case.joints))
+    peaks = {}
+    for name in (*PEAKS, *(column_of(name, k) for k in joints for name in PEAKS_OF_JOINTS)):
+        row = row_of_peak(name, rows[name])
+        peaks[name] = {"value": float(rows[name][row]), "time": float(rows["time"][row])}
+    for k, joint in enumerate(quake.case.joints):
+        slip = abs(peaks[column_of("slip_mean", k)]["value"])
+        if slip > LARGE_SLIP * joint.joint_length:
+            result["notes"].append(
+                f"the slip reaches {slip:.3g} m{of(quake.case, k)}: equilibrium is that of the "
+                "undeformed dam, and the drains through the joint are taken as intact"
+            )
+    return result | {"peaks": peaks} | values_at_end(quake.case, rows, 1 / quake.frequencies[0])
+
+
+def notes(quake: Earthquake) -> list[str]:
+    """What an engineer should know before the numbers of an earthquake."""
+    period, texts = 1 / quake.frequencies[0], quake.record.offsets()
+    longest = period / STEPS_OF_PERIOD
+    if quake.dt > longest * (1 + ROUND_OFF):
+        texts.append(
+            f"dt = {quake.dt:.3g} s is longer than a thirtieth of the first period, {longest:.3g} "
+            "s: the slip may depend on it; compare with half of it"
+        )
+    return texts
+
+
+def values_at_end(case: Case, rows: Table, period: float) -> dict[str, Any]:
+    """Whether the dam is at rest in the end, residual slip and tilt if it is, and the last values.
+
+    rows: columns of quake.csv; period: the first one [s], shorter than which no rest is recognised.
+    """
+    time = rows["time"]
+    shaken = np.flatnonzero((rows["ground_ax"] != 0) | (rows["ground_ay"] != 0))
+    rest = float(time[-1] - (time[shaken[-1]] if len(shaken) else 0.0))
+    length = min(MEAN_OVER, rest / 2)
+    last = time > time[-1] - length + ROUND_OFF * time[-1]
+    at_rest, end, residual, broken = bool(length >= period), {}, {}, {}
+    for k, joint in enumerate(case.joints):
+        column = {name: rows[column_of(name, k)] for name in (*PEAKS_OF_JOINTS, "T")}
+        slip, size = column["slip_mean"], joint.joint_length
+        plastic = slip - column["T"] / (joint["K_T"] * size)  # its elastic part follows T
+        openings = [np.maximum(column[n], 0.0) for n in ("heel_opening", "toe_opening")]
+        rooms = REST_OF_SLIP * np.abs(slip).max(), REST_OF_OPENING * np.max(openings)
+        moved = [float(np.ptp(values[last])) if length else 0.0 for values in (plastic, *openings)]
+        limits = np.maximum([rooms[0], rooms[1], rooms[1]], LEAST_MOTION)
+        at_rest &= bool((moved <= limits).all())
+        end[column_of("slip", k)] = float(slip[-1])
+        end[column_of("change", k)] = moved[0]
+        if length:
+            heel, toe, mean = (
+                float(column[name][last].mean())
+                for name in ("heel_opening", "toe_opening", "slip_mean")
+            )
+            residual[column_of("slip", k)] = mean
+            residual[column_of("tilt", k)] = (heel - toe) / joint.joint_along
+        if not joint.law.limits_shear:
+            broken[column_of("length", k)] = float(column["broken_length"][-1])
+    return {
+        "rest": rest,
+        "mean_over": length,
+        "at_rest": at_rest,
+        "end": end,
+        "residual": residual if at_rest else {},
+        "broken_without_friction": broken,
+    }
+
+
+def verdict(case: Case, found: dict[str, Any]) -> str:
+    """The verdict of a summary that has its `after`: STANDS or why not."""
+    if not found["after"]["equilibrium"]:
+        return NO_EQUILIBRIUM
+    if any(share > BROKEN for share in broken_shares(case, found).values()):
+        return NO_FRICTION
+    return STANDS if found["at_rest"] else NOT_AT_REST
+
+
+def broken_shares(case: Case, found: dict[str, Any]) -> dict[int, float]:
+    """The broken part of the joints, by their numbers, that have broken and have no friction."""
+    lengths = found["broken_without_friction"]
+    return {
+        k: length / joint.joint_length
+        for k, joint in enumerate(case.joints)
+        if (length := lengths.get(column_of("length", k), 0.0))
+    }
+
+
+def of(case: Case, joint: int) -> str:
+    """The name of a joint, by its number, in brackets; empty if there is only one."""
+    name = case.named((joint,))
+    return f" ({name})" if name else ""
+
+
+def statement(case: Case, found: dict[str, Any]) -> str:
+    """What a summary says of the end of an earthquake."""
+    joints = range(len(case.joints))
+    parts = [
+        f"law = {case.joints[k]['law']}{of(case, k)} has no friction, and the joint has broken "
+        f"over {share:.0%} of its length (law = bond keeps the friction)"
+        for k, share in broken_shares(case, found).items()
+    ]
+    millimetres = lambda values, name, k: f"{1e3 * values[column_of(name, k)]:.3g} mm"
+    if found["at_rest"]:
+        slips = [millimetres(found["residual"], "slip", k) + of(case, k) for k in joints]
+        parts.append(f"residual slip {', '.join(slips)}")
+    else:
+        ends = [
+            f"{millimetres(found['end'], 'slip', k)}{of(case, k)}, changed by "
+            f"{millimetres(found['end'], 'change', k)}"
+            for k in joints
+        ]
+        parts.append(
+            f"not at rest in the last {found['mean_over']:.3g} of {found['rest']:.3g} s without "
+            f"shaking, no residual slip: slip {'; '.join(ends)}; set a longer record_rest"
+        )
+    parts.append(ENDS[verdict(case, found)])
+    return "; ".join(parts)
+
+
+#: The end of a statement, by its verdict.
+ENDS = {
+    STANDS: "the dam stands after the earthquake",
+    NO_EQUILIBRIUM: "no static equilibrium is found after the earthquake",
+    NOT_AT_REST: "whether the dam stands is not known",
+    NO_FRICTION: "by this law nothing holds the joint: neither its slip nor whether the dam stands "
+    "is known",
+}
