@@ -527,7 +527,9 @@ def add_quake(commands: Commands) -> None:
 
 
 def do_quake(arguments: argparse.Namespace) -> int:
-    """Run damjoint quake; 1 if there is no static equilibrium after the earthquake."""
+    """Run damjoint quake; 1 if the dam does not stand after the earthquake, or if that is not
+    known.
+    """
     from .engines import engine_of
     from .studies import quake, quake_getdp
     from .studies.quake_result import QuakeResult, text

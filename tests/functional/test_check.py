@@ -408,10 +408,10 @@ def test_a_mesh_of_ones_own_has_the_factors_of_its_section(tmp_path, solid, orde
     """The gravity method on the loads of the finite elements, and the requirements that N, T, M
     suffice for; OSF needs the loads one by one.
     """
-    settings = {"n_joint": 20.0, "h_dam": 15.0, "h_found": 60.0, "law": "bond", "order": order}
+    settings = {"n_joint": 20.0, "law": "bond", "order": order}
     settings |= {"uplift": "cracked", "sigma_max": 1e4, "G_f": 5.0, "adhesion": 2e5, "G_t": 300.0}
     settings |= {"dim": solid.get("dim", 2.0)}
-    shape = {"batter": 3.0, "joint_slope": slope} | solid
+    shape = {"batter": 3.0, "joint_slope": slope, "h_dam": 15.0, "h_found": 60.0} | solid
     required = {"required_SSF": 1.9, "required_OSF": 1.1, "required_position": "middle half"}
     section = dj.case("dam", levels=[45.0], tail_levels=3.0, **settings | shape | required)
     OwnMesh.of(section).write(tmp_path / "own.msh")

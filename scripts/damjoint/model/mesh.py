@@ -241,7 +241,7 @@ def heel_normal(joint: Body, heel: Body) -> Array:
 
 
 @dataclasses.dataclass(frozen=True)
-class OwnGeometry:
+class GeometryFiles:
     """The files of a user's own geometry in their present state, and all else its mesh depends
     on: the parameters of a section's mesh, and those that a .geo file names.
     """
@@ -270,7 +270,7 @@ def files_of(path: Path, known: dict[Path, str]) -> dict[Path, str]:
 
 
 @lru_cache(maxsize=1)
-def mesh_of_own(geometry: OwnGeometry) -> Mesh:
+def mesh_of_own(geometry: GeometryFiles) -> Mesh:
     """The mesh of a user's own geometry, stored: its fingerprint is needed before the run."""
     return Mesh(geometry.case)
 
@@ -286,7 +286,7 @@ def mesh_of(case: Case) -> Mesh:
     files = tuple((path, state.st_mtime_ns, state.st_size) for path, state in states)
     words = set(re.findall(r"\w+", " ".join(texts.values())))
     used = shares(case) | {n: v for n, v in case.values.items() if n in words}
-    geometry = OwnGeometry(files, tuple(used.items()), case)
+    geometry = GeometryFiles(files, tuple(used.items()), case)
     mesh = mesh_of_own(geometry)
     if not mesh.is_current:
         mesh_of_own.cache_clear()

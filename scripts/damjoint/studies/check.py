@@ -391,7 +391,7 @@ class SafetyCheck:
         if partial:
             listed = ", ".join(f"{name} = {value:g}" for name, value in partial.items())
             notes.append(f"SSF with the partial factors {listed}")
-        if case["uplift"] == "flow":
+        if self.gravity and case["uplift"] == "flow":
             notes.append("gravity method: full head in the crack, linear beyond it")
         cracked = any(r.numbers["crack_length"] > 0 for r in self.results)
         if self.gravity and cracked and case.law.open_tension:
