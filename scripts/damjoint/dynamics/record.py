@@ -146,7 +146,7 @@ class Record:
                 texts.append(
                     f"the {axis} record leaves the ground with {last:.3g} m/s, its largest "
                     f"velocity is {largest:.3g} m/s: it may have an offset, which moves the dam "
-                    '(record_baseline = "corrected" removes it)'
+                    "(record_baseline = corrected removes it)"
                 )
         return texts
 
