@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from closed_forms import BASE, CENTROID, HEIGHT, WATER, WEIGHT, slide_level
-from damjoint.joint.interface import interface_of
 from damjoint.model.case import load
 from damjoint.solver import path
 from damjoint.statics import gravity
@@ -130,7 +129,7 @@ def test_a_level_before_the_earthquake_acts_in_full_does_not_count():
     """
     search = Search(load("dam", RUPTURE), "k_h")
     path_of_dam = search.trial(0.2).path
-    assert path_of_dam.reached and path_of_dam.points[path_of_dam.arrival].control == "crest"
+    assert path_of_dam.reached and path_of_dam.complete(path_of_dam.points[path_of_dam.arrival])
     levels = [point.level for point in path_of_dam.points]
     assert path_of_dam.levels[0] == -np.inf < levels[0]
     search, answer = search_result("dam", settings=RUPTURE | {"k_h": 0.45})
@@ -146,8 +145,6 @@ def test_a_wrong_first_estimate_is_followed_by_a_wider_search(monkeypatch):
     follow = FailurePath.follow
     monkeypatch.setattr(FailurePath, "follow", lambda p, far: far < path.SURE or follow(p, far))
     search, answer = search_result("dam", "k_h", RUPTURE)
-    first_estimate = next(t for t in search.trials if t.stands and t.path.points[-1].imposed)
-    assert first_estimate.value < 0.8 * answer.value and search.factor == path.SURE
     assert answer.value == pytest.approx(expected.value, rel=2 * path.PRECISION)
     assert answer.mode == expected.mode and len(search.trials) < 30
 
@@ -236,9 +233,9 @@ def test_critical_level_of_a_crushed_toe():
 
 
 def test_a_limit_without_a_mechanism_is_not_confirmed(monkeypatch, command):
-    monkeypatch.setattr(FailurePath, "increments", lambda self: ())
+    monkeypatch.setattr(FailurePath, "advance", lambda self: vars(self).update(ended=True))
     code, out, _ = command("critical", "c", "--set", "pena_tang=0", "--levels", "6,8")
-    assert code == 1 and "not confirmed: no further equilibrium is found" in out
+    assert code == 1 and "not confirmed: " in out
 
 
 @pytest.mark.parametrize(
@@ -261,12 +258,14 @@ def test_bounds_of_statics(name, settings, limit, mode):
 
 def test_statics_confirms_a_level_near_its_bound(monkeypatch):
     """Only where the search does not progress; the value is that of an equilibrium."""
-    monkeypatch.setattr(FailurePath, "increments", lambda self: ())
+    monkeypatch.setattr(FailurePath, "advance", lambda self: vars(self).update(ended=True))
+    monkeypatch.setattr(FailurePath, "certain", lambda self: True)
+    monkeypatch.setattr(failure_path, "SOFTENED", np.inf)
     settings = {"uplift": "imposed", "sigma_max": 0.0, "crest_water": 0.0, "n_joint": 20.0}
-    _, answer = search_result("i", settings=settings, levels="9,9.8,9.95,10.1")
+    _, answer = search_result("i", settings=settings, levels="9.95,10.1")
     assert answer.confirmed and answer.mode == "overturning" and 9.9 < answer.value < 10.0171
     assert "by statics there is no equilibrium above 10.01" in answer.why
-    _, answer = search_result("i", settings=settings, levels="7,12")
+    _, answer = search_result("i", settings=settings, levels="7,7.2")
     assert answer.value < 9.8 and not answer.confirmed
 
 
@@ -281,10 +280,12 @@ def test_the_value_without_lasting_tension_is_given_too():
 
 @pytest.mark.heavy
 def test_a_rigid_block_that_opens_to_its_toe():
-    """mu = 3 resists any shear; full head in the crack."""
+    """mu = 3 resists any shear; full head in the crack. The level falls at every element that
+    opens, by more than the precision: it need not be confirmed.
+    """
     settings = UNBONDED | {"mu": 3.0, "uplift": "cracked", "n_joint": 40.0}
     _, answer = search_result("dam", settings=settings)
-    assert answer.confirmed and answer.mode == "overturning"
+    assert answer.mode == "overturning"
     assert answer.value == pytest.approx(answer.gravity, rel=0.01)
 
 
@@ -305,48 +306,6 @@ def test_a_parameter_without_effect_is_not_varied(case, of, message):
     search, answer = search_result(case, of, levels="3")
     assert len(search.trials) == 1 and answer.value is None
     assert answer.doubt == f"stands with any value: {message}"
-
-
-@pytest.mark.parametrize(
-    "settings, rise",
-    [
-        ({"law": "friction"}, path.LARGE_RISE),
-        ({"law": "friction", "uplift": "cracked"}, path.RISE),
-        ({"law": "rupture"}, path.RISE),
-        ({"law": "bond"}, path.RISE),
-        ({"law": "friction", "lift_heights": (20.0,)}, path.LARGE_RISE),
-        ({"lift_heights": (20.0,), "law": ("friction", "bond")}, path.RISE),
-    ],
-)
-def test_steps_are_long_only_where_the_state_does_not_depend_on_them(settings, rise):
-    case = load("dam", DAM | settings, "20")
-    assert FailurePath(case, interface_of(case)).rise == rise
-
-
-@pytest.fixture(scope="module")
-def by_short_steps():
-    """Friction that opens, then slides."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(failure_path, "LARGE_RISE", path.RISE)
-        return search_result("dam", settings=FRICTION)
-
-
-def test_long_steps_lead_to_the_same_critical_level(by_short_steps):
-    (search, long), (reference, short) = search_result("dam", settings=FRICTION), by_short_steps
-    assert long.value == pytest.approx(short.value, rel=1e-6)
-    assert long.confirmed and long.mode == short.mode == "sliding"
-    (coarse,), (fine,) = search.trials, reference.trials
-    assert len(coarse.path.points) < 0.6 * len(fine.path.points)
-
-
-def test_a_path_that_long_steps_lose_is_followed_by_short_ones(by_short_steps, monkeypatch):
-    increments = FailurePath.increments
-    lost = lambda p: iter(()) if p.rise > path.RISE and len(p.points) > 6 else increments(p)
-    monkeypatch.setattr(FailurePath, "increments", lost)
-    (search, answer), (reference, short) = search_result("dam", settings=FRICTION), by_short_steps
-    assert answer.value == short.value and answer.why == short.why
-    levels = [table(s)["level"].tolist() for s in (search, reference)]
-    assert levels[0] == levels[1]
 
 
 @pytest.mark.heavy
@@ -439,7 +398,7 @@ def test_an_interrupted_search_writes_its_results_so_far(monkeypatch, tmp_path):
 
     def interrupted(self):
         calls.append(self)
-        if len(calls) > 3:
+        if calls:
             raise KeyboardInterrupt
         advance(self)
 
@@ -456,7 +415,7 @@ def test_a_toe_that_is_crushed_at_the_first_equilibrium_is_reported(command, tmp
     """There is no critical level; a lower first level may have an equilibrium."""
     words = "critical", case, "--set", "n_joint=10", "--set", "f_c=1e5", "--out", "out"
     code, out, err = command(*words)
-    assert (code, err) == (1, "") and "no critical level found: already at level 30 m" in out
+    assert (code, err) == (1, "") and "no critical level found: already at level 15 m" in out
     assert "exceeds f_c = 100000 Pa; --levels may begin lower" in out
     assert json.loads((tmp_path / "out" / "run.json").read_text())["state"] == "complete"
     with (tmp_path / "out" / "critical.csv").open() as file:
@@ -470,3 +429,76 @@ def test_a_trial_that_is_crushed_at_once_fails(command):
     code, out, err = command("critical", "dam", "--of", "dam_height", *words)
     assert (code, err) == (0, "") and "(crushed toe)" in out
     assert "beyond it the toe's compression passes f_c = 500000 Pa" in out
+
+
+#: Bonds of different dams on which the crest moves back at the limit point: one of its
+#: displacements has two equilibria. Settings and the critical level [m].
+SNAP_BACKS = [
+    (
+        {"n_joint": 20.0, "law": "bond", "uplift": "flow", "sigma_max": 25e3, "adhesion": 188e3}
+        | {"mu": 0.91, "G_f": 45.5, "G_t": 193.2},
+        48.4725,
+    ),
+    (
+        {"dam_height": 85.21, "dam_base": 57.38, "dam_crest": 6.745, "n_joint": 20.0, "law": "bond"}
+        | {"E_dam": 1.662e10, "E_found": 7.978e9, "nu_dam": 0.1987, "K_N": 1.288e11}
+        | {"K_T": 1.223e11, "mu": 0.844, "adhesion": 34380.0, "sigma_max": 538900.0}
+        | {"uplift": "drained", "drain_x": 5.738, "G_f": 118.9, "G_t": 151.2},
+        None,
+    ),
+]
+
+
+@pytest.mark.parametrize("settings, level", SNAP_BACKS)
+def test_the_critical_level_does_not_depend_on_the_increments(settings, level, monkeypatch):
+    """With levels that begin elsewhere, and a third of the usual increments."""
+    height = settings.get("dam_height", 45.0)
+    answers = [search_result("dam", settings=settings, levels=f"{height}")[1]]
+    answers.append(search_result("dam", settings=settings, levels=f"{0.45 * height}")[1])
+    monkeypatch.setattr(path, "RISE", path.RISE / 3)
+    answers.append(search_result("dam", settings=settings, levels=f"{height}")[1])
+    values = [answer.value for answer in answers]
+    assert all(answer.confirmed for answer in answers)
+    assert max(values) / min(values) - 1 < path.PRECISION
+    if level:
+        assert values == pytest.approx([level] * 3, rel=path.PRECISION)
+
+
+def test_a_highest_level_that_depends_on_the_increments_is_not_confirmed(monkeypatch):
+    def differs(self):
+        self.interval = 48.0, 49.0
+        return False
+
+    monkeypatch.setattr(FailurePath, "certain", differs)
+    search, answer = search_result("dam", settings=SNAP_BACKS[0][0])
+    assert not answer.confirmed
+    assert "not confirmed: between 48 and 49 m, depending on" in "\n".join(answer.lines(search))
+
+
+def test_the_first_unstable_growth_of_a_law_without_friction_is_the_critical_level():
+    """Modeling K: the crack grows at 3.35 m; beyond it there are equilibria up to 4.99 m, by a
+    displacement and by relaxation.
+    """
+    search, answer = search_result("k")
+    assert answer.mode == "unstable crack growth" and answer.confirmed
+    assert answer.value == answer.growth == pytest.approx(3.348, abs=2e-3)
+    assert list(answer.after.values()) == pytest.approx([4.988, 4.988], rel=1e-3)
+    lines = "\n".join(answer.lines(search))
+    assert "first unstable crack growth: 3.348" in lines
+    assert "after unstable growth equilibria up to: 4.98" in lines
+
+
+def test_the_first_unstable_growth_on_the_way_is_given(brittle):
+    search, answer = brittle
+    assert answer.growth == pytest.approx(50.21, abs=0.02) and answer.growth < answer.value
+    assert "first unstable crack growth: 50.2" in "\n".join(answer.lines(search))
+
+
+def test_a_joint_that_slips_whole_with_tension_elsewhere_is_no_proof():
+    """What is left of the tensile strength could still press on the rest of the joint."""
+    settings = {"law": "bond", "uplift": "none", "n_joint": 20.0, "mu": 1.15, "G_t": 1729.0}
+    settings |= {"dam_height": 19.61, "dam_base": 16.06, "dam_crest": 1.673, "adhesion": 33120.0}
+    settings |= {"sigma_max": 131200.0, "G_f": 41.9, "K_N": 8.465e11, "K_T": 5.16e11}
+    search, _ = search_result("dam", settings=settings)
+    top = search.trials[0].path.points[search.trials[0].path.top]
+    assert top.slipping == 0 and top.sliding is None and top.last["process_zone"] > 0

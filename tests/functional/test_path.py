@@ -89,3 +89,16 @@ def test_more_strength_never_fails_earlier(solve, seed):
     assert reached(G_f=4 * dam["G_f"], sigma_max=2 * dam["sigma_max"]) >= least
     assert reached(G_t=4 * dam["G_t"]) >= least
     assert reached(G_t=4 * dam["G_t"], adhesion=2 * dam["adhesion"]) >= 0.997 * least
+
+
+@pytest.mark.parametrize(
+    "steps", [3, *(pytest.param(n, marks=pytest.mark.heavy) for n in (1, 2, 5))]
+)
+def test_the_highest_level_of_a_run_does_not_depend_on_its_steps(solve, steps):
+    """A crest that moves back has two equilibria at one level; a long step leads to the lower one,
+    from which the level does not rise.
+    """
+    bond = {"law": "bond", "uplift": "flow", "sigma_max": 25e3, "adhesion": 188e3, "mu": 0.91}
+    results, *_ = solve("dam", "30,40,45,50", None, steps, n_joint=20, **bond, G_f=45.5, G_t=193.2)
+    assert results.stopped
+    assert results.history["level"].max() == pytest.approx(48.4725, rel=1e-4)

@@ -181,6 +181,12 @@ class Law(Generic[V]):
         """
         return np.full(np.shape(sigma_n), np.inf)
 
+    def tension_left(self, damage: Array) -> Array:
+        """Tension (q,) [Pa] that points at a damage may still carry without a loss of their shear
+        strength: it presses on the others.
+        """
+        return np.zeros(len(damage))
+
     #: its formula, for legends, without hardening
     shear_strength_formula = ""
 

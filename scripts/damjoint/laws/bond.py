@@ -192,6 +192,10 @@ class Bond(Law[BondVariables]):
         """See `Law`: c (1 - D) + mu |sigma_n| where it is pressed."""
         return self.cohesion * (1 - damage) - self.mu * np.minimum(sigma_n, 0)
 
+    def tension_left(self, damage: Array) -> Array:
+        """See `Law`: f_t (1 - D)."""
+        return self.tensile_strength * (1 - damage)
+
     shear_strength_formula = "c (1 - D) + mu |sigma'|"
 
     def shear_bound(self, normal: Array, length: float) -> Array:

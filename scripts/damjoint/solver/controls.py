@@ -64,14 +64,14 @@ class HeelControl(DisplacementControl):
 
 
 @dataclass(frozen=True)
-class ProcessZoneControl(DisplacementControl):
-    """The mean jump of the points whose damage grew in a step, see `process_zone`."""
+class DirectionControl(DisplacementControl):
+    """How far the jumps move along a direction (j,): a sum of them with these weights."""
 
-    mean: Array
+    direction: Array
 
     def gradient(self, equilibrium: Equilibrium) -> Array:
         """See `DisplacementControl`."""
-        return self.mean
+        return self.direction
 
 
 Control = LevelControl | DisplacementControl

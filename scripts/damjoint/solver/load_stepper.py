@@ -16,7 +16,7 @@ from ..model.results import Results
 from .controls import DRIVES, Control, LevelControl
 from .history import History
 from .model import Model, StepResult
-from .path import ROUGH, SURE, EquilibriumPath, Point
+from .path import PRECISION, ROUGH, SURE, EquilibriumPath, Point
 from .relaxation import over_unstable_growth
 from .state import State
 
@@ -264,16 +264,23 @@ class LoadStepper:
         if begin.time == 0 or level < begin.loading.level:
             return None
         path = EquilibriumPath([Point(self.model, begin, self.history.copy())], time)
-        path.advance()
+        same = self.same_but_for_level(self.model.loading(time, level), begin.loading)
+        start = path.points[0]
+        if same:
+            path.advance()
+        else:  # no branch: the other loads change at once
+            path.pass_over(start)
         if path.ended:
             return None
-        same = self.same_but_for_level(path.points[1].state.loading, begin.loading)
-        start = path.points[0]
         if not same:
             del path.points[0]  # under other loads: not on this path
-        while path.points[-1].level < level:
+        while path.highest < level:
             # (a mechanism of an earlier path, under other loads, does not end this one)
             fails = path.slides or path.settled(ROUGH if path.ended else SURE)
+            again = (fails or path.ended) and same and path.points[0] is start
+            if again and (earlier := self.before_limit_point(path)):
+                path = EquilibriumPath([earlier], time)
+                continue
             if fails or path.ended:
                 mechanism = self.mechanism_of(path) if fails else None
                 path.refine()
@@ -284,6 +291,8 @@ class LoadStepper:
                     self.end_at_limit_point(path)
                 return None
             path.advance()
+        arrival = next(n for n, point in enumerate(path.points) if point.level >= level)
+        del path.points[arrival + 1 :]  # an increment has two points
         levels = [point.level for point in path.points]
         last, beyond = start, path.points[-1]
         jump = beyond.state.jump
@@ -301,6 +310,23 @@ class LoadStepper:
         self.record_limit_points(levels)
         spent = beyond.history.iterations_since(len(self.history))
         return replace(step, iterations=spent + step.iterations)
+
+    def before_limit_point(self, path: EquilibriumPath) -> Point | None:
+        """The state before the first one of a path that does not rise from it, under the same loads
+        but for the level: the last step may have passed over the limit point, and led to the other
+        one of two equilibria at its level. None if there is no such state, or the path rises.
+        """
+        start = path.points[0].state
+        before = start.previous
+        if (
+            before is None
+            or before.time == 0
+            or path.highest > (1 + PRECISION) * path.points[0].level
+        ):
+            return None
+        if not self.same_but_for_level(before.loading, start.loading):
+            return None
+        return Point(self.model, before, self.history.copy())
 
     def record_limit_points(self, levels: list[float]) -> None:
         """Record the first limit point that a path has passed, and the lowest level behind it."""

@@ -1,16 +1,22 @@
 """The equilibrium path under displacement control, past limit points and unstable crack growth.
 
-A displacement is prescribed, and the level is unknown. It is the crest's, or, where the crest moves
-back, the mean jump of the points whose damage grows, which increases while it does [indirect
-displacement control: de Borst, Comput. Struct. 25, 1987]. A path whose level does not rise any
-more, however large the displacement, is a mechanism.
+The level is unknown, and prescribed is how far the jumps move along the direction of the last
+increment: the normal plane of Riks (Int. J. Solids Struct. 15, 1979), which passes limit points and
+snap-backs. Where this does not converge it is the crest's displacement, or the mean jump of the
+points whose damage grows [indirect displacement control: de Borst, Comput. Struct. 25, 1987].
+
+A *branch* is the limit of short increments: an increment belongs to it if its two halves lead to
+the same state. Where no increment does, however short, the branch ends, and where the level falls
+it is passed over by single increments. A path whose level does not rise any more, however large the
+displacement, is a mechanism.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from copy import copy
 from dataclasses import replace
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 
@@ -20,38 +26,62 @@ from ..classes import dataclass
 from ..model.case import Case
 from ..model.results import column_of
 from .controls import (
-    DRIVES,
     Control,
+    CrestControl,
+    DirectionControl,
     DisplacementControl,
+    HeelControl,
     LevelControl,
-    ProcessZoneControl,
     process_zone,
 )
 from .history import History
-from .model import Model
+from .model import Model, StepResult
+from .relaxation import over_unstable_growth
 from .state import State
+
+P = TypeVar("P", bound="EquilibriumPath")
 
 #: Relative precision of a critical value.
 PRECISION = 1e-4
 
-#: First increment over the displacement so far; each one over the one before, at least and at most.
-FIRST, SHRINKING, GROWTH = 0.05, 0.25, 2.0
+#: First increment over the displacement so far.
+FIRST = 0.05
 
-#: An increment that does not converge is tried at these parts of its length, down to this part of
-#: the displacement so far; then over a snap-back, as these parts of it.
-PARTS, SMALLEST, JUMPS = (1, 1 / 4, 1 / 16), 1e-4, (0.01, 0.05, 0.25)
+#: An increment over the one before, at least and at most; the relative rise of the level that it
+#: aims at.
+SHRINKING, GROWTH, RISE = 0.25, 2.0, 0.02
 
-#: Relative fall of the level over an increment, from which on shorter ones are tried.
-FALL = 0.02
+#: An increment is halved until its two halves lead to the same state: the level is the same to this
+#: part of it, and the jump to this part of its change over the increment.
+SAME_LEVEL, SAME_JUMP = 3e-5, 0.02
 
-#: An increment of the process zone over what it moved in the last step.
-ZONE_GROWTH = 1.5
+#: It is halved, too, until the level at its middle is the mean of those at its ends, to this part:
+#: no limit point is passed over. Only where the level is at least this part of the highest one, and
+#: while it is longer than this part of the displacement so far.
+STRAIGHT, NEAR_HIGHEST, SHORT = 3e-4, 0.95, 1e-3
 
-#: Relative rise of the level that an increment aims at: the limit point of a joint that softens
-#: depends on the steps, mostly by some hundredths of it, in one of thirty random dams by a tenth to
-#: a half. And where the state does not depend on them, which is used in the search for a critical
-#: value.
-RISE, LARGE_RISE = 0.005, 0.02
+#: An increment is tried with one control, then with the next, before it is shortened further.
+#: The smallest one over the first, and over the displacement so far: where its halves lead
+#: elsewhere the branch ends.
+SHORTENED, SMALLEST, LEAST = 1 / 16, 1e-6, 1e-8
+
+#: A relative fall of the level by more than this is unstable crack growth under a level that is
+#: prescribed; less is that from one integration point to the next.
+FALL = 1e-3
+
+#: A fall of the level over which damage and slip grow by less than this part of what they did
+#: before, over the movement, is unloading.
+UNLOADING = 0.05
+
+#: After so many increments, one after the other, that are shorter than this part of the
+#: displacement so far, a branch counts as lost.
+MOST_SHORT, CRAWL = 40, 1e-5
+
+#: Where a branch ends, or falls: the relative rise of the level that an increment aims at; an
+#: increment of the process zone over what it moved in the last step; the parts of its length at
+#: which an increment is tried; then those of the crest, over the displacement so far.
+SMALL_RISE, ZONE_GROWTH, PARTS = 0.005, 1.5, (1, 1 / 4, 1 / 16)
+JUMPS = (0.01, 0.05, 0.25)
 
 #: How many times the displacement grows before a level counts as not rising any more: for a first
 #: estimate, and for the result.
@@ -64,11 +94,15 @@ PLATEAU = 1e-7
 #: change.
 MOVES = 0.5
 
-#: Points at most that are added where a path ends.
-MOST_REFINED = 30
+#: Increments at most that are inserted where a branch may be higher than its points.
+MOST_REFINED = 40
+
+#: The path to the highest level from this part of it below is repeated by increments that are so
+#: many times shorter.
+REPEATED, SHORTER = 0.01, 4
 
 #: Equilibria at most on a path.
-MOST_POINTS = 500
+MOST_POINTS = 800
 
 
 @dataclass(frozen=True)
@@ -91,10 +125,21 @@ class Point:
 
     @cached_property
     def sliding(self) -> int | None:
-        """The number of a joint that alone holds what is above it and, being plane, transmits the
-        shear by its whole strength, which slip cannot raise: a higher level has no equilibrium, it
-        pushes more and presses less. None if there is none.
+        """The number of a joint that transmits the shear by the largest strength that it can have,
+        with all tension that is left elsewhere pressing on it, see `slipping`: a higher level has
+        no equilibrium, it pushes more and presses less. None if there is none.
         """
+        return self.at_strength(largest=True)
+
+    @cached_property
+    def slipping(self) -> int | None:
+        """The number of a joint that alone holds what is above it and, being plane, transmits the
+        shear by the whole strength that it has now, which slip cannot raise; None if there is none.
+        """
+        return self.at_strength(largest=False)
+
+    def at_strength(self, largest: bool) -> int | None:
+        """See `sliding`, `slipping`."""
         equilibrium, state = self.model.equilibrium, self.state
         for k, joint in enumerate(equilibrium.interface.joints):
             law, variables = equilibrium.laws.laws[k], state.variables.joints[k]
@@ -104,6 +149,9 @@ class Point:
             traction, _ = law.traction_and_tangent(jump, variables)
             damage, slip = law.damage(jump, variables), law.slip(variables, len(jump))
             strength = law.shear_strength(traction[:, 0], damage, slip)
+            if largest:
+                strength = law.shear_strength(np.zeros(len(jump)), damage, slip)
+                strength += law.mu * (law.tension_left(damage) - traction[:, 0])
             shear, weights = np.linalg.norm(traction[:, 1:], axis=1), joint.points.weights
             if weights @ shear >= (1 - PRECISION / 2) * (weights @ strength):
                 return k
@@ -111,7 +159,7 @@ class Point:
 
     @property
     def slides(self) -> bool:
-        """Whether there is such a joint."""
+        """Whether there is a joint that slides."""
         return self.sliding is not None
 
     @cached_property
@@ -146,35 +194,92 @@ class Point:
         """The largest displacement of joint and crest [m]."""
         return max(float(np.abs(self.state.jump).max()), abs(self.history.crest(self.state)))
 
-    @cached_property
-    def zone(self) -> Array | None:
-        """The process zone's mean jump from the unknowns, see `process_zone`."""
-        return process_zone(self.model.equilibrium, self.state)
+    @property
+    def movement(self) -> Array:
+        """The change of the unknowns in the last step (j,) [m]; zero in the first one."""
+        before = self.state.previous
+        return self.state.jump - (before.jump if before else self.state.jump)
+
+    def towards(self, movement: Array) -> DisplacementControl | None:
+        """The control of the movement along one of the unknowns (j,), in terms of its largest
+        component; None if there is none.
+        """
+        size = float(np.abs(movement).max())
+        return DirectionControl(0.0, size / (movement @ movement) * movement) if size else None
 
     @property
-    def zone_moved(self) -> float:
-        """By how much it has moved in the last step [m]."""
-        if self.zone is None or self.state.previous is None:
-            return 0.0
-        return float(self.zone @ (self.state.jump - self.state.previous.jump))
+    def controls(self) -> dict[str, DisplacementControl]:
+        """What can be prescribed to continue: the crest, unless it has moved back, which it does if
+        the dam is unloaded, too; the movement of the joints along the last one (arc); and the
+        mean jump of the points whose damage has grown (zone). First what has led to here.
+        """
+        crests = self.history.rows["crest_ux"][-2:]
+        controls: dict[str, DisplacementControl] = {}
+        if crests[-1] >= crests[0]:
+            controls["crest"] = CrestControl(0.0)
+        if arc := self.towards(self.movement):
+            controls["arc"] = arc
+        zone = process_zone(self.model.equilibrium, self.state)
+        if zone is not None:
+            controls["zone"] = DirectionControl(0.0, zone)
+        return dict(sorted(controls.items(), key=lambda item: item[0] != self.control))
 
-    def moved(self, kind: str, by: float) -> DisplacementControl:
-        """The control that moves crest, zone or heel further than here by a length [m]."""
-        control: DisplacementControl
-        if kind == "zone" and self.zone is not None:
-            control = ProcessZoneControl(0.0, self.zone)
-        else:
-            control = DRIVES[kind](0.0)
+    def moved(self, control: DisplacementControl) -> float:
+        """What a control measures of the last movement [m]."""
+        before = self.state.previous
+        if before is None:
+            return 0.0
+        return self.model.measure(control, self.state) - self.model.measure(control, before)
+
+    def further(self, control: DisplacementControl, by: float) -> DisplacementControl:
+        """A control, moved further than here by a length [m]."""
         return replace(control, value=self.model.measure(control, self.state) + by)
 
-    def step(self, time: float, control: Control) -> tuple[State, History] | None:
-        """The next equilibrium, by the first strategy; None if it does not converge."""
-        found = self.model.advance_by_first(self.state, time, control)
-        if found is None:
-            return None
+    def step(self, time: float, control: Control, imposed: float, kind: str) -> Point | None:
+        """The next equilibrium, by the first strategy; None if it does not converge.
+
+        imposed: the displacement imposed there [m]; kind: what is prescribed.
+        """
+        result = self.model.advance_by_first(self.state, time, control)
+        return self.after(result, imposed, kind) if result else None
+
+    def after(self, result: StepResult, imposed: float, kind: str) -> Point:
+        """The equilibrium that a step from here has led to, see `step`."""
         history = self.history.copy()
-        history.add(found, cuts=0)
-        return found.state, history
+        history.add(result, cuts=0)
+        return replace(self, state=result.state, history=history, imposed=imposed, control=kind)
+
+    def irreversible(self, state: State) -> Array:
+        """Damage and slip of all points in a state, (2 q,)."""
+        interface, variables = self.model.equilibrium.interface, state.variables
+        jump = variables.split(interface.jumps(interface.at_points, state.jump))
+        pairs = zip(self.model.equilibrium.laws.laws, jump, variables.joints, strict=True)
+        parts = [(law.damage(d, v), law.slip(v, len(d))) for law, d, v in pairs]
+        return np.concatenate([values for part in parts for values in part])
+
+    @cached_property
+    def dissipation(self) -> float:
+        """How much damage and slip have grown in the last step, over the movement."""
+        before = self.state.previous
+        if before is None or not self.movement.any():
+            return 0.0
+        growth = self.irreversible(self.state) - self.irreversible(before)
+        return float(np.abs(growth).sum() / np.abs(self.movement).max())
+
+    def unloads(self, begin: Point) -> bool:
+        """Whether the level falls in the last step while damage and slip grow by a small part of
+        what they did before another point: the way back, not the continuation of a path.
+        """
+        return self.level < begin.level and self.dissipation <= UNLOADING * begin.dissipation
+
+    def differs(self, other: Point, begin: Point) -> bool:
+        """Whether the state differs from another one, both reached from the same begin."""
+        moved = np.abs(other.state.jump - begin.state.jump).max()
+        apart = np.abs(other.state.jump - self.state.jump).max()
+        return bool(
+            abs(self.level - other.level) > SAME_LEVEL * abs(other.level)
+            or apart > SAME_JUMP * moved
+        )
 
 
 class EquilibriumPath:
@@ -187,14 +292,44 @@ class EquilibriumPath:
         self.points, self.time, self.tick = points, time, tick
         #: whether no further equilibrium has been found
         self.ended = not points
-        #: the largest displacement of joint and crest before the first increment, and the next
-        #: increment [m]
+        #: whether the end of a branch is passed over by relaxation, not by a displacement
+        self.relaxes = False
+        #: how many increments one after the other have been short
+        self.crawled = 0
+        #: the number of the first point of each branch but the first
+        self.starts = list[int]()
+        #: the largest displacement of joint and crest before the first increment [m]
         self.size = points[-1].displacement if points else 0.0
-        self.increment = FIRST * self.size
+        #: the next increment where a branch has ended [m]
+        self.over = FIRST * self.size
         #: relative rise of the level that an increment aims at
         self.rise = RISE
-        #: a far fall from an equilibrium, not taken yet: from, to, increment [m]
-        self.fall: tuple[Point, Point, float] | None = None
+        #: the next increment, over what the joints moved in the last one
+        self.growth = 1.0
+        #: the last two estimates of the highest level [m], where they differ, see `certain`
+        self.interval = np.nan, np.nan
+        #: the longest increment [m]
+        self.longest = np.inf
+        #: intervals in which no increment leads to a state of the branch, by the points before them
+        self.closed = list[Point]()
+
+    @property
+    def falls(self) -> bool:
+        """Whether the level falls by more than FALL beyond its highest one, on the first branch."""
+        first = self.starts[0] if self.starts else len(self.points)
+        levels = self.levels[self.top : first]
+        return bool(len(levels) and levels.min() < (1 - FALL) * self.highest)
+
+    @property
+    def ends_at_strength(self) -> bool:
+        """Whether all strength of a joint is used at its highest level, and no way on is left."""
+        ends = self.ended and not self.exhausted
+        return bool(ends and self.points[self.top].slipping is not None)
+
+    @property
+    def exhausted(self) -> bool:
+        """Whether it has as many points as a path may have."""
+        return len(self.points) >= MOST_POINTS
 
     def add(self, point: Point) -> None:
         """Append an equilibrium."""
@@ -254,7 +389,7 @@ class EquilibriumPath:
     @property
     def mode(self) -> str:
         """How the dam fails; empty if the path does not show it."""
-        if self.slides:
+        if self.slides or (not self.movements and self.failing):
             return "sliding"
         if not self.failing:
             return ""
@@ -269,9 +404,12 @@ class EquilibriumPath:
         """The numbers of the joints at which it fails: that slides, or whose jumps change most
         beyond the limit point; empty if the path does not show it.
         """
-        slides = self.points[self.top].sliding if self.points else None
-        if slides is not None:
-            return (slides,)
+        top = self.points[self.top] if self.points else None
+        ends = top is not None and self.top + 1 == len(self.points)
+        if top:
+            slides = top.slipping if ends else top.sliding
+            if slides is not None:
+                return (slides,)
         sizes = np.array([np.abs(moved).max() for moved in self.movements])
         return tuple(np.flatnonzero(sizes > MOVES * sizes.max(initial=0)).tolist())
 
@@ -296,123 +434,266 @@ class EquilibriumPath:
     # ----------------------------------------------------------------------------------------------
 
     def advance(self) -> None:
-        """Append the next equilibrium. From the highest one an increment over which the level falls
-        far comes last, also after the path of shorter ones: it may pass over a higher one.
-        """
-        last, fall = self.points[-1], None
-        for kind, by in self.increments():
-            new = self.step(last, by, kind)
-            if new and new.level < (1 - FALL) * last.level and last.level >= self.highest:
-                fall = fall or (last, new, by)
-            elif new:
-                self.fall = fall or self.fall
-                self.append(new, by)
-                return
-        start, new, by = fall or self.fall or (None, last, 0.0)
-        self.fall, self.ended = None, True
-        if start is self.points[self.top]:
-            del self.points[self.top + 1 :]
-            self.append(new, by)
-
-    def append(self, new: Point, by: float) -> None:
-        """Append an equilibrium, reached by an increment [m], and choose the next increment."""
-        rise = max((new.level - self.points[-1].level) / new.level, 1e-12)
-        self.increment = by * min(max(self.rise / rise, SHRINKING), GROWTH)
-        self.add(new)
-        self.ended = len(self.points) >= MOST_POINTS
-
-    def increments(self) -> Iterator[tuple[str, float]]:
-        """The increments to try: of the crest; where it moves back, of the process zone, which
-        comes first while it does; of the heel; of the crest, over a snap-back of all of them.
+        """Append the next equilibria of the branch; below its highest level, or where the branch
+        ends or its increments stay short, the next one, whether of the branch or not.
         """
         last = self.points[-1]
-        far, zone = self.imposed(last), ZONE_GROWTH * last.zone_moved
-        lengths = {"crest": self.increment, "zone": zone, "heel": self.increment}
-        crest = last.history.rows["crest_ux"][-2:]
-        backwards = last.control == "zone" and crest[-1] < crest[0]
-        for kind in sorted(lengths, key=lambda kind: backwards and kind == "crest"):
-            smallest = 0.0 if kind == "zone" else SMALLEST * far
-            parts = (part * lengths[kind] for part in PARTS)
-            yield from ((kind, length) for length in parts if length > smallest)
-        yield from (("crest", part * far) for part in JUMPS)
+        falls = last.level < (1 - FALL) * self.highest
+        if falls or self.crawled > MOST_SHORT or not self.advance_branch():
+            self.crawled = 0
+            self.pass_over(last)
 
-    def step(self, point: Point, by: float, kind: str) -> Point | None:
-        """The equilibrium at which crest, zone or heel have moved further than at a point [m]."""
-        time = max(point.state.time, self.time) + self.tick
-        found = point.step(time, point.moved(kind, by))
-        if found is None:
+    def advance_branch(self) -> bool:
+        """Append the next equilibria of the branch; whether there are any."""
+        last, part = self.points[-1], 1.0
+        while part > SMALLEST:
+            for kind, control in last.controls.items():
+                by = part * self.increment(control)
+                if abs(by) < LEAST * self.imposed(last):
+                    continue
+                if new := self.along(last, control, by, SHORTENED * abs(by), kind):
+                    reached = new[-1].imposed - self.imposed(last)
+                    self.append(new, shortened=reached < 0.9 * abs(by) or part < 1)
+                    short = reached < CRAWL * self.imposed(last)
+                    self.crawled = self.crawled + 1 if short else 0
+                    return True
+            part *= SHORTENED
+        return False
+
+    def pass_over(self, last: Point) -> None:
+        """Append an equilibrium beyond a point, whether of its branch or not."""
+        beyond = self.by_relaxation(last) if self.relaxes else self.by_displacement(last)
+        self.ended = beyond is None
+        if beyond:
+            rise = max((beyond.level - last.level) / beyond.level, 1e-12)
+            by = beyond.imposed - self.imposed(last)
+            self.over = by * min(max(SMALL_RISE / rise, SHRINKING), GROWTH)
+            self.append([beyond], another=True)
+
+    def by_displacement(self, last: Point) -> Point | None:
+        """The next equilibrium at a larger displacement of the crest; where it moves back, of the
+        process zone, which comes first while it does; of the heel; of the crest, over a snap-back
+        of all of them.
+        """
+        far, crest = self.imposed(last), last.history.rows["crest_ux"][-2:]
+        by = max(self.over, SHORT * far)
+        controls = {"crest": CrestControl(0.0), **last.controls, "heel": HeelControl(0.0)}
+        lengths = {"crest": by, "heel": by}
+        if zone := last.controls.get("zone"):
+            lengths = {"crest": by, "zone": ZONE_GROWTH * last.moved(zone), "heel": by}
+        backwards = last.control == "zone" and crest[-1] < crest[0]
+        order = sorted(lengths, key=lambda kind: backwards and kind == "crest")
+        tried = [(kind, part * lengths[kind]) for kind in order for part in PARTS]
+        for kind, by in [*tried, *(("crest", part * far) for part in JUMPS)]:
+            beyond = by and self.step(last, last.further(controls[kind], by), by, kind)
+            if beyond:
+                return beyond
+        return None
+
+    def by_relaxation(self, last: Point) -> Point | None:
+        """The equilibrium after unstable crack growth at a level higher by the precision."""
+        time, control = max(last.state.time, self.time), LevelControl(last.level * (1 + PRECISION))
+        result, _ = over_unstable_growth(last.model, last.state, time + self.tick, control, True)
+        if result is None:
             return None
-        return replace(
-            point,
-            state=found[0],
-            history=found[1],
-            imposed=self.imposed(point) + by,
-            control=kind,
-        )
+        by = float(np.abs(result.state.jump - last.state.jump).max())
+        return last.after(result, self.imposed(last) + by, "level")
+
+    def append(self, new: list[Point], another: bool = False, shortened: bool = False) -> None:
+        """Append equilibria, reached by an increment, and choose the next increment; another:
+        whether they may be of another branch; shortened: whether a longer one was tried first.
+        """
+        last = self.points[-1]
+        if another:
+            self.starts.append(len(self.points))
+        rise = (new[-1].level - last.level) / new[-1].level
+        growth = min(max(self.rise / max(rise, 1e-12), SHRINKING), 1.0 if shortened else GROWTH)
+        self.growth = growth * len(new)
+        for point in new:
+            self.add(point)
+        self.ended = self.exhausted
+
+    def increment(self, control: DisplacementControl) -> float:
+        """The next increment of a control [m]: what it measures in the last movement, times the
+        growth; without a last movement, a part of the displacement so far.
+        """
+        last = self.points[-1]
+        if last.state.previous is None or not last.movement.any():
+            return FIRST * self.imposed(last)
+        factor = min(self.growth, self.longest / float(np.abs(last.movement).max()))
+        return factor * last.moved(control)
+
+    def along(
+        self, point: Point, control: DisplacementControl, by: float, smallest: float, kind: str
+    ) -> list[Point]:
+        """The equilibria at the middle and at the end of the longest increment from a point that
+        belongs to the branch, from a length down to the smallest one [m]; empty if there is none.
+        """
+        whole: Point | None = None
+        while abs(by) > smallest:
+            ahead = point.further(control, by)
+            whole = whole or self.step(point, ahead, by, kind)
+            if whole is None:
+                by *= SHRINKING
+                continue
+            if not point.model.equilibrium.path_dependent:
+                return [whole]
+            middle = self.step(point, point.further(control, by / 2), by / 2, kind)
+            end = middle and self.step(middle, ahead, by / 2, kind)
+            if middle and end and not (whole.differs(end, point) or end.unloads(point)):
+                short = np.abs(end.state.jump - point.state.jump).max() < SHORT * self.imposed(
+                    point
+                )
+                if short or self.straight(point, middle, end):
+                    return [middle, end]
+            whole, by = middle, by / 2
+        return []
+
+    def straight(self, begin: Point, middle: Point, end: Point) -> bool:
+        """Whether no limit point is between three equilibria: the levels are in line, or low."""
+        bend = abs(middle.level - (begin.level + end.level) / 2)
+        highest = max(self.highest, middle.level, end.level)
+        return bend <= STRAIGHT * highest or middle.level < NEAR_HIGHEST * highest
+
+    def step(
+        self, point: Point, control: DisplacementControl, by: float, kind: str
+    ) -> Point | None:
+        """The equilibrium at the value of a control, an increment [m] further than a point."""
+        time = max(point.state.time, self.time) + self.tick
+        return point.step(time, control, self.imposed(point) + abs(by), kind)
 
     # -- refinement of its highest level
     # ----------------------------------------------------------------------------------------------
 
     def refine(self, wanted: float = np.inf) -> None:
-        """Insert points around the highest level, to the precision; no more than needed to show
-        that a wanted level is out of reach.
+        """Insert points of the branch where the level may be higher, to the precision; no more than
+        needed to show that a wanted level is out of reach.
         """
         for _ in range(MOST_REFINED):
-            left, share, possible = self.uncertain()
+            left, possible = self.uncertain()
             known = not possible - self.highest > PRECISION / 2 * possible
             if known or possible < wanted < np.inf:
                 return
-            middle = self.between(left, share)
-            if middle is None:
-                return
-            self.insert(left, middle)
+            self.insert(left, self.between(left))
 
-    def insert(self, left: int, point: Point) -> None:
-        """Insert an equilibrium after a point of a number."""
-        self.points.insert(left + 1, point)
+    def first_branch(self: P) -> P:
+        """The path up to the end of its first branch."""
+        other = self.copied()
+        del other.points[self.starts[0] :]
+        other.starts, other.ended = [], True
+        return other
 
-    def uncertain(self) -> tuple[int, float, float]:
-        """Where its highest level is uncertain: the number of a point, the fraction between it and
-        the next one, and an upper bound of the level [m] there; the highest level if it is certain.
+    def copied(self: P) -> P:
+        """Another path with the same points, to be continued independently."""
+        other = copy(self)
+        other.points, other.starts = list(self.points), list(self.starts)
+        other.closed = list(self.closed)
+        return other
+
+    def certain(self) -> bool:
+        """Whether shorter increments from before the highest level lead to the same one, to the
+        precision; else the path ends by them, and is to be continued.
         """
-        if self.slides and not self.points[self.top].model.equilibrium.path_dependent:
-            return self.top, 0.5, self.highest
-        inner = (i for i in (self.top - 1, self.top) if 0 <= i < len(self.points) - 1)
-        sides = [(i, *self.summit(i)) for i in inner if self.points[i + 1].imposed]
-        return max(sides, key=lambda side: side[2], default=(self.top, 0.5, self.highest))
+        top = self.points[self.top] if self.points else None
+        if top is None or top.slides:
+            return True
+        again = self.copied()
+        before = self.levels[: self.top] < (1 - REPEATED) * self.highest
+        begin = max([0, *np.flatnonzero(before), *(n for n in self.starts if n <= self.top)])
+        lengths = [self.length(number) for number in range(begin, self.top)]
+        del again.points[begin + 1 :]
+        again.starts = [number for number in self.starts if number <= begin]
+        again.closed, again.ended = list[Point](), False
+        again.growth, again.longest = 1.0, max(lengths, default=0.0) / SHORTER
+        distance, branches = 0.0, len(again.starts)
+        while not again.ended and distance < sum(lengths) + 2 * again.longest:
+            number = len(again.points)
+            again.advance()
+            if len(again.starts) > branches or len(again.points) == number:
+                break
+            distance += sum(again.length(n) for n in range(number - 1, len(again.points) - 1))
+        again.refine()
+        ends = sorted((float(again.highest), float(self.highest)))
+        if ends[1] - ends[0] <= PRECISION / 2 * ends[1]:
+            return True
+        again.longest = np.inf
+        again.interval = ends[0], ends[1]
+        vars(self).update(vars(again))
+        return False
 
-    def summit(self, left: int) -> tuple[float, float]:
-        """At which fraction between a point and the next one a concave path is likely to bend,
-        where the lines through their neighbours meet, and an upper bound of its level [m].
+    @property
+    def first_growth(self) -> float | None:
+        """The level [m] of the first unstable crack growth on the way to the highest level."""
+        return self.growth_until(self.top + 1)
+
+    def growth_until(self, number: int) -> float | None:
+        """The level [m] of the first limit point among so many points, after which the level falls
+        by more than FALL; None if there is none.
+        """
+        levels = self.levels[:number]
+        highest = np.maximum.accumulate(levels)
+        falls = np.flatnonzero(levels < (1 - FALL) * highest)
+        return float(highest[falls[0]]) if len(falls) else None
+
+    def insert(self, left: int, new: list[Point]) -> None:
+        """Insert equilibria after a point of a number; none: no increment is of the branch."""
+        self.points[left + 1 : left + 1] = new
+        self.starts = [start + len(new) * (start > left + 1) for start in self.starts]
+        if not new:
+            self.closed.append(self.points[left])
+
+    def uncertain(self) -> tuple[int, float]:
+        """Where the level may be highest: the number of the point before, and an upper bound [m];
+        the highest level if there is no such interval.
+        """
+        top = self.top
+        if not self.points:
+            return top, self.highest
+        point = self.points[top]
+        if point.slides and not point.model.equilibrium.path_dependent:
+            return top, self.highest
+        bounds = [(self.bound(left), left) for left in range(len(self.points) - 1)]
+        possible, left = max(bounds, default=(self.highest, top))
+        return left, max(possible, self.highest)
+
+    def bound(self, left: int) -> float:
+        """An upper bound of the level [m] between a point and the next one, where the lines through
+        their neighbours meet; -inf where no point can be inserted.
         """
         a, b = self.points[left], self.points[left + 1]
-        length, chord = b.imposed - self.imposed(a), self.slope(left)
+        if b.control == "level" or left + 1 in self.starts or any(a is p for p in self.closed):
+            return -np.inf
         before, beyond = self.slope(left - 1), self.slope(left + 1)
-        if before is None or chord is None:
-            return 0.5, max(a.level, b.level) + abs(b.level - a.level)
-        share = 0.5
-        if beyond is not None and before > chord > beyond:
-            share = np.clip((chord - beyond) / (before - beyond), 0.1, 0.9)
-        return float(share), max(a.level + before * length, b.level)
+        rise, length, ends = b.level - a.level, self.length(left), max(a.level, b.level)
+        chord = rise / (length or 1.0)
+        if before is None or beyond is None:
+            return ends + abs(rise)
+        if before > chord > beyond:  # where the lines through the neighbours meet
+            return a.level + before * (rise - beyond * length) / (before - beyond)
+        if before > chord:  # it may fall anywhere in between
+            return max(ends, a.level + before * length)
+        return max(ends, b.level - beyond * length) if chord > beyond else ends
+
+    def length(self, left: int) -> float:
+        """How far the jumps move between a point and the next one [m]."""
+        a, b = self.points[left : left + 2]
+        return float(np.abs(b.state.jump - a.state.jump).max())
 
     def slope(self, left: int) -> float | None:
-        """Rise of the level over the increment between a point and the next one; None if the next
-        one has a prescribed level.
+        """Rise of the level over the movement between a point and the next one; None if they are
+        not on one branch.
         """
-        if left < 0 or left + 1 >= len(self.points) or not self.points[left + 1].imposed:
+        if left < 0 or left + 1 >= len(self.points) or left + 1 in self.starts:
             return None
-        a, b = self.points[left], self.points[left + 1]
-        return (b.level - a.level) / (b.imposed - self.imposed(a))
+        a, b = self.points[left : left + 2]
+        return (b.level - a.level) / (self.length(left) or 1.0)
 
-    def between(self, left: int, share: float) -> Point | None:
-        """The equilibrium at a fraction between a point and the next one."""
-        a, b = self.points[left], self.points[left + 1]
-        if b.imposed:
-            return self.step(a, share * (b.imposed - self.imposed(a)), b.control)
-        case, times = a.model.case, (a.state.time, b.state.time)
-        time = times[0] + share * (times[1] - times[0])
-        found = a.step(time, LevelControl(case.level_at(time)))
-        return replace(a, state=found[0], history=found[1]) if found else None
+    def between(self, left: int) -> list[Point]:
+        """Equilibria of the branch between a point and the next one."""
+        a, b = self.points[left : left + 2]
+        control = a.towards(b.state.jump - a.state.jump)
+        length = self.length(left) / 2
+        return self.along(a, control, length, SMALLEST * length, b.control) if control else []
 
 
 def movement(case: Case, crack_length: float, x: np.ndarray, moved: np.ndarray) -> str:

@@ -66,6 +66,19 @@ ASSUMPTIONS = {
     "without tension, with the crack past the drains": (False, True),
 }
 
+#: How often at most a path is repeated by shorter increments before its highest level is said to
+#: depend on them.
+MOST_REPEATED = 3
+
+#: Relative length of the increments of the path that is compared with one on which a branch has
+#: ended.
+SHORTER_RISE = 0.5
+
+#: How unstable crack growth is passed over: whether by relaxation; and the relative difference
+#: up to which the levels that are reached after it agree.
+AFTER = {"by displacement": False, "by relaxation": True}
+AFTER_GROWTH = 1e-3
+
 #: Relative distance within which the bound of statics confirms a critical level below it.
 NEAR_BOUND = 0.02
 
@@ -105,6 +118,11 @@ class CriticalValue:
     gravity_with: Mapping[str, float] = field(default_factory=dict)
     #: notes on the gravity method's values
     notes: Sequence[str] = ()
+    #: level of the first unstable crack growth on the way, or at the critical level [m]; None: none
+    growth: float | None = None
+    #: the highest levels that are reached after the unstable growth that ends the branch, by how it
+    #: is passed over [m]
+    after: Mapping[str, float] = field(default_factory=dict)
     #: the joint that fails, if there are several, and the events on the way
     joint: str = ""
     events: Sequence[str] = ()
@@ -136,7 +154,7 @@ class CriticalValue:
             mode = f" ({self.mode}{where})" if self.mode else ""
             lines = [f"{name}: critical {of} {self.value:.6g}{unit}{mode}"]
             lines.append(self.why or f"not confirmed: {self.doubt}")
-        lines += self.events
+        lines += [*self.growth_lines(), *self.events]
         if search.of == "strength" and set(search.partial.values()) != {1.0}:
             mu, cohesion = search.partial["mu"], search.partial["adhesion"]
             lines.append(f"beyond the partial factors factor_mu = {mu:g}, factor_c = {cohesion:g}")
@@ -152,6 +170,19 @@ class CriticalValue:
             share = tension_share(joint, last)
             hints = joint.law.hints(Evidence(last["crack_length"], False, share))
             lines += (f"{name}: {hint}" if name else hint for hint in hints)
+        return lines
+
+    def growth_lines(self) -> list[str]:
+        """What is printed of unstable crack growth."""
+        if self.growth is None:
+            return []
+        lines = [f"first unstable crack growth: {self.growth:.6g} m"]
+        if self.after:
+            low, high = min(self.after.values()), max(self.after.values())
+            ways = "; ".join(f"{level:.6g} m {name}" for name, level in self.after.items())
+            agree = len(self.after) > 1 and high - low <= AFTER_GROWTH * high
+            doubt = "" if agree else "not confirmed, it depends on how the growth ends: "
+            lines.append(f"after unstable growth equilibria up to: {doubt}{ways}")
         return lines
 
 
@@ -256,14 +287,21 @@ class Search:
         """The strength of a joint, divided by a factor and the partial factors."""
         return {n: joint[n] / (factor * self.partial.get(n, 1.0)) for n in STRENGTH}
 
-    def path(self, value: float, case: Case, target: float | None = None) -> FailurePath:
-        """The equilibrium path of a case, followed to a first estimate; adds a trial."""
+    def path(
+        self, value: float, case: Case, target: float | None = None, to_growth: bool = False
+    ) -> FailurePath:
+        """The equilibrium path of a case, followed to a first estimate; adds a trial.
+
+        to_growth: with a law whose shear stiffness opening releases, only to the first unstable
+        crack growth.
+        """
         report = lambda level: self.on_progress(
             f"{self.of} {value:.6g}{self.unit}: level {level:.6g} m"
         )
         highest = max(target or 0, *case.levels)  # water may press on the crest
         interface = interface_of(replace(case, levels=(*case.levels[:-1], highest)))
         path = FailurePath(case, interface, target, report)
+        path.to_growth = to_growth and path.stepper.model.equilibrium.laws.releases_shear
         self.trials.append(Trial(value, path))
         path.follow(self.factor)
         return path
@@ -291,17 +329,67 @@ class Search:
         levels, tails = self.own.levels[:last], self.own.tail_levels[:last]
         below = last < len(self.own.levels)
         case = self.own.varied(self.settings, levels, tails) if below else self.base
-        path = self.path(max(case.levels), case, case.highest_level)
-        path.refine()  # first: a limit point that is known is confirmed sooner
-        path.follow(SURE)
-        path.refine()
+        path = self.path(max(case.levels), case, case.highest_level, to_growth=True)
+        for _ in range(MOST_REPEATED):
+            path.refine()  # first: a limit point that is known is confirmed sooner
+            path.follow(SURE)
+            grows = path.to_growth and path.grows
+            if grows and path.starts:
+                path = path.first_branch()
+            path.refine()
+            certain = path.reached or self.certain(path)
+            if certain:
+                break
         if path.reached:
             beyond = f"{path.target:g} m, twice the dam's height"
             return CriticalValue(
                 None, "", "", f"there is an equilibrium at {beyond}", path.points[-1]
             )
         point = path.points[path.top] if path.admissible else None
-        return self.result(point and point.level, path, point)
+        result = self.result(point and point.level, path, point)
+        if point is None:
+            return result
+        if grows:
+            return self.with_growth(result, path, certain)
+        if certain and not result.why and path.ends_at_strength:
+            result = replace(result, mode="sliding", why=end_of_branch(path), doubt="")
+        elif certain and not result.why and path.falls:
+            result = replace(result, why=lost_beyond_limit(path), doubt="")
+        result = replace(result, growth=path.first_growth)
+        return result if certain else replace(result, why="", doubt=by_increments(path))
+
+    def certain(self, path: FailurePath) -> bool:
+        """Whether shorter increments lead to the same highest level of a path: from before it, if
+        its branch has led there; else, from the beginning on. If not, the path is replaced.
+        """
+        if not path.starts or path.top < path.starts[0]:
+            return path.certain()
+        other = FailurePath(path.case, path.interface, path.target)
+        other.rise, other.to_growth = SHORTER_RISE * path.rise, path.to_growth
+        other.follow(SURE)
+        other.refine()
+        path.interval = tuple(sorted((float(path.highest), float(other.highest))))
+        return bool(path.interval[1] - path.interval[0] <= PRECISION * path.interval[1])
+
+    def with_growth(self, result: CriticalValue, path: FailurePath, certain: bool) -> CriticalValue:
+        """A result with the unstable crack growth that ends a path, and the highest levels that are
+        reached after it; certain: whether its level is.
+        """
+        after = {}
+        for name, relaxes in AFTER.items():
+            other = path.copied()
+            other.relaxes, other.to_growth, other.ended = relaxes, False, False
+            if relaxes:
+                del other.points[path.top + 1 :]
+                other.pass_over(other.points[-1])
+            other.follow(SURE)
+            other.refine()
+            if other.highest > (1 + PRECISION) * path.highest:
+                after[name] = float(other.highest)
+        mode = "unstable crack growth" if after else result.mode
+        why, doubt = (beyond_limit(path), "") if certain else ("", by_increments(path))
+        growth = float(path.highest)
+        return replace(result, mode=mode, why=why, doubt=doubt, growth=growth, after=after)
 
     def value(self) -> CriticalValue:
         """Search outwards from the case's own value for a stand and a failure, then bisect."""
@@ -638,6 +726,38 @@ def block_stands(method: gravity.GravityMethod, longest: bool) -> bool:
     return method.stands and not slides and not crushed
 
 
+def by_increments(path: FailurePath) -> str:
+    """What is said of a highest level that is not certain."""
+    low, high = path.interval
+    return f"between {low:.6g} and {high:.6g} m, depending on the increments of displacement"
+
+
+def beyond_limit(path: FailurePath) -> str:
+    """What is said of unstable crack growth at the highest level of a branch."""
+    low = min(point.level for point in path.points[path.top :])
+    beyond = f"the equilibria beyond it are lower, down to {low:.6g} m"
+    if path.top + 1 == len(path.points):
+        beyond = "no increment of the displacement, however short, leads on"
+    return f"there the crack grows unstably: {beyond}, and shorter ones lead to the same level"
+
+
+def lost_beyond_limit(path: FailurePath) -> str:
+    """What is said of a path that is lost beyond the limit point."""
+    low = min(point.level for point in path.points[path.top :])
+    return (
+        f"there the level has a limit point: the equilibria beyond it are lower, down to {low:.6g} "
+        "m, shorter increments lead to the same, and further ones are not found"
+    )
+
+
+def end_of_branch(path: FailurePath) -> str:
+    """What is said of a path that ends where the whole joint slips."""
+    return (
+        f"there the whole {path.joint or 'joint'} slips; no increment of the displacement leads "
+        "to a higher level, and shorter ones lead to the same"
+    )
+
+
 def of_each(values: list[float]) -> Setting:
     """A setting from the values of each joint."""
     return tuple(values) if len(values) > 1 else values[0]
@@ -775,6 +895,8 @@ def as_json(search: Search, answer: CriticalValue) -> dict[str, Any]:
         "unit": search.unit.strip(),
         "mode": answer.mode,
         "joint": answer.joint,
+        "first_unstable_growth": answer.growth,
+        "after_unstable_growth": dict(answer.after),
         "events": answer.events,
         "confirmed": answer.why,
         "doubt": answer.doubt,

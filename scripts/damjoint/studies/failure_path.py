@@ -1,7 +1,8 @@
 """The equilibrium path of one dam to its failure.
 
-The levels are prescribed as far as the steps converge; then the path is followed under displacement
-control (see solver/path.py), and its highest level is refined to the precision.
+The levels are prescribed until all other loads act in full and the joints have begun to move; then
+the path is followed under displacement control (see solver/path.py), and its highest level is
+refined to the precision.
 """
 
 from __future__ import annotations
@@ -16,8 +17,10 @@ from ..joint.interface import Interface
 from ..model.case import Case
 from ..model.loads import Loading
 from ..model.results import HISTORY, Columns, with_all_joints
-from ..solver.load_stepper import LoadStepper
-from ..solver.path import LARGE_RISE, RISE, EquilibriumPath, Point
+from ..solver.controls import LevelControl
+from ..solver.history import joint_row
+from ..solver.load_stepper import SAME_TIME, LoadStepper
+from ..solver.path import EquilibriumPath, Point
 
 #: Columns of critical.csv: a row per equilibrium of each dam that was tried. With several joints:
 #: of the first one; see `critical_columns`.
@@ -34,9 +37,9 @@ CRITICAL = {
     "compression": ("Pa", "total compression at the toe"),
 }
 
-#: Number of failed steps of the level, each half as long as the one before, after which a
-#: displacement is prescribed.
-FAILURES = 2
+#: The part of a joint that may open or soften before a displacement is prescribed. How often a step
+#: of the level is halved at most, until its two halves lead to the same state.
+SOFTENED, HALVINGS = 0.1, 4
 
 #: Time of an increment of displacement, after the last level, where all loads act in full.
 TICK = 1e-3
@@ -70,7 +73,9 @@ class FailurePath(EquilibriumPath):
         """target: the level [m] to reach, the highest still to come by default; on_step: called
         with the level of each equilibrium.
         """
-        self.case, self.on_step = case, on_step
+        self.case, self.interface, self.on_step = case, interface, on_step
+        #: whether it is followed to the first unstable crack growth only
+        self.to_growth = False
         self.points: list[Point] = []
         stepper = LoadStepper(case, interface, lambda _: self.add(point_of(stepper)))
         #: whether the loads of a time are those of the last one, but for the level
@@ -79,14 +84,51 @@ class FailurePath(EquilibriumPath):
         if not (case["weight_first"] and stepper.weigh()):
             stepper.advance_to(case.times[0])
         if not stepper.stopped:
-            advance(stepper)
-        ahead = [v for t, v in enumerate(case.levels, 1) if t >= stepper.state.time]
+            self.fill(point_of(stepper))
+        time = self.points[-1].state.time if self.points else 0.0
+        ahead = [v for t, v in enumerate(case.levels, 1) if t >= time]
         self.target = max(ahead) if target is None else target
         super().__init__(self.points, len(case.levels), TICK)
-        #: where displacement control begins
-        self.begin, self.first_increment = list(self.points), self.increment
-        if not stepper.model.equilibrium.path_dependent:
-            self.rise = LARGE_RISE
+
+    def fill(self, point: Point) -> None:
+        """Prescribe the levels, from a point on, until all other loads act in full and a part
+        SOFTENED of a joint has opened or softens, or until a step has been halved HALVINGS times.
+        """
+        smallest, at_rest = 0.5**HALVINGS, softened(point)
+        for target in self.case.times:
+            length = np.inf
+            while (left := target - point.state.time) > SAME_TIME:
+                new = self.by_level(point, min(length, left))
+                if not new:
+                    return
+                end, length = new[-1], new[-1].state.time - point.state.time
+                softens = self.on_path(end) and softened(end) > at_rest + SOFTENED
+                if softens and length > smallest:
+                    length /= 2
+                    continue
+                for equilibrium in new:
+                    self.add(equilibrium)
+                if softens:
+                    return
+                point, length = end, 2 * length
+
+    def by_level(self, point: Point, length: float) -> list[Point]:
+        """The equilibria at the middle and at the end of the longest step of the level from a
+        point, up to a length in time, whose halves lead to the same state; empty if there is none.
+        """
+        begin, case = point.state.time, self.case
+        reach = lambda start, time: start.step(
+            time, LevelControl(case.level_at(time)), 0.0, "level"
+        )
+        whole = reach(point, begin + length)
+        for _ in range(HALVINGS):
+            middle = reach(point, begin + length / 2)
+            if whole and middle:
+                end = reach(middle, begin + length)
+                if end and not whole.differs(end, point):
+                    return [middle, end]
+            whole, length = middle, length / 2
+        return []
 
     def add(self, point: Point) -> None:
         """Append an equilibrium, if the toe is not crushed before it."""
@@ -169,41 +211,44 @@ class FailurePath(EquilibriumPath):
 
     def follow(self, factor: float) -> None:
         """Continue until the target is reached, the dam slides or is crushed, the level has settled
-        or no further equilibrium is found.
-
-        A path of long increments that is lost is followed again by short ones. A highest level that
-        is not far below the target is refined.
+        or no further equilibrium is found. A highest level that is not far below the target is
+        refined.
         """
         while not (self.ended or self.decided(factor)):
             self.advance()
-        if self.points and self.rise > RISE and not self.decided(factor):
-            self.points[:] = self.begin
-            self.rise, self.increment, self.ended = RISE, self.first_increment, False
-            self.fall = None
-            self.follow(factor)
-        elif not self.reached:
+        if not self.reached:
             self.refine(self.target)
 
     def decided(self, factor: float) -> bool:
-        """Whether the target is reached, or the dam slides, is crushed or its level has settled."""
-        return bool(self.reached or self.crushed or self.slides or self.settled(factor))
+        """Whether the target is reached, or the dam slides, is crushed or its level has settled; or
+        a crack has grown unstably, if that is to be found.
+        """
+        if self.reached or self.crushed or self.slides or self.settled(factor):
+            return True
+        return self.to_growth and self.grows
+
+    @property
+    def grows(self) -> bool:
+        """Whether a crack has grown unstably: the level has fallen, or the branch has ended."""
+        return bool(self.starts) or self.growth_until(len(self.points)) is not None
 
     # -- refinement of its end
     # ----------------------------------------------------------------------------------------------
 
-    def insert(self, left: int, point: Point) -> None:
-        """Insert an equilibrium; if the toe is crushed there, it is the last one."""
-        if self.crushes(point):
-            self.points[left + 1 :] = [point]
-        else:
-            super().insert(left, point)
+    def insert(self, left: int, new: list[Point]) -> None:
+        """Insert equilibria; if the toe is crushed at one of them, it is the last one."""
+        super().insert(left, new)
+        for number in range(left + 1, left + 1 + len(new)):
+            if self.crushes(self.points[number]):
+                del self.points[number + 1 :]
+                return
 
-    def uncertain(self) -> tuple[int, float, float]:
+    def uncertain(self) -> tuple[int, float]:
         """See `EquilibriumPath.uncertain`: also where it passes the target or f_c."""
         if self.crushed_at_top or self.arrival is not None:
             right = len(self.points) - 1 if self.crushed else self.arrival
             ends = [p.level for p in self.points[max(right - 1, 0) : right + 1]]
-            return right - 1, 0.5, self.highest + max(ends) - min(ends)
+            return right - 1, self.highest + max(ends) - min(ends)
         return super().uncertain()
 
 
@@ -225,13 +270,10 @@ def point_of(stepper: LoadStepper) -> Point:
     return Point(stepper.model, stepper.state, stepper.history.copy())
 
 
-def advance(stepper: LoadStepper) -> None:
-    """Continue through the times of a case until some steps have not converged."""
-    failures, length = 0, np.inf
-    for target in stepper.case.times:
-        while stepper.state.time < target:
-            ahead = min(length, target - stepper.state.time)
-            if not stepper.step(stepper.state.time + ahead):
-                failures, length = failures + 1, ahead / 2
-            if failures > FAILURES:
-                return
+def softened(point: Point) -> float:
+    """The largest part of a joint that is open or softens."""
+    equilibrium, parts = point.model.equilibrium, list[float]()
+    for number, joint in enumerate(equilibrium.interface.joints):
+        row = joint_row(equilibrium, point.state, number)
+        parts.append((row["crack_length"] + row["process_zone"]) / joint.length)
+    return max(parts)
