@@ -478,9 +478,8 @@ class EquilibriumPath:
         far, crest = self.imposed(last), last.history.rows["crest_ux"][-2:]
         by = max(self.over, SHORT * far)
         controls = {"crest": CrestControl(0.0), **last.controls, "heel": HeelControl(0.0)}
-        lengths = {"crest": by, "heel": by}
-        if zone := last.controls.get("zone"):
-            lengths = {"crest": by, "zone": ZONE_GROWTH * last.moved(zone), "heel": by}
+        zone = last.controls.get("zone")
+        lengths = {"crest": by, "zone": ZONE_GROWTH * last.moved(zone) if zone else 0.0, "heel": by}
         backwards = last.control == "zone" and crest[-1] < crest[0]
         order = sorted(lengths, key=lambda kind: backwards and kind == "crest")
         tried = [(kind, part * lengths[kind]) for kind in order for part in PARTS]
