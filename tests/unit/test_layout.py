@@ -9,6 +9,7 @@ import pytest
 from damjoint_tools import pages
 
 PACKAGE = Path(damjoint.__file__).parent
+WITNESS = PACKAGE.with_name("damjoint_witness")
 #: Each part uses only those before it.
 PARTS = ["", "csr", "threads", "storage", "progress", "versions", "laws", "model", "fem", "joint"]
 PARTS += ["solver", "dynamics", "engines", "statics", "post", "accuracy", "runner", "studies"]
@@ -106,3 +107,19 @@ def test_functions_of_the_problem_definition_have_one_definition():
             places.setdefault(name, set()).add(place)
     assert len(places) > 100
     assert not {name: files for name, files in places.items() if len(files) > 1}
+
+
+@pytest.mark.parametrize("path", sorted(WITNESS.rglob("*.py")), ids=lambda p: str(p.name))
+def test_the_independent_verification_imports_nothing_of_the_package(path):
+    """Also not by a relative import beyond its own folder, or by name."""
+    depth = len(path.relative_to(WITNESS).parts)
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom):
+            names = [node.module or ""] if not node.level else []
+            assert node.level <= depth
+        elif isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        else:
+            continue
+        roots = {name.split(".")[0] for name in names}
+        assert not roots & {"damjoint", "damjoint_tools", "importlib"}

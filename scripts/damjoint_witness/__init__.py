@@ -1,0 +1,20 @@
+"""Independent verification of results: from the command line and the files of a run alone.
+
+Nothing of `damjoint` is imported (a test), so that none of its errors is repeated: the values of
+the joints are read from the command line again, loads, laws, water and elasticity are computed
+again, slowly and plainly, from the formulas of reference/theory.md.
+
+| module | what it checks, by what |
+|---|---|
+| `files` | reads the tables and run.json of a run |
+| `reader` | the values of each joint, levels and times, from the command line |
+| `statics` | weights and loads of the section's polygons: N + U, T, M of every step |
+| `laws/` | traction, damage, slip of every step at every node and integration point, replayed |
+| `water` | pressure and flux, from the openings |
+| `elasticity` | displacement jumps, from loads and tractions of the joints |
+| `again` | independence of steps; critical values |
+| `stops` | whether there is no equilibrium beyond the last state, by limit analysis |
+| `earthquake` | balance of momentum, motion and laws of every time step |
+
+Each check is a generator of the rules that the files violate, in words.
+"""

@@ -1,0 +1,80 @@
+"""Reading of a run's files into plain arrays."""
+
+from __future__ import annotations
+
+import csv
+import json
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+#: Columns of a table by name.
+Table = dict[str, NDArray[np.float64]]
+
+
+def read_table(path: Path) -> Table:
+    """Read the columns of a table."""
+    with path.open() as file:
+        heads, *rows = csv.reader(file)
+    values = np.array(rows, float).reshape(-1, len(heads))
+    return dict(zip(heads, values.T, strict=True))
+
+
+def rows_where(table: Table, which: NDArray[np.bool_]) -> Table:
+    """The rows of a table where a condition (n,) holds."""
+    return {name: column[which] for name, column in table.items()}
+
+
+def split_by(table: Table, name: str) -> list[Table]:
+    """The parts of a table with the same value in a column, in the order of their first rows."""
+    values = table[name]
+    return [rows_where(table, values == value) for value in dict.fromkeys(values.tolist())]
+
+
+@dataclass(frozen=True)
+class Files:
+    """Result files of a command `damjoint run ...` or `damjoint quake ...`, without its --out."""
+
+    folder: Path
+    #: the words after `damjoint`
+    words: tuple[str, ...]
+    exit_code: int = 0
+
+    @cached_property
+    def record(self) -> dict[str, Any]:
+        """The content of run.json."""
+        return dict(json.loads((self.folder / "run.json").read_text()))
+
+    @cached_property
+    def history(self) -> Table:
+        """Columns of history.csv."""
+        return read_table(self.folder / "history.csv")
+
+    def history_of(self, joint: int) -> Table:
+        """Columns of history.csv, those of a joint (from 0) without suffix."""
+        return without_suffix(self.history, joint)
+
+    @cached_property
+    def joint_tables(self) -> list[Table]:
+        """Columns of joint.csv, all joints."""
+        return split_by(read_table(self.folder / "joint.csv"), "time")
+
+    def tables_of(self, joint: int) -> list[Table]:
+        """Columns of joint.csv at a joint (from 0), a table for each time."""
+        return [rows_where(table, table["joint"] == joint + 1) for table in self.joint_tables]
+
+    @property
+    def stopped(self) -> bool:
+        """Whether the run ended before its last level."""
+        return bool(self.record["state"] != "complete")
+
+
+def without_suffix(table: Table, joint: int) -> Table:
+    """A table with the columns of a joint (from 0) without suffix."""
+    suffix = f"_{joint + 1}"
+    own = {n: table[n + suffix] for n in table if joint and n + suffix in table}
+    return table | own
