@@ -488,7 +488,7 @@ def add_critical(commands: Commands) -> None:
 
 def do_critical(arguments: argparse.Namespace) -> int:
     """Run damjoint critical; 1 if there is no critical value or it is not confirmed."""
-    from .studies.critical import critical
+    from .studies.critical_study import critical
 
     case = load_case(arguments, arguments.case)
     answer, lines = critical(case, arguments.of, arguments.out)

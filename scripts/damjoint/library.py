@@ -42,7 +42,8 @@ if TYPE_CHECKING:  # loaded when they are used, with what they draw with
     from matplotlib.figure import Figure
 
     from .studies.check import SafetyCheck
-    from .studies.critical import CriticalValue, Search
+    from .studies.critical import Search
+    from .studies.critical_value import CriticalValue
 
 __all__ = [
     "LAWS",
@@ -423,12 +424,14 @@ class Critical:
     @property
     def statement(self) -> list[str]:
         """The lines that `damjoint critical` prints."""
-        return self.answer.lines(self.search)
+        from .studies.critical_study import printed_lines
+
+        return printed_lines(self.answer, self.search)
 
     @property
     def equilibria(self) -> np.recarray:
         """critical.csv: a row per equilibrium of each trial."""
-        from .studies.critical import table
+        from .studies.critical_study import table
 
         return records(table(self.search))
 

@@ -12,7 +12,8 @@ from damjoint.solver import path
 from damjoint.statics import gravity
 from damjoint.statics.verdict import highest_by_statics
 from damjoint.studies import failure_path
-from damjoint.studies.critical import Search, critical, table
+from damjoint.studies.critical import Search
+from damjoint.studies.critical_study import critical, printed_lines, table
 from damjoint.studies.failure_path import FailurePath
 from scipy.optimize import brentq
 
@@ -105,7 +106,8 @@ def test_critical_strength_with_partial_factors():
     expected = (0.6 * block.N + 2e5 * block.body.length) / block.T
     assert answer.value == pytest.approx(expected, rel=2e-4)
     assert answer.gravity == pytest.approx(answer.value, rel=2e-4)
-    assert "beyond the partial factors factor_mu = 1.5, factor_c = 3" in answer.lines(search)
+    lines = printed_lines(answer, search)
+    assert "beyond the partial factors factor_mu = 1.5, factor_c = 3" in lines
     _, level = search_result(
         "dam", "level", DAM | UNBONDED | {"mu": 0.7} | partial, tail_levels="3"
     )
@@ -174,7 +176,7 @@ def brittle():
 def test_the_gravity_method_without_tension(brittle):
     """Tensile strength above the linear stress at the heel and below the elastic one."""
     search, answer = brittle
-    lines, free = "\n".join(answer.lines(search)), answer.gravity_with["without tension"]
+    lines, free = "\n".join(printed_lines(answer, search)), answer.gravity_with["without tension"]
     assert answer.value == pytest.approx(free, rel=0.02) and answer.gravity > 70
     assert f"gravity method: {answer.gravity:.6g} m; without tension: {free:.6g} m" in lines
     assert "(n_joint = 60), " in lines and "kPa, exceeds the strength of 2000 kPa" in lines
@@ -190,14 +192,14 @@ def test_the_value_of_the_gravity_method_names_its_joint():
     for joint, level in ((lift, answer.gravity), (base, answer.gravity_there)):
         assert gravity.at(joint, 1.0, level).SSF == pytest.approx(1, rel=1e-3)
     shown = f"gravity method on lift 9 m: {answer.gravity:.6g} m; on base: "
-    assert shown + f"{answer.gravity_there:.6g} m" in "\n".join(answer.lines(search))
+    assert shown + f"{answer.gravity_there:.6g} m" in "\n".join(printed_lines(answer, search))
 
 
 def test_the_gravity_method_with_a_crack_past_the_drains():
     """The short crack is in equilibrium up to the drains; mu N = T with the crack past them."""
     drains = {"dam_base": 30.0, "uplift": "cracked", "drains": 1.0, "drain_x": 6.0, "mu": 1.0}
     search = Search(load("dam", DAM | UNBONDED | drains, "40,44", "3"), "level")
-    first, longer = (search.by_gravity(44.4, True, longest) for longest in (False, True))
+    first, longer = (search.gravity.critical(44.4, True, longest) for longest in (False, True))
     method = gravity.at(search.own, 2.0, first - 1e-5)
     assert method.SSF > 1 and method.crack_length == pytest.approx(6, abs=1e-3)
     (other,) = gravity.at(search.own, 2.0, longer).further
@@ -273,7 +275,7 @@ def test_the_value_without_lasting_tension_is_given_too():
     """Tension c/mu of law = friction does not vanish on opening."""
     settings = {"law": "friction", "adhesion": 1e6, "n_joint": 20.0}
     search, answer = search_result("dam", settings=settings)
-    lines = "\n".join(answer.lines(search))
+    lines = "\n".join(printed_lines(answer, search))
     assert "kPa (" in lines and "% of the overturning moment), at any opening" in lines
     assert answer.gravity_with["without tension"] < answer.value
 
@@ -340,7 +342,7 @@ def test_the_gravity_method_of_a_trial_has_the_values_of_its_case(of):
     value = 1.3 * (1.0 if of == "strength" else search.own[of] or 0.1)
     by_parser = search.own.varied(search.case_at(value).source.overrides)
     blocks = [gravity.at(joint, 3.0) for joint in by_parser.joints]
-    assert [b.SSF for b in search.rigid_blocks(value)] == [b.SSF for b in blocks]
+    assert [b.SSF for b in search.gravity.rigid_blocks(value)] == [b.SSF for b in blocks]
     assert search.case_at(value) == by_parser
 
 
@@ -472,7 +474,8 @@ def test_a_highest_level_that_depends_on_the_increments_is_not_confirmed(monkeyp
     monkeypatch.setattr(FailurePath, "certain", differs)
     search, answer = search_result("dam", settings=SNAP_BACKS[0][0])
     assert not answer.confirmed
-    assert "not confirmed: between 48 and 49 m, depending on" in "\n".join(answer.lines(search))
+    lines = "\n".join(printed_lines(answer, search))
+    assert "not confirmed: between 48 and 49 m, depending on" in lines
 
 
 def test_the_first_unstable_growth_of_a_law_without_friction_is_the_critical_level():
@@ -483,7 +486,7 @@ def test_the_first_unstable_growth_of_a_law_without_friction_is_the_critical_lev
     assert answer.mode == "unstable crack growth" and answer.confirmed
     assert answer.value == answer.growth == pytest.approx(3.348, abs=2e-3)
     assert list(answer.after.values()) == pytest.approx([4.988, 4.988], rel=1e-3)
-    lines = "\n".join(answer.lines(search))
+    lines = "\n".join(printed_lines(answer, search))
     assert "first unstable crack growth: 3.348" in lines
     assert "after unstable growth equilibria up to: 4.98" in lines
 
@@ -491,7 +494,7 @@ def test_the_first_unstable_growth_of_a_law_without_friction_is_the_critical_lev
 def test_the_first_unstable_growth_on_the_way_is_given(brittle):
     search, answer = brittle
     assert answer.growth == pytest.approx(50.21, abs=0.02) and answer.growth < answer.value
-    assert "first unstable crack growth: 50.2" in "\n".join(answer.lines(search))
+    assert "first unstable crack growth: 50.2" in "\n".join(printed_lines(answer, search))
 
 
 def test_a_joint_that_slips_whole_with_tension_elsewhere_is_no_proof():

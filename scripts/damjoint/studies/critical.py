@@ -7,44 +7,30 @@ precision. A critical level needs no bisection: it is the highest level of the p
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from functools import cached_property
 from itertools import chain, zip_longest
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy.optimize import bisect
 
 from .. import InputError
 from ..arrays import Setting
-from ..engines import Outcome
-from ..engines.condensed.solve import about
-from ..fem.memory import sizes
 from ..joint.interface import interface_of
-from ..laws import Evidence
 from ..model.case import Case, resolve
-from ..model.notes import remarks
 from ..model.parameters import independent, parameter
-from ..model.results import Results, column_of, row_of_joint
-from ..post import folder as folders
-from ..post.tables import write_csv
-from ..progress import Progress
-from ..runner import save
+from ..model.results import Results, row_of_joint
 from ..solver.path import PRECISION, ROUGH, SURE, Point
-from ..statics import gravity
-from ..statics.limit import elastic_heel_stress
 from ..statics.verdict import (
     bound,
-    cracks_and_drains,
     highest_by_statics,
-    statement,
-    tension_share,
 )
 from ..threads import limited_threads
-from .failure_path import FailurePath, Trial, critical_columns, row
+from .critical_gravity import GravityValues
+from .critical_value import CriticalValue
+from .critical_words import beyond_limit, by_increments, end_of_branch, events_on, lost_beyond_limit
+from .failure_path import FailurePath, Trial
 
 #: Parameters that are divided by the strength reduction factor. The fracture energies are included:
 #: the stresses of the softening curve are scaled, its jumps are not.
@@ -59,13 +45,6 @@ QUICK = {"smallest_step": 1.0, "max_iterations": 15.0, "burst_iterations": 15.0}
 #: Parameters of a prescribed displacement.
 DRIVE = ("drive", "drive_begin", "drive_end", "drive_by")
 
-#: Further assumptions of the gravity method: tension, longest crack.
-ASSUMPTIONS = {
-    "with the crack past the drains": (True, True),
-    "without tension": (False, False),
-    "without tension, with the crack past the drains": (False, True),
-}
-
 #: How often at most a path is repeated by shorter increments before its highest level is said to
 #: depend on them.
 MOST_REPEATED = 3
@@ -74,10 +53,8 @@ MOST_REPEATED = 3
 #: ended.
 SHORTER_RISE = 0.5
 
-#: How unstable crack growth is passed over: whether by relaxation; and the relative difference
-#: up to which the levels that are reached after it agree.
+#: How unstable crack growth is passed over: whether by relaxation.
 AFTER = {"by displacement": False, "by relaxation": True}
-AFTER_GROWTH = 1e-3
 
 #: Relative distance within which the bound of statics confirms a critical level below it.
 NEAR_BOUND = 0.02
@@ -91,99 +68,6 @@ BESIDE_GRAVITY, GUESS_PRECISION = 0.01, 1e-3
 
 #: How often a step of the search is doubled at most.
 MOST_DOUBLED = 20
-
-#: Relative distances from a value at which the gravity method's critical value is sought.
-DISTANCES = (0.02, 0.05, 0.1, 0.2, 0.5, 0.9)
-
-
-@dataclass(frozen=True)
-class CriticalValue:
-    """The result of a search for a critical value."""
-
-    #: the largest load (or smallest strength) with an equilibrium; None if there is no limit
-    value: float | None
-    mode: str
-    #: why it is confirmed, or why not; one of them is empty
-    why: str
-    doubt: str
-    #: the last equilibrium
-    point: Point | None
-    #: critical value of the gravity method; None if it has none
-    gravity: float | None = None
-    #: the joint that fails by the gravity method, if there are several, and the value of the joint
-    #: that fails by the finite elements, if that is another one
-    gravity_joint: str = ""
-    gravity_there: float | None = None
-    #: the critical value with other assumptions, if they change it, {assumption: value}
-    gravity_with: Mapping[str, float] = field(default_factory=dict)
-    #: notes on the gravity method's values
-    notes: Sequence[str] = ()
-    #: level of the first unstable crack growth on the way, or at the critical level [m]; None: none
-    growth: float | None = None
-    #: the highest levels that are reached after the unstable growth that ends the branch, by how it
-    #: is passed over [m]
-    after: Mapping[str, float] = field(default_factory=dict)
-    #: the joint that fails, if there are several, and the events on the way
-    joint: str = ""
-    events: Sequence[str] = ()
-    #: error or interrupt that ended the search
-    error: BaseException | None = None
-
-    @property
-    def confirmed(self) -> bool:
-        """Whether there is a critical value, and a mechanism or bound of statics beyond it."""
-        return self.value is not None and bool(self.why)
-
-    def by_gravity(self, unit: str) -> list[str]:
-        """The values of the gravity method, each with its joint or assumption."""
-        if self.gravity is None:
-            return []
-        where = f" on {self.gravity_joint}" if self.gravity_joint else ""
-        values = {f"gravity method{where}": self.gravity}
-        if self.gravity_there is not None:
-            values[f"on {self.joint}"] = self.gravity_there
-        return [f"{n}: {v:.6g}{unit}" for n, v in (values | {**self.gravity_with}).items()]
-
-    def lines(self, search: Search) -> list[str]:
-        """The printed lines."""
-        of, name, unit = search.of, search.own.name, search.unit
-        if self.value is None:
-            lines = [f"{name}: no critical {of} found: {self.doubt}"]
-        else:
-            where = f" on {self.joint}" if self.mode and self.joint else ""
-            mode = f" ({self.mode}{where})" if self.mode else ""
-            lines = [f"{name}: critical {of} {self.value:.6g}{unit}{mode}"]
-            lines.append(self.why or f"not confirmed: {self.doubt}")
-        lines += [*self.growth_lines(), *self.events]
-        if search.of == "strength" and set(search.partial.values()) != {1.0}:
-            mu, cohesion = search.partial["mu"], search.partial["adhesion"]
-            lines.append(f"beyond the partial factors factor_mu = {mu:g}, factor_c = {cohesion:g}")
-        laws = self.point.model.equilibrium.laws.laws if self.point else ()
-        asked = any(joint.hardening_asked for joint in search.own.joints)
-        if any(law.hardens for law in laws) and asked:
-            lines += filter(None, [statement(last_state(search, self.point))])
-        lines += filter(None, ["; ".join(self.by_gravity(unit))])
-        lines += self.notes
-        case = self.point.model.case if self.point else search.own
-        for k, joint in enumerate(case.joints if self.point else ()):
-            last, name = row_of_joint(self.point.last, k), case.named((k,))
-            share = tension_share(joint, last)
-            hints = joint.law.hints(Evidence(last["crack_length"], False, share))
-            lines += (f"{name}: {hint}" if name else hint for hint in hints)
-        return lines
-
-    def growth_lines(self) -> list[str]:
-        """What is printed of unstable crack growth."""
-        if self.growth is None:
-            return []
-        lines = [f"first unstable crack growth: {self.growth:.6g} m"]
-        if self.after:
-            low, high = min(self.after.values()), max(self.after.values())
-            ways = "; ".join(f"{level:.6g} m {name}" for name, level in self.after.items())
-            agree = len(self.after) > 1 and high - low <= AFTER_GROWTH * high
-            doubt = "" if agree else "not confirmed, it depends on how the growth ends: "
-            lines.append(f"after unstable growth equilibria up to: {doubt}{ways}")
-        return lines
 
 
 class Search:
@@ -217,6 +101,7 @@ class Search:
         self.factor = ROUGH
         #: values on both sides of the gravity method's critical value
         self.guesses: list[float] = []
+        self.gravity = GravityValues(own, of, self.case_at, self.joints_at)
         self.check_quantity()
 
     def check_quantity(self) -> None:
@@ -287,6 +172,17 @@ class Search:
         """The strength of a joint, divided by a factor and the partial factors."""
         return {n: joint[n] / (factor * self.partial.get(n, 1.0)) for n in STRENGTH}
 
+    def joints_at(self, value: float) -> Sequence[Case]:
+        """The case of each joint with a value, for the gravity method.
+
+        Raises InputError.
+        """
+        if self.of == "level":
+            return self.own.joints
+        if self.of == "strength":  # without Gmsh's parser
+            return [joint.with_values(self.reduced(joint, value)) for joint in self.base.joints]
+        return self.case_at(value).joints
+
     def path(
         self, value: float, case: Case, target: float | None = None, to_growth: bool = False
     ) -> FailurePath:
@@ -317,7 +213,8 @@ class Search:
     def run(self) -> CriticalValue:
         """Search, and compare with the gravity method."""
         with limited_threads(1):
-            return self.beside_gravity(self.find())
+            result = self.find()
+            return self.gravity.beside(result, self.trials[-1].path.points)
 
     def find(self) -> CriticalValue:
         """Search, without the values of the gravity method."""
@@ -470,7 +367,7 @@ class Search:
         """Values beside the gravity method's critical value, the farther from the first trial
         first; empty if the gravity method has none, or another result for the first trial.
         """
-        stands = lambda value: self.rigid_block_stands(value, True, False)
+        stands = lambda value: self.gravity.stands(value)
         if stands(first.value) != first.stands:
             return []
         for value in self.outwards(first):
@@ -576,26 +473,6 @@ class Search:
         doubt = "" if why else doubt
         return CriticalValue(value, mode, why, doubt, point, joint=joint, events=events)
 
-    def beside_gravity(self, result: CriticalValue) -> CriticalValue:
-        """A result with the values of the gravity method, and a note on them."""
-        value, point = result.value, result.point
-        if value is None or (by_hand := self.by_gravity(value)) is None:
-            return result
-        joint, names = self.failing_block(by_hand), self.own.joint_names
-        there = None
-        if joint != result.joint and result.joint in names and self.own.of_joints:
-            there = self.by_gravity(value, joint=names.index(result.joint))
-        others: dict[str, float] = {}
-        for name, assumptions in ASSUMPTIONS.items():
-            other = self.by_gravity(value, *assumptions)
-            known = by_hand, *others.values()
-            if other is not None and not np.isclose(other, known, PRECISION, 0).any():
-                where = self.failing_block(other, *assumptions)
-                others[f"{name} on {where}" if where else name] = other
-        notes = filter(None, [self.tension(value), *(self.drains(value, point) if point else ())])
-        of_joint = {"gravity_joint": joint, "gravity_there": there}
-        return replace(result, gravity=by_hand, gravity_with=others, notes=[*notes], **of_joint)
-
     def by_statics(self, failing: FailurePath) -> tuple[str, str, str]:
         """How an unconfirmed path fails, why, and at which joint, if there are several: its
         resultants have no equilibrium above a level near its highest (below the target, for another
@@ -611,173 +488,10 @@ class Search:
         )
         return mode, why, joint
 
-    # -- the gravity method
-    # ----------------------------------------------------------------------------------------------
-
-    def tension(self, value: float) -> str:
-        """A note where the gravity method is uncracked but the elastic stress of the finite
-        elements exceeds the tensile strength at the first joint's heel; else empty.
-        """
-        method, *_ = self.rigid_blocks(value)
-        strength = method.case.law.tensile_strength
-        if method.crack_length or method.tip_stress <= 0:
-            return ""
-        case = self.own if self.of == "level" else self.case_at(value)
-        if self.of == "level":
-            level = {"levels": (*case.levels[:-1], value)}
-            case = replace(case.with_values({"drive": "level"}), **level)
-        elastic = elastic_heel_stress(case, interface_of(case))
-        if elastic <= strength:
-            return ""
-        linear = method.tip_stress / 1e3
-        return (
-            f"there the gravity method is uncracked, {linear:.4g} kPa at the heel; "
-            f"the elastic stress of the finite elements (n_joint = {case['n_joint']:g}), "
-            f"{elastic / 1e3:.4g} kPa, exceeds the strength of {strength / 1e3:.4g} kPa"
-        )
-
-    def drains(self, value: float, point: Point) -> Iterator[str]:
-        """Which crack passes the drains at a critical value, for each joint: of the finite elements
-        at the last equilibrium, or beyond it on the way to failure.
-        """
-        beyond = [p for p in self.trials[-1].path.points if p.imposed > point.imposed]
-        for k, method in enumerate(self.rigid_blocks(value)):
-            name, at = self.own.named((k,)), method.case["drain_x"]
-            cracks = [p.last[column_of("crack_length", k)] for p in (point, *beyond)]
-            grown = next((crack for crack in cracks if crack > at), cracks[0])
-            if note := cracks_and_drains(method.case, grown, method):
-                yield f"{name}: {note}" if name else note
-
-    def failing_block(self, value: float, tension: bool = True, longest: bool = False) -> str:
-        """The joints that fail by the gravity method beyond its critical value, if there are
-        several; arguments as in `by_gravity`.
-        """
-        for beyond in (value * (1 + PRECISION), value * (1 - PRECISION)):
-            methods = self.rigid_blocks(beyond, tension)
-            failing = [k for k, m in enumerate(methods) if not block_stands(m, longest)]
-            if failing:
-                return self.own.named(failing)
-        return ""
-
-    def by_gravity(
-        self,
-        value: float,
-        tension: bool = True,
-        longest: bool = False,
-        joint: int | None = None,
-    ) -> float | None:
-        """The critical value of the gravity method nearest to that of the finite elements; None if
-        there is none within DISTANCES.
-
-        tension: whether the joint has its tensile strength; longest: whether the longest of several
-        cracks in equilibrium decides; joint: the number of the only joint that is considered.
-        """
-        stands = lambda value: self.rigid_block_stands(value, tension, longest, joint)
-        at_value = stands(value)
-        for share in DISTANCES:
-            for other in (value * (1 + share), value * (1 - share)):
-                at_other = stands(other)
-                if at_other is not None and at_other != at_value:
-                    sign = lambda v: 1.0 if stands(v) == at_value else -1.0
-                    return float(bisect(sign, value, other, rtol=PRECISION / 1000))
-        return None
-
-    def rigid_blocks(self, value: float, tension: bool = True) -> list[gravity.GravityMethod]:
-        """The gravity method with a value, joint by joint; empty if the case allows no such value,
-        or its geometry no gravity method.
-        """
-        if self.own.geometry:
-            return []
-        try:
-            joints = self.joints_at(value)
-        except InputError:
-            return []
-        level = value if self.of == "level" else None
-        return [gravity.at(joint, joint.times[-1], level, tension) for joint in joints]
-
-    def joints_at(self, value: float) -> Sequence[Case]:
-        """The case of each joint with a value, for the gravity method.
-
-        Raises InputError.
-        """
-        if self.of == "level":
-            return self.own.joints
-        if self.of == "strength":  # without Gmsh's parser
-            return [joint.with_values(self.reduced(joint, value)) for joint in self.base.joints]
-        return self.case_at(value).joints
-
-    def rigid_block_stands(
-        self, value: float, tension: bool, longest: bool, joint: int | None = None
-    ) -> bool | None:
-        """Whether the gravity method finds an equilibrium of all joints, or of one by its number,
-        with friction if the law has it, and toes that are not crushed; None if there is no gravity
-        method.
-        """
-        methods = self.rigid_blocks(value, tension)
-        methods = methods if joint is None else methods[joint : joint + 1]
-        return all(block_stands(method, longest) for method in methods) if methods else None
-
-
-def block_stands(method: gravity.GravityMethod, longest: bool) -> bool:
-    """Whether a rigid block stands; longest: with the longest of several cracks in equilibrium."""
-    case, method = method.case, (method, *method.further)[-1] if longest else method
-    slides = case.law.limits_shear and method.SSF < 1
-    crushed = 0 < case["f_c"] < -method.sigma_n_toe
-    return method.stands and not slides and not crushed
-
-
-def by_increments(path: FailurePath) -> str:
-    """What is said of a highest level that is not certain."""
-    low, high = path.interval
-    return f"between {low:.6g} and {high:.6g} m, depending on the increments of displacement"
-
-
-def beyond_limit(path: FailurePath) -> str:
-    """What is said of unstable crack growth at the highest level of a branch."""
-    low = min(point.level for point in path.points[path.top :])
-    beyond = f"the equilibria beyond it are lower, down to {low:.6g} m"
-    if path.top + 1 == len(path.points):
-        beyond = "no increment of the displacement, however short, leads on"
-    return f"there the crack grows unstably: {beyond}, and shorter ones lead to the same level"
-
-
-def lost_beyond_limit(path: FailurePath) -> str:
-    """What is said of a path that is lost beyond the limit point."""
-    low = min(point.level for point in path.points[path.top :])
-    return (
-        f"there the level has a limit point: the equilibria beyond it are lower, down to {low:.6g} "
-        "m, shorter increments lead to the same, and further ones are not found"
-    )
-
-
-def end_of_branch(path: FailurePath) -> str:
-    """What is said of a path that ends where the whole joint slips."""
-    return (
-        f"there the whole {path.joint or 'joint'} slips; no increment of the displacement leads "
-        "to a higher level, and shorter ones lead to the same"
-    )
-
 
 def of_each(values: list[float]) -> Setting:
     """A setting from the values of each joint."""
     return tuple(values) if len(values) > 1 else values[0]
-
-
-#: What happens to a joint, by the column of the history that is then positive.
-EVENTS = {"crack_length": "opens", "slip_length": "slips"}
-
-
-def events_on(points: list[Point]) -> list[str]:
-    """When each of several joints first opens and slips on a path, in the order of the levels."""
-    case, events = points[0].model.case, list[tuple[int, str]]()
-    for k in range(len(case.of_joints)):
-        for name, verb in EVENTS.items():
-            first = next((i for i, p in enumerate(points) if p.last[column_of(name, k)] > 0), None)
-            if first is not None:
-                level = points[first].level
-                events.append((first, f"{case.named((k,))} {verb} from {level:.5g} m"))
-    listed = ", ".join(text for _, text in sorted(events))
-    return [f"on the way: {listed}"] if listed else []
 
 
 def point_at_target(trial: Trial) -> Point:
@@ -814,49 +528,6 @@ def outwards(value: float, end: float) -> Iterator[float]:
         yield from (value * 2.0**k for k in range(1, 13))
 
 
-# -- the study
-# --------------------------------------------------------------------------------------------------
-
-
-def critical(case: Case, of: str, out: Path | None = None) -> tuple[CriticalValue, list[str]]:
-    """Find a critical value of a case and write its files below out (default out/CASE_critical).
-
-    Returns the result, and its lines of text. An interrupted search writes its trials.
-    Raises InputError, RunError.
-    """
-    search = Search(case, of)
-    name = case.name
-    out = out or Path("out") / f"{name}_critical"
-    folders.check_writable(out)
-    start = time.perf_counter()
-    with Progress(sizes(search.own), bar_format="{desc} {elapsed}", leave=False) as shown:
-        search.on_progress = lambda message: shown.describe(f"{name}: {message}")
-        try:
-            answer = search.run()
-        except KeyboardInterrupt as caught:
-            write(search, search.interrupted(caught), out, time.perf_counter() - start)
-            raise
-        except InputError:  # an earlier run stays
-            raise
-        except Exception as error:
-            with folders.claim_output_folder(search.own, out):
-                folders.write_state(search.own, out, "failed", str(error))
-            raise
-    write(search, answer, out, time.perf_counter() - start)
-    return answer, answer.lines(search)
-
-
-def table(search: Search) -> dict[str, np.ndarray]:
-    """critical.csv: the equilibria of all trials."""
-    points = [(k, t, p) for k, t in enumerate(search.trials, 1) for p in t.path.points]
-    rows = [
-        {"trial": number, "value": trial.value, "stands": float(trial.stands)} | row(point)
-        for number, trial, point in points
-    ]
-    case = points[0][-1].model.case if points else search.own
-    return {name: np.array([cells[name] for cells in rows]) for name in critical_columns(case)}
-
-
 def last_state(search: Search, point: Point) -> Results:
     """The results of an equilibrium and of the steps to it, with the user's own parameters."""
     case, history = point.model.case, point.history.copy()
@@ -864,46 +535,3 @@ def last_state(search: Search, point: Point) -> Results:
     if point.state.time > history.saved_until:
         history.save(point.state)
     return history.results(case.with_values(required), stopped=False)
-
-
-def write(search: Search, answer: CriticalValue, out: Path, seconds: float) -> None:
-    """Write the last equilibrium as `damjoint run` does, critical.csv and its picture below out, in
-    place of an earlier run's files.
-    """
-    from . import critical_picture as picture
-
-    case = search.own
-    what = case.title, search.of, search.unit, search.trials
-    shown = picture.Content(*what, answer.value, answer.gravity, answer.mode)
-    with folders.claim_output_folder(case, out):
-        folders.write_state(case, out, "interrupted" if answer.error else "complete", answer.doubt)
-        if answer.point:
-            result = last_state(search, answer.point)
-            entries = {"critical": as_json(search, answer), "wall_seconds": {"search": seconds}}
-            entries["notes"] = remarks(case)
-            result.info = about(answer.point.model.equilibrium.bulk) | entries
-            save(Outcome(result, lambda: None, dict, answer.error), case, out)
-        write_csv(out / "critical.csv", table(search))
-        picture.draw(shown, out / f"{case.name}_critical.png")
-
-
-def as_json(search: Search, answer: CriticalValue) -> dict[str, Any]:
-    """The entry `critical` of run.json."""
-    return {
-        "of": search.of,
-        "value": answer.value,
-        "unit": search.unit.strip(),
-        "mode": answer.mode,
-        "joint": answer.joint,
-        "first_unstable_growth": answer.growth,
-        "after_unstable_growth": dict(answer.after),
-        "events": answer.events,
-        "confirmed": answer.why,
-        "doubt": answer.doubt,
-        "gravity_method": answer.gravity,
-        "gravity_method_joint": answer.gravity_joint,
-        "gravity_method_there": answer.gravity_there,
-        "gravity_method_notes": list(answer.notes),
-        "gravity_method_with": answer.gravity_with,
-        "trials": len(search.trials),
-    }

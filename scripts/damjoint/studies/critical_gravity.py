@@ -1,0 +1,166 @@
+"""Critical values of the gravity method, beside those of the finite elements."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import bisect
+
+from .. import InputError
+from ..joint.interface import interface_of
+from ..model.case import Case
+from ..model.results import column_of
+from ..solver.path import PRECISION, Point
+from ..statics import gravity
+from ..statics.limit import elastic_heel_stress
+from ..statics.verdict import cracks_and_drains
+from .critical_value import CriticalValue
+
+#: Further assumptions of the gravity method: tension, longest crack.
+ASSUMPTIONS = {
+    "with the crack past the drains": (True, True),
+    "without tension": (False, False),
+    "without tension, with the crack past the drains": (False, True),
+}
+
+#: Relative distances from a value at which the gravity method's critical value is sought.
+DISTANCES = (0.02, 0.05, 0.1, 0.2, 0.5, 0.9)
+
+
+@dataclass(frozen=True)
+class GravityValues:
+    """The gravity method of a case with any value of a quantity."""
+
+    case: Case
+    #: the quantity: level, strength, uplift or a parameter
+    of: str
+    #: the case with a value, and that of each of its joints; raise InputError
+    case_at: Callable[[float], Case]
+    joints_at: Callable[[float], Sequence[Case]]
+
+    def beside(self, result: CriticalValue, points: Sequence[Point]) -> CriticalValue:
+        """A result with the values of the gravity method, and a note on them."""
+        value, point = result.value, result.point
+        if value is None or (by_hand := self.critical(value)) is None:
+            return result
+        joint, names = self.failing_block(by_hand), self.case.joint_names
+        there = None
+        if joint != result.joint and result.joint in names and self.case.of_joints:
+            there = self.critical(value, joint=names.index(result.joint))
+        others: dict[str, float] = {}
+        for name, assumptions in ASSUMPTIONS.items():
+            other = self.critical(value, *assumptions)
+            known = by_hand, *others.values()
+            if other is not None and not np.isclose(other, known, PRECISION, 0).any():
+                where = self.failing_block(other, *assumptions)
+                others[f"{name} on {where}" if where else name] = other
+        of_drains = self.drains(value, point, points) if point else ()
+        notes = filter(None, [self.tension(value), *of_drains])
+        of_joint = {"gravity_joint": joint, "gravity_there": there}
+        return replace(result, gravity=by_hand, gravity_with=others, notes=[*notes], **of_joint)
+
+    def tension(self, value: float) -> str:
+        """A note where the gravity method is uncracked but the elastic stress of the finite
+        elements exceeds the tensile strength at the first joint's heel; else empty.
+        """
+        method, *_ = self.rigid_blocks(value)
+        strength = method.case.law.tensile_strength
+        if method.crack_length or method.tip_stress <= 0:
+            return ""
+        case = self.case if self.of == "level" else self.case_at(value)
+        if self.of == "level":
+            level = {"levels": (*case.levels[:-1], value)}
+            case = replace(case.with_values({"drive": "level"}), **level)
+        elastic = elastic_heel_stress(case, interface_of(case))
+        if elastic <= strength:
+            return ""
+        linear = method.tip_stress / 1e3
+        return (
+            f"there the gravity method is uncracked, {linear:.4g} kPa at the heel; "
+            f"the elastic stress of the finite elements (n_joint = {case['n_joint']:g}), "
+            f"{elastic / 1e3:.4g} kPa, exceeds the strength of {strength / 1e3:.4g} kPa"
+        )
+
+    def drains(self, value: float, point: Point, points: Sequence[Point]) -> Iterator[str]:
+        """Which crack passes the drains at a critical value, for each joint: of the finite elements
+        at the last equilibrium, or beyond it on the way to failure.
+        """
+        beyond = [p for p in points if p.imposed > point.imposed]
+        for k, method in enumerate(self.rigid_blocks(value)):
+            name, at = self.case.named((k,)), method.case["drain_x"]
+            cracks = [p.last[column_of("crack_length", k)] for p in (point, *beyond)]
+            grown = next((crack for crack in cracks if crack > at), cracks[0])
+            if note := cracks_and_drains(method.case, grown, method):
+                yield f"{name}: {note}" if name else note
+
+    def failing_block(self, value: float, tension: bool = True, longest: bool = False) -> str:
+        """The joints that fail by the gravity method beyond its critical value, if there are
+        several; arguments as in `critical`.
+        """
+        for beyond in (value * (1 + PRECISION), value * (1 - PRECISION)):
+            methods = self.rigid_blocks(beyond, tension)
+            failing = [k for k, m in enumerate(methods) if not block_stands(m, longest)]
+            if failing:
+                return self.case.named(failing)
+        return ""
+
+    def critical(
+        self,
+        value: float,
+        tension: bool = True,
+        longest: bool = False,
+        joint: int | None = None,
+    ) -> float | None:
+        """The critical value of the gravity method nearest to that of the finite elements; None if
+        there is none within DISTANCES.
+
+        tension: whether the joint has its tensile strength; longest: whether the longest of several
+        cracks in equilibrium decides; joint: the number of the only joint that is considered.
+        """
+        stands = lambda value: self.stands(value, tension, longest, joint)
+        at_value = stands(value)
+        for share in DISTANCES:
+            for other in (value * (1 + share), value * (1 - share)):
+                at_other = stands(other)
+                if at_other is not None and at_other != at_value:
+                    sign = lambda v: 1.0 if stands(v) == at_value else -1.0
+                    return float(bisect(sign, value, other, rtol=PRECISION / 1000))
+        return None
+
+    def rigid_blocks(self, value: float, tension: bool = True) -> list[gravity.GravityMethod]:
+        """The gravity method with a value, joint by joint; empty if the case allows no such value,
+        or its geometry no gravity method.
+        """
+        if self.case.geometry:
+            return []
+        try:
+            joints = self.joints_at(value)
+        except InputError:
+            return []
+        level = value if self.of == "level" else None
+        return [gravity.at(joint, joint.times[-1], level, tension) for joint in joints]
+
+    def stands(
+        self,
+        value: float,
+        tension: bool = True,
+        longest: bool = False,
+        joint: int | None = None,
+    ) -> bool | None:
+        """Whether the gravity method finds an equilibrium of all joints, or of one by its number,
+        with friction if the law has it, and toes that are not crushed; None if there is no gravity
+        method.
+        """
+        methods = self.rigid_blocks(value, tension)
+        methods = methods if joint is None else methods[joint : joint + 1]
+        return all(block_stands(method, longest) for method in methods) if methods else None
+
+
+def block_stands(method: gravity.GravityMethod, longest: bool) -> bool:
+    """Whether a rigid block stands; longest: with the longest of several cracks in equilibrium."""
+    case, method = method.case, (method, *method.further)[-1] if longest else method
+    slides = case.law.limits_shear and method.SSF < 1
+    crushed = 0 < case["f_c"] < -method.sigma_n_toe
+    return method.stands and not slides and not crushed

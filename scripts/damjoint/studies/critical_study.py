@@ -1,0 +1,153 @@
+"""`damjoint critical`: the search, its files and its printed lines."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import InputError
+from ..engines import Outcome
+from ..engines.condensed.solve import about
+from ..fem.memory import sizes
+from ..laws import Evidence
+from ..model.case import Case
+from ..model.notes import remarks
+from ..model.results import row_of_joint
+from ..post import folder as folders
+from ..post.tables import write_csv
+from ..progress import Progress
+from ..runner import save
+from ..statics.verdict import statement, tension_share
+from . import critical_picture as picture
+from .critical import Search, last_state
+from .critical_value import CriticalValue
+from .failure_path import critical_columns, row
+
+#: Relative difference up to which the levels agree that are reached after unstable crack growth.
+AFTER_GROWTH = 1e-3
+
+
+def critical(case: Case, of: str, out: Path | None = None) -> tuple[CriticalValue, list[str]]:
+    """Find a critical value of a case and write its files below out (default out/CASE_critical).
+
+    Returns the result, and its lines of text. An interrupted search writes its trials.
+    Raises InputError, RunError.
+    """
+    search = Search(case, of)
+    name = case.name
+    out = out or Path("out") / f"{name}_critical"
+    folders.check_writable(out)
+    start = time.perf_counter()
+    with Progress(sizes(search.own), bar_format="{desc} {elapsed}", leave=False) as shown:
+        search.on_progress = lambda message: shown.describe(f"{name}: {message}")
+        try:
+            answer = search.run()
+        except KeyboardInterrupt as caught:
+            write(search, search.interrupted(caught), out, time.perf_counter() - start)
+            raise
+        except InputError:  # an earlier run stays
+            raise
+        except Exception as error:
+            with folders.claim_output_folder(search.own, out):
+                folders.write_state(search.own, out, "failed", str(error))
+            raise
+    write(search, answer, out, time.perf_counter() - start)
+    return answer, printed_lines(answer, search)
+
+
+def table(search: Search) -> dict[str, np.ndarray]:
+    """critical.csv: the equilibria of all trials."""
+    points = [(k, t, p) for k, t in enumerate(search.trials, 1) for p in t.path.points]
+    rows = [
+        {"trial": number, "value": trial.value, "stands": float(trial.stands)} | row(point)
+        for number, trial, point in points
+    ]
+    case = points[0][-1].model.case if points else search.own
+    return {name: np.array([cells[name] for cells in rows]) for name in critical_columns(case)}
+
+
+def printed_lines(answer: CriticalValue, search: Search) -> list[str]:
+    """The printed lines."""
+    of, name, unit = search.of, search.own.name, search.unit
+    if answer.value is None:
+        lines = [f"{name}: no critical {of} found: {answer.doubt}"]
+    else:
+        where = f" on {answer.joint}" if answer.mode and answer.joint else ""
+        mode = f" ({answer.mode}{where})" if answer.mode else ""
+        lines = [f"{name}: critical {of} {answer.value:.6g}{unit}{mode}"]
+        lines.append(answer.why or f"not confirmed: {answer.doubt}")
+    lines += [*growth_lines(answer), *answer.events]
+    if search.of == "strength" and set(search.partial.values()) != {1.0}:
+        mu, cohesion = search.partial["mu"], search.partial["adhesion"]
+        lines.append(f"beyond the partial factors factor_mu = {mu:g}, factor_c = {cohesion:g}")
+    laws = answer.point.model.equilibrium.laws.laws if answer.point else ()
+    asked = any(joint.hardening_asked for joint in search.own.joints)
+    if any(law.hardens for law in laws) and asked:
+        lines += filter(None, [statement(last_state(search, answer.point))])
+    lines += filter(None, ["; ".join(answer.by_gravity(unit))])
+    lines += answer.notes
+    case = answer.point.model.case if answer.point else search.own
+    for k, joint in enumerate(case.joints if answer.point else ()):
+        last, name = row_of_joint(answer.point.last, k), case.named((k,))
+        share = tension_share(joint, last)
+        hints = joint.law.hints(Evidence(last["crack_length"], False, share))
+        lines += (f"{name}: {hint}" if name else hint for hint in hints)
+    return lines
+
+
+def growth_lines(answer: CriticalValue) -> list[str]:
+    """What is printed of unstable crack growth."""
+    if answer.growth is None:
+        return []
+    lines = [f"first unstable crack growth: {answer.growth:.6g} m"]
+    if answer.after:
+        low, high = min(answer.after.values()), max(answer.after.values())
+        ways = "; ".join(f"{level:.6g} m {name}" for name, level in answer.after.items())
+        agree = len(answer.after) > 1 and high - low <= AFTER_GROWTH * high
+        doubt = "" if agree else "not confirmed, it depends on how the growth ends: "
+        lines.append(f"after unstable growth equilibria up to: {doubt}{ways}")
+    return lines
+
+
+def write(search: Search, answer: CriticalValue, out: Path, seconds: float) -> None:
+    """Write the last equilibrium as `damjoint run` does, critical.csv and its picture below out, in
+    place of an earlier run's files.
+    """
+    case = search.own
+    what = case.title, search.of, search.unit, search.trials
+    shown = picture.Content(*what, answer.value, answer.gravity, answer.mode)
+    with folders.claim_output_folder(case, out):
+        folders.write_state(case, out, "interrupted" if answer.error else "complete", answer.doubt)
+        if answer.point:
+            result = last_state(search, answer.point)
+            entries = {"critical": as_json(search, answer), "wall_seconds": {"search": seconds}}
+            entries["notes"] = remarks(case)
+            result.info = about(answer.point.model.equilibrium.bulk) | entries
+            save(Outcome(result, lambda: None, dict, answer.error), case, out)
+        write_csv(out / "critical.csv", table(search))
+        picture.draw(shown, out / f"{case.name}_critical.png")
+
+
+def as_json(search: Search, answer: CriticalValue) -> dict[str, Any]:
+    """The entry `critical` of run.json."""
+    return {
+        "of": search.of,
+        "value": answer.value,
+        "unit": search.unit.strip(),
+        "mode": answer.mode,
+        "joint": answer.joint,
+        "first_unstable_growth": answer.growth,
+        "after_unstable_growth": dict(answer.after),
+        "events": answer.events,
+        "confirmed": answer.why,
+        "doubt": answer.doubt,
+        "gravity_method": answer.gravity,
+        "gravity_method_joint": answer.gravity_joint,
+        "gravity_method_there": answer.gravity_there,
+        "gravity_method_notes": list(answer.notes),
+        "gravity_method_with": answer.gravity_with,
+        "trials": len(search.trials),
+    }

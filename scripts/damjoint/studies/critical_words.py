@@ -1,0 +1,56 @@
+"""What is said of the equilibrium path that a critical value ends."""
+
+from __future__ import annotations
+
+from ..model.results import column_of
+from ..solver.path import Point
+from .failure_path import FailurePath
+
+
+def by_increments(path: FailurePath) -> str:
+    """What is said of a highest level that is not certain."""
+    low, high = path.interval
+    return f"between {low:.6g} and {high:.6g} m, depending on the increments of displacement"
+
+
+def beyond_limit(path: FailurePath) -> str:
+    """What is said of unstable crack growth at the highest level of a branch."""
+    low = min(point.level for point in path.points[path.top :])
+    beyond = f"the equilibria beyond it are lower, down to {low:.6g} m"
+    if path.top + 1 == len(path.points):
+        beyond = "no increment of the displacement, however short, leads on"
+    return f"there the crack grows unstably: {beyond}, and shorter ones lead to the same level"
+
+
+def lost_beyond_limit(path: FailurePath) -> str:
+    """What is said of a path that is lost beyond the limit point."""
+    low = min(point.level for point in path.points[path.top :])
+    return (
+        f"there the level has a limit point: the equilibria beyond it are lower, down to {low:.6g} "
+        "m, shorter increments lead to the same, and further ones are not found"
+    )
+
+
+def end_of_branch(path: FailurePath) -> str:
+    """What is said of a path that ends where the whole joint slips."""
+    return (
+        f"there the whole {path.joint or 'joint'} slips; no increment of the displacement leads "
+        "to a higher level, and shorter ones lead to the same"
+    )
+
+
+#: What happens to a joint, by the column of the history that is then positive.
+EVENTS = {"crack_length": "opens", "slip_length": "slips"}
+
+
+def events_on(points: list[Point]) -> list[str]:
+    """When each of several joints first opens and slips on a path, in the order of the levels."""
+    case, events = points[0].model.case, list[tuple[int, str]]()
+    for k in range(len(case.of_joints)):
+        for name, verb in EVENTS.items():
+            first = next((i for i, p in enumerate(points) if p.last[column_of(name, k)] > 0), None)
+            if first is not None:
+                level = points[first].level
+                events.append((first, f"{case.named((k,))} {verb} from {level:.5g} m"))
+    listed = ", ".join(text for _, text in sorted(events))
+    return [f"on the way: {listed}"] if listed else []
