@@ -9,7 +9,6 @@
 The package:
 
 arrays.py   types of arrays; csr.py: sparse matrices; threads.py: threads of the linear algebra
-classes.py  dataclasses that are quick to load
 storage.py  atomic writes, locks on files and folders
 progress.py progress of long work, on a terminal and in redirected output
 versions.py versions of the code and of what it uses, machine

@@ -11,14 +11,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 
 from . import RunError
-from .classes import dataclass
 from .engines import OnStep, Outcome
 from .model.case import Case, has_plane_fields
 from .model.notes import remarks

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
 from .arrays import Array, IntArray
-from .classes import dataclass
 
 if TYPE_CHECKING:
     from scipy import sparse
@@ -34,7 +34,7 @@ def ranges(starts: IntArray, counts: IntArray) -> IntArray:
     return np.repeat(starts - ends + counts, counts) + np.arange(ends[-1] if len(ends) else 0)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)  # a key of caches, by identity
 class CsrMatrix:
     """A matrix (m, n): the entries of row i are data[indptr[i] : indptr[i + 1]], in columns
     `indices`, of which none is repeated in a row.

@@ -8,12 +8,12 @@ bodies are needed) and raises RunError. Engines write no output folders.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from importlib import import_module
 from types import ModuleType
 from typing import TYPE_CHECKING
 
 from .. import InputError
-from ..classes import dataclass
 from ..model.case import Case
 from ..model.mesh import Mesh
 from ..model.results import Results

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..arrays import Array, IntArray, distinct
-from ..classes import dataclass
 from ..csr import CsrMatrix
 from ..model.case import Case
 from ..model.loads import COMPLETE, across, thermal_strains, wet

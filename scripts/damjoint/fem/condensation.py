@@ -24,12 +24,12 @@ the problem definition (tests compare both).
 from __future__ import annotations
 
 import time
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ..arrays import Array, IntArray, distinct, others
-from ..classes import dataclass
 from ..model.case import Case
 from ..threads import scipy_linalg
 from . import factor

@@ -7,13 +7,13 @@ engines solve one discrete problem. Wedges and hexahedra are of the condensed en
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cache
 from itertools import combinations, product
 
 import numpy as np
 
 from ..arrays import Array, IntArray
-from ..classes import dataclass
 from ..csr import CsrMatrix, stacked
 from ..model.mesh import Body
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ..arrays import Array, IntArray, Sparse, others
-from ..classes import dataclass
 from ..csr import CsrMatrix
 from .bodies import ElasticBody
 from .factor import solve_symmetric

@@ -11,10 +11,11 @@ joint there is a sum of these.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ..arrays import Array, IntArray
-from ..classes import dataclass
 from ..csr import CsrMatrix
 from .bodies import Bodies
 from .condensed import JointDofs

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from ..arrays import Array, IntArray
-from ..classes import dataclass
 
 
 @dataclass(frozen=True, kw_only=True)

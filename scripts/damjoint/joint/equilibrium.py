@@ -8,13 +8,12 @@ is part of the tangent.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 
 from ..arrays import Array
-from ..classes import dataclass
 from ..model.case import Case
 from ..model.loads import AddedPressure, Loading, line_forces, thermal_strains, water_column
 from ..model.scene import BED, DOWN

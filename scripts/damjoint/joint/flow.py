@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from ..arrays import Array, BoolArray, IntArray, distinct, others
-from ..classes import dataclass
 from ..csr import CsrMatrix, added
 from ..fem import elements
 from ..model.mesh import JointMesh

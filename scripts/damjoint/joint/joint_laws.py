@@ -7,6 +7,7 @@ other.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -14,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Array, BoolArray
-from ..classes import dataclass
 from ..laws import Law
 
 

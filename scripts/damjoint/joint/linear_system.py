@@ -13,13 +13,13 @@ equation it stays regular at a limit point of the load, where A is singular.
 from __future__ import annotations
 
 from contextlib import nullcontext
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.linalg import norm
 
 from ..arrays import Array, IntArray, distinct, mirror
-from ..classes import dataclass
 from ..csr import CsrMatrix
 from ..threads import limited_threads, scipy_linalg
 from .flow import Flow, FlowDerivative

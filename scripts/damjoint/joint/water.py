@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -11,7 +11,6 @@ import numpy as np
 
 from .. import ROUND_OFF
 from ..arrays import Array, IntArray
-from ..classes import dataclass
 from ..csr import CsrMatrix
 from ..laws import Law
 from ..model.case import Case, flows, freezes_uplift, has_drains

@@ -8,13 +8,13 @@ Signs: opening > 0, tension > 0, downstream > 0.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Array, BoolArray
-from ..classes import dataclass
 
 V = TypeVar("V")
 

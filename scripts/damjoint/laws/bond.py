@@ -8,12 +8,12 @@ plastic slip.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..arrays import Array, BoolArray
-from ..classes import dataclass
 from .base import Law
 
 

@@ -9,12 +9,12 @@ S = (1 - alpha)^3/sqrt(alpha). The plastic jump grows by the flow rule associate
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..arrays import Array, BoolArray
-from ..classes import dataclass
 from .base import Law
 
 #: Damage at which tensile strength and cohesion are largest: the maximum of S^2/(-S').

@@ -7,13 +7,12 @@ before sawing.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..arrays import Array, BoolArray
-from ..classes import dataclass
 from .base import Evidence, Law
 
 #: Parameters of a joint that stays elastic under any load.

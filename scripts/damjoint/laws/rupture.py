@@ -8,14 +8,13 @@ those beyond the thickness that grout and saw leave.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Array, BoolArray
-from ..classes import dataclass
 from .base import Evidence, Law
 
 

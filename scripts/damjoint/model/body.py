@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import field
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from ..arrays import Array, IntArray
-from ..classes import dataclass
 
 #: Corners of the sides of a cell, by its shape.
 SIDES: dict[str, tuple[list[int], ...]] = {

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ..arrays import Array, IntArray, Table
-from ..classes import dataclass
 from ..laws import COLUMNS, Law
 from .mesh import Body
 from .results import FLUX, THICKNESS, Results

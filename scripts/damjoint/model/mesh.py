@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import dataclasses
 import re
 import time
 from collections.abc import Mapping
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
@@ -15,7 +14,6 @@ import numpy as np
 
 from .. import InputError, RunError, data
 from ..arrays import Array, BoolArray, IntArray, Setting
-from ..classes import dataclass
 from ..csr import CsrMatrix
 from ..storage import check_end
 from .body import Body as Body
@@ -240,7 +238,7 @@ def heel_normal(joint: Body, heel: Body) -> Array:
     return normal
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclass(frozen=True)
 class GeometryFiles:
     """The files of a user's own geometry in their present state, and all else its mesh depends
     on: the parameters of a section's mesh, and those that a .geo file names.

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from .. import InputError
 from ..arrays import Array, IntArray, distinct
-from ..classes import dataclass
 from .body import Body
 from .case import Case, flows, has_drains
 from .mesh import JointMesh

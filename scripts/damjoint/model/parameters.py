@@ -10,7 +10,7 @@ import signal
 import threading
 import zlib
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from functools import lru_cache
 from pathlib import Path
 from types import ModuleType
@@ -18,7 +18,6 @@ from typing import Any
 
 from .. import InputError, __version__, data
 from ..arrays import Setting, Value
-from ..classes import dataclass
 from ..laws import LAWS
 from ..storage import atomic_write, cached
 from .arithmetic import explained, quantity

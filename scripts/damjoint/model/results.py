@@ -5,13 +5,12 @@ from __future__ import annotations
 import functools
 import operator
 from collections.abc import Collection
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias
 
 import numpy as np
 
 from ..arrays import Array, Table
-from ..classes import dataclass
 from .case import Case
 
 #: Columns of joint.csv: a row per joint node and requested level.

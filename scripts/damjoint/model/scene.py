@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-
-from ..classes import dataclass
+from dataclasses import dataclass
 
 #: Material (suffix of E_, nu_ and rho_) of each region. The region lower: concrete bonded to rock.
 MATERIALS = {"dam": "dam", "foundation": "found", "lower": "dam"}

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ..arrays import Array
-from ..classes import dataclass
 from ..joint.equilibrium import Equilibrium
 from ..model.loads import Loading
 from .state import State

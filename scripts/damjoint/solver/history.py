@@ -4,12 +4,11 @@ levels.
 
 from __future__ import annotations
 
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ..arrays import Array
-from ..classes import dataclass
 from ..joint.equilibrium import Equilibrium
 from ..joint.interface import JointInterface
 from ..model.case import Case

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from copy import copy
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
-from ..classes import dataclass
 from ..joint.interface import Interface
 from ..model.case import Case
 from ..model.loads import Loading

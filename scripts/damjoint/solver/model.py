@@ -6,14 +6,13 @@ A state is immutable; any number of steps can start from it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from .. import RunError
 from ..arrays import Array
-from ..classes import dataclass
 from ..joint.equilibrium import Equilibrium
 from ..joint.interface import Interface, interface_of
 from ..joint.joint_laws import TANGENT, Mode

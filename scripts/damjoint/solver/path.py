@@ -14,7 +14,7 @@ displacement, is a mechanism.
 from __future__ import annotations
 
 from copy import copy
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TypeVar
 
@@ -22,7 +22,6 @@ import numpy as np
 
 from .. import ROUND_OFF
 from ..arrays import Array
-from ..classes import dataclass
 from ..model.case import Case
 from ..model.results import column_of
 from .controls import (
