@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import contextlib
-import time
-from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from . import accuracy, versions
+from . import accuracy
 from .engines import Outcome, engine_of
 from .fem.memory import sizes
 from .model.case import Case
 from .model.results import Results
-from .post import folder as folders
-from .post import tables
 from .progress import Progress
+from .session import Session, end_of, session
 
 if TYPE_CHECKING:  # runs without a picture do not load it
     from .post.drawing_process import DrawingProcess
@@ -46,35 +43,26 @@ def run(
     progress: bool = True,
     engine: str = "auto",
     drawing: DrawingProcess | None = None,
+    key: str = "",
 ) -> list[Results]:
     """Solve all scenes of a case and write their results below out, replacing an earlier run's.
 
     fields: also write displacement, stress and joint fields for Gmsh and ParaView; picture: also a
     PNG; engine: condensed (auto) or getdp, the reference model; drawing: draws the pictures, by
-    default this process does.
+    default this process does; key: see `Session`.
     Returns the results in the order of case.scenes(). A run that stops early or is interrupted
     writes its converged steps. Raises InputError, RunError.
     """
-    chosen = engine_of(case, engine)
-    outcomes = list[Outcome]()
-    with folders.claim_output_folder(case, out):  # after the checks: bad input removes nothing
-        try:
-            versions.git_status()  # runs on another core meanwhile
-            with RunProgress(case, progress) as shown:
-                for outcome in accuracy.solve(case, chosen, shown.step, fields or picture):
-                    save(outcome, case, out)
-                    outcomes.append(outcome)
-                    if outcome.error:
-                        raise outcome.error
-        except BaseException as error:
-            if not outcomes:
-                state = "failed" if isinstance(error, Exception) else "interrupted"
-                folders.write_state(case, out, state, str(error) or "no step had converged")
-            raise
-        finally:
-            versions.commit()
+    chosen, outcomes = engine_of(case, engine), list[Outcome]()
+    with session(case, out, key=key) as study:
+        with RunProgress(case, progress) as shown:
+            for outcome in accuracy.solve(case, chosen, shown.step, fields or picture):
+                save(study, outcome)
+                outcomes.append(outcome)
+                if outcome.error:
+                    raise outcome.error
         if fields or picture:
-            write_fields_and_pictures(outcomes, case, out, fields, picture, drawing)
+            write_fields_and_pictures(study, outcomes, fields, picture, drawing)
     return [outcome.result for outcome in outcomes]
 
 
@@ -83,69 +71,49 @@ def write_outcomes(case: Case, outcomes: list[Outcome], out: Path) -> None:
 
     Raises InputError if out can not be written.
     """
-    with folders.claim_output_folder(case, out):
+    with session(case, out) as study:
         for outcome in outcomes:
-            save(outcome, case, out)
-        write_fields_and_pictures(outcomes, case, out, fields=True, picture=True)
+            save(study, outcome)
+        write_fields_and_pictures(study, outcomes, fields=True, picture=True)
 
 
-def save(outcome: Outcome, case: Case, out: Path) -> None:
-    """Write the tables of a scene of a case below out, and run.json with memory and times."""
-    folder = folders.scene_folder(case, outcome.result.case, out)
-    folder.mkdir(exist_ok=True)
-    start, result = time.perf_counter(), outcome.result
-    tables.write(result, folder)
-    result.info["wall_seconds"]["post"] = time.perf_counter() - start
-    result.info |= versions.provenance(result.info.pop("getdp", {}))
-    folders.write_info(result, folder, *early_end(outcome))
+def save(study: Session, outcome: Outcome) -> None:
+    """Write the tables of a scene and its run.json."""
+    study.save(outcome.result, *early_end(outcome))
 
 
 def early_end(outcome: Outcome) -> tuple[str, str]:
     """State (failed or interrupted) and message of a scene that an error ended; else empty."""
-    if not outcome.error:
-        return "", ""
     last = outcome.result.last
-    where = f" after level {last['level']:.6g} m" if last else " before the first step"
-    state = "failed" if isinstance(outcome.error, Exception) else "interrupted"
-    return state, f"{state}{where}" + (f": {outcome.error}" if str(outcome.error) else "")
+    return end_of(
+        outcome.error, f" after level {last['level']:.6g} m" if last else " before the first step"
+    )
 
 
 def write_fields_and_pictures(
+    study: Session,
     outcomes: list[Outcome],
-    case: Case,
-    out: Path,
     fields: bool,
     picture: bool,
     drawing: DrawingProcess | None = None,
 ) -> None:
-    """Write fields and pictures of the scenes of a case; add the seconds to run.json."""
+    """Write fields and pictures of saved scenes."""
     from .model.fields import Solution
 
+    def write(outcome: Outcome, folder: Path) -> None:
+        solution = Solution(outcome.result, outcome.mesh().bodies, outcome.fields())
+        if picture and drawing:
+            drawing.send(solution, folder)
+        if fields and solution.fields:
+            from .post.field_files import write_fields
+
+            write_fields(solution, folder / "fields")
+        if picture and not drawing:
+            from .post.pictures import draw
+
+            draw(solution, folder)
+
     for outcome in outcomes:
-        with added_seconds(outcome.result):
-            folder = folders.scene_folder(case, outcome.result.case, out)
-            solution = Solution(outcome.result, outcome.mesh().bodies, outcome.fields())
-            if picture and drawing:
-                drawing.send(solution, folder)
-            if fields and solution.fields:
-                from .post.field_files import write_fields
-
-                write_fields(solution, folder / "fields")
-            if picture and not drawing:
-                from .post.pictures import draw
-
-                draw(solution, folder)
-    for outcome in outcomes:
-        with added_seconds(outcome.result):
-            if picture and drawing:
-                drawing.wait()
-        folder = folders.scene_folder(case, outcome.result.case, out)
-        folders.write_info(outcome.result, folder, *early_end(outcome))
-
-
-@contextlib.contextmanager
-def added_seconds(result: Results) -> Iterator[None]:
-    """Add the seconds of a block to those of writing the results."""
-    start = time.perf_counter()
-    yield
-    result.info["wall_seconds"]["post"] += time.perf_counter() - start
+        study.add(outcome.result, partial(write, outcome))
+    for outcome in outcomes if picture and drawing else ():
+        study.add(outcome.result, lambda _: drawing.wait())

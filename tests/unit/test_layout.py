@@ -12,8 +12,8 @@ PACKAGE = Path(damjoint.__file__).parent
 WITNESS = PACKAGE.with_name("damjoint_witness")
 #: Each part uses only those before it.
 PARTS = ["", "csr", "threads", "storage", "progress", "versions", "laws", "model", "fem", "joint"]
-PARTS += ["solver", "dynamics", "engines", "statics", "post", "accuracy", "runner", "studies"]
-PARTS += ["library", "gui", "cli", "__main__"]
+PARTS += ["solver", "dynamics", "engines", "statics", "post", "accuracy", "session", "runner"]
+PARTS += ["studies", "library", "gui", "cli", "__main__"]
 
 
 def part_of(path):

@@ -10,7 +10,7 @@ import csv
 import json
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -27,6 +27,8 @@ TABLES = ("joint.csv", "history.csv", "curve.csv", "gravity.csv", "critical.csv"
 TABLES += ("quake.csv", "quake_joint.csv", "quake_stress.npz", "quake_state.npz", "run.json")
 PICTURES = ("", "_curve", "_check", "_critical", "_quake")
 FIELDS = r"(bulk|joint)(_t[\w.+-]+\.vtu|\.msh)|fields\.pvd"
+#: States of a run that has come to its end.
+ENDS = COMPLETE, STOPPED = "complete", "stopped"
 #: The table of a check, in the folder above those of its cases, and its first columns.
 CHECK, CHECK_HEAD = "check.csv", ["case", "joint", "answer", "uplift"]
 
@@ -156,13 +158,19 @@ def remove_if_empty(folder: Path) -> None:
         folder.rmdir()
 
 
-def write_state(case: Case, folder: Path, state: str, statement: str = "") -> None:
+def write_state(
+    case: Case,
+    folder: Path,
+    state: str,
+    statement: str = "",
+    entries: Mapping[str, Any] | None = None,
+) -> None:
     """Create the folder of a case and write the run.json of a run without results: running,
-    interrupted or failed, and why.
+    interrupted or failed, and why; entries: further ones.
     """
     folder.mkdir(parents=True, exist_ok=True)
     info = {"case": case.name, "state": state, "statement": statement}
-    write_json(folder, info | {"versions": {"damjoint": __version__}})
+    write_json(folder, {**info, "versions": {"damjoint": __version__}, **(entries or {})})
 
 
 def write_info(results: Results, folder: Path, state: str = "", why: str = "") -> None:
@@ -176,7 +184,7 @@ def write_info(results: Results, folder: Path, state: str = "", why: str = "") -
         {
             "case": case.name,
             "title": case.title,
-            "state": state or ("stopped" if results.stopped else "complete"),
+            "state": state or (STOPPED if results.stopped else COMPLETE),
             "verdict": state or verdict(results),
             "statement": why or statement(results),
             "hints": hints(results),

@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from .. import InputError
-from ..engines import Outcome
+from ..engines import Outcome, engine_of
 from ..engines.condensed.solve import about
 from ..fem.memory import sizes
 from ..laws import Evidence
 from ..model.case import Case
-from ..model.notes import remarks
 from ..model.results import row_of_joint
 from ..post import folder as folders
 from ..post.tables import write_csv
 from ..progress import Progress
-from ..runner import save
+from ..runner import early_end
+from ..session import Session, end_of, session
 from ..statics.verdict import statement, tension_share
 from . import critical_picture as picture
 from .critical import Search, last_state
@@ -36,25 +34,19 @@ def critical(case: Case, of: str, out: Path | None = None) -> tuple[CriticalValu
     Returns the result, and its lines of text. An interrupted search writes its trials.
     Raises InputError, RunError.
     """
+    engine_of(case, "auto")
     search = Search(case, of)
-    name = case.name
-    out = out or Path("out") / f"{name}_critical"
-    folders.check_writable(out)
-    start = time.perf_counter()
-    with Progress(sizes(search.own), bar_format="{desc} {elapsed}", leave=False) as shown:
-        search.on_progress = lambda message: shown.describe(f"{name}: {message}")
-        try:
-            answer = search.run()
-        except KeyboardInterrupt as caught:
-            write(search, search.interrupted(caught), out, time.perf_counter() - start)
-            raise
-        except InputError:  # an earlier run stays
-            raise
-        except Exception as error:
-            with folders.claim_output_folder(search.own, out):
-                folders.write_state(search.own, out, "failed", str(error))
-            raise
-    write(search, answer, out, time.perf_counter() - start)
+    with session(search.own, out or Path("out") / f"{case.name}_critical") as study:
+        options = {"bar_format": "{desc} {elapsed}", "leave": False}
+        with Progress(sizes(search.own), **options) as shown:
+            search.on_progress = lambda message: shown.describe(f"{case.name}: {message}")
+            try:
+                answer = search.run()
+            except KeyboardInterrupt as caught:
+                answer = search.interrupted(caught)
+        save(study, search, answer)
+        if answer.error:
+            raise answer.error
     return answer, printed_lines(answer, search)
 
 
@@ -112,23 +104,20 @@ def growth_lines(answer: CriticalValue) -> list[str]:
     return lines
 
 
-def write(search: Search, answer: CriticalValue, out: Path, seconds: float) -> None:
-    """Write the last equilibrium as `damjoint run` does, critical.csv and its picture below out, in
-    place of an earlier run's files.
-    """
-    case = search.own
-    what = case.title, search.of, search.unit, search.trials
+def save(study: Session, search: Search, answer: CriticalValue) -> None:
+    """Write the last equilibrium as `damjoint run` does, critical.csv and its picture."""
+    state, _ = end_of(answer.error)
+    entries = {"critical": as_json(search, answer), "wall_seconds": {"search": study.seconds}}
+    if answer.point:
+        result = last_state(search, answer.point)
+        result.info = about(answer.point.model.equilibrium.bulk) | entries
+        study.save(result, *early_end(Outcome(result, lambda: None, dict, answer.error)))
+    else:
+        study.save_without_results(state or folders.COMPLETE, answer.doubt, entries)
+    write_csv(study.out / "critical.csv", table(search))
+    what = search.own.title, search.of, search.unit, search.trials
     shown = picture.Content(*what, answer.value, answer.gravity, answer.mode)
-    with folders.claim_output_folder(case, out):
-        folders.write_state(case, out, "interrupted" if answer.error else "complete", answer.doubt)
-        if answer.point:
-            result = last_state(search, answer.point)
-            entries = {"critical": as_json(search, answer), "wall_seconds": {"search": seconds}}
-            entries["notes"] = remarks(case)
-            result.info = about(answer.point.model.equilibrium.bulk) | entries
-            save(Outcome(result, lambda: None, dict, answer.error), case, out)
-        write_csv(out / "critical.csv", table(search))
-        picture.draw(shown, out / f"{case.name}_critical.png")
+    picture.draw(shown, study.out / f"{search.own.name}_critical.png")
 
 
 def as_json(search: Search, answer: CriticalValue) -> dict[str, Any]:

@@ -1,0 +1,145 @@
+"""The life of a study in its output folder, the same for all commands.
+
+The folder is claimed, what is finished is saved at once, with its versions, machine, memory and
+times, and a study that ends early says so in run.json.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from . import versions
+from .model.case import Case
+from .model.notes import remarks
+from .model.results import Results
+from .post import folder as folders
+from .post import tables
+
+
+def end_of(error: BaseException | None, where: str = "") -> tuple[str, str]:
+    """State of a study that an error has ended, failed or interrupted, and its message; both empty
+    without an error. where: how far it had come.
+    """
+    if error is None:
+        return "", ""
+    state = "failed" if isinstance(error, Exception) else "interrupted"
+    return state, f"{state}{where}" + (f": {error}" if str(error) else "")
+
+
+def nothing_more(folder: Path) -> None:
+    """A study without further tables."""
+
+
+class Session:
+    """A study of a case that has claimed its folder, see `session`."""
+
+    def __init__(self, case: Case, out: Path, key: str = "") -> None:
+        """key: of all that decides the results, see `finished`; empty: they are not used again."""
+        self.case, self.out, self.key = case, out, key
+        self.notes, self.begun = remarks(case), time.perf_counter()
+        #: saved scenes: results, state and statement
+        self.saved: list[tuple[Results, str, str]] = []
+
+    def save(
+        self,
+        result: Results,
+        state: str = "",
+        statement: str = "",
+        more: Callable[[Path], None] = nothing_more,
+    ) -> None:
+        """Write the tables of a scene, and run.json with notes, versions, machine, memory, times.
+
+        state, statement: of an early end, see `folder.write_info`; more: writes further tables into
+        the folder of the scene.
+        """
+        folder, start = self.folder(result), time.perf_counter()
+        folder.mkdir(exist_ok=True)
+        tables.write(result, folder)
+        more(folder)
+        self.saved.append((result, state, statement))
+        info = result.info
+        info.setdefault("wall_seconds", {})["post"] = time.perf_counter() - start
+        info |= versions.provenance(info.pop("getdp", {})) | self.entries()
+        folders.write_info(result, folder, state, statement)
+
+    def save_without_results(
+        self, state: str, statement: str, entries: Mapping[str, Any] | None = None
+    ) -> None:
+        """Write run.json of a study without any equilibrium; entries: further ones."""
+        seconds = {"wall_seconds": {"all": self.seconds}}
+        further = seconds | versions.provenance({}) | self.entries() | dict(entries or {})
+        folders.write_state(self.case, self.out, state, statement, further)
+
+    def entries(self) -> dict[str, Any]:
+        """Notes on the case and, if there is one, the key for run.json."""
+        return {"notes": self.notes} | ({"key": self.key} if self.key else {})
+
+    def add(self, result: Results, write: Callable[[Path], object]) -> None:
+        """Write fields or pictures of a saved scene into its folder; the time is added to that of
+        writing its tables.
+        """
+        start = time.perf_counter()
+        write(self.folder(result))
+        result.info["wall_seconds"]["post"] += time.perf_counter() - start
+
+    def folder(self, result: Results) -> Path:
+        """The folder of a scene."""
+        return folders.scene_folder(self.case, result.case, self.out)
+
+    @property
+    def seconds(self) -> float:
+        """Wall seconds since the folder was claimed."""
+        return time.perf_counter() - self.begun
+
+    def complete(self) -> None:
+        """Write run.json again, with the times of fields and pictures."""
+        for result, state, statement in self.saved:
+            folders.write_info(result, self.folder(result), state, statement)
+
+
+@contextlib.contextmanager
+def session(case: Case, out: Path, keep: bool = False, key: str = "") -> Iterator[Session]:
+    """Claim the output folder of a study of a case, in place of an earlier one's results; after the
+    checks, so that bad input removes nothing. keep: continue an earlier one; key: see `Session`.
+
+    Raises InputError if the folder can not be written or is locked, or if the geometry of the case
+    is unsuitable.
+    """
+    study = Session(case, out, key)
+    with folders.claim_output_folder(case, out, keep):
+        try:
+            versions.git_status()  # runs on another core meanwhile
+            yield study
+        except BaseException as error:
+            if not study.saved:
+                state, _ = end_of(error)
+                study.save_without_results(state, str(error) or "no step had converged")
+            raise
+        finally:
+            versions.commit()
+        study.complete()
+
+
+def finished(case: Case, out: Path, key: str) -> bool:
+    """Whether a folder has the results of a study of this key that has come to its end."""
+    info = folders.read_info(out) or {}
+    return info.get("key") == key and info.get("state") in folders.ENDS
+
+
+@contextlib.contextmanager
+def several(cases: Mapping[Path, Case]) -> Iterator[None]:
+    """Compute studies of several cases, by their folders, some in other processes: if the block
+    ends early, those that were running have ended, too.
+    """
+    try:
+        yield
+    except BaseException as error:
+        state, _ = end_of(error)
+        for out, case in cases.items():
+            if (folders.read_info(out) or {}).get("state") == "running":
+                folders.write_state(case, out, state, "ended before its first result")
+        raise
