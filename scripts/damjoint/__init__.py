@@ -11,6 +11,7 @@ The package:
 arrays.py   types of arrays; csr.py: sparse matrices; threads.py: threads of the linear algebra
 storage.py  atomic writes, locks on files and folders
 progress.py progress of long work, on a terminal and in redirected output
+processes.py work in several processes
 versions.py versions of the code and of what it uses, machine
 model/      data: parameters, case, mesh, loads, results
 laws/       the joint laws, one file each
@@ -22,11 +23,12 @@ engines/    the engines: condensed/ from the parts above, getdp/ by the problem 
 statics/    gravity method, limit analysis, verdict
 post/       tables, pictures, fields and folders of results
 accuracy.py mesh refinement to a required accuracy, error estimate
+session.py  the life of a study in its output folder
 runner.py   solves a case and writes its results
 studies/    checks, sweeps, critical values, a law along a path, reports
-library.py  the interface for Python: case, run, fill, check, critical, sweep, further laws
+library.py  the interface for Python: case, run, fill, check, critical, quake, sweep, laws
 gui/        the Gmsh window
-cli.py      the command line; __main__.py prepares its process
+cli/        the command line, a file for each command; __main__.py prepares its process
 
 Each uses only those above it. damjoint_tools, beside the package: benchmarks, random verification
 and the pages made from the code.
@@ -44,6 +46,7 @@ if TYPE_CHECKING:
     from .library import Critical as Critical
     from .library import JointTable as JointTable
     from .library import Law as Law
+    from .library import Quake as Quake
     from .library import Run as Run
     from .library import Sample as Sample
     from .library import Step as Step
@@ -52,6 +55,7 @@ if TYPE_CHECKING:
     from .library import check as check
     from .library import critical as critical
     from .library import fill as fill
+    from .library import quake as quake
     from .library import run as run
     from .library import sweep as sweep
 
@@ -92,8 +96,8 @@ def data(folder: str) -> Path:
 
 #: What `import damjoint` offers, see library.py; imported when it is used.
 LIBRARY = (
-    *("case", "run", "fill", "check", "critical", "sweep"),
-    *("Case", "Run", "JointTable", "Step", "Critical", "Sample", "Sweep", "Law", "LAWS"),
+    *("case", "run", "fill", "check", "critical", "quake", "sweep"),
+    *("Case", "Run", "JointTable", "Step", "Critical", "Quake", "Sample", "Sweep", "Law", "LAWS"),
 )
 __all__ = [*LIBRARY, "InputError", "RunError"]
 

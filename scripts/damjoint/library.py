@@ -28,7 +28,7 @@ from .laws import LAWS, Law
 from .model.case import Case, load
 from .model.fields import Solution
 from .model.notes import notes
-from .model.results import HISTORY, Results, joint_columns
+from .model.results import HISTORY, Results, joint_columns, quake_columns
 from .progress import track
 from .solver.load_stepper import LoadStepper
 from .solver.state import State
@@ -44,6 +44,7 @@ if TYPE_CHECKING:  # loaded when they are used, with what they draw with
     from .studies.check import SafetyCheck
     from .studies.critical import Search
     from .studies.critical_value import CriticalValue
+    from .studies.quake_result import QuakeTables
 
 __all__ = [
     "LAWS",
@@ -51,6 +52,7 @@ __all__ = [
     "Critical",
     "JointTable",
     "Law",
+    "Quake",
     "Run",
     "Sample",
     "Step",
@@ -59,6 +61,7 @@ __all__ = [
     "check",
     "critical",
     "fill",
+    "quake",
     "run",
     "sweep",
 ]
@@ -476,6 +479,115 @@ def on_fixed_mesh(chosen: Case) -> Case:
 
 
 @dataclass(frozen=True, repr=False)
+class Quake:
+    """An earthquake of a case, made by `quake`."""
+
+    #: summary (see results.md), verdict, statement, stands
+    tables: QuakeTables
+
+    @property
+    def case(self) -> Case:
+        """The case."""
+        return self.tables.case
+
+    @property
+    def rows(self) -> np.recarray:
+        """quake.csv: a row per time step."""
+        return records(self.tables.rows)
+
+    @property
+    def history(self) -> np.recarray:
+        """history.csv: the static states, with that after the earthquake as a further row."""
+        return records(self.tables.static.history)
+
+    @property
+    def joint(self) -> JointTable:
+        """joint.csv: the joints in the static states."""
+        return records(self.tables.static.joint).view(JointTable)
+
+    @property
+    def frames(self) -> JointTable | None:
+        """quake_joint.csv: the joints at up to 200 times [s]; None by GetDP."""
+        frames = getattr(self.tables, "frames", None)
+        return records(frames.joint).view(JointTable) if frames else None
+
+    @property
+    def stress(self) -> Table | None:
+        """Effective normal stress [Pa] along the first joint in time, as in quake_stress.npz; None
+        by GetDP.
+        """
+        return getattr(self.tables, "stress", None)
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """Peaks, values at rest, modes, damping, notes: `quake` in run.json."""
+        return self.tables.summary
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Units of the columns of `rows`."""
+        return {name: unit for name, (unit, _) in quake_columns(self.case).items()}
+
+    @property
+    def verdict(self) -> str:
+        """stands, no equilibrium, not at rest, broken without friction."""
+        return self.tables.verdict
+
+    @property
+    def stands(self) -> bool:
+        """Whether the dam stands after the earthquake."""
+        return self.tables.stands
+
+    @property
+    def statement(self) -> str:
+        """What the end of the earthquake amounts to."""
+        return self.tables.statement
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """The rows as a DataFrame with units in its `attrs`.
+
+        Raises ImportError without pandas.
+        """
+        frame = optional("pandas").DataFrame(self.tables.rows)
+        frame.attrs["units"] = self.units
+        return frame
+
+    def __repr__(self) -> str:
+        return f"{self.case.name}: {self.statement}"
+
+
+def quake(
+    source: Case | str | Path = "dam",
+    *,
+    record: str | Path | None = None,
+    engine: str = "auto",
+    progress: bool = False,
+) -> Quake:
+    """The dam through a recorded earthquake, after its static loads; nothing is written.
+
+    Args:
+        source: a case, or its name or path, see `case`.
+        record: CSV of the ground's acceleration (default: that of the case).
+        engine: condensed (auto), or getdp, the reference model.
+        progress: show a bar, or where there is no terminal a line every ten seconds.
+
+    Raises:
+        InputError: bad input, or an earthquake that the engine can not compute.
+        RunError: no static equilibrium, or a step that could not be computed.
+    """
+    from .studies import quake_study
+
+    chosen = as_case(source)
+    chosen = noted(chosen if record is None else replace(chosen, record=Path(record)))
+    options = quake_study.Options(engine, progress=progress)
+    quake_study.check(chosen, options)
+    tables = quake_study.compute(chosen, options)
+    if tables.error:
+        raise tables.error
+    return Quake(tables)
+
+
+@dataclass(frozen=True, repr=False)
 class Sweep:
     """The rows of a sweep, made by `sweep`."""
 
@@ -570,7 +682,8 @@ def sweep(
         InputError: bad input.
         RunError: the mesh for an accuracy could not be computed, or a process was killed.
     """
-    from .studies.sweep import check_jobs, compute, notes_on_rows, planned
+    from .processes import check_jobs
+    from .studies.sweep import compute, notes_on_rows, planned
 
     check_jobs(jobs)
     if not values and not sample:

@@ -55,7 +55,8 @@ def run(
     """
     chosen, outcomes = engine_of(case, engine), list[Outcome]()
     with session(case, out, key=key) as study:
-        with RunProgress(case, progress) as shown:
+        shown = RunProgress(case, progress)
+        with shown:
             for outcome in accuracy.solve(case, chosen, shown.step, fields or picture):
                 save(study, outcome)
                 outcomes.append(outcome)
@@ -115,5 +116,7 @@ def write_fields_and_pictures(
 
     for outcome in outcomes:
         study.add(outcome.result, partial(write, outcome))
-    for outcome in outcomes if picture and drawing else ():
-        study.add(outcome.result, lambda _: drawing.wait())
+    if picture and drawing:
+        wait = drawing.wait
+        for outcome in outcomes:
+            study.add(outcome.result, lambda _: wait())

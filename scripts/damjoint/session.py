@@ -43,6 +43,8 @@ class Session:
         self.notes, self.begun = remarks(case), time.perf_counter()
         #: saved scenes: results, state and statement
         self.saved: list[tuple[Results, str, str]] = []
+        #: whether run.json has the end of the study
+        self.ended = False
 
     def save(
         self,
@@ -61,22 +63,21 @@ class Session:
         tables.write(result, folder)
         more(folder)
         self.saved.append((result, state, statement))
+        self.ended = True
         info = result.info
         info.setdefault("wall_seconds", {})["post"] = time.perf_counter() - start
-        info |= versions.provenance(info.pop("getdp", {})) | self.entries()
+        info |= versions.provenance(info.pop("getdp", {})) | {"notes": self.notes}
         folders.write_info(result, folder, state, statement)
 
     def save_without_results(
         self, state: str, statement: str, entries: Mapping[str, Any] | None = None
     ) -> None:
         """Write run.json of a study without any equilibrium; entries: further ones."""
-        seconds = {"wall_seconds": {"all": self.seconds}}
-        further = seconds | versions.provenance({}) | self.entries() | dict(entries or {})
-        folders.write_state(self.case, self.out, state, statement, further)
-
-    def entries(self) -> dict[str, Any]:
-        """Notes on the case and, if there is one, the key for run.json."""
-        return {"notes": self.notes} | ({"key": self.key} if self.key else {})
+        self.ended = True
+        further = {"notes": self.notes, "wall_seconds": {"all": self.seconds}, **(entries or {})}
+        folders.write_state(
+            self.case, self.out, state, statement, further | versions.provenance({})
+        )
 
     def add(self, result: Results, write: Callable[[Path], object]) -> None:
         """Write fields or pictures of a saved scene into its folder; the time is added to that of
@@ -96,8 +97,9 @@ class Session:
         return time.perf_counter() - self.begun
 
     def complete(self) -> None:
-        """Write run.json again, with the times of fields and pictures."""
+        """Write run.json again, with the times of fields and pictures, and the key."""
         for result, state, statement in self.saved:
+            result.info |= {"key": self.key} if self.key else {}
             folders.write_info(result, self.folder(result), state, statement)
 
 
@@ -115,7 +117,7 @@ def session(case: Case, out: Path, keep: bool = False, key: str = "") -> Iterato
             versions.git_status()  # runs on another core meanwhile
             yield study
         except BaseException as error:
-            if not study.saved:
+            if not study.ended:
                 state, _ = end_of(error)
                 study.save_without_results(state, str(error) or "no step had converged")
             raise
@@ -124,10 +126,9 @@ def session(case: Case, out: Path, keep: bool = False, key: str = "") -> Iterato
         study.complete()
 
 
-def finished(case: Case, out: Path, key: str) -> bool:
+def finished(out: Path, key: str) -> bool:
     """Whether a folder has the results of a study of this key that has come to its end."""
-    info = folders.read_info(out) or {}
-    return info.get("key") == key and info.get("state") in folders.ENDS
+    return (folders.read_info(out) or {}).get("key") == key
 
 
 @contextlib.contextmanager

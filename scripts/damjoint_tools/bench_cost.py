@@ -18,11 +18,12 @@ from damjoint.fem.bodies import Bodies
 from damjoint.fem.condensation import condense
 from damjoint.joint.interface import Interface, interface_of
 from damjoint.model.case import Case, load
+from damjoint.processes import pool_of
 from damjoint.progress import track
 from damjoint.runner import run
 from damjoint.solver.load_stepper import LoadStepper
 from damjoint.statics.verdict import verdict
-from damjoint.studies.sweep import pool_of, stepped
+from damjoint.studies.sweep import stepped
 from threadpoolctl import threadpool_limits
 
 from .bench_scenes import (

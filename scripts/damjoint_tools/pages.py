@@ -118,7 +118,9 @@ def results_page() -> str:
         "`quake`; the last row of history.csv and the last state in joint.csv are static ones, "
         "after the earthquake. `quake_joint.csv` has the columns of joint.csv at up to "
         f"{MOST_FRAMES} times [s], from 0, the static state. `quake_stress.npz` (numpy): `time` "
-        "[s], `s` [m] and `sigma_n_eff` [Pa] (rows, nodes) of the first joint.",
+        "[s], `s` [m] and `sigma_n_eff` [Pa] (rows, nodes) of the first joint. Of several records "
+        "`records.csv` has a row for each: `folder`, `record`, then as in a row of a sweep with "
+        "`--quake`, `verdict` and `statement`.",
         quake,
         "## CASE_sweep.csv",
         "Written by `damjoint sweep`, a row per combination, in the order of computation: `key`, "

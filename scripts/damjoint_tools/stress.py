@@ -20,9 +20,9 @@ from concurrent.futures import as_completed
 from pathlib import Path
 
 from damjoint import InputError, RunError
+from damjoint.processes import pool_of
 from damjoint.progress import track
 from damjoint.studies.result_file import result_file
-from damjoint.studies.sweep import pool_of
 
 from .provenance import RECORDED, provenance
 from .quake_comparison import MEASURES, further_checks

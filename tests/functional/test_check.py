@@ -16,6 +16,7 @@ from damjoint.post import folder as folders
 from damjoint.post.check_picture import draw_check, draw_joint
 from damjoint.statics import gravity
 from damjoint.statics.verdict import verdict
+from damjoint.studies import check as check_study
 from damjoint.studies.check import (
     SafetyCheck,
     by_finite_elements,
@@ -492,3 +493,64 @@ def test_a_note_on_all_joints_is_printed_once(solve):
     of_all, of_lift = labelled_notes(compare_joints(result))
     assert of_all.startswith("dam: only equilibrium is judged: required_SSF")
     assert of_lift == "dam, lift 15 m: gravity method: full head in the crack, linear beyond it"
+
+
+# -- several combinations
+# --------------------------------------------------------------------------------------------------
+
+
+def two_cases(folder):
+    """Two case files of small dams."""
+    for name, mu in (("usual", 0.8), ("flood", 0.6)):
+        text = f"default_mu = {mu};\ndefault_n_joint = 10;\nlevels() = {{30, 40}};\n"
+        (folder / f"{name}.case").write_text(text)
+    return "usual.case", "flood.case"
+
+
+def contents(folder):
+    """Tables below a folder."""
+    return {str(p.relative_to(folder)): p.read_text() for p in folder.rglob("*.csv")}
+
+
+@pytest.mark.usefixtures("no_pictures")
+def test_combinations_in_several_processes_have_the_same_tables(command, tmp_path):
+    cases = two_cases(tmp_path)
+    printed = [command("check", *cases, "--jobs", n, "--out", f"out{n}")[:2] for n in (1, 2)]
+    first, second = (contents(tmp_path / f"out{n}") for n in (1, 2))
+    assert first == second and {"check.csv", "flood/gravity.csv", "usual/joint.csv"} <= set(first)
+    assert printed[0] == (printed[1][0], printed[1][1].replace("out2", "out1"))
+
+
+@pytest.mark.usefixtures("no_pictures")
+def test_an_interrupted_check_continues(command, tmp_path, monkeypatch):
+    """The finished case is read, with the same rows; the next one is computed."""
+    cases = two_cases(tmp_path)
+    assert command("check", *cases, "--jobs", 1, "--out", "whole")[0] in (0, 1)
+    run, computed = check_study.run, []
+
+    def interrupted(case, *others, **options):
+        if computed:
+            raise KeyboardInterrupt
+        computed.append(case.name)
+        return run(case, *others, **options)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(check_study, "run", interrupted)
+        assert command("check", *cases, "--jobs", 1, "--out", "out")[0] == 130
+    assert computed == ["usual"]
+    monkeypatch.setattr(
+        check_study, "run", lambda case, *o, **k: computed.append(case.name) or run(case, *o, **k)
+    )
+    assert command("check", *cases, "--jobs", 1, "--out", "out")[0] in (0, 1)
+    assert computed == ["usual", "flood"]
+    tables, whole = (contents(tmp_path / name) for name in ("out", "whole"))
+    rows, expected = (
+        list(csv.DictReader(t.pop("check.csv").splitlines())) for t in (tables, whole)
+    )
+    assert tables == whole and len(rows) == len(expected)
+    for row, of_whole in zip(rows, expected, strict=True):  # tables have twelve digits
+        for name, cell in of_whole.items():
+            try:
+                assert float(row[name]) == pytest.approx(float(cell), rel=1e-9, abs=1e-5)
+            except ValueError:
+                assert row[name] == cell

@@ -19,8 +19,8 @@ from damjoint import RunError
 from damjoint.csr import CsrMatrix
 from damjoint.engines import engine_of
 from damjoint.fem import factor, memory
+from damjoint.processes import pool_of
 from damjoint.storage import atomic_write, locked_folder
-from damjoint.studies.sweep import pool_of
 from processes import without_progress
 from scipy import sparse
 
@@ -77,7 +77,7 @@ def test_an_interrupt_that_leaves_no_result_does_not_say_so(command, monkeypatch
 def test_worker_processes_end_with_their_parent(tmp_path):
     script = """
 import os, time
-from damjoint.studies.sweep import pool_of
+from damjoint.processes import pool_of
 with pool_of(2) as pool:
     print(*{pool.submit(os.getppid).result(), *pool._processes}, flush=True)
     time.sleep(600)

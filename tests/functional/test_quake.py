@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
+import damjoint as dj
 import numpy as np
 import pytest
 from damjoint import RunError
@@ -20,7 +21,7 @@ from damjoint.fem.bodies import Bodies, material_of
 from damjoint.fem.elasticity import stress
 from damjoint.model.case import load
 from damjoint.solver.history import joint_row
-from damjoint.studies import chart, outcome, quake_summary, sweep
+from damjoint.studies import chart, outcome, quake_study, quake_summary, sweep
 from damjoint.studies.plan import Plan
 from damjoint.studies.quake import QuakeRun
 from quakes import BLOCK, DAM, earthquake, joint_of, mean_slip, smooth_record, write_record
@@ -532,6 +533,93 @@ def case_file(tmp_path):
 
 #: Where the accuracy does not matter.
 LONG_STEPS = "--set", "dt=0.01", "--set", "record_rest=2"
+
+
+@pytest.fixture
+def records(tmp_path):
+    """Two records, as options."""
+    for name, size in (("weak", 2.0), ("strong", 6.0)):
+        smooth_record(tmp_path / f"{name}.csv", size, duration=0.5)
+    return [word for name in ("weak", "strong") for word in ("--record", tmp_path / f"{name}.csv")]
+
+
+def quakes(folder):
+    """Tables below a folder."""
+    return {str(p.relative_to(folder)): p.read_text() for p in folder.rglob("*.csv")}
+
+
+def test_several_records_in_several_processes(command, case_file, tmp_path, records):
+    """Each earthquake has a folder and a row; one process computes the same."""
+    words = "quake", case_file, *records, "--no-picture", *LONG_STEPS
+    code, out, err = command(*words, "--jobs", 2, "--out", "two")
+    assert code == 0 and err == "" and out.count("natural modes") == 2
+    with (tmp_path / "two" / "records.csv").open() as file:
+        weak, strong = csv.DictReader(file)
+    assert (weak["folder"], strong["folder"]) == ("weak", "strong")
+    assert float(weak["peak_ground_ax"]) < float(strong["peak_ground_ax"]) <= 6
+    for row in (weak, strong):
+        info = json.loads((tmp_path / "two" / row["folder"] / "run.json").read_text())
+        assert row["verdict"] == info["verdict"] and info["commit"] and info["wall_seconds"]
+        assert float(row["residual_slip"]) == pytest.approx(info["quake"]["residual"]["slip"])
+    assert command(*words, "--jobs", 1, "--out", "one")[0] == 0
+    assert quakes(tmp_path / "one") == quakes(tmp_path / "two")
+
+
+def test_earthquakes_that_are_finished_are_not_computed_again(
+    command, case_file, tmp_path, records, monkeypatch
+):
+    words = "quake", case_file, *records, "--no-picture", *LONG_STEPS, "--jobs", 1
+    compute, computed = quake_study.compute, []
+
+    def interrupted(case, *others):
+        computed.append(case.record.stem)
+        if computed == ["weak", "strong"]:
+            raise KeyboardInterrupt
+        return compute(case, *others)
+
+    monkeypatch.setattr(quake_study, "compute", interrupted)
+    assert command(*words)[0] == 130
+    out = tmp_path / "out" / "my_quake"
+    states = [json.loads((out / n / "run.json").read_text())["state"] for n in ("weak", "strong")]
+    assert states == ["complete", "interrupted"] and not (out / "records.csv").exists()
+    assert command(*words)[0] == 0 and computed == ["weak", "strong", "strong"]
+    assert (out / "records.csv").read_text().count("\n") == 3
+
+
+def test_two_records_of_one_name_are_refused(command, case_file, tmp_path):
+    smooth_record(tmp_path / "wave.csv", 2.0)
+    code, _, err = command("quake", case_file, *2 * ("--record", tmp_path / "wave.csv"))
+    assert code == 2 and "must be given once, and have its own name" in err
+
+
+@pytest.mark.parametrize("engine", ["condensed", "getdp"])
+def test_from_python_an_earthquake_is_what_the_command_writes(command, case_file, tmp_path, engine):
+    """Rows, static states, frames, stress and summary, of either engine; nothing is written."""
+    words = "--no-picture", "--set", "dt=0.01", "--set", "record_rest=0.6", "--out", "out"
+    assert command("quake", case_file, *words, "--engine", engine)[0] in (0, 1)
+    before = {p for p in tmp_path.rglob("*") if "cache" not in str(p)}
+    found = dj.quake(dj.case(case_file, dt=0.01, record_rest=0.6), engine=engine)
+    assert {p for p in tmp_path.rglob("*") if "cache" not in str(p)} == before
+    tables = {"quake": found.rows, "history": found.history, "joint": found.joint}
+    if engine == "condensed":
+        tables["quake_joint"] = found.frames
+        with np.load("out/quake_stress.npz") as stored:
+            assert all(np.array_equal(found.stress[name], stored[name]) for name in stored)
+    for name, table in tables.items():
+        stored = np.genfromtxt(f"out/{name}.csv", delimiter=",", names=True)
+        assert table.dtype.names == stored.dtype.names and len(table) == len(stored)
+        for column in stored.dtype.names:
+            scale = np.abs(stored[column]).max()
+            assert np.allclose(table[column], stored[column], 1e-6, 1e-9 * scale, equal_nan=True)
+    info = json.loads(Path("out/run.json").read_text())
+    assert (found.verdict, found.statement) == (info["verdict"], info["statement"])
+    assert found.stands == (info["verdict"] == "stands")
+    for name, peak in info["quake"]["peaks"].items():
+        assert found.summary["peaks"][name] == pytest.approx(peak, rel=1e-6)
+    assert found.units["crest_ux"] == "m" and found.units["ground_ax"] == "m/s2"
+    frame = found.to_pandas()
+    assert list(frame.columns) == list(found.rows.dtype.names)
+    assert frame.attrs["units"]["N"] == "N/m"
 
 
 def test_the_command_writes_rows_summary_and_picture(command, case_file, tmp_path):

@@ -9,7 +9,8 @@ import pytest
 from damjoint.dynamics.frames import MOST_FRAMES
 from damjoint.model.case import load
 from damjoint.post.tables import write_csv
-from damjoint.studies import quake
+from damjoint.studies import quake_study
+from damjoint.studies.quake_study import Options
 from damjoint_tools import (
     quake_comparison,
     quake_equations,
@@ -34,7 +35,7 @@ def files(tmp_path_factory):
     settings |= {"batter_height": 30.0, "added_mass": 2.0, "adhesion": (1e4, 1e5), "G_t": (50, 50)}
     settings |= {"damping_mass": 2.0, "record_rest": 0.6}
     case = load("dam", DAM | settings, "35", record=record)
-    quake.run(case, folder / "out", picture=False, progress=False)
+    quake_study.run(case, folder / "out", Options(picture=False, progress=False))
     return QuakeFiles(case, folder / "out", 0)
 
 
@@ -188,7 +189,7 @@ def test_the_slip_of_a_rigid_block_is_compared_with_its_closed_form(tmp_path):
     values = np.maximum(8 * np.sin(np.pi * times / 0.3), 0)
     record = write_record(tmp_path / "r.csv", times, values)
     case = load("dam", BLOCK | {"dt": 0.0025}, "0", record=record)
-    quake.run(case, tmp_path / "out", picture=False, progress=False)
+    quake_study.run(case, tmp_path / "out", Options(picture=False, progress=False))
     run = QuakeFiles(case, tmp_path / "out", 0)
     assert quake_comparison.sliding_block(run)[-1] == pytest.approx(-0.054306889, rel=5e-4)
     measures, violated = quake_comparison.closed_form(None, run, None)

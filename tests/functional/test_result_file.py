@@ -9,9 +9,11 @@ import pytest
 from damjoint import InputError, data
 from damjoint.model.case import load
 from damjoint.model.mesh import mesh_of
+from damjoint.processes import ProcessKilled, pool_of
+from damjoint.studies import keys
 from damjoint.studies.plan import Plan
 from damjoint.studies.result_file import result_file
-from damjoint.studies.sweep import ProcessKilled, key_of, pool_of
+from damjoint.studies.sweep import key_of
 from own_mesh import OwnMesh
 
 pytestmark = pytest.mark.usefixtures("no_pictures")
@@ -50,10 +52,10 @@ def test_the_content_of_a_mesh_is_part_of_the_key(command, tmp_path):
 
 def test_the_sides_of_a_mesh_are_part_of_the_key(tmp_path):
     case = own_case(tmp_path)
-    key = key_of(case)
+    key = keys.key_of(case)
     other = {"downstream": "crest surface"}
-    assert key_of(own_case(tmp_path, rename=other)) != key
-    assert key_of(own_case(tmp_path)) == key
+    assert keys.key_of(own_case(tmp_path, rename=other)) != key
+    assert keys.key_of(own_case(tmp_path)) == key
 
 
 def test_the_key_of_a_geometry_follows_the_values_and_files_that_it_uses(tmp_path, monkeypatch):

@@ -21,10 +21,10 @@ from .. import InputError, accuracy
 from ..engines.condensed import solve as engine
 from ..model.case import Case
 from ..model.parameters import declared
-from ..post.folder import claim_output_folder
 from ..runner import write_outcomes
+from ..session import session
 from ..storage import atomic_write
-from ..studies import quake
+from ..studies import quake, quake_study
 from .scene import SolvedScene
 from .sheet import Request, Sheet, case_text, check_request, titles
 
@@ -158,8 +158,8 @@ def run_quake(sheet: Sheet, pipe: Connection, stop: Stop) -> tuple[list[SolvedSc
         result = under_way.result_so_far(error) if error else under_way.result()
 
     def write(folder: Path) -> None:
-        with claim_output_folder(case, folder):
-            quake.write(result, folder, fields=True, picture=True)
+        with session(case, folder) as study:
+            quake_study.save(study, result, fields=True, picture=True)
 
     return SolvedScene.of_earthquake(result), write
 

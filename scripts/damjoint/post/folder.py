@@ -27,10 +27,11 @@ TABLES = ("joint.csv", "history.csv", "curve.csv", "gravity.csv", "critical.csv"
 TABLES += ("quake.csv", "quake_joint.csv", "quake_stress.npz", "quake_state.npz", "run.json")
 PICTURES = ("", "_curve", "_check", "_critical", "_quake")
 FIELDS = r"(bulk|joint)(_t[\w.+-]+\.vtu|\.msh)|fields\.pvd"
-#: States of a run that has come to its end.
-ENDS = COMPLETE, STOPPED = "complete", "stopped"
-#: The table of a check, in the folder above those of its cases, and its first columns.
-CHECK, CHECK_HEAD = "check.csv", ["case", "joint", "answer", "uplift"]
+#: States of a run that has come to its end: the last one; of the loads or of the equilibria.
+COMPLETE, STOPPED = "complete", "stopped"
+#: The tables of studies of several cases, in the folder above theirs, and their first columns.
+CHECK, RECORDS = "check.csv", "records.csv"
+HEADS = {CHECK: ["case", "joint", "answer", "uplift"], RECORDS: ["folder", "record"]}
 
 
 def check_writable(folder: Path) -> None:
@@ -49,7 +50,7 @@ def check_writable(folder: Path) -> None:
             if inner.is_symlink() or (inner.exists() and not inner.is_dir()):
                 name = inner.name
                 raise InputError(f"out = {folder}: its {name} must be a folder, and not a link")
-        for name in (*TABLES, CHECK):
+        for name in (*TABLES, *HEADS):
             if (folder / name).exists() and not (folder / name).is_file():
                 raise InputError(f"out = {folder}: its {name} must be a regular file")
     except OSError as error:  # a name too long, a loop of links
@@ -59,7 +60,7 @@ def check_writable(folder: Path) -> None:
 @contextlib.contextmanager
 def claim_output_folder(case: Case, folder: Path, keep: bool = False) -> Iterator[None]:
     """Create and lock the output folder of a run, and remove an earlier run's results, also the
-    table of a check of which it was a part; keep: not those of a run that is to be continued.
+    table of a study of which it was a part; keep: not those of a run that is to be continued.
 
     Raises InputError if the folder can not be written or is locked; an earlier run stays then.
     """
@@ -68,29 +69,29 @@ def claim_output_folder(case: Case, folder: Path, keep: bool = False) -> Iterato
     with locked_folder(folder):
         if not keep:
             clear(folder)
-        remove_check(folder)
-        if folder.resolve().name in cases_checked(folder.resolve().parent):
-            remove_check(folder.resolve().parent)
+        remove_tables(folder)
+        remove_tables(folder.resolve().parent, folder.resolve().name)
         write_state(case, folder, "running")
         yield
 
 
 @contextlib.contextmanager
-def claim_check_folder(folder: Path) -> Iterator[None]:
-    """Create and lock the folder of a check, and remove the table of an earlier one.
+def claim_study_folder(folder: Path) -> Iterator[None]:
+    """Create and lock the folder of a study of several cases, and remove the table of an earlier
+    one.
 
     Raises InputError if the folder can not be written or is locked; an earlier table stays then.
     """
     check_writable(folder)
     folder.mkdir(parents=True, exist_ok=True)
     with locked_folder(folder):
-        remove_check(folder)
+        remove_tables(folder)
         yield
 
 
-def cases_checked(folder: Path) -> set[str]:
-    """Names of the cases in the table of a check in a folder; empty if there is none."""
-    path = folder / CHECK
+def folders_in(path: Path) -> set[str]:
+    """Names of the folders in the table of a study of several cases; empty if there is none."""
+    head_of_table = HEADS[path.name]
     try:
         if not path.is_file():
             return set()
@@ -98,13 +99,17 @@ def cases_checked(folder: Path) -> set[str]:
             head, *rows = csv.reader(file)
     except (OSError, ValueError, csv.Error):  # no line, or a foreign file
         return set()
-    return {row[0] for row in rows if row} if head[: len(CHECK_HEAD)] == CHECK_HEAD else set()
+    return {row[0] for row in rows if row} if head[: len(head_of_table)] == head_of_table else set()
 
 
-def remove_check(folder: Path) -> None:
-    """Remove the table of a check from a folder."""
-    if cases_checked(folder):
-        (folder / CHECK).unlink(missing_ok=True)
+def remove_tables(folder: Path, name: str = "") -> None:
+    """Remove the tables of studies of several cases from a folder; name: only if one of the cases
+    has a folder of this name.
+    """
+    for table in HEADS:
+        listed = folders_in(folder / table)
+        if name in listed if name else listed:
+            (folder / table).unlink(missing_ok=True)
 
 
 def scene_folder(case: Case, scene: Case, out: Path) -> Path:

@@ -4,6 +4,7 @@ required factors. Load combinations are cases that include a common file.
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -19,12 +20,16 @@ from ..model.case import Case
 from ..model.fields import along
 from ..model.results import HISTORY, Results
 from ..post import folder as folders
+from ..post import stored
 from ..post.check_picture import SIGN, draw_check
 from ..post.tables import write_csv
 from ..post.units import FORCES, MOMENTS, STRESSES, Units, unit
+from ..processes import in_processes
 from ..runner import run
+from ..session import finished, several
 from ..statics import gravity, verdict
 from ..statics.gravity import GravityMethod
+from .keys import key_of
 
 FINITE_ELEMENTS, GRAVITY = "finite elements", "gravity method"
 LONGER = "gravity method, longer crack"
@@ -518,33 +523,50 @@ def signed_cell(value: float) -> str:
     return "" if math.isnan(value) else f"{value:+.3g}" if value else "0"
 
 
-def check_cases(cases: list[Case], out: Path) -> list[SafetyCheck]:
-    """Run cases, each into its folder below out, and check them.
+def check_cases(cases: list[Case], out: Path, jobs: int | None = None) -> list[SafetyCheck]:
+    """Run cases, each into its folder below out, and check them; jobs: number of processes.
 
     Writes check.csv into out after each case; gravity.csv and CASE_check.png into each scene's
-    folder, but not for a user's own geometry. Raises InputError, RunError.
+    folder, but not for a user's own geometry. Cases that have come to their end are not computed
+    again by the same command. Raises InputError, RunError.
     """
     names = [case.name for case in cases]
     for case in cases:
         if names.count(case.name) > 1:
             raise InputError(f"case {case.name}: must be given once, and have its own name")
         engine_of(case, "auto")
-    checks = list[SafetyCheck]()
-    with folders.claim_check_folder(out):
-        for case in cases:
-            for result in run(case, out / case.name):
-                of_joints = compare_joints(result)
-                checks += of_joints
-                if case.geometry:
-                    continue
-                methods = [method for own in result.joints if (method := hand_calculation(own))]
-                folder = folders.scene_folder(case, result.case, out / case.name)
-                write_csv(folder / "gravity.csv", loads_table(methods))
-                k = min(range(len(methods)), key=lambda k: of_joints[k].margin)
-                worst = of_joints[k]
-                draw_check(result, k, methods[k], picture_table(worst), worst.why, folder)
-            rows = [row for check in checks for row in check.rows]
+    tasks, done = [(case, out / case.name) for case in cases], dict[int, list[SafetyCheck]]()
+    by_folder = {folder: case for case, folder in tasks}
+    with folders.claim_study_folder(out), several(by_folder):
+        for number, checks in in_processes(check_case, tasks, jobs, "check"):
+            done[number] = checks
+            rows = [row for k in sorted(done) for check in done[k] for row in check.rows]
             write_csv(out / folders.CHECK, {name: [row[name] for row in rows] for name in CHECK})
+    return [check for k in sorted(done) for check in done[k]]
+
+
+def check_case(task: tuple[Case, Path], progress: bool) -> list[SafetyCheck]:
+    """Run a case into a folder, or read its results of an earlier command, and check it."""
+    case, out = task
+    key = key_of(case, case.accuracy, case.also_uplift)
+    folder_of = lambda scene: folders.scene_folder(case, scene, out)
+    results = list[Results]()
+    with contextlib.suppress(InputError):  # a file is missing or damaged
+        if finished(out, key):
+            results = [stored.read(folder_of(scene)).result for scene in case.scenes()]
+    results = results or run(case, out, progress=progress, key=key)
+    checks = list[SafetyCheck]()
+    for result in results:
+        of_joints = compare_joints(result)
+        checks += of_joints
+        if case.geometry:
+            continue
+        methods = [method for own in result.joints if (method := hand_calculation(own))]
+        write_csv(folder_of(result.case) / "gravity.csv", loads_table(methods))
+        k = min(range(len(methods)), key=lambda k: of_joints[k].margin)
+        worst = of_joints[k]
+        table = picture_table(worst)
+        draw_check(result, k, methods[k], table, worst.why, folder_of(result.case))
     return checks
 
 

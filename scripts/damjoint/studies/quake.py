@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -26,29 +26,19 @@ from ..fem.bodies import Bodies
 from ..fem.memory import sizes
 from ..joint.interface import interface_of
 from ..model.case import Case
-from ..model.fields import Field, Solution
-from ..model.notes import remarks
+from ..model.fields import Field
 from ..model.results import column_of
-from ..post import folder as folders
-from ..post import tables
-from ..post.field_files import write_fields
 from ..progress import Progress
+from ..session import end_of
 from ..solver.controls import LevelControl
 from ..solver.history import joint_row
 from ..solver.load_stepper import LoadStepper
 from ..solver.model import Model, StepResult
 from ..solver.state import State
 from ..statics.verdict import statement
-from ..storage import atomic_write
 from ..threads import limited_threads
-from ..versions import provenance
 from . import quake_summary
 from .quake_result import QuakeResult
-
-#: Files of an earthquake: rows, tables of the joints in the frames, stress along the first joint in
-#: time, the run under way.
-ROWS, FRAMES, STRESS = "quake.csv", "quake_joint.csv", "quake_stress.npz"
-CHECKPOINT = "quake_state.npz"
 
 #: First and last time of the frames [s]; None: the whole record.
 Span: TypeAlias = tuple[float, float] | None
@@ -139,15 +129,12 @@ class QuakeRun:
         full = self.stands_with_full_uplift()
         if full is not None:
             found["after"]["equilibrium_with_full_uplift_in_the_crack"] = full
-        return self._result_of(found, "", quake_summary.statement(quake.case, found))
+        return self._result_of(found)
 
     def result_so_far(self, error: BaseException) -> QuakeResult:
         """The result up to an error or interrupt."""
         self.history.end_at_complete_row(self.quake)
-        state = "failed" if isinstance(error, Exception) else "interrupted"
-        reached = f"{state} after t = {self.quake.now.time:.6g} s of the record"
-        words = f"{reached}: {error}" if str(error) else reached
-        return self._result_of(self.summary(), state, words)
+        return self._result_of(self.summary(), error)
 
     def summary(self) -> dict[str, Any]:
         """See `quake_summary`, of the rows so far; with the slip of the rigid blocks."""
@@ -159,21 +146,20 @@ class QuakeRun:
                 found["residual"][column_of("rigid_block", k)] = block
         return found
 
-    def _result_of(self, found: dict[str, Any], state: str, statement: str) -> QuakeResult:
-        """The result with a summary, an end and its statement."""
+    def _result_of(self, found: dict[str, Any], error: BaseException | None = None) -> QuakeResult:
+        """The result with a summary; error: that ended it early."""
         quake, history, static = self.quake, self.history, self.static.results()
-        static.info |= about(quake.problem.model.equilibrium.bulk)
         seconds = {name: value for name, value in self.seconds.items() if name != "steps"}
-        static.info |= {"notes": remarks(quake.case), "quake": found, "wall_seconds": seconds}
-        static.info |= provenance({})
-        verdict = state or quake_summary.verdict(quake.case, found)
-        static.info["verdict"] = verdict  # a joint that has slipped everywhere is no failure here
-        return QuakeResult(
-            case=quake.case,
+        static.info |= about(quake.problem.model.equilibrium.bulk) | {"wall_seconds": seconds}
+        return QuakeResult.of(
+            quake.case,
+            static,
+            found,
+            end_of(error, f" after t = {quake.now.time:.6g} s of the record"),
+            error=error,
             rows=history.table,
             stress=self.stress_table(),
             before=self.before,
-            static=static,
             frames=history.frames.results(quake),
             static_fields=self.static_fields,
             fields=lambda: history.frames.fields(
@@ -181,10 +167,6 @@ class QuakeRun:
             ),
             shapes=self.shapes(),
             mesh=quake.bodies.mesh,
-            summary=found,
-            stands=verdict == quake_summary.STANDS,
-            state=state,
-            statement=statement,
         )
 
     def static_fields(self) -> dict[float, Field]:
@@ -234,47 +216,6 @@ def static_step(model: Model, end: State) -> StepResult | None:
     return model.advance(end, end.time, LevelControl(end.loading.level))
 
 
-def run(
-    case: Case,
-    out: Path,
-    span: Span = None,
-    fields: bool = False,
-    picture: bool = True,
-    progress: bool = True,
-) -> QuakeResult:
-    """Compute the earthquake of a case and write its results into a folder.
-
-    span: of the frames [s], by default the whole record; fields, picture: whether to write those
-    files. A run that was interrupted continues with the same command. Raises InputError, RunError.
-    """
-    check(case, span)
-    folders.check_writable(out)
-    key, path = checkpoint.fingerprint(case, span), out / CHECKPOINT
-    resumed = checkpoint.exists(path, key)
-    with single_thread(), folders.claim_output_folder(case, out, keep=resumed):
-        try:
-            with Progress(sizes(case), None, progress, bar_format="{desc} {elapsed}", leave=False):
-                under_way = QuakeRun(case, span)
-        except BaseException as error:
-            state = "failed" if isinstance(error, Exception) else "interrupted"
-            folders.write_state(case, out, state, str(error) or "no step had converged")
-            raise
-        if resumed:
-            checkpoint.read(path, key, under_way.quake, under_way.history)
-        try:
-            follow(under_way, path, key, progress)
-        except BaseException as error:
-            result = under_way.result_so_far(error)
-            with contextlib.suppress(OSError):
-                checkpoint.write(path, key, under_way.quake, under_way.history)
-            write_tables(result, out)
-            raise
-        result = under_way.result()
-        write(result, out, fields, picture)
-        path.unlink(missing_ok=True)
-    return result
-
-
 @contextlib.contextmanager
 def single_thread() -> Iterator[None]:
     """Compute with a single thread, also in MUMPS: the matrices of a step are small."""
@@ -296,16 +237,62 @@ def outcome_of(case: Case) -> tuple[LoadStepper, dict[str, Any]]:
     return under_way.static, under_way.summary() | {"after": {"equilibrium": after is not None}}
 
 
-def follow(under_way: QuakeRun, path: Path, key: str, progress: bool) -> None:
-    """Compute the steps to the end of the record; writes the run under way into a file."""
+@dataclass(frozen=True)
+class Checkpoint:
+    """A file that keeps an earthquake under way, so that it can be continued."""
+
+    path: Path
+    #: fingerprint of the case
+    key: str
+
+    @property
+    def exists(self) -> bool:
+        """Whether the file has an earthquake of this key."""
+        return checkpoint.exists(self.path, self.key)
+
+    def read(self, under_way: QuakeRun) -> None:
+        """Continue from the file."""
+        checkpoint.read(self.path, self.key, under_way.quake, under_way.history)
+
+    def write(self, under_way: QuakeRun) -> None:
+        """Write the last converged step and all rows."""
+        checkpoint.write(self.path, self.key, under_way.quake, under_way.history)
+
+
+def compute(
+    case: Case, span: Span = None, kept: Checkpoint | None = None, progress: bool = True
+) -> QuakeResult:
+    """The earthquake of a case, up to its end or to an error in its steps.
+
+    span: of the frames [s], by default the whole record; kept: file from which it continues, if it
+    exists, and that is written meanwhile. Raises RunError if the static loads can not be computed.
+    """
+    with single_thread():
+        with Progress(sizes(case), None, progress, bar_format="{desc} {elapsed}", leave=False):
+            under_way = QuakeRun(case, span)
+        if kept and kept.exists:
+            kept.read(under_way)
+        try:
+            follow(under_way, kept, progress)
+            return under_way.result()
+        except BaseException as error:
+            result = under_way.result_so_far(error)
+            if kept:
+                with contextlib.suppress(OSError):
+                    kept.write(under_way)
+            return result
+
+
+def follow(under_way: QuakeRun, kept: Checkpoint | None, progress: bool) -> None:
+    """Compute the steps to the end of the record; kept: is written meanwhile."""
     written, quake = time.perf_counter(), under_way.quake
     options = {"bar_format": BAR, "leave": False}
     with Progress(quake.case.name, quake.record.duration, progress, **options) as bar:
         bar.update(quake.now.time)
         for step in under_way.steps():
             bar.update(step)
-            if time.perf_counter() - written > BETWEEN_WRITES:
-                checkpoint.write(path, key, quake, under_way.history)
+            if kept and time.perf_counter() - written > BETWEEN_WRITES:
+                kept.write(under_way)
                 written = time.perf_counter()
 
 
@@ -336,24 +323,3 @@ def rigid_block(quake: Earthquake, number: int) -> RigidBlock:
         shear_by_ground=along @ system.inertia / joint.width,
         normal_by_ground=across @ system.inertia / joint.width,
     )
-
-
-def write(result: QuakeResult, out: Path, fields: bool, picture: bool) -> None:
-    """Write the files of an earthquake into a folder; fields, picture: also those files."""
-    write_tables(result, out)
-    if fields:
-        write_fields(Solution(result.frames, result.mesh.bodies, result.fields()), out / "fields")
-    if picture:
-        from .quake_picture import draw  # matplotlib takes long to load
-
-        draw(result, out)
-
-
-def write_tables(result: QuakeResult, out: Path) -> None:
-    """Write the tables of the static states and of the earthquake, and run.json."""
-    tables.write(result.static, out)
-    tables.write_csv(out / ROWS, result.rows)
-    tables.write_csv(out / FRAMES, tables.rounded(result.frames.joint))
-    with atomic_write(out / STRESS) as part, part.open("wb") as file:
-        np.savez_compressed(file, **result.stress)
-    folders.write_info(result.static, out, result.state, result.statement)

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from tabulate import tabulate
 
 from ..arrays import Array
@@ -14,21 +13,70 @@ from ..arrays import Table as Columns
 from ..model.case import Case
 from ..model.fields import Field
 from ..model.mesh import Mesh
+from ..model.notes import remarks
 from ..model.results import QUAKE, QUAKE_OF_JOINTS, Results, column_of, quake_columns
 from ..post.summary import Table
+from . import quake_summary
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
 
 
 @dataclass(frozen=True, kw_only=True)
-class QuakeResult:
-    """The rows of an earthquake and what they amount to."""
+class QuakeTables:
+    """The rows of an earthquake and what they amount to, by either engine, up to its end or to an
+    error.
+    """
 
     case: Case
     rows: Columns
+    #: the tables of the static loads, with the state after the earthquake as a further row
+    static: Results
+    #: for run.json
+    summary: dict[str, Any]
+    #: interrupted or failed; empty if it has reached its end
+    state: str = ""
+    statement: str
+    #: the error that ended it early, to be raised when it is saved
+    error: BaseException | None = None
+
+    @classmethod
+    def of(
+        cls,
+        case: Case,
+        static: Results,
+        summary: dict[str, Any],
+        end: tuple[str, str] = ("", ""),
+        **others: Any,
+    ) -> Self:
+        """The result with a summary; end: state and message of an early end."""
+        state, words = end
+        static.info |= {"notes": remarks(case), "quake": summary}
+        # a joint that has slipped everywhere is no failure here
+        static.info["verdict"] = state or quake_summary.verdict(case, summary)
+        words = words or quake_summary.statement(case, summary)
+        of_end = {"summary": summary, "state": state, "statement": words}
+        return cls(case=case, static=static, **of_end, **others)
+
+    @property
+    def verdict(self) -> str:
+        """See `quake_summary.verdict`; failed or interrupted if it ended early."""
+        return str(self.static.info["verdict"])
+
+    @property
+    def stands(self) -> bool:
+        """Whether the verdict is that it stands after the earthquake."""
+        return self.verdict == quake_summary.STANDS
+
+
+@dataclass(frozen=True, kw_only=True)
+class QuakeResult(QuakeTables):
+    """An earthquake by the condensed engine, with its frames and fields."""
+
     #: time (rows,), distance from the heel (nodes,), effective normal stress (rows, nodes)
     stress: Columns
-    #: the tables of the static loads; and with the state after the earthquake as a further row
+    #: the tables of the static loads
     before: Results
-    static: Results
     #: the tables of the frames; times in seconds
     frames: Results
     #: displacement and stress of the bodies by time of the static states, and of the frames
@@ -38,19 +86,11 @@ class QuakeResult:
     #: static state (nodes, 2) of each body [m]
     shapes: list[tuple[str, float, dict[str, Array]]]
     mesh: Mesh
-    #: for run.json
-    summary: dict[str, Any]
-    #: whether the verdict is that it stands after the earthquake
-    stands: bool
-    #: interrupted or failed; empty if it has reached its end
-    state: str
-    statement: str
 
     @property
     def joint(self) -> int:
         """The number of the joint with the largest slip at the end."""
-        slips = [self.summary["end"][column_of("slip", k)] for k in self.joints]
-        return int(np.argmax(np.abs(slips)))
+        return quake_summary.largest_slip(self.case, self.summary)
 
     @property
     def joints(self) -> range:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from .. import ROUND_OFF
-from ..arrays import Array, Table
+from ..arrays import Array, Table, Value
 from ..dynamics.stepper import Earthquake
 from ..model.case import Case
 from ..model.results import column_of
@@ -30,6 +30,12 @@ BROKEN = 0.99
 #: Table of which the largest size is reported.
 PEAKS = ("ground_ax", "crest_ux", "crest_ax")
 PEAKS_OF_JOINTS = ("heel_opening", "toe_opening", "slip_mean", "open_length", "broken_length")
+
+#: Columns of an earthquake in a table of several: largest ground acceleration along x [m/s2]; of
+#: the joint with the largest slip: residual slip [m] and tilt, slip of the rigid block [m].
+QUAKE_COLUMNS = ("peak_ground_ax", "residual_slip", "residual_tilt", "rigid_block_slip")
+#: Those by their names in the summary of an earthquake; empty if the dam is not at rest.
+RESIDUAL = dict(zip(("slip", "tilt", "rigid_block"), QUAKE_COLUMNS[1:], strict=True))
 
 #: Slip over the length of a joint beyond which displacements are not small.
 LARGE_SLIP = 0.01
@@ -140,6 +146,19 @@ def verdict(case: Case, found: dict[str, Any]) -> str:
     if any(share > BROKEN for share in broken_shares(case, found).values()):
         return NO_FRICTION
     return STANDS if found["at_rest"] else NOT_AT_REST
+
+
+def columns(case: Case, found: dict[str, Any]) -> dict[str, Value]:
+    """QUAKE_COLUMNS of a summary; empty where a value is not known."""
+    residual, worst = found["residual"], largest_slip(case, found)
+    slips = {column: residual.get(column_of(name, worst), "") for name, column in RESIDUAL.items()}
+    return {"peak_ground_ax": abs(found["peaks"]["ground_ax"]["value"]), **slips}
+
+
+def largest_slip(case: Case, found: dict[str, Any]) -> int:
+    """The number of the joint with the largest slip at the end."""
+    slips = [abs(found["end"][column_of("slip", k)]) for k in range(len(case.joints))]
+    return int(np.argmax(slips))
 
 
 def broken_shares(case: Case, found: dict[str, Any]) -> dict[int, float]:

@@ -2,63 +2,43 @@
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
-import multiprocessing
-import os
-import signal
-import threading
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import TypeAlias
 
-from .. import InputError, RunError, __version__, accuracy
+from .. import InputError, RunError, accuracy
 from ..arrays import Value, Values
 from ..engines import engine_of
-from ..fem.cache import fingerprint
 from ..joint.interface import Interface, interface_of
 from ..model.case import Case, equal_steps, first_mesh, resolve, with_drive_times
-from ..model.mesh import mesh_of
 from ..model.notes import notes_on_settings
 from ..model.results import column_of as column_of_joint
 from ..model.results import history_columns
+from ..processes import ProcessKilled, as_finished, check_jobs, number_of
 from ..progress import Progress, track
 from ..solver.load_stepper import LoadStepper
 from ..statics.limit import mechanism
 from ..statics.verdict import failed, statement, verdict
 from ..threads import limited_threads
-from ..versions import code_fingerprint
-from . import quake, quake_summary
+from . import keys, quake, quake_summary
 from .critical import QUICK, Search
 from .plan import CHART, STATISTICS, Plan, Row, beside, cases_of, column_of, in_file
-from .quake_summary import NO_FRICTION, NOT_AT_REST
+from .quake_summary import NO_FRICTION, NOT_AT_REST, QUAKE_COLUMNS
 from .result_file import result_file
 
 
-def key_of(case: Case, plan: Plan | None = None) -> str:
-    """The key of a scene and its loading, and of what a plan computes of it, in a result file: of
-    all that decides its row, also the content of a mesh and the code.
-    """
-    of_joints = (
-        (own.name, own.hardening_asked, sorted(own.values.items())) for own in case.of_joints
-    )
-    loading = case.levels, case.tail_levels, case.times
-    identity = [sorted(case.values.items()), *loading, case.hardening_asked, *of_joints]
-    identity += __version__, code_fingerprint()
-    if case.geometry:
-        identity.append(fingerprint(mesh_of(case)))
-    if plan:
-        given = case.source.overrides if case.source else {}
-        quick = sorted(QUICK.keys() & given.keys()) if plan.critical else []
-        identity += bool(plan.sampled), plan.critical, quick, plan.slip_limit
-        if plan.slip_limit is not None and case.record:
-            identity.append(case.record.read_bytes())
-    return hashlib.sha256(repr(identity).encode()).hexdigest()[:16]
+def key_of(case: Case, plan: Plan) -> str:
+    """The key of a row in a result file: of all that decides it, and what a plan computes of it."""
+    given = case.source.overrides if case.source else {}
+    quick = sorted(QUICK.keys() & given.keys()) if plan.critical else []
+    others = [bool(plan.sampled), plan.critical, quick, plan.slip_limit]
+    if plan.slip_limit is not None and case.record:
+        others.append(case.record.read_bytes())
+    return keys.key_of(case, *others)
 
 
 #: Columns of the outcome: whether the dam fails (1, the exit code of `damjoint run`) or stands (0),
@@ -143,11 +123,6 @@ def last_row(task: Task, solved: Solved) -> dict[str, Value]:
     return row | result.last | dict(zip(OUTCOME, outcome, strict=True))
 
 
-#: Columns of an earthquake in a row: largest ground acceleration along x [m/s2]; of the joint with
-#: the largest residual slip: slip [m], tilt, slip of the rigid block [m].
-QUAKE_COLUMNS = ("peak_ground_ax", "residual_slip", "residual_tilt", "rigid_block_slip")
-#: Those by their names in the summary of an earthquake; empty if the dam is not at rest.
-RESIDUAL = dict(zip(("slip", "tilt", "rigid_block"), QUAKE_COLUMNS[1:], strict=True))
 #: The verdict of a row whose slip exceeds the limit.
 EXCEEDED = "residual slip"
 
@@ -163,12 +138,9 @@ def quake_row(task: Task) -> dict[str, Value]:
         static, found = quake.outcome_of(case)
     except Exception as error:
         return row | dict(zip(OUTCOME, (1.0, ERROR, message_of(error)), strict=True))
-    joints = range(len(case.joints))
-    worst = max(joints, key=lambda k: abs(found["end"][column_of_joint("slip", k)]))
-    residual = found["residual"]
-    row |= static.results().last | {"peak_ground_ax": abs(found["peaks"]["ground_ax"]["value"])}
-    row |= {column: residual.get(column_of_joint(n, worst), "") for n, column in RESIDUAL.items()}
-    slip = abs(found["residual" if found["at_rest"] else "end"][column_of_joint("slip", worst)])
+    row |= static.results().last | quake_summary.columns(case, found)
+    worst = column_of_joint("slip", quake_summary.largest_slip(case, found))
+    slip = abs(found["residual" if found["at_rest"] else "end"][worst])
     verdict, words = quake_summary.verdict(case, found), quake_summary.statement(case, found)
     if slip > task.slip_limit and verdict in (quake_summary.STANDS, NOT_AT_REST):
         verdict = EXCEEDED
@@ -234,54 +206,12 @@ def bundles(tasks: dict[str, Task]) -> list[list[str]]:
     groups: dict[str, list[str]] = {}
     for key, task in tasks.items():
         same = replace(task.case, levels=(), tail_levels=(), times=())
-        groups.setdefault(key_of(same), []).append(key)
+        groups.setdefault(keys.key_of(same), []).append(key)
     return [
-        keys[i : i + MOST_TOGETHER]
-        for keys in groups.values()
-        for i in range(0, len(keys), MOST_TOGETHER)
+        group[i : i + MOST_TOGETHER]
+        for group in groups.values()
+        for i in range(0, len(group), MOST_TOGETHER)
     ]
-
-
-class ProcessKilled(RunError):
-    """A process of a pool has ended without a result; saved: number of the rows in the file."""
-
-    def __init__(self, saved: int = 0) -> None:
-        kept = f"; {saved} rows are saved, the same command continues" if saved else ""
-        super().__init__(
-            f"a process was killed (out of memory?){kept}; --jobs 1 needs least memory"
-        )
-
-
-@contextlib.contextmanager
-def pool_of(jobs: int) -> Iterator[ProcessPoolExecutor]:
-    """Processes that end with their parent, even if it is killed, and after an error in a process
-    or in the caller. Raises ProcessKilled if one of them is killed.
-    """
-    with ProcessPoolExecutor(jobs, initializer=end_with_parent) as pool:
-        try:
-            yield pool
-        except BrokenProcessPool:
-            raise ProcessKilled from None
-        except BaseException:
-            for process in list(pool._processes.values()):  # the pool would wait for their tasks
-                process.terminate()
-            raise
-
-
-def end_with_parent() -> None:
-    """End this process when its parent ends, and at once and without words if it is interrupted:
-    an exception would be taken for the result of its task, or leave the pool's queue locked. (The
-    other signals end a fork of a command so, see __main__.py.)
-    """
-    if signal.getsignal(signal.SIGINT) != signal.SIG_IGN:
-        signal.signal(signal.SIGINT, signal.SIG_DFL)
-
-    def wait() -> None:
-        if parent := multiprocessing.parent_process():
-            parent.join()
-            os._exit(1)
-
-    threading.Thread(target=wait, daemon=True).start()
 
 
 def spread(
@@ -292,8 +222,7 @@ def spread(
     chosen = [[tasks[key] for key in keys] for keys in work]
     if scheduler:
         try:
-            from dask.distributed import Client
-            from dask.distributed import as_completed as as_finished
+            from dask.distributed import Client, as_completed
         except ImportError:
             raise InputError(
                 "--scheduler: needs dask.distributed; pip install 'damjoint[cluster]'"
@@ -312,18 +241,14 @@ def spread(
                 keys = list(chain.from_iterable(work[i : i + size]))
                 name = f"damjoint-{hashlib.sha256(' '.join(keys).encode()).hexdigest()[:32]}"
                 futures[client.submit(rows_of_bundles, chosen[i : i + size], key=name)] = keys
-            for future in as_finished(futures):
+            for future in as_completed(futures):
                 yield from zip(futures[future], future.result(), strict=True)
     elif jobs == 1 or len(work) == 1:
         for keys, some in zip(work, chosen, strict=True):
             yield from zip(keys, last_rows(some), strict=True)
     else:
-        with pool_of(jobs) as pool:
-            waiting = {
-                pool.submit(last_rows, some): keys for keys, some in zip(work, chosen, strict=True)
-            }
-            for future in as_completed(waiting):
-                yield from zip(waiting[future], future.result(), strict=True)
+        for number, rows in as_finished(last_rows, chosen, jobs):
+            yield from zip(work[number], rows, strict=True)
 
 
 def compute(
@@ -340,7 +265,7 @@ def compute(
     if first.search:
         first.search()  # checks the quantity
     interface_of(first.case)  # condensed before the processes start, which read it
-    return spread(tasks, jobs or os.cpu_count() or 1, scheduler)
+    return spread(tasks, number_of(jobs, len(tasks)), scheduler)
 
 
 def meshed(case: Case) -> tuple[Case, str]:
@@ -360,12 +285,6 @@ def meshed(case: Case) -> tuple[Case, str]:
     steps = case.source.steps or (1 if case["drive"] == "level" else None)
     mesh = {**first_mesh(case), **case.source.overrides, **refined}
     return resolve(replace(case.source, overrides=mesh, steps=steps, accuracy=None)), estimate
-
-
-def check_jobs(jobs: int | None) -> None:
-    """Raise InputError if a number of processes is not positive."""
-    if jobs is not None and jobs < 1:
-        raise InputError(f"jobs = {jobs}: must be an integer >= 1")
 
 
 def sweep(

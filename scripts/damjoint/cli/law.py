@@ -1,0 +1,35 @@
+"""damjoint law."""
+
+from __future__ import annotations
+
+import argparse
+
+from .options import Parser, settings_options
+
+SUMMARY = "evaluate a joint law along a path of displacement jumps"
+
+#: Options that it shares with other commands.
+SHARED = (settings_options,)
+
+
+def add(command: Parser) -> None:
+    """Add the options."""
+    command.add_argument("law", metavar="LAW", help="rupture, friction, bond or endo")
+    command.add_path(
+        "--path",
+        "FILE",
+        required=True,
+        help="CSV with columns delta_n, delta_t1, delta_t2 [m] and, if there is water, p [Pa]; "
+        "row n is the state at t = n",
+    )
+    command.add_path("--out", "FILE", help="CSV of results (default: print it)")
+
+
+def call(arguments: argparse.Namespace) -> int:
+    """Run damjoint law."""
+    from ..model import parameters
+    from ..studies import law_path
+
+    settings = parameters.settings(arguments.settings)
+    law_path.follow(arguments.law, arguments.path, settings, arguments.out)
+    return 0

@@ -1,0 +1,212 @@
+"""Options of the command line: their types, and those that several commands share."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import os
+import sys
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any, NoReturn
+
+from .. import InputError
+
+CASE = "a letter a to k (verification case SSNP142), dam, or the path of a .case file"
+ENGINE = (
+    "auto (default), condensed (both bodies condensed onto the joint; fast) or getdp (the "
+    "reference GetDP model)"
+)
+TAIL_LEVELS = "tailwater levels [m], one or as many as levels (default: those of the case)"
+JOBS = "number of processes (default: one per core)"
+RESUMED = "CSV of results; rows that are already in it are not computed again"
+
+
+class Checked(argparse.Action):
+    """Action that stores `convert(name, text)`, which raises InputError. As a `type`,
+    argparse would replace its message.
+    """
+
+    def __init__(self, *, convert: Callable[[str, str], object], **options: Any) -> None:
+        super().__init__(**options)
+        self.convert = partial(convert, self.dest)
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: object,
+        _: str | None = None,
+    ) -> None:
+        """Store the value, or the list of values."""
+        listed = values if isinstance(values, list) else None
+        value = self.convert(str(values)) if listed is None else list(map(self.convert, listed))
+        setattr(namespace, self.dest, value)
+
+
+class CheckedList(Checked):
+    """The same of an option that may be repeated: a list of its values."""
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: object,
+        _: str | None = None,
+    ) -> None:
+        """Add the value to the list."""
+        listed = [*(getattr(namespace, self.dest) or []), self.convert(str(values))]
+        setattr(namespace, self.dest, listed)
+
+
+def integer(name: str, text: str, least: int) -> int:
+    """Return an argument as an integer of at least `least`. Raises InputError."""
+    if not text.strip().isdecimal() or int(text) < least:
+        raise InputError(f"{name} = {text}: must be an integer >= {least}")
+    return int(text)
+
+
+def slip(name: str, text: str) -> float:
+    """Return an argument as a length [m]. Raises InputError."""
+    from ..model.arithmetic import number
+
+    try:
+        value = number(text)
+    except ValueError:
+        value = 0.0
+    if not value > 0:
+        raise InputError(f"--{name} {text}: must be a slip > 0 m")
+    return value
+
+
+def time_span(name: str, text: str) -> tuple[float, float]:
+    """Return an argument FIRST:LAST as two times [s]. Raises InputError."""
+    from ..studies.quake import span_of
+
+    return span_of(f"--{name}", text)
+
+
+def path(name: str, text: str) -> Path:
+    """Return an argument as a path. Raises InputError if it is empty: the current folder."""
+    if not text.strip():
+        raise InputError(f"{name} = {text!r}: must be a path")
+    return Path(text)
+
+
+def levels(name: str, text: str) -> tuple[float, ...]:
+    """Return an argument as water levels [m]. Raises InputError."""
+    from ..model.parameters import levels_of
+
+    return levels_of(name, text)
+
+
+class Help(argparse.HelpFormatter):
+    """Help as wide as the terminal. (argparse loads shutil for it, and that what compresses.)"""
+
+    def __init__(self, prog: str) -> None:
+        super().__init__(prog, width=terminal_width() - 2)
+
+
+class HelpWithLines(Help, argparse.RawDescriptionHelpFormatter):
+    """The same, with the lines of its text as they are."""
+
+
+def terminal_width() -> int:
+    """Number of columns: $COLUMNS, else of the terminal, else 80."""
+    with contextlib.suppress(KeyError, ValueError):
+        if int(os.environ["COLUMNS"]) > 0:
+            return int(os.environ["COLUMNS"])
+    with contextlib.suppress(OSError, ValueError):
+        if sys.__stdout__:
+            return os.get_terminal_size(sys.__stdout__.fileno()).columns or 80
+    return 80
+
+
+class Parser(argparse.ArgumentParser):
+    """Parser of arguments that raises InputError."""
+
+    def __init__(
+        self, formatter_class: type[argparse.HelpFormatter] = Help, **options: Any
+    ) -> None:
+        super().__init__(formatter_class=formatter_class, **options)
+
+    def error(self, message: str) -> NoReturn:
+        """Raise InputError instead of printing the usage."""
+        raise InputError(message)
+
+    def add_integer(self, name: str, least: int, **options: Any) -> None:
+        """Add an argument that is an integer >= least."""
+        convert = partial(integer, least=least)
+        self.add_argument(name, action=Checked, convert=convert, metavar="N", **options)
+
+    def add_path(self, name: str, metavar: str, **options: Any) -> None:
+        """Add an argument that is a path."""
+        self.add_argument(name, action=Checked, convert=path, metavar=metavar, **options)
+
+    def add_paths(self, name: str, metavar: str, **options: Any) -> None:
+        """Add an option that is a path and may be repeated."""
+        self.add_argument(name, action=CheckedList, convert=path, metavar=metavar, **options)
+
+    def add_levels(self, name: str, **options: Any) -> None:
+        """Add an option that is a list of water levels."""
+        self.add_argument(name, action=Checked, convert=levels, metavar="H1,H2,...", **options)
+
+    def add_list(self, name: str, metavar: str, **options: Any) -> None:
+        """Add an option that may be repeated."""
+        self.add_argument(name, action="append", default=[], metavar=metavar, **options)
+
+
+def settings_options() -> Parser:
+    """Options of all commands that load a case."""
+    options = Parser(add_help=False)
+    options.add_list(
+        "--set",
+        "NAME=VALUE",
+        dest="settings",
+        help="value of a parameter, in the unit of reference/parameters.md or with one of its own: "
+        "E_dam=20*GPa (repeatable; default: that of the case)",
+    )
+    options.add_argument(
+        "--run-geo",
+        action="store_true",
+        help="allow Gmsh to run the .geo file that the case names as its geometry; such a file can "
+        "run any program (default: refused)",
+    )
+    return options
+
+
+def water_options() -> Parser:
+    """Options of the commands that fill the reservoir."""
+    options = Parser(add_help=False)
+    options.add_levels(
+        "--levels",
+        help="water levels [m above the heel] at t = 1, 2, ..., rising or falling: 3,6,8,9 "
+        "(default: those of the case)",
+    )
+    options.add_levels("--tail-levels", help=TAIL_LEVELS)
+    return options
+
+
+def accuracy_options() -> Parser:
+    """The option of the commands that choose the mesh."""
+    options = Parser(add_help=False)
+    options.add_argument(
+        "--accuracy",
+        metavar="PERCENT",
+        help="refine the mesh until the estimated errors are smaller: coarse (3 %%), standard "
+        "(1 %%), fine (0.2 %%) or a percentage such as 0.5%% (default: no refinement)",
+    )
+    return options
+
+
+def loading_options() -> Parser:
+    """Options of the water and of the load steps."""
+    options = Parser(add_help=False, parents=[water_options()])
+    options.add_integer(
+        "--steps",
+        1,
+        help="number of equal load steps between two levels (default: those of the case, or 1 if "
+        "--levels is set)",
+    )
+    return options

@@ -1,0 +1,29 @@
+"""damjoint plot."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+from .options import Parser
+
+SUMMARY = "draw the pictures of a run again"
+
+
+def add(command: Parser) -> None:
+    """Add the options."""
+    command.add_path("out", "FOLDER", help="output folder of the run")
+
+
+def call(arguments: argparse.Namespace) -> int:
+    """Run damjoint plot."""
+    from ..post import pictures, stored
+
+    runs = [(folder, stored.read(folder)) for folder in stored.runs_in(arguments.out)]
+    for folder, result in runs:
+        print(pictures.draw(result, folder))
+        if "quake" in result.result.info:
+            print(
+                "damjoint: of an earthquake only the static states are drawn again", file=sys.stderr
+            )
+    return 0

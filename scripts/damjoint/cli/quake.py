@@ -1,0 +1,81 @@
+"""damjoint quake."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from .cases import load_cases
+from .options import (
+    CASE,
+    ENGINE,
+    JOBS,
+    Checked,
+    Parser,
+    loading_options,
+    settings_options,
+    time_span,
+)
+
+SUMMARY = (
+    "the dam through recorded earthquakes, after its static loads; continues if it was "
+    "interrupted; exit code 1 if the dam does not stand after one of them"
+)
+
+#: Options that it shares with other commands.
+SHARED = settings_options, loading_options
+
+
+def add(command: Parser) -> None:
+    """Add the options."""
+    command.add_argument("case", metavar="CASE", help=CASE)
+    command.add_paths(
+        "--record",
+        "FILE",
+        help="CSV of the ground's acceleration: time [s], horizontal and, if any, vertical, in "
+        "record_unit; repeatable: each earthquake has a folder with the name of its record "
+        "(default: that of the case)",
+    )
+    command.add_path("--out", "FOLDER", help="output folder (default: out/CASE_quake)")
+    command.add_integer("--jobs", 1, help=JOBS)
+    help_engine = f"{ENGINE}: tables only, and an interrupted run starts again"
+    command.add_argument("--engine", default="auto", metavar="NAME", help=help_engine)
+    command.add_argument(
+        "--fields",
+        nargs="?",
+        const="0:inf",
+        action=Checked,
+        convert=time_span,
+        metavar="FIRST:LAST",
+        help="write files of displacement and stress at up to 200 times between two times [s] "
+        "(default: none; --fields alone: the whole record)",
+    )
+    command.add_argument("--no-picture", action="store_true", help="draw no PNG")
+
+
+def call(arguments: argparse.Namespace) -> int:
+    """Run damjoint quake; 1 if the dam does not stand after an earthquake, or if that is not
+    known.
+    """
+    from ..studies import quake_getdp
+    from ..studies.quake_result import text
+    from ..studies.quake_study import Options, check, records_table, run_records
+
+    picture, fields = not arguments.no_picture, arguments.fields is not None
+    options = Options(arguments.engine, arguments.fields, fields, picture)
+    cases = load_cases(arguments, [arguments.case], arguments.record or [None])
+    out = arguments.out or Path("out") / f"{cases[0].name}_quake"
+    for case in cases:
+        check(case, options)
+    if arguments.engine == "getdp":
+        for line in quake_getdp.left_out(out, picture):
+            print(f"damjoint: {line}", file=sys.stderr)
+    results = run_records(cases, out, options, arguments.jobs)
+    for result in results:
+        steps = f"{result.summary['steps']} steps; {result.out}"
+        print(f"{result.case.name}: {result.statement}; {steps}\n")
+        print(text(result.case, result.summary), end="\n\n" if len(results) > 1 else "\n")
+    if len(results) > 1:
+        print(records_table(results))
+    return int(not all(result.stands for result in results))

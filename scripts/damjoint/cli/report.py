@@ -1,0 +1,33 @@
+"""damjoint report."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from .options import Parser
+
+SUMMARY = "write a report on runs, as HTML or PDF"
+
+
+def add(command: Parser) -> None:
+    """Add the options."""
+    command.add_path(
+        "out", "FOLDER", nargs="+", help="output folders of runs, or that of damjoint check"
+    )
+    command.add_path(
+        "--to",
+        "FILE",
+        default=Path("report.html"),
+        help="the report; a PDF if the name ends in .pdf, which needs weasyprint (default: "
+        "report.html)",
+    )
+
+
+def call(arguments: argparse.Namespace) -> int:
+    """Run damjoint report."""
+    from ..studies import report
+
+    report.write(arguments.out, arguments.to)
+    print(arguments.to)
+    return 0

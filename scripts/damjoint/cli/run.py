@@ -1,0 +1,67 @@
+"""damjoint run."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .cases import load_case
+from .options import CASE, ENGINE, Parser, accuracy_options, loading_options, settings_options
+
+if TYPE_CHECKING:
+    from ..post.drawing_process import DrawingProcess
+
+
+SUMMARY = "fill the reservoir of a case; exit code 1 if the dam fails or the run stops early"
+
+#: Options that it shares with other commands.
+SHARED = settings_options, loading_options, accuracy_options
+
+
+def add(command: Parser) -> None:
+    """Add the options."""
+    command.add_argument("case", metavar="CASE", help=CASE)
+    command.add_path("--out", "FOLDER", help="output folder (default: out/CASE)")
+    command.add_argument(
+        "--no-fields", action="store_true", help="write no files of displacement and stress"
+    )
+    command.add_argument("--no-picture", action="store_true", help="draw no PNG")
+    command.add_argument("--engine", default="auto", metavar="NAME", help=ENGINE)
+
+
+def call(arguments: argparse.Namespace) -> int:
+    """Run damjoint run; 0, or 1 if the dam fails or the run stopped before its last level."""
+    if arguments.no_picture:
+        return run_and_print(arguments, None)
+    from ..post.drawing_process import DrawingProcess
+
+    with DrawingProcess() as drawing:  # before the other libraries are loaded
+        return run_and_print(arguments, drawing)
+
+
+def run_and_print(arguments: argparse.Namespace, drawing: DrawingProcess | None) -> int:
+    """Run a case and print its results; drawing: draws its pictures (None: there are none)."""
+    from ..post import summary
+    from ..runner import run
+    from ..statics.verdict import failed, hints, path_statement, statement, verdict
+
+    case = load_case(arguments, arguments.case)
+    out = arguments.out or Path("out") / case.name
+    fields, picture = not arguments.no_fields, drawing is not None
+    code = 0
+    for result in run(case, out, fields, picture, engine=arguments.engine, drawing=drawing):
+        history = result.history
+        print(
+            f"{case.name}, uplift {result.case['uplift']}: {verdict(result)}; "
+            f"{len(history['time'])} steps, {history['iterations'].sum():.0f} iterations; {out}"
+        )
+        if result.last:
+            print(f"\n{summary.text(result)}")
+        driven = case["drive"] != "level"
+        lines = [path_statement(result) if driven else "", statement(result), *hints(result)]
+        lines.append(result.info.get("error_estimate", {}).get("statement", ""))
+        if any(lines):
+            print("", *filter(None, lines), sep="\n")
+        code = max(code, int(failed(result)))
+    return code

@@ -1,0 +1,38 @@
+"""damjoint stress."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from .options import JOBS, RESUMED, Parser
+from .tools import tool
+
+SUMMARY = "run random dams and verify their result files; exit code 1 if there is a defect"
+
+
+def add(command: Parser) -> None:
+    """Add the options."""
+    command.add_integer(
+        "count", 1, nargs="?", default=500, help="number of random dams (default: 500)"
+    )
+    command.add_integer("--seed", 1, default=1, help="seed of the random numbers (default: 1)")
+    command.add_argument("--quake", action="store_true", help="random earthquakes instead")
+    command.add_integer("--jobs", 1, help=JOBS)
+    command.add_path(
+        "--out", "FILE", default=Path("stress.csv"), help=f"{RESUMED} (default: stress.csv)"
+    )
+
+
+def call(arguments: argparse.Namespace) -> int:
+    """Run damjoint stress; 1 if a run is a defect."""
+    stress = tool("stress")
+    options = arguments.seed, arguments.out, arguments.jobs, arguments.quake
+    rows = stress.stress(arguments.count, *options)
+    for row in rows:
+        if row["class"] == stress.DEFECT:
+            print(f"{row['scene']}: {row['findings']}\n  {row['command']}")
+    numbers = stress.counts(rows)
+    counted = "; ".join(f"{number} {name}" for name, number in numbers.items())
+    print(counted, arguments.out, sep="; ")
+    return int(numbers[stress.DEFECT] > 0)

@@ -1,0 +1,48 @@
+"""damjoint validate."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from .options import ENGINE, Parser
+
+SUMMARY = "compare with the published numbers; exit code 1 if a row fails"
+
+
+def add(command: Parser) -> None:
+    """Add the options."""
+    command.add_argument(
+        "tests",
+        nargs="*",
+        metavar="FAMILY|CASE",
+        default=["ssnp142"],
+        help="families of tests (ssnp142, ssnp143, ssnp162, ssnp164, ssnv503, sdnv138; all) or "
+        "cases, such as the modelings a to k of SSNP142 (default: ssnp142)",
+    )
+    command.add_path(
+        "--out",
+        "FOLDER",
+        default=Path("out"),
+        help="folder that gets a folder for each case (default: out)",
+    )
+    help_engine = f"{ENGINE}, for cases; tests of a point and of an earthquake: condensed"
+    command.add_argument("--engine", default="auto", metavar="NAME", help=help_engine)
+
+
+def call(arguments: argparse.Namespace) -> int:
+    """Run damjoint validate; 1 if a row fails."""
+    from ..post import validation
+    from ..studies import validate
+
+    families, failed = validate.chosen(arguments.tests), False
+    summaries = []
+    for family, names in families.items():
+        comparisons = list(validate.compare(family, names, arguments.out, arguments.engine))
+        print(f"{family.upper()}: {validation.FAMILIES[family]}\n")
+        print(validation.report(comparisons), end="\n\n" if len(families) > 1 else "\n")
+        summaries.append(f"{family}: {validation.summary(comparisons)}")
+        failed |= any(c.verdict == "fail" for c in comparisons)
+    if len(families) > 1:
+        print("\n".join(summaries))
+    return int(failed)

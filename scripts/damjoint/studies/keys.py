@@ -1,0 +1,30 @@
+"""Keys by which finished results are found again: hashes of all that decides them."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from typing import Any
+
+from .. import __version__
+from ..fem.cache import fingerprint
+from ..model.case import Case
+from ..model.mesh import mesh_of
+from ..versions import code_fingerprint
+
+
+def key_of(case: Case, *others: Any) -> str:
+    """The key of a scene and its loading, and of others that decide the result."""
+    return hashlib.sha256(repr([*identity_of(case), *others]).encode()).hexdigest()[:16]
+
+
+def identity_of(case: Case) -> Iterator[Any]:
+    """All that decides the results of a scene, also the content of a mesh and the code."""
+    yield sorted(case.values.items())
+    yield from (case.levels, case.tail_levels, case.times, case.hardening_asked)
+    for joint in case.of_joints:
+        yield joint.name, joint.hardening_asked, sorted(joint.values.items())
+    yield __version__
+    yield code_fingerprint()
+    if case.geometry:
+        yield fingerprint(mesh_of(case))
