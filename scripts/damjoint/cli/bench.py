@@ -8,7 +8,7 @@ from pathlib import Path
 from .options import Parser
 from .tools import tool
 
-SUMMARY = "measure time, memory and discretisation error; resumed if it was interrupted"
+SUMMARY = "measure time, memory and discretisation error; continues if interrupted"
 
 
 def add(command: Parser) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 from .options import JOBS, RESUMED, Parser
 from .tools import tool
 
-SUMMARY = "run random dams and verify their result files; exit code 1 if there is a defect"
+SUMMARY = "verify the result files of random dams; exit code 1 if there is a defect"
 
 
 def add(command: Parser) -> None:
