@@ -6,8 +6,11 @@ import argparse
 import itertools
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from .. import InputError
 
 if TYPE_CHECKING:
     from ..model.case import Case
@@ -33,8 +36,11 @@ def load_cases(
     settings = parameters.settings(arguments.settings)
     cases: list[Case] = []
     printed = set[tuple[str, str]]()
+    all_steps = getattr(arguments, "all_steps", False)
+    if all_steps and arguments.engine == "getdp":
+        raise InputError("--all-steps: must not be given with --engine getdp")
     for name, record in itertools.product(names, records):
-        case = load(name, settings, **given, record=record)
+        case = replace(load(name, settings, **given, record=record), all_steps=all_steps)
         cases.append(case)
         for remark in remarks(case):
             if (case.name, remark) not in printed:

@@ -188,6 +188,18 @@ def water_options() -> Parser:
     return options
 
 
+def all_steps_option() -> Parser:
+    """The option of a table of all steps."""
+    options = Parser(add_help=False)
+    options.add_argument(
+        "--all-steps",
+        action="store_true",
+        help="also write steps.csv: jumps, tractions and internal variables of every step at all "
+        "nodes and integration points of the joints",
+    )
+    return options
+
+
 def accuracy_options() -> Parser:
     """The option of the commands that choose the mesh."""
     options = Parser(add_help=False)

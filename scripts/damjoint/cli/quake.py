@@ -13,6 +13,7 @@ from .options import (
     JOBS,
     Checked,
     Parser,
+    all_steps_option,
     loading_options,
     settings_options,
     time_span,
@@ -24,7 +25,7 @@ SUMMARY = (
 )
 
 #: Options that it shares with other commands.
-SHARED = settings_options, loading_options
+SHARED = settings_options, loading_options, all_steps_option
 
 
 def add(command: Parser) -> None:

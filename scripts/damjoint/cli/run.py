@@ -7,7 +7,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .cases import load_case
-from .options import CASE, ENGINE, Parser, accuracy_options, loading_options, settings_options
+from .options import (
+    CASE,
+    ENGINE,
+    Parser,
+    accuracy_options,
+    all_steps_option,
+    loading_options,
+    settings_options,
+)
 
 if TYPE_CHECKING:
     from ..post.drawing_process import DrawingProcess
@@ -16,7 +24,7 @@ if TYPE_CHECKING:
 SUMMARY = "fill the reservoir of a case; exit code 1 if the dam fails or the run stops early"
 
 #: Options that it shares with other commands.
-SHARED = settings_options, loading_options, accuracy_options
+SHARED = settings_options, loading_options, accuracy_options, all_steps_option
 
 
 def add(command: Parser) -> None:

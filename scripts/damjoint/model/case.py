@@ -137,6 +137,8 @@ class Case(ParameterValues):
     hardening_asked: bool = False
     #: the required relative error; None: the mesh is not refined
     accuracy: float | None = None
+    #: whether every update of the internal variables is written
+    all_steps: bool = False
     #: the user's own geometry instead of the section by parameters
     geometry: Path | None = None
     #: file of the ground's acceleration, for `damjoint quake`

@@ -39,6 +39,22 @@ FLUX = {"flux": ("kg/(m s)", "mass flux towards the toe, mean of the elements ar
 #: Additional column where the joint is grouted or sawn.
 THICKNESS = {"joint_thickness": ("m", "thickness that grout adds and the saw takes off (< 0)")}
 
+#: Columns of steps.csv: a row per node and per integration point of every update of the internal
+#: variables, in their order.
+STEPS = {
+    "update": ("-", "number of the update"),
+    "begin": ("-", "t at which its step began; in an earthquake [s]"),
+    "time": ("-", "t of the step; in an earthquake [s]"),
+    "level": JOINT["level"],
+    "tail_level": ("m", "tailwater level above the base"),
+    "frozen": ("-", "1: by the law with frozen damage, in unstable crack growth"),
+    "earthquake": ("-", "1: a time step of an earthquake"),
+    "joint": JOINT["joint"],
+    "weight": ("m", "length of joint that an integration point stands for; 0: a node"),
+    **{name: JOINT[name] for name in ("x", "y", "z", "delta_n", "delta_t1", "delta_t2")},
+    **{name: JOINT[name] for name in ("sigma_n_eff", "tau_1", "tau_2", "p", "damage", "slip")},
+}
+
 #: Columns of history.csv: a row per converged step. Forces are per metre of thickness, in 3D too.
 HISTORY = {
     "time": ("-", "t of the step"),
@@ -168,6 +184,8 @@ class Results:
     stopped: bool = False
     #: opening of the heel of the first joint [m] at each row of history
     heel: Array = field(default_factory=lambda: np.zeros(0))
+    #: of a case with `all_steps`: its updates of the internal variables, see `step_columns`
+    steps: Table | None = None
     #: about the run itself, for run.json: engine, sizes, versions, seconds
     info: dict[str, Any] = field(default_factory=dict)
 
@@ -247,6 +265,12 @@ def joint_columns(case: Case) -> Columns:
     worked = any(joint["grout_pressure"] or joint["saw_thickness"] for joint in case.joints)
     works = THICKNESS if worked else {}
     return functools.reduce(operator.or_, [JOINT, *of_laws, flow, works])
+
+
+def step_columns(case: Case) -> Columns:
+    """The columns of a case's steps.csv: unit and meaning."""
+    further = {n: column for n, column in joint_columns(case).items() if n not in JOINT | FLUX}
+    return STEPS | further
 
 
 def joint_table(case: Case, blocks: list[Array]) -> Table:

@@ -1,4 +1,4 @@
-"""Tables of a run as CSV files: joint.csv, history.csv, curve.csv."""
+"""Tables of a run as CSV files: joint.csv, history.csv, curve.csv, steps.csv."""
 
 from __future__ import annotations
 
@@ -17,6 +17,8 @@ from ..storage import SAVED, atomic_write
 Column = np.ndarray | Sequence[float | str]
 #: Decimals of coordinates in metres: the mesh generator's last digits differ between machines.
 DECIMALS = 9
+#: Format of numbers, and of those that stresses are computed from again.
+DIGITS, EXACT = ".12g", ".17g"
 
 
 def as_text(cell: str) -> str:
@@ -28,13 +30,13 @@ def as_text(cell: str) -> str:
     return cell
 
 
-def write_csv(target: Path | TextIO, table: Mapping[str, Column]) -> None:
-    """Write a table with its column names to a path or an open file; numbers with twelve digits,
-    texts escaped by `as_text`.
+def write_csv(target: Path | TextIO, table: Mapping[str, Column], digits: str = DIGITS) -> None:
+    """Write a table with its column names to a path or an open file; numbers in a format, texts
+    escaped by `as_text`.
     """
     if isinstance(target, Path):
         with atomic_write(target) as path, path.open("w", newline="") as file:
-            write_csv(file, table)
+            write_csv(file, table, digits)
         if any(len(column) for column in table.values()):
             SAVED.add(target)
         return
@@ -42,7 +44,7 @@ def write_csv(target: Path | TextIO, table: Mapping[str, Column]) -> None:
     writer.writerow(table)
     rows = zip(*table.values(), strict=True)
     writer.writerows(
-        [as_text(v) if isinstance(v, str) else f"{v:.12g}" for v in row] for row in rows
+        [as_text(v) if isinstance(v, str) else format(v, digits) for v in row] for row in rows
     )
 
 
@@ -56,6 +58,8 @@ def write(results: Results, folder: Path) -> None:
     case, history = results.case, results.history
     write_csv(folder / "joint.csv", rounded(results.joint))
     write_csv(folder / "history.csv", history)
+    if results.steps:
+        write_csv(folder / "steps.csv", results.steps, EXACT)
     if case["drive"] != "level":
         pressure = case["rho_water"] * case["g"] * history["level"]
         curve = {

@@ -17,7 +17,8 @@ from .history import History
 from .model import Model, StepResult
 from .path import PRECISION, ROUGH, SURE, EquilibriumPath, Point
 from .relaxation import over_unstable_growth
-from .state import State
+from .state import State, Trace
+from .trace_table import trace_table
 
 #: Times and relative lengths of steps that differ by less are the same.
 SAME_TIME = 1e-9
@@ -53,7 +54,8 @@ class LoadStepper:
         """interface: see `Model`; on_step: called with the time of each converged step."""
         self.model, self.on_step = Model(case, interface), on_step
         self.history = History(self.model.equilibrium)
-        self.state = self.model.start()
+        start = self.model.start()
+        self.state = Trace.start(start) if case.all_steps else start
         self.stopped = False
         #: whether an equilibrium path has been followed to its end
         self.path_ended = False
@@ -373,4 +375,6 @@ class LoadStepper:
             "unstable_growth": self.relaxed_at,
         }
         results.info = {name: value for name, value in info.items() if value}
+        if self.state.trace:
+            results.steps = trace_table(self.model.equilibrium, self.state.trace)
         return results

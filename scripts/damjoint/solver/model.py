@@ -245,4 +245,5 @@ class Model:
             pressures=equilibrium.pressures(end.jump, variables, loading, before_quake),
             before_quake=before_quake,
         )
-        return StepResult(new.after(state), iterations, end.size / (self.reference or 1.0))
+        new = new.after(state).traced(state, frozen is not None)
+        return StepResult(new, iterations, end.size / (self.reference or 1.0))

@@ -38,6 +38,8 @@ class State:
     before_quake: BeforeQuake | None = None
     #: the state before, without its own
     previous: State | None = None
+    #: the updates that led to it, of a case with `all_steps`
+    trace: Trace | None = None
 
     @staticmethod
     def undamaged(equilibrium: Equilibrium) -> State:
@@ -47,6 +49,15 @@ class State:
         jump = np.zeros(len(equilibrium.bulk.stiffness))
         points, nodes = (laws.initial(n) for n in numbers)
         return State(0.0, Loading(0.0, 0.0), jump, points, nodes)
+
+    def traced(self, begin: State, frozen: bool) -> State:
+        """This state with the update that has led to it from another one; frozen: whether by the
+        laws with frozen damage.
+        """
+        if begin.trace is None:
+            return self
+        own = replace(self, previous=None, trace=None)
+        return replace(self, trace=Trace(own, begin.time, frozen, begin.trace))
 
     def after(self, previous: State) -> State:
         """This state, as the one that follows another."""
@@ -80,3 +91,30 @@ def both_jumps(equilibrium: Equilibrium, jump: Array) -> tuple[Array, Array]:
     """The jump at the laws' points and at the nodes, (q, 3) each."""
     interface = equilibrium.interface
     return interface.jumps(interface.at_points, jump), interface.jumps(interface.at_nodes, jump)
+
+
+@dataclass(frozen=True)
+class Trace:
+    """An update of the internal variables, and all before it."""
+
+    state: State
+    #: time at which its step began
+    begin: float = 0.0
+    #: whether by the laws with frozen damage
+    frozen: bool = False
+    #: None: of the undamaged joints
+    before: Trace | None = None
+
+    @staticmethod
+    def start(state: State) -> State:
+        """The undamaged state, from which on updates are recorded."""
+        return replace(state, trace=Trace(state))
+
+    @property
+    def updates(self) -> list[Trace]:
+        """All updates, the first one first."""
+        found, one = list[Trace](), self
+        while one.before is not None:
+            found.append(one)
+            one = one.before
+        return found[::-1]

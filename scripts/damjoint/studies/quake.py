@@ -35,6 +35,7 @@ from ..solver.history import joint_row
 from ..solver.load_stepper import LoadStepper
 from ..solver.model import Model, StepResult
 from ..solver.state import State
+from ..solver.trace_table import trace_table
 from ..statics.verdict import statement
 from ..threads import limited_threads
 from . import quake_summary
@@ -149,6 +150,9 @@ class QuakeRun:
     def _result_of(self, found: dict[str, Any], error: BaseException | None = None) -> QuakeResult:
         """The result with a summary; error: that ended it early."""
         quake, history, static = self.quake, self.history, self.static.results()
+        if trace := quake.now.state.trace:
+            equilibrium = quake.problem.model.equilibrium
+            static.steps = trace_table(equilibrium, trace, history.rows["time"])
         seconds = {name: value for name, value in self.seconds.items() if name != "steps"}
         static.info |= about(quake.problem.model.equilibrium.bulk) | {"wall_seconds": seconds}
         return QuakeResult.of(

@@ -105,8 +105,10 @@ def run(case: Case, out: Path, options: Options = Options(), key: str = "") -> Q
     check(case, options)
     folders.check_writable(out)
     kept = Checkpoint(out / CHECKPOINT, fingerprint(case, options.span))
-    with session(case, out, options.engine != "getdp" and kept.exists, key) as study:
-        result = compute(case, options, kept)
+    # a table of all steps is that of a run without interruption
+    continues = options.engine != "getdp" and not case.all_steps
+    with session(case, out, continues and kept.exists, key) as study:
+        result = compute(case, options, kept if continues else None)
         ended = result.error is None
         save(study, result, options.fields and ended, options.picture and ended)
         if result.error:
@@ -171,7 +173,7 @@ def run_records(
 def run_record(task: tuple[Case, Path, Options], progress: bool) -> Ended:
     """Compute an earthquake, or read that of an earlier command."""
     case, out, options = task
-    key = f"{fingerprint(case, options.span)} {options}"
+    key = f"{fingerprint(case, options.span)} {options} {case.all_steps}"
     if finished(out, key):
         info = folders.read_info(out) or {}
         return Ended(case, out, info["quake"], info["verdict"], info["statement"])

@@ -1,0 +1,19 @@
+"""The joint laws at a point, replayed along the jumps that a run has written.
+
+Scalar Python from the formulas of section 4 of reference/theory.md.
+"""
+
+from __future__ import annotations
+
+from .bond import Bond
+from .endo import Endo
+from .friction import Friction
+from .point import Point
+from .rupture import Rupture
+
+LAWS: dict[str, type[Point]] = {
+    "bond": Bond,
+    "endo": Endo,
+    "friction": Friction,
+    "rupture": Rupture,
+}

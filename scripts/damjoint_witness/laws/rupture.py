@@ -1,0 +1,94 @@
+"""Cohesive rupture with grouting and sawing, section 4.1 of reference/theory.md."""
+
+from __future__ import annotations
+
+from math import hypot, inf, pi, tan
+
+from .point import Jump, Point, Values, ramp
+
+#: Regularisation length of the shear release [m].
+RELEASE = 1e-12
+
+
+class Rupture(Point):
+    """A point of law = rupture: largest opening kappa, tangential jump at the last release."""
+
+    def __init__(self, values: Values) -> None:
+        super().__init__(values)
+        P, self.f_t = values["pena_rupture"], values["sigma_max"]
+        self.contact = values["pena_contact"] * self.K_N
+        self.delta_e = self.f_t / self.K_N
+        self.L_C = (1 + P) * self.delta_e
+        self.sigma_c = self.f_t * (1 + P) / P
+        alpha = values["alpha"]
+        self.L_CT = inf if alpha == 2 else max(self.L_C * tan(alpha * pi / 4), RELEASE)
+        self.p_g, self.grout_t = values["grout_pressure"], values["grout_t"]
+        self.saw, self.saw_t = values["saw_thickness"], values["saw_t"]
+        self.kappa, self.released = self.delta_e, (0.0, 0.0)
+        #: thickness of the grout; the opening before sawing; of the saw [m]
+        self.grout, self.before, self.sawn = 0.0, 0.0, 0.0
+
+    def thickness(self) -> float:
+        """Thickness that grout adds and the saw takes off, < 0 [m]."""
+        return self.grout - self.sawn if self.p_g else -max(self.sawn - self.before, 0.0)
+
+    def opening(self, jump: Jump) -> float:
+        """The opening beyond that thickness [m]."""
+        return jump[0] - self.thickness()
+
+    def shear_share(self, opening: float) -> float:
+        """What is left of the shear stiffness at an opening."""
+        return 1.0 if opening <= 0 else max(0.0, 1 - opening / self.L_CT)
+
+    def step(self, jump: Jump, begin: float, end: float, frozen: bool) -> None:
+        """See `Point`."""
+        self.sawn = self.saw * ramp(end, self.saw_t)
+        liquid = self.p_g and begin < self.grout_t and end > self.grout_t - 1
+        # of a liquid grout: at most the opening -p/(beta K_N)
+        least = -self.p_g * ramp(end, self.grout_t) / self.contact if liquid else inf
+        share = self.shear_share(min(self.opening(self.jump), least))
+        if liquid:
+            self.grout = max(self.grout, jump[0] + self.sawn - least)
+        opening = self.opening(jump)
+        if (share if frozen else self.shear_share(opening)) <= 0:
+            self.released = jump[1:]
+        self.kappa = max(self.kappa, opening)
+        if self.saw and not self.sawn:
+            self.before = max(jump[0], 0.0)
+        self.jump = jump
+
+    def broken(self, opening: float) -> bool:
+        """Whether the tensile strength is lost."""
+        return opening >= self.L_C or self.kappa >= self.L_C or self.sawn > 0
+
+    def traction(self, jump: Jump) -> Jump:
+        """See `Point`."""
+        opening = self.opening(jump)
+        if opening <= 0:
+            normal = self.contact * opening
+        elif self.broken(opening):
+            normal = 0.0
+        elif opening <= self.kappa:
+            normal = self.sigma_c * (1 - self.kappa / self.L_C) * opening / self.kappa
+        else:
+            normal = self.sigma_c * (1 - opening / self.L_C)
+        K_t = self.K_T * self.shear_share(opening)
+        return (normal, K_t * (jump[1] - self.released[0]), K_t * (jump[2] - self.released[1]))
+
+    def damage(self, jump: Jump) -> float:
+        """See `Point`."""
+        if self.broken(self.opening(jump)) and self.kappa > 0:
+            return 1.0
+        return (self.kappa - self.delta_e) / (self.L_C - self.delta_e) if self.L_C else 0.0
+
+    def slip(self) -> float:
+        """See `Point`."""
+        return hypot(*self.released)
+
+    def further(self) -> dict[str, float]:
+        """See `Point`."""
+        return {"joint_thickness": self.thickness()}
+
+    def strength(self, normal: float) -> float:
+        """See `Point`: contact and elastic shear have no bound."""
+        return float(self.f_t + abs(normal))

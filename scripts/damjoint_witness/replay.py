@@ -1,0 +1,71 @@
+"""Laws from both sides: every node's and integration point's history, replayed by `laws`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from math import hypot
+
+import numpy as np
+
+from .files import Table, rows_where, split_by
+from .laws import LAWS
+from .laws.point import Values
+
+#: Tolerance of stresses, relative to the strength; of damage.
+TOLERANCE = 1e-6
+#: Rounding of a stress, relative to the stiffness times the jump and to the stress itself.
+ROUNDING = 1e-11
+
+
+def laws(steps: Table, joints: Sequence[Values]) -> Iterator[str]:
+    """Check traction, damage, slip and the further internal variables of all updates of steps.csv;
+    joints: values of each joint.
+    """
+    for k, values in enumerate(joints):
+        rows = rows_where(steps, steps["joint"] == k + 1)
+        if len(rows["update"]):
+            yield from law_of_joint(rows, values, f"joint {k + 1}: " if len(joints) > 1 else "")
+
+
+def law_of_joint(rows: Table, values: Values, prefix: str) -> Iterator[str]:
+    """Check a joint: the first point that differs, and by how much the worst one does."""
+    updates = split_by(rows, "update")
+    times = [(u["begin"][0], u["time"][0], bool(u["frozen"][0])) for u in updates]
+    if "earthquake" in rows:  # its time does not act on the joint
+        last = max((t for t, u in zip(times, updates, strict=True) if not u["earthquake"][0]))[1]
+        times = [
+            (last, last, f) if u["earthquake"][0] else (b, e, f)
+            for (b, e, f), u in zip(times, updates, strict=True)
+        ]
+    names = ("delta_n", "delta_t1", "delta_t2", "sigma_n_eff", "tau_1", "tau_2", "damage", "slip")
+    table = np.array([[u[name] for name in names] for u in updates])  # (updates, names, points)
+    further = [name for name in ("lambda", "joint_thickness") if name in rows]
+    extra = np.array([[u[name] for name in further] for u in updates])
+    worst: dict[str, tuple[float, float]] = {}
+    for q in range(table.shape[2]):
+        point = LAWS[values["law"]](values)
+        history = table[:, :, q].tolist()
+        for n, (begin, end, frozen) in enumerate(times):
+            *row, damage, slip = history[n]
+            jump = (row[0], row[1], row[2])
+            point.step(jump, begin, end, frozen)
+            exact = point.traction(jump)
+            size = point.K_N * abs(jump[0]) + point.K_T * hypot(jump[1], jump[2])
+            room = TOLERANCE * point.strength(exact[0]) + ROUNDING * (size + abs(row[3]))
+            errors = {
+                "normal stress": abs(row[3] - exact[0]) / room,
+                "shear stress": hypot(row[4] - exact[1], row[5] - exact[2]) / room,
+                "slip": abs(slip - point.slip()) * point.K_T / room,
+            }
+            if point.K_N * point.jumping(jump) > room:
+                errors["damage"] = abs(damage - point.damage(jump)) / TOLERANCE
+            if further:
+                known = point.further()
+                for column, value in zip(further, extra[n, :, q].tolist(), strict=True):
+                    if column in known:
+                        errors[column] = abs(value - known[column]) * point.K_N / room
+            for name, error in errors.items():
+                if not error <= 1 and error > worst.get(name, (0.0, 0.0))[0]:
+                    worst[name] = error, updates[n]["time"][0]
+    for name, (error, time) in worst.items():
+        yield f"{prefix}{name} off by {error:.3g} tolerances from the law at t = {time:g}"
