@@ -1,0 +1,38 @@
+"""All checks of a run's files."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cached_property
+
+from . import replay, statics, stops, tables
+from .files import Files, Table, read_table
+from .reader import read
+
+
+class Witness:
+    """The files of a run beside what its command has asked for."""
+
+    def __init__(self, files: Files) -> None:
+        self.files, self.asked = files, read(files.words)
+
+    @cached_property
+    def steps(self) -> Table:
+        """Columns of steps.csv."""
+        return read_table(self.files.folder / "steps.csv")
+
+    def violations(self) -> list[str]:
+        """The rules that the files violate, in words."""
+        return list(self._violations())
+
+    def _violations(self) -> Iterator[str]:
+        files, asked, steps = self.files, self.asked, self.steps
+        yield from tables.bookkeeping(files, asked)
+        yield from statics.balance(files, asked)
+        yield from tables.integrals(files, asked, steps)
+        yield from tables.nodes(files, asked, steps)
+        yield from replay.laws(steps, asked.joints)
+
+    def stop(self) -> tuple[bool, str]:
+        """Whether it is wrong that the run has stopped, and a remark, see `stops.judge`."""
+        return stops.judge(self.files, self.asked, self.steps)
