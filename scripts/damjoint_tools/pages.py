@@ -18,7 +18,7 @@ from pathlib import Path
 from damjoint.dynamics.frames import MOST_FRAMES
 from damjoint.laws import COLUMNS
 from damjoint.model.parameters import declared
-from damjoint.model.results import FLUX, HISTORY, JOINT, QUAKE, THICKNESS
+from damjoint.model.results import FLUX, HISTORY, JOINT, QUAKE, STEPS, THICKNESS
 from damjoint.post.validation import Comparison
 from damjoint.statics.gravity import LOADS
 from damjoint.studies.check import CHECK
@@ -76,9 +76,17 @@ def parameters_page() -> str:
 
 def results_page() -> str:
     """reference/results.md: the columns of the tables."""
-    joint, history, check, loads, critical, quake = (
+    joint, history, steps, check, loads, critical, quake = (
         markdown([(f"`{n}`", u, m) for n, (u, m) in columns.items()], ("column", "unit", "meaning"))
-        for columns in (JOINT | COLUMNS | FLUX | THICKNESS, HISTORY, CHECK, LOADS, CRITICAL, QUAKE)
+        for columns in (
+            JOINT | COLUMNS | FLUX | THICKNESS,
+            HISTORY,
+            STEPS,
+            CHECK,
+            LOADS,
+            CRITICAL,
+            QUAKE,
+        )
     )
     parts = [
         "# Results",
@@ -96,6 +104,13 @@ def results_page() -> str:
         "joints, the columns of lengths, openings and resultants are those of joint 1; those of "
         "joint 2, 3, ... follow with its number: `N_2`, `T_2`, ...",
         history,
+        "## steps.csv",
+        "Written with `--all-steps`, also by `damjoint quake`: for every update of the internal "
+        "variables, in their order, a row per joint node and per integration point. Besides the "
+        "converged steps these are the weight alone, the increments of an equilibrium path that "
+        "lead to a step, and the rounds of unstable crack growth. Numbers have all digits; "
+        "`lambda` and `joint_thickness` as in joint.csv.",
+        steps,
         "## curve.csv",
         "Written by a run under displacement control: `time`, `level` [m], `pressure` [Pa] at the "
         "foot of the face, `heel_opening` [m], `crest_ux` [m] of each converged step.",

@@ -9,9 +9,9 @@ from collections.abc import Callable
 from typing import TypeAlias
 
 import numpy as np
+from damjoint_witness.earthquake import Shaken
 
 from . import quake_equations
-from .quake_verification import QuakeFiles, unit_loads
 from .random_quakes import (
     CLOSED_FORM,
     ELASTIC,
@@ -52,12 +52,12 @@ FINE_STEP = 1e-5
 NO_SLIP = 1e-6
 
 #: Runs a scene with further options of the command, and returns its files.
-Again: TypeAlias = Callable[..., QuakeFiles]
+Again: TypeAlias = Callable[..., Shaken]
 #: Numbers, and violated rules.
 Checked: TypeAlias = tuple[dict[str, float], list[str]]
 
 
-def further_checks(scene: RandomQuake, run: QuakeFiles, again: Again) -> Checked:
+def further_checks(scene: RandomQuake, run: Shaken, again: Again) -> Checked:
     """Return the numbers of all checks of a scene, and the rules that they violate."""
     measures, found = {}, []
     for check in scene.checks:
@@ -70,14 +70,14 @@ def further_checks(scene: RandomQuake, run: QuakeFiles, again: Again) -> Checked
     return measures, found
 
 
-def equations(scene: RandomQuake, run: QuakeFiles, again: Again) -> Checked:
+def equations(scene: RandomQuake, run: Shaken, again: Again) -> Checked:
     """Check the equations of all unknowns at each step, and the balance of energy."""
     found = quake_equations.measures(scene.case)
     measures = {"residual": found["residual"], "energy_lost": found["lost"]}
     violated = []
     if not found["residual"] <= quake_equations.RESIDUAL_TOLERANCE:
         violated.append(f"equations: residual {found['residual']:.3g} of the static loads")
-    conserves = run.case["hht_alpha"] == 0
+    conserves = run.values["hht_alpha"] == 0
     room = quake_equations.ENERGY_TOLERANCE
     lost, rise = found["lost"], found["rise"]
     if not lost >= -room or (conserves and not (lost <= room and rise <= room)):
@@ -85,22 +85,22 @@ def equations(scene: RandomQuake, run: QuakeFiles, again: Again) -> Checked:
     return measures, violated
 
 
-def halved(scene: RandomQuake, run: QuakeFiles, again: Again) -> Checked:
+def halved(scene: RandomQuake, run: Shaken, again: Again) -> Checked:
     """Run with steps of half the length; of an elastic joint also with a quarter, which gives the
     order, and measure the change of the residual slip of other joints.
     """
-    dt = run.record["quake"]["dt"]
+    dt = run.found["dt"]
     half = again(scene.changed(dt=dt / 2))
     if scene.kind != ELASTIC:
         slips = [
-            (joint.residual_slip, other.residual_slip, np.abs(joint.history["slip_mean"]).max())
+            (joint.residual_slip, other.residual_slip, np.abs(joint.rows["slip_mean"]).max())
             for joint, other in zip(run.joints, half.joints, strict=True)
         ]
         before, after, largest = max(slips, key=lambda slip: slip[2])
         return {"change_by_dt": abs(after - before) / largest} if largest > NO_SLIP else {}, []
     quarter = again(scene.changed(dt=dt / 4))
     crest = [
-        files.history["crest_ux"][step - 1 :: step]
+        files.rows["crest_ux"][step - 1 :: step]
         for files, step in ((run, 1), (half, 2), (quarter, 4))
     ]
     number = min(map(len, crest))  # the last step may end after the record
@@ -112,7 +112,7 @@ def halved(scene: RandomQuake, run: QuakeFiles, again: Again) -> Checked:
     return {"order": order}, [] if right else [f"order: {order:.3g}"]
 
 
-def stronger(scene: RandomQuake, run: QuakeFiles, again: Again) -> Checked:
+def stronger(scene: RandomQuake, run: Shaken, again: Again) -> Checked:
     """Run with greater friction and cohesion, and measure the largest slip of any joint."""
     case = scene.case
     strengths = {
@@ -121,13 +121,13 @@ def stronger(scene: RandomQuake, run: QuakeFiles, again: Again) -> Checked:
     }
     other = again(scene.changed(**strengths))
     before, after = (
-        max(np.abs(joint.history["slip_mean"]).max() for joint in files.joints)
+        max(np.abs(joint.rows["slip_mean"]).max() for joint in files.joints)
         for files in (run, other)
     )
     return {"slip_if_stronger": after / before} if before > NO_SLIP else {}, []
 
 
-def reversed_motion(scene: RandomQuake, run: QuakeFiles, again: Again) -> Checked:
+def reversed_motion(scene: RandomQuake, run: Shaken, again: Again) -> Checked:
     """Compare the motion with those of the reversed record and of a small part of it, which are
     the same times a factor for a linear joint.
     """
@@ -147,14 +147,14 @@ def reversed_motion(scene: RandomQuake, run: QuakeFiles, again: Again) -> Checke
     return {"asymmetry": worst}, []
 
 
-def since_static(run: QuakeFiles) -> dict[str, np.ndarray]:
+def since_static(run: Shaken) -> dict[str, np.ndarray]:
     """Return columns of quake.csv as differences from the static state."""
-    rows, still = run.history, run.static_row()
+    rows, still = run.rows, run.static_row()
     result = {name: rows[name] for name in ("crest_ux", "crest_ax", "slip_mean")}
     return result | {name: rows[name] - still[name] for name in "NTM"}
 
 
-def getdp(scene: RandomQuake, run: QuakeFiles, again: Again) -> Checked:
+def getdp(scene: RandomQuake, run: Shaken, again: Again) -> Checked:
     """Compare with the reference GetDP model.
 
     A long step in which a joint softens can have several equilibria, of which the engines may find
@@ -164,16 +164,16 @@ def getdp(scene: RandomQuake, run: QuakeFiles, again: Again) -> Checked:
     difference = differences(run, again(scene, *options))
     if difference <= TOLERANCES["engines"]:
         return {"engines": difference}, []
-    short = scene.changed(dt=run.record["quake"]["dt"] / SHORTER)
+    short = scene.changed(dt=run.found["dt"] / SHORTER)
     same = differences(again(short), again(short, *options))
     return {"engines": same, "engines_at_dt": difference}, []
 
 
-def differences(run: QuakeFiles, other: QuakeFiles) -> float:
+def differences(run: Shaken, other: Shaken) -> float:
     """Return the largest difference between the rows of two engines over the largest value of a
     column, of the slips over the largest slip; inf with other time steps.
     """
-    rows, others = run.history, other.history
+    rows, others = run.rows, other.rows
     if len(rows["time"]) != len(others["time"]):
         return np.inf
     names = [n for n in others if not n.startswith(("iterations", "residual", "shear_reserve"))]
@@ -186,31 +186,31 @@ def differences(run: QuakeFiles, other: QuakeFiles) -> float:
     return worst
 
 
-def closed_form(scene: RandomQuake, run: QuakeFiles, again: Again) -> Checked:
+def closed_form(scene: RandomQuake, run: Shaken, again: Again) -> Checked:
     """Compare the slip with that of Newmark's rigid block (1965) at every step.
 
     Where the block stops or turns, its velocity has errors that last while it slides: within a step
     at most mu g dt, and what the joint's spring gives back, 2 mu N / sqrt(K_T L m).
     """
-    rows, case, exact = run.history, run.case, sliding_block(run)
+    rows, v, exact = run.rows, run.values, sliding_block(run)
     error, largest = np.abs(rows["slip_mean"] - exact).max(), np.abs(exact).max()
     sliding = rows["dt"][np.abs(np.diff(exact, prepend=0.0)) > 0].sum()
-    holding, stiffness = np.abs(rows["T"]).max(), case["K_T"] * run.length
-    spring = 2 * holding / np.sqrt(-unit_loads(run)[0, 0] * stiffness)
-    velocity = case["mu"] * case["g"] * rows["dt"].max() + spring
+    holding, stiffness = np.abs(rows["T"]).max(), v["K_T"] * run.section.length
+    spring = 2 * holding / np.sqrt(-run.unit_loads[0, 0] * stiffness)
+    velocity = v["mu"] * v["g"] * rows["dt"].max() + spring
     room = velocity * sliding + 2 * holding / stiffness
     violated = [f"closed form: slip off by {error:.3g} m"] if error > room else []
     return {"closed_form": error / largest} if largest > NO_SLIP else {}, violated
 
 
-def sliding_block(run: QuakeFiles) -> np.ndarray:
+def sliding_block(run: Shaken) -> np.ndarray:
     """Return the slip (n,) at the rows of a rigid block on a level joint with dry friction."""
-    rows, unit, static = run.history, unit_loads(run), run.by_hand()
+    rows, unit, static = run.rows, run.unit_loads, run.by_hand()
     time = np.arange(0, rows["time"][-1] + FINE_STEP, FINE_STEP)
     ground = [np.interp(time, rows["time"], rows[f"ground_a{axis}"]) for axis in "xy"]
     pushed = static[0] + unit[0, 0] * ground[0] + unit[1, 0] * ground[1]
     normal = static[1] - run.static_row()["U"] + unit[0, 1] * ground[0] + unit[1, 1] * ground[1]
-    most, mass = run.case["mu"] * np.maximum(normal, 0), -unit[0, 0]
+    most, mass = run.values["mu"] * np.maximum(normal, 0), -unit[0, 0]
     slip, v, slips = 0.0, 0.0, []
     for push, friction in zip(pushed, most, strict=True):
         if v == 0 and abs(push) <= friction:
@@ -225,7 +225,7 @@ def sliding_block(run: QuakeFiles) -> np.ndarray:
     return np.interp(rows["time"], time, slips)
 
 
-CHECK_BY_NAME: dict[str, Callable[[RandomQuake, QuakeFiles, Again], Checked]] = {
+CHECK_BY_NAME: dict[str, Callable[[RandomQuake, Shaken, Again], Checked]] = {
     EQUATIONS: equations,
     HALVED: halved,
     STRONGER: stronger,

@@ -1,6 +1,6 @@
 """Random dams, each run by the command in a new process and verified from its result files.
 
-The verification is independent of the engines and of laws/: see verification.py.
+The verification is independent of the package: see damjoint_witness.
 """
 
 from __future__ import annotations
@@ -23,13 +23,14 @@ from damjoint import InputError, RunError
 from damjoint.processes import pool_of
 from damjoint.progress import track
 from damjoint.studies.result_file import result_file
+from damjoint_witness.earthquake import Shaken
+from damjoint_witness.files import Files
+from damjoint_witness.verify import Witness
 
 from .provenance import RECORDED, provenance
 from .quake_comparison import MEASURES, further_checks
-from .quake_verification import QuakeFiles, judge_quake, quake_violations
 from .random_quakes import RandomQuake, random_quake
 from .random_scenes import RandomScene, as_text, random_scene
-from .verification import RunFiles, judge_stop, violations
 
 #: Columns of the result file.
 COLUMNS = (
@@ -64,7 +65,7 @@ def run_and_verify(scene: RandomScene, folder: Path) -> dict[str, object]:
     try:
         run = run_of(scene, folder)
         row["seconds"] = f"{time.perf_counter() - start:.2f}"
-        row |= {"verdict": run.record["verdict"]} | verified(run)
+        row |= {"verdict": run.files.record["verdict"]} | verified(run)
         if isinstance(scene, RandomQuake):
             row |= {"kind": scene.kind} | with_further_checks(scene, run, folder, row)
     except RunError as error:
@@ -73,18 +74,19 @@ def run_and_verify(scene: RandomScene, folder: Path) -> dict[str, object]:
     return row
 
 
-def run_of(scene: RandomScene, folder: Path, *options: str, name: str = "out") -> RunFiles:
+def run_of(scene: RandomScene, folder: Path, *options: str, name: str = "out") -> Witness:
     """Run a scene by the command with further options, and return its files, in folder/name.
 
     Raises RunError if the command has written no result, or exceeds the time limit.
     """
-    quake, case = isinstance(scene, RandomQuake), scene.case
-    words = [*scene.words, *(() if quake else ("--no-fields",)), "--no-picture", *options]
-    words += ["--out", str(folder / name)]
+    quake, words = isinstance(scene, RandomQuake), scene.words
+    tables = "--no-picture", *(() if quake else ("--no-fields",))
+    table_of_steps = () if "getdp" in options else ("--all-steps",)
     environment = os.environ | ONE_THREAD | {"DAMJOINT_CACHE": str(folder / "cache")}
+    out = "--out", str(folder / name)
     try:
         done = subprocess.run(
-            [sys.executable, "-m", "damjoint", *words],
+            [sys.executable, "-m", "damjoint", *words, *tables, *table_of_steps, *options, *out],
             env=environment,
             capture_output=True,
             text=True,
@@ -95,13 +97,13 @@ def run_of(scene: RandomScene, folder: Path, *options: str, name: str = "out") -
         raise RunError(f"not finished after {LONGEST * TIME_LIMIT} s") from None
     if done.returncode == -signal.SIGXCPU:
         raise RunError(f"not finished after {TIME_LIMIT} s of CPU time")
-    run = (QuakeFiles if quake else RunFiles)(case, folder / name, done.returncode)
+    files = Files(folder / name, tuple(words), done.returncode)
     try:
-        _ = run.record["verdict"]
+        _ = files.record["verdict"]
     except (OSError, KeyError):
         last = (done.stderr.strip().splitlines() or ["no message"])[-1]
         raise RunError(f"exit code {done.returncode}: {last}") from None
-    return run
+    return Witness(files)
 
 
 #: Number of prctl's option by which a process gets a signal when its parent ends.
@@ -116,7 +118,7 @@ def limit() -> None:
 
 
 def with_further_checks(
-    scene: RandomQuake, run: QuakeFiles, folder: Path, row: dict[str, object]
+    scene: RandomQuake, run: Witness, folder: Path, row: dict[str, object]
 ) -> dict[str, object]:
     """Return the numbers of the further checks of a verified earthquake, and its class and findings
     with theirs.
@@ -125,28 +127,29 @@ def with_further_checks(
         return {}
     runs = itertools.count(1)
 
-    def again(changed: RandomQuake, *options: str) -> RunFiles:
-        return run_of(changed, folder, *options, name=f"again_{next(runs)}")
+    def again(changed: RandomQuake, *options: str) -> Shaken:
+        return run_of(changed, folder, *options, name=f"again_{next(runs)}").shaken
 
-    measures, found = further_checks(scene, run, again)
+    measures, found = further_checks(scene, run.shaken, again)
     numbers = {name: f"{value:.3g}" for name, value in measures.items()}
     return numbers | {"class": DEFECT if found else VERIFIED, "findings": "; ".join(found)}
 
 
-def verified(run: RunFiles) -> dict[str, object]:
+def verified(run: Witness) -> dict[str, object]:
     """Verify a run; returns its class, findings and size."""
-    quake = isinstance(run, QuakeFiles)
-    broken = (quake_violations if quake else violations)(run)
-    wrong, remark = (judge_quake if quake else judge_stop)(run) if run.stopped else (False, "")
-    fine = UNDECIDED if remark else JUSTIFIED if run.stopped else VERIFIED
-    history = run.history
+    quake, stopped = run.asked.command == "quake", run.files.stopped
+    broken = run.violations()
+    wrong, remark = run.stop() if stopped else (False, "")
+    fine = UNDECIDED if remark else JUSTIFIED if stopped else VERIFIED
+    rows = run.shaken.rows if quake else run.files.history
+    levels = run.asked.levels[-1:] if quake else rows["level"]
     return {
         "class": DEFECT if broken or wrong else fine,
         "findings": "; ".join(filter(None, [*broken, remark])),
-        "level": f"{history['level'].max(initial=0):.6g}",
-        "steps": len(history["time"]),
-        "iterations": int(history["iterations"].sum()),
-        "cuts": int(history["cuts"].sum()) if not quake else run.record["quake"]["halvings"],
+        "level": f"{max(levels, default=0):.6g}",
+        "steps": len(rows["time"]),
+        "iterations": int(rows["iterations"].sum()),
+        "cuts": run.files.record["quake"]["halvings"] if quake else int(rows["cuts"].sum()),
     }
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from dataclasses import dataclass
 from functools import cached_property
@@ -19,8 +18,8 @@ Table = dict[str, NDArray[np.float64]]
 def read_table(path: Path) -> Table:
     """Read the columns of a table."""
     with path.open() as file:
-        heads, *rows = csv.reader(file)
-    values = np.array(rows, float).reshape(-1, len(heads))
+        heads, rows = file.readline().strip().split(","), file.readlines()
+    values = np.loadtxt(rows, delimiter=",", ndmin=2) if rows else np.zeros((0, len(heads)))
     return dict(zip(heads, values.T, strict=True))
 
 

@@ -304,6 +304,9 @@ def asked(
     options: dict[str, str],
 ) -> Asked:
     """Return what values, lists and options ask for together."""
+    own_times = lists.pop("times", ())
+    if {"levels", "steps"} & options.keys():
+        own_times = ()
     for option in ("levels", "tail-levels"):
         if option in options:
             lists[option.replace("-", "_")] = tuple(map(float, options.pop(option).split(",")))
@@ -336,6 +339,7 @@ def asked(
             least = max(number, LEAST_ELEMENTS)
             joint["n_joint"] = float(min(least, resolved[0]["n_joint"]))
     times = {k + (i + 1) / steps for k in range(len(levels)) for i in range(steps)}
+    times = set(own_times) or times
     if resolved[0]["drive"] != "level":
         times |= {resolved[0]["drive_begin"], resolved[0]["drive_end"]} - {0.0}
     return Asked(

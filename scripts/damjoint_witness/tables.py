@@ -14,6 +14,12 @@ from .reader import Asked, differences
 DIGITS = 1e-7
 #: Of integrals over the points, relative to the sum of the sizes of their parts.
 SUMS = 1e-9
+#: Columns that joint.csv and steps.csv share, by unit.
+COLUMNS = (
+    ("delta_n", "delta_t1", "delta_t2", "slip"),
+    ("sigma_n_eff", "tau_1", "tau_2", "p"),
+    ("damage",),
+)
 
 
 def bookkeeping(files: Files, asked: Asked) -> Iterator[str]:
@@ -91,26 +97,24 @@ def integrals(files: Files, asked: Asked, steps: Table) -> Iterator[str]:
 
 def nodes(files: Files, asked: Asked, steps: Table) -> Iterator[str]:
     """Check that the rows of joint.csv are those of the nodes in steps.csv."""
-    sized = {
-        "m": ("delta_n", "delta_t1", "delta_t2", "slip"),
-        "Pa": ("sigma_n_eff", "tau_1", "tau_2", "p"),
-        "-": ("damage",),
-    }
     for k in range(len(asked.joints)):
         updates = updates_of(steps, k, nodes=True)
         for table in files.tables_of(k):
-            time = float(table["time"][0])
-            own = step_of(updates, time, float(table["level"][0]))
-            if own is None or len(own["x"]) != len(table["x"]):
-                yield f"joint {k + 1}: steps.csv has no step of joint.csv at t = {time:g}"
+            time, level = float(table["time"][0]), float(table["level"][0])
+            yield from rows_of_nodes(table, step_of(updates, time, level), "joint.csv", k)
+
+
+def rows_of_nodes(table: Table, step: Table | None, name: str, joint: int) -> Iterator[str]:
+    """Check the rows of a table of a joint (from 0) at a time against those of steps.csv."""
+    where = f"{name} is off at t = {table['time'][0]:g}"
+    if step is None or len(step["x"]) != len(table["x"]):
+        yield f"joint {joint + 1}: steps.csv has no step of {where}"
+        return
+    one, other = (np.lexsort([np.round(rows[axis], 6) for axis in "zyx"]) for rows in (table, step))
+    for columns in COLUMNS:
+        scale = max(np.abs(step[column]).max() for column in columns)
+        for column in columns:
+            off = np.abs(table[column][one] - step[column][other]).max()
+            if off > SUMS * scale:
+                yield f"joint {joint + 1}: {column} of {where}"
                 return
-            orders = [
-                np.lexsort([np.round(rows[axis], 6) for axis in "zyx"]) for rows in (table, own)
-            ]
-            for names in sized.values():
-                scale = max(np.abs(own[name]).max() for name in names)
-                for name in names:
-                    off = np.abs(table[name][orders[0]] - own[name][orders[1]]).max()
-                    if off > SUMS * scale:
-                        yield f"joint {k + 1}: {name} of joint.csv is off at t = {time:g}"
-                        return

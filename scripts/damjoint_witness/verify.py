@@ -5,16 +5,26 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import cached_property
 
-from . import replay, statics, stops, tables
+from . import earthquake, replay, statics, stops, tables
 from .files import Files, Table, read_table
-from .reader import read
+from .reader import Asked, read
 
 
 class Witness:
-    """The files of a run beside what its command has asked for."""
+    """The files of a run or of an earthquake beside what its command has asked for."""
 
     def __init__(self, files: Files) -> None:
-        self.files, self.asked = files, read(files.words)
+        self.files = files
+
+    @cached_property
+    def asked(self) -> Asked:
+        """What the command has asked for."""
+        return read(self.files.words)
+
+    @property
+    def shaken(self) -> earthquake.Shaken:
+        """The files of an earthquake."""
+        return earthquake.Shaken(self.files, self.asked)
 
     @cached_property
     def steps(self) -> Table:
@@ -27,12 +37,17 @@ class Witness:
 
     def _violations(self) -> Iterator[str]:
         files, asked, steps = self.files, self.asked, self.steps
-        yield from tables.bookkeeping(files, asked)
-        yield from statics.balance(files, asked)
-        yield from tables.integrals(files, asked, steps)
-        yield from tables.nodes(files, asked, steps)
+        if asked.command == "quake":
+            yield from earthquake.violations(self.shaken, steps)
+        else:
+            yield from tables.bookkeeping(files, asked)
+            yield from statics.balance(files, asked)
+            yield from tables.integrals(files, asked, steps)
+            yield from tables.nodes(files, asked, steps)
         yield from replay.laws(steps, asked.joints)
 
     def stop(self) -> tuple[bool, str]:
-        """Whether it is wrong that the run has stopped, and a remark, see `stops.judge`."""
+        """Whether it is wrong that the run has stopped early, and a remark."""
+        if self.asked.command == "quake":
+            return earthquake.judge(self.shaken)
         return stops.judge(self.files, self.asked, self.steps)

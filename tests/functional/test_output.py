@@ -35,6 +35,22 @@ def test_a_text_in_a_table_is_not_a_formula_for_a_spreadsheet(tmp_path):
     assert {number for _, number in cells} == {"-1"}
 
 
+def test_a_table_of_all_steps_is_written_on_demand(command, tmp_path):
+    """Its last rows are those of joint.csv; a run without it removes it, and is the same."""
+    words = "run", "dam", "--set", "n_joint=10", "--levels", "40", "--no-fields", "--no-picture"
+    assert command(*words, "--all-steps")[0] == 0
+    folder = tmp_path / "out" / "dam"
+    steps, joint = read(folder / "steps.csv"), read(folder / "joint.csv")
+    history = (folder / "history.csv").read_text()
+    last = (steps["update"] == steps["update"].max()) & (steps["weight"] == 0)
+    for name in ("delta_n", "sigma_n_eff", "tau_1", "damage"):
+        assert_allclose(np.sort(steps[name][last]), np.sort(joint[name]), rtol=1e-11)
+    assert command(*words)[0] == 0
+    assert not (folder / "steps.csv").exists() and (folder / "history.csv").read_text() == history
+    code, _, error = command(*words, "--all-steps", "--engine", "getdp")
+    assert code == 2 and error.endswith("--all-steps: must not be given with --engine getdp\n")
+
+
 def test_a_matplotlibrc_in_the_current_folder_has_no_effect(tmp_path):
     (tmp_path / "matplotlibrc").write_text("axes.facecolor: red\nfont.size: 40\n")
     script = (
