@@ -9,8 +9,9 @@ from damjoint.arrays import Setting
 from damjoint.model.case import Case, has_drains, load
 from damjoint.model.parameters import declared
 
-#: Third number of the seed of the lift joints, which are drawn apart.
-LIFT_DRAWS = 1
+#: Third number of the seed of the lift joints, and of temperature, works on the joint, waterstop,
+#: law = endo and variants of loads, which are drawn apart.
+LIFT_DRAWS, WORKS_DRAWS = 1, 3
 #: Parameters that are drawn for each joint, but for the place of its drains.
 OF_JOINTS = (
     *("law", "K_N", "K_T", "sigma_max", "adhesion", "mu", "pena_rupture", "alpha", "pena_tang"),
@@ -77,7 +78,53 @@ class RandomNumbers:
 def random_scene(seed: int, number: int) -> RandomScene:
     """Draw scene `number` of a seed: a dam with one to four joints."""
     scene, rng = single_joint_scene(seed, number), RandomNumbers(seed, number, LIFT_DRAWS)
-    return with_lifts(scene, rng) if rng.event(0.4) else scene
+    scene = with_lifts(scene, rng) if rng.event(0.4) else scene
+    return with_works(scene, RandomNumbers(seed, number, WORKS_DRAWS))
+
+
+def with_works(scene: RandomScene, rng: RandomNumbers) -> RandomScene:
+    """Add to some scenes a change of temperature and variants of their loads; in some with a single
+    joint the law endo, grouting or sawing, or a waterstop.
+    """
+    settings, drawn = scene.settings, temperature(rng) if rng.event(0.25) else {}
+    if "silt_height" in settings and rng.event(0.5):
+        drawn |= {"silt_weight": 1, "silt_K0": rng.uniform(0.3, 0.8)}
+    if "k_h" in settings:
+        drawn |= {"added_mass": rng.choice(1, 2), "quake_uplift": rng.choice("crack", "unchanged")}
+    if "drained" in settings["uplift"] and rng.event(0.3):
+        drawn["drain_reference"] = "reservoir"
+    if "lift_heights" not in settings:
+        law, uplift = settings["law"], settings["uplift"]
+        if rng.event(0.15) and "mu" in settings:  # not a slender dam
+            law, drawn = "endo", drawn | endo(rng, settings)
+        still = uplift in ("none", "imposed", "drained")
+        if still and rng.event(0.3) and "drive" not in settings:
+            if law == "rupture" and rng.event(0.5):
+                drawn["grout_pressure"] = rng.log_uniform(1e3, 3e5)
+            if law in ("rupture", "friction"):
+                drawn |= {"saw_thickness": rng.log_uniform(1e-6, 1e-4), "saw_t": rng.choice(1, 2)}
+        if uplift == "imposed" and rng.event(0.2):
+            drawn |= {"uplift": "waterstop", "waterstop": rng.uniform(0, settings["dam_base"] / 3)}
+    return replace(scene, settings=settings | drawn)
+
+
+def temperature(rng: RandomNumbers) -> dict[str, Setting]:
+    """Draw changes of temperature."""
+    drawn = {
+        "temperature_dam": rng.uniform(-8, 8),
+        "temperature_linear": rng.choice(0, rng.uniform(-8, 8)),
+        "temperature_found": rng.choice(0, rng.uniform(-4, 4)),
+    }
+    return drawn | ({"temperature_period": rng.uniform(1, 4)} if rng.event(0.3) else {})
+
+
+def endo(rng: RandomNumbers, settings: dict[str, Setting]) -> dict[str, Setting]:
+    """Draw strengths of law = endo within its conditions."""
+    mu, strength = settings["mu"], rng.log_uniform(3e3, 1e6)
+    cohesion = float(f"{mu * strength * rng.uniform(1.05, 1.35):.4g}")
+    least = 1.2968 * max(strength**2 / settings["K_N"], cohesion**2 / settings["K_T"])
+    energy = float(f"{rng.log_uniform(1.5, 50) * max(least, 1):.4g}")
+    return {"law": "endo", "sigma_max": strength, "adhesion": cohesion, "G_f": energy}
 
 
 def single_joint_scene(seed: int, number: int) -> RandomScene:

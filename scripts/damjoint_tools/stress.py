@@ -74,13 +74,16 @@ def run_and_verify(scene: RandomScene, folder: Path) -> dict[str, object]:
     return row
 
 
-def run_of(scene: RandomScene, folder: Path, *options: str, name: str = "out") -> Witness:
-    """Run a scene by the command with further options, and return its files, in folder/name.
+def run_of(
+    scene: RandomScene, folder: Path, *options: str, name: str = "out", fields: bool = False
+) -> Witness:
+    """Run a scene by the command with further options, and return its files, in folder/name;
+    fields: with those of the bodies.
 
     Raises RunError if the command has written no result, or exceeds the time limit.
     """
     quake, words = isinstance(scene, RandomQuake), scene.words
-    tables = "--no-picture", *(() if quake else ("--no-fields",))
+    tables = "--no-picture", *(() if quake or fields else ("--no-fields",))
     table_of_steps = () if "getdp" in options else ("--all-steps",)
     environment = os.environ | ONE_THREAD | {"DAMJOINT_CACHE": str(folder / "cache")}
     out = "--out", str(folder / name)

@@ -18,6 +18,12 @@ def add(command: Parser) -> None:
     )
     command.add_integer("--seed", 1, default=1, help="seed of the random numbers (default: 1)")
     command.add_argument("--quake", action="store_true", help="random earthquakes instead")
+    command.add_argument(
+        "--mutate",
+        action="store_true",
+        help="instead put errors into copies of the package, one by one, and look in which random "
+        "dam the verification notices them; exit code 1 if more than one is not noticed",
+    )
     command.add_integer("--jobs", 1, help=JOBS)
     command.add_path(
         "--out", "FILE", default=Path("stress.csv"), help=f"{RESUMED} (default: stress.csv)"
@@ -26,6 +32,8 @@ def add(command: Parser) -> None:
 
 def call(arguments: argparse.Namespace) -> int:
     """Run damjoint stress; 1 if a run is a defect."""
+    if arguments.mutate:
+        return mutate(arguments)
     stress = tool("stress")
     options = arguments.seed, arguments.out, arguments.jobs, arguments.quake
     rows = stress.stress(arguments.count, *options)
@@ -36,3 +44,14 @@ def call(arguments: argparse.Namespace) -> int:
     counted = "; ".join(f"{number} {name}" for name, number in numbers.items())
     print(counted, arguments.out, sep="; ")
     return int(numbers[stress.DEFECT] > 0)
+
+
+def mutate(arguments: argparse.Namespace) -> int:
+    """Run damjoint stress --mutate; 1 if more than one mutation is not noticed."""
+    rows = tool("mutations").mutate(arguments.seed, arguments.out, arguments.jobs)
+    for row in rows:
+        noticed = f"{row['scene']}: {row['finding']}" if row["scene"] else "not noticed"
+        print(f"{row['mutation']}: {noticed}")
+    missed = sum(not row["scene"] for row in rows)
+    print(f"{len(rows) - missed} of {len(rows)} mutations noticed; {arguments.out}")
+    return int(missed > 1)

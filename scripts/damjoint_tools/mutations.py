@@ -1,0 +1,310 @@
+"""Mutations: errors put into a copy of the package, which the verification has to notice.
+
+Each one changes a single place of the source. The commands of random scenes are run with the copy
+until the verification finds something; the verification itself is that of this package.
+"""
+
+from __future__ import annotations
+
+import csv
+import itertools
+import os
+import shutil
+import tempfile
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from pathlib import Path
+
+import damjoint
+from damjoint import RunError
+from damjoint.progress import track
+
+from .random_quakes import random_quake
+from .random_scenes import RandomScene, random_scene
+from .stress import ONE_THREAD, run_of
+
+#: Folders beside scripts/ that the package reads.
+DATA = "pro", "geo", "cases", "reference"
+#: Columns of the result file.
+COLUMNS = ("mutation", "place", "relevant", "scene", "finding")
+#: Relevant scenes at most, and scenes that are drawn to find them.
+MOST_SCENES, MOST_DRAWN = 60, 600
+
+
+def everywhere(_: RandomScene) -> bool:
+    """Whether a mutation can matter in a scene: in all."""
+    return True
+
+
+def having(name: str, *values: object) -> Callable[[RandomScene], bool]:
+    """Whether a scene sets a parameter, to one of some values if there are any, at any joint."""
+
+    def matters(scene: RandomScene) -> bool:
+        value = scene.settings.get(name, 0)
+        found = value if isinstance(value, tuple) else (value,)
+        return any(v in values if values else v for v in found)
+
+    return matters
+
+
+def both(*conditions: Callable[[RandomScene], bool]) -> Callable[[RandomScene], bool]:
+    """Whether a scene fulfils all conditions."""
+    return lambda scene: all(matters(scene) for matters in conditions)
+
+
+def several(scene: RandomScene) -> bool:
+    """Whether a scene has several joints."""
+    return "lift_heights" in scene.settings
+
+
+def tail(scene: RandomScene) -> bool:
+    """Whether a scene has tailwater."""
+    return any(float(level) for level in scene.tail_levels.split(","))
+
+
+def levels(scene: RandomScene) -> bool:
+    """Whether a scene has several levels."""
+    return "," in scene.levels
+
+
+def drained(scene: RandomScene) -> bool:
+    """Whether a scene has drains that are no half as effective as none."""
+    drains = having("uplift", "drained")(scene) or having("drains", 1)(scene)
+    return drains and scene.settings.get("drain_effectiveness", 0.5) != 0.5
+
+
+@dataclass(frozen=True)
+class Mutation:
+    """An error: a text of a file of the package, which occurs once, and what replaces it."""
+
+    name: str
+    file: str
+    text: str
+    instead: str
+    #: whether it can matter in a scene
+    matters: Callable[[RandomScene], bool] = everywhere
+    #: looked for in earthquakes
+    quake: bool = False
+    #: the bodies' fields are needed to notice it
+    fields: bool = False
+
+    def make(self, folder: Path) -> Path:
+        """Copy the package into a folder with the error; returns the folder of its modules.
+
+        Raises ValueError if the text does not occur exactly once.
+        """
+        source = Path(damjoint.__file__).parent
+        copy = folder / "scripts" / source.name
+        shutil.copytree(source, copy, ignore=shutil.ignore_patterns("__pycache__"))
+        for name in DATA:
+            beside = source.parents[1] / name
+            if beside.exists() and not (copy / name).exists():
+                (folder / name).symlink_to(beside)
+        path = copy / self.file
+        before = path.read_text()
+        if before.count(self.text) != 1:
+            raise ValueError(
+                f"{self.name}: {self.file} has {before.count(self.text)} times: {self.text}"
+            )
+        path.write_text(before.replace(self.text, self.instead))
+        return copy.parent
+
+
+MUTATIONS = (
+    Mutation(
+        "drains: 1 - e for e",
+        "joint/water.py",
+        "drained = drained - effectiveness * np.maximum(",
+        "drained = drained - (1 - effectiveness) * np.maximum(",
+        both(drained, having("uplift", "drained")),
+    ),
+    Mutation(
+        "sign of the drains",
+        "joint/water.py",
+        "drained = drained - effectiveness * np.maximum(",
+        "drained = drained + effectiveness * np.maximum(",
+        having("uplift", "drained"),
+    ),
+    Mutation(
+        "drains of the first joint in all",
+        "joint/water.py",
+        'at = case["drain_x"] / self.joint.length',
+        'at = float(case.source.overrides["drain_x"][0]) / self.joint.length',
+        both(several, lambda s: "drained" in s.settings["uplift"][1:]),
+    ),
+    Mutation(
+        "square law for the cubic law of flow",
+        "joint/water.py",
+        "return factor**3, np.where(growing, 3 / narrowest * factor**2, 0)",
+        "return factor**2, np.where(growing, 2 / narrowest * factor, 0)",
+        having("uplift", "flow"),
+    ),
+    Mutation(
+        "G_t x 1.1",
+        "laws/bond.py",
+        'self.damage_per_slip = self.cohesion / (2 * p["G_t"])',
+        'self.damage_per_slip = self.cohesion / (2.2 * p["G_t"])',
+        both(having("law", "bond"), having("adhesion")),
+    ),
+    Mutation(
+        "bond strengths x 0.8",
+        "laws/bond.py",
+        'self.tensile_strength, self.cohesion, self.mu = p["sigma_max"], p["adhesion"], p["mu"]',
+        "self.tensile_strength, self.cohesion, self.mu = "
+        '0.8 * p["sigma_max"], 0.8 * p["adhesion"], p["mu"]',
+        both(having("law", "bond"), lambda s: having("adhesion")(s) or having("sigma_max")(s)),
+    ),
+    Mutation(
+        "maximum of the damage dropped",
+        "laws/bond.py",
+        "return np.maximum(damage, np.clip(share, 0, 1))",
+        "return np.clip(share, 0, 1)",
+        having("law", "bond"),
+    ),
+    Mutation(
+        "mu of the first joint in all laws",
+        "joint/equilibrium.py",
+        "JointLaws([own.law for own in case.joints])",
+        "JointLaws([own.with_values({'mu': case['mu']}).law for own in case.joints])",
+        both(several, having("law", "friction", "bond", "endo")),
+    ),
+    Mutation(
+        "alpha of rupture: tan(alpha pi/5)",
+        "laws/rupture.py",
+        "np.tan(self.alpha * np.pi / 4)",
+        "np.tan(self.alpha * np.pi / 5)",
+        both(having("law", "rupture"), having("alpha")),
+    ),
+    Mutation(
+        "K_T x 1.01",
+        "laws/friction.py",
+        'self.K_N, self.K_T, self.H = p["K_N"], p["K_T"], p["pena_tang"]',
+        'self.K_N, self.K_T, self.H = p["K_N"], 1.01 * p["K_T"], p["pena_tang"]',
+        having("law", "friction"),
+    ),
+    Mutation(
+        "thickness of the saw x 1.02",
+        "laws/friction.py",
+        'self.saw, self.saw_t = p["saw_thickness"], p["saw_t"]',
+        'self.saw, self.saw_t = 1.02 * p["saw_thickness"], p["saw_t"]',
+        both(having("saw_thickness"), having("law", "friction")),
+    ),
+    Mutation(
+        "silt x 1.02",
+        "joint/equilibrium.py",
+        'weight = grown * case["rho_silt"] * case["g"]',
+        'weight = 1.02 * grown * case["rho_silt"] * case["g"]',
+        having("silt_height"),
+    ),
+    Mutation(
+        "ice x 1.02",
+        "model/loads.py",
+        '"ice": (loads.ice_force, 0.0),',
+        '"ice": (1.02 * loads.ice_force, 0.0),',
+        having("ice_force"),
+    ),
+    Mutation(
+        "tailwater on the face x 1.02",
+        "joint/equilibrium.py",
+        "level = loading.tail if face.side in BY_TAIL else loading.level",
+        "level = 1.02 * loading.tail if face.side in BY_TAIL else loading.level",
+        tail,
+    ),
+    Mutation(
+        "added mass x 1.02",
+        "model/loads.py",
+        "factor = zangar_share(case, level) / 2 if zangar else 7 / 8",
+        "factor = 1.02 * (zangar_share(case, level) / 2 if zangar else 7 / 8)",
+        having("k_h"),
+    ),
+    Mutation(
+        "temperature x 1.1",
+        "model/loads.py",
+        "uniform = loads.expansion_dam * loads.temperature_dam",
+        "uniform = 1.1 * loads.expansion_dam * loads.temperature_dam",
+        having("temperature_dam"),
+        fields=True,
+    ),
+    Mutation(
+        "modulus of plane stress",
+        "fem/elasticity.py",
+        "return young * poisson / ((1 + poisson) * (1 - 2 * poisson)), young / (2 * (1 + poisson))",
+        "return young * poisson / (1 - poisson**2), young / (2 * (1 + poisson))",
+        having("nu"),
+        fields=True,
+    ),
+    Mutation(
+        "Poisson's ratio x 1.05",
+        "fem/elasticity.py",
+        "return young * poisson / ((1 + poisson) * (1 - 2 * poisson)), young / (2 * (1 + poisson))",
+        "return young * (p := 1.05 * poisson) / ((1 + p) * (1 - 2 * p)), young / (2 * (1 + p))",
+        having("nu"),
+        fields=True,
+    ),
+    Mutation(
+        "order of the levels",
+        "model/case.py",
+        "points, time = (0.0, *levels), min(time, len(levels))",
+        "points, time = (0.0, *levels[::-1]), min(time, len(levels))",
+        levels,
+    ),
+    Mutation(
+        "damping by the mass x 1.1",
+        "dynamics/stepper.py",
+        'a0 = a1 * w1 * w2 if case["damping_mass"] != WITHOUT else 0.0',
+        'a0 = 1.1 * a1 * w1 * w2 if case["damping_mass"] != WITHOUT else 0.0',
+        having("damping_mass"),
+        quake=True,
+    ),
+)
+
+
+def scenes_of(mutation: Mutation, seed: int, folder: Path) -> Iterator[tuple[str, RandomScene]]:
+    """Names and scenes of a seed in which a mutation can matter; folder: of records."""
+    draw = (lambda k: random_quake(seed, k, folder)) if mutation.quake else None
+    drawn = ((k, draw(k) if draw else random_scene(seed, k)) for k in range(MOST_DRAWN))
+    relevant = ((f"{seed}-{k}", scene) for k, scene in drawn if mutation.matters(scene))
+    return itertools.islice(relevant, MOST_SCENES)
+
+
+def look_for(mutation: Mutation, seed: int) -> dict[str, object]:
+    """Run the relevant scenes with a mutation until it is noticed; returns its row."""
+    row: dict[str, object] = {"mutation": mutation.name, "place": mutation.file, "relevant": 0}
+    with tempfile.TemporaryDirectory(prefix="damjoint-mutation-") as name:
+        folder = Path(name)
+        modules = mutation.make(folder)
+        os.environ |= ONE_THREAD | {"PYTHONPATH": str(modules)}
+        for scene_name, scene in scenes_of(mutation, seed, folder / "records"):
+            row["relevant"] = int(str(row["relevant"])) + 1
+            out = folder / scene_name
+            out.mkdir()
+            try:
+                run = run_of(scene, out, fields=mutation.fields)
+                found = run.violations()
+                wrong, remark = run.stop() if run.files.stopped else (False, "")
+                found += [remark] if wrong else []
+            except RunError as error:
+                found = [str(error)]
+            shutil.rmtree(out)
+            if found:
+                return row | {"scene": scene_name, "finding": found[0]}
+    return row
+
+
+def mutate(seed: int, out: Path, jobs: int | None = None) -> list[dict[str, str]]:
+    """Look for all mutations in the scenes of a seed, and write a table into a file; returns its
+    rows.
+    """
+    rows: dict[str, dict[str, object]] = {}
+    with ProcessPoolExecutor(jobs or os.cpu_count() or 1) as pool:
+        waiting = [pool.submit(look_for, mutation, seed) for mutation in MUTATIONS]
+        for future in track(as_completed(waiting), "mutate", len(waiting)):
+            row = future.result()
+            rows[str(row["mutation"])] = row
+    with out.open("w", newline="") as file:
+        table = csv.DictWriter(file, COLUMNS, restval="", lineterminator="\n")
+        table.writeheader()
+        table.writerows(rows[mutation.name] for mutation in MUTATIONS)
+    with out.open() as file:
+        return list(csv.DictReader(file))
