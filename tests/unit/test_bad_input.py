@@ -319,7 +319,53 @@ def test_a_value_beyond_any_material_or_load_is_refused(command, setting, limit)
     assert f"{name} = " in err and f"between -{limit} and {limit} " in err
 
 
-@pytest.mark.parametrize("modulus", [1e6, 1e20])
+@pytest.mark.parametrize(
+    "words, message",
+    [
+        ("law=friction K_N=1e5", "K_N = 100000: must be >= 2.354e+06 Pa/m (rho_dam g / 0.01: the"),
+        ("law=friction K_T=1e4", "K_T = 10000: must be >= 9.81e+05 Pa/m (rho_water g / 0.01: the"),
+        ("law=rupture pena_contact=1e-30", "pena_contact = 1e-30: must be >= 2.354e-05 (rho_dam g"),
+        (
+            "law=rupture pena_contact=1e20",
+            "pena_contact = 1e+20: must be <= 1.471e+06 (2e+08 E_dam",
+        ),
+        ("K_T=1e20", "K_T = 1e+20: must be <= 1.471e+17 Pa/m (2e+08 E_dam / L: beyond it"),
+        ("K_N=1e20 E_found=2e9", "K_N = 1e+20: must be <= 1.176e+16 Pa/m (2e+08 E_found / L"),
+        ("law=friction E=1e20 K_N=1e8", "K_N = 1e+08: must be >= 8.824e+10 Pa/m (3e-12 E_dam n_jo"),
+        ("E=1e7", "E_dam = 1e+07: must be >= 1.059e+07 Pa (rho_dam g H / 0.1: a small strain"),
+        ("E_found=1e7", "E_found = 1e+07: must be >= 1.059e+07 Pa (rho_dam g H / 0.1: a small"),
+        (
+            "lift_heights=20 law=friction K_T=1e10,1e4",
+            "lift 20 m: K_T = 10000: must be >= 9.81e+05",
+        ),
+    ],
+)
+def test_a_stiffness_that_makes_the_system_rounding_is_refused(command, words, message):
+    """Before, no equilibrium was found, as if the dam failed."""
+    settings = [word for setting in words.split() for word in ("--set", setting)]
+    code, out, err = command("run", "dam", *settings)
+    assert (code, out) == (2, "") and len(err.splitlines()) == 1 and message in err
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"law": "friction", "K_N": 2.4e6, "K_T": 1e6},
+        {"law": "friction", "K_N": 1.4e17, "K_T": 1.4e17},
+        {"law": "friction", "E": 1e20, "K_N": 4e9, "K_T": 4e9},
+        {"law": "friction", "E": 1.1e7},
+        {"law": "rupture", "pena_contact": 2.4e-5},
+        {"law": "rupture", "pena_contact": 1e6},
+    ],
+)
+def test_at_the_limits_of_the_stiffnesses_a_dam_stands(settings):
+    """By a joint that only slides and opens the dam stands whatever its stiffness: the limit level
+    of friction is that of statics.
+    """
+    assert dj.run(dj.case("dam", n_joint=20, **settings)).verdict == "stands"
+
+
+@pytest.mark.parametrize("modulus", [2e7, 1e20])
 def test_within_the_range_of_moduli_a_dam_stands(modulus):
     """Also with a rigid body, as of a published foundation."""
     for name in ("E", "E_dam", "E_found"):

@@ -26,6 +26,7 @@ from .constraints import (
     check_lifts,
     check_softening,
     check_steps,
+    check_stiffness,
     check_tail_levels,
     check_times,
     check_values,
@@ -263,8 +264,11 @@ class Case(ParameterValues):
         )
         several = tuple(of_joints) if len(joints) > 1 else ()
         case = replace(self, section=ends[0], of_joints=several)
-        for own in case.joints:
-            check_distances(own, own.section["joint_along"][0])
+        for own, joint in zip(case.joints, joints, strict=True):
+            length = own.section["joint_along"][0]
+            check_distances(own, length)
+            on_rock = joint.lower == "foundation" != joint.upper
+            check_stiffness(own, length, carries=on_rock, holds=len(joints) == 1)
         return case
 
     @cached_property

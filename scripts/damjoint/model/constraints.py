@@ -45,6 +45,14 @@ LARGEST = {
 LEAST_LENGTH = 1e-6
 #: The least Young's modulus [Pa], that of a soft soil.
 LEAST_MODULUS = 1e6
+#: The largest closure and shear of an undamaged joint under a column of concrete or water as high
+#: as the dam, over its height; the largest strain of the bodies under that of concrete. Beyond
+#: them the limit of small displacements would end a run, not the strength of the dam.
+LARGEST_CLOSURE, LARGEST_STRAIN = 0.01, 0.1
+#: The least stiffness of a joint, K L / (E n^2) with n elements, and the largest, K L / E. Below
+#: the first, rounding of the rigid motion on the joint in the stiffness of the dam exceeds 1e-4 of
+#: the stress; above the second, rounding of a slip or an opening in the points beside it does.
+LOOSEST, STIFFEST = 3e-12, 2e8
 #: Value of added_mass: Zangar's pressure in place of Westergaard's.
 ZANGAR = 2
 
@@ -74,6 +82,7 @@ def check_values(
     check_moduli(case)
     check_magnitudes(case)
     if by_parameters:
+        check_strain(case, case["dam_height"])
         check_section(case, section)
         check_distances(case, section["joint_along"][0])
     elif case["temperature_linear"]:
@@ -81,6 +90,8 @@ def check_values(
             f"temperature_linear = {case['temperature_linear']:g}: must be 0 with a geometry of "
             "one's own (it is linear between the faces of the section)"
         )
+    if by_parameters:
+        check_stiffness(case, section["joint_along"][0])
     check_drains(case)
     check_works(case)
     if not by_parameters and case["added_mass"] == ZANGAR:
@@ -111,6 +122,57 @@ def check_magnitudes(case: ParameterValues) -> None:
                 f"{name} = {case[name]:g}: must be between {-largest:g} and {largest:g} {unit}, "
                 "beyond any material or load"
             )
+
+
+def check_strain(case: ParameterValues, height: float) -> None:
+    """Young's moduli: strain at most LARGEST_STRAIN under a column of concrete of a height [m]."""
+    least = case["rho_dam"] * case["g"] * height / LARGEST_STRAIN
+    for name in ("E_dam", "E_found"):
+        if case[name] < least:
+            raise InputError(
+                f"{name} = {case[name]:g}: must be >= {least:.4g} Pa (rho_dam g H / "
+                f"{LARGEST_STRAIN:g}: a small strain under the weight of the dam, H = {height:g} m)"
+            )
+
+
+def check_stiffness(
+    case: ParameterValues, length: float, carries: bool = True, holds: bool = True
+) -> None:
+    """Stiffnesses of a joint of a length [m]: small closure and shear; rounding does not decide
+    whether there is an equilibrium. carries: whether a body stands on it (an open contraction joint
+    has next to none); holds: whether it alone holds a body against the water.
+    """
+    softer = "E_dam" if case["E_dam"] <= case["E_found"] else "E_found"
+    most = (
+        STIFFEST * case[softer] / length,
+        f"{STIFFEST:g} {softer} / L: beyond it rounding decides",
+    )
+    loosest = (
+        LOOSEST * case["E_dam"] * case["n_joint"] ** 2 / length,
+        f"{LOOSEST:g} E_dam n_joint^2 / L: below it rounding decides",
+    )
+    closes, shifts = (
+        (
+            case[density] * case["g"] / LARGEST_CLOSURE,
+            f"{density} g / {LARGEST_CLOSURE:g}: {what} by a small part of the dam's height",
+        )
+        for density, what in (
+            ("rho_dam", "the weight closes the joint"),
+            ("rho_water", "the water shifts the dam"),
+        )
+    )
+    limits = [("K_N", 1.0, closes), ("K_T", 1.0, shifts)]
+    if declared()["pena_contact"].matters_in(case.values):
+        limits.append(("pena_contact", case["K_N"], closes))
+    for name, factor, small in limits:
+        needed = holds if name == "K_T" else carries
+        least = [(">=", *small), (">=", *loosest)] if needed else []
+        for sign, bound, why in [*least, ("<=", *most)]:
+            if (case[name] * factor < bound) if sign == ">=" else (case[name] * factor > bound):
+                unit = " Pa/m" if factor == 1 else ""
+                raise InputError(
+                    f"{name} = {case[name]:g}: must be {sign} {bound / factor:.4g}{unit} ({why})"
+                )
 
 
 def check_energies(case: ParameterValues) -> None:

@@ -18,7 +18,7 @@ from ..csr import CsrMatrix
 from ..storage import check_end
 from .body import Body as Body
 from .case import Case, OfJoint, has_drains
-from .constraints import check_levels_on_mesh
+from .constraints import check_levels_on_mesh, check_strain
 from .cut import cut
 from .parameters import assignments, constants, listing, start_gmsh
 from .scene import (
@@ -309,6 +309,7 @@ def check_loads(case: Case, mesh: Mesh) -> None:
         case.source.check_lists([joint.name for joint in mesh.joints])
     heights = mesh.user_geometry.concrete[:, 1]
     low, high = float(heights.min()), float(heights.max())
+    check_strain(case, high - low)
     if case["face_load"] == "hydrostatic":
         for name, levels in (("levels", case.levels), ("tail_levels", case.tail_levels)):
             check_levels_on_mesh(name, levels, low, high)
