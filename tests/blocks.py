@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from damjoint.model.mesh import SIZE_OPTIONS
-from damjoint.model.parameters import start_gmsh
+from damjoint.input.parameters import start_gmsh
+from damjoint.mesh.generate import SIZE_OPTIONS
 
 #: Corners (x0, y0, x1, y1) of the rock [m].
 ROCK = -20.0, -20.0, 40.0, 0.0

@@ -6,7 +6,7 @@ import signal
 import pytest
 from damjoint import runner
 from damjoint.__main__ import OBJECTS
-from damjoint.model.case import load
+from damjoint.input.resolve import load
 from damjoint.threads import limited_threads
 
 

@@ -6,8 +6,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from damjoint.model.case import Case
-from damjoint.model.mesh import OWN_FACES, OWN_NAMES, SHAPES, Body, Mesh, dimension
+from damjoint.input.case import Case
+from damjoint.mesh.body import Body
+from damjoint.mesh.mesh import Mesh
+from damjoint.mesh.regions import OWN_FACES, OWN_NAMES, SHAPES, dimension
 
 KINDS = {shape: kind for kind, shape in SHAPES.items()}
 

@@ -4,8 +4,8 @@ import numpy as np
 from damjoint.dynamics.stepper import Earthquake
 from damjoint.fem.bodies import Bodies
 from damjoint.fem.cache import cached
+from damjoint.input.resolve import load
 from damjoint.joint.interface import Interface
-from damjoint.model.case import load
 from damjoint.solver.load_stepper import LoadStepper
 
 #: A rigid block on a rigid ground, with dry friction.

@@ -13,8 +13,10 @@ storage.py  atomic writes, locks on files and folders
 progress.py progress of long work, on a terminal and in redirected output
 processes.py work in several processes
 versions.py versions of the code and of what it uses, machine
-model/      data: parameters, case, mesh, loads, results
 laws/       the joint laws, one file each
+input/      parameters, case files, a case and its checks
+mesh/       meshes, by Gmsh or a user's own, with their regions and joints
+model/      loads, water between joints, results, notes on a case
 fem/        finite elements of the bodies, condensed onto the joint
 joint/      the joint between them: interpolation, water, residual and tangent
 solver/     load stepping, Newton's method, equilibrium path

@@ -19,7 +19,8 @@ import numpy as np
 
 from . import RunError
 from .engines import OnStep, Outcome
-from .model.case import Case, has_plane_fields
+from .input.case import Case
+from .input.refinement import has_plane_fields
 from .model.notes import remarks
 from .model.results import Results
 from .statics.verdict import stiffness_ratio

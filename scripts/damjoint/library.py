@@ -24,8 +24,9 @@ from . import ROUND_OFF, InputError, accuracy
 from .arrays import Array, Table, Value
 from .engines import Outcome, engine_of
 from .engines.condensed.solve import threads_of
+from .input.case import Case
+from .input.resolve import load, varied
 from .laws import LAWS, Law
-from .model.case import Case, load
 from .model.fields import Solution
 from .model.notes import notes
 from .model.results import HISTORY, Results, joint_columns, quake_columns
@@ -94,7 +95,7 @@ def case(
     """
     loading = as_list(levels), as_list(tail_levels), steps, accuracy
     if isinstance(source, Case):
-        return source.varied(parameters, *loading)
+        return varied(source, parameters, *loading)
     return load(str(source), parameters, *loading)
 
 
@@ -465,8 +466,8 @@ def critical(
     """
     from .studies.critical import Search
 
-    varied = as_case(source).varied(parameters, as_list(levels), as_list(tail_levels))
-    chosen = noted(varied)
+    changed = varied(as_case(source), parameters, as_list(levels), as_list(tail_levels))
+    chosen = noted(changed)
     search = Search(on_fixed_mesh(chosen), of)
     return Critical(search.run(), search)
 

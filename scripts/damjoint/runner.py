@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from . import accuracy
 from .engines import Outcome, engine_of
 from .fem.memory import sizes
-from .model.case import Case
+from .input.case import Case
 from .model.results import Results
 from .progress import Progress
 from .session import Session, end_of, session

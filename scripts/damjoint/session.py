@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from . import versions
-from .model.case import Case
+from .input.case import Case
 from .model.notes import remarks
 from .model.results import Results
 from .post import folder as folders

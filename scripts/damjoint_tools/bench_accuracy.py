@@ -10,7 +10,9 @@ from functools import partial
 import numpy as np
 from damjoint import accuracy as refinement
 from damjoint.engines import engine_of
-from damjoint.model.case import ACCURACIES, Case, load
+from damjoint.input.case import Case
+from damjoint.input.refinement import ACCURACIES
+from damjoint.input.resolve import load
 from damjoint.model.results import Results
 from damjoint.progress import track
 

@@ -19,8 +19,8 @@ from damjoint.engines.getdp import quake as getdp_quake
 from damjoint.fem import factor
 from damjoint.fem.bodies import Bodies
 from damjoint.fem.condensation import condense
+from damjoint.input.resolve import load
 from damjoint.joint.interface import Interface
-from damjoint.model.case import load
 from damjoint.progress import track
 from damjoint.solver.load_stepper import LoadStepper
 from damjoint.studies.critical import Search

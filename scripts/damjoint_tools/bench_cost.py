@@ -16,8 +16,9 @@ import numpy as np
 from damjoint import RunError
 from damjoint.fem.bodies import Bodies
 from damjoint.fem.condensation import condense
+from damjoint.input.case import Case
+from damjoint.input.resolve import load
 from damjoint.joint.interface import Interface, interface_of
-from damjoint.model.case import Case, load
 from damjoint.processes import pool_of
 from damjoint.progress import track
 from damjoint.runner import run

@@ -10,7 +10,8 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
-from damjoint.model.case import Case, load
+from damjoint.input.case import Case
+from damjoint.input.resolve import load
 from damjoint.post import validation
 from damjoint.runner import run
 from damjoint.storage import locked_folder

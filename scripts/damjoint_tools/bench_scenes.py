@@ -15,8 +15,9 @@ import numpy as np
 from damjoint import RunError
 from damjoint.fem.bodies import Bodies
 from damjoint.fem.condensation import condense
+from damjoint.input.case import Case
+from damjoint.input.resolve import load
 from damjoint.joint.interface import Interface
-from damjoint.model.case import Case, load
 from damjoint.model.fields import along
 from damjoint.model.results import Results
 from damjoint.post import tables

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 from damjoint.arrays import Array
+from damjoint.input.resolve import load
 from damjoint.laws import LAWS, Law
-from damjoint.model.case import load
 from damjoint.post.drawing import write_picture
 
 #: Strengths at which all laws have the same tensile strength, cohesion and fracture energies.

@@ -16,8 +16,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from damjoint.dynamics.frames import MOST_FRAMES
+from damjoint.input.parameters import declared
 from damjoint.laws import COLUMNS
-from damjoint.model.parameters import declared
 from damjoint.model.results import FLUX, HISTORY, JOINT, QUAKE, STEPS, THICKNESS
 from damjoint.post.validation import Comparison
 from damjoint.statics.gravity import LOADS
@@ -235,7 +235,7 @@ def face_integrations(published: list[Comparison]) -> str:
     """Table of the cases on the geometry of their files: published numbers, computed as published
     and with the exact pressure on the face.
     """
-    from damjoint.model.case import load
+    from damjoint.input.resolve import load
     from damjoint.post.validation import compare
     from damjoint.runner import run
 

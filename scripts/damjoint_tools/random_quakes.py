@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 from damjoint.arrays import Setting
-from damjoint.model.case import Case
+from damjoint.input.case import Case
 
 from .random_scenes import RandomNumbers, RandomScene, joint, mesh, of_joints
 

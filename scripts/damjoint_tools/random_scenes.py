@@ -6,8 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from damjoint.arrays import Setting
-from damjoint.model.case import Case, has_drains, load
-from damjoint.model.parameters import declared
+from damjoint.input.case import Case
+from damjoint.input.parameters import declared
+from damjoint.input.resolve import load
+from damjoint.input.values import has_drains
 
 #: Third number of the seed of the lift joints, and of temperature, works on the joint, waterstop,
 #: law = endo and variants of loads, which are drawn apart.

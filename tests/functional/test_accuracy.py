@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from damjoint import RunError, accuracy
 from damjoint.engines.condensed import solve as condensed
-from damjoint.model.case import load
+from damjoint.input.resolve import load
 
 #: A dam of ordinary stiffness that slips and opens at its heel.
 DAM = {"E_dam": 2e10, "E_found": 3e10, "K_N": 1e11, "K_T": 1e11}

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from closed_forms import BASE, CENTROID, HEIGHT, WATER, WEIGHT, slide_level
-from damjoint.model.case import load
+from damjoint.input.resolve import load, varied
 from damjoint.solver import path
 from damjoint.statics import gravity
 from damjoint.statics.verdict import highest_by_statics
@@ -340,7 +340,7 @@ def test_the_gravity_method_of_a_trial_has_the_values_of_its_case(of):
     drained = {"law": "bond", "uplift": "drained", "lift_heights": (12.0,), "mu": (0.9, 0.7)}
     search = Search(load("dam", DAM | drained | {"factor_mu": 1.2}), of)
     value = 1.3 * (1.0 if of == "strength" else search.own[of] or 0.1)
-    by_parser = search.own.varied(search.case_at(value).source.overrides)
+    by_parser = varied(search.own, search.case_at(value).source.overrides)
     blocks = [gravity.at(joint, 3.0) for joint in by_parser.joints]
     assert [b.SSF for b in search.gravity.rigid_blocks(value)] == [b.SSF for b in blocks]
     assert search.case_at(value) == by_parser

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from damjoint import InputError, RunError
 from damjoint.engines import engine_of
-from damjoint.model.case import load
+from damjoint.input.resolve import load
 from damjoint.statics import gravity
 from numpy.testing import assert_allclose
 from scipy import sparse

@@ -7,8 +7,9 @@ import pytest
 from blocks import write_blocks
 from damjoint import InputError, runner
 from damjoint.engines.getdp import law, solve
+from damjoint.input.case import Case
+from damjoint.input.resolve import load
 from damjoint.laws import LAWS
-from damjoint.model.case import Case, load
 from damjoint.model.results import JOINT, Results
 
 

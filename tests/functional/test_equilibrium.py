@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from closed_forms import BASE, CENTROID, WATER, WEIGHT, integral, resultants, slide_level, thrust
 from damjoint import InputError, runner
-from damjoint.model.case import load
+from damjoint.input.resolve import load
 from damjoint.statics import gravity
 from numpy.testing import assert_allclose
 

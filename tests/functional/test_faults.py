@@ -429,7 +429,7 @@ def test_mumps_out_of_memory_is_one_line(monkeypatch):
 def test_a_closed_pipe_is_an_error_also_after_gmsh_has_started():
     """Gmsh sets SIGPIPE to the system's default, which ends the process without a word."""
     code = (
-        "import os; from damjoint.model.parameters import start_gmsh; start_gmsh(); "
+        "import os; from damjoint.input.parameters import start_gmsh; start_gmsh(); "
         "end, pipe = os.pipe(); os.close(end); os.write(pipe, b'0')"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)

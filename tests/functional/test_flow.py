@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from closed_forms import BASE, WATER, differences
 from damjoint import runner
-from damjoint.model.case import load
+from damjoint.input.resolve import load
 from damjoint.statics import gravity
 from numpy.testing import assert_allclose
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from damjoint import RunError
 from damjoint.engines.getdp import process
-from damjoint.model.case import CASES
+from damjoint.input.case_names import CASES
 from damjoint.storage import locked_folder
 from test_output import read
 
@@ -213,7 +213,7 @@ def test_tailwater_in_the_history(command, tmp_path):
 def test_an_interrupted_run_writes_its_converged_steps(tmp_path, monkeypatch, engine):
     """Ctrl-C after the second step."""
     from damjoint import runner
-    from damjoint.model.case import load
+    from damjoint.input.resolve import load
 
     def interrupt(self, scene, now):
         if now > 1:

@@ -12,8 +12,8 @@ import pytest
 from damjoint import data, runner
 from damjoint.engines.getdp.process import find_getdp
 from damjoint.engines.getdp.tables import PRINTED, PRINTED_OF_JOINTS, complete_rows
-from damjoint.model.case import load
-from damjoint.model.parameters import parameter, start_gmsh
+from damjoint.input.parameters import parameter, start_gmsh
+from damjoint.input.resolve import load
 from matplotlib.image import imread
 
 #: An order 1 mesh that is solved in a second

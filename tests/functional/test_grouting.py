@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from damjoint.fem.elasticity import body_force, elasticity
 from damjoint.fem.elements import JOINT, Space, points_of
-from damjoint.model.case import load
-from damjoint.model.mesh import Body
+from damjoint.input.resolve import load
+from damjoint.mesh.body import Body
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 

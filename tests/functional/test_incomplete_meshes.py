@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from blocks import write_blocks
 from damjoint import InputError
-from damjoint.model.case import load
-from damjoint.model.mesh import Mesh, mesh_of
+from damjoint.input.resolve import load
+from damjoint.mesh.mesh import Mesh, mesh_of
 from damjoint.model.notes import notes, understood
 from own_mesh import OwnMesh
 

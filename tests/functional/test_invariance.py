@@ -5,7 +5,7 @@ import pytest
 from closed_forms import JUMPS_AND_STRESSES, differences
 from damjoint import runner
 from damjoint.engines.getdp import law
-from damjoint.model.case import load
+from damjoint.input.resolve import load
 from numpy.testing import assert_allclose
 
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 from damjoint import InputError, runner
+from damjoint.input.resolve import load
 from damjoint.joint.interface import interface_of
-from damjoint.model.case import load
-from damjoint.model.mesh import Mesh
+from damjoint.mesh.mesh import Mesh
 from damjoint.model.results import column_of
 from damjoint.post import stored
 from damjoint.solver.load_stepper import LoadStepper

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from damjoint.model import mesh
-from damjoint.model.case import load
+from damjoint.input.resolve import load
+from damjoint.mesh import mesh
 
 # Bulk and joint elements, from the table of the verification document.
 PUBLISHED = {

@@ -1,15 +1,16 @@
 """Notes on a case: the same from all commands; loads that never act are refused by all of them."""
 
 import json
+from functools import partial
 
 import pytest
 from damjoint import InputError
 from damjoint import library as dj
 from damjoint.gui.numbers import warnings
-from damjoint.model.case import load
-from damjoint.model.constraints import STAGED, WORKS
+from damjoint.input.constraints import STAGED, WORKS
+from damjoint.input.parameters import independent
+from damjoint.input.resolve import load, varied
 from damjoint.model.notes import notes
-from damjoint.model.parameters import independent
 from quakes import smooth_record
 
 #: A coarse dam with a law that has all works on the joint.
@@ -146,7 +147,8 @@ def test_a_load_that_never_acts_is_refused(load_name, parameter):
     (note,) = notes(load("dam", settings | {time: 2.5}, "6,9"))
     assert note == f"{part} t = 2"
     late = load("dam", {"law": law, time: 3.0}, "6,9")
-    changes = [late.varied] + [late.changed] * (parameter in independent())  # rows of a sweep
+    # rows of a sweep
+    changes = [partial(varied, late)] + [late.changed] * (parameter in independent())
     for change in changes:
         with pytest.raises(InputError, match=f"{time} = 3"):
             change({parameter: size})

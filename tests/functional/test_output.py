@@ -171,7 +171,7 @@ def test_fields_of_any_cells_are_read_as_they_were_written(tmp_path):
 def test_fields_for_gmsh(folder):
     """Each view has dam and foundation, a step per level with its time, the unit in its name."""
     import gmsh
-    from damjoint.model.parameters import start_gmsh
+    from damjoint.input.parameters import start_gmsh
 
     start_gmsh()
     history = read(folder / "history.csv")

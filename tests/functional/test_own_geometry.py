@@ -4,9 +4,9 @@ import gmsh
 import numpy as np
 import pytest
 from damjoint import InputError, runner
-from damjoint.model.case import load
-from damjoint.model.mesh import Mesh
-from damjoint.model.parameters import start_gmsh
+from damjoint.input.parameters import start_gmsh
+from damjoint.input.resolve import load
+from damjoint.mesh.mesh import Mesh
 from damjoint.statics.verdict import hints
 from numpy.polynomial.legendre import leggauss
 

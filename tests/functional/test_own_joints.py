@@ -6,9 +6,9 @@ from blocks import write_blocks
 from damjoint import InputError
 from damjoint.engines.condensed.solve import check
 from damjoint.engines.getdp import solve as getdp
+from damjoint.input.resolve import load
 from damjoint.joint.interface import interface_of
-from damjoint.model.case import load
-from damjoint.model.mesh import mesh_of
+from damjoint.mesh.mesh import mesh_of
 from damjoint.solver.load_stepper import LoadStepper
 from damjoint.statics.verdict import verdict
 

@@ -8,10 +8,10 @@ import pytest
 from damjoint import data
 from damjoint.engines.getdp.process import Runner, write_problem
 from damjoint.engines.getdp.tables import read_history
+from damjoint.input.resolve import load
 from damjoint.joint.interface import interface_of
 from damjoint.laws import LAWS, Law
-from damjoint.model.case import load
-from damjoint.model.mesh import mesh_of
+from damjoint.mesh.mesh import mesh_of
 from damjoint.post.pictures import shear_limit
 from damjoint.solver.load_stepper import LoadStepper
 from damjoint.statics.verdict import hints, verdict

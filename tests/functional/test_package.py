@@ -46,7 +46,7 @@ def test_the_wheel_runs_in_a_fresh_environment(tmp_path):
     for tool in ("bench_page", "stress", "pages"):  # of the commands bench and stress, and make
         call(python, "-c", f"import damjoint_tools.{tool}", cwd=elsewhere, env=environment)
     (elsewhere / "own.case").write_text('Include "presets/usace_usual.case";')
-    read = "from damjoint.model.case import load; print(load('own.case')['required_SSF'])"
+    read = "from damjoint.input.resolve import load; print(load('own.case')['required_SSF'])"
     assert call(python, "-c", read, cwd=elsewhere, env=environment) == "2.0\n"
     where = call(
         python, "-c", "import damjoint; print(damjoint.data('pro'))", cwd=elsewhere, env=environment

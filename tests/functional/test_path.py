@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from damjoint.model.case import load
+from damjoint.input.resolve import load
 from damjoint.statics.verdict import hints, statement, verdict
 from damjoint.studies.critical import Search
 

@@ -13,8 +13,8 @@ import damjoint as dj
 import numpy as np
 import pytest
 from damjoint import RunError
-from damjoint.model.case import load
-from damjoint.model.mesh import Body
+from damjoint.input.resolve import load
+from damjoint.mesh.body import Body
 from damjoint.post import pictures
 from damjoint.post.drawing import runs_of
 from damjoint.post.drawing_process import DrawingProcess, joined

@@ -8,7 +8,7 @@ from contextlib import redirect_stderr
 import pytest
 from damjoint import progress
 from damjoint.fem.memory import joint_size, joints_size, sizes
-from damjoint.model.case import load
+from damjoint.input.resolve import load
 from damjoint.progress import Progress, track
 
 SMALL = ("--set", "n_joint=10", "--set", "h_dam=15", "--set", "h_found=60")

@@ -9,9 +9,9 @@ from functools import partial
 import numpy as np
 import pytest
 from damjoint import InputError, runner
+from damjoint.input.parameters import AUTOMATIC, declared
+from damjoint.input.resolve import load
 from damjoint.laws import COLUMNS
-from damjoint.model.case import load
-from damjoint.model.parameters import AUTOMATIC, declared
 from damjoint.model.results import FLUX, HISTORY, JOINT
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st

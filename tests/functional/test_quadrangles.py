@@ -5,7 +5,7 @@ import pytest
 from closed_forms import differences
 from damjoint import data
 from damjoint.engines import engine_of
-from damjoint.model.case import load
+from damjoint.input.resolve import load
 from damjoint.statics.verdict import hints
 from numpy.testing import assert_allclose
 

@@ -19,7 +19,7 @@ from damjoint.dynamics.step import TimeStep
 from damjoint.fem import factor
 from damjoint.fem.bodies import Bodies, material_of
 from damjoint.fem.elasticity import stress
-from damjoint.model.case import load
+from damjoint.input.resolve import load
 from damjoint.solver.history import joint_row
 from damjoint.studies import chart, outcome, quake_study, quake_summary, sweep
 from damjoint.studies.plan import Plan

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from damjoint.dynamics.history import QuakeHistory
 from damjoint.engines.getdp import quake as engine
-from damjoint.model.case import load
+from damjoint.input.resolve import load
 from damjoint.post import folder
 from damjoint.studies import quake_getdp
 from quakes import DAM, earthquake, smooth_record, write_record

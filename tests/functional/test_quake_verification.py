@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from damjoint.dynamics.frames import MOST_FRAMES
-from damjoint.model.case import load
+from damjoint.input.resolve import load
 from damjoint.post.tables import EXACT, write_csv
 from damjoint.studies import quake_study
 from damjoint.studies.quake_study import Options

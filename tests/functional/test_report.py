@@ -10,7 +10,7 @@ import sys
 import numpy as np
 import pytest
 from damjoint import cli
-from damjoint.model.case import load
+from damjoint.input.resolve import load
 from damjoint.post import stored
 from damjoint.post.pictures import shear_limit
 from damjoint.statics import gravity

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import pytest
 from damjoint import InputError, data
-from damjoint.model.case import load
-from damjoint.model.mesh import mesh_of
+from damjoint.input.resolve import load, varied
+from damjoint.mesh.mesh import mesh_of
 from damjoint.processes import ProcessKilled, pool_of
 from damjoint.studies import keys
 from damjoint.studies.plan import Plan
@@ -67,11 +67,11 @@ def test_the_key_of_a_geometry_follows_the_values_and_files_that_it_uses(tmp_pat
     (tmp_path / "own.case").write_text('geometry = "own.geo";\nlevels() = {1};\n')
     case = load(str(tmp_path / "own.case"))
     mesh = mesh_of(case)
-    assert mesh_of(case.varied({"silt_height": 0.5, "mu": 0.7})) is mesh
+    assert mesh_of(varied(case, {"silt_height": 0.5, "mu": 0.7})) is mesh
     (tmp_path / "inner.geo").write_text(f"{text}\nused = silt_height;\n")
     other = mesh_of(case)
-    assert other is not mesh and mesh_of(case.varied({"mu": 0.7})) is other
-    assert mesh_of(case.varied({"silt_height": 0.5})) is not other
+    assert other is not mesh and mesh_of(varied(case, {"mu": 0.7})) is other
+    assert mesh_of(varied(case, {"silt_height": 0.5})) is not other
 
 
 @pytest.mark.parametrize(

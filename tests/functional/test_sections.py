@@ -5,7 +5,7 @@ integration of sections.py, cracked uplift against the gravity method.
 import numpy as np
 import pytest
 from damjoint import InputError
-from damjoint.model.case import load
+from damjoint.input.resolve import load
 from damjoint.statics import gravity
 from numpy.testing import assert_allclose
 from sections import resultants

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 from damjoint.engines.getdp import process
+from damjoint.input.resolve import load
 from damjoint.laws.friction import FrictionVariables
-from damjoint.model.case import load
-from damjoint.model.mesh import mesh_of
+from damjoint.mesh.mesh import mesh_of
 from damjoint.solver.load_stepper import LoadStepper
 from damjoint.statics.verdict import verdict
 

@@ -11,7 +11,8 @@ from dataclasses import replace
 
 import pytest
 from closed_forms import slide_level
-from damjoint.model.case import CASES, load
+from damjoint.input.case_names import CASES
+from damjoint.input.resolve import load, varied
 from damjoint.post.units import LENGTHS
 from damjoint.statics import gravity
 from damjoint.studies import chart, sweep
@@ -272,7 +273,7 @@ def test_the_search_of_a_row_is_that_of_its_case():
         search = task.search()
         settings = base.source.overrides | row
         own = load("dam", settings, levels=base.levels, tail_levels=base.tail_levels)
-        assert search.base == replace(own.varied(search.settings), published=False)
+        assert search.base == replace(varied(own, search.settings), published=False)
         assert search.own == replace(own, published=False)
 
 

@@ -12,9 +12,9 @@ import pytest
 from damjoint import InputError, data
 from damjoint.engines.getdp.process import find_getdp
 from damjoint.fem.cache import key_of
-from damjoint.model.case import load
+from damjoint.input.parameters import start_gmsh
+from damjoint.input.resolve import load
 from damjoint.model.loads import Loading
-from damjoint.model.parameters import start_gmsh
 from numpy.testing import assert_allclose
 
 #: A weightless wall, 2 m thick and 20 m high, free to slide on its base.

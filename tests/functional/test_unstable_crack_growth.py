@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from damjoint.input.resolve import load
 from damjoint.laws import LAWS
-from damjoint.model.case import load
 from damjoint.statics.verdict import hints, verdict
 from damjoint_witness.files import Files
 from damjoint_witness.verify import Witness

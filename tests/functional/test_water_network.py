@@ -7,8 +7,8 @@ import pytest
 from blocks import write_blocks
 from damjoint import InputError
 from damjoint.engines.condensed.solve import check
+from damjoint.input.resolve import load
 from damjoint.joint.interface import interface_of
-from damjoint.model.case import load
 from damjoint.model.loads import Loading
 from damjoint.solver.load_stepper import LoadStepper
 from damjoint.solver.model import Model

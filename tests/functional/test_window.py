@@ -23,8 +23,8 @@ from damjoint.gui.sheet import Request, case_text, check_request, titles
 from damjoint.gui.views import caption
 from damjoint.gui.window import ACTION, Session
 from damjoint.gui.worker import EngineProcess
-from damjoint.model.case import load
-from damjoint.model.mesh import mesh_of
+from damjoint.input.resolve import load
+from damjoint.mesh.mesh import mesh_of
 from damjoint.post.units import LENGTHS
 from damjoint.statics.verdict import hints
 from damjoint.studies.check import compare_methods

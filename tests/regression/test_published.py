@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from damjoint.input.resolve import load
 from damjoint.joint.equilibrium import Equilibrium
 from damjoint.joint.interface import interface_of
-from damjoint.model.case import load
 from damjoint.model.loads import Loading
 from damjoint.post import validation
 from damjoint.studies import validate

@@ -21,8 +21,8 @@ from damjoint.engines.condensed.recover import recover
 from damjoint.fem.bodies import Bodies
 from damjoint.fem.condensation import condense
 from damjoint.fem.elements import pairs_of
+from damjoint.input.resolve import load
 from damjoint.joint.interface import Interface
-from damjoint.model.case import load
 from damjoint.post import validation
 from damjoint.solver.load_stepper import LoadStepper
 from damjoint.studies import quake_tests

@@ -276,7 +276,7 @@ def test_a_bad_case_has_no_effect_on_the_next_one(tmp_path):
     )
     script = """
 from damjoint import InputError
-from damjoint.model.case import load
+from damjoint.input.resolve import load
 try:
     load("bad.case")
 except InputError:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from damjoint import storage
 from damjoint.fem import cache
-from damjoint.model.case import load
+from damjoint.input.resolve import load
 
 SMALL = {"n_joint": 6.0, "h_dam": 4.0, "h_found": 4.0}
 

@@ -5,8 +5,9 @@ import os
 import gmsh
 import pytest
 from damjoint import InputError
-from damjoint.model import casefile, parameters
-from damjoint.model.case import CASES, load
+from damjoint.input import casefile, parameters
+from damjoint.input.case_names import CASES
+from damjoint.input.resolve import load
 from damjoint.post import validation
 
 #: With a list of texts, one for each joint, which Gmsh writes in another way.

@@ -7,7 +7,7 @@ from damjoint.fem.bodies import Bodies
 from damjoint.fem.condensation import responses_body_by_body
 from damjoint.fem.glued_elimination import responses_at_once
 from damjoint.fem.gluing import Gluing
-from damjoint.model.case import load
+from damjoint.input.resolve import load
 
 
 @pytest.mark.parametrize(

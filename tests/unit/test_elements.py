@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from damjoint.fem.elasticity import at_middles, body_force, elasticity, mass, stress, thermal_load
 from damjoint.fem.elements import CORNERS, Space, basis, corners_of
-from damjoint.model.mesh import Body
+from damjoint.mesh.body import Body
 from scipy.sparse.linalg import spsolve
 
 #: Numbers of functions: quadratic on simplices, products of quadratic ones on other shapes.

@@ -8,8 +8,8 @@ from pathlib import Path
 import damjoint
 import pytest
 from damjoint import cli
+from damjoint.input.parameters import declared
 from damjoint.laws import COLUMNS, LAWS
-from damjoint.model.parameters import declared
 from damjoint.model.results import FLUX, HISTORY, JOINT, QUAKE
 from damjoint.studies.check import CHECK
 from damjoint.studies.failure_path import CRITICAL

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from closed_forms import BASE, CENTROID, WEIGHT, resultants, slide_level
-from damjoint.model.case import load
+from damjoint.input.resolve import load
 from damjoint.statics import gravity
 from numpy.testing import assert_allclose
 from scipy.integrate import quad

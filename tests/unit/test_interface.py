@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from damjoint.fem.bodies import Bodies
 from damjoint.fem.condensation import condense
+from damjoint.input.resolve import load
 from damjoint.joint import interface as joint_interface
 from damjoint.joint import linear_system
 from damjoint.joint.flow import FlowDerivative
 from damjoint.joint.interface import Interface, LastInterface
 from damjoint.joint.linear_system import Border, lu_solve
-from damjoint.model.case import load
 from numpy.testing import assert_allclose
 
 SMALL = {"n_joint": 10.0, "h_dam": 3.0, "h_found": 4.0, "order": 2.0}

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from damjoint import InputError
 from damjoint.engines.getdp import law
-from damjoint.model.case import load
+from damjoint.input.resolve import load
 from numpy.testing import assert_allclose
 
 K_N, K_T, F, C, MU = 1e11, 5e10, 2e5, 3e5, 0.7

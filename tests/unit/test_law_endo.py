@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from damjoint import InputError
 from damjoint.engines.getdp import law
-from damjoint.model.case import load
+from damjoint.input.resolve import load
 from numpy.testing import assert_allclose
 from scipy.optimize import brentq
 

@@ -11,9 +11,9 @@ from damjoint_tools import pages
 PACKAGE = Path(damjoint.__file__).parent
 WITNESS = PACKAGE.with_name("damjoint_witness")
 #: Each part uses only those before it.
-PARTS = ["", "csr", "threads", "storage", "progress", "processes", "versions", "laws", "model"]
-PARTS += ["fem", "joint", "solver", "dynamics", "engines", "statics", "post", "accuracy"]
-PARTS += ["session", "runner", "studies", "library", "gui", "cli", "__main__"]
+PARTS = ["", "csr", "threads", "storage", "progress", "processes", "versions", "laws", "input"]
+PARTS += ["mesh", "model", "fem", "joint", "solver", "dynamics", "engines", "statics", "post"]
+PARTS += ["accuracy", "session", "runner", "studies", "library", "gui", "cli", "__main__"]
 
 
 def part_of(path):

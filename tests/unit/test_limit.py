@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import pytest
 from closed_forms import BASE, resultants
+from damjoint.input.resolve import load
 from damjoint.joint.interface import interface_of
-from damjoint.model.case import load
 from damjoint.statics.limit import mechanism
 
 COARSE = {"n_joint": 10, "pena_tang": 0, "law": "friction", "uplift": "imposed"}

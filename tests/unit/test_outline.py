@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from damjoint.model.case import load
+from damjoint.input.resolve import load
+from damjoint.mesh.body import Body
 from damjoint.model.fields import (
     BROKEN,
     CLOSED,
@@ -13,7 +14,6 @@ from damjoint.model.fields import (
     row_of_nodes,
     state_of,
 )
-from damjoint.model.mesh import Body
 from damjoint.post.outline import JointLine, fill_to_level, section_of, skin
 from damjoint.post.units import FORCES, LENGTHS, unit, with_unit
 from numpy.testing import assert_allclose

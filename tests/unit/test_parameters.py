@@ -6,10 +6,11 @@ from typing import get_args
 import numpy as np
 import pytest
 from damjoint import InputError
-from damjoint.model import parameters
-from damjoint.model.case import CASES, as_published, load
-from damjoint.model.parameters import independent
-from damjoint.model.values import TextName
+from damjoint.input import parameters
+from damjoint.input.case_names import CASES
+from damjoint.input.parameters import independent
+from damjoint.input.resolve import as_published, load
+from damjoint.input.values import TextName
 from numpy.testing import assert_allclose
 
 # Values of each modeling in the verification document and the published test files.

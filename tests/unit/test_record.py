@@ -7,7 +7,7 @@ import pytest
 from damjoint import InputError
 from damjoint.dynamics.record import MOST_STEPS, Record, read
 from damjoint.dynamics.rigid_block import RigidBlock
-from damjoint.model.case import load
+from damjoint.input.resolve import load
 from quakes import write_record
 
 

@@ -1,7 +1,7 @@
 """damjoint new: a case file that runs as it is and has all parameters."""
 
-from damjoint.model import casefile, parameters
-from damjoint.model.case import load
+from damjoint.input import casefile, parameters
+from damjoint.input.resolve import load
 
 
 def test_the_new_case_is_the_dam_of_the_defaults(command, tmp_path):

@@ -8,9 +8,9 @@ import gmsh
 import pytest
 from damjoint import InputError, data
 from damjoint.engines.getdp.process import find_getdp
-from damjoint.model import casefile, parameters
-from damjoint.model.arithmetic import units
-from damjoint.model.case import load
+from damjoint.input import casefile, parameters
+from damjoint.input.arithmetic import units
+from damjoint.input.resolve import load
 from damjoint.studies.plan import plan_of, sample_of
 
 UNITS = data("pro") / "units.pro"

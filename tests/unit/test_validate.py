@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from damjoint.engines.getdp.tables import nodes_of
-from damjoint.model.case import load
+from damjoint.input.resolve import load
 from damjoint.model.results import HISTORY, JOINT, Results
 from damjoint.post import validation
 from damjoint.statics.verdict import failed, statement, verdict

@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from damjoint.model.case import OfJoint, load
+from damjoint.input.case import OfJoint
+from damjoint.input.resolve import load
 from damjoint.model.results import HISTORY, Results
 from damjoint.statics import verdict
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from .. import InputError
 
 if TYPE_CHECKING:
-    from ..model.case import Case
+    from ..input.case import Case
 
 
 def load_case(arguments: argparse.Namespace, name: str) -> Case:
@@ -27,8 +27,8 @@ def load_cases(
     """Load cases with the options of a command, each with the records of earthquakes, None for its
     own; print the remarks on them, and a warning if 3D runs are slow.
     """
-    from ..model import parameters
-    from ..model.case import load
+    from ..input import parameters
+    from ..input.resolve import load
     from ..model.notes import remarks
 
     options = ("levels", "tail_levels", "steps", "accuracy")

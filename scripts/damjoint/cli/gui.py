@@ -23,7 +23,7 @@ def call(arguments: argparse.Namespace) -> int:
     """Run damjoint gui; 0 when the window is closed."""
     from ..gui.sheet import Request
     from ..gui.window import gui
-    from ..model import parameters
+    from ..input import parameters
 
     gui(Request(arguments.case, parameters.settings(arguments.settings)))
     return 0

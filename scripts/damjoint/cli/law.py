@@ -27,7 +27,7 @@ def add(command: Parser) -> None:
 
 def call(arguments: argparse.Namespace) -> int:
     """Run damjoint law."""
-    from ..model import parameters
+    from ..input import parameters
     from ..studies import law_path
 
     settings = parameters.settings(arguments.settings)

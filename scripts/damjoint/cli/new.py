@@ -16,7 +16,7 @@ def add(command: Parser) -> None:
 
 def call(arguments: argparse.Namespace) -> int:
     """Run damjoint new."""
-    from ..model import template
+    from ..input import template
 
     template.write(arguments.path)
     print(f"{arguments.path}: a 45 m dam on rock; damjoint run {arguments.path}")

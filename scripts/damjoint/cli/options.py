@@ -69,7 +69,7 @@ def integer(name: str, text: str, least: int) -> int:
 
 def slip(name: str, text: str) -> float:
     """Return an argument as a length [m]. Raises InputError."""
-    from ..model.arithmetic import number
+    from ..input.arithmetic import number
 
     try:
         value = number(text)
@@ -96,7 +96,7 @@ def path(name: str, text: str) -> Path:
 
 def levels(name: str, text: str) -> tuple[float, ...]:
     """Return an argument as water levels [m]. Raises InputError."""
-    from ..model.parameters import levels_of
+    from ..input.parameters import levels_of
 
     return levels_of(name, text)
 

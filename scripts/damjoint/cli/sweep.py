@@ -23,7 +23,7 @@ from .options import (
 )
 
 if TYPE_CHECKING:
-    from ..model.case import Case
+    from ..input.case import Case
     from ..studies.plan import Plan, Row
 
 
@@ -97,7 +97,7 @@ def add(command: Parser) -> None:
 
 def call(arguments: argparse.Namespace) -> int:
     """Run damjoint sweep."""
-    from ..model import parameters
+    from ..input import parameters
     from ..studies.plan import cases_of, plan_of, sample_of
     from ..studies.sweep import meshed, sweep
 

@@ -24,8 +24,8 @@ from ..arrays import Array, Sparse
 from ..fem.bodies import Bodies
 from ..fem.elasticity import elasticity, lame, mass
 from ..fem.elements import WATER, Space, points_of
-from ..model.case import Case
-from ..model.mesh import outward
+from ..input.case import Case
+from ..mesh.sides import outward
 from .record import Record
 from .system import ROCK
 

@@ -18,7 +18,7 @@ import numpy as np
 from .. import __version__
 from ..arrays import Array
 from ..fem.cache import key_of, sources
-from ..model.case import Case
+from ..input.case import Case
 from ..storage import read_entry, write_entry
 from .history import Peak, QuakeHistory
 from .scheme import Motion

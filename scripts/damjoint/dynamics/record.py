@@ -12,8 +12,8 @@ import numpy as np
 
 from .. import ROUND_OFF, InputError
 from ..arrays import Array, IntArray
-from ..model.case import Case
-from ..model.parameters import TINY
+from ..input.case import Case
+from ..input.parameters import TINY
 from ..storage import text_of
 
 #: Standard gravity [m/s2], for records in g.

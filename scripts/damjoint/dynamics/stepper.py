@@ -11,7 +11,7 @@ import numpy as np
 from .. import ROUND_OFF, RunError
 from ..arrays import Array, Sparse
 from ..fem.bodies import Bodies
-from ..model.case import Case
+from ..input.case import Case
 from ..solver.model import LARGEST_JUMP, Model
 from ..solver.newton import Diverged
 from ..solver.state import State

@@ -23,12 +23,12 @@ from ..fem.elements import Space
 from ..fem.factor import partial_factors
 from ..fem.glued_bodies import GluedBodies
 from ..fem.gluing import Gluing
+from ..input.case import Case
+from ..input.parameters import TINY
+from ..input.scene import UP
 from ..joint.interface import Interface, JointInterface
 from ..joint.wet_faces import WetFace
-from ..model.case import Case
 from ..model.loads import AddedPressure
-from ..model.parameters import TINY
-from ..model.scene import UP
 
 #: Displacement (n, 3) of points (n, 3) in a rigid motion.
 Motion = Callable[[Array], Array]

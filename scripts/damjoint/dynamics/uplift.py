@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays import Array, BoolArray
+from ..input.case import Case
 from ..joint.water import JointWater, Pressure
-from ..model.case import Case
 from ..solver.state import State
 from .step import Problem
 

@@ -14,8 +14,8 @@ from types import ModuleType
 from typing import TYPE_CHECKING
 
 from .. import InputError
-from ..model.case import Case
-from ..model.mesh import Mesh
+from ..input.case import Case
+from ..mesh.mesh import Mesh
 from ..model.results import Results
 
 if TYPE_CHECKING:

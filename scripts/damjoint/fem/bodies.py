@@ -10,10 +10,11 @@ import numpy as np
 
 from ..arrays import Array, IntArray, distinct
 from ..csr import CsrMatrix
-from ..model.case import Case
+from ..input.case import Case
+from ..input.scene import LINES, MATERIALS
+from ..mesh.body import Body
+from ..mesh.mesh import Mesh, mesh_of
 from ..model.loads import COMPLETE, across, thermal_strains, wet
-from ..model.mesh import Body, Mesh, mesh_of
-from ..model.scene import LINES, MATERIALS
 from .elasticity import (
     Distribution,
     Material,

@@ -20,10 +20,13 @@ import numpy as np
 
 from .. import RunError, __version__, data
 from ..arrays import Array
-from ..model.case import Case
+from ..input.case import Case
+from ..input.scene import MATERIALS
+from ..mesh.body import Body
+from ..mesh.generate import shares
+from ..mesh.joint_mesh import Face, JointMesh
+from ..mesh.mesh import Mesh, mesh_of
 from ..model.loads import COMPLETE, overtopped, thermal_strains, wet_segments
-from ..model.mesh import Body, Face, JointMesh, Mesh, mesh_of, shares
-from ..model.scene import MATERIALS
 from ..storage import cache_folder, read_entry, write_entry
 from .condensed import Condensed, CondensedJoint, JointDofs
 from .memory import check_size
@@ -68,16 +71,11 @@ def fingerprint(mesh: Mesh) -> str:
     return digest.hexdigest()
 
 
-#: The files of the package that meshes and the stored classes depend on, beside those of fem/.
-MESHES = ("csr.py", *(f"model/{n}.py" for n in ("body", "cut", "mesh", "skin", "user_geometry")))
-
-
 @lru_cache(maxsize=1)
 def sources() -> str:
     """Checksum of the files by which condensed bodies are computed: meshes and elements."""
     package = Path(__file__).parents[1]
-    meshes = (package / name for name in MESHES)
-    code = *meshes, *sorted((package / "fem").glob("*.py"))
+    code = package / "csr.py", *sorted(package.glob("mesh/*.py")), *sorted(package.glob("fem/*.py"))
     shapes = data("pro") / "section.pro", *sorted(data("geo").glob("*.geo"))
     texts = [path.read_bytes() for path in (*shapes, *code)]
     return f"{zlib.crc32(b''.join(texts)):08x}"

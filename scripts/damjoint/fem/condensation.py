@@ -30,7 +30,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Array, IntArray, distinct, others
-from ..model.case import Case
+from ..input.case import Case
 from ..threads import scipy_linalg
 from . import factor
 from .bodies import Bodies, ElasticBody

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from ..arrays import Array, IntArray
 from ..csr import CsrMatrix
-from ..model.mesh import Face, JointMesh
+from ..mesh.joint_mesh import Face, JointMesh
 from .responses import Responses
 
 

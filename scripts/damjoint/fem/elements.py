@@ -15,7 +15,7 @@ import numpy as np
 
 from ..arrays import Array, IntArray
 from ..csr import CsrMatrix, stacked
-from ..model.mesh import Body
+from ..mesh.body import Body
 
 #: Corners of the reference elements, by node number.
 CORNERS: dict[str, list[tuple[float, ...]]] = {

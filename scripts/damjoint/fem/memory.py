@@ -7,7 +7,7 @@ import resource
 from pathlib import Path
 
 from .. import RunError
-from ..model.case import Case
+from ..input.case import Case
 
 #: Part of a limited address space that buffers of libraries take [bytes].
 BUFFERS = 0.15e9

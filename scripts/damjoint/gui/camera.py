@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import gmsh
 import numpy as np
 
-from ..model.case import Case
+from ..input.case import Case
+from ..mesh.body import Body
 from ..model.loads import Loading, line_forces
-from ..model.mesh import Body
 from .layout import ABOVE, BELOW, MARGIN, Layout
 
 #: Foundation shown beside and below the dam, over its height.

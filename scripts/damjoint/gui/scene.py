@@ -9,9 +9,9 @@ import numpy as np
 from .. import InputError, RunError, accuracy
 from ..arrays import Table as Columns
 from ..engines import Outcome
+from ..mesh.body import Body
 from ..model.fields import Field
 from ..model.loads import Loading
-from ..model.mesh import Body
 from ..model.results import Results
 from ..post.summary import Table
 from ..runner import early_end

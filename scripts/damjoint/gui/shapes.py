@@ -14,8 +14,10 @@ import numpy as np
 
 from .. import ROUND_OFF
 from ..arrays import Table
+from ..input.case import Case
+from ..input.scene import BED, DOWN, FLOOR, SIDES, TOP, UP
 from ..laws import Law
-from ..model.case import Case
+from ..mesh.body import Body
 from ..model.fields import (
     BROKEN,
     SLIPPED,
@@ -26,9 +28,7 @@ from ..model.fields import (
     state_of,
 )
 from ..model.loads import Loading, line_forces
-from ..model.mesh import Body
 from ..model.results import Results
-from ..model.scene import BED, DOWN, FLOOR, SIDES, TOP, UP
 from ..post.outline import exaggeration, joint_lines, section_of, skin
 from ..post.units import FORCES, with_unit
 from .camera import Camera, result_camera, undeformed_camera

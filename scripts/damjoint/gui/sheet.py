@@ -15,9 +15,12 @@ import gmsh
 from .. import InputError
 from ..accuracy import REFINED
 from ..arrays import Setting, Settings
-from ..model import casefile
-from ..model.case import CASES, Case, case_file, first_mesh, load
-from ..model.parameters import INCLUDE, assignments, checked, declared, listing, parse_by_gmsh
+from ..input import casefile
+from ..input.case import Case
+from ..input.case_names import CASES, case_file
+from ..input.parameters import INCLUDE, assignments, checked, declared, listing, parse_by_gmsh
+from ..input.refinement import first_mesh
+from ..input.resolve import load
 from ..studies import quake
 
 

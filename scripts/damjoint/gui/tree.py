@@ -16,8 +16,9 @@ import gmsh
 
 from .. import InputError
 from ..dynamics.frames import MOST_FRAMES
-from ..model.case import ACCURACIES, Case
-from ..model.parameters import AUTOMATIC, Parameter, levels_of
+from ..input.case import Case
+from ..input.parameters import AUTOMATIC, Parameter, levels_of
+from ..input.refinement import ACCURACIES
 from . import views
 from .scene import SolvedScene
 from .sheet import Request, Sheet

@@ -13,7 +13,7 @@ from textwrap import wrap
 import gmsh
 import numpy as np
 
-from ..model.case import Case
+from ..input.case import Case
 from ..model.fields import (
     BROKEN,
     CLOSED,

@@ -16,9 +16,9 @@ from typing import Any
 import gmsh
 
 from .. import InputError, RunError, data
-from ..model.case import Case
-from ..model.mesh import as_text, shares
-from ..model.parameters import listing, start_gmsh
+from ..input.case import Case
+from ..input.parameters import listing, start_gmsh
+from ..mesh.generate import as_text, shares
 from . import export, tree, views
 from .camera import result_camera, undeformed_camera
 from .gallery import RED, Gallery

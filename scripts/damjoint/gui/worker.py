@@ -19,8 +19,8 @@ from typing import Any, TypeAlias
 
 from .. import InputError, accuracy
 from ..engines.condensed import solve as engine
-from ..model.case import Case
-from ..model.parameters import declared
+from ..input.case import Case
+from ..input.parameters import declared
 from ..runner import write_outcomes
 from ..session import session
 from ..storage import atomic_write

@@ -14,9 +14,9 @@ from functools import lru_cache
 import numpy as np
 
 from ..arrays import Array
-from ..model.case import Case
+from ..input.case import Case
+from ..input.scene import BED, DOWN
 from ..model.loads import AddedPressure, Loading, line_forces, thermal_strains, water_column
-from ..model.scene import BED, DOWN
 from .flow import FlowDerivative, FlowSolution
 from .interface import Interface
 from .joint_laws import TANGENT, JointLaws, JointVariables, Mode

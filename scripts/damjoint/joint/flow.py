@@ -12,7 +12,7 @@ import numpy as np
 from ..arrays import Array, BoolArray, IntArray, distinct, others
 from ..csr import CsrMatrix, added
 from ..fem import elements
-from ..model.mesh import JointMesh
+from ..mesh.joint_mesh import JointMesh
 from ..threads import scipy_linalg
 
 #: Number of unknowns up to which the Laplace equation is solved by a dense matrix: scipy takes

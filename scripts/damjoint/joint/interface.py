@@ -14,11 +14,11 @@ from ..csr import CsrMatrix, added, stacked
 from ..fem import elements
 from ..fem.cache import cached, key_of
 from ..fem.condensed import Condensed, CondensedJoint
-from ..model.case import Case, OfJoint
-from ..model.chord import Chord
-from ..model.mesh import heel_normal
+from ..input.case import Case, OfJoint
+from ..input.scene import UP
+from ..mesh.chord import Chord
+from ..mesh.joint_mesh import heel_normal
 from ..model.network import Network
-from ..model.scene import UP
 from .assembly import MOST_TERMS, Assembly, number_of_terms
 from .flow import Flow, JointFields, Wetted
 from .linear_system import Border, Change, UndamagedSystem

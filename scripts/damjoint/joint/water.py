@@ -12,8 +12,9 @@ import numpy as np
 from .. import ROUND_OFF
 from ..arrays import Array, IntArray
 from ..csr import CsrMatrix
+from ..input.case import Case
+from ..input.values import flows, freezes_uplift, has_drains
 from ..laws import Law
-from ..model.case import Case, flows, freezes_uplift, has_drains
 from ..model.loads import Loading, heads_at_ends
 from ..model.network import Network, WaterPath, networks_of
 from .flow import NO_NODES, Flow, FlowDerivative, FlowSolution, JointFields

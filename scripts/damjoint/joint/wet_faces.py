@@ -16,7 +16,7 @@ import numpy as np
 from ..arrays import Array, IntArray
 from ..csr import CsrMatrix
 from ..fem import elements
-from ..model.mesh import Face
+from ..mesh.joint_mesh import Face
 
 #: Height of pressure [m] for a surface at a level [m], at heights y [m] where the normal's
 #: horizontal part has a size (0 to 1); and its column (see model/loads.py) from low to high.

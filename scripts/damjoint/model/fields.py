@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Array, IntArray, Table
+from ..input.scene import numbered
 from ..laws import COLUMNS, Law
-from .mesh import Body
+from ..mesh.body import Body
 from .results import FLUX, THICKNESS, Results
-from .scene import numbered
 
 
 @dataclass

@@ -12,10 +12,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import Array
-from .case import Case, flows
-from .constraints import STAGED, ZANGAR
-from .parameters import TINY
-from .scene import DOWN, SIDES, TAILWATER, TOP, UP
+from ..input.case import Case
+from ..input.constraints import STAGED, ZANGAR
+from ..input.parameters import TINY
+from ..input.scene import DOWN, SIDES, TAILWATER, TOP, UP
+from ..input.values import flows
 
 
 @dataclass(frozen=True)

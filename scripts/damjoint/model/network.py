@@ -11,9 +11,10 @@ import numpy as np
 
 from .. import InputError
 from ..arrays import Array, IntArray, distinct
-from .body import Body
-from .case import Case, flows, has_drains
-from .mesh import JointMesh
+from ..input.case import Case
+from ..input.values import flows, has_drains
+from ..mesh.body import Body
+from ..mesh.joint_mesh import JointMesh
 
 
 @dataclass(frozen=True, kw_only=True)

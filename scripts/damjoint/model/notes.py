@@ -8,12 +8,15 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from .case import Case, has_drains
-from .constraints import STAGED, USUAL, WORKS
-from .mesh import GEOMETRY, Mesh, mesh_of
-from .parameters import declared
-from .scene import BED, DOWN, FLOOR, TAILWATER, TOP, UP
-from .user_geometry import LOWEST, size_below
+from ..input.case import Case
+from ..input.constraints import STAGED, USUAL, WORKS
+from ..input.parameters import declared
+from ..input.scene import BED, DOWN, FLOOR, TAILWATER, TOP, UP
+from ..input.values import has_drains
+from ..mesh.generate import GEOMETRY
+from ..mesh.mesh import Mesh, mesh_of
+from ..mesh.topology import size_below
+from ..mesh.user_geometry import LOWEST
 
 #: Parameters of the section and its mesh that a user's .geo file may use and a mesh does not.
 OF_SECTION = (

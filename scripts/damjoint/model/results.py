@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from ..arrays import Array, Table
-from .case import Case
+from ..input.case import Case
 
 #: Columns of joint.csv: a row per joint node and requested level.
 JOINT = {

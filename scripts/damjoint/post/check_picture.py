@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 
+from ..input.parameters import constants
 from ..model.fields import BROKEN, SOFTENING, along, state_of
-from ..model.parameters import constants
 from ..model.results import Results
 from ..statics.gravity import GravityMethod
 from .drawing import (

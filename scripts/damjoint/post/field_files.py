@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from ..arrays import Table
+from ..input.parameters import constants, start_gmsh
+from ..mesh.body import Body
 from ..model.fields import OF_JOINT, Field, Solution, joint_body, joint_data
-from ..model.mesh import Body
-from ..model.parameters import constants, start_gmsh
 from ..storage import atomic_write
 
 #: Element types of order 1 in Gmsh by shape: number, dimension.

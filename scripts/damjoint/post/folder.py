@@ -16,8 +16,9 @@ from pathlib import Path
 from typing import Any
 
 from .. import InputError, __version__
-from ..model.case import Case, OfJoint, is_name
-from ..model.parameters import declared
+from ..input.case import Case, OfJoint
+from ..input.case_names import is_name
+from ..input.parameters import declared
 from ..model.results import Results, history_columns, joint_columns
 from ..statics.verdict import hints, statement, verdict
 from ..storage import PART, atomic_write, locked_folder

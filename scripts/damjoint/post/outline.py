@@ -10,10 +10,9 @@ import numpy as np
 
 from .. import ROUND_OFF
 from ..arrays import Table
-from ..model.body import SIDES
-from ..model.case import Case
+from ..input.case import Case
+from ..mesh.body import SIDES, Body
 from ..model.fields import distance
-from ..model.mesh import Body
 
 #: Relative distance of points that count as level: a user's crest may be slightly off.
 LEVEL = 1e-6

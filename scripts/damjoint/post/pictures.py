@@ -21,9 +21,9 @@ from matplotlib.ticker import MaxNLocator
 from matplotlib.tri import Triangulation
 
 from .. import ROUND_OFF
-from ..model.case import Case
+from ..input.case import Case
+from ..mesh.body import Body
 from ..model.fields import Solution, along, distance, row_of_nodes, state_of
-from ..model.mesh import Body
 from ..model.results import Results
 from ..statics import gravity
 from ..statics.verdict import decisive_joint, overturning_level, statement

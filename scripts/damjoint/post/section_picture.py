@@ -15,10 +15,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from ..arrays import Table
-from ..model.case import has_drains
+from ..input.parameters import constants
+from ..input.values import has_drains
 from ..model.fields import BROKEN, Solution, distance, nearest_rows, state_of
 from ..model.loads import Loading, line_forces
-from ..model.parameters import constants
 from .drawing import (
     CONCRETE,
     DARK,

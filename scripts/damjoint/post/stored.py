@@ -13,19 +13,14 @@ import numpy as np
 
 from .. import InputError
 from ..arrays import Value
-from ..model.case import (
-    SECTION,
-    SHARED,
-    Case,
-    is_name,
-    parsed_by_joint,
-    stacked_joints,
-)
+from ..input.case import SECTION, SHARED, Case
+from ..input.case_names import is_name
+from ..input.joints import parsed_by_joint, stacked_joints
+from ..input.parameters import INCLUDE, assignments, constants, declared, listing
+from ..input.scene import numbered
+from ..mesh.body import Body
 from ..model.fields import Field, Solution
-from ..model.mesh import Body
-from ..model.parameters import INCLUDE, assignments, constants, declared, listing
 from ..model.results import HISTORY, Results
-from ..model.scene import numbered
 from .folder import read_info, scene_folders
 
 #: Errors that reading damaged files can raise; SyntaxError: by XML.

@@ -11,7 +11,8 @@ import numpy as np
 
 from .. import data
 from ..arrays import Array
-from ..model.case import CASES, Case
+from ..input.case import Case
+from ..input.case_names import CASES
 from ..model.results import Results
 
 #: The families, and what each test shows.

@@ -9,9 +9,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..arrays import Array
+from ..input.case import Case
 from ..joint.equilibrium import Equilibrium
 from ..joint.interface import JointInterface
-from ..model.case import Case
 from ..model.results import (
     HISTORY_OF_JOINTS,
     THICKNESS,

@@ -8,8 +8,8 @@ from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
+from ..input.case import Case
 from ..joint.interface import Interface
-from ..model.case import Case
 from ..model.loads import Loading
 from ..model.results import Results
 from .controls import DRIVES, Control, LevelControl

@@ -13,12 +13,13 @@ import numpy as np
 
 from .. import RunError
 from ..arrays import Array
+from ..input.case import Case
+from ..input.values import freezes_uplift
 from ..joint.equilibrium import Equilibrium
 from ..joint.interface import Interface, interface_of
 from ..joint.joint_laws import TANGENT, Mode
 from ..joint.linear_system import Border
 from ..joint.water import BeforeQuake
-from ..model.case import Case, freezes_uplift
 from ..model.loads import COMPLETE, Loading
 from ..model.network import with_paths
 from .controls import Control, DisplacementControl, LevelControl

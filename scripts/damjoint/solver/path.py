@@ -22,7 +22,7 @@ import numpy as np
 
 from .. import ROUND_OFF
 from ..arrays import Array
-from ..model.case import Case
+from ..input.case import Case
 from ..model.results import column_of
 from .controls import (
     Control,

@@ -21,11 +21,12 @@ import numpy as np
 
 from .. import InputError
 from ..arrays import Table
-from ..model.case import Case, flows, freezes_uplift, has_drains
-from ..model.constraints import ZANGAR
+from ..input.case import Case
+from ..input.constraints import ZANGAR
+from ..input.parameters import constants
+from ..input.values import flows, freezes_uplift, has_drains
 from ..model.loads import Loading, heads_at_ends, line_forces, zangar_column, zangar_share
 from ..model.network import WaterPath
-from ..model.parameters import constants
 
 #: Distance from a plane, over the length of a joint, within which a node lies in it.
 PLANE = 1e-6

@@ -12,9 +12,10 @@ from functools import lru_cache
 
 import numpy as np
 
+from ..input.case import Case
+from ..input.values import flows, freezes_uplift
 from ..joint.interface import Interface
 from ..laws import UNBREAKABLE
-from ..model.case import Case, flows, freezes_uplift
 from ..model.results import column_of
 from ..solver.load_stepper import LoadStepper
 

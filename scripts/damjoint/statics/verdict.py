@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..input.case import Case
+from ..input.values import freezes_uplift, has_drains
 from ..laws import Evidence
-from ..model.case import Case, freezes_uplift, has_drains
 from ..model.loads import COMPLETE, thermal_strains
 from ..model.results import Results, row_of_joint
 from . import gravity

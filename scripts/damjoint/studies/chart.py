@@ -14,8 +14,8 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from ..model import parameters
-from ..model.case import Case
+from ..input import parameters
+from ..input.case import Case
 from ..post.drawing import BLUE, ORANGE, RED, write_picture
 from ..post.units import LENGTHS, Units, unit
 from ..statics.gravity import sliding_factor

@@ -16,7 +16,7 @@ from tabulate import tabulate
 
 from .. import ROUND_OFF, InputError
 from ..engines import engine_of
-from ..model.case import Case
+from ..input.case import Case
 from ..model.fields import along
 from ..model.results import HISTORY, Results
 from ..post import folder as folders

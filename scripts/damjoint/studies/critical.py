@@ -17,9 +17,10 @@ from scipy.optimize import bisect
 
 from .. import InputError
 from ..arrays import Setting
+from ..input.case import Case
+from ..input.parameters import independent, parameter
+from ..input.resolve import resolve, varied
 from ..joint.interface import interface_of
-from ..model.case import Case, resolve
-from ..model.parameters import independent, parameter
 from ..model.results import Results, row_of_joint
 from ..solver.path import PRECISION, ROUGH, SURE, Point
 from ..statics.verdict import (
@@ -74,7 +75,7 @@ class Search:
     """The search for a critical value."""
 
     def __init__(self, own: Case, of: str) -> None:
-        """own: the case, of model.case.load; of: level, strength, uplift or a parameter.
+        """own: the case, of input.resolve.load; of: level, strength, uplift or a parameter.
 
         Raises InputError.
         """
@@ -166,7 +167,7 @@ class Search:
             return self.base.changed({self.name: value})
         else:
             changed = {self.name: value}
-        return self.own.varied(self.settings | changed)
+        return varied(self.own, self.settings | changed)
 
     def reduced(self, joint: Case, factor: float) -> dict[str, float]:
         """The strength of a joint, divided by a factor and the partial factors."""
@@ -225,7 +226,7 @@ class Search:
         last = int(np.argmax(self.own.levels)) + 1
         levels, tails = self.own.levels[:last], self.own.tail_levels[:last]
         below = last < len(self.own.levels)
-        case = self.own.varied(self.settings, levels, tails) if below else self.base
+        case = varied(self.own, self.settings, levels, tails) if below else self.base
         path = self.path(max(case.levels), case, case.highest_level, to_growth=True)
         for _ in range(MOST_REPEATED):
             path.refine()  # first: a limit point that is known is confirmed sooner

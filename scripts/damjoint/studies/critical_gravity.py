@@ -9,8 +9,8 @@ import numpy as np
 from scipy.optimize import bisect
 
 from .. import InputError
+from ..input.case import Case
 from ..joint.interface import interface_of
-from ..model.case import Case
 from ..model.results import column_of
 from ..solver.path import PRECISION, Point
 from ..statics import gravity

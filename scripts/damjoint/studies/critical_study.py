@@ -10,8 +10,8 @@ import numpy as np
 from ..engines import Outcome, engine_of
 from ..engines.condensed.solve import about
 from ..fem.memory import sizes
+from ..input.case import Case
 from ..laws import Evidence
-from ..model.case import Case
 from ..model.results import row_of_joint
 from ..post import folder as folders
 from ..post.tables import write_csv

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Array
+from ..input.case import Case
 from ..joint.interface import Interface
-from ..model.case import Case
 from ..model.loads import Loading
 from ..model.results import HISTORY, Columns, with_all_joints
 from ..solver.controls import LevelControl

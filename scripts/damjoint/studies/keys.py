@@ -8,8 +8,8 @@ from typing import Any
 
 from .. import __version__
 from ..fem.cache import fingerprint
-from ..model.case import Case
-from ..model.mesh import mesh_of
+from ..input.case import Case
+from ..mesh.mesh import mesh_of
 from ..versions import code_fingerprint
 
 

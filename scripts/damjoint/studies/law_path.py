@@ -11,7 +11,7 @@ import numpy as np
 from .. import InputError
 from ..arrays import Value
 from ..engines.getdp.law import evaluate
-from ..model.parameters import parameter
+from ..input.parameters import parameter
 from ..post.tables import write_csv
 from ..storage import text_of
 

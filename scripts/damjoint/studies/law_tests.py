@@ -14,8 +14,8 @@ import numpy as np
 from scipy.optimize import toms748
 
 from ..arrays import Array, Values
+from ..input.resolve import load
 from ..laws import Law
-from ..model.case import load
 
 #: Largest jump that a loaded point is searched within, and accuracy of the search.
 LARGEST_JUMP, ACCURACY = 10.0, 1e-20

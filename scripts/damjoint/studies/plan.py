@@ -13,9 +13,10 @@ import numpy as np
 
 from .. import InputError
 from ..arrays import Array, Value, Values
-from ..model import parameters
-from ..model.arithmetic import arithmetic_value, explained, quantity
-from ..model.case import Case
+from ..input import parameters
+from ..input.arithmetic import arithmetic_value, explained, quantity
+from ..input.case import Case
+from ..input.resolve import varied
 
 #: A row of a result file: texts by column.
 Row: TypeAlias = dict[str, str]
@@ -321,7 +322,7 @@ def cases_of(base: Case, plan: Plan) -> Iterator[tuple[dict[str, Value], Case]]:
         if key not in resolved:
             changed = {n: v for n, v in row.items() if n != "level"}
             loading = up_to(base, row["level"]) if "level" in row else {}
-            resolved[key] = base.varied(changed, **loading)
+            resolved[key] = varied(base, changed, **loading)
         yield row, resolved[key].changed(alone)
 
 

@@ -24,8 +24,8 @@ from ..engines.condensed.solve import about
 from ..fem import factor
 from ..fem.bodies import Bodies
 from ..fem.memory import sizes
+from ..input.case import Case
 from ..joint.interface import interface_of
-from ..model.case import Case
 from ..model.fields import Field
 from ..model.results import column_of
 from ..progress import Progress

@@ -11,8 +11,8 @@ from .. import RunError
 from ..dynamics.stepper import Earthquake
 from ..engines.getdp import quake as engine
 from ..fem.bodies import Bodies
+from ..input.case import Case
 from ..joint.interface import interface_of
-from ..model.case import Case
 from ..post import folder as folders
 from ..progress import Progress
 from ..session import end_of

@@ -10,9 +10,9 @@ from tabulate import tabulate
 
 from ..arrays import Array
 from ..arrays import Table as Columns
-from ..model.case import Case
+from ..input.case import Case
+from ..mesh.mesh import Mesh
 from ..model.fields import Field
-from ..model.mesh import Mesh
 from ..model.notes import remarks
 from ..model.results import QUAKE, QUAKE_OF_JOINTS, Results, column_of, quake_columns
 from ..post.summary import Table

@@ -15,7 +15,7 @@ from .. import InputError
 from ..arrays import Value
 from ..dynamics.checkpoint import fingerprint
 from ..engines import engine_of
-from ..model.case import Case
+from ..input.case import Case
 from ..model.fields import Solution
 from ..post import folder as folders
 from ..post import tables

@@ -10,7 +10,7 @@ import numpy as np
 from .. import ROUND_OFF
 from ..arrays import Array, Table, Value
 from ..dynamics.stepper import Earthquake
-from ..model.case import Case
+from ..input.case import Case
 from ..model.results import column_of
 
 #: Time over which the residual values are a mean [s]: the last half of the rest, at most this.

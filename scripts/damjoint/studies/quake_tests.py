@@ -13,7 +13,8 @@ import numpy as np
 from .. import ROUND_OFF, data
 from ..arrays import Array, Values
 from ..dynamics.stepper import Earthquake
-from ..model.case import Case, load
+from ..input.case import Case
+from ..input.resolve import load
 from .quake import QuakeRun
 
 

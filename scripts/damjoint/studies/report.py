@@ -17,7 +17,8 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from matplotlib.figure import Figure
 
 from .. import ROUND_OFF, InputError, RunError, __version__
-from ..model.case import Case, is_name
+from ..input.case import Case
+from ..input.case_names import is_name
 from ..model.fields import Solution
 from ..model.results import Results
 from ..post import pictures, stored

@@ -9,13 +9,10 @@ import numpy as np
 
 from .. import ROUND_OFF
 from ..arrays import Value
-from ..model.case import Case, equal_steps, flows, has_drains
-from ..model.parameters import (
-    Parameter,
-    constants,
-    declared,
-    parse,
-)
+from ..input.case import Case
+from ..input.parameters import Parameter, constants, declared, parse
+from ..input.resolve import equal_steps
+from ..input.values import flows, has_drains
 from ..post import stored
 from ..post.units import STRESSES, Units, unit
 

@@ -7,7 +7,7 @@ from scipy import linalg, stats
 
 from .. import InputError
 from ..arrays import Array, IntArray
-from ..model.arithmetic import call_of, explained
+from ..input.arithmetic import call_of, explained
 
 #: Distributions by scipy's names, and `normal`.
 DISTRIBUTIONS = {

@@ -13,8 +13,10 @@ from typing import TypeAlias
 from .. import InputError, RunError, accuracy
 from ..arrays import Value, Values
 from ..engines import engine_of
+from ..input.case import Case
+from ..input.refinement import first_mesh
+from ..input.resolve import equal_steps, resolve, with_drive_times
 from ..joint.interface import Interface, interface_of
-from ..model.case import Case, equal_steps, first_mesh, resolve, with_drive_times
 from ..model.notes import notes_on_settings
 from ..model.results import column_of as column_of_joint
 from ..model.results import history_columns

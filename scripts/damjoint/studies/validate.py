@@ -8,7 +8,7 @@ from pathlib import Path
 
 from .. import InputError, RunError
 from ..arrays import Array
-from ..model.case import load
+from ..input.resolve import load
 from ..post import validation
 from ..post.validation import FAMILIES, Comparison
 from ..runner import run

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 from ...fem.cache import cached
 from ...fem.condensed import Condensed
 from ...fem.memory import joint_size
+from ...input.case import Case
 from ...joint.interface import Interface
-from ...model.case import Case
-from ...model.mesh import mesh_of
+from ...mesh.mesh import mesh_of
 from ...model.network import with_paths
 from ...solver.load_stepper import LoadStepper
 from ...threads import limited_threads

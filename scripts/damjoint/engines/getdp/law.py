@@ -9,9 +9,9 @@ import numpy as np
 
 from ... import RunError, data
 from ...arrays import Values
-from ...model.case import load
-from ...model.constraints import WORKS, check_acting
-from ...model.parameters import assignments, listing, parameter
+from ...input.constraints import WORKS, check_acting
+from ...input.parameters import assignments, listing, parameter
+from ...input.resolve import load
 from ...storage import check_end
 from . import process
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from ... import InputError
-from ...model.case import Case
-from ...model.mesh import JointMesh, Mesh
+from ...input.case import Case
+from ...input.parameters import listing
+from ...mesh.joint_mesh import JointMesh
+from ...mesh.mesh import Mesh
 from ...model.network import HigherHeel, Network, PathDrains, WaterPath, networks_of, plane_paths
-from ...model.parameters import listing
 
 
 def values_of_paths(mesh: Mesh, case: Case) -> list[str]:

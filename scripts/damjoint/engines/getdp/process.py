@@ -14,11 +14,13 @@ from pathlib import Path
 
 from ... import InputError, RunError, data
 from ...arrays import Value
-from ...model.case import Case
-from ...model.chord import Chord
-from ...model.mesh import Mesh, area, heel_normal
-from ...model.parameters import assignments, constants, declared, listing, quoted
-from ...model.scene import LINES, SIDES
+from ...input.case import Case
+from ...input.parameters import assignments, constants, declared, listing, quoted
+from ...input.scene import LINES, SIDES
+from ...mesh.chord import Chord
+from ...mesh.joint_mesh import heel_normal
+from ...mesh.mesh import Mesh
+from ...mesh.sides import area
 from ...storage import check_end
 from .paths import values_of_paths
 

@@ -17,8 +17,8 @@ from ... import InputError, RunError
 from ...arrays import Table, Value
 from ...dynamics.record import Record
 from ...dynamics.stepper import Damping
-from ...model.case import Case
-from ...model.mesh import mesh_of
+from ...input.case import Case
+from ...mesh.mesh import mesh_of
 from ...model.results import Results, column_of, quake_columns
 from . import process, tables
 from .solve import check as check_static

@@ -15,8 +15,9 @@ import numpy as np
 
 from ... import InputError, RunError, data
 from ...fem.memory import bulk_size, check_memory
-from ...model.case import Case, flows, freezes_uplift, has_drains
-from ...model.mesh import Mesh, mesh_of
+from ...input.case import Case
+from ...input.values import flows, freezes_uplift, has_drains
+from ...mesh.mesh import Mesh, mesh_of
 from ...model.network import with_paths
 from .. import OnStep, Outcome
 from . import process, tables

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ...model.case import Case
+from ...input.case import Case
+from ...mesh.mesh import Mesh
 from ...model.fields import Field
-from ...model.mesh import Mesh
 from ...model.results import (
     FLUX,
     JOINT,

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..arrays import IntArray
 from .body import Body
-from .user_geometry import tags_of
+from .topology import tags_of
 
 
 def inner_ends(ends: Sequence[Body], surfaces: Sequence[Body], skin: Body) -> list[IntArray]:

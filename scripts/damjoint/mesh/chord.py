@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Array
-from .mesh import JointMesh
+from .joint_mesh import JointMesh
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,267 +4,46 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
-from .. import InputError, RunError, data
-from ..arrays import Array, BoolArray, IntArray, Setting
-from ..csr import CsrMatrix
-from ..storage import check_end
-from .body import Body as Body
-from .case import Case, OfJoint, has_drains
-from .constraints import check_levels_on_mesh, check_strain
-from .cut import cut
-from .parameters import assignments, constants, listing, start_gmsh
-from .scene import (
-    BED,
-    DOWN,
-    FLOOR,
-    LINES,
+from .. import InputError, RunError
+from ..arrays import IntArray
+from ..input.case import Case
+from ..input.constraints import check_levels_on_mesh, check_strain
+from ..input.parameters import constants, start_gmsh
+from ..input.scene import (
     SIDES,
-    TAILWATER,
-    TOP,
-    UP,
     Joint,
     numbered,
     stacked,
 )
-from .skin import inner_ends
-from .user_geometry import NamedFace, UserGeometry
-
-#: Parameters that the mesh always depends on.
-GEOMETRY = (
-    *("dim", "mesh_pattern", "n_joint", "n_layers", "h_dam", "h_found"),
-    *("dam_base", "dam_crest", "dam_height", "batter", "batter_height", "neck_height"),
-    *("joint_slope", "joint_height", "found_side", "found_depth", "thickness"),
+from ..storage import check_end
+from .body import Body as Body
+from .cut import cut
+from .generate import generate, shares
+from .joint_mesh import Face, JointMesh
+from .regions import (
+    LOADED,
+    NEEDED,
+    OF_JOINTS,
+    OWN_FACES,
+    OWN_NAMES,
+    REGIONS,
+    SHAPES,
+    FaceRegion,
+    dimension,
 )
-#: Parameters on which it depends only if a line force acts.
-MARKS = {
-    "ice_force": ("ice_level",),
-    "anchor_force": ("anchor_at",),
-    "force_x": ("force_face", "force_at"),
-    "force_y": ("force_face", "force_at"),
-}
-
-#: Regions of a user's own geometry by the parameters that need them.
-LOADED = {
-    "hold_z": "sides",
-    "ice_force": "ice",
-    "anchor_force": "anchor",
-    "force_x": "force",
-    "force_y": "force",
-}
-
-#: Codimension of the regions; their numbers are in pro/parameters.pro.
-REGIONS = {
-    "dam": 0,
-    "foundation": 0,
-    "lower": 0,
-    "joint": 1,
-    "fixed": 1,
-    "sides": 1,
-    "heel": 2,
-    "toe": 2,
-    "crest": 2,
-    "ice": 2,
-    "force": 2,
-    "anchor": 2,
-}
-#: Regions of which each joint has its own.
-OF_JOINTS = ("dam", "joint", "heel", "toe")
-#: Regions that every geometry has.
-NEEDED = ("dam", "foundation", "joint", "fixed", "heel", "toe", "crest")
-
-#: Extent along z over that along y below which a joint faces along z.
-FLAT = 1e-6
+from .sides import is_inside, outward, part_of, sides
+from .skin import inner_ends
+from .user_files import GeometryFiles, files_of
+from .user_geometry import NamedFace, UserGeometry
 
 #: Limit of the joint's element tags: six digits in the keys of GetDP's internal variables.
 MOST_TAGS = 1_000_000
-
-#: Gmsh element types of order 1 by their VTK name.
-SHAPES = {
-    15: "vertex",
-    1: "line",
-    2: "triangle",
-    3: "quad",
-    4: "tetra",
-    5: "hexahedron",
-    6: "wedge",
-}
-
-
-#: Names of the physical groups of a user's own geometry: bodies and lines, faces by side and body.
-OWN_NAMES = {
-    "dam": "dam",
-    "foundation": "foundation",
-    "lower dam": "lower",
-    "joint": "joint",
-    "fixed": "fixed",
-    "z faces": "sides",
-    "heel": "heel",
-    "toe": "toe",
-    "crest": "crest",
-    **{name: name for name in LINES},
-}
-OWN_FACES = {
-    "upstream": ("dam", UP),
-    "downstream": ("dam", DOWN),
-    "crest surface": ("dam", TOP),
-    "lower upstream": ("foundation", UP),
-    "lower downstream": ("foundation", DOWN),
-    "reservoir floor": ("foundation", FLOOR),
-    "tailwater bed": ("foundation", BED),
-}
-
-
-def dimension(region: str, dim: int) -> int:
-    """The dimension of a region's elements in 2D or 3D."""
-    return 0 if region == "crest" else dim - REGIONS[region.split(" ")[0]]
-
-
-@dataclass
-class Face:
-    """A face that water can press on: its surface, normals outwards; the name of its body; its side
-    (one of SIDES); lowest and highest y [m] of a straight face (nan for any other).
-    """
-
-    surface: Body
-    body: str
-    side: str
-    low: float = np.nan
-    high: float = np.nan
-
-    @property
-    def tailwater(self) -> bool:
-        """Whether tailwater, not the reservoir, presses on it."""
-        return self.side in TAILWATER
-
-    @property
-    def lowest(self) -> float:
-        """Lowest y [m]."""
-        return float(self.surface.points[:, 1].min()) if np.isnan(self.low) else self.low
-
-
-@dataclass
-class JointMesh:
-    """The mesh of a joint: its surface, normals from the lower to the upper body; the lines (in the
-    plane: points) where it ends; names of its bodies.
-    """
-
-    dim: int
-    surface: Body
-    heel: Body
-    toe: Body
-    upper: str
-    lower: str
-    #: for messages
-    name: str
-    #: tags of the surface's nodes in the upper body; in the lower one they are the surface's
-    upper_tags: IntArray
-    #: whether it has nodes of other joints; tags of the nodes of heel and toe that lie at another
-    #: joint, not on the surface of the dam and its rock
-    meets: bool = False
-    inner_ends: IntArray = field(default_factory=lambda: np.zeros(0, int))
-
-    def face(self, above: bool) -> Body:
-        """The surface as a part of the body above or below it."""
-        return replace(self.surface, node_tags=self.upper_tags) if above else self.surface
-
-    @property
-    def heel_nodes(self) -> IntArray:
-        """Indices of the surface's nodes at the heel."""
-        return np.flatnonzero(np.isin(self.surface.node_tags, self.heel.node_tags))
-
-    @property
-    def toe_nodes(self) -> IntArray:
-        """Indices of the surface's nodes at the toe."""
-        return np.flatnonzero(np.isin(self.surface.node_tags, self.toe.node_tags))
-
-    @property
-    def width(self) -> float:
-        """Extent along z, or along y if it faces along z [m]; 1 in the plane."""
-        if self.dim == 2:
-            return 1.0
-        _, y, z = np.ptp(self.surface.points, axis=0)
-        return float(z if z > FLAT * y else y)
-
-    @property
-    def ends(self) -> dict[str, list[float]]:
-        """Heel, toe and length, by the names of pro/section.pro."""
-        heel, toe = (line.points[:, :2].mean(axis=0) for line in (self.heel, self.toe))
-        return ends_of(heel, toe, area(self.surface) / self.width)
-
-    @property
-    def of_case(self) -> OfJoint:
-        """Name, bodies and ends, for its case."""
-        return OfJoint(
-            name=self.name, upper=self.upper, lower=self.lower, values={}, section=self.ends
-        )
-
-
-def shares(case: Case) -> dict[str, Setting]:
-    """The parameters that the mesh of a case depends on, and the lists of its lifts."""
-    names = [*GEOMETRY, *(n for force, needs in MARKS.items() if case[force] for n in needs)]
-    values: dict[str, Setting] = {name: case[name] for name in names}
-    # of a force only whether it acts
-    values |= {name: float(bool(case[name])) for name in MARKS}
-    if has_drains(case):  # they need a node in all modes of uplift
-        values |= {"uplift": "drained", "drain_x": case["drain_x"]}
-    if case.lift_heights:
-        _, *lifts = case.joints
-        values["lift_heights"] = case.lift_heights
-        values["lift_slopes"] = tuple(lift["joint_slope"] for lift in lifts)
-        values["lift_drain_x"] = tuple(has_drains(lift) * lift["drain_x"] for lift in lifts)
-    return values
-
-
-def as_text(settings: Mapping[str, Setting]) -> str:
-    """Values and lists of numbers in Gmsh's language."""
-    lists = {name: value for name, value in settings.items() if isinstance(value, tuple)}
-    values = {n: value for n, value in settings.items() if not isinstance(value, tuple)}
-    listed = (listing(name, map(float, value)) for name, value in lists.items())
-    return assignments(values) + "".join(listed)
-
-
-def heel_normal(joint: Body, heel: Body) -> Array:
-    """The joint's normal at its heel, a mean of the elements there."""
-    near = [np.isin(joint.node_tags[t], heel.node_tags).any(axis=1) for _, t in joint.cells]
-    normal: Array = joint.normals[np.concatenate(near)].mean(axis=0)
-    return normal
-
-
-@dataclass(frozen=True)
-class GeometryFiles:
-    """The files of a user's own geometry in their present state, and all else its mesh depends
-    on: the parameters of a section's mesh, and those that a .geo file names.
-    """
-
-    #: path, time of the last change, size
-    files: tuple[tuple[Path, int, int], ...]
-    parameters: tuple[tuple[str, Setting], ...]
-    #: for making the mesh
-    case: Case = field(compare=False)
-
-
-#: A statement by which a .geo file takes in another file.
-INCLUDES = r"\b(?:Include|Merge)\s+\"([^\"]*)\""
-
-
-def files_of(path: Path, known: dict[Path, str]) -> dict[Path, str]:
-    """A .geo file and those that it includes, but for the declarations, with their text; added to
-    those that are known.
-    """
-    if path in known or data("pro").resolve() in path.resolve().parents or not path.is_file():
-        return known
-    known[path] = path.read_text(errors="replace")
-    for name in re.findall(INCLUDES, known[path]):
-        files_of(path.parent / name, known)
-    return known
 
 
 @lru_cache(maxsize=1)
@@ -313,62 +92,6 @@ def check_loads(case: Case, mesh: Mesh) -> None:
     if case["face_load"] == "hydrostatic":
         for name, levels in (("levels", case.levels), ("tail_levels", case.tail_levels)):
             check_levels_on_mesh(name, levels, low, high)
-
-
-#: Options of Gmsh by which geo/dam2d.geo chooses where element sizes come from; 1: the default.
-SIZE_OPTIONS = ("MeshSizeExtendFromBoundary", "MeshSizeFromPoints")
-
-
-def generate(case: Case) -> None:
-    """Make the mesh of a case, as Gmsh's current mesh.
-
-    Raises RunError, and InputError if a user's own geometry can not be read.
-    """
-    import tempfile
-
-    gmsh = start_gmsh()
-    gmsh.clear()
-    gmsh.parser.clear()
-    gmsh.onelab.clear()
-    for option in SIZE_OPTIONS:  # of an earlier geometry in this process
-        gmsh.option.setNumber(f"Mesh.{option}", 1)
-    own = case.geometry
-    # in a folder of its own: Gmsh runs a file of options, FILE.opt, beside the file it opens
-    with tempfile.TemporaryDirectory(prefix="damjoint-") as folder:
-        path = Path(folder) / f"scene{own.suffix if own else '.geo'}"
-        if not own:
-            path.write_text(as_text(shares(case)) + f'Include "{data("geo")}/dam.geo";\n')
-        elif own.suffix == ".geo":  # it may take sizes from the case
-            path.write_text(assignments(case.values) + f'Include "{own}";\n')
-        else:
-            path.symlink_to(own)
-        try:
-            gmsh.open(str(path))
-            if not len(gmsh.model.mesh.getElements(int(case["dim"]))[0]):
-                gmsh.model.mesh.generate(int(case["dim"]))
-        except Exception as error:  # what gmsh raises
-            if own:
-                gmsh.finalize()  # else Gmsh remains busy with a file that it could not read
-                raise InputError(f"geometry = {own}: {error}") from None
-            raise RunError(f"mesh: {error}") from None
-    if own:
-        # format MSH 2.2 has an element once for each of its groups: a point that is heel and toe
-        ends = [e for d in range(int(case["dim"]) - 1) for e in gmsh.model.getEntities(d)]
-        if ends:  # else of all entities
-            gmsh.model.mesh.removeDuplicateElements(ends)
-        # tags from 1 on, for small tables by tag and small keys in GetDP
-        gmsh.model.mesh.renumberNodes()
-        gmsh.model.mesh.renumberElements()
-
-
-class FaceRegion(NamedTuple):
-    """The physical group of a face, and the face's attributes but for its surface."""
-
-    tag: int
-    body: str
-    side: str
-    low: float = np.nan
-    high: float = np.nan
 
 
 class Mesh:
@@ -768,87 +491,3 @@ def write_mesh(case: Case, path: Path) -> dict[str, int]:
     mesh = Mesh(case)
     mesh.write(path)
     return mesh.counts
-
-
-def ends_of(heel: Array, toe: Array, along: float) -> dict[str, list[float]]:
-    """The joint by the names of pro/section.pro, from its ends (2,) and its length [m]."""
-    length = float(np.linalg.norm(toe - heel))
-    values = (*heel, *toe, length, along)
-    names = ("heel_x", "heel_y", "toe_x", "toe_y", "joint_length", "joint_along")
-    return {name: [float(value)] for name, value in zip(names, values, strict=True)}
-
-
-def area(surface: Body) -> float:
-    """Area of a surface, length of a line [m2, m]."""
-    total = 0.0
-    for _, table in surface.cells:
-        edges = surface.points[table[:, 1:]] - surface.points[table[:, :1]]
-        if table.shape[1] == 2:
-            total += np.linalg.norm(edges[:, 0], axis=1).sum()
-        for i in range(edges.shape[1] - 1):
-            total += np.linalg.norm(np.cross(edges[:, i], edges[:, i + 1]), axis=1).sum() / 2
-    return float(total)
-
-
-def outward(surface: Body, body: Body) -> tuple[Array, BoolArray] | None:
-    """Unit normals (elements, 3) of a part of a body's surface, out of the body, and which elements
-    are numbered the other way round; None if not all are sides of the body's elements.
-    """
-    inside = cells_inside(surface, body)
-    if (inside < 0).any():
-        return None
-    normals = surface.unit_normals()
-    from_body = surface.middles() - body.middles()[inside]
-    inwards = np.einsum("ij,ij->i", normals, from_body) < 0
-    normals[inwards] *= -1
-    # without the mesh generator's rounding: a level joint's normal is (0, 1, 0)
-    return np.round(normals, 12) + 0.0, inwards
-
-
-def is_inside(surface: Body, body: Body) -> bool:
-    """Whether each element of a surface is a side of two elements of a body."""
-    size = int(max(surface.node_tags.max(), body.node_tags.max())) + 1
-    shared = incidence(surface, size) @ incidence(body, size).T
-    corners = np.concatenate([np.full(len(t), t.shape[1]) for _, t in surface.cells])
-    beside = np.bincount(shared.rows[shared.data == corners[shared.rows]])
-    return len(beside) == len(corners) and bool((beside == 2).all())
-
-
-def cells_inside(surface: Body, body: Body) -> IntArray:
-    """For each element of a surface, the body's cell that has all its nodes; -1: none."""
-    size = int(max(surface.node_tags.max(), body.node_tags.max())) + 1
-    rows = [incidence(b, size) for b in (surface, body)]
-    shared = rows[0] @ rows[1].T
-    corners = np.concatenate([np.full(len(t), t.shape[1]) for _, t in surface.cells])
-    is_side = shared.data == corners[shared.rows]
-    inside = np.full(len(corners), -1)
-    inside[shared.rows[is_side]] = shared.indices[is_side]
-    return inside
-
-
-def sides(surface: Body, body: Body) -> BoolArray:
-    """Which elements of a surface are sides of the body's elements."""
-    return np.asarray(cells_inside(surface, body) >= 0)
-
-
-def part_of(surface: Body, selected: BoolArray) -> Body:
-    """Some elements of a surface."""
-    ends = np.cumsum([len(table) for _, table in surface.cells])[:-1]
-    chosen = np.split(selected, ends)
-    cells = [(shape, table[own]) for (shape, table), own in zip(surface.cells, chosen, strict=True)]
-    used = np.unique(np.concatenate([table.ravel() for _, table in cells]))
-    return Body(
-        surface.points[used],
-        surface.node_tags[used],
-        [(shape, np.searchsorted(used, table)) for shape, table in cells if len(table)],
-        surface.element_tags[selected],
-        [r for r, (_, table) in zip(surface.regions, cells, strict=True) if len(table)],
-    )
-
-
-def incidence(body: Body, size: int) -> CsrMatrix:
-    """Which of the mesh's nodes each element has (elements, size)."""
-    columns = np.concatenate([body.node_tags[table].ravel() for _, table in body.cells]).astype(int)
-    widths = np.concatenate([np.full(len(t), t.shape[1]) for _, t in body.cells])
-    pointers = np.concatenate([[0], np.cumsum(widths)])
-    return CsrMatrix(np.ones(len(columns)), columns, pointers, (len(widths), size))

@@ -1,0 +1,1 @@
+"""What a user gives: case files, parameters, what follows from them, and its checks."""

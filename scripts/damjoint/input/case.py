@@ -1,0 +1,337 @@
+"""Case: a scene and its loading, from a case file and overrides, checked."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from .. import InputError
+from ..arrays import Setting, Value, Values
+from ..laws import LAWS, Law
+from .constraints import (
+    USUAL,
+    check_acting,
+    check_distances,
+    check_lift_heights,
+    check_lifts,
+    check_stiffness,
+    check_values,
+    highest_level,
+)
+from .parameters import (
+    constants,
+    declared,
+    independent,
+)
+from .source import Source
+from .values import ParameterValues
+from .values import flows as flows
+from .values import freezes_uplift as freezes_uplift
+from .values import has_drains as has_drains
+
+#: Constants of pro/parameters.pro that both engines use.
+SHARED = (
+    *("strategy_growth", "strategy_secant", "strategy_release", "strategy_iterations", "cut"),
+    *("round_off", "coarsest", "artificial", "yield_tolerance", "release_length"),
+    *("crack_aperture", "crack_most", "zangar_angle", "zangar_cm"),
+)
+
+
+#: Those of them that the laws use.
+SOLVER = "artificial", "yield_tolerance", "release_length"
+
+
+#: Variables of pro/section.pro: the joint's ends, the segments of the faces, the marks of line
+#: forces.
+SECTION = (
+    *("heel_x", "heel_y", "toe_x", "toe_y", "joint_length", "joint_along", "crest_x", "neck_y"),
+    *("seg_side", "seg_body", "seg_x0", "seg_y0", "seg_x1", "seg_y1"),
+    *("mark_region", "mark_x", "mark_y", "mark_segment"),
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class OfJoint:
+    """What a joint of several has for itself: the values that differ from the case's, and SECTION
+    with this joint alone; its name and those of the bodies above and below it.
+    """
+
+    name: str
+    upper: str
+    lower: str
+    values: dict[str, Value]
+    section: dict[str, list[float]] = field(compare=False, repr=False)
+    #: as in Case
+    hardening_asked: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Case(ParameterValues):
+    """A scene and its loading: all that a run depends on. With several joints, its values are those
+    of the first one; each of `joints` is a case of a single joint.
+    """
+
+    name: str
+    title: str
+    values: dict[str, Value]
+    #: reservoir and tailwater [m] at t = 1, 2, ...
+    levels: tuple[float, ...]
+    tail_levels: tuple[float, ...]
+    #: t of the converged steps; joint tables are written at those in `requested`
+    times: tuple[float, ...]
+    #: further uplift modes of a published case
+    also_uplift: tuple[str, ...] = ()
+    #: whether it is a published case of the package, but for mesh, solver and uplift
+    published: bool = False
+    #: whether pena_tang has been set: then a dam stands though its whole joint slips
+    hardening_asked: bool = False
+    #: the required relative error; None: the mesh is not refined
+    accuracy: float | None = None
+    #: whether every update of the internal variables is written
+    all_steps: bool = False
+    #: the user's own geometry instead of the section by parameters
+    geometry: Path | None = None
+    #: file of the ground's acceleration, for `damjoint quake`
+    record: Path | None = None
+    #: what it is made from; None for a case of stored results, which can not be varied
+    source: Source | None = field(default=None, compare=False, repr=False)
+    #: SHARED of pro/parameters.pro
+    shared: dict[str, list[float]] = field(default_factory=dict, compare=False, repr=False)
+    #: SECTION of pro/section.pro
+    section: dict[str, list[float]] = field(default_factory=dict, compare=False, repr=False)
+    #: heights of the joints above the first one [m]
+    lift_heights: tuple[float, ...] = ()
+    #: an entry for each joint, from the lowest; empty if there is only one
+    of_joints: tuple[OfJoint, ...] = ()
+
+    @cached_property
+    def joints(self) -> tuple[Case, ...]:
+        """The case of each joint, from the lowest: its own values, and the section above it."""
+        if not self.of_joints:
+            return (self,)
+        return tuple(
+            replace(
+                self,
+                values=self.values | own.values,
+                section=own.section,
+                hardening_asked=own.hardening_asked,
+                lift_heights=(),
+                of_joints=(),
+            )
+            for own in self.of_joints
+        )
+
+    @property
+    def given(self) -> dict[str, Setting]:
+        """The parameters that a user has set: in a case file of their own, or beside it; not what a
+        case or preset of the package sets.
+        """
+        if self.source is None:
+            return {}
+        text, known = self.source.text, declared()
+        of_file = {**text.defaults, **text.of_joints}
+        of_user = {n: v for n, v in of_file.items() if n in text.of_user}
+        return {n: v for n, v in {**of_user, **self.source.overrides}.items() if n in known}
+
+    @property
+    def ineffective(self) -> tuple[str, ...]:
+        """Those of `given` that differ from their default, though they matter at no joint."""
+        known = declared()
+        of_joints = [joint.values for scene in self.scenes() for joint in scene.joints]
+        return tuple(
+            name
+            for name, value in self.given.items()
+            if not any(known[name].matters_in(values) for values in of_joints)
+            and value != constants()[name][0]
+        )
+
+    @property
+    def unusual(self) -> dict[str, float]:
+        """Those of `given` with a value that is neither 0 nor within USUAL, by name."""
+        pairs = [(n, joint[n]) for n in self.given if n in USUAL for joint in self.joints]
+        return {n: v for n, v in pairs if v and not USUAL[n][0] <= v <= USUAL[n][1]}
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the joints, for messages."""
+        return tuple(own.name for own in self.of_joints) or (joint_name(self["joint_height"]),)
+
+    def of_all_joints(self, name: str) -> str:
+        """The values of a parameter at all joints, each once, as text."""
+        return ", ".join(dict.fromkeys(str(joint[name]) for joint in self.joints))
+
+    def above(self, numbers: Collection[int]) -> set[str]:
+        """The bodies that without the joints of these numbers have no connection to the rock."""
+        if not self.of_joints:
+            return {"dam"} if numbers else set()
+        pairs = [(own.lower, own.upper) for own in self.of_joints]
+        rest = [pair for k, pair in enumerate(pairs) if k not in numbers]
+        reached, before = {"foundation"}, set[str]()
+        while reached != before:
+            before = set(reached)
+            reached |= {name for pair in rest if reached & set(pair) for name in pair}
+        return {name for pair in pairs for name in pair} - reached
+
+    def separates(self, numbers: Collection[int]) -> bool:
+        """Whether without the joints of these numbers a body has no connection to the rock."""
+        return bool(self.above(numbers))
+
+    def separating(self, numbers: Sequence[int]) -> tuple[int, ...]:
+        """The first of some joints, by their numbers, that alone holds what is above it; or those
+        on the rock, if all of these are among them; else none.
+        """
+        alone = [(k,) for k in numbers if self.separates((k,))]
+        on_rock = tuple(
+            k for k, own in enumerate(self.of_joints) if own.lower == "foundation" != own.upper
+        )
+        together = [on_rock] if set(on_rock) <= set(numbers) else []
+        return next(iter([*alone, *together]), ())
+
+    def named(self, numbers: Sequence[int]) -> str:
+        """The names of joints by their numbers; empty if there is only one joint."""
+        return " and ".join(self.joint_names[k] for k in numbers) if self.of_joints else ""
+
+    def with_values(self, values: Values) -> Case:
+        """The case with other values, the same for all joints; without the checks of `changed`."""
+        others = tuple(
+            replace(own, values={n: v for n, v in own.values.items() if n not in values})
+            for own in self.of_joints
+        )
+        return replace(self, values={**self.values, **values}, of_joints=others)
+
+    def with_joints(self, joints: Sequence[OfJoint]) -> Case:
+        """The case of a user's own geometry, with the names and ends of its joints.
+
+        Raises InputError if the case has drains or a waterstop beyond the end of a joint.
+        """
+        same = [replace(joint, hardening_asked=self.hardening_asked) for joint in joints]
+        known = self.of_joints or same
+        ends = [self.section | joint.section for joint in joints]
+        of_joints = (
+            replace(joint, values=own.values, section=section, hardening_asked=own.hardening_asked)
+            for own, joint, section in zip(known, joints, ends, strict=True)
+        )
+        several = tuple(of_joints) if len(joints) > 1 else ()
+        case = replace(self, section=ends[0], of_joints=several)
+        for own, joint in zip(case.joints, joints, strict=True):
+            length = own.section["joint_along"][0]
+            check_distances(own, length)
+            on_rock = joint.lower == "foundation" != joint.upper
+            check_stiffness(own, length, carries=on_rock, holds=len(joints) == 1)
+        return case
+
+    @cached_property
+    def law(self) -> Law[Any]:
+        """The joint's law with its parameters."""
+        solver = {name: self.shared[name][0] for name in SOLVER}
+        return LAWS[self["law"]](self.values | solver)
+
+    @property
+    def joint_length(self) -> float:
+        """Distance from heel to toe [m]."""
+        return self.section["joint_length"][0]
+
+    @property
+    def size(self) -> float:
+        """Characteristic length of the dam [m]."""
+        return self.joint_length if self.geometry else self["dam_height"]
+
+    @property
+    def joint_along(self) -> float:
+        """Length from heel to toe along the joint [m]; its mean in 3D."""
+        return self.section["joint_along"][0]
+
+    @property
+    def requested(self) -> tuple[float, ...]:
+        """The times of the levels and of the end of a prescribed displacement; the last time."""
+        ends = {self["drive_end"]} if self["drive"] != "level" else set()
+        return tuple(t for t in self.times if t == round(t) or t in ends or t == self.times[-1])
+
+    @property
+    def highest_level(self) -> float:
+        """The highest allowed water level [m]."""
+        return math.inf if self.geometry else highest_level(self)
+
+    @property
+    def reached(self) -> float:
+        """The highest level of the reservoir [m]; the highest allowed if it is not prescribed."""
+        return max(self.levels) if self["drive"] == "level" else self.highest_level
+
+    def level_at(self, time: float) -> float:
+        """Reservoir level [m] at a time, linear between the levels, from 0 at t = 0."""
+        return between(self.levels, time)
+
+    def tail_at(self, time: float) -> float:
+        """Tailwater level [m] at a time."""
+        return between(self.tail_levels, time)
+
+    def before_last_level(self) -> Case | None:
+        """The case without its last level; None if it has only one level or a prescribed
+        displacement.
+        """
+        before = len(self.levels) - 1
+        if not before or self["drive"] != "level":
+            return None
+        return replace(
+            self,
+            levels=self.levels[:-1],
+            tail_levels=self.tail_levels[:-1],
+            times=tuple(t for t in self.times if t <= before),
+        )
+
+    def changed(self, values: Values) -> Case:
+        """The case with other values of independent parameters, without Gmsh's parser.
+
+        Raises InputError, and KeyError if other parameters depend on one of them.
+        """
+        checked = {name: declared()[name].check(value) for name, value in values.items()}
+        if not checked.keys() <= independent():
+            raise KeyError(*checked.keys() - independent())
+        source = self.source and self.source.with_overrides(checked)
+        result = replace(self.with_values(checked), source=source, published=False)
+        check_joints(result)
+        return result
+
+    def scenes(self) -> list[Case]:
+        """The case itself, then with its further uplift modes."""
+        return [self, *(self.with_uplift(mode) for mode in self.also_uplift)]
+
+    def with_uplift(self, mode: str) -> Case:
+        """The case with another uplift, and no further uplift modes."""
+        source = self.source and self.source.with_overrides({"uplift": mode})
+        return replace(self.with_values({"uplift": mode}), source=source, also_uplift=())
+
+
+def between(levels: tuple[float, ...], time: float) -> float:
+    """Level at a time: linear between 0 at t = 0 and the levels at t = 1, 2, ..., then constant."""
+    points, time = (0.0, *levels), min(time, len(levels))
+    i = min(int(time), len(points) - 2)
+    return points[i] + (time - i) * (points[i + 1] - points[i])
+
+
+def joint_name(height: float) -> str:
+    """The name of a joint whose heel is at a height [m]."""
+    return f"lift {height:g} m" if height else "base"
+
+
+def check_joints(case: Case) -> None:
+    """Check the values of a case, joint by joint, and the heights of its lifts.
+
+    Raises InputError.
+    """
+    if case.lift_heights:
+        check_lift_heights(case.lift_heights, case["dam_height"])
+    for joint, name in zip(case.joints, case.joint_names, strict=True):
+        try:
+            check_values(joint, joint.section, joint.geometry is None)
+            check_acting(joint, joint.times[-1])
+        except InputError as error:  # of a value for all joints the first one
+            where = "" if joint is case.joints[0] else f"{name}: "
+            raise InputError(f"{where}{error}") from None
+    if case.lift_heights:
+        sections = [joint.section for joint in case.joints]
+        check_lifts(case, case.lift_heights, sections)

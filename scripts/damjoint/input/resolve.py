@@ -1,0 +1,179 @@
+"""A case from its source: values that follow from others, the loading, and the checks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from .. import InputError
+from ..arrays import Settings
+from . import casefile
+from .case import SECTION, SHARED, Case, check_joints
+from .case_names import CASES, case_file
+from .constraints import (
+    check_also_uplift,
+    check_drive,
+    check_levels,
+    check_softening,
+    check_steps,
+    check_tail_levels,
+    check_times,
+)
+from .geometry_file import own_geometry
+from .joints import parsed_by_joint, settings_of_joints, stacked_joints
+from .parameters import checked, declared, levels_of, listing
+from .refinement import first_mesh, relative_error
+from .source import Source
+from .values import flows as flows
+from .values import freezes_uplift as freezes_uplift
+from .values import has_drains as has_drains
+
+
+def load(
+    case: str,
+    overrides: Settings | None = None,
+    levels: str | Sequence[float] | None = None,
+    tail_levels: str | Sequence[float] | None = None,
+    steps: int | None = None,
+    accuracy: str | None = None,
+    record: Path | None = None,
+) -> Case:
+    """Read a case file, apply overrides, resolve the parameters that follow others, check all.
+
+    case: letter, name or path; overrides: {name: value, or a value for each joint}, also
+    lift_heights [m]; levels, tail_levels: [m] at t = 1, 2, 3, also as a text 'a,b,c'; steps: equal
+    steps between two levels; accuracy: coarse, standard, fine or a percentage, chooses order, first
+    mesh (overrides win) and one step per level; record: file of the ground's acceleration. Raises
+    InputError.
+    """
+    path = case_file(case)
+    text = casefile.read(path)
+    if record:
+        text.texts["record"] = str(record)
+    return resolve(Source(path, text, dict(overrides or {}), levels, tail_levels, steps, accuracy))
+
+
+def resolve(source: Source) -> Case:
+    """The case of a source, see `load`.
+
+    Raises InputError.
+    """
+    path, file, overrides = source.path, source.text, source.overrides
+    levels, tail_levels = source.levels, source.tail_levels
+    steps, accuracy, error = source.steps, source.accuracy, None
+    if accuracy is not None:
+        error, plain = relative_error(accuracy), resolve(Source(path, file, overrides))
+        overrides = {**first_mesh(plain), **overrides}
+        steps = steps or (1 if plain["drive"] == "level" else None)
+    if steps is not None:
+        check_steps(steps)
+    lists = {name: tuple(values) for name, values in file.lists.items()}
+    if levels is not None:
+        lists["levels"] = levels_of("levels", levels)
+    if levels is not None or steps is not None:
+        lists.pop("times", None)
+    tails = lists.pop("tail_levels", (0.0,))
+    if tail_levels is not None:
+        tails = levels_of("tail_levels", tail_levels)
+    overrides = {name: checked(name, value) for name, value in overrides.items()}
+    lifts = lists.pop("lift_heights", ())
+    if "lift_heights" in overrides:
+        given = overrides.pop("lift_heights")
+        lifts = levels_of("lift_heights", given) if given else ()
+    geometry = own_geometry(file.texts["geometry"]) if "geometry" in file.texts else None
+    values = settings_of_joints({**file.defaults, **file.of_joints, **overrides}, lifts, geometry)
+    listed = "".join(listing(n, v) for n, v in lists.items())
+    variables, *of_joints = parsed_by_joint(values, listed, lifts)
+    if accuracy is not None and geometry and geometry.suffix != ".geo":
+        raise InputError(
+            f"accuracy = {accuracy}: must not be set with a mesh as geometry "
+            f"({geometry.name}), which can not be refined"
+        )
+    heights = tuple(variables["levels"])
+    also = () if "uplift" in overrides else tuple(file.texts.get("also_uplift", "").split())
+    result = Case(
+        name=path.stem,
+        title=file.texts.get("title", path.stem),
+        values={name: variables[name][0] for name in declared()},
+        levels=heights,
+        tail_levels=tails[:1] * len(heights) if len(set(tails)) == 1 else tails,
+        times=tuple(variables["times"]) if steps is None else equal_steps(len(heights), steps),
+        also_uplift=also,
+        published=as_published(path, overrides, levels, tail_levels),
+        hardening_asked=bool(variables["hardening_asked"][0]),
+        accuracy=error,
+        geometry=geometry,
+        record=Path(file.texts["record"]) if "record" in file.texts else None,
+        source=source,
+        shared={n: variables[n] for n in SHARED},
+        section={n: variables[n] for n in SECTION},
+        lift_heights=lifts,
+        of_joints=stacked_joints(variables, of_joints),
+    )
+    for joint, parsed in zip(result.joints, of_joints or [variables], strict=True):
+        check_softening(joint.joint, bool(parsed["softening_twice"][0]))
+    check_joints(result)
+    check_loading(result, tails, of_case=tail_levels is None)
+    return with_drive_times(result)
+
+
+def varied(
+    case: Case,
+    overrides: Settings | None = None,
+    levels: str | Sequence[float] | None = None,
+    tail_levels: str | Sequence[float] | None = None,
+    steps: int | None = None,
+    accuracy: str | None = None,
+) -> Case:
+    """The case with other values of any parameters, and with another loading or accuracy where they
+    are not None; arguments as in `load`. The parameters that follow others follow them.
+
+    Raises InputError.
+    """
+    if case.source is None:
+        raise InputError(f"case {case.name}: of stored results; must be a case that was loaded")
+    given = {"levels": levels, "tail_levels": tail_levels, "steps": steps, "accuracy": accuracy}
+    changes: dict[str, Any] = {n: value for n, value in given.items() if value is not None}
+    return resolve(replace(case.source.with_overrides(overrides or {}), **changes))
+
+
+def check_loading(case: Case, tails: Sequence[float], of_case: bool) -> None:
+    """Check levels, times and further uplift modes of a case; tails: tailwater levels as listed;
+    of_case: whether they are those of the case file.
+
+    Raises InputError.
+    """
+    number = len(case.levels)
+    check_levels("levels", case.levels, case.highest_level)
+    check_levels("tail_levels", tails, case.highest_level)
+    check_tail_levels(case.tail_levels, number, of_case)
+    check_times(case.times, number)
+    check_also_uplift(case.also_uplift, case["uplift"])
+    if case["drive"] != "level":
+        check_drive(case["drive_begin"], case["drive_end"], number)
+
+
+def with_drive_times(case: Case) -> Case:
+    """The case with steps at begin and end of a prescribed displacement."""
+    if case["drive"] == "level":
+        return case
+    ends = {case["drive_begin"], case["drive_end"]} - {0.0}
+    return replace(case, times=tuple(sorted({*case.times, *ends})))
+
+
+def equal_steps(levels: int, steps: int) -> tuple[float, ...]:
+    """Times of equal steps between levels."""
+    return tuple(i + (k + 1) / steps for i in range(levels) for k in range(steps))
+
+
+def as_published(path: Path, overrides: Settings, *loading: str | Sequence[float] | None) -> bool:
+    """Whether a case of the package is unchanged but for mesh, solver and uplift."""
+    harmless = {n for n, p in declared().items() if p.group in ("Mesh", "Solver")}
+    own = path.resolve().parent == CASES.resolve()
+    return (
+        own
+        and set(overrides) <= harmless | {"order", "uplift"}
+        and all(levels is None for levels in loading)
+    )

@@ -1,0 +1,99 @@
+"""Gmsh makes the mesh of a case, from geo/*.geo or a user's own geometry."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from .. import InputError, RunError, data
+from ..arrays import Setting
+from ..input.case import Case
+from ..input.parameters import assignments, listing, start_gmsh
+from ..input.values import has_drains
+from .body import Body as Body
+
+#: Parameters that the mesh always depends on.
+GEOMETRY = (
+    *("dim", "mesh_pattern", "n_joint", "n_layers", "h_dam", "h_found"),
+    *("dam_base", "dam_crest", "dam_height", "batter", "batter_height", "neck_height"),
+    *("joint_slope", "joint_height", "found_side", "found_depth", "thickness"),
+)
+
+
+#: Parameters on which it depends only if a line force acts.
+MARKS = {
+    "ice_force": ("ice_level",),
+    "anchor_force": ("anchor_at",),
+    "force_x": ("force_face", "force_at"),
+    "force_y": ("force_face", "force_at"),
+}
+
+
+def shares(case: Case) -> dict[str, Setting]:
+    """The parameters that the mesh of a case depends on, and the lists of its lifts."""
+    names = [*GEOMETRY, *(n for force, needs in MARKS.items() if case[force] for n in needs)]
+    values: dict[str, Setting] = {name: case[name] for name in names}
+    # of a force only whether it acts
+    values |= {name: float(bool(case[name])) for name in MARKS}
+    if has_drains(case):  # they need a node in all modes of uplift
+        values |= {"uplift": "drained", "drain_x": case["drain_x"]}
+    if case.lift_heights:
+        _, *lifts = case.joints
+        values["lift_heights"] = case.lift_heights
+        values["lift_slopes"] = tuple(lift["joint_slope"] for lift in lifts)
+        values["lift_drain_x"] = tuple(has_drains(lift) * lift["drain_x"] for lift in lifts)
+    return values
+
+
+def as_text(settings: Mapping[str, Setting]) -> str:
+    """Values and lists of numbers in Gmsh's language."""
+    lists = {name: value for name, value in settings.items() if isinstance(value, tuple)}
+    values = {n: value for n, value in settings.items() if not isinstance(value, tuple)}
+    listed = (listing(name, map(float, value)) for name, value in lists.items())
+    return assignments(values) + "".join(listed)
+
+
+#: Options of Gmsh by which geo/dam2d.geo chooses where element sizes come from; 1: the default.
+SIZE_OPTIONS = ("MeshSizeExtendFromBoundary", "MeshSizeFromPoints")
+
+
+def generate(case: Case) -> None:
+    """Make the mesh of a case, as Gmsh's current mesh.
+
+    Raises RunError, and InputError if a user's own geometry can not be read.
+    """
+    import tempfile
+
+    gmsh = start_gmsh()
+    gmsh.clear()
+    gmsh.parser.clear()
+    gmsh.onelab.clear()
+    for option in SIZE_OPTIONS:  # of an earlier geometry in this process
+        gmsh.option.setNumber(f"Mesh.{option}", 1)
+    own = case.geometry
+    # in a folder of its own: Gmsh runs a file of options, FILE.opt, beside the file it opens
+    with tempfile.TemporaryDirectory(prefix="damjoint-") as folder:
+        path = Path(folder) / f"scene{own.suffix if own else '.geo'}"
+        if not own:
+            path.write_text(as_text(shares(case)) + f'Include "{data("geo")}/dam.geo";\n')
+        elif own.suffix == ".geo":  # it may take sizes from the case
+            path.write_text(assignments(case.values) + f'Include "{own}";\n')
+        else:
+            path.symlink_to(own)
+        try:
+            gmsh.open(str(path))
+            if not len(gmsh.model.mesh.getElements(int(case["dim"]))[0]):
+                gmsh.model.mesh.generate(int(case["dim"]))
+        except Exception as error:  # what gmsh raises
+            if own:
+                gmsh.finalize()  # else Gmsh remains busy with a file that it could not read
+                raise InputError(f"geometry = {own}: {error}") from None
+            raise RunError(f"mesh: {error}") from None
+    if own:
+        # format MSH 2.2 has an element once for each of its groups: a point that is heel and toe
+        ends = [e for d in range(int(case["dim"]) - 1) for e in gmsh.model.getEntities(d)]
+        if ends:  # else of all entities
+            gmsh.model.mesh.removeDuplicateElements(ends)
+        # tags from 1 on, for small tables by tag and small keys in GetDP
+        gmsh.model.mesh.renumberNodes()
+        gmsh.model.mesh.renumberElements()
