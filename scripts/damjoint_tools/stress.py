@@ -17,6 +17,7 @@ import tempfile
 import time
 from collections.abc import Iterator
 from concurrent.futures import as_completed
+from importlib.util import find_spec
 from pathlib import Path
 
 from damjoint import InputError, RunError
@@ -63,7 +64,7 @@ def run_and_verify(scene: RandomScene, folder: Path) -> dict[str, object]:
         **{name: as_text(scene.settings.get(name, case[name])) for name in ("law", "uplift")},
     }
     try:
-        run = run_of(scene, folder)
+        run = run_of(scene, folder, fields=True)
         row["seconds"] = f"{time.perf_counter() - start:.2f}"
         row |= {"verdict": run.files.record["verdict"]} | verified(run)
         if isinstance(scene, RandomQuake):
@@ -185,8 +186,10 @@ def stress(
 
     out: CSV of COLUMNS; a row is written when its scene is finished. quake: earthquakes, with their
     records in a folder beside the file. Raises InputError, also if the rows in the file were
-    computed by other code.
+    computed by other code, or scikit-fem is missing.
     """
+    if not find_spec("skfem"):
+        raise InputError("stress: needs scikit-fem; install it by pip install 'damjoint[test]'")
     now = provenance()
     names = [f"{seed}-{number}" for number in range(count)]
     with result_file(out, COLUMNS, ("dim", "seconds")) as (file, done):

@@ -10,6 +10,7 @@ again, slowly and plainly, from the formulas of reference/theory.md.
 | `reader` | the values of each joint, levels and times, from the command line |
 | `statics` | weights and loads of the section's polygons: N + U, T, M of every step |
 | `laws/` | traction, damage, slip of every step at every node and integration point, replayed |
+| `solids` | reads the bodies' mesh; functions and quadrature on their sides |
 | `water` | pressure and flux, from the openings |
 | `elasticity` | displacement jumps, from loads and tractions of the joints |
 | `again` | independence of steps; critical values |

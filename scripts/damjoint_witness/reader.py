@@ -190,21 +190,27 @@ def joint_on(whole: Section, heel_y: float, slope: float) -> Section:
     )
 
 
-def sections(joints: Sequence[Values]) -> tuple[Section, ...]:
-    """Return the section above each joint, the lowest first, from their parameters."""
-    first = joints[0]
+def section_above_base(first: Values) -> Section:
+    """Return the section above the base, also of a dam whose first joint is a lift, from the
+    parameters of the first joint.
+    """
     height, base, batter = (first[name] for name in ("dam_height", "dam_base", "batter"))
     on_base = first["joint_height"] == 0
     toe_y = base * math.tan(math.radians(first["joint_slope"])) if on_base else 0.0
     crest_x, neck_y = batter + first["dam_crest"], height - first["neck_height"]
     bend = [(batter, first["batter_height"])] if batter and first["batter_height"] < height else []
     neck = [(crest_x, neck_y)] if first["neck_height"] else []
-    whole = Section(
+    return Section(
         (0.0, 0.0),
         (base, toe_y),
         ((0.0, 0.0), *bend, (batter, height)),
         ((base, toe_y), *neck, (crest_x, height)),
     )
+
+
+def sections(joints: Sequence[Values]) -> tuple[Section, ...]:
+    """Return the section above each joint, the lowest first, from their parameters."""
+    whole = section_above_base(joints[0])
     return tuple(
         whole
         if not joint["joint_height"]

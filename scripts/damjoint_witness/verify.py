@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import cached_property
 
-from . import earthquake, replay, statics, stops, tables
+from . import earthquake, replay, statics, stops, tables, water
 from .files import Files, Table, read_table
 from .reader import Asked, read
 
@@ -44,7 +44,15 @@ class Witness:
             yield from statics.balance(files, asked)
             yield from tables.integrals(files, asked, steps)
             yield from tables.nodes(files, asked, steps)
+            yield from water.violations(files, asked, steps)
+            if (files.folder / "fields").is_dir():
+                yield from self._elasticity()
         yield from replay.laws(steps, asked.joints)
+
+    def _elasticity(self) -> Iterator[str]:
+        from . import elasticity  # scikit-fem is needed here only
+
+        return elasticity.violations(self.files, self.asked, self.steps)
 
     def stop(self) -> tuple[bool, str]:
         """Whether it is wrong that the run has stopped early, and a remark."""

@@ -201,6 +201,7 @@ def test_scenes_have_one_to_four_joints_and_can_be_loaded():
 
 
 def test_stress_is_reproducible_and_resumed_and_makes_a_page(command, monkeypatch):
+    pytest.importorskip("skfem")
     monkeypatch.setattr(stress, "TIME_LIMIT", 60)
     code, out, _ = command("stress", 2, "--seed", 3, "--out", "s.csv")
     assert code == 0 and "0 defect; s.csv" in out

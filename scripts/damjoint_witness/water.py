@@ -1,0 +1,725 @@
+"""Pressure and flux of the water in the joints, from the written openings.
+
+Heads at the ends by the levels; between them, by `uplift`, a straight line, the line over the
+drains, or the flow through the openings: in 2D the elements are resistances in series, in a network
+where joints meet, in 3D finite elements. The discretisation is that of reference/theory.md:
+pressure of order 1, the cube of the aperture integrated by the points of the joint law.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from decimal import Decimal, localcontext
+from functools import cache, cached_property
+from typing import Any
+
+import meshio
+import numpy as np
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import splu
+from scipy.spatial import cKDTree
+
+from .files import Files, Table, rows_where
+from .reader import Asked, Values
+from .solids import SHAPES, Array, IntArray, Sides, functions, rule
+
+#: Error of a pressure over the largest one, and of a flux over its scale: they are written with 12
+#: digits. In 3D, of a system of equations.
+DIGITS, IN_3D = 1e-9, 1e-6
+#: Places of nodes have 9 decimals [m].
+SAME_PLACE = 1e-7
+#: Times that differ by less are the same.
+SAME_TIME = 1e-9
+#: Aperture of the closed joint [m] with uplift = cracked, and the largest growth over it.
+CRACK_APERTURE, CRACK_MOST = 1e-8, 100.0
+#: Digits of the elimination in a network: conductances of open and closed joints differ by 1e18.
+PRECISION = 60
+#: Modes whose water flows, and those that water does not pass.
+FLOWING, CLOSED = ("flow", "cracked"), ("none", "waterstop")
+
+
+# -- joints
+# --------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class JointState:
+    """A joint at a time: rows of its nodes, its elements, and the openings."""
+
+    asked: Asked
+    number: int
+    rows: Table
+    sides: tuple[Sides, ...]
+    tail: float
+    #: rows of its integration points when the step began; none: undamaged
+    before: Table
+
+    @property
+    def values(self) -> Values:
+        """Parameters of the joint."""
+        return self.asked.joints[self.number]
+
+    @property
+    def level(self) -> float:
+        """Level of the reservoir [m], with the offset of the joint's heel."""
+        return float(self.rows["level"][0]) + float(self.values["joint_head_offset"])
+
+    @cached_property
+    def positions(self) -> Array:
+        """Positions of the rows (n, 3)."""
+        return places(self.rows)
+
+    @cached_property
+    def ends(self) -> tuple[Array, Array]:
+        """Positions (2,) of heel and toe in the plane of x and y."""
+        s = self.rows["s"]
+        return self.positions[s.argmin(), :2], self.positions[s.argmax(), :2]
+
+    @cached_property
+    def along(self) -> Array:
+        """Direction (2,) from heel to toe of a plane joint."""
+        heel, toe = self.ends
+        return np.asarray((toe - heel) / np.linalg.norm(toe - heel))
+
+    @property
+    def length(self) -> float:
+        """Distance from heel to toe [m]."""
+        return float(np.linalg.norm(self.ends[1] - self.ends[0]))
+
+    def distance(self, positions: Array) -> Array:
+        """Return the distance from the heel at positions (q, 3) [m]."""
+        return np.asarray((positions[:, :2] - self.ends[0]) @ self.along)
+
+    @property
+    def unit_weight(self) -> float:
+        """Weight of water [N/m3]."""
+        return float(self.values["rho_water"] * self.values["g"])
+
+    def find(self, places: Array) -> IntArray:
+        """Return the rows at places (..., 3)."""
+        distance, found = map(np.asarray, cKDTree(self.positions).query(places))
+        if distance.max(initial=0) > SAME_PLACE:
+            raise ValueError("joint.csv: a node of the joint's elements has no row")
+        return np.asarray(found, int)
+
+    def widening(self) -> list[Array]:
+        """Return, of the elements of each shape, the hydraulic aperture over that of the closed
+        joint at the points of the law (m, q).
+        """
+        found, start = [], 0
+        for sides in self.sides:
+            u, _ = joint_rule(sides.shape, sides.order, self.values["quadrature"])
+            at = functions(sides.shape, sides.order, u)
+            opening = np.maximum(self.rows["delta_n"][self.find(sides.places)] @ at.T, 0)
+            if self.values["uplift"] == "flow":
+                found.append(1 + opening / self.values["aperture_min"])
+            elif self.values["uplift"] == "cracked":
+                crack = self.crack_opening(start, opening.size).reshape(opening.shape)
+                beyond = np.maximum(opening - crack, 0)
+                found.append(1 + np.minimum(beyond / CRACK_APERTURE, CRACK_MOST))
+            else:
+                found.append(np.ones_like(opening))
+            start += opening.size
+        return found
+
+    def crack_opening(self, start: int, number: int) -> Array:
+        """Return the opening [m] beyond which integration points (start, ...) are cracked: what had
+        broken before the step lets the water in.
+        """
+        values, f_t = self.values, float(self.values["sigma_max"])
+        damage = self.before["damage"][start : start + number]
+        damage = damage if len(damage) else np.zeros(number)
+        if values["law"] == "friction":
+            return np.full(number, values["adhesion"] / values["mu"] / values["K_N"])
+        softened = 2 * values["G_f"] / f_t if f_t else 0.0
+        if values["law"] == "rupture":
+            softened = (1 + values["pena_rupture"]) * f_t / values["K_N"]
+        if values["law"] == "endo":
+            return np.full(number, softened)
+        return np.where(damage >= 1, 0.0, softened)
+
+
+@cache
+def joint_rule(shape: str, order: int, quadrature: str) -> tuple[Array, Array]:
+    """Reference points (q, d) and weights (q,) of the joint law: as many as integrate the square of
+    the jump, or those of the published elements.
+    """
+    if shape == "triangle":
+        if order == 2:
+            return rule("triangle")
+        if quadrature == "published":
+            return np.full((1, 2), 1 / 3), np.array([0.5])
+        return np.array([[1, 1], [4, 1], [1, 4]]) / 6, np.full(3, 1 / 6)
+    x, w = np.polynomial.legendre.leggauss(2 if quadrature == "published" else order + 1)
+    if shape == "line":
+        return x[:, None], w
+    return np.array([(a, b) for a in x for b in x]), np.outer(w, w).ravel()
+
+
+def sides_of(files: Files, asked: Asked, number: int, rows: Table) -> tuple[Sides, ...]:
+    """Return the elements of a joint: in 2D between its nodes along it, in 3D those of the file
+    fields/joint_t*.vtu.
+    """
+    order = int(asked.joints[0]["order"])
+    if asked.joints[0]["dim"] == 2:
+        by_s = np.argsort(rows["s"])[::order]
+        corners = np.column_stack([rows[name][by_s] for name in "xyz"])
+        return (Sides("line", np.stack([corners[:-1], corners[1:]], axis=1), order),)
+    path = next((files.folder / "fields").glob("joint_t*.vtu"))
+    mesh: Any = meshio.read(path)
+    own = mesh.point_data["joint"] == number + 1
+    tables = [block.data[own[block.data].all(axis=1)] for block in mesh.cells]
+    return tuple(Sides(SHAPES[t.shape[1]], mesh.points[t], order) for t in tables if len(t))
+
+
+# -- heads
+# --------------------------------------------------------------------------------------------------
+
+#: Head [m] at positions (q, 3).
+Heads = Callable[[Array], Array]
+
+
+def heads_at_ends(
+    heel: float, toe: float, level: float, tail: float, flowing: bool
+) -> tuple[float, float]:
+    """Return the heads [m] at heel and toe of these heights. A dry end has its own elevation; water
+    that flows does not enter there: a lower head on the other side holds here, too.
+    """
+    if level <= heel and tail <= toe:
+        rest = min(heel, toe, max(level, tail))
+        return rest, rest
+    first = level if level > heel else min(heel, tail) if flowing else heel
+    last = tail if tail > toe else min(toe, level) if flowing else toe
+    return first, last
+
+
+def line_over_drains(joint: JointState) -> tuple[list[float], list[float]]:
+    """Return places [m from the heel] and heads [m] of uplift = imposed or drained."""
+    values, length = joint.values, joint.length
+    heel, toe = (float(end[1]) for end in joint.ends)
+    first, last = heads_at_ends(heel, toe, joint.level, joint.tail, flowing=False)
+    if values["uplift"] != "drained":
+        return [0, length], [first, last]
+    at = values["drain_x"]
+    undrained = first + (last - first) * at / length
+    if values["drain_reference"] == "reservoir":
+        undrained = first
+    outlet = max(values["drain_level"], joint.tail, joint.ends[0][1] + at * joint.along[1])
+    drained = undrained - values["drain_effectiveness"] * max(undrained - outlet, 0)
+    return [0, at, length], [first, drained, last]
+
+
+def pressure(joint: JointState, heads: Heads) -> Callable[[Array], Array]:
+    """Return the pressure [Pa] at positions (q, 3) from the head there."""
+    values = joint.values
+
+    def at(positions: Array) -> Array:
+        if values["uplift"] == "none":
+            return np.zeros(len(positions))
+        full = np.maximum(joint.unit_weight * (heads(positions) - positions[:, 1]), 0)
+        if values["uplift"] != "waterstop":
+            return np.asarray(full)
+        stop = values["waterstop"]
+        return np.asarray(full * (joint.distance(positions) <= stop + SAME_PLACE) * (stop > 0))
+
+    return at
+
+
+# -- flow
+# --------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Flow:
+    """A solution: heads at the nodes (n,) [m], in 2D their drop along the elements (m,) [m], which
+    may be a small difference, and what enters at the nodes (n,).
+    """
+
+    heads: Array
+    drops: Array
+    inflow: Array
+
+    def mixed(self, share: float, other: Flow) -> Flow:
+        """Return the mean with a share of another solution."""
+        pairs = (
+            (self.heads, other.heads),
+            (self.drops, other.drops),
+            (self.inflow, other.inflow),
+        )
+        return Flow(*((1 - share) * own + share * its for own, its in pairs))
+
+
+@dataclass(frozen=True)
+class Graph:
+    """Flow along lines: pairs of nodes with a conductance; fixed heads [m]."""
+
+    pairs: IntArray
+    conductances: Array
+    number: int
+
+    def solve(self, fixed: dict[int, float]) -> Flow:
+        """Solve for fixed heads by node: the others are eliminated one by one, in numbers of
+        PRECISION digits.
+        """
+        with localcontext() as context:
+            context.prec = PRECISION
+            links: list[dict[int, Decimal]] = [{} for _ in range(self.number)]
+            for (i, k), size in zip(self.pairs.tolist(), self.conductances.tolist(), strict=True):
+                for a, b in ((i, k), (k, i)):
+                    links[a][b] = links[a].get(b, Decimal(0)) + Decimal(size)
+            eliminated = []
+            free = [node for node in range(self.number) if node not in fixed and links[node]]
+            for node in sorted(free, key=lambda n: len(links[n])):
+                own = links[node]
+                whole = sum(own.values(), Decimal(0))
+                for a, size in own.items():
+                    del links[a][node]
+                    for b, other in own.items():
+                        if a != b:
+                            links[a][b] = links[a].get(b, Decimal(0)) + size * other / whole
+                eliminated.append((node, own, whole))
+            heads = {node: Decimal(head) for node, head in fixed.items()}
+            inflow = np.zeros(self.number)
+            for node in fixed:
+                parts = [size * (heads[node] - heads[b]) for b, size in links[node].items()]
+                inflow[node] = float(sum(parts, Decimal(0)))
+            for node, own, whole in reversed(eliminated):
+                heads[node] = sum((size * heads[b] for b, size in own.items()), Decimal(0)) / whole
+            drops = [float(heads[i] - heads[k]) for i, k in self.pairs.tolist()]
+        return Flow(
+            np.array([float(heads[n]) for n in range(self.number)]), np.array(drops), inflow
+        )
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Flow on surfaces: stiffness of order 1."""
+
+    matrix: Any
+
+    def solve(self, fixed: dict[int, float]) -> Flow:
+        """Solve for fixed heads by node."""
+        number = self.matrix.shape[0]
+        heads, known = np.zeros(number), np.zeros(number, bool)
+        known[list(fixed)] = True
+        heads[list(fixed)] = list(fixed.values())
+        free = np.flatnonzero(~known)
+        if len(free):
+            rows = self.matrix[free]
+            heads[free] = splu(rows[:, free].tocsc()).solve(-(rows @ heads))
+        return Flow(heads, np.zeros(0), np.asarray(self.matrix @ heads))
+
+
+@dataclass(frozen=True)
+class Network:
+    """Joints whose water is one: their states, and the nodes of order 1 of all of them."""
+
+    joints: tuple[JointState, ...]
+    #: positions of the nodes of all joints of the dam, each joint's once (n, 3)
+    all_nodes: Array
+
+    @property
+    def first(self) -> JointState:
+        """The first joint, whose weight of water and levels are those of all."""
+        return self.joints[0]
+
+    @property
+    def flowing(self) -> bool:
+        """Whether water flows through an opening."""
+        return any(joint.values["uplift"] in FLOWING for joint in self.joints)
+
+    @cached_property
+    def _numbering(self) -> tuple[Array, list[list[IntArray]]]:
+        corners = [sides.corners for joint in self.joints for sides in joint.sides]
+        places, number = distinct_places(np.concatenate([c.reshape(-1, 3) for c in corners]))
+        parts = np.split(number, np.cumsum([c.size // 3 for c in corners])[:-1])
+        tables = iter([part.reshape(c.shape[:2]) for part, c in zip(parts, corners, strict=True)])
+        return places, [[next(tables) for _ in joint.sides] for joint in self.joints]
+
+    @property
+    def nodes(self) -> Array:
+        """Positions of the nodes (n, 3)."""
+        return self._numbering[0]
+
+    @property
+    def tables(self) -> list[list[IntArray]]:
+        """Nodes of the elements of each joint (m, c), by shape."""
+        return self._numbering[1]
+
+    def nodes_of(self, joint: int) -> IntArray:
+        """Return the nodes of a joint."""
+        return np.unique(np.concatenate([table.ravel() for table in self.tables[joint]]))
+
+    @cached_property
+    def widening(self) -> list[list[Array]]:
+        """Of each joint and shape the aperture at the points of the law (m, q), over that of the
+        closed joint.
+        """
+        return [joint.widening() for joint in self.joints]
+
+    def conductivities(self, uniform: bool) -> Iterator[tuple[Sides, IntArray, Array]]:
+        """Yield elements, their nodes, and w^3 times weights at the points of the law (m, q), in a
+        unit that is that of all joints; uniform: w = 1.
+        """
+        by_aperture = any(joint.values["uplift"] == "flow" for joint in self.joints)
+        for joint, tables, widening in zip(self.joints, self.tables, self.widening, strict=True):
+            closed = joint.values["aperture_min"] if by_aperture else 1.0
+            for sides, table, factor in zip(joint.sides, tables, widening, strict=True):
+                _, w = joint_rule(sides.shape, sides.order, joint.values["quadrature"])
+                cube = np.ones_like(factor) if uniform else (closed * factor) ** 3
+                yield sides, table, cube * np.outer(sides.measures, w)
+
+    def operator(self, uniform: bool) -> Graph | Surface:
+        """Return the equations of the flow; uniform: of a uniform aperture."""
+        parts = list(self.conductivities(uniform))
+        if self.first.values["dim"] == 2:
+            by_length = [c.sum(axis=1) / (2 * s.measures) ** 2 for s, _, c in parts]
+            pairs = np.concatenate([table for _, table, _ in parts])
+            return Graph(pairs, np.concatenate(by_length), len(self.nodes))
+        number = len(self.nodes)
+        total = sparse.csr_matrix((number, number))
+        for sides, table, sizes in parts:
+            u, _ = joint_rule(sides.shape, sides.order, self.first.values["quadrature"])
+            slopes = gradients(sides, u)
+            blocks = np.einsum("mq,mqax,mqbx->mab", sizes, slopes, slopes)
+            rows = np.repeat(table, table.shape[1], axis=1).ravel()
+            columns = np.tile(table, (1, table.shape[1])).ravel()
+            entries = blocks.ravel(), (rows, columns)
+            total = total + sparse.coo_matrix(entries, (number, number)).tocsr()
+        return Surface(total)
+
+    # -- ends
+
+    @cached_property
+    def ends(self) -> tuple[IntArray, IntArray]:
+        """Nodes of heels and of toes on the surface of the dam: at no other joint."""
+        tree, ends = cKDTree(self.all_nodes), list[IntArray]()
+        for which in (0, 1):
+            nodes: list[int] = []
+            for k, joint in enumerate(self.joints):
+                own = self.nodes_of(k)
+                s = joint.rows["s"][joint.find(self.nodes[own])]
+                at_end = own[np.abs(s - (s.max() if which else s.min())) < SAME_PLACE]
+                near = tree.query_ball_point(self.nodes[at_end], SAME_PLACE)
+                nodes += [n for n, others in zip(at_end, near, strict=True) if len(others) == 1]
+            ends.append(np.unique(np.array(nodes, int)))
+        return ends[0], ends[1]
+
+    @cached_property
+    def branched(self) -> bool:
+        """Whether it is more than one way from heel to toe."""
+        heels, toes = self.ends
+        if self.first.values["dim"] == 3:
+            return not (len(heels) and len(toes))
+        if not len(heels) == len(toes) == 1:
+            return True
+        return self.first.values["dim"] == 2 and bool((self.degrees > 2).any() or self.dead_ends)
+
+    @cached_property
+    def degrees(self) -> IntArray:
+        """Number of elements at each node."""
+        tables = [table.ravel() for tables in self.tables for table in tables]
+        return np.bincount(np.concatenate(tables))
+
+    @property
+    def dead_ends(self) -> int:
+        """Number of ends at a joint that water does not pass, in 2D."""
+        return int((self.degrees == 1).sum()) - sum(map(len, self.ends))
+
+    def fixed(self) -> tuple[dict[int, float], set[int]]:
+        """Return the heads [m] at the ends, and those ends where water leaves but does not
+        enter.
+        """
+        first, (heels, toes) = self.first, self.ends
+        heights = self.nodes[:, 1]
+        if not self.branched:
+            heel, toe = (float(heights[nodes].mean()) for nodes in (heels, toes))
+            at_ends = heads_at_ends(heel, toe, first.level, first.tail, self.flowing)
+            pairs = zip((heels, toes), at_ends, strict=True)
+            return {int(n): head for nodes, head in pairs for n in nodes}, set()
+        levels = ((heels, first.level), (toes, first.tail))
+        heads = {int(n): max(heights[n], level) for nodes, level in levels for n in nodes}
+        dry = {n for n in heads if heads[n] <= heights[n]}
+        if len(dry) == len(heads):
+            lowest = heights[self.degrees == 1].min()
+            rest = float(min(lowest, max(first.level, first.tail)))
+            return dict.fromkeys(range(len(heights)), rest), set()
+        return heads, dry
+
+    # -- solution
+
+    def solve(self, uniform: bool, drains: dict[int, float] | None = None) -> Flow:
+        """Solve the flow, with the heads [m] at drains by node."""
+        operator, (heads, exits) = self.operator(uniform), self.fixed()
+        heads |= drains or {}
+        while True:
+            found = operator.solve(heads)
+            most = ENTERS * np.abs(found.inflow).max()
+            entering = {n for n in exits if found.inflow[n] > most}
+            if not entering:
+                return found
+            exits -= entering
+            heads = {n: head for n, head in heads.items() if n not in entering}
+
+    def drains(self) -> tuple[dict[int, float], float]:
+        """Return the nodes of drains that no crack has reached and the heads [m] of their outlets;
+        their effectiveness.
+        """
+        found, effect = {}, 0.0
+        for k, joint in enumerate(self.joints):
+            values = joint.values
+            if values["uplift"] not in FLOWING or not values["drains"]:
+                continue
+            own = self.nodes_of(k)
+            s = joint.rows["s"][joint.find(self.nodes[own])]
+            inner = (s > s.min() + SAME_PLACE) & (s < s.max() - SAME_PLACE)
+            own, away = own[inner], np.abs(s[inner] - values["drain_x"])
+            nodes = own[away < away.min() + SAME_PLACE]
+            beside = [
+                factor[np.isin(table, nodes).any(axis=1)]
+                for table, factor in zip(self.tables[k], self.widening[k], strict=True)
+            ]
+            if values["uplift"] == "cracked" and any((f > 1).any() for f in beside):
+                continue
+            effect = values["drain_effectiveness"]
+            for n in nodes.tolist():
+                found[n] = float(max(self.nodes[n, 1], values["drain_level"], joint.tail))
+        return found, effect
+
+    @cached_property
+    def flow(self) -> Flow:
+        """The flow: drains remove a part of the head that there would be without them."""
+        free = self.solve(uniform=not self.flowing)
+        drains, effect = self.drains()
+        if not drains or not effect or any(free.heads[n] <= head for n, head in drains.items()):
+            return free
+        return free.mixed(effect, self.solve(False, drains))
+
+    @property
+    def heads(self) -> Array:
+        """Heads at the nodes (n,) [m]."""
+        return self.flow.heads
+
+    def heads_of(self, joint: int) -> Heads:
+        """Return the head in a joint, by its functions of order 1."""
+        if self.first.values["dim"] == 2:
+            nodes = self.nodes_of(joint)
+            s = self.joints[joint].distance(self.nodes[nodes])
+            by_s = np.argsort(s)
+            return lambda positions: np.interp(
+                self.joints[joint].distance(positions), s[by_s], self.heads[nodes[by_s]]
+            )
+
+        def at(positions: Array) -> Array:
+            (sides,), (table,) = self.joints[joint].sides, self.tables[joint]
+            plane = Sides(sides.shape, sides.corners, 1)
+            points = plane.at(positions, np.ones(len(positions)))
+            return np.asarray((points.functions * self.heads[table[points.sides]]).sum(axis=1))
+
+        return at
+
+    def flux(self, joint: int) -> tuple[Array, float, float]:
+        """Return the flux towards the toe [kg/(m s)] at the rows of a joint, mean of the elements
+        around them, that out of the toe per metre of thickness, and its scale: that of the aperture
+        under the steepest head.
+        """
+        state, values = self.joints[joint], self.joints[joint].values
+        (sides,), (table,), (factor,) = state.sides, self.tables[joint], self.widening[joint]
+        u, w = joint_rule(sides.shape, sides.order, values["quadrature"])
+        cube = (values["aperture_min"] * factor) ** 3
+        share = state.unit_weight * values["rho_water"] / (12 * values["visc"])
+        if values["dim"] == 2:
+            lengths = 2 * sides.measures
+            conductance = cube @ w / 2 / lengths
+            first = sum(len(t) for tables in self.tables[:joint] for t in tables)
+            means = share * conductance * self.flow.drops[first : first + len(table)]
+            order = np.argsort(state.distance(sides.corners.mean(axis=1)))
+            leakage = float(means[order[-1]])
+        else:
+            slopes = np.einsum("mqax,ma->mqx", gradients(sides, u), self.heads[table])
+            along = slopes[..., :2] @ state.along
+            means = -share * (cube * along) @ w / w.sum()
+            at_toe = np.isin(np.arange(len(self.nodes)), self.ends[1]).astype(float)[table]
+            tested = np.einsum("mqax,ma->mqx", gradients(sides, u), at_toe)
+            products = np.einsum("mqx,mqx->mq", slopes, tested) * cube
+            leakage = float(-share * np.sum(products @ w * sides.measures))
+            leakage /= float(np.ptp(self.nodes[:, 2]))
+        rows = state.find(sides.places)
+        total, count = np.zeros(len(state.positions)), np.zeros(len(state.positions))
+        np.add.at(total, rows, means[:, None])
+        np.add.at(count, rows, 1)
+        heads = np.ptp(self.heads) + max(state.level, 0) * 1e-3
+        scale = max(float(np.abs(means).max()), share * values["aperture_min"] ** 3 * heads)
+        return total / np.maximum(count, 1), leakage, scale
+
+
+#: Water that enters at an exit, over the most at a node, up to which it counts as rounding.
+ENTERS = 1e-12
+
+
+def distinct_places(places: Array) -> tuple[Array, IntArray]:
+    """Return places (n, 3), each once, and the number of each of those given (m,)."""
+    pairs = cKDTree(places).query_pairs(SAME_PLACE, output_type="ndarray")
+    links = sparse.coo_matrix((np.ones(len(pairs)), pairs.T), (len(places),) * 2)
+    _, number = connected_components(links, directed=False)
+    _, first = np.unique(number, return_index=True)
+    return places[first], np.asarray(number, int)
+
+
+def gradients(sides: Sides, u: Array) -> Array:
+    """Return the gradients (m, q, n, 3) of the functions of order 1 at reference points (q, d)."""
+    step = 1e-3  # exact: functions are at most linear along each reference coordinate
+    by_reference = np.stack(
+        [
+            functions(sides.shape, 1, u + step * e) - functions(sides.shape, 1, u - step * e)
+            for e in np.eye(u.shape[1])
+        ],
+        axis=2,
+    ) / (2 * step)
+    return np.asarray(np.einsum("qnd,mxd->mqnx", by_reference, np.linalg.pinv(sides.slopes)))
+
+
+# -- check
+# --------------------------------------------------------------------------------------------------
+
+
+def networks(joints: Sequence[JointState]) -> list[Network]:
+    """Return the joints that share water: those that meet and that water passes."""
+    everything = np.concatenate([joint.positions for joint in joints])
+    groups: list[list[int]] = []
+    for k, joint in enumerate(joints):
+        if joint.values["uplift"] in CLOSED:
+            continue
+        tree = cKDTree(joint.positions)
+        near = [
+            group
+            for group in groups
+            if any(
+                np.isfinite(tree.query(joints[i].positions, 1, 0, 2, SAME_PLACE)[0]).any()
+                for i in group
+            )
+        ]
+        joined = [k, *(i for group in near for i in group)]
+        groups = [*(g for g in groups if g not in near), joined]
+    return [Network(tuple(joints[k] for k in sorted(group)), everything) for group in groups]
+
+
+def heads_of(joints: Sequence[JointState]) -> list[Heads]:
+    """Return the head of the water in each joint."""
+    found: dict[int, Heads] = {}
+    for network in networks(joints):
+        alone = network.first.values["uplift"] in ("imposed", "drained")
+        if len(network.joints) == 1 and alone and not joints[0].asked.geometry:
+            found[network.first.number] = line(network.first)
+            continue
+        for k, joint in enumerate(network.joints):
+            found[joint.number] = network.heads_of(k)
+    return [found.get(k, at_level(joint.level)) for k, joint in enumerate(joints)]
+
+
+def at_level(level: float) -> Heads:
+    """Return a uniform head [m]."""
+    return lambda positions: np.full(len(positions), level)
+
+
+def line(joint: JointState) -> Heads:
+    """Return the head of a joint of uniform transmissivity, with drains or without."""
+    places, heads = line_over_drains(joint)
+    return lambda positions: np.interp(joint.distance(positions), places, heads)
+
+
+def states(files: Files, asked: Asked, steps: Table) -> Iterator[tuple[float, list[JointState]]]:
+    """Yield at each requested time the number of its update and the joints."""
+    for table in files.joint_tables:
+        update = update_at(steps, table["time"][0], table["level"][0])
+        tail = float(steps["tail_level"][steps["update"] == update][0])
+        joints = []
+        for k in range(len(asked.joints)):
+            opened, softened = water_follows(asked.joints[k], steps, update)
+            now, then = (
+                rows_where(steps, (steps["update"] == number) & (steps["joint"] == k + 1))
+                for number in (update, opened)
+            )
+            rows = with_all_digits(rows_where(table, table["joint"] == k + 1), now, then)
+            sides = sides_of(files, asked, k, rows)
+            before = rows_where(steps, (steps["update"] == softened) & (steps["joint"] == k + 1))
+            before = rows_where(before, before["weight"] > 0)
+            joints.append(JointState(asked, k, rows, sides, tail, before))
+        yield update, joints
+
+
+def water_follows(values: Values, steps: Table, update: float) -> tuple[float, float]:
+    """Return the numbers of the updates whose openings and whose damage the water of an update
+    follows: its own and the one before; in a pseudo-static earthquake with quake_uplift = unchanged
+    the last one before it.
+    """
+    last = 1 - values["quake_t"]
+    acts = bool(values["k_h"] or values["k_v"]) and values["quake_uplift"] == "unchanged"
+    time = float(steps["time"][steps["update"] == update][0])
+    if not acts or time + last <= 0:
+        return update, update - 1
+    earlier = float(steps["update"][steps["time"] + last <= SAME_TIME].max(initial=0))
+    return earlier, earlier
+
+
+def with_all_digits(rows: Table, now: Table, opened: Table) -> Table:
+    """Return rows of a joint with the coordinates of the nodes in steps.csv, and with the openings
+    that the water follows; none: closed.
+    """
+    nodes, then = (rows_where(table, table["weight"] == 0) for table in (now, opened))
+    found = np.asarray(cKDTree(places(nodes)).query(places(rows))[1])
+    exact = rows | {name: nodes[name][found] for name in "xyz"}
+    openings = then["delta_n"][found] if len(then["delta_n"]) else np.zeros(len(found))
+    return exact | {"delta_n": openings}
+
+
+def places(table: Table) -> Array:
+    """Return the positions (n, 3) of rows."""
+    return np.column_stack([table[name] for name in "xyz"])
+
+
+def update_at(steps: Table, time: float, level: float) -> float:
+    """Return the number of the last update at a time and level, which a table has with 12 digits.
+    Points of an equilibrium path have the time of their step's end: they are found by the level.
+    """
+    by_level = np.abs(steps["level"] - level) <= SAME_TIME * max(abs(level), 1)
+    exact = by_level & (np.abs(steps["time"] - time) <= SAME_TIME * max(time, 1))
+    return float(steps["update"][exact if exact.any() else by_level].max())
+
+
+def violations(files: Files, asked: Asked, steps: Table) -> Iterator[str]:
+    """Yield where pressure or flux differ from those that follow from the openings; in 3D of a run
+    with fields, which have the elements of the joints.
+    """
+    plane = asked.joints[0]["dim"] == 2
+    room = DIGITS if plane else IN_3D
+    if not plane and not (files.folder / "fields").is_dir():
+        return
+    for _, joints in states(files, asked, steps):
+        time = joints[0].rows["time"][0]
+        for joint, heads in zip(joints, heads_of(joints), strict=True):
+            exact = pressure(joint, heads)(joint.positions)
+            scale = joint.unit_weight * max(joint.level, joint.tail, asked.joints[0]["dam_height"])
+            error = np.abs(joint.rows["p"] - exact).max()
+            if error > room * scale:
+                yield f"joint {joint.number + 1}: p off by {error:.3g} Pa at t = {time:g}"
+        for network in networks(joints):
+            for k, joint in enumerate(network.joints):
+                if joint.values["uplift"] == "flow":
+                    yield from flux(files, network, k, room)
+
+
+def flux(files: Files, network: Network, joint: int, room: float) -> Iterator[str]:
+    """Yield where the flux in the tables of a joint differs."""
+    state = network.joints[joint]
+    time, history = state.rows["time"][0], files.history_of(state.number)
+    means, leakage, scale = network.flux(joint)
+    written = float(history["flux"][np.argmin(np.abs(history["time"] - time))])
+    for what, error in (
+        ("flux", np.abs(state.rows["flux"] - means).max()),
+        ("leakage", abs(written - leakage)),
+    ):
+        if error > room * scale:
+            yield f"joint {state.number + 1}: {what} off by {error:.3g} kg/(m s) at t = {time:g}"

@@ -1,0 +1,139 @@
+"""Water and elasticity of the independent verification: they hold for what a run writes, and notice
+files in which a quantity has been altered.
+"""
+
+import csv
+import shutil
+
+import numpy as np
+import pytest
+from damjoint import cli
+from damjoint_witness import elasticity, water
+from damjoint_witness.files import Files, read_table
+from damjoint_witness.reader import read
+
+pytest.importorskip("skfem")
+
+SMALL = "--set n_joint=8 --set h_dam=12 --set h_found=40 --no-picture --all-steps"
+LOADS = (
+    "--set batter=4 --set batter_height=20 --set silt_height=12 --set silt_weight=1 "
+    "--set ice_force=5e4 --set anchor_force=1e6 --set k_h=0.05 --set k_v=0.03 --set floor_water=1 "
+    "--set temperature_dam=3 --set temperature_linear=-6 --set E_found=1e10 --set nu_found=0.3"
+)
+SCENES = {
+    "flow": "run dam --set uplift=flow --set drains=1 --set drain_x=9 --set sigma_max=2e4 "
+    f"--levels 30,44 --tail-levels 5 {LOADS}",
+    "lifts": "run dam --set order=1 --set lift_heights=14,30 --set joint_slope=4,-2,0 "
+    "--set uplift=cracked,drained,waterstop --set waterstop=3 --set sigma_max=0 --levels 44 "
+    "--tail-levels 18",
+    "monoliths": "run monoliths --run-geo --set uplift=flow,cracked,imposed --levels 43",
+}
+SCENES_3D = {
+    pattern: "run dam --set dim=3 --set n_layers=2 --set thickness=9 --set hold_z=1 "
+    f"--set mesh_pattern={pattern} --set uplift=flow --set sigma_max=2e4 --levels 44 {LOADS}"
+    for pattern in ("free", "layers")
+} | {
+    "regular": "run dam --set dim=3 --set mesh_pattern=regular --set order=1 --set uplift=flow "
+    "--set drains=1 --set drain_x=9 --levels 44"
+}
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """written(name): folder and words of the run of a scene."""
+    done = {}
+
+    def once(name):
+        if name not in done:
+            words = [*(SCENES | SCENES_3D)[name].split(), *SMALL.split()]
+            folder = tmp_path_factory.mktemp(name)
+            cli.main([*words, "--out", str(folder)])
+            done[name] = folder, tuple(word for word in words if word != "--all-steps")
+        return done[name]
+
+    return once
+
+
+def found(check, folder, words):
+    files = Files(folder, words)
+    return list(check.violations(files, read(words), read_table(folder / "steps.csv")))
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_water_and_jumps_are_those_of_the_run(written, name):
+    assert found(water, *written(name)) == []
+    assert found(elasticity, *written(name)) == []
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("name", SCENES_3D)
+def test_water_and_jumps_in_3d(written, name):
+    assert found(water, *written(name)) == []
+    assert found(elasticity, *written(name)) == []
+
+
+def altered(folder, tmp_path, name, column, factor):
+    """A copy of the files in which a column of a table is multiplied."""
+    copy = tmp_path / "altered"
+    shutil.copytree(folder, copy)
+    with (copy / name).open() as file:
+        heads, *rows = csv.reader(file)
+    k = heads.index(column)
+    for row in rows:
+        row[k] = repr(factor * float(row[k]))
+    with (copy / name).open("w", newline="") as file:
+        csv.writer(file).writerows([heads, *rows])
+    return copy
+
+
+@pytest.mark.parametrize(
+    "name, table, column, factor, what",
+    [
+        ("flow", "joint.csv", "p", 1.01, "p off"),
+        ("flow", "joint.csv", "flux", 1.0001, "flux off"),
+        ("flow", "history.csv", "flux", 1.0001, "leakage off"),
+        ("flow", "steps.csv", "delta_n", 1.0001, "p off"),
+        ("lifts", "joint.csv", "p", 1 + 1e-6, "joint 3: p off"),
+        ("monoliths", "joint.csv", "p", 1 + 1e-6, "joint 2: p off"),
+    ],
+)
+def test_altered_water_is_noticed(written, tmp_path, name, table, column, factor, what):
+    folder, words = written(name)
+    copy = altered(folder, tmp_path, table, column, factor)
+    assert any(what in violation for violation in found(water, copy, words))
+
+
+@pytest.mark.parametrize("column", ["delta_n", "delta_t1", "sigma_n_eff", "tau_1"])
+def test_altered_jumps_and_tractions_are_noticed(written, tmp_path, column):
+    folder, words = written("lifts")
+    copy = altered(folder, tmp_path, "steps.csv", column, 1 + 1e-4)
+    assert found(elasticity, copy, words)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        *("E_found=1.001e10", "nu_dam=0.201", "temperature_linear=-6.01", "rho_silt=901"),
+        *("ice_force=50100", "k_h=0.0501", "added_mass=2", "anchor_angle=0.1", "floor_water=0"),
+    ],
+)
+def test_other_values_than_those_of_the_run_are_noticed(written, change):
+    """As if the program took other values than those that the command asks for."""
+    folder, words = written("flow")
+    assert found(elasticity, folder, (*words, "--set", change))
+
+
+@pytest.mark.parametrize(
+    "change", ["drain_effectiveness=0.501", "drains=0", "aperture_min=1.01e-5", "visc=1.01e-3"]
+)
+def test_other_values_of_the_water_are_noticed(written, change):
+    folder, words = written("flow")
+    assert found(water, folder, (*words, "--set", change))
+
+
+def test_elimination_in_a_network_is_exact_for_any_conductances():
+    """Three lines from a node, one of them closed: the head by hand."""
+    graph = water.Graph(np.array([[0, 3], [1, 3], [2, 3]]), np.array([1e18, 1.0, 3.0]), 4)
+    flow = graph.solve({0: 30.0, 1: 20.0, 2: 10.0})
+    assert flow.drops[0] == pytest.approx((10 + 3 * 20) / 1e18, rel=1e-12)
+    assert flow.inflow == pytest.approx([70, -10, -60, 0], rel=1e-12)
