@@ -33,7 +33,9 @@ from .model.results import HISTORY, Results, joint_columns, quake_columns
 from .progress import track
 from .solver.load_stepper import LoadStepper
 from .solver.state import State
-from .statics.verdict import hints, statement, verdict
+from .statics.hints import hints
+from .statics.statement import statement
+from .statics.verdict import verdict
 from .studies.plan import Plan, Sample, column_of, in_file, listed, plan_with
 from .threads import limited_threads
 

@@ -10,7 +10,8 @@ from damjoint.model.results import column_of
 from damjoint.post import stored
 from damjoint.solver.load_stepper import LoadStepper
 from damjoint.statics import gravity
-from damjoint.statics.verdict import failed, statement, verdict
+from damjoint.statics.statement import statement
+from damjoint.statics.verdict import failed, verdict
 from damjoint.studies.check import FINITE_ELEMENTS, GRAVITY, compare_joints
 from damjoint_tools.random_scenes import random_scene
 from scipy.optimize import brentq

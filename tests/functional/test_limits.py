@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from closed_forms import BASE, CENTROID, WATER, WEIGHT, slide_level, thrust
 from damjoint import cli
-from damjoint.statics.verdict import hints, statement, verdict
+from damjoint.statics.hints import hints
+from damjoint.statics.statement import statement
+from damjoint.statics.verdict import verdict
 from numpy.testing import assert_allclose
 
 

@@ -7,7 +7,7 @@ from damjoint import InputError, runner
 from damjoint.input.parameters import start_gmsh
 from damjoint.input.resolve import load
 from damjoint.mesh.mesh import Mesh
-from damjoint.statics.verdict import hints
+from damjoint.statics.hints import hints
 from numpy.polynomial.legendre import leggauss
 
 #: Gauss points and weights on a line, their products for a triangle: enough for a kink.

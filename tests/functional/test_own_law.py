@@ -14,7 +14,8 @@ from damjoint.laws import LAWS, Law
 from damjoint.mesh.mesh import mesh_of
 from damjoint.post.pictures import shear_limit
 from damjoint.solver.load_stepper import LoadStepper
-from damjoint.statics.verdict import hints, verdict
+from damjoint.statics.hints import hints
+from damjoint.statics.verdict import verdict
 
 
 class Springs(Law):

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 from damjoint.input.resolve import load
-from damjoint.statics.verdict import hints, statement, verdict
+from damjoint.statics.hints import hints
+from damjoint.statics.statement import statement
+from damjoint.statics.verdict import verdict
 from damjoint.studies.critical import Search
 
 #: 45 m dam with drains on a joint that cracks and slides slightly.

@@ -6,7 +6,7 @@ from closed_forms import differences
 from damjoint import data
 from damjoint.engines import engine_of
 from damjoint.input.resolve import load
-from damjoint.statics.verdict import hints
+from damjoint.statics.hints import hints
 from numpy.testing import assert_allclose
 
 #: A dam on a foundation of three blocks in rows and columns; regular: quadrangles but in the last

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from damjoint.input.resolve import load
 from damjoint.laws import LAWS
-from damjoint.statics.verdict import hints, verdict
+from damjoint.statics.hints import hints
+from damjoint.statics.verdict import verdict
 from damjoint_witness.files import Files
 from damjoint_witness.verify import Witness
 

@@ -26,7 +26,7 @@ from damjoint.gui.worker import EngineProcess
 from damjoint.input.resolve import load
 from damjoint.mesh.mesh import mesh_of
 from damjoint.post.units import LENGTHS
-from damjoint.statics.verdict import hints
+from damjoint.statics.hints import hints
 from damjoint.studies.check import compare_methods
 from PIL import Image
 from quakes import DAM, smooth_record

@@ -8,7 +8,8 @@ from damjoint.engines.getdp.tables import nodes_of
 from damjoint.input.resolve import load
 from damjoint.model.results import HISTORY, JOINT, Results
 from damjoint.post import validation
-from damjoint.statics.verdict import failed, statement, verdict
+from damjoint.statics.statement import statement
+from damjoint.statics.verdict import failed, verdict
 
 REFERENCE = validation.Reference(
     *("ssnp142", "A", "imposed", "delta_n", 1.3, None, None, None),

@@ -52,7 +52,9 @@ def run_and_print(arguments: argparse.Namespace, drawing: DrawingProcess | None)
     """Run a case and print its results; drawing: draws its pictures (None: there are none)."""
     from ..post import summary
     from ..runner import run
-    from ..statics.verdict import failed, hints, path_statement, statement, verdict
+    from ..statics.hints import hints
+    from ..statics.statement import path_statement, statement
+    from ..statics.verdict import failed, verdict
 
     case = load_case(arguments, arguments.case)
     out = arguments.out or Path("out") / case.name

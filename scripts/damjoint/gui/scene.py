@@ -15,7 +15,8 @@ from ..model.loads import Loading
 from ..model.results import Results
 from ..post.summary import Table
 from ..runner import early_end
-from ..statics.verdict import decisive_joint, failed, statement, verdict
+from ..statics.statement import statement
+from ..statics.verdict import decisive_joint, failed, verdict
 from ..studies.quake_result import QuakeResult
 from .numbers import Numbers, QuakeNumbers, shown_rows, table_of_frames, table_of_levels, warnings
 

@@ -20,7 +20,9 @@ from ..input.case import Case, OfJoint
 from ..input.case_names import is_name
 from ..input.parameters import declared
 from ..model.results import Results, history_columns, joint_columns
-from ..statics.verdict import hints, statement, verdict
+from ..statics.hints import hints
+from ..statics.statement import statement
+from ..statics.verdict import verdict
 from ..storage import PART, atomic_write, locked_folder
 
 #: Files of a run: tables, pictures CASE....png, fields.

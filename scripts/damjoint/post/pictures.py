@@ -26,7 +26,8 @@ from ..mesh.body import Body
 from ..model.fields import Solution, along, distance, row_of_nodes, state_of
 from ..model.results import Results
 from ..statics import gravity
-from ..statics.verdict import decisive_joint, overturning_level, statement
+from ..statics.statement import statement
+from ..statics.verdict import decisive_joint, overturning_level
 from . import validation
 from .drawing import (
     BLUE,

@@ -40,6 +40,8 @@ class Mechanism:
     level: float = np.nan
     #: the joint that fails, or several; empty if the dam has only one
     joint: str = ""
+    #: their numbers
+    joints: tuple[int, ...] = ()
 
 
 class LoadStepper:
@@ -345,7 +347,8 @@ class LoadStepper:
     def mechanism_of(self, path: EquilibriumPath) -> Mechanism:
         """The mechanism of a path that does not reach the prescribed level."""
         ratio = path.points[-1].imposed / path.imposed(path.points[path.limit_point])
-        return Mechanism(path.mode, float(ratio), path.time, joint=path.joint)
+        joints = tuple(map(int, path.failing))
+        return Mechanism(path.mode, float(ratio), path.time, joint=path.joint, joints=joints)
 
     def end_at_limit_point(self, path: EquilibriumPath) -> None:
         """Take a path's limit point as a step, in which nothing but the level has changed."""

@@ -29,6 +29,8 @@ from ..runner import run
 from ..session import finished, several
 from ..statics import gravity, verdict
 from ..statics.gravity import GravityMethod
+from ..statics.statement import cracks_and_drains
+from ..statics.statement import statement as statement_of
 from .keys import key_of
 
 FINITE_ELEMENTS, GRAVITY = "finite elements", "gravity method"
@@ -224,7 +226,7 @@ def by_finite_elements(
     case, last, partial = result.case, result.last, result.partial_load
     (joint,) = case.joint_names
     if statement is None:
-        statement = verdict.statement(result) if verdict.failed(result) else ""
+        statement = statement_of(result) if verdict.failed(result) else ""
     if not last:
         nothing = dict.fromkeys(NUMBERS, math.nan)
         return MethodResult(case, joint, FINITE_ELEMENTS, math.nan, nothing, statement, partial)
@@ -275,9 +277,9 @@ def compare_methods(
 
 
 def beside_drains(result: Results, method: GravityMethod) -> list[str]:
-    """The note on crack and drains by both methods, see `verdict.cracks_and_drains`."""
+    """The note on crack and drains by both methods, see `cracks_and_drains`."""
     crack = result.last["crack_length"] if result.last else 0.0
-    return list(filter(None, [verdict.cracks_and_drains(result.case, crack, method)]))
+    return list(filter(None, [cracks_and_drains(result.case, crack, method)]))
 
 
 def compare_joints(result: Results) -> list[SafetyCheck]:
@@ -286,7 +288,7 @@ def compare_joints(result: Results) -> list[SafetyCheck]:
     A run that failed fails at the joints that its verdict names, at all if it names none; the
     others are not judged if a part of the loads is missing.
     """
-    why = verdict.statement(result) if verdict.failed(result) else ""
+    why = statement_of(result) if verdict.failed(result) else ""
     failing = verdict.failing_joints(result) if why else ()
     case, checks = result.case, []
     for k, own in enumerate(result.joints):

@@ -23,10 +23,8 @@ from ..input.resolve import resolve, varied
 from ..joint.interface import interface_of
 from ..model.results import Results, row_of_joint
 from ..solver.path import PRECISION, ROUGH, SURE, Point
-from ..statics.verdict import (
-    bound,
-    highest_by_statics,
-)
+from ..statics.statement import words_of_bound
+from ..statics.verdict import bound, highest_by_statics
 from ..threads import limited_threads
 from .critical_gravity import GravityValues
 from .critical_value import CriticalValue
@@ -465,9 +463,10 @@ class Search:
                 f"the equilibrium path, followed to {ratio:.2g} times that displacement, reaches "
                 f"{top.level:.6g} m at most"
             )
-            _, reached, where = bound(last_state(self, top))
-            if reached:
-                why += f"; there {f'on {where} ' if where else ''}{reached}"
+            reached = bound(last_state(self, top))
+            if reached.mode:
+                where = self.own.named(reached.joints)
+                why += f"; there {f'on {where} ' if where else ''}{words_of_bound(reached)}"
         else:
             mode, why, joint = self.by_statics(failing)
         events = events_on(failing.admissible) if failing.admissible else []

@@ -15,7 +15,7 @@ from ..model.results import column_of
 from ..solver.path import PRECISION, Point
 from ..statics import gravity
 from ..statics.limit import elastic_heel_stress
-from ..statics.verdict import cracks_and_drains
+from ..statics.statement import cracks_and_drains
 from .critical_value import CriticalValue
 
 #: Further assumptions of the gravity method: tension, longest crack.

@@ -18,7 +18,8 @@ from ..post.tables import write_csv
 from ..progress import Progress
 from ..runner import early_end
 from ..session import Session, end_of, session
-from ..statics.verdict import statement, tension_share
+from ..statics.hints import tension_share
+from ..statics.statement import statement
 from . import critical_picture as picture
 from .critical import Search, last_state
 from .critical_value import CriticalValue

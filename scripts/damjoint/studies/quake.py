@@ -36,7 +36,7 @@ from ..solver.load_stepper import LoadStepper
 from ..solver.model import Model, StepResult
 from ..solver.state import State
 from ..solver.trace_table import trace_table
-from ..statics.verdict import statement
+from ..statics.statement import statement
 from ..threads import limited_threads
 from . import quake_summary
 from .quake_result import QuakeResult

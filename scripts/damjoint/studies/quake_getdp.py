@@ -17,7 +17,7 @@ from ..post import folder as folders
 from ..progress import Progress
 from ..session import end_of
 from ..solver.model import Model
-from ..statics.verdict import statement
+from ..statics.statement import statement
 from . import quake, quake_summary
 from .quake_result import QuakeTables
 

@@ -24,7 +24,8 @@ from ..processes import ProcessKilled, as_finished, check_jobs, number_of
 from ..progress import Progress, track
 from ..solver.load_stepper import LoadStepper
 from ..statics.limit import mechanism
-from ..statics.verdict import failed, statement, verdict
+from ..statics.statement import statement
+from ..statics.verdict import failed, verdict
 from ..threads import limited_threads
 from . import keys, quake, quake_summary
 from .critical import QUICK, Search

@@ -12,7 +12,7 @@ from ..input.resolve import load
 from ..post import validation
 from ..post.validation import FAMILIES, Comparison
 from ..runner import run
-from ..statics.verdict import statement
+from ..statics.statement import statement
 from . import law_tests, quake_tests
 
 

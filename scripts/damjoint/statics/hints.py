@@ -1,0 +1,142 @@
+"""Hints on a result besides its verdict: limits of the model, what to change."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..input.case import Case
+from ..input.values import has_drains
+from ..laws import Evidence
+from ..model.results import Results
+from . import gravity
+from .verdict import STIFF_JOINT, stiffness_ratio, verdict
+
+#: Depth and width of the foundation over the dam's height below which the crack is too long: a 45 m
+#: dam at 45 m has a crack of 10.7, 5.3, 4.2, 3.2 m with a foundation of 5, 34, 60, 120 m.
+LEAST_FOUNDATION = 1.5
+#: K_N L/E below which the joint is softer than the dam: the stress is that of a rigid block.
+SOFT_JOINT = 1
+
+
+def hints(results: Results) -> list[str]:
+    """Hints on a result besides its verdict: limits of the model, what to change; with several
+    joints those of a joint with its name.
+    """
+    case, of_joints = results.case, list[str]()
+    for k, own in enumerate(results.joints):
+        name = case.named((k,))
+        of_joints += (f"{name}: {hint}" if name else hint for hint in hints_on_joint(own))
+    if case.published:
+        return of_joints
+    return of_joints + hints_on_run(results)
+
+
+def hints_on_joint(results: Results) -> list[str]:
+    """Hints on the stiffness of the only joint of these results."""
+    case, messages = results.case, list[str]()
+    ratio = stiffness_ratio(results)
+    if ratio >= STIFF_JOINT and case["quadrature"] == "published":
+        messages.append(
+            f"K_N h/E = {ratio:.3g}: the joint is stiff for this mesh, its node stresses oscillate "
+            "(N, T, M do not): set quadrature = full"
+        )
+    soft = case["K_N"] * case.joint_length / min(case["E_dam"], case["E_found"])
+    if soft < SOFT_JOINT:
+        messages.append(
+            f"K_N L/E = {soft:.3g}: the joint is softer than the dam; a closed joint of "
+            "concrete on rock has 10 to 1000"
+        )
+    return messages
+
+
+def hints_on_run(results: Results) -> list[str]:
+    """Hints on the model as a whole, and on the last state of each joint."""
+    case, last, messages = results.case, results.last, list[str]()
+    reach = min(case["found_side"], case["found_depth"])
+    if case["dim"] == 3 and case["hold_z"] and not case.geometry:
+        messages.append(
+            "an extruded section with hold_z = 1 is in plane strain: dim = 2 has the same "
+            "solution in less time"
+        )
+    if not case.geometry and reach < LEAST_FOUNDATION * case["dam_height"]:
+        messages.append(
+            f"the foundation reaches {reach:g} m: less than {LEAST_FOUNDATION:g} heights of the "
+            "dam make the crack too long"
+        )
+    if levels := results.info.get("unstable_growth"):
+        messages.append(
+            f"unstable crack growth at level {min(levels):.4g} m: the state after it depends on "
+            "steps and mesh"
+        )
+    for limit, lowest in results.info.get("limit_points", ()):
+        messages.append(
+            f"unstable crack growth at level {limit:.4g} m: along the equilibrium path the level "
+            f"falls to {lowest:.4g} m before it rises again"
+        )
+    if results.info.get("engine") == "getdp" and verdict(results) == "not converged":
+        messages.append(
+            "the engine getdp does not follow the equilibrium path beyond a limit point: "
+            "--engine condensed does"
+        )
+    unstable = bool(levels) or verdict(results) == "not converged"
+    for k, own in enumerate(results.joints if last else []):
+        name, last = case.named((k,)), own.last
+        share = tension_share(own.case, last)
+        evidence = Evidence(last["crack_length"], unstable, share)
+        of_joint = [*own.case.law.hints(evidence), *hints_on_state(own, last)]
+        messages += (f"{name}: {hint}" if name else hint for hint in of_joint)
+    return messages
+
+
+def tension_share(case: Case, last: dict[str, float]) -> float:
+    """Part of the overturning moment that the tension of the open points balances; nan if it is not
+    known.
+    """
+    pull = case.law.open_tension * last["crack_length"]
+    if case.geometry or not pull:
+        return np.nan
+    time = min(last["time"], case.times[-1])
+    block = gravity.with_crack(case, time, last["level"], 0.0)
+    parts = [*(m for load in block.loads for m in load[3:]), last["M"] - block.resultant.moment]
+    overturning = -sum(m for m in parts if m < 0)
+    arm = block.body.length - last["crack_length"] / 2
+    return pull * arm / overturning if overturning else np.nan
+
+
+#: Part of the tensile strength from which on the heel counts as in tension.
+IN_TENSION = 1e-3
+#: Distance of a node from the drains, over the joint's length, within which it is at the drains.
+AT_DRAINS = 1e-5
+
+
+def hints_on_state(results: Results, last: dict[str, float]) -> list[str]:
+    """Hints on the last state: resolution of the crack, drains, tension at the heel."""
+    case, messages, crack = results.case, [], last["crack_length"]
+    element = case.joint_length / case["n_joint"]
+    if crack > 0 and not (case.accuracy or case.geometry or "quake" in results.info):
+        messages.append(
+            f"the crack ({crack:.3g} m) ends somewhere in an element of {element:.2g} m; "
+            "--accuracy 3% chooses the mesh and estimates the error"
+        )
+    if has_drains(case) and len(results.joint["time"]):  # a section's mesh has a node there
+        away = np.abs(results.at()["s"] - case["drain_x"]).min()
+        if away > AT_DRAINS * case.joint_along:
+            messages.append(
+                f"the mesh has no node at the drains (drain_x = {case['drain_x']:g} m): the "
+                f"nearest is {away:.2g} m away"
+            )
+    if has_drains(case) and crack > case["drain_x"]:
+        unchanged = "" if case["uplift"] == "cracked" else "; the model keeps their effect"
+        messages.append(
+            f"the crack ({crack:.3g} m) has passed the drains ({case['drain_x']:g} m){unchanged}"
+        )
+    if len(results.joint["time"]) and not case.law.open_tension * crack:
+        rows = results.at()
+        heel = rows["sigma_n_eff"][rows["s"] <= rows["s"].min()].mean()
+        strength = case.law.tensile_strength
+        if heel > IN_TENSION * strength > 0:
+            messages.append(
+                f"the heel is in tension, {heel / 1e3:.4g} kPa of the tensile strength of "
+                f"{strength / 1e3:.4g} kPa"
+            )
+    return messages

@@ -1,0 +1,128 @@
+"""What is said of the end of a run, and of its path."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..input.case import Case
+from ..input.values import has_drains
+from ..model.results import Results
+from . import gravity
+from .verdict import STIFF_JOINT, Bound, bound, failure, slipped_from, stiffness_ratio, verdict
+
+
+def statement(results: Results) -> str:
+    """Why and where a run has stopped, or that the dam slides; empty if it stands."""
+    case, last, found = results.case, results.last, failure(results)
+    mode, joint = found.mode, found.at(case)
+    if mode == "no equilibrium":
+        return "no equilibrium even at the first step"
+    if results.stopped:
+        where = f"level {last['level']:.6g} m (t = {last['time']:.6g})"
+        if mode == "out of range":
+            return (
+                f"out of range: the displacement needs a level below 0 or above "
+                f"{case.highest_level:g} m beyond {where}; the last converged state is saved"
+            )
+        return f"{verdict(results)}: {reason_of_stop(results)}; the last converged state is saved"
+    if not mode:
+        return ""
+    level = max(slipped_from(results.joints[k]) or 0.0 for k in found.joints)
+    case = case.joints[found.joints[0]]
+    hardening, where = case.law.hardening_parameter, joint or "joint"
+    slides = f"sliding: the whole {where} has slipped or is open from level {level:.6g} m on"
+    if not hardening:
+        return f"{slides}; the joint has no further shear strength"
+    default = ", a numerical default; set it if your joint hardens"
+    return (
+        f"{slides}; the dam stands on the hardening {hardening} = {case[hardening]:.4g} Pa/m"
+        f"{'' if case.hardening_asked else default}"
+    )
+
+
+def reason_of_stop(results: Results) -> str:
+    """The mechanism or bound of statics at which a run has stopped, or that there is none."""
+    case, last, shown = results.case, results.last, results.info.get("mechanism")
+    where = f"level {last['level']:.6g} m (t = {last['time']:.6g})"
+    if shown:
+        ratio = shown["displacement_ratio"]
+        along = f", followed to {ratio:.2g} times that displacement," if ratio > 1 else ""
+        most = shown["level"]
+        with_all = f" under the loads of t = {shown['time']:g}" if most < last["level"] else ""
+        path = f"the equilibrium path{along} reaches {most:.6g} m at most{with_all}"
+        return f"no equilibrium beyond {where}: {path}"
+    reached = bound(results)
+    if reached.mode:
+        joint = case.named(reached.joints)
+        at_joint = f"{joint}: " if joint else ""
+        return f"no equilibrium beyond {where}: {at_joint}{words_of_bound(reached)}"
+    arm = case.joint_along - last["x_resultant"]
+    return (
+        f"no equilibrium is found beyond {where}, and no mechanism either{stiff_joint(results)}; "
+        f"there the resultant is {arm:.3g} m from the toe, T/N' = {last['T'] / last['N']:.3g}"
+    )
+
+
+def words_of_bound(reached: Bound) -> str:
+    """Why a state has reached a bound of statics; empty if it has reached none."""
+    if reached.mode == "overturning":
+        side = "from" if reached.value >= 0 else "beyond"
+        return f"the resultant is {abs(reached.value):.3g} m {side} the toe"
+    if reached.mode == "sliding":
+        strength = f"{reached.strength:.5g} N/m"
+        return f"T = {reached.value:.5g} N/m reaches the shear strength, {strength}"
+    return ""
+
+
+def stiff_joint(results: Results) -> str:
+    """The hint, in brackets, that the joint is too stiff for its elements; empty if it is not."""
+    ratio = stiffness_ratio(results)
+    if ratio < STIFF_JOINT:
+        return ""
+    why = f"the joint is too stiff for this mesh: K_N h/E = {ratio:.3g}"
+    return f" ({why}; refine n_joint or lower K_N)"
+
+
+def cracks_and_drains(case: Case, crack: float, block: gravity.GravityMethod) -> str:
+    """On which side of the drains the crack ends by each method, and what follows, with the uplift
+    that has the full head in the crack; empty with another uplift, or if neither crack passes them.
+
+    case: of the joint; crack: its length [m] by the finite elements; block: the gravity method.
+    """
+    at = case["drain_x"]
+    blocks = (block, *block.further)
+    if case["uplift"] != "cracked" or not has_drains(case):
+        return ""
+    if max(crack, *(state.crack_length for state in blocks)) <= at:
+        return ""
+
+    def ends(length: float) -> str:
+        if length > at:
+            return f"a crack of {length:.4g} m has passed them: the full head acts, no drainage"
+        where = f"a crack of {length:.4g} m ends before them" if length else "no crack"
+        return f"{where}: they lower the head"
+
+    by_hand = "; or, if it grows further, ".join(ends(state.crack_length) for state in blocks)
+    return (
+        f"drains at {at:g} m, full head in the crack: finite elements (stress of the elastic dam, "
+        f"largest at the heel): {ends(crack)}; gravity method (stress linear along the joint): "
+        f"{by_hand}"
+    )
+
+
+def path_statement(results: Results) -> str:
+    """The largest level of a run under displacement control, and whether its path snaps back."""
+    history, case = results.history, results.case
+    level, time = history["level"], history["time"]
+    if not len(level):
+        return "no step has converged"
+    driven = (time > case["drive_begin"] - 1e-9) & (time < case["drive_end"] + 1e-9)
+    load = case["rho_water"] * case["g"] * level.max()
+    text = f"largest load: level {level.max():.5g} m ({load / 1e3:.5g} kPa)"
+    if case["drive_by"] < 0:
+        return text + "; the displacement was reversed"
+    falls = bool((np.diff(level[driven]) < 0).any())
+    moved = history["crest_ux"][driven], results.heel[driven]
+    back = any(bool((np.diff(m) < 0).any()) for m in moved)
+    text += "; the level " + ("falls while the displacement grows" if falls else "always rises")
+    return text + ("; snap-back occurs" if back else "; no snap-back")
