@@ -57,7 +57,8 @@ class CsrMatrix:
         places, inverse = np.unique(rows * np.int64(shape[1]) + columns, return_inverse=True)
         row, column = np.divmod(places, max(shape[1], 1))
         pointers = np.searchsorted(row, np.arange(shape[0] + 1))
-        return CsrMatrix(np.bincount(inverse, values, len(places)), column, pointers, shape)
+        summed = np.asarray(np.bincount(inverse, values, len(places)), float)
+        return CsrMatrix(summed, column, pointers, shape)
 
     @staticmethod
     def of_scipy(matrix: Any) -> CsrMatrix:
@@ -118,7 +119,8 @@ class CsrMatrix:
             return np.asarray(self.dense @ other)
         if other.ndim == 2 or is_large(len(self.data)):
             return np.asarray(self.scipy() @ other)
-        return np.bincount(self.rows, self.data * other[self.indices], self.shape[0])
+        products = self.data * other[self.indices]
+        return np.asarray(np.bincount(self.rows, products, self.shape[0]), float)
 
     def _times(self, other: CsrMatrix) -> CsrMatrix:
         """The product with a matrix."""

@@ -83,6 +83,11 @@ def as_finished(
             yield waiting[future], future.result()
 
 
+def without_progress(work: Callable[[Item, bool], Result], item: Item) -> Result:
+    """The result of an item."""
+    return work(item, False)
+
+
 def in_processes(
     work: Callable[[Item, bool], Result], items: Sequence[Item], jobs: int | None, title: str
 ) -> Iterator[tuple[int, Result]]:
@@ -96,5 +101,5 @@ def in_processes(
     if several == 1:
         yield from ((number, work(item, True)) for number, item in enumerate(items))
     else:
-        finished = as_finished(partial(work, progress=False), items, several)
+        finished = as_finished(partial(without_progress, work), items, several)
         yield from track(finished, title, len(items))

@@ -6,7 +6,7 @@ import contextlib
 import sys
 import threading
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sized
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -107,7 +107,7 @@ def clock(seconds: float) -> str:
 
 def track(items: Iterable[Item], title: str, total: int | None = None) -> Iterator[Item]:
     """Iterate with progress; total: number of items, by default their length."""
-    count = total if total is not None or not hasattr(items, "__len__") else len(items)
+    count = len(items) if total is None and isinstance(items, Sized) else total
     with Progress(title, count) as progress:
         for item in items:
             yield item

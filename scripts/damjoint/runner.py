@@ -80,15 +80,14 @@ def write_outcomes(case: Case, outcomes: list[Outcome], out: Path) -> None:
 
 def save(study: Session, outcome: Outcome) -> None:
     """Write the tables of a scene and its run.json."""
-    study.save(outcome.result, *early_end(outcome))
+    study.save(outcome.result, *early_end(outcome.result, outcome.error))
 
 
-def early_end(outcome: Outcome) -> tuple[str, str]:
+def early_end(result: Results, error: BaseException | None) -> tuple[str, str]:
     """State (failed or interrupted) and message of a scene that an error ended; else empty."""
-    last = outcome.result.last
-    return end_of(
-        outcome.error, f" after level {last['level']:.6g} m" if last else " before the first step"
-    )
+    last = result.last
+    where = f" after level {last['level']:.6g} m" if last else " before the first step"
+    return end_of(error, where)
 
 
 def write_fields_and_pictures(

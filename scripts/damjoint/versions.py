@@ -90,9 +90,9 @@ def git_status() -> subprocess.Popen[str] | None:
     # without locks, which runs at the same time would wait for
     git = "git", "--no-optional-locks", "-C", str(checkout)
     words = "status", "--porcelain=v2", "--branch", "--", *CODE_FOLDERS
-    quiet = {"stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL, "text": True}
+    pipe, null = subprocess.PIPE, subprocess.DEVNULL
     with contextlib.suppress(OSError):
-        return subprocess.Popen([*git, *words], **quiet)
+        return subprocess.Popen([*git, *words], stdout=pipe, stderr=null, text=True)
     return None
 
 

@@ -169,7 +169,7 @@ def validation_pages() -> None:
     published numbers, all tests computed again.
     """
     from damjoint.post.validation import FAMILIES, report, worst
-    from damjoint.studies.validate import compare, tests_of
+    from damjoint.verification.validate import compare, tests_of
 
     from .provenance import provenance, source_line
 
@@ -208,7 +208,7 @@ def quake_conventions(published: list[Comparison]) -> str:
     conventions.
     """
     from damjoint.post.validation import compare_steps, last_time
-    from damjoint.studies.quake_tests import follow, sdnv138
+    from damjoint.verification.quake_tests import follow, sdnv138
 
     own = {}
     for name, test in sdnv138().items():

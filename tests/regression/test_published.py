@@ -7,7 +7,7 @@ from damjoint.joint.equilibrium import Equilibrium
 from damjoint.joint.interface import interface_of
 from damjoint.model.loads import Loading
 from damjoint.post import validation
-from damjoint.studies import validate
+from damjoint.verification import validate
 
 #: at most so many Newton iterations: in one step, in all of them (both uplifts of a, b, i counted
 #: apart)

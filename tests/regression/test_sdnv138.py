@@ -25,7 +25,7 @@ from damjoint.input.resolve import load
 from damjoint.joint.interface import Interface
 from damjoint.post import validation
 from damjoint.solver.load_stepper import LoadStepper
-from damjoint.studies import quake_tests
+from damjoint.verification import quake_tests
 from quakes import write_record
 from scipy import sparse
 

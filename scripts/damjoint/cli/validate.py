@@ -33,7 +33,7 @@ def add(command: Parser) -> None:
 def call(arguments: argparse.Namespace) -> int:
     """Run damjoint validate; 1 if a row fails."""
     from ..post import validation
-    from ..studies import validate
+    from ..verification import validate
 
     families, failed = validate.chosen(arguments.tests), False
     summaries = []

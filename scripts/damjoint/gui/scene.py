@@ -53,7 +53,7 @@ class SolvedScene:
         """The scenes of an outcome, one for each joint, that of the decisive joint first; computes
         the bodies' fields. name: of the outcome, empty if it is the only one.
         """
-        result, (state, _) = outcome.result, early_end(outcome)
+        result, (state, _) = outcome.result, early_end(outcome.result, outcome.error)
         bodies, fields, times = outcome.mesh().bodies, outcome.fields(), times_of(result)
         message = statement(result)
         if state and isinstance(outcome.error, (InputError, RunError)):

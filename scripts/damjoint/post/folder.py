@@ -26,8 +26,10 @@ from ..statics.verdict import verdict
 from ..storage import PART, atomic_write, locked_folder
 
 #: Files of a run: tables, pictures CASE....png, fields.
-TABLES = ("joint.csv", "history.csv", "curve.csv", "steps.csv", "gravity.csv", "critical.csv")
-TABLES += ("quake.csv", "quake_joint.csv", "quake_stress.npz", "quake_state.npz", "run.json")
+TABLES = (
+    *("joint.csv", "history.csv", "curve.csv", "steps.csv", "gravity.csv", "critical.csv"),
+    *("quake.csv", "quake_joint.csv", "quake_stress.npz", "quake_state.npz", "run.json"),
+)
 PICTURES = ("", "_curve", "_check", "_critical", "_quake")
 FIELDS = r"(bulk|joint)(_t[\w.+-]+\.vtu|\.msh)|fields\.pvd"
 #: States of a run that has come to its end: the last one; of the loads or of the equilibria.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 
@@ -89,7 +89,7 @@ def table(family: str) -> list[Reference]:
 
 def reference(family: str, row: Mapping[str, str]) -> Reference:
     """A row of a table; columns that a family does not have are empty."""
-    number = lambda name: float(row[name]) if row.get(name) else None
+    number: Callable[[str], float | None] = lambda name: float(row[name]) if row.get(name) else None
     return Reference(
         family=family,
         modeling=row["modeling"],
@@ -178,7 +178,7 @@ def report(comparisons: list[Comparison], style: str = "simple", notes: bool = F
     """
     from tabulate import tabulate
 
-    shown = lambda value: "" if value is None else f"{value:.6g}"
+    shown: Callable[[float | None], str] = lambda value: "" if value is None else f"{value:.6g}"
     rows = [
         (
             c.reference.modeling,

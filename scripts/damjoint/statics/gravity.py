@@ -15,7 +15,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -93,7 +93,10 @@ class Segment(NamedTuple):
     def pressure_load(self, p0: float, p1: float) -> Load:
         """The resultant of a pressure [Pa] that is linear from one end to the other."""
         width, rise, mean = self.x1 - self.x0, self.y1 - self.y0, (p0 + p1) / 2
-        first_moment = lambda v0, v1: (p0 * (2 * v0 + v1) + p1 * (v0 + 2 * v1)) / 6
+
+        def first_moment(v0: float, v1: float) -> float:
+            return (p0 * (2 * v0 + v1) + p1 * (v0 + 2 * v1)) / 6
+
         return Load(
             "pressure",
             -mean * rise,
@@ -128,7 +131,8 @@ class Segment(NamedTuple):
         width, rise = self.x1 - self.x0, self.y1 - self.y0
         if rise == 0:
             return Load("pressure", 0, 0, 0, 0)
-        column = zangar_column(surface, *sorted((self.y0, self.y1)), floor)
+        low, high = sorted((self.y0, self.y1))
+        column = zangar_column(surface, low, high, floor)
         total, lever = (math.copysign(1.0, rise) * part for part in column)
         lean = width / rise
         return Load(
@@ -198,7 +202,8 @@ class RigidBlock(JointLine):
         x1, y1 = np.roll(x, -1), np.roll(y, -1)
         cross = x * y1 - x1 * y
         area = float(cross.sum() / 2)
-        return area, *(float((cross * (v + v1)).sum() / (6 * area)) for v, v1 in ((x, x1), (y, y1)))
+        xc, yc = (float((cross * (v + v1)).sum() / (6 * area)) for v, v1 in ((x, x1), (y, y1)))
+        return area, xc, yc
 
     def force_at(self, mark: str, name: str, fx: float, fy: float) -> Load:
         """A force at a mark of pro/section.pro; none where that lies below the joint."""
@@ -258,7 +263,8 @@ def loads_on(
     """All loads on the body above the joint but the water in the joint; the weight first, others
     only if they act.
     """
-    area, *centroid = body.area_and_centroid
+    area, *center = body.area_and_centroid
+    centroid = (center[0], center[1])
     weight = case["rho_dam"] * case["g"] * area
     up, down, top = (body.segments(side) for side in ("UP", "DOWN", "TOP"))
     on_crest = case["crest_water"] and case["face_load"] == "hydrostatic"
@@ -619,7 +625,7 @@ class GravityMethod:
             )
         return notes
 
-    def table(self) -> dict[str, list]:
+    def table(self) -> dict[str, list[Any]]:
         """Resultants by the columns LOADS: the loads, the uplift, the sum."""
         tx, ty = self.body.along
         joint = Load("uplift", 0.0 - ty * self.U, tx * self.U, 0.0, 0.0 - self.uplift.moment)

@@ -238,7 +238,10 @@ def highest_on_joint(case: Case, last: dict[str, float]) -> tuple[float, str, st
     if case.geometry or case["uplift"] == "flow" or freezes_uplift(case):
         return np.inf, "", ""
     crack = 0.0 if law.open_tension else last["crack_length"]
-    block = lambda level: gravity.with_crack(case, time, level, crack)
+
+    def block(level: float) -> gravity.GravityMethod:
+        return gravity.with_crack(case, time, level, crack)
+
     at_last = block(last["level"])
     length = at_last.uncracked
 

@@ -8,6 +8,7 @@ import contextlib
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -330,12 +331,15 @@ class SafetyCheck:
 
     def at_joint(self, name: str, internal: bool) -> SafetyCheck:
         """The same with the name of the joint; internal: see `MethodResult`."""
-        own = lambda result: replace(result, joint=name, internal=internal)
+
+        def at_joint(result: MethodResult) -> MethodResult:
+            return replace(result, joint=name, internal=internal)
+
         return replace(
             self,
-            finite_elements=own(self.finite_elements),
-            gravity=self.gravity and own(self.gravity),
-            longer=[own(result) for result in self.longer],
+            finite_elements=at_joint(self.finite_elements),
+            gravity=self.gravity and at_joint(self.gravity),
+            longer=list(map(at_joint, self.longer)),
         )
 
     @property
@@ -551,7 +555,7 @@ def check_case(task: tuple[Case, Path], progress: bool) -> list[SafetyCheck]:
     """Run a case into a folder, or read its results of an earlier command, and check it."""
     case, out = task
     key = key_of(case, case.accuracy, case.also_uplift)
-    folder_of = lambda scene: folders.scene_folder(case, scene, out)
+    folder_of = partial(folders.scene_folder, case, out=out)
     results = list[Results]()
     with contextlib.suppress(InputError):  # a file is missing or damaged
         if finished(out, key):

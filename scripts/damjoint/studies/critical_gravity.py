@@ -58,8 +58,14 @@ class GravityValues:
                 others[f"{name} on {where}" if where else name] = other
         of_drains = self.drains(value, point, points) if point else ()
         notes = filter(None, [self.tension(value), *of_drains])
-        of_joint = {"gravity_joint": joint, "gravity_there": there}
-        return replace(result, gravity=by_hand, gravity_with=others, notes=[*notes], **of_joint)
+        return replace(
+            result,
+            gravity=by_hand,
+            gravity_joint=joint,
+            gravity_there=there,
+            gravity_with=others,
+            notes=[*notes],
+        )
 
     def tension(self, value: float) -> str:
         """A note where the gravity method is uncracked but the elastic stress of the finite
@@ -71,8 +77,8 @@ class GravityValues:
             return ""
         case = self.case if self.of == "level" else self.case_at(value)
         if self.of == "level":
-            level = {"levels": (*case.levels[:-1], value)}
-            case = replace(case.with_values({"drive": "level"}), **level)
+            levels = (*case.levels[:-1], value)
+            case = replace(case.with_values({"drive": "level"}), levels=levels)
         elastic = elastic_heel_stress(case, interface_of(case))
         if elastic <= strength:
             return ""
@@ -119,13 +125,18 @@ class GravityValues:
         tension: whether the joint has its tensile strength; longest: whether the longest of several
         cracks in equilibrium decides; joint: the number of the only joint that is considered.
         """
-        stands = lambda value: self.stands(value, tension, longest, joint)
+
+        def stands(value: float) -> bool | None:
+            return self.stands(value, tension, longest, joint)
+
         at_value = stands(value)
         for share in DISTANCES:
             for other in (value * (1 + share), value * (1 - share)):
                 at_other = stands(other)
                 if at_other is not None and at_other != at_value:
-                    sign = lambda v: 1.0 if stands(v) == at_value else -1.0
+                    sign: Callable[[float], float] = lambda v: (
+                        1.0 if stands(v) == at_value else -1.0
+                    )
                     return float(bisect(sign, value, other, rtol=PRECISION / 1000))
         return None
 

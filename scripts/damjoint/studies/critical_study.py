@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..engines import Outcome, engine_of
+from ..engines import engine_of
 from ..engines.condensed.solve import about
 from ..fem.memory import sizes
 from ..input.case import Case
@@ -18,6 +18,7 @@ from ..post.tables import write_csv
 from ..progress import Progress
 from ..runner import early_end
 from ..session import Session, end_of, session
+from ..solver.path import Point
 from ..statics.hints import tension_share
 from ..statics.statement import statement
 from . import critical_picture as picture
@@ -38,8 +39,7 @@ def critical(case: Case, of: str, out: Path | None = None) -> tuple[CriticalValu
     engine_of(case, "auto")
     search = Search(case, of)
     with session(search.own, out or Path("out") / f"{case.name}_critical") as study:
-        options = {"bar_format": "{desc} {elapsed}", "leave": False}
-        with Progress(sizes(search.own), **options) as shown:
+        with Progress(sizes(search.own), bar_format="{desc} {elapsed}", leave=False) as shown:
             search.on_progress = lambda message: shown.describe(f"{case.name}: {message}")
             try:
                 answer = search.run()
@@ -76,15 +76,20 @@ def printed_lines(answer: CriticalValue, search: Search) -> list[str]:
     if search.of == "strength" and set(search.partial.values()) != {1.0}:
         mu, cohesion = search.partial["mu"], search.partial["adhesion"]
         lines.append(f"beyond the partial factors factor_mu = {mu:g}, factor_c = {cohesion:g}")
-    laws = answer.point.model.equilibrium.laws.laws if answer.point else ()
-    asked = any(joint.hardening_asked for joint in search.own.joints)
-    if any(law.hardens for law in laws) and asked:
-        lines += filter(None, [statement(last_state(search, answer.point))])
+    if answer.point:
+        hardens = any(law.hardens for law in answer.point.model.equilibrium.laws.laws)
+        if hardens and any(joint.hardening_asked for joint in search.own.joints):
+            lines += filter(None, [statement(last_state(search, answer.point))])
     lines += filter(None, ["; ".join(answer.by_gravity(unit))])
     lines += answer.notes
-    case = answer.point.model.case if answer.point else search.own
-    for k, joint in enumerate(case.joints if answer.point else ()):
-        last, name = row_of_joint(answer.point.last, k), case.named((k,))
+    return lines + hints_at(answer.point) if answer.point else lines
+
+
+def hints_at(point: Point) -> list[str]:
+    """Hints of the laws at an equilibrium."""
+    case, lines = point.model.case, list[str]()
+    for k, joint in enumerate(case.joints):
+        last, name = row_of_joint(point.last, k), case.named((k,))
         share = tension_share(joint, last)
         hints = joint.law.hints(Evidence(last["crack_length"], False, share))
         lines += (f"{name}: {hint}" if name else hint for hint in hints)
@@ -112,7 +117,7 @@ def save(study: Session, search: Search, answer: CriticalValue) -> None:
     if answer.point:
         result = last_state(search, answer.point)
         result.info = about(answer.point.model.equilibrium.bulk) | entries
-        study.save(result, *early_end(Outcome(result, lambda: None, dict, answer.error)))
+        study.save(result, *early_end(result, answer.error))
     else:
         study.save_without_results(state or folders.COMPLETE, answer.doubt, entries)
     write_csv(study.out / "critical.csv", table(search))

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from .. import InputError
-from ..arrays import Value
+from ..arrays import Settings, Value
 from ..engines.getdp.law import evaluate
 from ..input.parameters import parameter
 from ..post.tables import write_csv
@@ -47,14 +47,20 @@ def read_path(path: Path) -> dict[str, np.ndarray]:
     return table
 
 
-def follow(law: str, path: Path, settings: dict[str, Value], out: Path | None) -> None:
+def follow(law: str, path: Path, settings: Settings, out: Path | None) -> None:
     """Evaluate a law along a path and write path and result to out; None: to standard output.
 
     Raises InputError.
     """
     parameter("law").check(law)
+    values: dict[str, Value] = {}
+    for name, value in settings.items():
+        if isinstance(value, tuple):
+            listed = ",".join(map(str, value))
+            raise InputError(f"{name} = {listed}: must be a single value, a law has no joints")
+        values[name] = value
     table = read_path(path)
     if out is not None and not out.parent.is_dir():
         raise InputError(f"out = {out}: must be a file in an existing folder")
-    result = evaluate(law, np.column_stack([table[n] for n in JUMPS]), table.get("p"), settings)
+    result = evaluate(law, np.column_stack([table[n] for n in JUMPS]), table.get("p"), values)
     write_csv(out or sys.stdout, {**table, **result})

@@ -12,7 +12,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from .. import InputError
-from ..arrays import Array, Value, Values
+from ..arrays import Array, Settings, Value, Values
 from ..input import parameters
 from ..input.arithmetic import arithmetic_value, explained, quantity
 from ..input.case import Case
@@ -261,7 +261,7 @@ def tie(name: str, expression: str, row: Values) -> Value:
 
 
 def plan_of(
-    vary: list[str], tied: list[str], sample: Sample | None, settings: Values, critical: str = ""
+    vary: list[str], tied: list[str], sample: Sample | None, settings: Settings, critical: str = ""
 ) -> Plan:
     """The plan of the texts NAME=VALUES, NAME=EXPRESSION and a sample; settings: parameters that
     are set for all rows; critical: as in Plan.
@@ -282,7 +282,7 @@ def plan_with(
     axes: Sequence[tuple[str, list[Value]]],
     ties: Sequence[tuple[str, str]],
     sample: Sample | None,
-    settings: Values,
+    settings: Settings,
     critical: str,
 ) -> Plan:
     """The plan of checked values by name, expressions by name and a sample; the rest as `plan_of`.

@@ -54,9 +54,14 @@ class QuakeTables:
         static.info |= {"notes": remarks(case), "quake": summary}
         # a joint that has slipped everywhere is no failure here
         static.info["verdict"] = state or quake_summary.verdict(case, summary)
-        words = words or quake_summary.statement(case, summary)
-        of_end = {"summary": summary, "state": state, "statement": words}
-        return cls(case=case, static=static, **of_end, **others)
+        return cls(
+            case=case,
+            static=static,
+            summary=summary,
+            state=state,
+            statement=words or quake_summary.statement(case, summary),
+            **others,
+        )
 
     @property
     def verdict(self) -> str:
@@ -105,8 +110,7 @@ class QuakeResult(QuakeTables):
 
 def peaks_table(found: dict[str, Any], case: Case) -> Table:
     """Tabulate the peaks of a summary."""
-    columns = quake_columns(case)
-    rows = []
+    columns, rows = quake_columns(case), list[tuple[str, ...]]()
     for name, peak in found["peaks"].items():
         unit, meaning = columns[name]
         closed = "opening" in name and peak["value"] <= 0
@@ -130,7 +134,7 @@ MOVING = [
 
 def residual_table(found: dict[str, Any], case: Case) -> Table:
     """Tabulate the residual values of a summary."""
-    rows = []
+    rows = list[tuple[str, ...]]()
     for k in range(len(case.joints)):
         of = f" ({case.named((k,))})" if case.of_joints else ""
         for group, name, meaning, unit in AT_REST if found["at_rest"] else MOVING:

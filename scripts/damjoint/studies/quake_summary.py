@@ -185,7 +185,10 @@ def statement(case: Case, found: dict[str, Any]) -> str:
         f"over {share:.0%} of its length (law = bond keeps the friction)"
         for k, share in broken_shares(case, found).items()
     ]
-    millimetres = lambda values, name, k: f"{1e3 * values[column_of(name, k)]:.3g} mm"
+
+    def millimetres(values: dict[str, float], name: str, k: int) -> str:
+        return f"{1e3 * values[column_of(name, k)]:.3g} mm"
+
     if found["at_rest"]:
         slips = [millimetres(found["residual"], "slip", k) + of(case, k) for k in joints]
         parts.append(f"residual slip {', '.join(slips)}")

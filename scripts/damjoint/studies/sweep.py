@@ -16,6 +16,7 @@ from ..engines import engine_of
 from ..input.case import Case
 from ..input.refinement import first_mesh
 from ..input.resolve import equal_steps, resolve, with_drive_times
+from ..input.source import Source
 from ..joint.interface import Interface, interface_of
 from ..model.notes import notes_on_settings
 from ..model.results import column_of as column_of_joint
@@ -145,9 +146,10 @@ def quake_row(task: Task) -> dict[str, Value]:
     worst = column_of_joint("slip", quake_summary.largest_slip(case, found))
     slip = abs(found["residual" if found["at_rest"] else "end"][worst])
     verdict, words = quake_summary.verdict(case, found), quake_summary.statement(case, found)
-    if slip > task.slip_limit and verdict in (quake_summary.STANDS, NOT_AT_REST):
+    limit = task.slip_limit or 0.0
+    if slip > limit and verdict in (quake_summary.STANDS, NOT_AT_REST):
         verdict = EXCEEDED
-    words = f"{words}; limit {1e3 * task.slip_limit:.3g} mm"
+    words = f"{words}; limit {1e3 * limit:.3g} mm"
     fails = float(verdict != quake_summary.STANDS)
     return row | dict(zip(OUTCOME, (fails, verdict, words), strict=True))
 
@@ -195,10 +197,20 @@ def notes_on_rows(case: Case, rows: Sequence[Case]) -> list[str]:
     return list(lines.values())
 
 
+def source_of(case: Case) -> Source:
+    """Where a case comes from.
+
+    Raises InputError if it was read from the files of a run.
+    """
+    if case.source is None:
+        raise InputError(f"case {case.name}: must be loaded from a case file")
+    return case.source
+
+
 def search_of(case: Case, quantity: str) -> Search:
     """The search of a row's critical value, with one step per level."""
-    levels = {"levels": case.levels, "tail_levels": case.tail_levels}
-    source, times = replace(case.source, **levels, steps=None), equal_steps(len(case.levels), 1)
+    levels, tails, times = case.levels, case.tail_levels, equal_steps(len(case.levels), 1)
+    source = replace(source_of(case), levels=levels, tail_levels=tails, steps=None)
     return Search(with_drive_times(replace(case, times=times, source=source)), quantity)
 
 
@@ -285,9 +297,10 @@ def meshed(case: Case) -> tuple[Case, str]:
         raise outcome.error
     refined = {n: outcome.result.case[n] for n in accuracy.REFINED}
     estimate = outcome.result.info["error_estimate"]["statement"]
-    steps = case.source.steps or (1 if case["drive"] == "level" else None)
-    mesh = {**first_mesh(case), **case.source.overrides, **refined}
-    return resolve(replace(case.source, overrides=mesh, steps=steps, accuracy=None)), estimate
+    source = source_of(case)
+    steps = source.steps or (1 if case["drive"] == "level" else None)
+    mesh = {**first_mesh(case), **source.overrides, **refined}
+    return resolve(replace(source, overrides=mesh, steps=steps, accuracy=None)), estimate
 
 
 def sweep(

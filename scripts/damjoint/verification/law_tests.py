@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import toms748
 
-from ..arrays import Array, Values
+from ..arrays import Array, Value, Values
 from ..input.resolve import load
 from ..laws import Law
 
@@ -106,8 +106,8 @@ def ssnp162() -> dict[str, LawTest]:
     Other modelings are these on other elements: B, C, M, N, O that of A; F, Q, R of E; H, I of G; P
     of D; K, L of J.
     """
-    tests, quarters = {}, (0, 15, 30, 45, 60)
-    rupture: Values = {"K_N": 1e12, "K_T": 2e12, "sigma_max": 1e5, "alpha": 1.5}
+    tests, quarters = dict[str, LawTest](), (0, 15, 30, 45, 60)
+    rupture: dict[str, Value] = {"K_N": 1e12, "K_T": 2e12, "sigma_max": 1e5, "alpha": 1.5}
     rupture |= {"pena_rupture": 0.5, "pena_contact": 3.0}
     E, elastic, broken = 3e12, 1e5 / 1e12 + 1e5 / 3e12, 1.5e-7
     softened = 0.2 * elastic + 0.8 * broken
@@ -148,23 +148,28 @@ def ssnp162() -> dict[str, LawTest]:
     wet: Values = {"K_N": 1e7, "K_T": 2e7, "mu": 0.5, "adhesion": 1e5, "pena_tang": 20.0}
     p = 5e4
     elastic = 2e5 / 1e7 + (2e5 - p) / E
-    pulled = (0, elastic, 2 * elastic, -((2e5 / 3 - p) / 1e7 + 2e5 / 3 / E))
-    steps = [(t, Loaded(E * u + p, E), 0.0, 0.0) for t, u in ramp(quarters[:-1], pulled)]
+    wet_pulled = (0, elastic, 2 * elastic, -((2e5 / 3 - p) / 1e7 + 2e5 / 3 / E))
+    steps = [(t, Loaded(E * u + p, E), 0.0, 0.0) for t, u in ramp(quarters[:-1], wet_pulled)]
     tests["J I"] = LawTest("friction", wet, steps, p)
     # in 3D: sheared to and fro while it slips across
     soft: Values = {"K_N": 0.1, "K_T": 0.15, "mu": 0.2, "adhesion": 0.1, "pena_tang": 1e-7}
-    quarters = (0, 15, 30, 45, 60)
     sheared = dict(ramp(quarters, (0, 0, 20, -20, 20)))
     across = dict(ramp((0, 30, 60), (0, 50 / 3, 50)))
     closed = dict(ramp(quarters, (0, -50, -50, -50, -50)))
-    steps = [(t, closed[t], sheared[t], across[t] if t > 15 else 0.0) for t in sheared]
-    tests["E"] = LawTest("friction", soft, steps)
+    to_and_fro = [(t, closed[t], sheared[t], across[t] if t > 15 else 0.0) for t in sheared]
+    tests["E"] = LawTest("friction", soft, to_and_fro)
     return tests
 
 
 def ssnp164() -> dict[str, LawTest]:
     """A cube of 1 m and a joint of law endo in series."""
-    endo: Values = {"K_N": 1e12, "K_T": 2e12, "sigma_max": 9000.0, "adhesion": 1e4, "mu": 1.0}
+    endo: dict[str, Value] = {
+        "K_N": 1e12,
+        "K_T": 2e12,
+        "sigma_max": 9000.0,
+        "adhesion": 1e4,
+        "mu": 1.0,
+    }
     endo |= {"G_f": 1.0}
     E = 3e12
     pulled = [*ramp((0, 20, 40, 60, 80), (0, 6e-6, 1e-4, 5e-4, 4.9999e-4))]

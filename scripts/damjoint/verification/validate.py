@@ -41,10 +41,12 @@ def tests_without_case(family: str) -> dict[str, Callable[[], dict[str, Array]]]
     """
     laws = law_tests.FAMILIES.get(family, dict)()
     quakes = quake_tests.FAMILIES.get(family, dict)()
-    return {name: partial(law_tests.follow, test) for name, test in laws.items()} | {
-        name: partial(quake_tests.follow, test, validation.last_time(family))
-        for name, test in quakes.items()
-    }
+    tests: dict[str, Callable[[], dict[str, Array]]] = {}
+    for name, law in laws.items():
+        tests[name] = partial(law_tests.follow, law)
+    for name, quake in quakes.items():
+        tests[name] = partial(quake_tests.follow, quake, validation.last_time(family))
+    return tests
 
 
 def family_of(name: str) -> str:

@@ -15,7 +15,7 @@ from ..arrays import Array, Values
 from ..dynamics.stepper import Earthquake
 from ..input.case import Case
 from ..input.resolve import load
-from .quake import QuakeRun
+from ..studies.quake import QuakeRun
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ def columns(quake: Earthquake, static: Array, start: float, duration: float) -> 
     static: displacement of the dam's nodes (n, 3) under the static loads. Raises RunError.
     """
     dim, points = int(quake.case["dim"]), quake.system.spaces["dam"].body.points
-    places = {"crest": [0, quake.case["dam_height"], 0], "heel": [0, 0, 0]}
+    places = {"crest": np.array([0, quake.case["dam_height"], 0]), "heel": np.zeros(3)}
     nodes = {name: np.abs(points - at).sum(axis=1).argmin() for name, at in places.items()}
     moved, rows = quake.system.motion["dam"], []
     for step in quake.steps():

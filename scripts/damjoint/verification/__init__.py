@@ -1,0 +1,1 @@
+"""Published tests, which `damjoint validate` runs; no other command loads them."""
