@@ -18,7 +18,15 @@ from ..input.case import Case
 from ..input.scene import BED, DOWN, FLOOR, SIDES, TOP, UP
 from ..laws import Law
 from ..mesh.body import Body
-from ..model.fields import BROKEN, SLIPPED, SOFTENING, distance, joint_body, nearest_rows, state_of
+from ..model.fields import (
+    BROKEN,
+    SLIPPED,
+    SOFTENING,
+    distance,
+    joint_body,
+    nearest_rows,
+    state_of,
+)
 from ..model.loads import Loading, line_forces
 from ..model.results import Results
 from ..post.outline import exaggeration, joint_lines, section_of, skin
