@@ -94,6 +94,11 @@ def case(
 
     Raises:
         InputError: name, value, and what is allowed.
+
+    Example:
+        >>> dam = case("dam", levels=[30, 40], mu=0.8, n_joint=10)
+        >>> dam["mu"], dam.levels
+        (0.8, (30.0, 40.0))
     """
     loading = as_list(levels), as_list(tail_levels), steps, accuracy
     if isinstance(source, Case):
@@ -322,6 +327,11 @@ def run(source: Case | str | Path, *, engine: str = "auto") -> Run:
     Raises:
         InputError: the engine can not run the case.
         RunError: the case could not be computed.
+
+    Example:
+        >>> result = run(case("dam", levels=40, n_joint=10))
+        >>> result.verdict, len(result.joint.opening)
+        ('stands', 21)
     """
     return solved(noted(as_case(source)), engine)
 
@@ -368,6 +378,10 @@ def fill(source: Case | str | Path) -> Iterator[Step]:
     Raises:
         InputError: bad input.
         RunError: a step could not be computed.
+
+    Example:
+        >>> [step.level for step in fill(case("dam", levels=[30, 40], n_joint=10))]
+        [30.0, 40.0]
     """
     case = noted(as_case(source))
     threads = threads_of(case)
@@ -394,6 +408,11 @@ def check(cases: Case | str | Path | Sequence[Case | str | Path]) -> list[Safety
     Raises:
         InputError: bad input.
         RunError: a case could not be computed.
+
+    Example:
+        >>> (base,) = check(case("dam", levels=40, n_joint=10, required_SSF=1.1))
+        >>> [(row["answer"], row["verdict"]) for row in base.rows][:2]
+        [('finite elements', 'pass'), ('gravity method', 'pass')]
     """
     from .studies.check import compare_joints
 
@@ -465,6 +484,12 @@ def critical(
     Raises:
         InputError: bad input, or a case in which there is nothing to vary.
         RunError: the case could not be computed.
+
+    Example:
+        >>> dry = case("dam", levels=40, n_joint=10, law="friction", adhesion=0.0)
+        >>> limit = critical(dry)
+        >>> limit.mode, limit.confirmed
+        ('sliding', True)
     """
     from .studies.critical import Search
 
@@ -577,6 +602,13 @@ def quake(
     Raises:
         InputError: bad input, or an earthquake that the engine can not compute.
         RunError: no static equilibrium, or a step that could not be computed.
+
+    Example:
+        >>> wave = [f"{i / 50},{2 * (i % 10 == 0)}" for i in range(20)]
+        >>> _ = Path("wave.csv").write_text("time,horizontal\\n" + "\\n".join(wave))
+        >>> coarse = case("dam", levels=30, n_joint=10, record_unit="m/s2", record_rest=0.5)
+        >>> quake(coarse, record="wave.csv").rows.dtype.names[:2]
+        ('time', 'ground_ax')
     """
     from .studies import quake_study
 
@@ -684,6 +716,10 @@ def sweep(
     Raises:
         InputError: bad input.
         RunError: the mesh for an accuracy could not be computed, or a process was killed.
+
+    Example:
+        >>> sweep(case("dam", n_joint=10), level=[40, 70], jobs=1).rows.verdict.tolist()
+        ['stands', 'sliding']
     """
     from .processes import check_jobs
     from .studies.sweep import compute, notes_on_rows, planned

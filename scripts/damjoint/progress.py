@@ -30,9 +30,17 @@ class Progress:
     """
 
     def __init__(
-        self, title: str, total: float | None = None, show: bool = True, **options: Any
+        self,
+        title: str,
+        total: float | None = None,
+        show: bool = True,
+        soon: bool = False,
+        **options: Any,
     ) -> None:
-        """total: of all updates; show: whether anything is printed; options: of tqdm's bar."""
+        """total: of all updates; show: whether anything is printed; soon: whether also the first
+        line comes as soon as a bar; options: of tqdm's bar.
+        """
+        self.soon = soon
         self.title, self.total, self.done, self.options = title, total, 0.0, options
         self.start = self.updated = time.monotonic()
         self.over = threading.Event()
@@ -83,7 +91,9 @@ class Progress:
 
     def write_lines(self) -> None:
         """Print lines to stderr until the work is over."""
-        while not self.over.wait(INTERVAL):
+        wait = DELAY if self.soon else INTERVAL
+        while not self.over.wait(wait):
+            wait = INTERVAL
             with contextlib.suppress(OSError, ValueError):  # closed
                 print(self.line(), file=sys.stderr, flush=True)
 

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 from . import accuracy
 from .engines import Outcome, engine_of
-from .fem.memory import sizes
+from .fem.memory import seconds, sizes
 from .input.case import Case
 from .model.results import Results
-from .progress import Progress
+from .progress import INTERVAL, Progress
 from .session import Session, end_of, session
 
 if TYPE_CHECKING:  # runs without a picture do not load it
@@ -24,7 +24,8 @@ class RunProgress(Progress):
     def __init__(self, case: Case, show: bool) -> None:
         count = len(case.scenes())
         bar = "{desc} {percentage:3.0f}%|{bar}| {elapsed}"
-        super().__init__(sizes(case), count * case.times[-1], show, bar_format=bar, leave=False)
+        total, soon = count * case.times[-1], seconds(case) > INTERVAL
+        super().__init__(sizes(case), total, show, soon, bar_format=bar, leave=False)
         self.name, self.reached = case.name, [0.0] * count
 
     def step(self, scene: int, now: float) -> None:

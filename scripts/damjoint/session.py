@@ -13,11 +13,13 @@ from pathlib import Path
 from typing import Any
 
 from . import versions
+from .fem.memory import seconds, sizes
 from .input.case import Case
 from .model.notes import remarks
 from .model.results import Results
 from .post import folder as folders
 from .post import tables
+from .progress import INTERVAL, Progress
 
 
 def end_of(error: BaseException | None, where: str = "") -> tuple[str, str]:
@@ -101,6 +103,12 @@ class Session:
         for result, state, statement in self.saved:
             result.info |= {"key": self.key} if self.key else {}
             folders.write_info(result, self.folder(result), state, statement)
+
+
+def preparation(case: Case, show: bool = True) -> Progress:
+    """Progress of what comes before the first step of a study."""
+    soon = seconds(case) > INTERVAL
+    return Progress(sizes(case), None, show, soon, bar_format="{desc} {elapsed}", leave=False)
 
 
 @contextlib.contextmanager

@@ -2,6 +2,7 @@
 
 import ast
 import csv
+import doctest
 import re
 import subprocess
 import sys
@@ -297,3 +298,11 @@ def test_a_check_of_a_single_case():
     assert alone.rows[0]["SSF"] == listed.rows[0]["SSF"]
     with pytest.raises(dj.InputError, match="case no: unknown"):  # not those of its letters
         dj.check("no")
+
+
+@pytest.mark.parametrize("name", ["case", "run", "fill", "check", "critical", "sweep", "quake"])
+def test_the_examples_of_the_docstrings(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (example,) = doctest.DocTestFinder().find(getattr(library, name), name, library, vars(library))
+    result = doctest.DocTestRunner().run(example)
+    assert result.attempted and not result.failed

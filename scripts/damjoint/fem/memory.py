@@ -8,9 +8,15 @@ from pathlib import Path
 
 from .. import RunError
 from ..input.case import Case
+from ..progress import INTERVAL, clock
 
 #: Part of a limited address space that buffers of libraries take [bytes].
 BUFFERS = 0.15e9
+
+#: Seconds of bodies of a million unknowns and the power by which they grow, by dimension; of the
+#: elimination of joints and of an iteration, over the cube of their unknowns; iterations of a step.
+OF_BODIES = {2: (24.0, 1.12), 3: (350.0, 1.45)}
+ELIMINATION, FACTORISATION, ITERATIONS = 2e-10, 1.1e-11, 5.0
 
 #: Memory of a factorised body [bytes per unknown], measured in 2D by `damjoint bench`.
 PER_UNKNOWN = 2400
@@ -55,8 +61,27 @@ def sizes(case: Case) -> str:
     """
     if case.geometry:
         return f"{case.name}, mesh and elimination of the bodies"
-    unknowns = f"about {bulk_size(case):.0f} unknowns, {joints_size(case)} of them on the joints"
-    return f"{case.name}, mesh and elimination of {unknowns}"
+    joints = joints_size(case)
+    unknowns = f"about {max(bulk_size(case), joints):.0f} unknowns, {joints} of them on the joints"
+    expected = seconds(case)
+    forecast = f", about {clock(expected)} in all" if expected > INTERVAL else ""
+    return f"{case.name}, mesh and elimination of {unknowns}{forecast}"
+
+
+def seconds(case: Case) -> float:
+    """Forecast the seconds of a case on an idle machine, roughly.
+
+    By `damjoint bench` (growth with size, several joints): the bodies by their unknowns; of the
+    joints, whose matrices are dense, the cube of their unknowns once for the elimination and for
+    each iteration.
+    """
+    if case.geometry:
+        return 0.0
+    joints, scenes = float(joints_size(case)), len(case.scenes())
+    base, power = OF_BODIES[int(case["dim"])]
+    bodies = base * (max(bulk_size(case), joints) / 1e6) ** power
+    iterations = ITERATIONS * len(case.times) * scenes
+    return bodies + joints**3 * (ELIMINATION + iterations * FACTORISATION)
 
 
 def check_size(case: Case) -> None:

@@ -9,15 +9,13 @@ import numpy as np
 
 from ..engines import engine_of
 from ..engines.condensed.solve import about
-from ..fem.memory import sizes
 from ..input.case import Case
 from ..laws import Evidence
 from ..model.results import row_of_joint
 from ..post import folder as folders
 from ..post.tables import write_csv
-from ..progress import Progress
 from ..runner import early_end
-from ..session import Session, end_of, session
+from ..session import Session, end_of, preparation, session
 from ..solver.path import Point
 from ..statics.hints import tension_share
 from ..statics.statement import statement
@@ -39,7 +37,7 @@ def critical(case: Case, of: str, out: Path | None = None) -> tuple[CriticalValu
     engine_of(case, "auto")
     search = Search(case, of)
     with session(search.own, out or Path("out") / f"{case.name}_critical") as study:
-        with Progress(sizes(search.own), bar_format="{desc} {elapsed}", leave=False) as shown:
+        with preparation(search.own) as shown:
             search.on_progress = lambda message: shown.describe(f"{case.name}: {message}")
             try:
                 answer = search.run()

@@ -23,13 +23,12 @@ from ..engines.condensed.recover import recover
 from ..engines.condensed.solve import about
 from ..fem import factor
 from ..fem.bodies import Bodies
-from ..fem.memory import sizes
 from ..input.case import Case
 from ..joint.interface import interface_of
 from ..model.fields import Field
 from ..model.results import column_of
 from ..progress import Progress
-from ..session import end_of
+from ..session import end_of, preparation
 from ..solver.controls import LevelControl
 from ..solver.history import joint_row
 from ..solver.load_stepper import LoadStepper
@@ -272,7 +271,7 @@ def compute(
     exists, and that is written meanwhile. Raises RunError if the static loads can not be computed.
     """
     with single_thread():
-        with Progress(sizes(case), None, progress, bar_format="{desc} {elapsed}", leave=False):
+        with preparation(case, progress):
             under_way = QuakeRun(case, span)
         if kept and kept.exists:
             kept.read(under_way)
@@ -287,11 +286,15 @@ def compute(
             return result
 
 
+def bar_of(case: Case, record: Record, show: bool) -> Progress:
+    """Progress over the seconds of a record."""
+    return Progress(case.name, record.duration, show, bar_format=BAR, leave=False)
+
+
 def follow(under_way: QuakeRun, kept: Checkpoint | None, progress: bool) -> None:
     """Compute the steps to the end of the record; kept: is written meanwhile."""
     written, quake = time.perf_counter(), under_way.quake
-    options = {"bar_format": BAR, "leave": False}
-    with Progress(quake.case.name, quake.record.duration, progress, **options) as bar:
+    with bar_of(quake.case, quake.record, progress) as bar:
         bar.update(quake.now.time)
         for step in under_way.steps():
             bar.update(step)

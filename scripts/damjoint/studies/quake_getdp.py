@@ -14,7 +14,6 @@ from ..fem.bodies import Bodies
 from ..input.case import Case
 from ..joint.interface import interface_of
 from ..post import folder as folders
-from ..progress import Progress
 from ..session import end_of
 from ..solver.model import Model
 from ..statics.statement import statement
@@ -70,8 +69,7 @@ def earthquake_of(case: Case) -> Earthquake:
 def solve(vibrations: Earthquake, progress: bool) -> engine.GetdpQuake:
     """Run GetDP, with a progress bar."""
     case, record = vibrations.case, vibrations.record
-    options = {"bar_format": quake.BAR, "leave": False}
-    with Progress(case.name, record.duration, progress, **options) as bar:
+    with quake.bar_of(case, record, progress) as bar:
         reached = 0.0
 
         def on_step(time: float) -> None:
