@@ -94,10 +94,10 @@ def joints_data(solution: Solution, time: float) -> Table:
     column.
     """
     parts = []
-    for k, own in enumerate(solution.result.joints):
+    for k, joint_result in enumerate(solution.result.joints):
         surface = joint_body(solution.bodies, k)
         number = np.full(len(surface.points), k + 1.0)
-        parts.append(joint_data(own, surface, time) | {"joint": number})
+        parts.append(joint_data(joint_result, surface, time) | {"joint": number})
     names = [name for name in (*OF_JOINT, "joint") if any(name in part for part in parts)]
     missing = [np.full(len(part["joint"]), np.nan) for part in parts]
     return {
@@ -195,8 +195,8 @@ def write_collection(folder: Path, fields: dict[float, Field]) -> None:
 def write_views(path: Path, points: np.ndarray, cells: Cells, views: list[View]) -> None:
     """Write a mesh with views, a step per time, for Gmsh."""
     gmsh = start_gmsh()
-    before, own = gmsh.model.getCurrent(), "fields of damjoint"
-    gmsh.model.add(own)
+    before, scratch = gmsh.model.getCurrent(), "fields of damjoint"
+    gmsh.model.add(scratch)
     tags = np.arange(1, len(points) + 1)
     dimension = ELEMENTS[cells[0][0]][1]
     entity = gmsh.model.addDiscreteEntity(dimension)
@@ -215,11 +215,11 @@ def write_views(path: Path, points: np.ndarray, cells: Cells, views: list[View])
         for step, (time, values) in enumerate(steps.items()):
             values = values.reshape(len(places), -1)
             gmsh.view.addHomogeneousModelData(
-                view, step, own, kind, places, values.ravel(), time, values.shape[1]
+                view, step, scratch, kind, places, values.ravel(), time, values.shape[1]
             )
         gmsh.view.write(view, str(path), append=True)
         gmsh.view.remove(view)
-    gmsh.model.setCurrent(own)
+    gmsh.model.setCurrent(scratch)
     gmsh.model.remove()
     if before in gmsh.model.list():
         gmsh.model.setCurrent(before)

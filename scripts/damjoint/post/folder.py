@@ -200,7 +200,7 @@ def write_info(results: Results, folder: Path, state: str = "", why: str = "") -
             "hints": hints(results),
             "parameters": case.values,
             "lift_heights": case.lift_heights,
-            "joints": [stored(case, own) for own in case.of_joints],
+            "joints": [stored(case, joint) for joint in case.of_joints],
             "levels": case.levels,
             "tail_levels": case.tail_levels,
             "times": case.times,
@@ -218,9 +218,9 @@ def write_info(results: Results, folder: Path, state: str = "", why: str = "") -
     )
 
 
-def stored(case: Case, own: OfJoint) -> dict[str, Any]:
+def stored(case: Case, joint: OfJoint) -> dict[str, Any]:
     """What run.json has of a joint; a section by parameters is computed again."""
-    return asdict(own) | {"section": own.section if case.geometry else {}}
+    return asdict(joint) | {"section": joint.section if case.geometry else {}}
 
 
 def write_json(folder: Path, info: dict[str, Any]) -> None:

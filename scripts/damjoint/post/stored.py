@@ -97,11 +97,13 @@ def case_of(info: dict[str, Any]) -> Case:
     values = {n: p.check(info["parameters"][n]) for n, p in declared().items()}
     levels, tail_levels, times = (finite(n, info[n]) for n in ("levels", "tail_levels", "times"))
     lifts = finite("lift_heights", info["lift_heights"])
-    own = [
+    of_joints_given = [
         values | {n: declared()[n].check(v) for n, v in joint["values"].items()}
         for joint in info["joints"]
     ]
-    parsed, *of_joints = parsed_by_joint(own or [values], listing("levels", levels), lifts)
+    parsed, *of_joints = parsed_by_joint(
+        of_joints_given or [values], listing("levels", levels), lifts
+    )
     # a section by parameters is computed again
     ends = ("name", "upper", "lower", "section") if info["geometry"] else ()
     joints = tuple(
@@ -216,12 +218,12 @@ def extract_body(bulk: meshio.Mesh, numbers: dict[int, str]) -> tuple[Body, np.n
     [Pa].
     """
     blocks = [
-        (numbers[number], block.type, block.data[own == number], stress[own == number])
-        for block, own, stress in zip(
+        (numbers[number], block.type, block.data[region == number], stress[region == number])
+        for block, region, stress in zip(
             bulk.cells, bulk.cell_data["body"], bulk.cell_data["stress"], strict=True
         )
         for number in numbers
-        if (own == number).any()
+        if (region == number).any()
     ]
     names, shapes, tables, stresses = zip(*blocks, strict=True)
     used = np.unique(np.concatenate([table.ravel() for table in tables]))

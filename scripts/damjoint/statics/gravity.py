@@ -387,8 +387,8 @@ class Uplift:
             undrained = head + (self.last - head) * share
             knots[place] = undrained - effect * max(undrained - max(outlet, tail), 0.0)
             before, head = place, knots[place]
-            own = (place - start) * (1 if forwards else -1) + crack
-            places += [own] if crack < own < length else []
+            distance = (place - start) * (1 if forwards else -1) + crack
+            places += [distance] if crack < distance < length else []
         places, way = sorted(places), sorted(knots)
         heads = np.interp([along(s) for s in places], way, [knots[x] for x in way])
         return places, heads.tolist()

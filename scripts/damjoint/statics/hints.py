@@ -23,9 +23,9 @@ def hints(results: Results) -> list[str]:
     joints those of a joint with its name.
     """
     case, of_joints = results.case, list[str]()
-    for k, own in enumerate(results.joints):
+    for k, joint_result in enumerate(results.joints):
         name = case.named((k,))
-        of_joints += (f"{name}: {hint}" if name else hint for hint in hints_on_joint(own))
+        of_joints += (f"{name}: {hint}" if name else hint for hint in hints_on_joint(joint_result))
     if case.published:
         return of_joints
     return of_joints + hints_on_run(results)
@@ -79,11 +79,11 @@ def hints_on_run(results: Results) -> list[str]:
             "--engine condensed does"
         )
     unstable = bool(levels) or verdict(results) == "not converged"
-    for k, own in enumerate(results.joints if last else []):
-        name, last = case.named((k,)), own.last
-        share = tension_share(own.case, last)
+    for k, joint_result in enumerate(results.joints if last else []):
+        name, last = case.named((k,)), joint_result.last
+        share = tension_share(joint_result.case, last)
         evidence = Evidence(last["crack_length"], unstable, share)
-        of_joint = [*own.case.law.hints(evidence), *hints_on_state(own, last)]
+        of_joint = [*joint_result.case.law.hints(evidence), *hints_on_state(joint_result, last)]
         messages += (f"{name}: {hint}" if name else hint for hint in of_joint)
     return messages
 

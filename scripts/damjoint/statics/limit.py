@@ -39,11 +39,11 @@ class Elastic:
         """The case with a joint that does not fail."""
         values = tuple((n, v) for n, v in case.values.items() if n not in STRENGTHS)
         strong = case.with_values(UNBREAKABLE)
-        own = tuple(
+        joint_values = tuple(
             (joint.name, *((n, v) for n, v in joint.values.items() if n not in STRENGTHS))
             for joint in case.of_joints
         )
-        key = values, own, case.levels, case.tail_levels, case.times
+        key = values, joint_values, case.levels, case.tail_levels, case.times
         return Elastic(key, strong, interface)
 
 
@@ -74,8 +74,8 @@ def mechanism(case: Case, interface: Interface) -> tuple[str, str]:
         case = case.with_joints(interface.of_joints)
     history = resultants(Elastic.of(case, interface))
     for k, joint in enumerate(case.joints):
-        own = {name: history[column_of(name, k)] for name in "NTM"} | {"level": history["level"]}
-        if case.separates((k,)) and (failure := mechanism_of_joint(joint, own))[0]:
+        rows = {name: history[column_of(name, k)] for name in "NTM"} | {"level": history["level"]}
+        if case.separates((k,)) and (failure := mechanism_of_joint(joint, rows))[0]:
             where = case.named((k,))
             return failure if not where else (f"{failure[0]} on {where}", failure[1])
     return "", ""

@@ -88,8 +88,9 @@ def decisive_joint(results: Results) -> int:
     if failing := failing_joints(results):
         return failing[0]
     parts = [
-        max(own.last[n] for n in ("crack_length", "slip_length")) / own.case.joint_along
-        for own in results.joints
+        max(joint_result.last[n] for n in ("crack_length", "slip_length"))
+        / joint_result.case.joint_along
+        for joint_result in results.joints
         if results.last
     ]
     return int(np.argmax(parts)) if parts else 0
@@ -107,7 +108,9 @@ def slipped_joints(results: Results) -> tuple[int, ...]:
     """The numbers of joints that have slipped along all of their length and alone hold what is
     above them; empty if there are none.
     """
-    slipped = [k for k, own in enumerate(results.joints) if slipped_from(own) is not None]
+    slipped = [
+        k for k, joint_result in enumerate(results.joints) if slipped_from(joint_result) is not None
+    ]
     return results.case.separating(slipped)
 
 
@@ -180,8 +183,8 @@ def bound(results: Results) -> Bound:
         last = joint[1].last
         return joint[1].case.hardening_asked, not last["crack_length"] + last["process_zone"]
 
-    for k, own in sorted(enumerate(results.joints), key=has_reserve):
-        reached = bound_on_joint(own)
+    for k, joint_result in sorted(enumerate(results.joints), key=has_reserve):
+        reached = bound_on_joint(joint_result)
         if reached.mode and case.separates((k,)):
             return replace(reached, joints=(k,))
     return Bound()

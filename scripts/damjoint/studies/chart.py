@@ -177,12 +177,12 @@ def draw_curves(figure: Figure, table: Table, names: list[str]) -> None:
         values = table.values(drawn)
         shown = values if valued else values[~bad]
         size, factor = unit([np.nan_to_num(shown)], units)
-        for number, (key, own) in enumerate(sorted(curves.items(), key=lambda item: item[1])):
+        for number, (key, members) in enumerate(sorted(curves.items(), key=lambda item: item[1])):
             color, mark = CURVES[number % len(CURVES)]
-            good = np.where(bad[own], np.nan, values[own] * factor)
+            good = np.where(bad[members], np.nan, values[members] * factor)
             style = {"color": color, "markersize": 4.5, "linestyle": "none" if categories else "-"}
-            panel.plot(x[own], good, mark, **style, label=key)
-            failing, cross = [i for i in own if bad[i]], color if others else RED
+            panel.plot(x[members], good, mark, **style, label=key)
+            failing, cross = [i for i in members if bad[i]], color if others else RED
             at_value = [i for i in failing if valued and np.isfinite(values[i])]
             panel.plot(x[at_value], values[at_value] * factor, "x", color=cross)
             at_edge = [i for i in failing if i not in at_value]
@@ -219,9 +219,9 @@ def draw_verdicts(panel: Axes, table: Table, x: np.ndarray, values: np.ndarray) 
     """Mark each row by its verdict, and the factor that all rows require, if they do."""
     verdicts = np.array([row["verdict"] for row in table.rows])
     for mark, verdict in zip(VERDICTS, dict.fromkeys(verdicts.tolist()), strict=False):
-        own = verdicts == verdict
+        alike = verdicts == verdict
         style = {"color": "black", "mfc": "white", "markersize": 7, "zorder": 4}
-        panel.plot(x[own], values[own], mark, **style, label=verdict)
+        panel.plot(x[alike], values[alike], mark, **style, label=verdict)
     required = {case["required_SSF"] for case in table.cases}
     if len(required) == 1 and (least := required.pop()):
         panel.axhline(least, color="black", linestyle="--", lw=0.9, label=f"required {least:g}")

@@ -292,7 +292,7 @@ def compare_joints(result: Results) -> list[SafetyCheck]:
     why = statement_of(result) if verdict.failed(result) else ""
     failing = verdict.failing_joints(result) if why else ()
     case, checks = result.case, []
-    for k, own in enumerate(result.joints):
+    for k, joint_result in enumerate(result.joints):
         fails, last = k in failing or not failing, result.last
         ended = ""
         if not fails and result.partial_load:
@@ -300,7 +300,7 @@ def compare_joints(result: Results) -> list[SafetyCheck]:
             ended = f"{NOT_JUDGED} beyond {end}, where the run ended: {verdict.verdict(result)}"
         alone = case.separates((k,))
         internal = not alone and case.of_joints[k].lower != "foundation"
-        check = compare_methods(own, why if fails else "", ended, alone)
+        check = compare_methods(joint_result, why if fails else "", ended, alone)
         checks.append(check.at_joint(case.joint_names[k], internal))
     return checks
 
@@ -567,7 +567,9 @@ def check_case(task: tuple[Case, Path], progress: bool) -> list[SafetyCheck]:
         checks += of_joints
         if case.geometry:
             continue
-        methods = [method for own in result.joints if (method := hand_calculation(own))]
+        methods = [
+            method for joint_result in result.joints if (method := hand_calculation(joint_result))
+        ]
         write_csv(folder_of(result.case) / "gravity.csv", loads_table(methods))
         k = min(range(len(methods)), key=lambda k: of_joints[k].margin)
         worst = of_joints[k]

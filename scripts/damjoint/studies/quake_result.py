@@ -104,8 +104,8 @@ class QuakeResult(QuakeTables):
 
     def rows_of(self, joint: int) -> Columns:
         """The rows of a joint, by its number, with the columns of QUAKE."""
-        own = {name: column_of(name, joint) for name in QUAKE_OF_JOINTS}
-        return {name: self.rows[own.get(name, name)] for name in QUAKE}
+        of_joint = {name: column_of(name, joint) for name in QUAKE_OF_JOINTS}
+        return {name: self.rows[of_joint.get(name, name)] for name in QUAKE}
 
 
 def peaks_table(found: dict[str, Any], case: Case) -> Table:

@@ -243,9 +243,9 @@ def run_section(folder: Path, solution: Solution) -> RunSection:
     case, info = result.case, result.info
     checks = compare_joints(result)
     number = decisive_joint(result)
-    own, check = result.joints[number], checks[number]
+    joint_result, check = result.joints[number], checks[number]
     # the loads one by one need a section by parameters
-    rigid = None if case.geometry else hand_calculation(own)
+    rigid = None if case.geometry else hand_calculation(joint_result)
     critical = critical_value(info.get("critical"))
     # requirements do not apply to the last state before a failure, nor to that after an earthquake,
     # in which the whole joint has slipped
@@ -280,7 +280,7 @@ def run_section(folder: Path, solution: Solution) -> RunSection:
         loads=loads_table(rigid) if rigid else None,
         formulas=formulas(rigid) if rigid and rigid.stands else [],
         notes=notes_of(checks),
-        summary=summary_of(own, check),
+        summary=summary_of(joint_result, check),
         computation=computation(result),
         materials=report_input.materials(case),
         other_input=report_input.other_input(case),
@@ -530,8 +530,8 @@ def discretisation_error(result: Results) -> str:
     """Error that --accuracy has estimated; else how to estimate it."""
     if "error_estimate" in result.info:
         return str(result.info["error_estimate"]["statement"])
-    own = result.case.geometry and result.case.geometry.suffix != ".geo"
-    how = "compare a run on a finer mesh" if own else "damjoint run --accuracy 1% estimates it"
+    of_mesh = result.case.geometry and result.case.geometry.suffix != ".geo"
+    how = "compare a run on a finer mesh" if of_mesh else "damjoint run --accuracy 1% estimates it"
     return f"error of the mesh: not estimated; {how}"
 
 

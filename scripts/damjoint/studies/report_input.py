@@ -154,8 +154,8 @@ def parameters(case: Case) -> dict[str, Entry]:
     joint.
     """
     known, values = declared(), case.values
-    own = {n: v for n, v in values.items() if not known[n].automatic}
-    automatic, defaults = parse(stored.parser_input(own, case.levels)), constants()
+    fixed = {n: v for n, v in values.items() if not known[n].automatic}
+    automatic, defaults = parse(stored.parser_input(fixed, case.levels)), constants()
     matter = visible(case)
     entries = {}
     for name, parameter in known.items():

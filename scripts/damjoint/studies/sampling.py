@@ -112,8 +112,8 @@ def correlated(shares: Array, pairs: list[tuple[int, int, float]]) -> Array:
     scores, corrected = stats.norm.ppf(shares), wanted
     orders: list[tuple[float, IntArray]] = []
     if number > inputs:
-        own = linalg.cholesky(np.corrcoef(scores.T), lower=True)
-        scores = linalg.solve_triangular(own, stats.zscore(scores).T, lower=True).T
+        factor = linalg.cholesky(np.corrcoef(scores.T), lower=True)
+        scores = linalg.solve_triangular(factor, stats.zscore(scores).T, lower=True).T
     for _ in range(MOST_ITERATIONS):
         ranks = (scores @ root.T).argsort(axis=0).argsort(axis=0)
         error = wanted - np.corrcoef(ranks.T) if number > inputs else np.zeros_like(wanted)

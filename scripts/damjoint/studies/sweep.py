@@ -189,10 +189,10 @@ def planned(case: Case, plan: Plan) -> Iterator[tuple[str, Values, Task]]:
 
 def notes_on_rows(case: Case, rows: Sequence[Case]) -> list[str]:
     """The notes on rows that their case does not have, the first one on each parameter."""
-    own, lines = notes_on_settings(case), dict[str, str]()
+    of_case, lines = notes_on_settings(case), dict[str, str]()
     for row in rows:
         for note in notes_on_settings(row):
-            if note not in own:
+            if note not in of_case:
                 lines.setdefault(note.split()[0], note)
     return list(lines.values())
 
