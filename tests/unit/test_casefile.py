@@ -1,6 +1,7 @@
 """Case files are data: their statements; nothing in them is executed."""
 
 import os
+import subprocess
 
 import gmsh
 import pytest
@@ -10,35 +11,114 @@ from damjoint.input.case_names import CASES
 from damjoint.input.resolve import load
 from damjoint.post import validation
 
-#: With a list of texts, one for each joint, which Gmsh writes in another way.
-TEXTS_BY_JOINT = {
-    "monoliths",
-    "valley_blocks",
-    *(path.stem for path in CASES.glob("ssnp143*.case")),
-}
+#: Cases that add to the block of a joint of an included case, which Gmsh takes for a second one.
+ADDED = {path.stem for path in CASES.glob("ssnp143?*.case")} - {"ssnp143c"}
 
 
 @pytest.mark.parametrize(
     "path",
-    [path for path in sorted(CASES.rglob("*.case")) if path.stem not in TEXTS_BY_JOINT],
+    [path for path in sorted(CASES.rglob("*.case")) if path.stem not in ADDED],
     ids=lambda path: path.stem,
 )
 def test_damjoint_and_gmsh_read_a_case_alike(path):
     """The cases can be opened in Gmsh and GetDP."""
     ours = casefile.read(path)
     parameters.start_gmsh()
-    gmsh.parser.clear()
-    gmsh.parser.parse(str(path))
+    gmsh.open(str(path))  # which forgets the structs of an earlier file, as in the window
     names = gmsh.parser.getNames()
     numbers = {n: gmsh.parser.getNumber(n).tolist() for n in names}
     texts = {n: list(gmsh.parser.getString(n)) for n in names if not numbers[n]}
     expected = {f"default_{n}": [v] for n, v in ours.defaults.items() if isinstance(v, float)}
-    expected |= ours.lists | {n: list(values) for n, values in ours.of_joints.items()}
+    expected |= ours.lists
     assert {n: v for n, v in numbers.items() if v} == expected
     expected = {f"default_{n}": [v] for n, v in ours.defaults.items() if isinstance(v, str)}
     if "geometry" in texts:  # damjoint: relative to the case file
         texts["geometry"] = [str(path.parent / texts["geometry"][0])]
     assert texts == expected | {n: [v] for n, v in ours.texts.items()}
+
+
+@pytest.mark.parametrize("name", ["lifts", "monoliths", "valley_blocks", "ssnp143", "ssnp143c"])
+def test_gmsh_and_getdp_read_the_block_of_a_joint(tmp_path, name):
+    """Struct Joint::NAME [ ... ] is a part of the language of both."""
+    blocks = casefile.read(CASES / f"{name}.case").blocks
+    values = {f"Joint::{key}.{n}": v for key, own in blocks.items() for n, v in own.items()}
+    printed = [
+        f'Printf(StrCat("{name} = ", {name}));'
+        if isinstance(value, str)
+        else f'Printf("{name} = %.17g", {name});'
+        for name, value in values.items()
+    ]
+    text = "\n".join([f'Include "{CASES / name}.case";', *printed]) + "\n"
+    for file, words in (("all.geo", ("gmsh", "-parse_and_exit")), ("all.pro", ("getdp",))):
+        write(tmp_path, text, file)
+        done = subprocess.run([*words, file], cwd=tmp_path, capture_output=True, text=True)
+        read = dict(
+            line.split(" = ") for line in done.stdout.splitlines() if line.count(" = ") == 1
+        )
+        assert values and {n: read.get(n) for n in values} == {
+            n: v if isinstance(v, str) else f"{v:.17g}" for n, v in values.items()
+        }, done.stdout + done.stderr
+
+
+LIFTS = 'lift_heights() = {12.5, 25};\nStruct Joint::lift_25_m [ law "friction", mu 0.5 + 0.2 ];\n'
+
+
+def test_a_block_sets_the_values_of_one_joint(tmp_path):
+    """Whatever the order of the blocks; all other values are those of all joints."""
+    text = "default_mu = 0.9;\nStruct Joint::lift_12_5_m [ sigma_max 0.1*MPa ];\n" + LIFTS
+    case = load(str(write(tmp_path, text)))
+    assert case.joint_names == ("base", "lift 12.5 m", "lift 25 m")
+    assert [joint["mu"] for joint in case.joints] == [0.9, 0.9, 0.7]
+    assert [joint["law"] for joint in case.joints] == ["bond", "bond", "friction"]
+    assert [joint["sigma_max"] for joint in case.joints] == [2e5, 1e5, 2e5]
+    assert {"mu", "law", "sigma_max"} <= case.given.keys()
+    for mu in ((0.5, 0.6, 0.8), 0.6):  # of the command line
+        values = [joint["mu"] for joint in load(str(tmp_path / "mine.case"), {"mu": mu}).joints]
+        assert values == (list(mu) if isinstance(mu, tuple) else [mu] * 3)
+
+
+def test_a_case_adds_to_the_blocks_of_an_included_one(tmp_path):
+    """By the value; a default for all joints replaces those of an included file; no lifts, no
+    blocks of lifts.
+    """
+    write(tmp_path, LIFTS + "Struct Joint::base [ mu 0.9 ];", "common.case")
+
+    def values(text, name):
+        case = load(str(write(tmp_path, 'Include "common.case";' + text)))
+        return [joint[name] for joint in case.joints]
+
+    more = "Struct Joint::lift_25_m [ adhesion 0 ];"
+    assert values(more, "mu") == pytest.approx([0.9, 0.8, 0.7])
+    assert values(more, "adhesion") == [2e5, 2e5, 0]
+    assert values("default_mu = 0.6;", "mu") == [0.6] * 3
+    assert values("lift_heights() = {};", "mu") == [0.9]
+    assert [j["mu"] for j in load(str(tmp_path / "common.case"), {"lift_heights": ()}).joints] == [
+        0.9
+    ]
+
+
+def test_a_joint_that_is_moved_keeps_its_block(tmp_path):
+    """By --set lift_heights or joint_height, of the same number of joints."""
+    path = str(write(tmp_path, LIFTS + "Struct Joint::base [ mu 0.9 ];"))
+    moved = load(path, {"lift_heights": (13.0, 20.0), "joint_height": 2.0})
+    assert moved.joint_names == ("lift 2 m", "lift 13 m", "lift 20 m")
+    assert [joint["mu"] for joint in moved.joints] == [0.9, 0.8, 0.7]
+    with pytest.raises(InputError, match="Struct Joint::lift_25_m: there is no such joint"):
+        load(path, {"lift_heights": (13.0,)})
+
+
+def test_a_list_of_joints_is_read_with_the_blocks_that_replace_it(command, tmp_path):
+    lists = 'lift_heights() = {20}; law() = {"bond", "friction"}; mu() = {0.9, 1}; levels() = {9};'
+    path = write(tmp_path, lists)
+    small = "--set", "n_joint=8", "--set", "order=1", "--no-fields", "--no-picture"
+    code, _, err = command("run", "mine.case", *small)
+    head, _, blocks = err.partition("; write instead: ")
+    assert (code, err.count("\n")) == (0, 1)
+    assert head == "damjoint: mine: law(), mu(): the next version does not read lists of joints"
+    other = load(
+        str(write(tmp_path, "lift_heights() = {20}; levels() = {9};" + blocks, "new.case"))
+    )
+    assert other.of_joints == load(str(path)).of_joints and other.values == load(str(path)).values
 
 
 def write(tmp_path, text, name="mine.case"):
@@ -94,7 +174,18 @@ def test_every_preset_fits_a_dam(tmp_path, path):
         ('Include "../pro/parameters.pro";', "must be a .case file"),
         ('Include "/etc/passwd";', "must be a .case file"),
         ("If(1) default_E = 1e9; EndIf", "If"),
-        ('default_law = Str["friction"];', "not part of a case"),
+        ('default_law = Str["friction"];', "quotes, one of rupture, friction"),
+        (LIFTS + "Struct Joint::lift_26_m [ mu 1 ];", "there is no such joint; must be one of J"),
+        (LIFTS + "Struct Joint::lift_25_m [ mu 1 ];", "line 3: Struct Joint :: lift_25_m [ mu 1 ]"),
+        (LIFTS + "default_mu = 1;", "must stand before the blocks of joints that set mu"),
+        ("Struct Joint::base [ mu 1, mu 2 ];", "mu is set twice"),
+        ("Struct Joint::base [ muh 1 ];", "muh: unknown parameter; allowed: mu"),
+        ("Struct Joint::base [ E 1e10 ];", "E: is of the whole dam: must be set by default_E"),
+        ("Struct Joint::base [ mu ];", "must be a number"),
+        ("Struct Joint::base [ mu -1 ];", "mu = -1.0: must be a number > 0"),
+        ("Struct Joint::base { mu 1 };", "must be Struct Joint::NAME [ parameter value, ... ]"),
+        ("Struct Base [ mu 1 ];", "Struct Joint::<joint> [ <parameter> value, ... ]"),
+        ("mu() = {1}; Struct Joint::base [ mu 1 ];", "mu() is a list: must be in blocks for all"),
         ("default_E = GetEnv(1);", "must be a number"),
         ("default_E = __import__;", "must be a number"),
         ("default_E = E;", "must be a number"),

@@ -110,8 +110,12 @@ def check_request(request: Request) -> Sheet:
     unchanged = Request(request.case, accuracy=request.accuracy)
     fill_database(unchanged, unchanged.load())
     own = {name: gmsh_value(declared()[name].label) for name in declared()}
-    lists = casefile.read(path).of_joints
-    changes = {n: v for n, v in request.overrides.items() if n in lists or v != own.get(n)}
+    file = casefile.read(path)
+    changes = {
+        n: v
+        for n, v in request.overrides.items()
+        if n in file.of_joints or n in file.in_blocks or v != own.get(n)
+    }
     request = replace(request, overrides=changes)
     case = request.load()
     fill_database(request, case)
@@ -126,12 +130,23 @@ def fill_database(request: Request, case: Case) -> None:
     """
     file = casefile.read(case_file(request.case))
     settings: dict[str, Setting] = {**file.defaults, **file.of_joints}
+    settings |= first_block(case)
     settings |= first_mesh(case) if request.accuracy else {}
     settings |= {name: checked(name, value) for name, value in request.overrides.items()}
     settings.pop("lift_heights", None)
     first = {n: v[0] if isinstance(v, tuple) else v for n, v in settings.items()}
     lists = listing("levels", case.levels) + listing("times", case.times)
     parse_by_gmsh(assignments(first) + lists + INCLUDE)
+
+
+def first_block(case: Case) -> dict[str, Setting]:
+    """What the first joint of a case has for itself in its file."""
+    source = case.source
+    if not source or not source.text.blocks:
+        return {}
+    if case.geometry:  # the mesh has the names of the joints
+        return {n: case.values[n] for n in source.text.in_blocks if n not in source.overrides}
+    return {**source.blocks(case.joint_names).get(casefile.key_of(case.joint_names[0]), {})}
 
 
 def gmsh_value(label: str) -> float | str:
@@ -160,6 +175,8 @@ def case_text(sheet: Sheet, run: Case) -> str:
         if name in declared():
             file.defaults.pop(name, None)
             file.of_joints.pop(name, None)
+            for values in file.blocks.values():
+                values.pop(name, None)
             (file.of_joints if isinstance(setting, tuple) else file.defaults)[name] = setting
     file.defaults |= {name: run[name] for name in REFINED} if request.accuracy else {}
     file.texts = {"title": case.title}
@@ -176,4 +193,10 @@ def case_text(sheet: Sheet, run: Case) -> str:
     }
     if case.lift_heights:
         file.lists["lift_heights"] = list(case.lift_heights)
+    names = run.joint_names
+    if file.of_joints and len(set(names)) == len(next(iter(file.of_joints.values()))):
+        for k, name in enumerate(names):
+            block = file.blocks.setdefault(casefile.key_of(name), {})
+            block |= {n: values[k] for n, values in file.of_joints.items()}
+        file.of_joints = {}
     return casefile.written(file)

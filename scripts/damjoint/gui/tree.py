@@ -283,12 +283,16 @@ class Tree:
         return entry
 
     def of_joints(self, parameter: Parameter) -> str:
-        """The values of the joints, if the case sets a list of them; else empty."""
-        source = self.sheet.case.source
-        setting = {**source.text.of_joints, **source.overrides}.get(parameter.name)
-        if not isinstance(setting, tuple):
+        """The values of the joints, if the case sets some for itself; else empty."""
+        source, name = self.sheet.case.source, parameter.name
+        setting = {**source.text.of_joints, **source.overrides}.get(name)
+        in_blocks = name in source.text.in_blocks and name not in source.overrides
+        if not (isinstance(setting, tuple) or in_blocks):
             return ""
-        return ", ".join(v if isinstance(v, str) else f"{v:.6g}" for v in setting)
+        values = (
+            setting if isinstance(setting, tuple) else [j[name] for j in self.sheet.case.joints]
+        )
+        return ", ".join(v if isinstance(v, str) else f"{v:.6g}" for v in values)
 
     def request(self) -> Request:
         """Read the user's request; another case starts without changes.

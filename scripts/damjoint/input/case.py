@@ -12,6 +12,7 @@ from typing import Any
 from .. import InputError
 from ..arrays import Setting, Value, Values
 from ..laws import LAWS, Law
+from .casefile import joint_name as joint_name
 from .constraints import (
     USUAL,
     check_acting,
@@ -133,7 +134,8 @@ class Case(ParameterValues):
         if self.source is None:
             return {}
         text, known = self.source.text, declared()
-        of_file = {**text.defaults, **text.of_joints}
+        of_blocks = {n: tuple(text.of_block(n)) for n in text.in_blocks}
+        of_file = {**text.defaults, **of_blocks, **text.of_joints}
         of_user = {n: v for n, v in of_file.items() if n in text.of_user}
         return {n: v for n, v in {**of_user, **self.source.overrides}.items() if n in known}
 
@@ -311,11 +313,6 @@ def between(levels: tuple[float, ...], time: float) -> float:
     points, time = (0.0, *levels), min(time, len(levels))
     i = min(int(time), len(points) - 2)
     return points[i] + (time - i) * (points[i + 1] - points[i])
-
-
-def joint_name(height: float) -> str:
-    """The name of a joint whose heel is at a height [m]."""
-    return f"lift {height:g} m" if height else "base"
 
 
 def check_joints(case: Case) -> None:

@@ -6,9 +6,6 @@ import os
 from pathlib import Path
 
 from .. import InputError, data
-from .values import flows as flows
-from .values import freezes_uplift as freezes_uplift
-from .values import has_drains as has_drains
 
 CASES = data("cases")
 

@@ -11,7 +11,11 @@ A case is a list of statements, in any layout, with // and /* */ comments:
     default_<parameter> = value;     a text; arithmetic with + - * / ^ ( ), Pi, the units of
                                      pro/units.pro and defaults set before
     levels() = {value, ...};         tail_levels(), times() and lift_heights() likewise
-    <parameter>() = {value, ...};    of a joint: a value for each joint, the lowest first
+    Struct Joint::<joint> [ <parameter> value, ... ];
+                                     values of the joint of this name, in which _ stands for all but
+                                     letters and digits: Joint::lift_25_m
+    <parameter>() = {value, ...};    of a joint: a value for each joint, the lowest first; in this
+                                     version only
 """
 
 from __future__ import annotations
@@ -19,7 +23,7 @@ from __future__ import annotations
 import contextlib
 import re
 import unicodedata
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeAlias
@@ -37,7 +41,7 @@ LONGEST, MOST_FILES = 1_000_000, 50
 TOKEN = re.compile(
     r"""(?P<nothing>\s+|//[^\n]*|/\*.*?\*/) |(?P<text>"[^"\\\n]*")
     |(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?) |(?P<name>[A-Za-z_]\w*)
-    |(?P<mark>[-+*/^(){},;=]) |(?P<other>.)""",
+    |(?P<mark>::|[-+*/^(){},;=[\]]) |(?P<other>.)""",
     re.X | re.S,
 )
 
@@ -59,10 +63,22 @@ class CaseText:
     texts: dict[str, str] = field(default_factory=dict)
     #: values of each joint, by parameter
     of_joints: dict[str, tuple[Value, ...]] = field(default_factory=dict)
+    #: values by the key of a joint and the parameter; and the files that set them last
+    blocks: dict[str, dict[str, Value]] = field(default_factory=dict)
+    block_files: dict[str, Path] = field(default_factory=dict, compare=False)
     #: parameters and lists that a file of the user sets last, not one of the package
     of_user: set[str] = field(default_factory=set, compare=False)
     #: number of files read
     files: int = field(default=0, compare=False)
+
+    @property
+    def in_blocks(self) -> list[str]:
+        """The parameters that blocks of joints set."""
+        return list(dict.fromkeys(name for values in self.blocks.values() for name in values))
+
+    def of_block(self, name: str) -> Iterator[Value]:
+        """The values of a parameter in the blocks of joints that set it."""
+        return (values[name] for values in self.blocks.values() if name in values)
 
 
 def read(path: Path) -> CaseText:
@@ -82,7 +98,27 @@ def written(case: CaseText) -> str:
         f"{name}() = {{{', '.join(map(literal, values))}}};\n"
         for name, values in (case.lists | case.of_joints).items()
     ]
-    return "".join([*lines, assignments(case.defaults), *lists])
+    blocks = [block(joint, values) for joint, values in case.blocks.items() if values]
+    return "".join([*lines, assignments(case.defaults), *lists, *blocks])
+
+
+def key_of(joint: str) -> str:
+    """The name of a joint in a case file: Joint::lift_12_5_m for "lift 12.5 m"."""
+    return re.sub(r"\W", "_", joint)
+
+
+def block(key: str, values: Mapping[str, Value]) -> str:
+    """The statement of a joint's own values."""
+    entries = ", ".join(f"{name} {literal(value)}" for name, value in values.items())
+    return f"Struct Joint::{key} [ {entries} ];\n"
+
+
+def blocks_of(lists: Mapping[str, Sequence[Value]], joints: Sequence[str]) -> str:
+    """The statements that say the same as lists with a value for each joint."""
+    return "".join(
+        block(key_of(joint), {name: values[k] for name, values in lists.items()})
+        for k, joint in enumerate(joints)
+    )
 
 
 def literal(value: Value) -> str:
@@ -141,9 +177,14 @@ def add_statement(case: CaseText, statement: list[Token], path: Path, where: str
         if not file.exists():
             raise InputError(f"{where}: there is no such file beside {path.name}, and no preset")
         read_into(case, file)
+    elif name == "lift_heights" and tokens[1:] == ("(", ")", "=", "{", "}"):
+        case.lists.pop(name, None)
+        keep_first_block(case)
     elif name in LISTS and tokens[1:4] == ("(", ")", "="):
         case.lists[name] = numbers(items_of(kinds[4:], tokens[4:], where), case, where)
         note_owner(case, name, path)
+    elif tokens[:3] == ("Struct", "Joint", "::"):
+        add_block(case, kinds, tokens, path, where)
     elif name in TEXTS and tokens[1:2] == ("=",):
         if kinds[2:] != ("text",):
             raise InputError(f'{where}: must be {name} = "words"')
@@ -156,6 +197,7 @@ def add_statement(case: CaseText, statement: list[Token], path: Path, where: str
         with located(where):
             known = parameter(name)
         case.of_joints.pop(name, None)
+        replace_in_blocks(case, name, path, where)
         value = value_in((kinds[2:], tokens[2:]), known, case, where)
         with located(where):
             case.defaults[name] = known.check(value)
@@ -166,6 +208,7 @@ def add_statement(case: CaseText, statement: list[Token], path: Path, where: str
         with located(where):
             checked(name, values)
         case.defaults.pop(name, None)
+        replace_in_blocks(case, name, path, where)
         case.of_joints[name] = values
         note_owner(case, name, path)
     else:
@@ -180,8 +223,63 @@ def add_statement(case: CaseText, statement: list[Token], path: Path, where: str
             + 'Include "file.case", title, also_uplift, geometry, record, '
             + "default_<parameter> = value, "
             + ", ".join(f"{n}() = {{...}}" for n in LISTS)
-            + ", <parameter of a joint>() = {...}"
+            + ", Struct Joint::<joint> [ <parameter> value, ... ]"
         )
+
+
+def add_block(
+    case: CaseText, kinds: tuple[str, ...], tokens: tuple[str, ...], path: Path, where: str
+) -> None:
+    """Add the values of one joint: Struct Joint::NAME [ parameter value, ... ]."""
+    if kinds[3:4] != ("name",) or tokens[4:5] != ("[",) or tokens[-1:] != ("]",):
+        raise InputError(
+            f"{where}: must be Struct Joint::NAME [ parameter value, ... ], such as Struct "
+            "Joint::lift_25_m [ mu 0.7, adhesion 0.1*MPa ]"
+        )
+    key, values = tokens[3], dict[str, Value]()
+    if case.block_files.get(f"{key}::") == path:
+        raise InputError(f"{where}: Joint::{key} is set twice in {path.name}")
+    for item_kinds, item in items_of(
+        ("mark", *kinds[5:-1], "mark"), ("{", *tokens[5:-1], "}"), where
+    ):
+        name = item[0] if item else ""
+        with located(where):
+            known = parameter(name)
+            if not known.of_joints:
+                raise InputError(f"{name}: is of the whole dam: must be set by default_{name}")
+        if name in values:
+            raise InputError(f"{where}: {name} is set twice")
+        if name in case.of_joints:
+            raise InputError(f"{where}: {name}() is a list: must be in blocks for all joints")
+        value = value_in((item_kinds[1:], item[1:]), known, case, where)
+        with located(where):
+            values[name] = known.check(value)
+        case.block_files[name] = path
+        note_owner(case, name, path)
+    case.block_files[f"{key}::"] = path
+    case.blocks[key] = case.blocks.get(key, {}) | values
+
+
+def replace_in_blocks(case: CaseText, name: str, path: Path, where: str) -> None:
+    """Let a value for all joints, or a list, replace those that the blocks of included files set.
+
+    Raises InputError if a block of the same file sets one.
+    """
+    if case.block_files.get(name) == path:
+        raise InputError(f"{where}: must stand before the blocks of joints that set {name}")
+    for values in case.blocks.values():
+        values.pop(name, None)
+
+
+def keep_first_block(case: CaseText) -> None:
+    """Remove the blocks of all joints but the first: there are no others any more."""
+    first = key_of(joint_name(float(case.defaults.get("joint_height", 0.0))))
+    case.blocks = {key: values for key, values in case.blocks.items() if key == first}
+
+
+def joint_name(height: float) -> str:
+    """The name of a joint whose heel is at a height [m]."""
+    return f"lift {height:g} m" if height else "base"
 
 
 def note_owner(case: CaseText, name: str, path: Path) -> None:

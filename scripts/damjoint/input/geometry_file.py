@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import os
+import re
+import tempfile
+from collections.abc import Mapping
+from functools import lru_cache
 from pathlib import Path
 
 from .. import RUN_GEO, InputError, data
-from .values import flows as flows
-from .values import freezes_uplift as freezes_uplift
-from .values import has_drains as has_drains
+from ..arrays import Value
+from .parameters import assignments, start_gmsh
 
 
 def own_geometry(name: str) -> Path:
@@ -48,3 +51,60 @@ def is_mesh(path: Path) -> bool:
             return path.suffix == ".msh" and file.read(len(MESH)) == MESH
     except OSError as error:
         raise InputError(f"geometry = {path}: {error.strerror}") from None
+
+
+#: A statement by which a .geo file takes in another file.
+INCLUDES = r"\b(?:Include|Merge)\s+\"([^\"]*)\""
+
+
+def files_of(path: Path, known: dict[Path, str]) -> dict[Path, str]:
+    """A .geo file and those that it includes, but for the declarations, with their text; added to
+    those that are known.
+    """
+    if path in known or data("pro").resolve() in path.resolve().parents or not path.is_file():
+        return known
+    known[path] = path.read_text(errors="replace")
+    for name in re.findall(INCLUDES, known[path]):
+        files_of(path.parent / name, known)
+    return known
+
+
+def joints_in(path: Path, values: Mapping[str, Value]) -> tuple[str, ...]:
+    """The names of the joints of a user's own geometry, in the mesh's order, without its mesh.
+
+    values: of all parameters, of which a .geo file may use some. Raises InputError if it can not
+    be read.
+    """
+    texts = files_of(path, {}) if path.suffix == ".geo" else {path: ""}
+    words = set(re.findall(r"\w+", " ".join(texts.values())))
+    used = {n: v for n, v in values.items() if n in words or f"default_{n}" in words}
+    states = tuple((file, file.stat().st_mtime_ns, file.stat().st_size) for file in texts)
+    return joints_by_gmsh(states, assignments(used), assignments(values))
+
+
+@lru_cache(maxsize=4)
+def joints_by_gmsh(
+    states: tuple[tuple[Path, int, int], ...], used: str, values: str
+) -> tuple[str, ...]:
+    """See `joints_in`; Gmsh's current model remains."""
+    gmsh, (path, _, _) = start_gmsh(), states[0]
+    before = gmsh.model.getCurrent() if gmsh.model.list() else ""
+    gmsh.parser.clear()
+    gmsh.onelab.clear()
+    with tempfile.TemporaryDirectory(prefix="damjoint-") as folder:
+        file = Path(folder) / f"joints{path.suffix}"
+        if path.suffix == ".geo":
+            file.write_text(values + f'Include "{path}";\n')
+        else:
+            file.symlink_to(path)
+        try:
+            gmsh.open(str(file))
+        except Exception as error:  # what gmsh raises
+            gmsh.finalize()  # else Gmsh remains busy with a file that it could not read
+            raise InputError(f"geometry = {path}: {error}") from None
+    names = [gmsh.model.getPhysicalName(*group) for group in gmsh.model.getPhysicalGroups()]
+    gmsh.model.remove()
+    if before:
+        gmsh.model.setCurrent(before)
+    parts = (name.strip().lower().partition(" ") for name in names)
+    return tuple(name or "joint" for region, _, name in parts if region == "joint")

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from .. import InputError
-from ..arrays import Settings, Value
+from ..arrays import Settings, Value, Values
 from .arithmetic import number
-from .case import SECTION, OfJoint, joint_name
+from .case import SECTION, OfJoint
+from .casefile import joint_name, key_of
+from .geometry_file import joints_in
 from .parameters import (
     INCLUDE,
     assignments,
@@ -18,19 +21,21 @@ from .parameters import (
 )
 from .scene import stacked
 from .source import lists_of_joints
-from .values import flows as flows
-from .values import freezes_uplift as freezes_uplift
-from .values import has_drains as has_drains
 
 
 def settings_of_joints(
-    settings: Settings, lifts: tuple[float, ...], geometry: Path | None
+    settings: Settings,
+    blocks: Mapping[str, Mapping[str, Value]],
+    lifts: tuple[float, ...],
+    geometry: Path | None,
 ) -> list[dict[str, Value]]:
     """The settings of each joint, from the lowest.
 
-    lifts: heights of the joints above the first [m]. Raises InputError if a list has another length
-    than there are joints; of a geometry of one's own the mesh has them: until it is read, see
-    `Source.check_lists`, there are as many as the longest list has values.
+    blocks: of single joints, by their keys; lifts: heights of the joints above the first [m].
+    Raises InputError if a list has another length than there are joints, or there is no joint of a
+    block. Of a geometry of one's own the mesh has the joints: its names are read if there are
+    blocks; else, until the mesh is read, see `Source.check_lists`, there are as many as the longest
+    list has values.
     """
     lists = lists_of_joints(settings)
     single = {n: v for n, v in settings.items() if not isinstance(v, tuple)}
@@ -38,23 +43,51 @@ def settings_of_joints(
         raise InputError(
             "lift_heights: must not be set for a geometry of one's own, whose mesh has the joints"
         )
-    number = max([1, *map(len, lists.values())]) if geometry else 1 + len(lifts)
-    for name, values in lists.items():
-        if len(values) != number and not geometry:
+    by_mesh = geometry and not blocks
+    names = names_of_section(single, lifts)
+    if geometry and blocks:
+        names = names_of_geometry(single, geometry)
+    keys = [key_of(name) for name in names]
+    for key in blocks:
+        if keys.count(key) != 1:
             raise InputError(
-                f"{name} = {','.join(map(str, values))}: must be one value, or as many as there "
-                f"are joints ({number})"
+                f"Struct Joint::{key}: there {'are several' if key in keys else 'is no'} such joint"
+                "; must be one of " + ", ".join(f"Joint::{k}" for k in keys)
             )
-        lists[name] = values + values[-1:] * (number - len(values))
+    count = max([1, *map(len, lists.values())]) if by_mesh else len(names)
+    for name, values in lists.items():
+        if len(values) != count and not by_mesh:
+            raise InputError(
+                f"{name} = {','.join(map(str, values))}: must be one value, or "
+                + (
+                    f"one for each joint of the geometry ({count}: {', '.join(names)})"
+                    if geometry
+                    else f"as many as there are joints ({count})"
+                )
+            )
+        lists[name] = values + values[-1:] * (count - len(values))
     heights = {} if geometry else {"joint_height": lifts}
     return [
         {
             **single,
+            **({} if by_mesh else blocks.get(keys[k], {})),
             **{n: v[k] for n, v in lists.items()},
             **({n: v[k - 1] for n, v in heights.items()} if k else {}),
         }
-        for k in range(number)
+        for k in range(count)
     ]
+
+
+def names_of_section(settings: Settings, lifts: tuple[float, ...]) -> tuple[str, ...]:
+    """The names of the joints of a section, from the lowest."""
+    lowest = number(str(settings.get("joint_height", default_of("joint_height"))))
+    return tuple(map(joint_name, (lowest, *lifts)))
+
+
+def names_of_geometry(settings: Values, geometry: Path) -> tuple[str, ...]:
+    """The names of the joints of a geometry of one's own, in its order, by the settings for all."""
+    variables = parse(assignments(settings) + INCLUDE)
+    return joints_in(geometry, {n: variables[n][0] for n in declared()})
 
 
 def parsed_by_joint(

@@ -7,9 +7,6 @@ import math
 from .. import InputError
 from .arithmetic import number
 from .case import Case
-from .values import flows as flows
-from .values import freezes_uplift as freezes_uplift
-from .values import has_drains as has_drains
 
 #: Relative errors by name.
 ACCURACIES = {"coarse": 0.03, "standard": 0.01, "fine": 0.002}

@@ -22,13 +22,10 @@ from .constraints import (
     check_times,
 )
 from .geometry_file import own_geometry
-from .joints import parsed_by_joint, settings_of_joints, stacked_joints
+from .joints import names_of_section, parsed_by_joint, settings_of_joints, stacked_joints
 from .parameters import checked, declared, levels_of, listing
 from .refinement import first_mesh, relative_error
 from .source import Source
-from .values import flows as flows
-from .values import freezes_uplift as freezes_uplift
-from .values import has_drains as has_drains
 
 
 def load(
@@ -83,7 +80,9 @@ def resolve(source: Source) -> Case:
         given = overrides.pop("lift_heights")
         lifts = levels_of("lift_heights", given) if given else ()
     geometry = own_geometry(file.texts["geometry"]) if "geometry" in file.texts else None
-    values = settings_of_joints({**file.defaults, **file.of_joints, **overrides}, lifts, geometry)
+    settings = {**file.defaults, **file.of_joints, **overrides}
+    names = () if geometry else names_of_section(settings, lifts)
+    values = settings_of_joints(settings, source.blocks(names), lifts, geometry)
     listed = "".join(listing(n, v) for n, v in lists.items())
     variables, *of_joints = parsed_by_joint(values, listed, lifts)
     if accuracy is not None and geometry and geometry.suffix != ".geo":

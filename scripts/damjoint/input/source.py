@@ -9,12 +9,7 @@ from pathlib import Path
 from .. import InputError
 from ..arrays import Setting, Settings, Value
 from . import casefile
-from .parameters import (
-    checked,
-)
-from .values import flows as flows
-from .values import freezes_uplift as freezes_uplift
-from .values import has_drains as has_drains
+from .parameters import checked
 
 
 @dataclass(frozen=True)
@@ -42,6 +37,26 @@ class Source:
                     f"{name} = {','.join(map(str, values))}: must be one value, or one for each "
                     f"joint of the geometry ({len(joints)}: {', '.join(joints)})"
                 )
+
+    def blocks(self, names: Sequence[str]) -> dict[str, dict[str, Value]]:
+        """The values of single joints by their keys, without those that overrides replace.
+
+        names: of the joints of a section; empty for a geometry of one's own. Where overrides move
+        the joints of the file, each keeps its values; without lifts only the first has any.
+        """
+        given = {
+            key: {name: value for name, value in values.items() if name not in self.overrides}
+            for key, values in self.text.blocks.items()
+        }
+        if names and {"lift_heights", "joint_height"} & self.overrides.keys():
+            lowest = float(self.text.defaults.get("joint_height", 0.0))
+            heights = (lowest, *self.text.lists.get("lift_heights", ()))
+            before = [casefile.key_of(casefile.joint_name(height)) for height in heights]
+            if len(before) == len(names) or len(names) == 1:
+                moved = dict(zip(before, map(casefile.key_of, names), strict=False))
+                gone = before[len(names) :]
+                given = {moved.get(k, k): values for k, values in given.items() if k not in gone}
+        return {key: values for key, values in given.items() if values}
 
     def with_overrides(self, overrides: Settings) -> Source:
         """The source with further overrides, which win."""

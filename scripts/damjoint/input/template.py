@@ -20,8 +20,10 @@ title = "{title}";
 levels() = {{30, 40, 45}};
 tail_levels() = {{0, 0, 3}};
 
-// Lift joints at these heights [m] above the base; values of each joint, the lowest first.
-// lift_heights() = {{15, 30}};  law() = {{"bond", "friction", "friction"}};  mu() = {{0.8, 1, 1}};
+// Lift joints at these heights [m] above the base, and values that one of the joints base,
+// lift_15_m, lift_30_m has for itself; in all others it has the defaults.
+// lift_heights() = {{15, 30}};
+// Struct Joint::lift_15_m [ law "friction", mu 1, adhesion 0.1*MPa ];
 """
 
 #: Parameters that differ from dam to dam.

@@ -10,7 +10,6 @@ from ..arrays import Setting
 from ..input.case import Case
 from ..input.parameters import assignments, listing, start_gmsh
 from ..input.values import has_drains
-from .body import Body as Body
 
 #: Parameters that the mesh always depends on.
 GEOMETRY = (

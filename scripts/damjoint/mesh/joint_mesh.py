@@ -11,7 +11,7 @@ from ..input.case import OfJoint
 from ..input.scene import (
     TAILWATER,
 )
-from .body import Body as Body
+from .body import Body
 from .sides import area
 
 #: Extent along z over that along y below which a joint faces along z.

@@ -14,6 +14,7 @@ from .. import InputError, RunError
 from ..arrays import IntArray
 from ..input.case import Case
 from ..input.constraints import check_levels_on_mesh, check_strain
+from ..input.geometry_file import files_of
 from ..input.parameters import constants, start_gmsh
 from ..input.scene import (
     SIDES,
@@ -22,7 +23,7 @@ from ..input.scene import (
     stacked,
 )
 from ..storage import check_end
-from .body import Body as Body
+from .body import Body
 from .cut import cut
 from .generate import generate, shares
 from .joint_mesh import Face, JointMesh
@@ -39,7 +40,7 @@ from .regions import (
 )
 from .sides import is_inside, outward, part_of, sides
 from .skin import inner_ends
-from .user_files import GeometryFiles, files_of
+from .user_files import GeometryFiles
 from .user_geometry import NamedFace, UserGeometry
 
 #: Limit of the joint's element tags: six digits in the keys of GetDP's internal variables.

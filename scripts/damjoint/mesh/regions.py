@@ -14,7 +14,6 @@ from ..input.scene import (
     TOP,
     UP,
 )
-from .body import Body as Body
 
 #: Regions of a user's own geometry by the parameters that need them.
 LOADED = {

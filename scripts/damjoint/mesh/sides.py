@@ -6,7 +6,7 @@ import numpy as np
 
 from ..arrays import Array, BoolArray, IntArray
 from ..csr import CsrMatrix
-from .body import Body as Body
+from .body import Body
 
 
 def area(surface: Body) -> float:

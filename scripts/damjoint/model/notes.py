@@ -4,11 +4,12 @@ loads that act in part or not at all; of a geometry of one's own, what is unders
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from ..input.case import Case
+from ..input.casefile import blocks_of
 from ..input.constraints import STAGED, USUAL, WORKS
 from ..input.parameters import declared
 from ..input.scene import BED, DOWN, FLOOR, TAILWATER, TOP, UP
@@ -47,13 +48,26 @@ def notes(case: Case) -> list[str]:
 
     Raises InputError if that is unsuitable.
     """
-    of_mesh = notes_on_geometry(case, mesh_of(case)) if case.geometry else ()
-    return [*notes_on_settings(case), *of_mesh]
+    if not case.geometry:
+        return notes_on_settings(case)
+    mesh = mesh_of(case)
+    lists = lists_as_blocks(case, [joint.name for joint in mesh.joints])
+    return [*notes_on_settings(case), *lists, *notes_on_geometry(case, mesh)]
 
 
 def notes_on_settings(case: Case) -> list[str]:
     """Those that need no mesh: on settings without effect, unusual values, and loads."""
-    return [*settings_in_vain(case), *unusual_values(case), *loads_in_part(case)]
+    lists = () if case.geometry else lists_as_blocks(case, case.joint_names)
+    return [*settings_in_vain(case), *unusual_values(case), *loads_in_part(case), *lists]
+
+
+def lists_as_blocks(case: Case, joints: Sequence[str]) -> Iterator[str]:
+    """Yield how the lists of a case file are written as blocks of joints, by their names."""
+    lists = case.source.text.of_joints if case.source else {}
+    if lists and len(joints) == len(next(iter(lists.values()))):
+        listed = ", ".join(f"{name}()" for name in lists)
+        blocks = blocks_of(lists, joints).replace("\n", " ").strip()
+        yield f"{listed}: the next version does not read lists of joints; write instead: {blocks}"
 
 
 def settings_in_vain(case: Case) -> Iterator[str]:
