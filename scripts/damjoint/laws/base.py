@@ -208,3 +208,54 @@ class Law(Generic[V]):
     def hints(self, evidence: Evidence) -> Iterator[str]:
         """What an engineer should know of a result of this law."""
         yield from ()
+
+
+class SofteningLaw(Law[V]):
+    """A law with damage, which can be frozen for a step: nothing breaks, slip does not soften.
+
+    The methods of the response take `frozen`, what `frozen_damage` has returned; None: the damage
+    grows.
+    """
+
+    def frozen_damage(self, jump: Array, variables: V) -> Array:
+        """What is frozen of each point at a jump (q,): its damage, or its share of stiffness."""
+        raise NotImplementedError
+
+    def traction_and_tangent(
+        self, jump: Array, variables: V, frozen: Array | None = None
+    ) -> tuple[Array, Array]:
+        """See `Law`."""
+        raise NotImplementedError
+
+    def secant_stiffness(self, jump: Array, variables: V, frozen: Array | None = None) -> Array:
+        """See `Law`."""
+        raise NotImplementedError
+
+    def update_internal_variables(
+        self, jump: Array, variables: V, frozen: Array | None = None
+    ) -> V:
+        """See `Law`."""
+        raise NotImplementedError
+
+    def freeze(self, jump: Array, variables: V) -> Law[V]:
+        """See `Law`."""
+        return FrozenDamage(self, self.frozen_damage(jump, variables))
+
+
+class FrozenDamage(Law[V]):
+    """A softening law with frozen damage: its response and the internal variables after a step."""
+
+    def __init__(self, law: SofteningLaw[V], frozen: Array) -> None:
+        self.law, self.frozen = law, frozen
+
+    def traction_and_tangent(self, jump: Array, variables: V) -> tuple[Array, Array]:
+        """See `Law`."""
+        return self.law.traction_and_tangent(jump, variables, self.frozen)
+
+    def secant_stiffness(self, jump: Array, variables: V) -> Array:
+        """See `Law`."""
+        return self.law.secant_stiffness(jump, variables, self.frozen)
+
+    def update_internal_variables(self, jump: Array, variables: V) -> V:
+        """See `Law`."""
+        return self.law.update_internal_variables(jump, variables, self.frozen)

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..arrays import Array, BoolArray
-from .base import Law
+from .base import SofteningLaw
 
 #: Damage at which tensile strength and cohesion are largest: the maximum of S^2/(-S').
 PEAK = (np.sqrt(1.5 / 3.5) - 0.5) / 2.5
@@ -65,7 +65,7 @@ def degradation(alpha: Array) -> tuple[Array, Array, Array]:
     )
 
 
-class Endo(Law[EndoVariables]):
+class Endo(SofteningLaw[EndoVariables]):
     """Tensile strength and cohesion that soften with one damage; friction with its dilatancy."""
 
     variable_names = ("alpha", "plastic_1", "plastic_2", "plastic_n")
@@ -114,8 +114,10 @@ class Endo(Law[EndoVariables]):
         """See `Law`."""
         return EndoVariables(np.zeros(points), np.zeros((points, 3)))
 
-    def update_internal_variables(self, jump: Array, variables: EndoVariables) -> EndoVariables:
-        """See `Law`."""
+    def update_internal_variables(
+        self, jump: Array, variables: EndoVariables, frozen: Array | None = None
+    ) -> EndoVariables:
+        """See `Law`; the damage that a step does is known after it, also if it is frozen in it."""
         alpha = self.damaged(jump, variables)
         plastic = self.plastic_return(jump, variables, alpha).plastic
         return EndoVariables(alpha, plastic[:, [1, 2, 0]])
@@ -184,13 +186,17 @@ class Endo(Law[EndoVariables]):
         alpha[grows] = np.maximum(1 / (1 + np.exp(-odds)), variables.alpha)
         return alpha
 
-    def traction_and_tangent(self, jump: Array, variables: EndoVariables) -> tuple[Array, Array]:
+    def traction_and_tangent(
+        self, jump: Array, variables: EndoVariables, frozen: Array | None = None
+    ) -> tuple[Array, Array]:
         """See `Law`; the tangent is symmetric."""
-        alpha = self.damaged(jump, variables)
+        alpha = self.damaged(jump, variables) if frozen is None else frozen
         at = self.plastic_return(jump, variables, alpha)
-        grows = alpha > variables.alpha
-        b = at.coupling / np.sqrt(np.where(grows, at.decrease * self.energy, np.inf))[:, None]
-        tangent = self.stiffness_with(at.compliance) - b[:, :, None] * b[:, None, :]
+        tangent = self.stiffness_with(at.compliance)
+        if frozen is None:
+            grows = alpha > variables.alpha
+            b = at.coupling / np.sqrt(np.where(grows, at.decrease * self.energy, np.inf))[:, None]
+            tangent = tangent - b[:, :, None] * b[:, None, :]
         return self.K * (jump - at.plastic), tangent
 
     def stiffness_with(self, compliance: Array) -> Array:
@@ -198,14 +204,16 @@ class Endo(Law[EndoVariables]):
         flow = (1 - self.artificial) * self.K[:, None] * compliance * self.K
         return np.asarray(np.diag(self.K) - flow)
 
-    def secant_stiffness(self, jump: Array, variables: EndoVariables) -> Array:
+    def secant_stiffness(
+        self, jump: Array, variables: EndoVariables, frozen: Array | None = None
+    ) -> Array:
         """See `Law`: the tangent at constant damage."""
-        alpha = self.damaged(jump, variables)
+        alpha = self.damaged(jump, variables) if frozen is None else frozen
         return self.stiffness_with(self.plastic_return(jump, variables, alpha).compliance)
 
-    def freeze(self, jump: Array, variables: EndoVariables) -> FrozenEndo:
-        """See `Law`."""
-        return FrozenEndo(self, self.damaged(jump, variables))
+    def frozen_damage(self, jump: Array, variables: EndoVariables) -> Array:
+        """See `SofteningLaw`."""
+        return self.damaged(jump, variables)
 
     # -- meaning
 
@@ -249,24 +257,3 @@ class Endo(Law[EndoVariables]):
     def shear_bound(self, normal: Array, length: float) -> Array:
         """See `Law`: tension lowers the strength elsewhere by as much as it presses there."""
         return np.maximum(self.mu * normal + self.cohesion * length, 0)
-
-
-class FrozenEndo(Endo):
-    """The law with frozen damage: a point that flows does not soften."""
-
-    def __init__(self, law: Endo, frozen: Array) -> None:
-        vars(self).update(vars(law))
-        self.law, self.frozen = law, frozen
-
-    def damaged(self, jump: Array, variables: EndoVariables) -> Array:
-        """See `Endo`."""
-        return self.frozen
-
-    def traction_and_tangent(self, jump: Array, variables: EndoVariables) -> tuple[Array, Array]:
-        """See `Law`."""
-        at = self.plastic_return(jump, variables, self.frozen)
-        return self.K * (jump - at.plastic), self.stiffness_with(at.compliance)
-
-    def update_internal_variables(self, jump: Array, variables: EndoVariables) -> EndoVariables:
-        """See `Law`: the damage that the step does is known after it."""
-        return self.law.update_internal_variables(jump, variables)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Array, BoolArray
-from .base import Evidence, Law
+from .base import Evidence, SofteningLaw
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class RuptureVariables:
     largest: float = np.inf
 
 
-class Rupture(Law[RuptureVariables]):
+class Rupture(SofteningLaw[RuptureVariables]):
     """Softening in tension, elastic shear that the opening releases, contact."""
 
     variable_names = ("kappa", "released_1", "released_2", "thickness")
@@ -81,11 +81,11 @@ class Rupture(Law[RuptureVariables]):
         return replace(variables, sawn=sawn, largest=largest)
 
     def update_internal_variables(
-        self, jump: Array, variables: RuptureVariables
+        self, jump: Array, variables: RuptureVariables, frozen: Array | None = None
     ) -> RuptureVariables:
         """See `Law`."""
         v, opening = variables, self.opening(jump, variables)
-        free = self.shear_share(opening) <= 0
+        free = (self.shear_share(opening) if frozen is None else frozen) <= 0
         return replace(
             v,
             kappa=np.maximum(v.kappa, opening),
@@ -118,17 +118,13 @@ class Rupture(Law[RuptureVariables]):
         """The opening beyond the thickness that grout and saw leave (q,) [m]."""
         return np.minimum(self.gap(jump, variables), variables.largest)
 
-    def opening_breaks(self, opening: Array, variables: RuptureVariables) -> BoolArray:
-        """Whether a point has lost its tensile strength."""
+    def is_broken_at(self, opening: Array, variables: RuptureVariables) -> BoolArray:
+        """Whether a point has lost its tensile strength at an opening (q,) of the step."""
         return self.was_broken(variables) | (opening >= self.L_C)
 
     def was_broken(self, variables: RuptureVariables) -> BoolArray:
         """Whether it had at the beginning of the step."""
         return (variables.kappa >= self.L_C) | (variables.sawn > 0)
-
-    def unloads(self, opening: Array, variables: RuptureVariables) -> BoolArray:
-        """Whether a point is on the line between the origin and its largest opening."""
-        return opening <= variables.kappa
 
     def shear_share(self, opening: Array) -> Array:
         """What is left of the shear stiffness (q,): 1 to 0."""
@@ -138,19 +134,32 @@ class Rupture(Law[RuptureVariables]):
         """Derivative of the shear stiffness with the opening (q,) [Pa/m2]."""
         return np.where((opening > 0) & (opening < self.L_CT), -self.K_T / self.L_CT, 0)
 
+    def unloading_stiffness(self, kappa: Array) -> Array:
+        """Slope of the line from the origin to the softening at the largest opening (q,)."""
+        return np.asarray(self.sigma_c * (1 - kappa / self.L_C) / kappa)
+
+    def softening_stress(self, opening: Array) -> Array:
+        """Normal stress of an opening that is the largest so far (q,)."""
+        return np.asarray(self.sigma_c * (1 - opening / self.L_C))
+
     def normal_response(
-        self, opening: Array, variables: RuptureVariables, secant: bool = False
+        self,
+        opening: Array,
+        variables: RuptureVariables,
+        frozen: Array | None,
+        secant: bool = False,
     ) -> tuple[Array, Array]:
-        """Normal stress, and its tangent or a secant stiffness that is positive (q,)."""
-        v, weak = variables, self.artificial * self.K_N
-        closed, broken = opening <= 0, self.opening_breaks(opening, v)
-        unloads = self.unloads(opening, v)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            unloading = self.sigma_c * (1 - v.kappa / self.L_C) / v.kappa
-            open_stress = np.where(
-                unloads, unloading * opening, self.sigma_c * (1 - opening / self.L_C)
-            )
-            normal = np.where(closed, self.K_contact * opening, np.where(broken, 0, open_stress))
+        """Normal stress, and its tangent or a secant stiffness that is positive (q,); with frozen
+        damage open points do not soften.
+        """
+        v, weak, closed = variables, self.artificial * self.K_N, opening <= 0
+        broken, unloads = self.was_broken(v), np.ones(len(opening), bool)
+        if frozen is None:
+            broken, unloads = self.is_broken_at(opening, v), opening <= v.kappa
+        with np.errstate(divide="ignore", invalid="ignore"):  # without tensile strength
+            unloading = self.unloading_stiffness(v.kappa)
+            stress = np.where(unloads, unloading * opening, self.softening_stress(opening))
+            normal = np.where(closed, self.K_contact * opening, np.where(broken, 0, stress))
             softening: Array | float = -self.sigma_c / self.L_C if self.L_C else 0.0
             softening = normal / opening if secant else softening
         free = (opening >= v.largest) | broken & ~closed
@@ -158,30 +167,37 @@ class Rupture(Law[RuptureVariables]):
         stiffness = np.where(free, weak, bonded)
         return normal, np.maximum(stiffness, weak) if secant else stiffness
 
-    def stiffness(self, normal: Array, opening: Array) -> Array:
+    def stiffness(self, normal: Array, shear_share: Array) -> Array:
         """The diagonal stiffness (q, 3, 3): normal, and what is left of the shear stiffness."""
-        shear = np.maximum(self.K_T * self.shear_share(opening), self.artificial * self.K_T)
-        matrix = np.zeros((len(opening), 3, 3))
+        shear = np.maximum(self.K_T * shear_share, self.artificial * self.K_T)
+        matrix = np.zeros((len(normal), 3, 3))
         matrix[:, 0, 0], matrix[:, 1, 1], matrix[:, 2, 2] = normal, shear, shear
         return matrix
 
-    def traction_and_tangent(self, jump: Array, variables: RuptureVariables) -> tuple[Array, Array]:
-        """See `Law`."""
+    def traction_and_tangent(
+        self, jump: Array, variables: RuptureVariables, frozen: Array | None = None
+    ) -> tuple[Array, Array]:
+        """See `Law`; frozen: what is left of the shear stiffness."""
         opening, slip = self.opening(jump, variables), jump[:, 1:] - variables.released
-        normal, slope = self.normal_response(opening, variables)
-        shear = (self.K_T * self.shear_share(opening))[:, None] * slip
-        tangent = self.stiffness(slope, opening)
-        tangent[:, 1:, 0] = self.shear_slope(opening)[:, None] * slip
-        return np.column_stack([normal, shear]), tangent
+        normal, slope = self.normal_response(opening, variables, frozen)
+        share = self.shear_share(opening) if frozen is None else frozen
+        tangent = self.stiffness(slope, share)
+        if frozen is None:
+            tangent[:, 1:, 0] = self.shear_slope(opening)[:, None] * slip
+        return np.column_stack([normal, (self.K_T * share)[:, None] * slip]), tangent
 
-    def secant_stiffness(self, jump: Array, variables: RuptureVariables) -> Array:
+    def secant_stiffness(
+        self, jump: Array, variables: RuptureVariables, frozen: Array | None = None
+    ) -> Array:
         """See `Law`."""
         opening = self.opening(jump, variables)
-        return self.stiffness(self.normal_response(opening, variables, secant=True)[1], opening)
+        share = self.shear_share(opening) if frozen is None else frozen
+        normal = self.normal_response(opening, variables, frozen, secant=True)[1]
+        return self.stiffness(normal, share)
 
-    def freeze(self, jump: Array, variables: RuptureVariables) -> FrozenRupture:
-        """See `Law`."""
-        return FrozenRupture(self, self.shear_share(self.opening(jump, variables)))
+    def frozen_damage(self, jump: Array, variables: RuptureVariables) -> Array:
+        """See `SofteningLaw`: what is left of the shear stiffness."""
+        return self.shear_share(self.opening(jump, variables))
 
     def release_side(self, jump: Array, variables: RuptureVariables) -> NDArray[np.int_]:
         """See `Law`."""
@@ -206,8 +222,8 @@ class Rupture(Law[RuptureVariables]):
 
     def is_open(self, jump: Array, variables: RuptureVariables) -> BoolArray:
         """See `Law`: whether it is broken."""
-        breaks = self.opening_breaks(self.opening(jump, variables), variables)
-        return breaks & (variables.kappa > 0)
+        broken = self.is_broken_at(self.opening(jump, variables), variables)
+        return broken & (variables.kappa > 0)
 
     def opening_of_crack(self, variables: RuptureVariables, points: int) -> Array:
         """See `Law`."""
@@ -225,27 +241,3 @@ class Rupture(Law[RuptureVariables]):
                 "opens, and has no friction: the crack grows unstably; alpha = 2 keeps the "
                 "stiffness, law = bond has friction"
             )
-
-
-class FrozenRupture(Rupture):
-    """Rupture with frozen damage: nothing breaks, and opening releases no more shear."""
-
-    def __init__(self, law: Rupture, share: Array) -> None:
-        vars(self).update(vars(law))
-        self.share = share
-
-    def opening_breaks(self, opening: Array, variables: RuptureVariables) -> BoolArray:
-        """See `Rupture`."""
-        return self.was_broken(variables)
-
-    def unloads(self, opening: Array, variables: RuptureVariables) -> BoolArray:
-        """See `Rupture`."""
-        return np.ones(len(opening), bool)
-
-    def shear_share(self, opening: Array) -> Array:
-        """See `Rupture`."""
-        return self.share
-
-    def shear_slope(self, opening: Array) -> Array:
-        """See `Rupture`."""
-        return np.zeros(len(opening))
