@@ -236,9 +236,7 @@ def test_frequencies_against_a_dense_eigenvalue_solution(tmp_path):
     quake = earthquake(smooth_record(tmp_path / "r.csv", 1.0), ELASTIC, "40")
     problem, system = quake.problem, quake.system
     interface = problem.model.equilibrium.interface
-    of_joints = interface.stiffness(
-        problem.model.equilibrium.undamaged, np.arange(len(interface.weights))
-    )
+    of_joints = interface.assembly.whole(problem.model.equilibrium.undamaged)
     stiffness = system.stiffness.toarray()
     stiffness[np.ix_(system.jumps, system.jumps)] += of_joints.toarray()
     largest = eigh(system.mass.toarray(), stiffness, eigvals_only=True)[::-1]
@@ -256,8 +254,7 @@ def test_free_vibration_decays_as_rayleigh_damping_says(tmp_path, braked):
     quake = earthquake(record, settings, "40")
     problem, system = quake.problem, quake.system
     interface = problem.model.equilibrium.interface
-    points = np.arange(len(interface.weights))
-    of_joints = interface.stiffness(problem.model.equilibrium.undamaged, points)
+    of_joints = interface.assembly.whole(problem.model.equilibrium.undamaged)
     frequencies, modes = system.frequencies(of_joints, 1)
     omega, mode = 2 * np.pi * frequencies[0], modes[:, 0]
     mode = 1e-3 * mode / (system.crest @ mode)[0]

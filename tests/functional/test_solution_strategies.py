@@ -7,6 +7,7 @@ from damjoint.input.resolve import load
 from damjoint.laws.friction import FrictionVariables
 from damjoint.mesh.mesh import mesh_of
 from damjoint.solver.load_stepper import LoadStepper
+from damjoint.solver.newton import Convergence, Iterate, Strategy, newton
 from damjoint.statics.verdict import verdict
 
 #: A dam of realistic stiffness; the shear release of its joint is far shorter than its jumps.
@@ -143,3 +144,34 @@ def test_unstable_crack_growth_ends_in_equilibrium(solve):
     joint |= {"joint_slope": 0.746, "ice_force": 588000, "uplift": "cracked", "n_joint": 20}
     (result,) = solve("dam", "89.2,126", steps=2, **bulk, **joint)
     assert verdict(result) == "stands" and result.last["level"] == 126
+
+
+@pytest.mark.parametrize(
+    "rest, ceiling, criterion",
+    [(0.0, 1.0, "tolerance"), (1e-6, 1.0, "round-off"), (1e-6, 1e-7, None), (1e-3, 1.0, None)],
+)
+def test_the_criterion_by_which_a_solution_ends(rest, ceiling, criterion):
+    """A spring of 1e12 N/m to 0.1 m whose residual keeps a rest [N]: the last bit of the jump is
+    1e-5 N.
+    """
+
+    def evaluate(jump, level, last):
+        residual = 1e12 * (jump - 0.1)
+        correction = lambda _secant: (-residual / 1e12, 0.0)
+        return Iterate(jump, level, residual + rest, float(abs(residual + rest)[0]), correction)
+
+    start = evaluate(np.zeros(1), 0.0, None)
+    convergence = Convergence(1e11, 1e-9, ceiling, 5.0, 10.0)
+    solution = newton(evaluate, start, convergence, Strategy(3.0, 0, 0, 20, 4))
+    assert (solution and solution[2]) == criterion
+
+
+def test_steps_that_converge_by_round_off_are_listed(solve):
+    """At 9 m all of the joint has slid by centimetres, which only a soft hardening ends; at 3 and
+    6 m it holds. The times are in run.json.
+    """
+    (result,) = solve("c", "3,6,9", pena_tang=1e6)
+    assert result.last["slip_length"] == pytest.approx(5)
+    assert result.info["converged_by_round_off"] == [3]
+    (result,) = solve("c", "3,6,9")
+    assert "converged_by_round_off" not in result.info

@@ -43,7 +43,7 @@ def pressures(model, level, tail=0.0, jump=None):
     """Pressure at the nodes of each joint over the weight of the water, and their places (x, y)."""
     equilibrium, start = model.equilibrium, model.start()
     jump = start.jump if jump is None else jump
-    found = equilibrium.pressures(jump, start.variables, Loading(level, tail))
+    found = equilibrium.water_in_step(start.variables).pressures(jump, Loading(level, tail))
     places = [joint.space.locations[:, :2] for joint in equilibrium.interface.joints]
     return [own.nodes / WATER for own in found], places, found
 
@@ -193,7 +193,8 @@ def test_the_bases_of_blocks_have_the_uplift_of_one_base(level):
         coarse = {"n_joint": 8.0, "h_dam": 10.0, "h_found": 40.0, "order": 1.0}
         built = Model(load(name, coarse, [level]))
         start = built.start()
-        found = built.equilibrium.pressures(start.jump, start.variables, Loading(level, 0.0))
+        water = built.equilibrium.water_in_step(start.variables)
+        found = water.pressures(start.jump, Loading(level, 0.0))
         total[name] = sum(
             water.wetted.points.weights @ own.water_points
             for water, own in zip(built.equilibrium.water, found, strict=True)
@@ -255,9 +256,8 @@ def test_a_waterstop_behind_another_joint(model, mode):
     heads, places, _ = pressures(built, 9.0, 2.0)
     assert heads[0] == pytest.approx(9.0)
     assert heads[1] == pytest.approx(9.0 * (places[1][:, 0] <= 12))
-    assert built.equilibrium.pressures(
-        built.start().jump, built.start().variables, Loading(9.0, 2.0)
-    )[1].water_points == pytest.approx(9.0 * WATER)
+    *_, found = pressures(built, 9.0, 2.0)
+    assert found[1].water_points == pytest.approx(9.0 * WATER)
     joints = BASES | {"contraction": (10, 0, 10, 10)}
     built = model((mode, mode, "waterstop"), [9.0], [3.0], joints=joints, waterstop=2.0)
     heads, places, _ = pressures(built, 9.0, 3.0)
@@ -332,9 +332,7 @@ def test_the_gravity_method_has_the_same_uplift(model, uplift, settings):
         found = gravity.Uplift(own, body, level, tail, 0.0)
         water = built.equilibrium.water[number]
         points, joint = water.wetted.points, water.joint
-        pressure = built.equilibrium.pressures(
-            built.start().jump, built.start().variables, Loading(level, tail)
-        )[number].water_points
+        pressure = pressures(built, level, tail)[2][number].water_points
         toe = np.array([*body.toe, 0.0])
         arm = np.linalg.norm(points.positions - toe, axis=1)
         sizes = points.weights * pressure

@@ -1,8 +1,6 @@
 """Linear systems of the joint: the reduced system against the full one; derivatives of the flow
 against differences."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from damjoint.fem.bodies import Bodies
@@ -12,7 +10,7 @@ from damjoint.joint import interface as joint_interface
 from damjoint.joint import linear_system
 from damjoint.joint.flow import FlowDerivative
 from damjoint.joint.interface import Interface, LastInterface
-from damjoint.joint.linear_system import Border, lu_solve
+from damjoint.joint.linear_system import Border, DenseSystem, Tangent, WoodburySystem, lu_solve
 from numpy.testing import assert_allclose
 
 SMALL = {"n_joint": 10.0, "h_dam": 3.0, "h_found": 4.0, "order": 2.0}
@@ -36,10 +34,10 @@ def test_stiffness_of_points(interface, monkeypatch):
     number, size = len(interface.weights), len(interface.bulk.stiffness)
     tangent = rng.normal(size=(number, 3, 3))
     for points in (np.arange(number), np.arange(0, number, 3), np.zeros(0, int)):
-        by_terms = interface.stiffness(tangent[points], points)
+        by_terms = interface.assembly.stiffness(tangent[points], points)
         with monkeypatch.context() as patch:
-            patch.setitem(vars(interface), "by_terms", None)
-            product = interface.stiffness(tangent[points], points)
+            patch.setitem(vars(interface.assembly), "by_terms", None)
+            product = interface.assembly.stiffness(tangent[points], points)
         assert by_terms.shape == (size, size)
         for name in ("data", "indices", "indptr"):
             assert np.array_equal(getattr(by_terms, name), getattr(product, name))
@@ -66,28 +64,28 @@ def test_solution_of_the_linear_system(interface, flowing, bordered, few, monkey
     """A third of the points with another, unsymmetric tangent; pressures that depend on some of the
     unknowns."""
     monkeypatch.setattr(linear_system, "FEW", few)
-    monkeypatch.setattr(interface, "_undamaged", None)
     rng = np.random.default_rng(142)
     number, size = len(interface.weights), len(interface.bulk.stiffness)
     undamaged = np.broadcast_to(UNDAMAGED, (number, 3, 3))
     tangent = undamaged.copy()
     changed = rng.permutation(number)[: number // 3]
     tangent[changed] = 1e11 * rng.normal(size=(len(changed), 3, 3)) + np.diag([1e8, 2e12, 1e8])
-    change = interface.change(tangent, undamaged)
-    assert 0 < len(change.rows) < size
-    matrix = interface.bulk.stiffness + interface.stiffness(tangent, np.arange(number)).toarray()
+    _, rows = interface.assembly.change(tangent, undamaged)
+    assert 0 < len(rows) < size
+    system = WoodburySystem(interface.assembly, interface.bulk.stiffness, undamaged)
+    matrix = interface.bulk.stiffness + interface.assembly.whole(tangent).toarray()
+    flow, lines = None, ()
     if flowing:
         columns = np.sort(rng.permutation(size)[: size // 4])
-        flowing = (interface.joints[0].flow,)
-        lift = interface.lift(flowing)
+        lines = (interface.joints[0].flow,)
+        lift = system.lift(lines)
         pressure = 1e10 * rng.normal(size=(lift.shape[1], size // 4))
         matrix[:, columns] -= lift @ pressure
         flow = FlowDerivative(pressure=pressure, columns=columns)
-        change = replace(change, flow=flow, flowing=flowing)
     right, slope, row = rng.normal(size=(3, size))
     gap = 0.7e-12  # of the size of x
     border = Border(slope, row, 0.3e-12, gap) if bordered else None
-    x, s = interface.solve(undamaged, change, right, border)
+    x, s = system.solve(Tangent(tangent, flow, lines), right, border)
     if bordered:
         whole = np.block([[matrix, slope[:, None]], [row[None, :], np.array([[0.3e-12]])]])
         expected = np.linalg.solve(whole, np.append(right, gap))
@@ -97,6 +95,19 @@ def test_solution_of_the_linear_system(interface, flowing, bordered, few, monkey
         expected = np.linalg.solve(matrix, right)
         assert s == 0
     assert_allclose(x, expected, rtol=0, atol=1e-7 * np.abs(expected).max())
+
+
+def test_dense_system(interface):
+    """The system of a small time step is that of the whole matrix."""
+    rng = np.random.default_rng(142)
+    tangent = 1e11 * rng.normal(size=(len(interface.weights), 3, 3)) + UNDAMAGED
+    matrix = interface.bulk.stiffness + interface.assembly.whole(tangent).toarray()
+    right = rng.normal(size=len(matrix))
+    found, _ = DenseSystem(interface.assembly, interface.bulk.stiffness).solve(
+        Tangent(tangent), right
+    )
+    expected = np.linalg.solve(matrix, right)
+    assert_allclose(found, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
 
 
 def test_pressures_derivatives(interface):

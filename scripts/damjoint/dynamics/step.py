@@ -6,107 +6,27 @@ joints' forces since the static state. Reduced to the jumps (fem/factor.py), div
 
     S d1 + (joint forces) = loads,
 
-an equilibrium of the same form as the static one: solved by the same model, laws and strategies.
+the equation of joint/problem.py, solved by the same laws and strategies as at rest.
 """
 
 from __future__ import annotations
 
-from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..arrays import Array, Sparse
-from ..fem.condensed import Condensed
 from ..fem.factor import partial_factors
 from ..joint.equilibrium import Equilibrium
-from ..joint.interface import Interface
-from ..joint.joint_laws import TANGENT, JointLaws, JointVariables, Mode
-from ..joint.water import BeforeQuake, Pressure
-from ..model.loads import Loading
-from ..solver.controls import LevelControl
+from ..joint.joint_laws import JointVariables
+from ..joint.linear_system import MOST_DENSE, DenseSystem, LinearSystem, WoodburySystem
+from ..joint.problem import Dashpots, JointProblem
+from ..joint.water import Pressure
 from ..solver.model import Model, StepResult
-from ..solver.state import State
+from ..solver.state import State, StepLaws
+from ..solver.step import Plan, Start, solve
 from .scheme import HHT, Motion
-from .small_joints import MOST_UNKNOWNS, SmallInterface
 from .system import System
-
-
-class DampedLaws(JointLaws):
-    """The laws of the joints with dashpots beside them at closed points: traction c d'."""
-
-    def __init__(self, laws: JointLaws, coefficients: Array, rate: float) -> None:
-        """coefficients: c of a closed point, normal and tangential (3,) [Pa s/m]; rate: of the
-        velocity with the displacement at the end of a step [1/s].
-        """
-        super().__init__(laws.laws)
-        self.coefficients, self.rate = coefficients, rate
-        #: of the step under way: c of each point (q, 3), and the jump (q, 3) at which the
-        #: velocity at the end of the step is zero
-        self.active, self.resting = np.zeros((0, 3)), np.zeros((0, 3))
-
-    def begin(self, before: Array, resting: Array) -> None:
-        """Begin a step from jumps (q, 3)."""
-        self.active = self.coefficients * (before[:, :1] <= 0)
-        self.resting = resting
-
-    def undamaged_tangent(self, points: list[int]) -> Array:  # type: ignore[override]
-        """See `JointLaws`: with all dashpots."""
-        return super().undamaged_tangent(points) + np.diag(self.rate * self.coefficients)
-
-    def evaluate(
-        self, jump: Array, variables: JointVariables, mode: Mode = TANGENT
-    ) -> tuple[Array, Array]:
-        """See `JointLaws`."""
-        traction, tangent = super().evaluate(jump, variables, mode)
-        return self.with_dashpots(jump, traction), tangent + self._stiffness()
-
-    def secant_stiffness(self, jump: Array, variables: JointVariables) -> Array:
-        """See `JointLaws`."""
-        return super().secant_stiffness(jump, variables) + self._stiffness()
-
-    def with_dashpots(self, jump: Array, traction: Array) -> Array:
-        """A traction with that of the dashpots (q, 3)."""
-        return traction + self.rate * self.active * (jump - self.resting)
-
-    def _stiffness(self) -> Array:
-        """Derivative of the dashpots' traction (q, 3, 3)."""
-        return (self.rate * self.active)[:, :, None] * np.eye(3)
-
-
-class DynamicEquilibrium(Equilibrium):
-    """The equilibrium of the jumps in time steps of one length; its loads are those passed as
-    `frozen_lift`.
-    """
-
-    def __init__(self, static: Equilibrium, stiffness: Array) -> None:
-        """stiffness: S (j, j)."""
-        vars(self).update(vars(static))
-        bulk = replace(static.bulk, stiffness=stiffness)
-        small = len(stiffness) <= MOST_UNKNOWNS
-        around = SmallInterface if small else with_bulk
-        self.interface, self.bulk = around(static.interface, bulk), bulk
-        self.flowing = ()
-        self.loads = lambda _loading: np.zeros(len(stiffness))  # type: ignore[assignment]
-        #: of the step under way
-        self.pressure: tuple[Pressure, ...] = ()
-
-    def pressures(
-        self,
-        jump: Array,
-        variables: JointVariables,
-        loading: Loading,
-        before_quake: BeforeQuake | None = None,
-    ) -> tuple[Pressure, ...]:
-        """The water pressure in each joint, which does not change within a step."""
-        return self.pressure
-
-
-def with_bulk(interface: Interface, bulk: Condensed) -> Interface:
-    """The same joints with other bodies around them."""
-    other = copy(interface)
-    vars(other).update(bulk=bulk, _undamaged=None)
-    return other
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -146,33 +66,36 @@ class TimeStep:
 
     def __init__(self, problem: Problem, dt: float) -> None:
         self.problem, self.dt = problem, dt
-        system, scheme, model = problem.system, problem.scheme, problem.model
-        velocity, acceleration = scheme.rates(dt)
+        system, scheme = problem.system, problem.scheme
+        #: derivatives of velocity [1/s] and acceleration [1/s2] at the end with the displacement
+        self.rate, acceleration = scheme.rates(dt)
         #: 1 + alpha
         self.weight = weight = 1 + scheme.shift
         matrix = acceleration * system.mass + weight * (
-            system.stiffness + velocity * problem.damping
+            system.stiffness + self.rate * problem.damping
         )
         self.factors = partial_factors(matrix.tocsr(), system.jumps)
+        #: S (j, j)
         self.stiffness = self.factors.schur / weight
-        equilibrium = DynamicEquilibrium(model.equilibrium, self.stiffness)
-        self.laws = None
-        if problem.dashpots.any():
-            laws = DampedLaws(equilibrium.laws, problem.dashpots, velocity)
-            points = [len(joint.points.weights) for joint in equilibrium.interface.joints]
-            equilibrium.laws, equilibrium.undamaged = laws, laws.undamaged_tangent(points)
-            self.laws = laws
-        self.equilibrium = equilibrium
-        self.model = copy(model)
-        self.model.equilibrium = equilibrium
+        self.equilibrium = problem.model.equilibrium
+        self.linear_system = self._linear_system()
         #: nodal forces of the joints in the static state (j,)
         self.at_static = self.joint_forces(problem.static)
+
+    def _linear_system(self) -> LinearSystem:
+        """What solves the linear systems of S and the joints' tangents."""
+        assembly = self.equilibrium.interface.assembly
+        if len(self.stiffness) <= MOST_DENSE:
+            return DenseSystem(assembly, self.stiffness)
+        all_closed = np.diag(self.rate * self.problem.dashpots)
+        undamaged = self.equilibrium.undamaged + all_closed
+        return WoodburySystem(assembly, self.stiffness, undamaged)
 
     def joint_forces(self, state: State) -> Array:
         """Nodal forces of the joints (j,), without dashpots, at a state."""
         interface = self.equilibrium.interface
         at_points = interface.jumps(interface.at_points, state.jump)
-        traction, _ = JointLaws.evaluate(self.equilibrium.laws, at_points, state.variables)
+        traction, _ = self.equilibrium.laws.evaluate(at_points, state.variables)
         return interface.forces(traction) - lift(self.equilibrium, state.pressures)
 
     def advance(
@@ -185,12 +108,37 @@ class TimeStep:
         """A step from a state, None if it does not converge.
 
         loads: of the earthquake on the unknowns (n,) at begin and end; pressure: in the joints,
-        constant in the step; persist: whether further strategies follow the first. Raises Diverged.
+        constant in the step; persist: whether further strategies follow the first, also after one
+        that has diverged.
         """
-        problem, dt = self.problem, self.dt
-        system, scheme, motion = problem.system, problem.scheme, begin.motion
-        alpha, weight, static = scheme.shift, self.weight, problem.static
-        of_velocity, of_acceleration = scheme.history(motion, dt)
+        equilibrium, model = self.equilibrium, self.problem.model
+        now, loading = begin.state, begin.state.loading
+        start = now.begin_step(equilibrium.laws, now.time)
+        lifted = lift(equilibrium, pressure)
+        joints = self.joint_problem(begin, start.variables, self.on_jumps(begin, loads, lifted))
+        ahead = now.jump + self.dt * begin.motion.velocity[self.problem.system.jumps]
+        size = lambda jump: float(np.linalg.norm(joints.residual(jump, loading).value))
+        guess = min(now.jump, ahead, key=size)
+        strategies = model.strategies
+        if not persist:  # where points stick and slip by turns, only a descent of the residual ends
+            strategies = strategies[0], replace(strategies[0], growth=1.0)
+        starts = [Start(strategy, guess, loading.level) for strategy in strategies]
+        solution = solve(joints, loading, Plan(starts, model.convergence, persist))
+        if solution is None:
+            return None
+        laws = StepLaws(equilibrium.laws, equilibrium.laws)
+        state = replace(
+            start.update(equilibrium.interface, laws, solution.jump), pressures=pressure
+        )
+        residual = solution.size / (model.reference or 1.0)
+        step = StepResult(state, solution.iterations, residual, solution.criterion)
+        return self.moved(begin, state, joints, lifted), step
+
+    def on_jumps(self, begin: Moving, loads: tuple[Array, Array], lifted: Array) -> Array:
+        """The loads (j,) of a step, see `advance`; lifted: of the water in the joints."""
+        problem, motion, static = self.problem, begin.motion, self.problem.static
+        system, alpha, weight = problem.system, problem.scheme.shift, self.weight
+        of_velocity, of_acceleration = problem.scheme.history(motion, self.dt)
         right = system.mass @ of_acceleration
         if problem.damping.nnz:
             right += problem.damping @ (weight * of_velocity + alpha * motion.velocity)
@@ -198,50 +146,46 @@ class TimeStep:
             right += alpha * (system.stiffness @ motion.displacement)
         right += weight * loads[1] - alpha * loads[0]
         right[system.jumps] += alpha * begin.forces
-        lifted = lift(self.equilibrium, pressure)
         on_jumps = self.factors.reduce(right) / weight + self.stiffness @ static.jump
         on_jumps += self.at_static + lifted
+        return on_jumps
 
-        equilibrium, interface = self.equilibrium, self.equilibrium.interface
-        equilibrium.pressure = pressure
-        now, jumps = begin.state, system.jumps
-        if self.laws:
-            before = interface.jumps(interface.at_points, now.jump)
-            resting = static.jump + of_velocity[jumps] / self.laws.rate
-            self.laws.begin(before, interface.jumps(interface.at_points, resting))
-        ahead = now.jump + dt * motion.velocity[jumps]
-        variables = now.begin_step(equilibrium.laws, now.time).variables
-
-        def size(jump: Array) -> float:
-            value = equilibrium.residual(jump, variables, now.loading, frozen_lift=on_jumps).value
-            return float(np.linalg.norm(value))
-
-        guess = min(now.jump, ahead, key=size)
-        first = self.model.strategies[0]
-        # where points stick and slip one after the other, only a descent of the residual ends
-        quick = first, replace(first, growth=1.0)
-        step = self.model.advance(
-            now,
-            now.time,
-            LevelControl(now.loading.level),
-            strategies=self.model.strategies if persist else quick,
-            guess=(guess, now.loading.level),
-            frozen_lift=on_jumps,
+    def joint_problem(
+        self, begin: Moving, variables: JointVariables, constant: Array
+    ) -> JointProblem:
+        """The joints at the end of a step: internal variables of its beginning, and loads (j,)."""
+        equilibrium = self.equilibrium
+        return JointProblem(
+            interface=equilibrium.interface,
+            stiffness=self.stiffness,
+            system=self.linear_system,
+            laws=equilibrium.laws,
+            variables=variables,
+            constant=constant,
+            dashpots=self.dashpots(begin) if self.problem.dashpots.any() else None,
         )
-        if step is None:
-            return None
-        state = step.state
-        at_points = interface.jumps(interface.at_points, state.jump)
-        traction, _ = equilibrium.laws.evaluate(at_points, variables)
-        forces = interface.forces(traction) - lifted - self.at_static
-        displacement = self.factors.expand(state.jump - static.jump)
-        end = Moving(
-            time=begin.time + dt,
+
+    def dashpots(self, begin: Moving) -> Dashpots:
+        """The dashpots of the points that are closed when a step begins."""
+        interface, jumps = self.equilibrium.interface, self.problem.system.jumps
+        of_velocity, _ = self.problem.scheme.history(begin.motion, self.dt)
+        resting = self.problem.static.jump + of_velocity[jumps] / self.rate
+        before, at_rest = (
+            interface.jumps(interface.at_points, jump) for jump in (begin.state.jump, resting)
+        )
+        return Dashpots(self.rate * (self.problem.dashpots * (before[:, :1] <= 0)), at_rest)
+
+    def moved(self, begin: Moving, state: State, joints: JointProblem, lifted: Array) -> Moving:
+        """The dam after a step to a state, by the problem that has led to it."""
+        interface, motion = self.equilibrium.interface, begin.motion
+        traction = joints.traction(state.jump)
+        displacement = self.factors.expand(state.jump - self.problem.static.jump)
+        return Moving(
+            time=begin.time + self.dt,
             state=state,
-            motion=scheme.step(motion, displacement, dt),
-            forces=forces,
+            motion=self.problem.scheme.step(motion, displacement, self.dt),
+            forces=interface.forces(traction) - lifted - self.at_static,
         )
-        return end, step
 
 
 def lift(equilibrium: Equilibrium, pressure: tuple[Pressure, ...]) -> Array:

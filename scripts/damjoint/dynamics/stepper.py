@@ -13,7 +13,6 @@ from ..arrays import Array, Sparse
 from ..fem.bodies import Bodies
 from ..input.case import Case
 from ..solver.model import LARGEST_JUMP, Model
-from ..solver.newton import Diverged
 from ..solver.state import State
 from . import absorbing
 from .absorbing import AbsorbingRock, travel_time
@@ -117,7 +116,7 @@ class Earthquake:
         massless = case.with_values({"rock_mass": 0.0})
         self.system = system = System.of(massless, bodies, interface)
         undamaged = model.equilibrium.undamaged
-        of_joints = interface.stiffness(undamaged, np.arange(len(interface.weights)))
+        of_joints = interface.assembly.whole(undamaged)
         #: natural frequencies [Hz] with undamaged joints, the water's mass and massless rock
         self.frequencies, shapes = system.frequencies(of_joints, FREQUENCIES)
         self.damping = Damping.of(case, self.frequencies)
@@ -215,12 +214,9 @@ class Earthquake:
         loads = self.load(now.time), self.load(now.time + length)
         pressure = pressures_in_motion(self.case, self.problem, now.state)
         persist = halvings == MOST_HALVINGS
-        try:
-            found = self.steps_of_length[halvings].advance(now, loads, pressure, persist)
-        except Diverged:
-            found = None
-        if found is None:
+        advanced = self.steps_of_length[halvings].advance(now, loads, pressure, persist)
+        if advanced is None:
             return None
-        end, step = found
+        end, step = advanced
         ground = self.record.at(now.time + length)
         return Converged(end, ground, length, step.iterations, step.residual)

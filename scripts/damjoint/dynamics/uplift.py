@@ -33,7 +33,7 @@ def pressures_in_motion(case: Case, problem: Problem, state: State) -> tuple[Pre
             for water, pressure, jump, variables in parts
         )
     if mode == "crack" and equilibrium.flowing:
-        return equilibrium.pressures(state.jump, state.variables, state.loading)
+        return equilibrium.water_in_step(state.variables).pressures(state.jump, state.loading)
     return static
 
 

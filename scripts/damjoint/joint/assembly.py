@@ -1,31 +1,106 @@
-"""Stiffness of the joints, assembled from the tangents at their Gauss points.
-
-The pattern is that of the interpolation and is found once; a product of sparse matrices would sort
-it anew in every iteration of Newton's method.
+"""Stiffness of the joints, assembled from the tangents at their Gauss points: the sum of w B^T D B,
+with B the interpolation of the jump, D the tangent and w the weight of a point.
 """
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 
-from ..arrays import Array, IntArray
+from ..arrays import Array, IntArray, Sparse
 from ..csr import CsrMatrix, ranges
 
 #: Number of terms up to which they are kept: more take longer than a product of scipy's matrices.
 MOST_TERMS = 500_000
 
 
+class Assembly:
+    """The assembly of the stiffness (j, j) from tangents (q, 3, 3), whatever the bodies around."""
+
+    def __init__(self, at_points: CsrMatrix, weights: Array) -> None:
+        """at_points: B of all points (dim * q, j), dim rows for each; weights: (q,)."""
+        self.at_points, self.weights = at_points, weights
+        self.number, self.size = len(weights), at_points.shape[1]
+        self.dim = at_points.shape[0] // self.number
+
+    @cached_property
+    def by_terms(self) -> Terms | None:
+        """The terms of the stiffness; None for many points, by products of sparse matrices."""
+        few = number_of_terms(self.at_points, self.dim) <= MOST_TERMS
+        return Terms(self.at_points, self.dim) if few else None
+
+    def stiffness(self, tangent: Array, points: IntArray) -> CsrMatrix:
+        """The stiffness (j, j) of some Gauss points with a tangent (points, 3, 3)."""
+        number, d = len(points), self.dim
+        blocks = self.weights[points, None, None] * tangent[:, :d, :d]
+        if self.by_terms:
+            return self.by_terms.sum(blocks, points)
+        rows = self.at_points[(d * points[:, None] + np.arange(d)).ravel()]
+        columns = np.repeat(np.arange(d * number).reshape(number, d), d, axis=0)
+        diagonal = CsrMatrix(
+            blocks.ravel(), columns.ravel(), d * np.arange(d * number + 1), (d * number,) * 2
+        )
+        return rows.T @ (diagonal @ rows)
+
+    def whole(self, tangent: Array) -> CsrMatrix:
+        """The stiffness (j, j) of all Gauss points with a tangent (q, 3, 3)."""
+        return self.stiffness(tangent, np.arange(self.number))
+
+    def change(self, tangent: Array, before: Array) -> tuple[CsrMatrix, IntArray]:
+        """The change of the stiffness from one tangent to another (q, 3, 3), without its zero rows,
+        and the rows.
+        """
+        # rows: components of the traction
+        differs = (tangent != before).any(axis=2)[:, : self.dim]
+        points = np.flatnonzero(differs.any(axis=1))
+        changes = np.zeros(self.size, bool)
+        changes[self.at_points.indices[differs.ravel()[self.at_points.rows]]] = True
+        rows = np.flatnonzero(changes)
+        return self.stiffness(tangent[points] - before[points], points)[rows], rows
+
+    @cached_property
+    def operator(self) -> Sparse:
+        """Entries of the stiffness (j * j) from those of the tangents (q * dim * dim)."""
+        from scipy import sparse
+
+        d, size = self.dim, self.size
+        rows, columns, values = [], [], []
+        for q in range(self.number):
+            block = self.at_points[d * q : d * (q + 1)]
+            touched = np.unique(block.indices)
+            local = block.columns(touched).toarray()
+            # d (w B^T D B)[a, b] / d D[k, l]
+            parts = self.weights[q] * np.einsum("ka,lb->abkl", local, local)
+            entries = touched[:, None] * size + touched
+            rows.append(np.repeat(entries.ravel(), d * d))
+            columns.append(np.tile(q * d * d + np.arange(d * d), entries.size))
+            values.append(parts.ravel())
+        data, row, column = (np.concatenate(part) for part in (values, rows, columns))
+        return sparse.csr_matrix((data, (row, column)), (size * size, self.number * d * d))
+
+    def dense(self, tangent: Array) -> Array:
+        """The stiffness (j, j) of all Gauss points by one product, for few unknowns."""
+        entries = np.ascontiguousarray(tangent[:, : self.dim, : self.dim]).ravel()
+        stiffness: Array = self.operator @ entries
+        return stiffness.reshape(self.size, self.size)
+
+
 def number_of_terms(at_points: CsrMatrix, dim: int) -> int:
-    """Number of products of two interpolations, at most, that an `Assembly` adds."""
+    """Number of products of two interpolations, at most, that `Terms` add."""
     of_points = np.add.reduceat(at_points.counts, np.arange(0, at_points.shape[0], dim))
     return int(of_points @ of_points)
 
 
-class Assembly:
-    """Sum of B^T D B over Gauss points with matrices D (dim, dim): B interpolates the jump."""
+class Terms:
+    """Sum of B^T D B over Gauss points with matrices D (dim, dim): B interpolates the jump.
+
+    The pattern of the sum is that of the interpolation and is found once; a product of sparse
+    matrices would sort it anew in every iteration of Newton's method.
+    """
 
     def __init__(self, at_points: CsrMatrix, dim: int) -> None:
-        """at_points: B of all points (dim * points, j), see `Interface.at_points`."""
+        """at_points: B of all points (dim * points, j), see `Assembly`."""
         self.dim, self.at_points, size = dim, at_points, at_points.shape[1]
         point = at_points.rows // dim
         number = at_points.shape[0] // dim
@@ -40,10 +115,10 @@ class Assembly:
         self.entry = np.repeat(np.arange(len(point)), counts[point])
         self.pair = ranges(starts[point], counts[point])
         self.component = at_points.rows[self.entry] % dim
-        places = at_points.indices[self.entry] * size + unknown[self.pair]
-        #: place of each term among the entries of the stiffness, and their rows and columns
-        places, self.place = np.unique(places, return_inverse=True)
-        self.rows, self.columns = np.divmod(places, size)
+        numbers = at_points.indices[self.entry] * size + unknown[self.pair]
+        #: number of each term among the entries of the stiffness, and their rows and columns
+        numbers, self.number = np.unique(numbers, return_inverse=True)
+        self.rows, self.columns = np.divmod(numbers, size)
         self.terms = np.bincount(point, counts[point], number).astype(int)
         self.starts = np.cumsum(self.terms) - self.terms
 
@@ -59,8 +134,8 @@ class Assembly:
         some = ranges(self.starts[points], self.terms[points])
         terms = self.at_points.data[self.entry[some]]
         terms *= products[self.component[some], self.pair[some]]
-        place, used = self.place[some], np.zeros(len(self.rows), bool)
-        used[place] = True
-        data = np.asarray(np.bincount((np.cumsum(used) - 1)[place], terms), float)
+        number, used = self.number[some], np.zeros(len(self.rows), bool)
+        used[number] = True
+        data = np.asarray(np.bincount((np.cumsum(used) - 1)[number], terms), float)
         pointers = np.searchsorted(self.rows[used], np.arange(size + 1))
         return CsrMatrix(data, self.columns[used], pointers, (size, size))

@@ -1,14 +1,9 @@
-"""The equilibrium of the joints with the condensed bodies around them (see fem/condensation.py).
-
-Unknowns: the jumps. Residual R = N^T W t(jump) - (water in the joints) + S jump - t_0(loading) = 0;
-the pressure of flowing water is solved at the same jump before every residual, and its derivative
-is part of the tangent.
+"""The joints with the condensed bodies around them (see fem/condensation.py) at rest: laws, loads,
+water, and the problem of a step made from them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -17,35 +12,19 @@ from ..arrays import Array
 from ..input.case import Case
 from ..input.scene import BED, DOWN
 from ..model.loads import AddedPressure, Loading, line_forces, thermal_strains, water_column
-from .flow import FlowDerivative, FlowSolution
 from .interface import Interface
-from .joint_laws import TANGENT, JointLaws, JointVariables, Mode
-from .linear_system import Change
-from .water import BeforeQuake, JointWater, Pressure, water_systems
+from .joint_laws import JointLaws, JointVariables
+from .problem import JointProblem, rate
+from .step_water import StepWater
+from .water import BeforeQuake, JointWater, water_systems
 from .wet_faces import WetFace
-
-
-@dataclass(frozen=True)
-class Residual:
-    """The forces out of balance at a jump and a level (j,), and their derivatives."""
-
-    value: Array
-    #: with the jump, a change of the undamaged joint's, by the law's tangent or by its secant
-    by_jump: Callable[[bool], Change]
-    #: with the level (j,)
-    by_level: Callable[[], Array]
-
 
 #: Sides of the faces under the tailwater.
 BY_TAIL = DOWN, BED
 
-#: Step of a difference with the level, over the size of the dam; level below which the reservoir
-#: counts as empty, and the level that replaces it, over the same.
-DIFFERENCE, EMPTY, SMALL_LEVEL = 1e-5, 1e-3, 0.1
-
 
 class Equilibrium:
-    """The joints with the condensed bodies: loads, water pressure, residual and tangent."""
+    """The joints with the condensed bodies: their laws, their water and the static loads."""
 
     def __init__(self, case: Case, interface: Interface) -> None:
         self.case, self.bulk, self.interface = case, interface.bulk, interface
@@ -147,21 +126,6 @@ class Equilibrium:
             total += size * bulk.units[name]
         return forces, total
 
-    def rate(self, of: Callable[[Loading], Array], loading: Loading) -> Array:
-        """The derivative with the reservoir level of a function that is nearly linear in it.
-
-        It is zero for an empty reservoir, and displacement control could not start: there it is
-        taken at a small level.
-        """
-        height = self.case.size
-        step = DIFFERENCE * max(height, abs(loading.level))
-        level = loading.level if abs(loading.level) > EMPTY * height else SMALL_LEVEL * height
-        above, below = (replace(loading, level=level + s) for s in (step, -step))
-        return (of(above) - of(below)) / (2 * step)
-
-    # -- water in the joints
-    # ---------------------------------------------------------------------------------------------
-
     def _loads(self, loading: Loading) -> Array:
         """t_0 and, unless it flows, the water in the joints together (j,)."""
         total = self.external_forces(loading)[1]
@@ -170,104 +134,41 @@ class Equilibrium:
                 total = total + water.lift(loading)
         return total
 
-    def flowing_lift(
-        self,
-        jump: Array,
-        variables: JointVariables,
-        loading: Loading,
-        before_quake: BeforeQuake | None = None,
-    ) -> tuple[Array, list[FlowSolution]]:
-        """Forces of flowing water on the faces of the joints (j,), and the solution of each of
-        `flowing`; before_quake: see `residual`.
+    # -- steps
+    # ---------------------------------------------------------------------------------------------
+
+    def water_in_step(
+        self, variables: JointVariables, before_quake: BeforeQuake | None = None
+    ) -> StepWater:
+        """The water in the joints for the internal variables of a step's beginning; before_quake:
+        the joints before the earthquake that acts, if the water follows from them.
         """
-        total, solutions = np.zeros(len(jump)), []
-        for system in self.flowing:
-            solution = system.solve(jump, variables, loading, before_quake)
-            beyond = system.expand_to_nodes(solution)
-            for water in system.members:
-                total += water.lift(loading, water.wetted.fields @ beyond[water.nodes])
-            solutions.append(solution)
-        return total, solutions
+        return StepWater(
+            joints=self.water,
+            flowing=self.flowing,
+            variables=variables,
+            before_quake=before_quake,
+        )
 
-    def residual(
+    def problem(
         self,
-        jump: Array,
         variables: JointVariables,
-        loading: Loading,
-        mode: Mode = TANGENT,
-        frozen_lift: Array | None = None,
         before_quake: BeforeQuake | None = None,
-    ) -> Residual:
-        """The residual and its derivatives.
+        laws: JointLaws | None = None,
+    ) -> JointProblem:
+        """The equilibrium at the end of a step, see `water_in_step`; laws: with frozen damage."""
+        return JointProblem(
+            interface=self.interface,
+            stiffness=self.bulk.stiffness,
+            system=self.interface.system(self.undamaged),
+            laws=laws or self.laws,
+            variables=variables,
+            loads=self.loads,
+            size=self.case.size,
+            water=self.water_in_step(variables, before_quake),
+        )
 
-        mode: of the laws; frozen_lift (j,): replaces the lift of the flowing water; before_quake:
-        the joints whose opening the water follows instead, see `JointWater`.
-        """
-        interface = self.interface
-        at_points = interface.jumps(interface.at_points, jump)
-        traction, tangent = self.laws.evaluate(at_points, variables, mode)
-        dry_before = before_quake if any(water.dry_crack for water in self.water) else None
-        if dry_before:
-            lost, lost_rate = self.lost_pressure(at_points, variables, loading, dry_before)
-            traction = traction + lost
-        value = self.bulk.stiffness @ jump - self.loads(loading) + interface.forces(traction)
-
-        flowing, solutions = bool(self.flowing) and frozen_lift is None, list[FlowSolution]()
-        if flowing:
-            lift, solutions = self.flowing_lift(jump, variables, loading, before_quake)
-            value = value - lift
-        elif frozen_lift is not None:
-            value = value - frozen_lift
-
-        def by_jump(secant: bool) -> Change:
-            stiffness = tangent
-            if secant:
-                stiffness = (mode.frozen or self.laws).secant_stiffness(at_points, variables)
-            if dry_before:
-                stiffness = stiffness + lost_rate
-            change = interface.change(stiffness, self.undamaged)
-            following = [
-                (system.flow, derivative)
-                for system, solution in zip(self.flowing, solutions, strict=False)
-                if (derivative := system.derivative(jump, variables, solution, before_quake))
-            ]
-            flow = FlowDerivative.joined([derivative for _, derivative in following])
-            return replace(change, flow=flow, flowing=tuple(flow for flow, _ in following))
-
-        def by_level() -> Array:
-            slope = -self.rate(self._loads, loading)
-            if flowing:
-                lifted = lambda other: self.flowing_lift(jump, variables, other, before_quake)[0]
-                slope = slope - self.rate(lifted, loading)
-            if dry_before:
-                losing = lambda other: interface.forces(
-                    self.lost_pressure(at_points, variables, other, dry_before)[0]
-                )
-                slope = slope + self.rate(losing, loading)
-            return slope
-
-        return Residual(value, by_jump, by_level)
-
-    def lost_pressure(
-        self, jump: Array, variables: JointVariables, loading: Loading, before_quake: BeforeQuake
-    ) -> tuple[Array, Array]:
-        """The losses of `JointWater.lost_pressure` at the points of all joints, for jumps (q, 3)
-        there.
-        """
-        pairs = zip(self.water, variables.split(jump[:, 0]), variables.joints, strict=True)
-        losses = [water.lost_pressure(own, v, loading, before_quake) for water, own, v in pairs]
-        traction, rate = (np.concatenate(parts) for parts in zip(*losses, strict=True))
-        return traction, rate
-
-    def pressures(
-        self,
-        jump: Array,
-        variables: JointVariables,
-        loading: Loading,
-        before_quake: BeforeQuake | None = None,
-    ) -> tuple[Pressure, ...]:
-        """The water pressure in each joint at a jump; before_quake: see `residual`."""
-        return tuple(water.pressure(jump, variables, loading, before_quake) for water in self.water)
+    # -- the crest
 
     def crest(self, jump: Array, loading: Loading) -> float:
         """The crest's displacement along x [m]."""
@@ -279,5 +180,5 @@ class Equilibrium:
 
     def crest_rate(self, loading: Loading) -> float:
         """Its derivative with the level."""
-        forces = self.rate(lambda other: self.external_forces(other)[0], loading)
+        forces = rate(lambda other: self.external_forces(other)[0], loading, self.case.size)
         return float(self.bulk.crest_pressure @ forces)

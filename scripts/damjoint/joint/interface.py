@@ -1,5 +1,5 @@
-"""The joints of condensed bodies, whatever their laws, water and levels: interpolations, flow
-operators, and the linear systems of Newton's method.
+"""The joints of condensed bodies, whatever their laws, water and levels: interpolations, assembly
+of their stiffness, flow operators.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from ..input.scene import UP
 from ..mesh.chord import Chord
 from ..mesh.joint_mesh import heel_normal
 from ..model.network import Network
-from .assembly import MOST_TERMS, Assembly, number_of_terms
+from .assembly import Assembly
 from .flow import Flow, JointFields, Wetted
-from .linear_system import Border, Change, UndamagedSystem
+from .linear_system import WoodburySystem
 from .wet_faces import WetFace, points_where
 
 
@@ -215,8 +215,8 @@ class Interface:
         upstream = [f.surface.points[:, 1].min() for f in self.faces.values() if f.side == UP]
         #: height of the reservoir floor [m]
         self.floor = min(upstream, default=0.0)
-        self._undamaged: UndamagedSystem | None = None
-        self._lift: tuple[tuple[Flow, ...], CsrMatrix] | None = None
+        self.assembly = Assembly(self.at_points, self.weights)
+        self._system: WoodburySystem | None = None
         self._flows: dict[tuple[object, ...], Flow] = {}
 
     def jumps(self, matrix: CsrMatrix, unknowns: Array) -> Array:
@@ -227,12 +227,6 @@ class Interface:
         """Nodal forces (j,) of a traction (q, 3) at the Gauss points."""
         weighted = self.weights[:, None] * traction[:, : self.dim]
         return self.from_points @ weighted.ravel()
-
-    def lift(self, flowing: tuple[Flow, ...]) -> CsrMatrix:
-        """Nodal forces of the pressures of flowing water; the last ones are kept."""
-        if self._lift is None or flowing != self._lift[0]:
-            self._lift = flowing, stacked([flow.lift.T for flow in flowing]).T
-        return self._lift[1]
 
     def flow_of(self, network: Network, waterstops: tuple[float | None, ...]) -> Flow:
         """Operators of water that flows in joints that meet; kept. waterstops: distance from the
@@ -262,56 +256,13 @@ class Interface:
         """Names, bodies and ends of the joints."""
         return [replace(joint.mesh.of_case, section=joint.section) for joint in self.joints]
 
-    # -- linear systems
-
-    @cached_property
-    def by_terms(self) -> Assembly | None:
-        """The assembly of the stiffness; None for many points, by products of sparse matrices."""
-        few = number_of_terms(self.at_points, self.dim) <= MOST_TERMS
-        return Assembly(self.at_points, self.dim) if few else None
-
-    def stiffness(self, tangent: Array, points: IntArray) -> CsrMatrix:
-        """Stiffness (j, j) of some Gauss points with a tangent (points, 3, 3)."""
-        number, d = len(points), self.dim
-        blocks = self.weights[points, None, None] * tangent[:, :d, :d]
-        if self.by_terms:
-            return self.by_terms.sum(blocks, points)
-        rows = self.at_points[(d * points[:, None] + np.arange(d)).ravel()]
-        columns = np.repeat(np.arange(d * number).reshape(number, d), d, axis=0)
-        diagonal = CsrMatrix(
-            blocks.ravel(), columns.ravel(), d * np.arange(d * number + 1), (d * number,) * 2
-        )
-        return rows.T @ (diagonal @ rows)
-
-    def undamaged(self, tangent: Array) -> UndamagedSystem:
-        """Linear system of the undamaged joints for a tangent (q, 3, 3); the last one is kept."""
-        if self._undamaged is None or not np.array_equal(tangent, self._undamaged.tangent):
-            points = np.arange(len(self.weights))
-            matrix = self.bulk.stiffness.copy()
-            self.stiffness(tangent, points).add_to(matrix)
-            self._undamaged = UndamagedSystem(tangent, matrix)
-        return self._undamaged
-
-    def change(self, tangent: Array, undamaged: Array) -> Change:
-        """Change by the laws for a tangent, from the undamaged one (q, 3, 3)."""
-        # rows: components of the traction
-        differs = (tangent != undamaged).any(axis=2)[:, : self.dim]
-        points = np.flatnonzero(differs.any(axis=1))
-        changes = np.zeros(self.at_points.shape[1], bool)
-        changes[self.at_points.indices[differs.ravel()[self.at_points.rows]]] = True
-        rows = np.flatnonzero(changes)
-        change = tangent[points] - undamaged[points]
-        return Change(law=self.stiffness(change, points)[rows], rows=rows)
-
-    def solve(
-        self, undamaged: Array, change: Change, right: Array, border: Border | None
-    ) -> tuple[Array, float]:
-        """Solve A x = right (j,), bordered or not; see UndamagedSystem.solve.
-
-        undamaged: tangent (q, 3, 3). Raises LinAlgError if the system is singular.
+    def system(self, undamaged: Array) -> WoodburySystem:
+        """Linear systems of the joints with the condensed bodies, by the tangent (q, 3, 3) of the
+        undamaged joints; the last one is kept.
         """
-        lift = self.lift(change.flowing) if change.flow else None
-        return self.undamaged(undamaged).solve(change, right, border, lift)
+        if self._system is None or not np.array_equal(undamaged, self._system.undamaged):
+            self._system = WoodburySystem(self.assembly, self.bulk.stiffness, undamaged)
+        return self._system
 
 
 #: Number of unknowns up to which two interfaces are kept.
@@ -320,8 +271,8 @@ SMALL = 2000
 
 class LastInterface:
     """The last interface, and the one before if both are small: a study computes its scenes mesh by
-    mesh, and an interface with its dense matrices may take gigabytes. The rows of a sweep take
-    turns with the searches for their critical values, in which water may stand on the crest.
+    mesh, and an interface with its dense matrices may take gigabytes. `sweep --critical` alternates
+    between two face meshes, as water may stand on the crest in a search: both stay.
     """
 
     def __init__(self) -> None:

@@ -31,19 +31,6 @@ class JointVariables:
         return [values[begin:end] for begin, end in pairwise(self.starts)]
 
 
-@dataclass(frozen=True)
-class Mode:
-    """How the solver evaluates the laws in an iteration."""
-
-    #: the laws with frozen damage, see `Law.freeze`
-    frozen: JointLaws | None = None
-    #: points (q,) that are placed inside the release of their shear, see `Law.shear_release`
-    releasing: BoolArray | None = None
-
-
-TANGENT = Mode()
-
-
 class JointLaws:
     """The laws of the joints."""
 
@@ -110,17 +97,18 @@ class JointLaws:
         )
 
     def evaluate(
-        self, jump: Array, variables: JointVariables, mode: Mode = TANGENT
+        self, jump: Array, variables: JointVariables, releasing: BoolArray | None = None
     ) -> tuple[Array, Array]:
-        """Traction and tangent in a mode of the solver, see `Law`."""
-        frozen = mode.frozen.laws if mode.frozen else self.laws
-        releasing: list[Any] = [None] * len(self.laws)
-        if mode.releasing is not None:
-            releasing = variables.split(mode.releasing)
+        """Traction (q, 3) and tangent (q, 3, 3); releasing: points (q,) that are placed inside the
+        release of their shear, see `Law.evaluate`.
+        """
+        inside: list[Any] = [None] * len(self.laws)
+        if releasing is not None:
+            inside = variables.split(releasing)
         parts = [
-            law.evaluate(own, state, points)
-            for law, own, state, points in zip(
-                frozen, variables.split(jump), variables.joints, releasing, strict=True
+            law.evaluate(jump, state, points)
+            for law, jump, state, points in zip(
+                self.laws, variables.split(jump), variables.joints, inside, strict=True
             )
         ]
         traction, tangent = (np.concatenate(values) for values in zip(*parts, strict=True))

@@ -1,37 +1,45 @@
-"""Linear systems of Newton's method on the joints.
+"""Linear systems (S + K) x = r of Newton's method on the joints: S of what is around them, K of
+their tangent and of the pressures of flowing water that follow from the jumps.
 
-The tangent is that of the undamaged joints, A_0 = S + K_0, and its change where a joint has
-opened, broken or slipped: A = A_0 + L - B P (L: change by the law, on few rows; P: derivative of
-the pressures of flowing water; B: their nodal forces). With C = A_0^-1, computed once, A x = r is
+Either assembled and factorised anew (`DenseSystem`), or by Woodbury's formula (`WoodburySystem`),
+from the tangent of the undamaged joints and its change where a joint has opened, broken or slipped:
+A = A_0 + L - B P, A_0 = S + K_0 (L: change by the law, on few rows; P: derivative of the pressures
+of flowing water; B: their nodal forces). With C = A_0^-1, computed once, A x = r is
 
     x = C (r - f + B p),    f = L x,    p = P x,
 
-a system of the forces f on the rows of L and the pressures p only (Woodbury). Bordered by one more
-equation it stays regular at a limit point of the load, where A is singular.
+a system of the forces f on the rows of L and the pressures p only. Bordered by one more equation it
+stays regular at a limit point of the load, where A is singular.
 """
 
 from __future__ import annotations
 
 from contextlib import nullcontext
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 from numpy.linalg import norm
 
-from ..arrays import Array, IntArray, distinct, mirror
-from ..csr import CsrMatrix
+from ..arrays import Array, distinct, mirror
+from ..csr import CsrMatrix, stacked
 from ..threads import limited_threads, scipy_linalg
+from .assembly import Assembly
 from .flow import Flow, FlowDerivative
 
+#: Number of unknowns up to which thousands of systems of one matrix S, few for each time step, are
+#: solved faster by factorising each than by Woodbury's formula.
+MOST_DENSE = 400
 
-@dataclass(frozen=True, kw_only=True)
-class Change:
-    """L (rows, j), without its zero rows, and P if water flows, and where."""
 
-    #: a CsrMatrix; dense in the steps of a small model, see dynamics/small_joints.py
-    law: Any
-    rows: IntArray
+@dataclass(frozen=True)
+class Tangent:
+    """The derivative of the joints' forces at a jump: of the laws at the Gauss points (q, 3, 3),
+    and of the pressures of flowing water, and where it flows.
+    """
+
+    law: Array
     flow: FlowDerivative | None = None
     flowing: tuple[Flow, ...] = ()
 
@@ -46,42 +54,92 @@ class Border:
     gap: float
 
 
-class UndamagedSystem:
-    """The inverse tangent of the undamaged joints, C = A_0^-1 (j, j)."""
+class LinearSystem(Protocol):
+    """Solves (S + K) x = r for tangents K."""
 
-    def __init__(self, tangent: Array, matrix: Array) -> None:
-        """tangent: (q, 3, 3) of the Gauss points; matrix: A_0, overwritten if it is large.
+    def solve(
+        self, tangent: Tangent, right: Array, border: Border | None = None
+    ) -> tuple[Array, float]:
+        """Solve for right (j,), bordered or not: x, and s, 0 without border.
+
+        Raises LinAlgError if the system is singular.
+        """
+        ...
+
+
+class DenseSystem:
+    """Assembled and factorised anew for each tangent; neither border nor flow."""
+
+    def __init__(self, assembly: Assembly, stiffness: Array) -> None:
+        """stiffness: S (j, j)."""
+        self.assembly, self.stiffness = assembly, stiffness
+
+    def solve(
+        self, tangent: Tangent, right: Array, border: Border | None = None
+    ) -> tuple[Array, float]:
+        """See `LinearSystem`."""
+        return lu_solve(self.stiffness + self.assembly.dense(tangent.law), right), 0.0
+
+
+class WoodburySystem:
+    """By the inverse of the matrix with undamaged joints; the matrix itself is factorised if it is
+    small and more than half of its rows change.
+    """
+
+    def __init__(self, assembly: Assembly, stiffness: Array, undamaged: Array) -> None:
+        """stiffness: S (j, j); undamaged: tangent (q, 3, 3) of the undamaged joints."""
+        self.assembly, self.stiffness, self.undamaged = assembly, stiffness, undamaged
+        self._lift: tuple[tuple[Flow, ...], CsrMatrix] | None = None
+        self._by_pressure: tuple[CsrMatrix, Array] | None = None
+
+    def matrix(self) -> Array:
+        """A_0 (j, j)."""
+        matrix = self.stiffness.copy()
+        self.assembly.whole(self.undamaged).add_to(matrix)
+        return matrix
+
+    @cached_property
+    def small_matrix(self) -> Array | None:
+        """A_0 of few unknowns."""
+        return self.matrix() if len(self.stiffness) <= FEW else None
+
+    @cached_property
+    def compliance(self) -> Array:
+        """C = A_0^-1 (j, j).
 
         Raises LinAlgError if A_0 is not positive definite: the joint does not support the dam.
         """
-        self.tangent = tangent
-        #: A_0 of few unknowns
-        self.matrix = matrix if len(matrix) <= FEW else None
-        self.compliance = positive_inverse(matrix)
-        self._by_pressure: tuple[CsrMatrix, Array] | None = None
+        return positive_inverse(self.matrix() if self.small_matrix is None else self.small_matrix)
+
+    def lift(self, flowing: tuple[Flow, ...]) -> CsrMatrix:
+        """B (j, p), the nodal forces of the pressures of flowing water; the last one is kept."""
+        if self._lift is None or flowing != self._lift[0]:
+            self._lift = flowing, stacked([flow.lift.T for flow in flowing]).T
+        return self._lift[1]
 
     def by_pressure(self, lift: CsrMatrix) -> Array:
-        """C B (j, p), the jumps by unit pressures with nodal forces B; the last one is kept."""
+        """C B (j, p), the jumps by unit pressures; the last one is kept."""
         if self._by_pressure is None or self._by_pressure[0] is not lift:
             self._by_pressure = lift, np.ascontiguousarray((lift.T @ self.compliance).T)
         return self._by_pressure[1]
 
     def solve(
-        self,
-        change: Change,
-        right: Array,
-        border: Border | None = None,
-        lift: CsrMatrix | None = None,
+        self, tangent: Tangent, right: Array, border: Border | None = None
     ) -> tuple[Array, float]:
-        """Solve A x = right (j,), bordered or not; x and s (0 without border).
-
-        lift: B, if water flows. Raises LinAlgError if the system is singular.
-        """
-        compliance, law, rows, flow = self.compliance, change.law, change.rows, change.flow
+        """See `LinearSystem`."""
+        compliance, flow = self.compliance, tangent.flow
+        law, rows = self.assembly.change(tangent.law, self.undamaged)
+        lift = self.lift(tangent.flowing) if flow else None
         m = len(rows)
         size = m + (len(flow.pressure) if flow else 0)
-        if self.matrix is not None and size > len(right) / 2:
-            return self._solve_whole(self.matrix, change, right, border, lift)
+        if self.small_matrix is not None and size > len(right) / 2:
+            whole = np.empty((len(right) + (border is not None),) * 2)
+            matrix = whole[: len(right), : len(right)]
+            matrix[:] = self.small_matrix
+            matrix[rows[law.rows], law.indices] += law.data
+            if flow and lift:
+                matrix[:, flow.columns] -= lift @ flow.pressure
+            return solve_whole(whole, right, border)
         start = compliance @ right
         small = np.zeros((size + (border is not None),) * 2)
         small_right = np.zeros(len(small))
@@ -115,30 +173,20 @@ class UndamagedSystem:
         x -= s * by_slope
         return x, s
 
-    def _solve_whole(
-        self,
-        undamaged: Array,
-        change: Change,
-        right: Array,
-        border: Border | None,
-        lift: CsrMatrix | None,
-    ) -> tuple[Array, float]:
-        """The same by A, assembled from A_0 in a matrix with room for the border."""
-        law, size = change.law, len(right)
-        whole = np.empty((size + (border is not None),) * 2)
-        matrix = whole[:size, :size]
-        matrix[:] = undamaged
-        matrix[change.rows[law.rows], law.indices] += law.data
-        if change.flow and lift:
-            matrix[:, change.flow.columns] -= lift @ change.flow.pressure
-        if border is None:
-            return lu_solve(whole, right), 0.0
-        # a row of the size of the others, for the choice of the pivots
-        scale = max(matrix.max(), -matrix.min()) / (np.abs(border.row).max() or 1)
-        whole[:-1, -1] = border.slope
-        whole[-1, :-1], whole[-1, -1] = scale * border.row, scale * border.rate
-        *x, s = lu_solve(whole, np.append(right, scale * border.gap))
-        return np.array(x), float(s)
+
+def solve_whole(whole: Array, right: Array, border: Border | None) -> tuple[Array, float]:
+    """Solve A x = right (j,), by LU, for A in a matrix with room for the border, if there is one;
+    the matrix may be overwritten.
+    """
+    if border is None:
+        return lu_solve(whole, right), 0.0
+    matrix = whole[:-1, :-1]
+    # a row of the size of the others, for the choice of the pivots
+    scale = max(matrix.max(), -matrix.min()) / (np.abs(border.row).max() or 1)
+    whole[:-1, -1] = border.slope
+    whole[-1, :-1], whole[-1, -1] = scale * border.row, scale * border.rate
+    *x, s = lu_solve(whole, np.append(right, scale * border.gap))
+    return np.array(x), float(s)
 
 
 def positive_inverse(matrix: Array) -> Array:

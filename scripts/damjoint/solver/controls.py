@@ -77,6 +77,24 @@ class DirectionControl(DisplacementControl):
 
 Control = LevelControl | DisplacementControl
 
+
+class Prescribed:
+    """A displacement control as a constraint on the joints of an equilibrium, see step.py."""
+
+    def __init__(self, control: DisplacementControl, equilibrium: Equilibrium) -> None:
+        self.control, self.equilibrium = control, equilibrium
+        self.stiffness = equilibrium.case["K_N"] * equilibrium.bulk.width
+        self.row, self.highest_level = control.gradient(equilibrium), equilibrium.case.highest_level
+
+    def gap(self, jump: Array, loading: Loading) -> float:
+        """See `Constraint`."""
+        return self.control.value - self.control.measure(self.equilibrium, jump, loading)
+
+    def rate(self, loading: Loading) -> float:
+        """See `Constraint`."""
+        return self.control.rate(self.equilibrium, loading)
+
+
 #: By the value of the parameter `drive`.
 DRIVES = {"crest": CrestControl, "heel": HeelControl}
 

@@ -22,6 +22,7 @@ from ..model.results import (
     joint_table,
 )
 from .model import StepResult
+from .newton import BY_ROUND_OFF
 from .state import State
 
 #: What is recorded of each step, and of each joint; the other columns of HISTORY are made from
@@ -79,6 +80,8 @@ class History:
     tables: list[tuple[Array, Array]] = field(default_factory=list)
     #: the states of the tables
     saved: list[State] = field(default_factory=list)
+    #: times of the rows whose step has converged by round-off, see `Convergence`
+    by_round_off: list[float] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         joints = len(self.equilibrium.interface.joints)
@@ -87,7 +90,13 @@ class History:
     def copy(self) -> History:
         """Another one, that can be continued independently."""
         rows = {name: list(values) for name, values in self.rows.items()}
-        return replace(self, rows=rows, tables=list(self.tables), saved=list(self.saved))
+        return replace(
+            self,
+            rows=rows,
+            tables=list(self.tables),
+            saved=list(self.saved),
+            by_round_off=list(self.by_round_off),
+        )
 
     @property
     def last(self) -> dict[str, float]:
@@ -128,6 +137,8 @@ class History:
             row |= {column_of(name, k): value for name, value in of_joint.items()}
         for name, value in row.items():
             self.rows[name].append(float(value))
+        if step.criterion == BY_ROUND_OFF:
+            self.by_round_off.append(state.time)
 
     def crest(self, state: State) -> float:
         """The crest's displacement along x [m]."""

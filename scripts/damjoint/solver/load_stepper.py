@@ -172,6 +172,16 @@ class LoadStepper:
     def steps_to(self, target: float) -> Iterator[State]:
         """The steps up to a time; one that does not converge is cut, the next ones grow again.
 
+            weigh first, if the case says so
+            while the time is before the target:
+                step = direct step to the time (the strategies in turn)
+                if none and the weight is in it:     weigh, and try again
+                if none:                             over the limit point, along the equilibrium
+                                                     path or by relaxation
+                if none and it can be cut no more:   the whole step by the fallback, or stop
+                elif none:                           cut the step
+                if there is one:                     commit it, and double the next one
+
         The first step includes the weight at any length: it is cut to the weight alone first.
         """
         case = self.case
@@ -376,6 +386,7 @@ class LoadStepper:
             "mechanism": self.mechanism and asdict(self.mechanism),
             "limit_points": self.limit_points,
             "unstable_growth": self.relaxed_at,
+            "converged_by_round_off": self.history.by_round_off,
         }
         results.info = {name: value for name, value in info.items() if value}
         if self.state.trace:

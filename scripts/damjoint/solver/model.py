@@ -17,14 +17,13 @@ from ..input.case import Case
 from ..input.values import freezes_uplift
 from ..joint.equilibrium import Equilibrium
 from ..joint.interface import Interface, interface_of
-from ..joint.joint_laws import TANGENT, Mode
-from ..joint.linear_system import Border
 from ..joint.water import BeforeQuake
 from ..model.loads import COMPLETE, Loading
 from ..model.network import with_paths
-from .controls import Control, DisplacementControl, LevelControl
-from .newton import Convergence, Diverged, Iterate, Strategy, newton
-from .state import Frozen, State
+from .controls import Control, DisplacementControl, LevelControl, Prescribed
+from .newton import BY_TOLERANCE, Convergence, Strategy
+from .state import State, StepLaws
+from .step import Plan, Start, solve
 
 #: Largest jump of an equilibrium of small displacements, over the size of the dam.
 LARGEST_JUMP = 0.1
@@ -42,6 +41,8 @@ class StepResult:
     iterations: int
     #: norm of the residual over the reference
     residual: float
+    #: of convergence, see `Convergence`
+    criterion: str = BY_TOLERANCE
 
 
 class Model:
@@ -73,8 +74,8 @@ class Model:
         """
         start, case = self.start(), self.case
         highest = replace(COMPLETE, level=max(case.levels), tail=max(case.tail_levels))
-        residual = self.equilibrium.residual(start.jump, start.variables, highest).value
-        size = float(np.linalg.norm(residual))
+        problem = self.equilibrium.problem(start.variables)
+        size = float(np.linalg.norm(problem.residual(start.jump, highest).value))
         if not np.isfinite(size):
             raise RunError("loads: are not finite numbers; look at densities, levels and gravity")
         return size
@@ -99,10 +100,11 @@ class Model:
         """When a step has converged."""
         shared, reference = self.case.shared, self.reference
         return Convergence(
-            self.case["tolerance"] * reference,
-            shared["coarsest"][0] * reference,
-            shared["round_off"][0],
-            LARGEST_JUMP * self.case.size,
+            reference=reference,
+            tolerance=self.case["tolerance"] * reference,
+            rounding_ceiling=shared["coarsest"][0] * reference,
+            round_off=shared["round_off"][0],
+            largest_jump=LARGEST_JUMP * self.case.size,
         )
 
     def start(self) -> State:
@@ -133,28 +135,45 @@ class Model:
         extrapolate: bool = False,
         persist: bool = True,
         guess: tuple[Array, float] | None = None,
-        frozen: Frozen | None = None,
-        frozen_lift: Array | None = None,
+        frozen: StepLaws | None = None,
+        constant_lift: Array | None = None,
     ) -> StepResult | None:
         """A step from a state to a time, by the first strategy that converges; None if none does.
 
         strategies: those of the model by default; extrapolate: whether the first one starts from
         the last two states; persist: whether the others follow one that has diverged; guess: jump
-        and level to start from; frozen: the law with frozen damage; frozen_lift: see
-        `Equilibrium.residual`.
+        and level to start from; frozen: the laws with frozen damage; constant_lift (j,): see
+        `JointProblem.with_constant_lift`.
         """
-        strategies = self.strategies if strategies is None else strategies
-        for number, strategy in enumerate(strategies):
-            begin = guess or self.predict(state, time, control, extrapolate and number == 0)
-            try:
-                found = self.solve(state, time, control, strategy, begin, frozen, frozen_lift)
-            except Diverged:
-                if not persist:
-                    return None
-                continue
-            if found:
-                return found
-        return None
+        equilibrium, laws = self.equilibrium, self.equilibrium.laws
+        start, before_quake = state.begin_step(laws, time), self.before_quake(state, time)
+        step_laws = frozen or StepLaws(laws, laws)
+        problem = equilibrium.problem(start.variables, before_quake, step_laws.points)
+        water = equilibrium.water_in_step(start.variables, before_quake)
+        if constant_lift is not None:
+            problem = problem.with_constant_lift(constant_lift)
+        starts = [
+            Start(strategy, *(guess or self.predict(state, time, control, extrapolate and not n)))
+            for n, strategy in enumerate(self.strategies if strategies is None else strategies)
+        ]
+        plan = Plan(starts, self.convergence, persist)
+        constraint = None
+        if isinstance(control, DisplacementControl):
+            constraint = Prescribed(control, equilibrium)
+        loading = self.loading(time, state.loading.level)
+        solution = solve(problem, loading, plan, constraint)
+        if solution is None:
+            return None
+        reached = replace(loading, level=solution.level)
+        new = replace(
+            start.update(equilibrium.interface, step_laws, solution.jump),
+            time=time,
+            loading=reached,
+            pressures=water.pressures(solution.jump, reached),
+            before_quake=before_quake,
+        )
+        residual = solution.size / (self.reference or 1.0)
+        return StepResult(new.after(state), solution.iterations, residual, solution.criterion)
 
     def advance_by_first(self, state: State, time: float, control: Control) -> StepResult | None:
         """A step by the first strategy only, from the extrapolation of the last two states."""
@@ -186,65 +205,3 @@ class Model:
     def measure(self, control: DisplacementControl, state: State) -> float:
         """The displacement of a control in a state [m]."""
         return control.measure(self.equilibrium, state.jump, state.loading)
-
-    def solve(
-        self,
-        state: State,
-        time: float,
-        control: Control,
-        strategy: Strategy,
-        begin: tuple[Array, float],
-        frozen: Frozen | None = None,
-        frozen_lift: Array | None = None,
-    ) -> StepResult | None:
-        """A step by one strategy, from a jump and a level, see `advance`. Raises Diverged."""
-        equilibrium, start = self.equilibrium, state.begin_step(self.equilibrium.laws, time)
-        interface, laws, variables = equilibrium.interface, equilibrium.laws, start.variables
-        frozen_laws, before_quake = frozen and frozen.points, self.before_quake(state, time)
-        loads, convergence = self.loading(time, begin[1]), self.convergence
-        stiffness = equilibrium.case["K_N"] * equilibrium.bulk.width
-
-        def evaluate(jump: Array, level: float, last: Iterate | None) -> Iterate:
-            side, mode = None, Mode(frozen=frozen_laws) if frozen_laws else TANGENT
-            if strategy.release:
-                side = laws.release_side(interface.jumps(interface.at_points, jump), variables)
-                if last and last.side is not None:
-                    crossing = side * last.side < 0
-                    releasing = crossing & ((side < 0) | (strategy.release > 1))
-                    side, mode = np.where(releasing, 0, side), replace(mode, releasing=releasing)
-            here = replace(loads, level=level)
-            residual = equilibrium.residual(jump, variables, here, mode, frozen_lift, before_quake)
-            size, gap = float(np.linalg.norm(residual.value)), 0.0
-            if isinstance(control, DisplacementControl):
-                gap = control.value - control.measure(equilibrium, jump, here)
-                size = float(np.hypot(size, stiffness * gap))
-
-            def correction(secant: bool) -> tuple[Array, float]:
-                edge = None
-                if isinstance(control, DisplacementControl):
-                    row, rate = control.gradient(equilibrium), control.rate(equilibrium, here)
-                    edge = Border(residual.by_level(), row, rate, gap)
-                change = residual.by_jump(secant)
-                return interface.solve(equilibrium.undamaged, change, -residual.value, edge)
-
-            return Iterate(jump, level, residual.value, size, correction, side)
-
-        with np.errstate(over="ignore", invalid="ignore"):  # a diverging iterate is discarded
-            found = newton(evaluate, evaluate(*begin, None), convergence, strategy)
-        if found is None:
-            return None
-        end, iterations = found
-        if np.abs(end.jump).max() > convergence.largest_jump:
-            raise Diverged
-        if not isinstance(control, LevelControl) and not 0 <= end.level <= self.case.highest_level:
-            return None
-        loading = replace(loads, level=end.level)
-        new = replace(
-            start.update(equilibrium, end.jump, frozen),
-            time=time,
-            loading=loading,
-            pressures=equilibrium.pressures(end.jump, variables, loading, before_quake),
-            before_quake=before_quake,
-        )
-        new = new.after(state).traced(state, frozen is not None)
-        return StepResult(new, iterations, end.size / (self.reference or 1.0))

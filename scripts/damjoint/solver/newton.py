@@ -50,35 +50,52 @@ Evaluate = Callable[[Array, float, Iterate | None], Iterate]
 
 @dataclass(frozen=True)
 class Convergence:
-    """When an iterate has converged: norm of the residual <= tolerance, or not above what rounding
-    alone makes of it.
+    """When an iterate has converged, by one of two criteria: `tolerance`, norm of the residual up
+    to a tolerance; `round-off`, not above what rounding alone makes of it.
 
     After a slip of a centimetre the terms of the residual are 1e9 times the loads and cancel; no
     iteration gets below a few times their rounding.
     """
 
+    #: norm of the residual of the undamaged joints under the highest water [N]: what the
+    #: residual is measured by
+    reference: float
+    #: [N]; parameter `tolerance` times the reference, 1e-9 by default: smaller ones are not
+    #: reached, larger ones show in the resultants
     tolerance: float
-    #: norm of the residual up to which rounding is accepted as its cause, and how many times the
-    #: residual of rounded unknowns it may be
-    coarsest: float
+    #: [N]; `coarsest` times the reference: a larger residual is never put down to rounding
+    rounding_ceiling: float
+    #: [-]; how many times the residual of unknowns rounded in the last bit it may be, a few
     round_off: float
-    #: the largest jump of an equilibrium of small displacements [m]
+    #: [m]; largest jump of an equilibrium of small displacements, beyond which a strategy has
+    #: diverged
     largest_jump: float
 
-    def reached(self, now: Iterate, before: float, evaluate: Evaluate) -> bool:
-        """Whether an iterate has converged; before: norm of the residual one iteration ago."""
+    def reached(self, now: Iterate, before: float, evaluate: Evaluate) -> str:
+        """The criterion by which an iterate has converged, empty if by none; before: norm of the
+        residual one iteration ago.
+        """
         if now.size <= self.tolerance:
-            return True
-        if not 0.1 * before < now.size <= self.coarsest:  # it still falls, or is too large
-            return False
-        return bool(now.size <= self.round_off * rounding(now, evaluate))
+            return BY_TOLERANCE
+        if not FALLS * before < now.size <= self.rounding_ceiling:  # it still falls, or is large
+            return ""
+        return BY_ROUND_OFF if now.size <= self.round_off * rounding(now, evaluate) else ""
 
 
-#: Relative change of the residual below which it stagnates, over so many iterations: something
-#: slides or falls.
-STAGNATION, ITERATIONS = 1e-6, 4
+#: Criteria by which a solution ends.
+BY_TOLERANCE, BY_ROUND_OFF = "tolerance", "round-off"
 
-#: Relative difference of residuals below which two iterates are the same.
+#: A residual below this part of the one before still falls, and is iterated further [-].
+FALLS = 0.1
+
+#: Relative change of the residual below which it stagnates [-]: something slides or falls. Ten
+#: times larger ends solutions that still converge, slowly.
+STAGNATION = 1e-6
+#: Number of iterations over which it does.
+STAGNATING_ITERATIONS = 4
+
+#: Relative difference of residuals below which two iterates are the same [-], and Newton's method
+#: has come back to one of them: above the rounding of a norm, far below any progress.
 SAME = 1e-10
 
 #: x rounded to 43 of its 53 bits is x (2^10 + 1) - (x (2^10 + 1) - x): Veltkamp's splitting.
@@ -95,8 +112,8 @@ def rounding(now: Iterate, evaluate: Evaluate) -> float:
 
 def newton(
     evaluate: Evaluate, start: Iterate, convergence: Convergence, strategy: Strategy
-) -> tuple[Iterate, int] | None:
-    """The converged iterate and the number of iterations; None if there is none.
+) -> tuple[Iterate, int, str] | None:
+    """The converged iterate, the number of iterations and the criterion; None if there is none.
 
     Raises Diverged.
 
@@ -105,8 +122,9 @@ def newton(
     """
     now, sizes = start, list[float]()
     for iterations in range(strategy.iterations + 1):
-        if convergence.reached(now, sizes[-1] if sizes else np.inf, evaluate):
-            return now, iterations
+        criterion = convergence.reached(now, sizes[-1] if sizes else np.inf, evaluate)
+        if criterion:
+            return now, iterations, criterion
         if not np.isfinite(now.size) or iterations == strategy.iterations or stagnates(now, sizes):
             return None
         if np.abs(now.jump).max() > convergence.largest_jump:
@@ -127,9 +145,9 @@ def newton(
 
 
 def stagnates(now: Iterate, sizes: list[float]) -> bool:
-    """Whether the residual repeats, or has not changed over ITERATIONS iterations."""
-    unchanged = len(sizes) >= ITERATIONS and all(
-        repeats(now.size, [size], STAGNATION) for size in sizes[-ITERATIONS:]
+    """Whether the residual repeats, or has not changed over STAGNATING_ITERATIONS."""
+    unchanged = len(sizes) >= STAGNATING_ITERATIONS and all(
+        repeats(now.size, [size], STAGNATION) for size in sizes[-STAGNATING_ITERATIONS:]
     )
     return unchanged or repeats(now.size, sizes, SAME)
 

@@ -29,7 +29,8 @@ def relax(
     relaxed state is more damaged than a direct step would give.
     """
     equilibrium, state = model.equilibrium, begin
-    laws, iterations, sizes, found = equilibrium.laws, 0, list[float](), None
+    laws, iterations, sizes = equilibrium.laws, 0, list[float]()
+    relaxed: StepResult | None = None
     before_quake = model.before_quake(begin, time)
     strategies = [strategy for strategy in model.strategies[:-1] if not strategy.release]
     for _ in range(ROUNDS):
@@ -39,9 +40,8 @@ def relax(
         step = model.advance(start, time, control, strategies=coupled, persist=False, frozen=frozen)
         if step is None and equilibrium.flowing:
             level = control.level if isinstance(control, LevelControl) else start.loading.level
-            loading = model.loading(time, level)
             opened = before_quake or start
-            lift, _ = equilibrium.flowing_lift(opened.jump, opened.variables, loading)
+            water = equilibrium.water_in_step(opened.variables)
             step = model.advance(
                 start,
                 time,
@@ -49,26 +49,25 @@ def relax(
                 strategies=strategies,
                 persist=False,
                 frozen=frozen,
-                frozen_lift=lift,
+                constant_lift=water.flow(opened.jump, model.loading(time, level)).lift,
             )
         if step is None:
             return None
         iterations += step.iterations
         state = replace(step.state, time=begin.time)
         jump, variables = state.jump, state.begin_step(laws, time).variables
-        residual = equilibrium.residual(
-            jump, variables, state.loading, before_quake=before_quake
-        ).value
-        size = float(np.linalg.norm(residual))
+        problem = equilibrium.problem(variables, before_quake)
+        size = float(np.linalg.norm(problem.residual(jump, state.loading).value))
         if size <= model.convergence.tolerance:
-            pressures = equilibrium.pressures(jump, variables, state.loading, before_quake)
-            relaxed = replace(step.state, pressures=pressures).after(begin)
-            return StepResult(relaxed, iterations, size / (model.reference or 1.0)), True
+            water = equilibrium.water_in_step(variables, before_quake)
+            pressures = water.pressures(jump, state.loading)
+            balanced = replace(step.state, pressures=pressures).after(begin)
+            return StepResult(balanced, iterations, size / (model.reference or 1.0)), True
         if repeats(size, sizes, SAME):
             return None
         sizes.append(size)
-        found = replace(step, iterations=iterations), False
-    return found
+        relaxed = replace(step, iterations=iterations)
+    return (relaxed, False) if relaxed else None
 
 
 def over_unstable_growth(

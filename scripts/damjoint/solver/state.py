@@ -8,14 +8,17 @@ import numpy as np
 
 from ..arrays import Array
 from ..joint.equilibrium import Equilibrium
+from ..joint.interface import Interface
 from ..joint.joint_laws import JointLaws, JointVariables
 from ..joint.water import BeforeQuake, Pressure
 from ..model.loads import Loading
 
 
 @dataclass(frozen=True)
-class Frozen:
-    """The laws of the joints with frozen damage, at the integration points and at the nodes."""
+class StepLaws:
+    """The laws of the joints in a step, at the integration points and at the nodes: the same, or
+    with the damage frozen that each point has.
+    """
 
     points: JointLaws
     nodes: JointLaws
@@ -69,16 +72,17 @@ class State:
         points, nodes = (laws.begin_step(v, self.time, time) for v in both)
         return replace(self, variables=points, node_variables=nodes)
 
-    def freeze(self, equilibrium: Equilibrium) -> Frozen:
+    def freeze(self, equilibrium: Equilibrium) -> StepLaws:
         """The laws with the damage frozen that this state's jump leads to."""
-        points, nodes = both_jumps(equilibrium, self.jump)
+        points, nodes = both_jumps(equilibrium.interface, self.jump)
         laws = equilibrium.laws
-        return Frozen(laws.freeze(points, self.variables), laws.freeze(nodes, self.node_variables))
+        return StepLaws(
+            laws.freeze(points, self.variables), laws.freeze(nodes, self.node_variables)
+        )
 
-    def update(self, equilibrium: Equilibrium, jump: Array, frozen: Frozen | None) -> State:
-        """The state with a jump, and the internal variables after it."""
-        points, nodes = both_jumps(equilibrium, jump)
-        laws = frozen or Frozen(equilibrium.laws, equilibrium.laws)
+    def update(self, interface: Interface, laws: StepLaws, jump: Array) -> State:
+        """The state with a jump (j,), and the internal variables after it."""
+        points, nodes = both_jumps(interface, jump)
         return replace(
             self,
             jump=jump,
@@ -87,9 +91,8 @@ class State:
         )
 
 
-def both_jumps(equilibrium: Equilibrium, jump: Array) -> tuple[Array, Array]:
+def both_jumps(interface: Interface, jump: Array) -> tuple[Array, Array]:
     """The jump at the laws' points and at the nodes, (q, 3) each."""
-    interface = equilibrium.interface
     return interface.jumps(interface.at_points, jump), interface.jumps(interface.at_nodes, jump)
 
 

@@ -1,0 +1,95 @@
+"""The water in the joints in a step, that follows the jumps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Array
+from ..model.loads import Loading
+from .flow import FlowDerivative, FlowSolution
+from .joint_laws import JointVariables
+from .linear_system import Tangent
+from .water import BeforeQuake, JointWater, Pressure, WaterSystem
+
+
+@dataclass(frozen=True, kw_only=True)
+class StepWater:
+    """The water in the joints for the internal variables of a step's beginning: it follows the
+    jumps of the step or, with quake_uplift = unchanged or zero, those before a pseudo-static
+    earthquake.
+    """
+
+    joints: list[JointWater]
+    #: where it flows
+    flowing: tuple[WaterSystem, ...]
+    variables: JointVariables
+    before_quake: BeforeQuake | None = None
+
+    def flow(self, jump: Array, loading: Loading) -> StepFlow:
+        """The water that flows, at a jump (j,)."""
+        solutions = [
+            system.solve(jump, self.variables, loading, self.before_quake)
+            for system in self.flowing
+        ]
+        lift = np.zeros(len(jump))
+        for system, solution in zip(self.flowing, solutions, strict=True):
+            nodal = system.expand_to_nodes(solution)
+            for water in system.members:
+                lift += water.lift(loading, water.wetted.fields @ nodal[water.nodes])
+        return StepFlow(water=self, jump=jump, lift=lift, solutions=solutions)
+
+    @property
+    def loses_pressure(self) -> bool:
+        """Whether a crack that a pseudo-static earthquake opens is dry, see `lost_pressure`."""
+        return self.before_quake is not None and any(water.dry_crack for water in self.joints)
+
+    def lost_pressure(self, at_points: Array, loading: Loading) -> tuple[Array, Array]:
+        """The losses of `JointWater.lost_pressure` at the points of all joints, for jumps (q, 3)
+        there: as a traction (q, 3), and its derivative (q, 3, 3).
+        """
+        assert self.before_quake
+        openings = self.variables.split(at_points[:, 0])
+        losses = [
+            water.lost_pressure(opening, variables, loading, self.before_quake)
+            for water, opening, variables in zip(
+                self.joints, openings, self.variables.joints, strict=True
+            )
+        ]
+        traction, derivative = (np.concatenate(parts) for parts in zip(*losses, strict=True))
+        return traction, derivative
+
+    def pressures(self, jump: Array, loading: Loading) -> tuple[Pressure, ...]:
+        """The water pressure in each joint at a jump (j,)."""
+        return tuple(
+            water.pressure(jump, self.variables, loading, self.before_quake)
+            for water in self.joints
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class StepFlow:
+    """The water that flows in the joints at a jump (j,)."""
+
+    water: StepWater
+    jump: Array
+    #: its forces on the joint faces (j,)
+    lift: Array
+    #: of each of `StepWater.flowing`
+    solutions: list[FlowSolution]
+
+    def tangent(self, law: Array) -> Tangent:
+        """The derivative of the joints' forces, with that of the laws (q, 3, 3)."""
+        water = self.water
+        following = [
+            (system.flow, derivative)
+            for system, solution in zip(water.flowing, self.solutions, strict=True)
+            if (
+                derivative := system.derivative(
+                    self.jump, water.variables, solution, water.before_quake
+                )
+            )
+        ]
+        joined = FlowDerivative.joined([derivative for _, derivative in following])
+        return Tangent(law, joined, tuple(flow for flow, _ in following))

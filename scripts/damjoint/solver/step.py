@@ -1,0 +1,134 @@
+"""A step solved by Newton's method: one strategy after the other, with the level prescribed or,
+under displacement control, unknown. At rest and in motion alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from ..arrays import Array
+from ..joint.linear_system import Border
+from ..joint.problem import JointProblem
+from ..model.loads import Loading
+from .newton import Convergence, Diverged, Iterate, Strategy, newton
+
+
+class Constraint(Protocol):
+    """A displacement that is prescribed in place of the level."""
+
+    #: [N/m]; weight of its gap in the norm of the residual
+    stiffness: float
+    #: its derivative with the jump (j,), and the highest level that is looked for [m]
+    row: Array
+    highest_level: float
+
+    def gap(self, jump: Array, loading: Loading) -> float:
+        """What is missing at a jump (j,) [m]."""
+        ...
+
+    def rate(self, loading: Loading) -> float:
+        """Its derivative with the level."""
+        ...
+
+
+@dataclass(frozen=True)
+class Start:
+    """A strategy, and the jump (j,) and the level where it starts."""
+
+    strategy: Strategy
+    jump: Array
+    level: float
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How a step is solved."""
+
+    #: tried in turn, until one converges
+    starts: Sequence[Start]
+    convergence: Convergence
+    #: whether the others follow one that has diverged
+    persist: bool = True
+
+
+@dataclass(frozen=True)
+class Solution:
+    """The jump (j,) and the level of a converged step."""
+
+    jump: Array
+    level: float
+    iterations: int
+    #: norm of the residual [N], and the criterion of convergence
+    size: float
+    criterion: str
+
+
+def solve(
+    problem: JointProblem, loading: Loading, plan: Plan, constraint: Constraint | None = None
+) -> Solution | None:
+    """Solve a step from the first start that leads to convergence; None if none does.
+
+    loading: at the end of the step, but for the level: that of the start or, with a constraint,
+    unknown.
+    """
+    for begin in plan.starts:
+        try:
+            solution = solve_from(problem, loading, begin, plan.convergence, constraint)
+        except Diverged:
+            if not plan.persist:
+                return None
+            continue
+        if solution:
+            return solution
+    return None
+
+
+def solve_from(
+    problem: JointProblem,
+    loading: Loading,
+    begin: Start,
+    convergence: Convergence,
+    constraint: Constraint | None,
+) -> Solution | None:
+    """From one start, see `solve`. Raises Diverged."""
+    strategy = begin.strategy
+
+    def evaluate(jump: Array, level: float, last: Iterate | None) -> Iterate:
+        side = releasing = None
+        if strategy.release:
+            side = problem.laws.release_side(problem.jumps(jump), problem.variables)
+            if last and last.side is not None:
+                crossing = side * last.side < 0
+                releasing = crossing & ((side < 0) | (strategy.release > 1))
+                side = np.where(releasing, 0, side)
+        here = replace(loading, level=level)
+        residual = problem.residual(jump, here, releasing)
+        size, gap = float(np.linalg.norm(residual.value)), 0.0
+        if constraint:
+            gap = constraint.gap(jump, here)
+            size = float(np.hypot(size, constraint.stiffness * gap))
+
+        def correction(secant: bool) -> tuple[Array, float]:
+            border = None
+            if constraint:
+                rate = constraint.rate(here)
+                border = Border(residual.by_level(), constraint.row, rate, gap)
+            return problem.system.solve(residual.by_jump(secant), -residual.value, border)
+
+        return Iterate(jump, level, residual.value, size, correction, side)
+
+    with np.errstate(over="ignore", invalid="ignore"):  # a diverging iterate is discarded
+        first = evaluate(begin.jump, begin.level, None)
+        converged = newton(evaluate, first, convergence, strategy)
+    if converged is None:
+        return None
+    end, iterations, criterion = converged
+    if np.abs(end.jump).max() > convergence.largest_jump:
+        raise Diverged
+    if constraint and not 0 <= end.level <= constraint.highest_level:
+        return None
+    return Solution(end.jump, end.level, iterations, end.size, criterion)
