@@ -13,6 +13,12 @@
 
 Include "../pro/parameters.pro";
 
+// Tags of the point and the curve at the drains of the first joint, of the surface of the dam above
+// it, and of those above joint j > 0: FIRST_LIFT + j
+DRAIN_TAG = 100;
+DAM_SURFACE = 1;
+FIRST_LIFT = 100;
+
 h_joint = joint_length / n_joint;
 regular = !StrCmp(mesh_pattern, "regular");
 
@@ -54,7 +60,7 @@ For j In {0 : top}
     n_first = (n_first < number) ? n_first : number - 1;
     n_first = (n_first < 1) ? 1 : n_first;
     n_rest = (n_first < number) ? number - n_first : 1;
-    middle = (j == 0) ? 100 : newp;
+    middle = (j == 0) ? DRAIN_TAG : newp;
     Point(middle) = {drain_point_x(j), drain_point_y(j), 0, h_joint};
   EndIf
   all_first() += n_first;
@@ -141,7 +147,7 @@ joint_start() = {0};
 For j In {0 : top}
   joint_curves() += first_curve(j);
   If(all_rest(j) > 0)
-    line = (j == 0) ? 100 : newl;
+    line = (j == 0) ? DRAIN_TAG : newl;
     Line(line) = {drain_point(j), known_point(2 * j + 1)};
     Transfinite Curve {line} = all_rest(j) + 1;
     joint_curves() += line;
@@ -174,7 +180,7 @@ For j In {0 : top}
       EndFor
     EndIf
   EndFor
-  body = (j == 0) ? 1 : 100 + j;
+  body = (j == 0) ? DAM_SURFACE : FIRST_LIFT + j;
   Curve Loop(body) = {around()};
   Plane Surface(body) = {body};
   dam() += body;
@@ -196,7 +202,7 @@ For i In {0 : #seg_side() - 1}
 EndFor
 lower() = {};
 base_back() = {joint_back()};
-base_points() = {1, 2};
+base_points() = {known_point(0), known_point(1)};
 If(lift)
   For k In {0 : #known_point() - 1}
     If(known_x(k) == 0 && known_y(k) == 0)
@@ -229,13 +235,15 @@ If(!regular)
   Line(side + 1) = {left, right};
   Line(side + 2) = {right, corner_right};
   fixed() = {side, side + 1, side + 2};
-  Curve Loop(2) = {surface_left(), fixed(), surface_right(), base_back()};
-  Plane Surface(2) = {2};
-  foundation() = {2};
+  rock = 2;
+  Curve Loop(rock) = {surface_left(), fixed(), surface_right(), base_back()};
+  Plane Surface(rock) = {rock};
+  foundation() = {rock};
   If(lift)
-    Curve Loop(3) = {base, under(), joint_back()};
-    Plane Surface(3) = {3};
-    lower() = {3};
+    below_lift = 3;
+    Curve Loop(below_lift) = {base, under(), joint_back()};
+    Plane Surface(below_lift) = {below_lift};
+    lower() = {below_lift};
   EndIf
 Else
   // Quadrangles in the dam, below and beside it; coarse triangles at the sides of the foundation,
@@ -244,59 +252,100 @@ Else
   n_depth = Ceil(7 * n_joint / 50);
   n_side = Ceil(5 * n_joint / 50);
   side = 0.5 * found_side;  // width of the quadrangles beside the joint
-  Point(5) = {-found_side, 0, 0, h_found};
-  Point(6) = {-found_side, -found_depth, 0, h_found};
-  Point(7) = {dam_base + found_side, -found_depth, 0, h_found};
-  Point(8) = {dam_base + found_side, base_toe_y, 0, h_found};
-  Point(9) = {0, -found_depth, 0, h_found};
-  Point(10) = {dam_base, -found_depth, 0, h_found};
-  Point(11) = {-side, 0, 0, h_found};
-  Point(12) = {-side, -found_depth, 0, h_found};
-  Point(13) = {dam_base + side, base_toe_y, 0, h_found};
-  Point(14) = {dam_base + side, -found_depth, 0, h_found};
-  Line(5) = {1, 11};
-  Line(6) = {11, 5};
-  Line(7) = {5, 6};
-  Line(8) = {6, 12};
-  Line(9) = {12, 9};
-  Line(10) = {9, 10};
-  Line(11) = {10, 14};
-  Line(12) = {14, 7};
-  Line(13) = {7, 8};
-  Line(14) = {8, 13};
-  Line(15) = {13, 2};
-  Line(16) = {1, 9};
-  Line(17) = {2, 10};
-  Line(18) = {11, 12};
-  Line(19) = {13, 14};
-  Transfinite Curve {3, 10} = all_first(0) + all_rest(0) + 1;
-  Transfinite Curve {2, -4} = n_dam + 1 Using Progression 1.25 ^ (9 / n_dam);
-  Transfinite Curve {16, 17, 18, 19} = n_depth + 1 Using Progression 1.5 ^ (7 / n_depth);
-  Transfinite Curve {5, -9, -15, 11} = n_side + 1 Using Progression 1.5 ^ (5 / n_side);
-  Transfinite Curve {6, 8, 12, 14} = Ceil(n_joint / 50) + 1;
-  Transfinite Curve {7, 13} = Ceil(2 * n_joint / 50) + 1;
-  Curve Loop(2) = {16, 10, -17, joint_back()};
-  Curve Loop(3) = {5, 18, 9, -16};
-  Curve Loop(4) = {17, 11, -19, 15};
-  Curve Loop(5) = {6, 7, 8, -18};
-  Curve Loop(6) = {19, 12, 13, 14};
-  Plane Surface(2) = {2};
-  Plane Surface(3) = {3};
-  Plane Surface(4) = {4};
-  Plane Surface(5) = {5};
-  Plane Surface(6) = {6};
+  heel = known_point(0);
+  toe = known_point(1);
+  // Points: on the surface of the rock and, below, on its base, from upstream to downstream. The
+  // tags follow those of the dam; a point and a curve at the drains have DRAIN_TAG.
+  floor_end = 5;
+  floor_middle = 11;
+  bed_middle = 13;
+  bed_end = 8;
+  base_left = 6;
+  base_floor = 12;
+  base_heel = 9;
+  base_toe = 10;
+  base_bed = 14;
+  base_right = 7;
+  Point(floor_end) = {-found_side, 0, 0, h_found};
+  Point(base_left) = {-found_side, -found_depth, 0, h_found};
+  Point(base_right) = {dam_base + found_side, -found_depth, 0, h_found};
+  Point(bed_end) = {dam_base + found_side, base_toe_y, 0, h_found};
+  Point(base_heel) = {0, -found_depth, 0, h_found};
+  Point(base_toe) = {dam_base, -found_depth, 0, h_found};
+  Point(floor_middle) = {-side, 0, 0, h_found};
+  Point(base_floor) = {-side, -found_depth, 0, h_found};
+  Point(bed_middle) = {dam_base + side, base_toe_y, 0, h_found};
+  Point(base_bed) = {dam_base + side, -found_depth, 0, h_found};
+  // Curves around the rock, from the heel upstream and back to the toe; then those across it
+  floor_near = 5;
+  floor_far = 6;
+  left_side = 7;
+  base_1 = 8;
+  base_2 = 9;
+  base_3 = 10;
+  base_4 = 11;
+  base_5 = 12;
+  right_side = 13;
+  bed_far = 14;
+  bed_near = 15;
+  below_heel = 16;
+  below_toe = 17;
+  below_floor = 18;
+  below_bed = 19;
+  Line(floor_near) = {heel, floor_middle};
+  Line(floor_far) = {floor_middle, floor_end};
+  Line(left_side) = {floor_end, base_left};
+  Line(base_1) = {base_left, base_floor};
+  Line(base_2) = {base_floor, base_heel};
+  Line(base_3) = {base_heel, base_toe};
+  Line(base_4) = {base_toe, base_bed};
+  Line(base_5) = {base_bed, base_right};
+  Line(right_side) = {base_right, bed_end};
+  Line(bed_far) = {bed_end, bed_middle};
+  Line(bed_near) = {bed_middle, toe};
+  Line(below_heel) = {heel, base_heel};
+  Line(below_toe) = {toe, base_toe};
+  Line(below_floor) = {floor_middle, base_floor};
+  Line(below_bed) = {bed_middle, base_bed};
+  // The dam's faces, from the toe: downstream, crest, upstream
+  downstream = 2;
+  crest_line = 3;
+  upstream = 4;
+  Transfinite Curve {crest_line, base_3} = all_first(0) + all_rest(0) + 1;
+  Transfinite Curve {downstream, -upstream} = n_dam + 1 Using Progression 1.25 ^ (9 / n_dam);
+  Transfinite Curve {below_heel, below_toe, below_floor, below_bed}
+    = n_depth + 1 Using Progression 1.5 ^ (7 / n_depth);
+  Transfinite Curve {floor_near, -base_2, -bed_near, base_4}
+    = n_side + 1 Using Progression 1.5 ^ (5 / n_side);
+  Transfinite Curve {floor_far, base_1, base_5, bed_far} = Ceil(n_joint / 50) + 1;
+  Transfinite Curve {left_side, right_side} = Ceil(2 * n_joint / 50) + 1;
+  // Rock below the dam, beside it upstream and downstream, and at the sides
+  rock_below = 2;
+  rock_left = 3;
+  rock_right = 4;
+  side_left = 5;
+  side_right = 6;
+  Curve Loop(rock_below) = {below_heel, base_3, -below_toe, joint_back()};
+  Curve Loop(rock_left) = {floor_near, below_floor, base_2, -below_heel};
+  Curve Loop(rock_right) = {below_toe, base_4, -below_bed, bed_near};
+  Curve Loop(side_left) = {floor_far, left_side, base_1, -below_floor};
+  Curve Loop(side_right) = {below_bed, base_5, right_side, bed_far};
+  For k In {rock_below : side_right}
+    Plane Surface(k) = {k};
+  EndFor
+  quadrangles() = {dam(0), rock_below, rock_left, rock_right};
   If(drained)  // bounded by five curves: the corners are given
-    Transfinite Surface {1} = {1, 2, known_point(2), known_point(3)};
-    Transfinite Surface {2} = {1, 9, 10, 2};
-    Transfinite Surface {3:4};
+    Transfinite Surface {dam(0)} = {heel, toe, known_point(2), known_point(3)};
+    Transfinite Surface {rock_below} = {heel, base_heel, base_toe, toe};
+    Transfinite Surface {rock_left, rock_right};
   Else
-    Transfinite Surface {1:4};
+    Transfinite Surface {quadrangles()};
   EndIf
-  Recombine Surface {1:4};
-  foundation() = {2:6};
-  fixed() = {7, 8, 9, 10, 11, 12, 13};
-  surface_left() = {5, 6};
-  surface_right() = {14, 15};
+  Recombine Surface {quadrangles()};
+  foundation() = {rock_below : side_right};
+  fixed() = {left_side, base_1, base_2, base_3, base_4, base_5, right_side};
+  surface_left() = {floor_near, floor_far};
+  surface_right() = {bed_far, bed_near};
 EndIf
 
 // Between several joints: element sizes by the distance from the nearest one, not below that of
