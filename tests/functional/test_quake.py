@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from damjoint import RunError
 from damjoint.dynamics import step as step_module
-from damjoint.dynamics.frames import MOST_FRAMES, Frames, interval_of
+from damjoint.dynamics.frames import MOST_FRAMES, Frames, frame_interval
 from damjoint.dynamics.history import QuakeHistory
 from damjoint.dynamics.record import read
 from damjoint.dynamics.scheme import Motion
@@ -829,7 +829,7 @@ def test_frames_are_at_most_200(steps, span):
     """The static state, every n-th step within the span, and the end if it is in the span."""
     times = np.add.accumulate(np.full(steps, 0.005))
     duration = 0.005 * steps
-    interval = interval_of(0.005, duration, span)
+    interval = frame_interval(0.005, duration, span)
     frames = Frames(interval, span, None)
     chosen = np.array([time for time in times if frames.wanted(time, duration)])
     assert 1 + len(chosen) <= MOST_FRAMES

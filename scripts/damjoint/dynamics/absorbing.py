@@ -77,8 +77,8 @@ class FreeField:
         velocity, stress = np.zeros((2, len(self.y), 2))
         for axis, speed in enumerate(self.speeds):
             up, down = (
-                self.record.velocity(time + way / speed)[:, axis] / 2
-                for way in (-self.y, self.y - 2 * self.surface)
+                self.record.velocity(time + path / speed)[:, axis] / 2
+                for path in (-self.y, self.y - 2 * self.surface)
             )
             velocity[:, axis] = up + down
             stress[:, axis] = self.density * speed * (down - up)
@@ -109,8 +109,8 @@ class AbsorbingRock:
         of_elements = outward(boundary, space.body)
         assert of_elements is not None  # a section's boundary has sides of elements
         normals = of_elements[0][points.elements][:, :dim]
-        places = np.ravel(dim * space.find(part)[:, None] + np.arange(dim))
-        values = sparse.kron(points.values.scipy(), sparse.eye(dim)) @ moved[places]
+        dofs = np.ravel(dim * space.find(part)[:, None] + np.arange(dim))
+        values = sparse.kron(points.values.scipy(), sparse.eye(dim)) @ moved[dofs]
         weighted = values.T @ sparse.diags(np.repeat(points.weights, dim))
         along = normals[:, :, None] * normals[:, None, :]
         impedance = density * (speeds[1] * along + speeds[0] * (np.eye(dim) - along))

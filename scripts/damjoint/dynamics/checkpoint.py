@@ -29,7 +29,7 @@ from .stepper import Earthquake
 def fingerprint(case: Case, span: tuple[float, float] | None) -> str:
     """Hash of all that an earthquake depends on; span: of its frames."""
     record = case.record.read_bytes() if case.record else b""
-    values = [own.values for own in case.joints]
+    values = [joint.values for joint in case.joints]
     loading = case.levels, case.tail_levels, case.times
     scene = json.dumps([__version__, sources(), key_of(case), values, loading, span], default=str)
     return hashlib.sha256(scene.encode() + record).hexdigest()

@@ -41,7 +41,7 @@ class Frames:
     def of(quake: Earthquake, span: tuple[float, float] | None = None) -> Frames:
         """The frame of the static state; span: of all others [s], by default the whole record."""
         span = span or (0.0, math.inf)
-        interval = interval_of(quake.dt, quake.record.duration, span)
+        interval = frame_interval(quake.dt, quake.record.duration, span)
         frames = Frames(interval, span, History(quake.problem.model.equilibrium))
         frames.add(quake, quake.problem.at_rest, 0, 0.0)
         return frames
@@ -100,7 +100,7 @@ class Frames:
         }
 
 
-def interval_of(dt: float, duration: float, span: tuple[float, float]) -> float:
+def frame_interval(dt: float, duration: float, span: tuple[float, float]) -> float:
     """The smallest multiple of dt at which there are at most MOST_FRAMES in a span: the static
     state, both ends of the span, and the end of a record of a duration.
     """

@@ -38,12 +38,12 @@ def corner_dashpots(joint: JointInterface, dashpots: Array, state: State) -> Spa
     areas = np.bincount(points.elements, points.weights) * (opening[order[starts]] < 0)
     result, first = sparse.csr_matrix((len(state.jump), len(state.jump))), 0
     for _, cells in joint.surface.cells:
-        own, corners = slice(first, first + len(cells)), cells.shape[1]
+        of_cells, corners = slice(first, first + len(cells)), cells.shape[1]
         first += len(cells)
         size = cells.size, len(joint.space.locations)
         values = CsrMatrix(np.ones(cells.size), cells.ravel(), np.arange(cells.size + 1), size)
-        frames = np.repeat(joint.frames[own], corners, axis=0)
+        frames = np.repeat(joint.frames[of_cells], corners, axis=0)
         at_corners = joint.components(values, frames).scipy()
-        parts = np.outer(np.repeat(areas[own] / corners, corners), dashpots[: joint.dim])
+        parts = np.outer(np.repeat(areas[of_cells] / corners, corners), dashpots[: joint.dim])
         result = result + at_corners.T @ sparse.diags(parts.ravel()) @ at_corners
     return result

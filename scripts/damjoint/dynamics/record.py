@@ -169,17 +169,17 @@ def check_steps(case: Case, times: Array, lines: IntArray) -> None:
             f"{name}, row {lines[k + 1]}: t = {times[k + 1]:g} s: must be >= {SHORTEST:g} s after "
             "the time before"
         )
-    own = f"the shortest interval of {case.record}"
+    limit = f"the shortest interval of {case.record}"
     if shortest < typical * (1 - DIGITS):
-        own += f" (before row {lines[k + 1]}; half of its intervals are >= {typical:g} s)"
+        limit += f" (before row {lines[k + 1]}; half of its intervals are >= {typical:g} s)"
     if dt > shortest * (1 + DIGITS):
-        raise InputError(f"dt = {dt:g}: must be <= {shortest:g} s, {own}")
+        raise InputError(f"dt = {dt:g}: must be <= {shortest:g} s, {limit}")
     duration = float(times[-1]) - case["record_start"]
     step = shortest / 2 if dt == -1 else dt
     number = (duration + rest) / max(step, TINY)
     if number <= MOST_STEPS:
         return
-    cause = f"dt = {dt:g}" + (f", half {own}" if dt == -1 else "")
+    cause = f"dt = {dt:g}" + (f", half {limit}" if dt == -1 else "")
     if duration + rest > typical / 2 * MOST_STEPS:
         longest = f"{name}, row {lines[-1]}: t = {times[-1]:g} s"
         cause = f"record_rest = {rest:g}" if rest > duration else longest

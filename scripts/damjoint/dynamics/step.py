@@ -191,7 +191,7 @@ class TimeStep:
 def lift(equilibrium: Equilibrium, pressure: tuple[Pressure, ...]) -> Array:
     """Nodal forces (j,) of the water pressure in the joints."""
     parts = (
-        water.force(own.water_points)
-        for water, own in zip(equilibrium.water, pressure, strict=True)
+        water.force(of_joint.water_points)
+        for water, of_joint in zip(equilibrium.water, pressure, strict=True)
     )
     return sum(parts, np.zeros(len(equilibrium.bulk.stiffness)))

@@ -48,7 +48,7 @@ class Damping:
     def of(case: Case, frequencies: Array) -> Damping:
         """The damping of a case, by default at the first and third natural frequency."""
         ends = (case["damping_f1"], frequencies[0]), (case["damping_f2"], frequencies[-1])
-        f1, f2 = (float(own if given == -1 else given) for given, own in ends)
+        f1, f2 = (float(natural if given == -1 else given) for given, natural in ends)
         w1, w2 = 2 * math.pi * f1, 2 * math.pi * f2
         a1 = 2 * case["damping"] / (w1 + w2)
         a0 = a1 * w1 * w2 if case["damping_mass"] != WITHOUT else 0.0

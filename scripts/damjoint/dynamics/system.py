@@ -209,10 +209,10 @@ def added_mass(case: Case, interface: Interface, body: ElasticBody) -> Sparse:
         ).tocsr()
         weighted = normal.T @ sparse.diags(face.points.weights * density) @ normal
         number = dofs.reshape(-1, face.dim).T.ravel()
-        places = sparse.csr_matrix(
+        numbering = sparse.csr_matrix(
             (np.ones(len(number)), (number, np.arange(len(number)))), (size, len(number))
         )
-        result += places @ weighted @ places.T
+        result += numbering @ weighted @ numbering.T
     return result
 
 

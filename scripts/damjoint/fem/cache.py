@@ -183,8 +183,8 @@ def unpack(tree: Any, arrays: list[Array]) -> Any:
 def prune(parent: Path) -> None:
     """Delete the files longest unused until the cache is not above its limit."""
     kinds = ".bin", ".json", ".npz"  # the last: of earlier versions
-    found = [file for file in parent.iterdir() if file.suffix in kinds]
-    files = sorted(found, key=lambda f: f.stat().st_mtime)
+    entries = [file for file in parent.iterdir() if file.suffix in kinds]
+    files = sorted(entries, key=lambda f: f.stat().st_mtime)
     total = sum(f.stat().st_size for f in files)
     for file in files:
         if total <= LIMIT:

@@ -115,13 +115,13 @@ def solve_lower(factor: Array, right: Array) -> Array:
     return solution
 
 
-def add_at(total: Array, places: Any, values: Array) -> None:
+def add_at(total: Array, indices: Any, values: Array) -> None:
     """Add values at places of an array, which may be repeated."""
-    rows = np.ravel(places[0] if isinstance(places, tuple) else places)
+    rows = np.ravel(indices[0] if isinstance(indices, tuple) else indices)
     if len(distinct(rows)) == len(rows):
-        total[places] += values  # several times faster
+        total[indices] += values  # several times faster
     else:
-        np.add.at(total, places, values)
+        np.add.at(total, indices, values)
 
 
 class JointElimination:
@@ -132,14 +132,14 @@ class JointElimination:
         glued = np.zeros((gluing.nodes, gluing.nodes))
         coupling = np.zeros((gluing.unknowns, gluing.nodes))
         by_jumps = np.zeros((gluing.unknowns, gluing.unknowns))
-        for name, own in gluing.bodies.items():
+        for name, of_body in gluing.bodies.items():
             stiffness = reduced[name].stiffness
             # (a body that a joint is inside of has several degrees of freedom of a node)
-            add_at(glued, np.ix_(own.node, own.node), stiffness)
-            if len(own.jumps.data):
-                carried = own.on_jumps(stiffness).T
-                add_at(coupling.T, own.node, carried)
-                by_jumps += own.on_jumps(carried)
+            add_at(glued, np.ix_(of_body.node, of_body.node), stiffness)
+            if len(of_body.jumps.data):
+                carried = of_body.on_jumps(stiffness).T
+                add_at(coupling.T, of_body.node, carried)
+                by_jumps += of_body.on_jumps(carried)
         #: C^T
         self.coupling = coupling
         #: K, L of K = L L^T, and L^-1 C
@@ -149,17 +149,17 @@ class JointElimination:
         #: S
         self.stiffness = by_jumps - self.half.T @ self.half
 
-    def on_nodes(self, own: BodyDofs, forces: Array) -> Array:
+    def on_nodes(self, of_body: BodyDofs, forces: Array) -> Array:
         """Forces (n, ...) on the degrees of freedom of a body as forces on the glued ones."""
         total = np.zeros((self.gluing.nodes, *forces.shape[1:]))
-        add_at(total, own.node, forces)
+        add_at(total, of_body.node, forces)
         return total
 
-    def transmitted(self, own: BodyDofs, forces: Array) -> Array:
+    def transmitted(self, of_body: BodyDofs, forces: Array) -> Array:
         """t_0 of forces (n, k) on the degrees of freedom of a body."""
-        nodes = self.on_nodes(own, forces)
+        nodes = self.on_nodes(of_body, forces)
         through = self.half.T @ solve_lower(self.factor, nodes)
-        return own.on_jumps(forces) - through
+        return of_body.on_jumps(forces) - through
 
 
 def responses_body_by_body(bodies: Bodies, gluing: Gluing) -> Responses:
@@ -192,18 +192,18 @@ def responses_body_by_body(bodies: Bodies, gluing: Gluing) -> Responses:
     dof_of_face: dict[str, IntArray] = {}
     count = 0
     for name, body in bodies.by_name.items():
-        own, dofs_of = reduced[name], gluing.bodies[name]
+        part, of_body = reduced[name], gluing.bodies[name]
         bears_crest = name == crest_body
-        pressure.append(joints.transmitted(dofs_of, own.forces))
-        direct = np.pad(row, (0, len(own.dofs) - size)) if bears_crest else 0
-        crest_pressure.append(direct + crest_both[dofs_of.node] @ own.forces)
+        pressure.append(joints.transmitted(of_body, part.forces))
+        direct = np.pad(row, (0, len(part.dofs) - size)) if bears_crest else 0
+        crest_pressure.append(direct + crest_both[of_body.node] @ part.forces)
         column = np.full(body.stiffness.shape[0], -1)
-        column[own.dofs] = count + np.arange(len(own.dofs))
-        count += len(own.dofs)
+        column[part.dofs] = count + np.arange(len(part.dofs))
+        count += len(part.dofs)
         dof_of_face |= {n: column[dofs] for n, dofs in body.face_dofs.items()}
-        by_load = joints.transmitted(dofs_of, own.units)
-        moved = (row @ own.loaded_units if bears_crest else 0) + (
-            crest_both[dofs_of.node] @ own.units
+        by_load = joints.transmitted(of_body, part.units)
+        moved = (row @ part.loaded_units if bears_crest else 0) + (
+            crest_both[of_body.node] @ part.units
         )
         for i, load in enumerate(body.unit_loads):
             units[load] = units.get(load, 0) + by_load[:, i]

@@ -143,8 +143,8 @@ def mass(space: Space, dim: int, densities: dict[str, float]) -> Sparse:
     size = len(space.locations)
     scalar = sparse.csr_matrix((size, size))
     if values:
-        places = np.concatenate(rows), np.concatenate(columns)
-        scalar = sparse.coo_matrix((np.concatenate(values), places), (size, size)).tocsr()
+        indices = np.concatenate(rows), np.concatenate(columns)
+        scalar = sparse.coo_matrix((np.concatenate(values), indices), (size, size)).tocsr()
     return sparse.kron(scalar, sparse.eye(dim), format="csr")
 
 
@@ -167,7 +167,7 @@ def thermal_load(
 
 def inside(space: Space, region: str | None) -> BoolArray:
     """Whether each element of a body is in a region, or in any."""
-    return by_element(space, [region in (None, own) for own in space.body.regions])
+    return by_element(space, [region in (None, of_element) for of_element in space.body.regions])
 
 
 def by_element(space: Space, values: list[Any]) -> Any:

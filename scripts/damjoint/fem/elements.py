@@ -254,8 +254,8 @@ class Space:
             cuts = np.cumsum([m.size // 3 for m in middles])[:-1]
             products = np.split(len(body.points) + inverse, cuts)
             self.connectivity = [
-                (shape, np.hstack([cells, own.reshape(p.shape[:2])]))
-                for (shape, cells), p, own in zip(body.cells, pairs, products, strict=True)
+                (shape, np.hstack([cells, numbers.reshape(p.shape[:2])]))
+                for (shape, cells), p, numbers in zip(body.cells, pairs, products, strict=True)
             ]
 
     def find(self, part: Space) -> IntArray:

@@ -79,8 +79,8 @@ def compile_into(folder: Path) -> ctypes.CDLL | None:
     path = folder / file_name()
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=folder) as own:  # others may compile it, too
-            part = Path(own) / path.name
+        with tempfile.TemporaryDirectory(dir=folder) as temporary:  # others may compile it, too
+            part = Path(temporary) / path.name
             options = "-O2", "-shared", "-fPIC", SOURCE, "-ldmumps_seq", "-o", part
             subprocess.run(["cc", *options], check=True, capture_output=True)
             with part.open("r+b") as file:  # what follows the sections is not loaded
@@ -199,13 +199,13 @@ class MumpsFactors:
         fails.
         """
         self.mumps, self.keep = mumps, (keep + 1).astype(np.int32)
-        *places, values = upper_triangle(matrix)
+        *indices, values = upper_triangle(matrix)
         order, self.size = elimination_order(matrix, keep), matrix.shape[0]
         #: lower triangle of the Schur complement of `keep` (k, k)
         self.lower = np.zeros((len(keep), len(keep)))
         beside += float(self.lower.nbytes)
         needed, error = ctypes.c_double(), ctypes.c_int()
-        row, column = (i.astype(np.int32, copy=False) for i in places)
+        row, column = (i.astype(np.int32, copy=False) for i in indices)
         for index in row, column:
             index += 1
         mumps.damjoint_factorise.restype = ctypes.c_void_p
@@ -253,8 +253,8 @@ class MumpsFactors:
     def _run(self, right: Array, part: int, reduced: Array | None) -> None:
         """See damjoint_solve."""
         count = right.shape[1] if right.ndim > 1 else 1
-        own = None if reduced is None else pointer(reduced)
-        error = self.mumps.damjoint_solve(self.factors, count, pointer(right), part, own)
+        on_schur = None if reduced is None else pointer(reduced)
+        error = self.mumps.damjoint_solve(self.factors, count, pointer(right), part, on_schur)
         if error:
             raise RuntimeError(f"MUMPS, error {error}")
 

@@ -31,8 +31,8 @@ class GluedBodies:
         shared = np.full(gluing.nodes, -1)
         numbers, fixed, size = {}, list[IntArray](), 0
         for name, body in reversed(bodies.items()):
-            of_body, own = gluing.bodies[name], body.stiffness.shape[0]
-            number = np.full(own, -1)
+            of_body, dofs = gluing.bodies[name], body.stiffness.shape[0]
+            number = np.full(dofs, -1)
             number[of_body.dofs] = shared[of_body.node]
             new = np.flatnonzero(number < 0)
             number[new] = size + np.arange(len(new))
@@ -53,21 +53,23 @@ class GluedBodies:
             return sparse.csr_matrix((np.ones(len(rows)), (rows, columns)), shape)
 
         motion = {}
-        for name, own in gluing.bodies.items():
+        for name, of_body in gluing.bodies.items():
             number, count = self.numbers[name], len(self.numbers[name])
             glued = boolean(np.arange(count), number, (count, self.size))
-            on_joints = np.arange(len(own.dofs))
-            carried = boolean(own.dofs, on_joints, (count, len(own.dofs))) @ own.jumps.scipy()
+            on_joints = np.arange(len(of_body.dofs))
+            carried = (
+                boolean(of_body.dofs, on_joints, (count, len(of_body.dofs))) @ of_body.jumps.scipy()
+            )
             motion[name] = sparse.hstack([glued[:, self.free], carried], format="csr")
         return motion
 
     def stiffness(self) -> CsrMatrix:
         """Stiffness of the free degrees of freedom [N/m]."""
-        place = np.full(self.size, -1, np.int32)
-        place[self.free] = np.arange(len(self.free))
+        position = np.full(self.size, -1, np.int32)
+        position[self.free] = np.arange(len(self.free))
         parts = []
         for name, body in self.bodies.items():
-            number = place[self.numbers[name]]
+            number = position[self.numbers[name]]
             rows = np.repeat(number, body.stiffness.counts)
             columns = number[body.stiffness.indices]
             free = (rows >= 0) & (columns >= 0)

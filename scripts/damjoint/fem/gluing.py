@@ -78,30 +78,30 @@ class Gluing:
         roots, carried, independent = trees(up, low, sum(sizes))
         column = np.cumsum(independent) - 1
         unknowns = int(independent.sum())
-        _, where, place = np.unique(roots[low], return_index=True, return_inverse=True)
+        _, where, position = np.unique(roots[low], return_index=True, return_inverse=True)
         order = np.argsort(np.argsort(where))  # in the order in which the joints have them
         node = np.full(sum(sizes), -1)
-        node[low] = node[up] = order[place]
+        node[low] = node[up] = order[position]
 
         def of_body(name: str) -> BodyDofs:
             end = first[name] + sizes[names.index(name)]
             above, below = ((m >= first[name]) & (m < end) for m in (up, low))
-            own = np.column_stack([up, low])[np.column_stack([above, below])]
-            own = own[np.sort(np.unique(own, return_index=True)[1])]
-            matrix = combined([carried.get(int(m), {}) for m in own], column, unknowns)
-            return BodyDofs(dofs=own - first[name], node=node[own], jumps=matrix)
+            functions = np.column_stack([up, low])[np.column_stack([above, below])]
+            functions = functions[np.sort(np.unique(functions, return_index=True)[1])]
+            matrix = combined([carried.get(int(m), {}) for m in functions], column, unknowns)
+            return BodyDofs(dofs=functions - first[name], node=node[functions], jumps=matrix)
 
         def of_joints(k: int) -> JointDofs:
-            own = np.flatnonzero(of_joint == k)
+            of_this = np.flatnonzero(of_joint == k)
             jumps = (
                 {int(e): 1.0}
                 if independent[e]
                 else difference(carried.get(int(up[e]), {}), carried.get(int(low[e]), {}))
-                for e in own
+                for e in of_this
             )
             entries = combined(list(jumps), column, unknowns)
             return JointDofs(
-                rows=rows[own][entries.rows], columns=entries.indices, factors=entries.data
+                rows=rows[of_this][entries.rows], columns=entries.indices, factors=entries.data
             )
 
         return Gluing(

@@ -95,7 +95,7 @@ def number_of_terms(at_points: CsrMatrix, dim: int) -> int:
 class Terms:
     """Sum of B^T D B over Gauss points with matrices D (dim, dim): B interpolates the jump.
 
-    The pattern of the sum is that of the interpolation and is found once; a product of sparse
+    The pattern of the sum is that of the interpolation and is computed once; a product of sparse
     matrices would sort it anew in every iteration of Newton's method.
     """
 

@@ -29,18 +29,21 @@ class Equilibrium:
     def __init__(self, case: Case, interface: Interface) -> None:
         self.case, self.bulk, self.interface = case, interface.bulk, interface
         self.water = [
-            JointWater(own, joint, number)
-            for number, (own, joint) in enumerate(zip(case.joints, interface.joints, strict=True))
+            JointWater(joint_case, joint, number)
+            for number, (joint_case, joint) in enumerate(
+                zip(case.joints, interface.joints, strict=True)
+            )
         ]
         #: where water flows
         systems = water_systems(self.water, interface)
         self.flowing = tuple(system for system in systems if system.members[0].flowing)
         self.unit_weight = case["rho_water"] * case["g"]
-        self.laws = JointLaws([own.law for own in case.joints])
+        self.laws = JointLaws([joint_case.law for joint_case in case.joints])
         #: whether the state under rising water depends on the steps that lead to it; in a crack
         #: water enters after the step that has opened it
         self.path_dependent = any(
-            own.law.path_dependent or own["uplift"] == "cracked" for own in case.joints
+            joint_case.law.path_dependent or joint_case["uplift"] == "cracked"
+            for joint_case in case.joints
         )
         #: tangent (q, 3, 3) of the undamaged joints
         points = [len(joint.points.weights) for joint in interface.joints]

@@ -119,9 +119,9 @@ class JointInterface:
         total, count = np.zeros((number, values.shape[1])), np.zeros((number, 1))
         for shape, cells in self.surface.cells:
             points = self.rule[shape]
-            own = values[start : start + points * len(cells)].reshape(len(cells), points, -1)
+            of_cells = values[start : start + points * len(cells)].reshape(len(cells), points, -1)
             start += points * len(cells)
-            at_corners = elements.to_corners(shape, points) @ own
+            at_corners = elements.to_corners(shape, points) @ of_cells
             np.add.at(total, cells, at_corners)
             np.add.at(count, cells, 1)
         return total / count
@@ -228,7 +228,7 @@ class Interface:
         weighted = self.weights[:, None] * traction[:, : self.dim]
         return self.from_points @ weighted.ravel()
 
-    def flow_of(self, network: Network, waterstops: tuple[float | None, ...]) -> Flow:
+    def network_flow(self, network: Network, waterstops: tuple[float | None, ...]) -> Flow:
         """Operators of water that flows in joints that meet; kept. waterstops: distance from the
         heel of each joint beyond which there is none.
         """

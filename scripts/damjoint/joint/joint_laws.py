@@ -1,4 +1,4 @@
-"""The laws of all joints at once: points joint by joint, each joint with its own law.
+"""The laws of all joints at once: points joint by joint, each joint with its law.
 
 The methods are those of `Law` (see laws/base.py); arrays are those of the joints, one after the
 other.
@@ -57,7 +57,7 @@ class JointLaws:
     def begin_step(self, variables: JointVariables, begin: float, end: float) -> JointVariables:
         """See `Law`."""
         pairs = zip(self.laws, variables.joints, strict=True)
-        parts = tuple(law.begin_step(own, begin, end) for law, own in pairs)
+        parts = tuple(law.begin_step(state, begin, end) for law, state in pairs)
         return JointVariables(parts, variables.starts)
 
     def update_internal_variables(self, jump: Array, variables: JointVariables) -> JointVariables:
@@ -70,8 +70,8 @@ class JointLaws:
     ) -> list[Any]:
         """The values of a method of `Law` with each joint's jumps and internal variables."""
         return [
-            getattr(law, method.__name__)(own, state)
-            for law, own, state in zip(
+            getattr(law, method.__name__)(jumps, state)
+            for law, jumps, state in zip(
                 self.laws, variables.split(jump), variables.joints, strict=True
             )
         ]

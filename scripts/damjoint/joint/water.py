@@ -75,17 +75,17 @@ class JointWater:
         #: the part of the joint on which water may press
         self.wetted = joint.wetted_within(self.waterstop) if self.waterstop else joint.wetted
         self.law: Law[Any] = case.law
-        #: heights of heel and toe [m] and path coordinate at the places of `head`
-        self.places = lru_cache(maxsize=4)(self._places)
+        #: heights of heel and toe [m] and path coordinate at the points of `head`
+        self.along = lru_cache(maxsize=4)(self._along)
 
-    def _places(self, matrix: CsrMatrix | None) -> tuple[Array, Array, Array]:
+    def _along(self, matrix: CsrMatrix | None) -> tuple[Array, Array, Array]:
         along = self.system.fields
         values = [field[self.nodes] for field in (along.heel_y, along.toe_y, along.xi)]
         heel, toe, xi = values if matrix is None else [matrix @ field for field in values]
         return heel, toe, xi
 
     def head(self, loading: Loading, matrix: CsrMatrix | None = None) -> Array:
-        """Head [m] in a joint of uniform transmissivity, at the joint's nodes or at the places that
+        """Head [m] in a joint of uniform transmissivity, at the joint's nodes or at the points that
         an interpolation matrix of `JointFields` leads to: linear along the joint between the heads
         of `heads_at_ends`, along the whole path where joints meet. With a waterstop: that of the
         reservoir, or of the joint from which the water comes.
@@ -99,7 +99,7 @@ class JointWater:
         if self.system.branched:
             nodal = self.system.heads(loading)[self.nodes]
             return nodal if matrix is None else matrix @ nodal
-        case, (heel, toe, xi) = self.case, self.places(matrix)
+        case, (heel, toe, xi) = self.case, self.along(matrix)
         levels = loading.level, loading.tail
         first, last = heads_at_ends(case, *levels, heel, toe, self.flowing)
         drains: Sequence[tuple[float, Array | float, float, float]] = ()
@@ -128,7 +128,7 @@ class JointWater:
         return values
 
     def uplift(self, loading: Loading, matrix: CsrMatrix, y: Array, beyond: Array | float) -> Array:
-        """Pressure [Pa], not below zero, at places of height y that an interpolation matrix of
+        """Pressure [Pa], not below zero, at points of height y that an interpolation matrix of
         `JointFields` leads to; beyond: pressure of flowing water beyond the imposed one.
         """
         pressure = np.maximum(self.unit_weight * (self.head(loading, matrix) - y) + beyond, 0)
@@ -178,8 +178,8 @@ class JointWater:
         """
         assert self.drains
         nodes, _ = self.drains
-        own = self.joint.surface.points[nodes, 1]
-        outlet = np.maximum(own, max(self.case["drain_level"], loading.tail))
+        height = self.joint.surface.points[nodes, 1]
+        outlet = np.maximum(height, max(self.case["drain_level"], loading.tail))
         return self.nodes[nodes], outlet
 
     def cracked_to_drains(self, factor: Array) -> bool:
@@ -262,8 +262,8 @@ class JointWater:
         water_points = at(self.wetted.fields, self.wetted.points.positions)
         nodes = at(fields.at_locations, joint.space.locations)
         if before_quake and self.dry_crack:
-            opening, own = joint.jumps(joint.at_points, jump)[:, 0], variables.joints[self.number]
-            lost_at_points = self.lost_pressure(opening, own, loading, before_quake)[0][:, 0]
+            opening, state = joint.jumps(joint.at_points, jump)[:, 0], variables.joints[self.number]
+            lost_at_points = self.lost_pressure(opening, state, loading, before_quake)[0][:, 0]
             weights = joint.points.weights  # at the nodes so that the resultant is the same
             spread = fields.at_points.T @ (weights * lost_at_points)
             lost_at_nodes = spread / (fields.at_points.T @ weights)
@@ -298,7 +298,7 @@ class WaterSystem:
         """Operators of the flow."""
         if self.network and self.interface:
             waterstops = tuple(water.waterstop for water in self.members)
-            return self.interface.flow_of(self.network, waterstops)
+            return self.interface.network_flow(self.network, waterstops)
         return self.members[0].joint.flow
 
     @property
@@ -357,7 +357,7 @@ class WaterSystem:
         (EM 1110-2-2200).
         """
         opened = [water.opened(jump, variables, before_quake) for water in self.members]
-        factors = [water.aperture(*own)[0] for water, own in zip(self.members, opened, strict=True)]
+        factors = [water.aperture(*at)[0] for water, at in zip(self.members, opened, strict=True)]
         conductivity = np.concatenate(
             [
                 water.scale * factor * water.joint.points.weights
@@ -399,9 +399,9 @@ class WaterSystem:
         """
         sizes = [len(member.joint.points.weights) for member in self.members]
         first = sum(sizes[: self.members.index(water)])
-        own = slice(first, first + len(water.joint.points.weights))
+        of_joint = slice(first, first + len(water.joint.points.weights))
         by_axis = {
-            axis: sum(system.share * system.gradients[k][own] for system in solution.systems)
+            axis: sum(system.share * system.gradients[k][of_joint] for system in solution.systems)
             for k, axis in enumerate(self.fields.axes)
         }
         return [np.asarray(by_axis[axis]) for axis in water.joint.fields.axes]

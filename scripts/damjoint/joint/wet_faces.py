@@ -105,8 +105,8 @@ class WetFace:
         nodes = self.surface.points[functions[: len(elements.corners_of(shape))]]
         normal = self.surface.normals[element, : self.dim]
         of_functions = forces.reshape(-1, self.dim)
-        for u, place, area in points_below(shape, nodes, nodes[:, 1] - level):
-            force = area * height(level, place[1], abs(normal[0]))
+        for u, position, area in points_below(shape, nodes, nodes[:, 1] - level):
+            force = area * height(level, position[1], abs(normal[0]))
             values = elements.basis(shape, self.space.order, u)[0]
             of_functions[functions] -= force * np.outer(values, normal)
 
@@ -149,16 +149,16 @@ def points_where(space: elements.Space, height: Array) -> elements.Points:
             if (height[corners] < 0).any():
                 points = points_below(shape, surface.points[corners], height[corners])
                 rows += [
-                    (elements.basis(shape, space.order, u)[0], functions, place, area, start + e)
-                    for u, place, area in points
+                    (elements.basis(shape, space.order, u)[0], functions, position, area, start + e)
+                    for u, position, area in points
                 ]
         start += len(table)
-    values, functions, places, areas, numbers = zip(*rows, strict=True) if rows else ([],) * 5
+    values, functions, positions, areas, numbers = zip(*rows, strict=True) if rows else ([],) * 5
     pointers = np.cumsum([0, *map(len, values)])
     data = (np.concatenate([[], *values]), np.concatenate([NONE, *functions]), pointers)
     return elements.Points(
         weights=np.array(areas, float),
-        positions=np.array(places, float).reshape(-1, 3),
+        positions=np.array(positions, float).reshape(-1, 3),
         values=CsrMatrix(*data, (len(rows), len(space.locations))),
         gradients=(),
         elements=np.array(numbers, int),

@@ -146,7 +146,7 @@ class Law(Generic[V]):
         return self.damage(jump, variables) >= self.broken_damage
 
     def cohesion_left(self, jump: Array, variables: V) -> Array:
-        """Part of the cohesion that a point has left (q,), 1 to 0; here 1 until it is broken."""
+        """Remaining part of the cohesion of a point (q,), 1 to 0; here 1 until it is broken."""
         return np.where(self.is_broken(jump, variables), 0.0, 1.0)
 
     def opening_of_crack(self, variables: V, points: int) -> Array:

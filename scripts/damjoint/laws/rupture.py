@@ -127,7 +127,7 @@ class Rupture(SofteningLaw[RuptureVariables]):
         return (variables.kappa >= self.L_C) | (variables.sawn > 0)
 
     def shear_share(self, opening: Array) -> Array:
-        """What is left of the shear stiffness (q,): 1 to 0."""
+        """Remaining part of the shear stiffness (q,): 1 to 0."""
         return np.where(opening <= 0, 1, np.maximum(1 - opening / self.L_CT, 0))
 
     def shear_slope(self, opening: Array) -> Array:
@@ -168,7 +168,7 @@ class Rupture(SofteningLaw[RuptureVariables]):
         return normal, np.maximum(stiffness, weak) if secant else stiffness
 
     def stiffness(self, normal: Array, shear_share: Array) -> Array:
-        """The diagonal stiffness (q, 3, 3): normal, and what is left of the shear stiffness."""
+        """The diagonal stiffness (q, 3, 3): normal, and the remaining shear stiffness."""
         shear = np.maximum(self.K_T * shear_share, self.artificial * self.K_T)
         matrix = np.zeros((len(normal), 3, 3))
         matrix[:, 0, 0], matrix[:, 1, 1], matrix[:, 2, 2] = normal, shear, shear
@@ -177,7 +177,7 @@ class Rupture(SofteningLaw[RuptureVariables]):
     def traction_and_tangent(
         self, jump: Array, variables: RuptureVariables, frozen: Array | None = None
     ) -> tuple[Array, Array]:
-        """See `Law`; frozen: what is left of the shear stiffness."""
+        """See `Law`; frozen: the remaining part of the shear stiffness."""
         opening, slip = self.opening(jump, variables), jump[:, 1:] - variables.released
         normal, slope = self.normal_response(opening, variables, frozen)
         share = self.shear_share(opening) if frozen is None else frozen
@@ -196,7 +196,7 @@ class Rupture(SofteningLaw[RuptureVariables]):
         return self.stiffness(normal, share)
 
     def frozen_damage(self, jump: Array, variables: RuptureVariables) -> Array:
-        """See `SofteningLaw`: what is left of the shear stiffness."""
+        """See `SofteningLaw`: the remaining part of the shear stiffness."""
         return self.shear_share(self.opening(jump, variables))
 
     def release_side(self, jump: Array, variables: RuptureVariables) -> NDArray[np.int_]:

@@ -1,4 +1,4 @@
-"""What is prescribed in a step: the reservoir's level, or a displacement that is found with it."""
+"""What is prescribed in a step: the level, or a displacement, with the level unknown."""
 
 from __future__ import annotations
 

@@ -170,17 +170,17 @@ def joint_rows(equilibrium: Equilibrium, state: State, number: int) -> tuple[Arr
     """
     joint, law = equilibrium.interface.joints[number], equilibrium.laws.laws[number]
     variables, pressure = state.node_variables.joints[number], state.pressures[number]
-    place, corners = joint.space.locations, len(joint.surface.points)
+    locations, corners = joint.space.locations, len(joint.surface.points)
     jump = joint.jumps(joint.at_nodes, state.jump)
     traction, _ = law.traction_and_tangent(jump, variables)
     damage, slip = law.damage(jump, variables), law.slip(variables, len(jump))
     nodes = joint.mean_at_nodes(np.column_stack([jump, traction, damage, slip]))
     nodes[:, 3] -= pressure.nodes
     columns = {
-        "time": np.full(len(place), state.time),
-        "level": np.full(len(place), state.loading.level),
-        "joint": np.full(len(place), number + 1.0),
-        **dict(zip("xyz", place.T, strict=True)),
+        "time": np.full(len(locations), state.time),
+        "level": np.full(len(locations), state.loading.level),
+        "joint": np.full(len(locations), number + 1.0),
+        **dict(zip("xyz", locations.T, strict=True)),
         **dict(zip(JUMP_AND_STRESS, nodes.T, strict=False)),
         "p": pressure.nodes,
         "damage": nodes[:, 6],
@@ -201,7 +201,7 @@ def joint_rows(equilibrium: Equilibrium, state: State, number: int) -> tuple[Arr
     at_corners = joint.extrapolate(np.hstack([at_points, stress]))
     for name, values in zip(JUMP_AND_STRESS, at_corners.T, strict=True):
         extrapolated[name][:corners] = values
-    nothing = np.full(len(place), np.nan)  # of a column that only other joints have
+    nothing = np.full(len(locations), np.nan)  # of a column that only other joints have
     names = [name for name in joint_columns(equilibrium.case) if name != "sigma_n_eff"]
     tables = columns, columns | extrapolated
     one, other = (np.column_stack([t.get(name, nothing) for name in names]) for t in tables)

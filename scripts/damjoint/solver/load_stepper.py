@@ -295,7 +295,7 @@ class LoadStepper:
                 path = EquilibriumPath([earlier], time)
                 continue
             if fails or path.ended:
-                mechanism = self.mechanism_of(path) if fails else None
+                mechanism = self.mechanism_on(path) if fails else None
                 path.refine()
                 if mechanism:
                     self.mechanism = replace(mechanism, level=float(path.highest))
@@ -354,7 +354,7 @@ class LoadStepper:
         )
         return one.tail == other.tail and np.array_equal(dry, other_dry)
 
-    def mechanism_of(self, path: EquilibriumPath) -> Mechanism:
+    def mechanism_on(self, path: EquilibriumPath) -> Mechanism:
         """The mechanism of a path that does not reach the prescribed level."""
         ratio = path.points[-1].imposed / path.imposed(path.points[path.limit_point])
         joints = tuple(map(int, path.failing))

@@ -17,7 +17,7 @@ class Diverged(Exception):
 
 @dataclass(frozen=True)
 class Strategy:
-    """One way of solving a step."""
+    """How Newton's method is applied to a step."""
 
     #: how much the residual may grow before a correction is halved
     growth: float

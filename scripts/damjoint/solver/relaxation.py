@@ -77,10 +77,10 @@ def over_unstable_growth(
     from that state, by the law from the last one; where it does not converge and `accept_relaxed`,
     the relaxed state itself, if the law is in equilibrium there.
     """
-    found = relax(model, begin, time, control)
-    if found is None:
+    end = relax(model, begin, time, control)
+    if end is None:
         return None, False
-    relaxed, balanced = found
+    relaxed, balanced = end
     first, *others = model.strategies
     strategies = [first, *(strategy for strategy in others if strategy.release)]
     guess = relaxed.state.jump, relaxed.state.loading.level
