@@ -165,8 +165,8 @@ MUTATIONS = (
     Mutation(
         "mu of the first joint in all laws",
         "joint/equilibrium.py",
-        "JointLaws([own.law for own in case.joints])",
-        "JointLaws([own.with_values({'mu': case['mu']}).law for own in case.joints])",
+        "JointLaws([joint_case.law for joint_case in case.joints])",
+        "JointLaws([each.with_values({'mu': case['mu']}).law for each in case.joints])",
         both(several, having("law", "friction", "bond", "endo")),
     ),
     Mutation(

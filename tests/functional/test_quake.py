@@ -10,7 +10,6 @@ import damjoint as dj
 import numpy as np
 import pytest
 from damjoint import RunError
-from damjoint.dynamics import step as step_module
 from damjoint.dynamics.frames import MOST_FRAMES, Frames, frame_interval
 from damjoint.dynamics.history import QuakeHistory
 from damjoint.dynamics.record import read
@@ -20,6 +19,7 @@ from damjoint.fem import factor
 from damjoint.fem.bodies import Bodies, material_of
 from damjoint.fem.elasticity import stress
 from damjoint.input.resolve import load
+from damjoint.joint import linear_system
 from damjoint.solver.history import joint_row
 from damjoint.studies import chart, outcome, quake_study, quake_summary, sweep
 from damjoint.studies.plan import Plan
@@ -389,7 +389,7 @@ def test_steps_solve_the_equations_of_all_unknowns(tmp_path, alpha):
 
 @pytest.mark.parametrize("other", ["Woodbury", pytest.param("SuperLU", marks=pytest.mark.heavy)])
 def test_linear_solvers_agree(tmp_path, monkeypatch, other):
-    """Dense matrices of small joints against the formula for large ones; MUMPS against SuperLU."""
+    """Dense matrices of few unknowns against the formula for many; MUMPS against SuperLU."""
     record = smooth_record(tmp_path / "r.csv", 6.0, duration=0.4)
     settings = DAM | {"dt": 0.0025, "mu": 0.75}  # no step is halved
     quakes = [earthquake(record, settings, "30")]
@@ -397,7 +397,7 @@ def test_linear_solvers_agree(tmp_path, monkeypatch, other):
     if other == "SuperLU":
         monkeypatch.setattr(factor, "library", lambda: None)
     else:
-        monkeypatch.setattr(step_module, "MOST_UNKNOWNS", 0)
+        monkeypatch.setattr(linear_system, "MOST_DENSE", 0)
     quakes.append(earthquake(record, settings, "30"))
     run(quakes[1])
     slips = [mean_slip(quake) for quake in quakes]

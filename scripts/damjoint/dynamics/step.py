@@ -19,7 +19,7 @@ from ..arrays import Array, Sparse
 from ..fem.factor import partial_factors
 from ..joint.equilibrium import Equilibrium
 from ..joint.joint_laws import JointVariables
-from ..joint.linear_system import MOST_DENSE, DenseSystem, LinearSystem, WoodburySystem
+from ..joint.linear_system import many_systems
 from ..joint.problem import Dashpots, JointProblem
 from ..joint.water import Pressure
 from ..solver.model import Model, StepResult
@@ -78,18 +78,14 @@ class TimeStep:
         #: S (j, j)
         self.stiffness = self.factors.schur / weight
         self.equilibrium = problem.model.equilibrium
-        self.linear_system = self._linear_system()
+        all_closed = np.diag(self.rate * problem.dashpots)
+        self.linear_system = many_systems(
+            self.equilibrium.interface.assembly,
+            self.stiffness,
+            self.equilibrium.undamaged + all_closed,
+        )
         #: nodal forces of the joints in the static state (j,)
         self.at_static = self.joint_forces(problem.static)
-
-    def _linear_system(self) -> LinearSystem:
-        """What solves the linear systems of S and the joints' tangents."""
-        assembly = self.equilibrium.interface.assembly
-        if len(self.stiffness) <= MOST_DENSE:
-            return DenseSystem(assembly, self.stiffness)
-        all_closed = np.diag(self.rate * self.problem.dashpots)
-        undamaged = self.equilibrium.undamaged + all_closed
-        return WoodburySystem(assembly, self.stiffness, undamaged)
 
     def joint_forces(self, state: State) -> Array:
         """Nodal forces of the joints (j,), without dashpots, at a state."""

@@ -174,6 +174,15 @@ class WoodburySystem:
         return x, s
 
 
+def many_systems(assembly: Assembly, stiffness: Array, undamaged: Array) -> LinearSystem:
+    """What solves the systems of thousands of time steps, few for each, without border and flow;
+    see `WoodburySystem`.
+    """
+    if len(stiffness) <= MOST_DENSE:
+        return DenseSystem(assembly, stiffness)
+    return WoodburySystem(assembly, stiffness, undamaged)
+
+
 def solve_whole(whole: Array, right: Array, border: Border | None) -> tuple[Array, float]:
     """Solve A x = right (j,), by LU, for A in a matrix with room for the border, if there is one;
     the matrix may be overwritten.
