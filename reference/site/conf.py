@@ -58,7 +58,7 @@ add_module_names = False
 #: list is a statement of Sphinx.
 CONTENTS = {
     "Use": (
-        *("reference/usage", "reference/tour", "reference/window"),
+        *("reference/usage", "reference/choosing", "reference/tour", "reference/window"),
         *("reference/python", "reference/notebooks/tour", "reference/notebooks/law"),
     ),
     "Reference": (
