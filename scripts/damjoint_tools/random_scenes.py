@@ -43,6 +43,18 @@ class RandomScene:
         water = ["--levels", self.levels, "--tail-levels", self.tail_levels]
         return ["run", "dam", *changed, *water, "--steps", str(self.steps)]
 
+    def critical(self, start: float) -> list[str]:
+        """Arguments of the command that finds its critical level from a start [m]."""
+        words = self.words
+        tail = self.tail_levels.split(",")[-1]
+        given = words[1 : words.index("--levels")]
+        return ["critical", *given, "--levels", f"{start:.10g}", "--tail-levels", tail]
+
+    def up_to(self, level: float) -> RandomScene:
+        """The scene with a single level [m], reached in four steps."""
+        tail = self.tail_levels.split(",")[-1]
+        return replace(self, levels=f"{level:.10g}", tail_levels=tail, steps=4)
+
     @property
     def case(self) -> Case:
         """The case as the command loads it."""

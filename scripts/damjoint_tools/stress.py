@@ -17,6 +17,7 @@ import tempfile
 import time
 from collections.abc import Iterator
 from concurrent.futures import as_completed
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -24,6 +25,7 @@ from damjoint import InputError, RunError
 from damjoint.processes import pool_of
 from damjoint.progress import track
 from damjoint.studies.result_file import result_file
+from damjoint_witness import again
 from damjoint_witness.earthquake import Shaken
 from damjoint_witness.files import Files
 from damjoint_witness.verify import Witness
@@ -39,12 +41,16 @@ COLUMNS = (
     "highest_level",
     *("steps", "iterations", "cuts", "seconds", "command", "kind"),
     *MEASURES,
+    *("steps_difference", "critical_level", "critical_difference"),
     *RECORDED,
 )
 #: Outcomes of the verification.
 CLASSES = VERIFIED, JUSTIFIED, UNDECIDED, DEFECT = (
     *("converged and verified", "stopped and justified", "stopped, undecided", "defect"),
 )
+
+#: Every how many scenes the load steps and the critical level are computed again.
+AGAIN = 5
 
 #: Limit of a command's CPU time [s], and of its duration while others run, over that.
 TIME_LIMIT, LONGEST = 300, 4
@@ -53,8 +59,10 @@ TIME_LIMIT, LONGEST = 300, 4
 ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL")}
 
 
-def run_and_verify(scene: RandomScene, folder: Path) -> dict[str, object]:
-    """Run a scene by the command and verify its files; returns its row without the number."""
+def run_and_verify(scene: RandomScene, folder: Path, twice: bool = False) -> dict[str, object]:
+    """Run a scene by the command and verify its files; returns its row without the number. twice:
+    also with twice the steps, and its critical level.
+    """
     start, case = time.perf_counter(), scene.case
     row = {
         "command": " ".join(["damjoint", *scene.words]),
@@ -69,6 +77,8 @@ def run_and_verify(scene: RandomScene, folder: Path) -> dict[str, object]:
         row |= {"verdict": run.files.record["verdict"]} | verified(run)
         if isinstance(scene, RandomQuake):
             row |= {"kind": scene.kind} | with_further_checks(scene, run, folder, row)
+        elif twice:
+            row |= computed_again(scene, run, folder, row)
     except RunError as error:
         row |= {"class": DEFECT, "findings": str(error)}
         row.setdefault("seconds", f"{time.perf_counter() - start:.2f}")
@@ -83,14 +93,21 @@ def run_of(
 
     Raises RunError if the command has written no result, or exceeds the time limit.
     """
-    quake, words = isinstance(scene, RandomQuake), scene.words
-    tables = "--no-picture", *(() if quake or fields else ("--no-fields",))
+    tables = "--no-picture", *(() if isinstance(scene, RandomQuake) or fields else ("--no-fields",))
     table_of_steps = () if "getdp" in options else ("--all-steps",)
+    return Witness(files_of(scene.words, folder, *tables, *table_of_steps, *options, name=name))
+
+
+def files_of(words: list[str], folder: Path, *options: str, name: str) -> Files:
+    """Run a command with further options, and return its files, in folder/name.
+
+    Raises RunError if it has written no result, or exceeds the time limit.
+    """
     environment = os.environ | ONE_THREAD | {"DAMJOINT_CACHE": str(folder / "cache")}
     out = "--out", str(folder / name)
     try:
         done = subprocess.run(
-            [sys.executable, "-m", "damjoint", *words, *tables, *table_of_steps, *options, *out],
+            [sys.executable, "-m", "damjoint", *words, *options, *out],
             env=environment,
             capture_output=True,
             text=True,
@@ -107,7 +124,7 @@ def run_of(
     except (OSError, KeyError):
         last = (done.stderr.strip().splitlines() or ["no message"])[-1]
         raise RunError(f"exit code {done.returncode}: {last}") from None
-    return Witness(files)
+    return files
 
 
 #: Number of prctl's option by which a process gets a signal when its parent ends.
@@ -139,6 +156,60 @@ def with_further_checks(
     return numbers | {"class": DEFECT if found else VERIFIED, "findings": "; ".join(found)}
 
 
+def computed_again(
+    scene: RandomScene, run: Witness, folder: Path, row: dict[str, object]
+) -> dict[str, object]:
+    """Compute a verified scene with twice the steps, and its critical level from three starts;
+    returns the differences, and class and findings of the row with what is found.
+    """
+    if row["class"] == DEFECT:
+        return {}
+    found, numbers = [], {}
+    if row["class"] == VERIFIED:
+        doubled = run_of(replace(scene, steps=2 * scene.steps), folder, name="doubled").files
+        found += again.other_steps(run.asked, run.files, doubled)
+        if not doubled.stopped:
+            numbers["steps_difference"] = again.difference(run.files, doubled)
+    case = scene.case
+    if case["dim"] == 2 and not again.follows_history(run.asked):
+        more, differences = critical_levels(scene, case["dam_height"], folder)
+        found, numbers = [*found, *more], numbers | differences
+    if found:
+        found = [text for text in (row["findings"], *found) if text]
+        return numbers | {"class": DEFECT, "findings": "; ".join(map(str, found))}
+    return {name: f"{value:.8g}" for name, value in numbers.items()}
+
+
+def critical_levels(
+    scene: RandomScene, height: float, folder: Path
+) -> tuple[list[str], dict[str, float]]:
+    """Find the critical level of a scene from three starts, and verify the state below a confirmed
+    one; returns what is found, and numbers for the row.
+    """
+
+    def search(start: float, name: str) -> again.Critical | None:
+        return again.Critical.of(files_of(scene.critical(start), folder, name=name).record)
+
+    first = search(again.FIRST_START * height, "critical")
+    if first is None:
+        return [], {}
+    starts = [search(part * first.level, f"critical_{part:g}") for part in again.STARTS]
+    results = [first, *filter(None, starts)]
+    found, levels = list(again.starts(results)), [result.level for result in results]
+    numbers = {
+        "critical_level": first.level,
+        "critical_difference": (max(levels) - min(levels)) / max(levels),
+    }
+    if first.confirmed:
+        below = run_of(scene.up_to(again.BELOW * first.level), folder, name="below", fields=True)
+        found += [f"below the critical level: {text}" for text in below.violations()]
+        if below.files.stopped:
+            found.append(f"no equilibrium at {again.BELOW:g} of the critical level")
+        else:
+            found += again.above(first, below.files, below.asked, below.steps)
+    return found, numbers
+
+
 def verified(run: Witness) -> dict[str, object]:
     """Verify a run; returns its class, findings and size."""
     quake, stopped = run.asked.command == "quake", run.files.stopped
@@ -163,7 +234,7 @@ def row_of(seed: int, number: int, records: Path | None, parent: Path) -> dict[s
     """
     scene = random_quake(seed, number, records) if records else random_scene(seed, number)
     with tempfile.TemporaryDirectory(dir=parent) as folder:
-        row = run_and_verify(scene, Path(folder))
+        row = run_and_verify(scene, Path(folder), twice=number % AGAIN == 0)
     return {"scene": f"{seed}-{number}"} | row
 
 

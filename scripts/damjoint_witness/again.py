@@ -1,0 +1,137 @@
+"""A scene again: with twice as many load steps, and its critical level from several starts.
+
+Under a water level that rises step by step the state does not depend on the steps (section 8 of
+reference/theory.md). The critical level does not depend on the level that the search starts from;
+just below it there is an equilibrium, which is verified like any other run, and just above it none
+is certain by statics, nor possible where the strength cannot change in between.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from . import stops
+from .files import Files, Table
+from .reader import Asked
+
+#: Difference of jumps between two numbers of steps, over the largest jump (theory, section 8).
+SAME_STATE = 1e-6
+#: Difference of confirmed critical levels over the level: their precision.
+SAME_LEVEL = 1e-4
+#: Level of the first start over the dam's height; over the first critical level that is found those
+#: of the others, and of the states below and above it.
+FIRST_START, STARTS, BELOW, ABOVE = 0.5, (0.6, 0.9), 0.995, 1.005
+
+
+# -- load steps
+# --------------------------------------------------------------------------------------------------
+
+
+def follows_history(asked: Asked) -> bool:
+    """Return whether the state under rising water may depend on the way there: a joint that slips
+    under a change of temperature before the water turns the slip back, grouting and sawing, a first
+    step that bears the weight with a part of the water, a controlled displacement.
+    """
+    first = asked.joints[0]
+    heat = any(first[f"temperature_{part}"] for part in ("dam", "linear", "found"))
+    works = any(v["grout_pressure"] or v["saw_thickness"] for v in asked.joints)
+    return bool(heat or works or first["drive"] != "level" or not first["weight_first"])
+
+
+def follows_steps(asked: Asked, *records: dict[str, Any]) -> bool:
+    """Return whether a state may depend on the load steps: on the history; after levels that fall;
+    of water that enters a crack after the step that has opened it; after unstable crack growth.
+    """
+    falls = any(list(levels) != sorted(levels) for levels in (asked.levels, asked.tail_levels))
+    unstable = any(record.get(n) for record in records for n in ("unstable_growth", "limit_points"))
+    entering = any(v["uplift"] == "cracked" for v in asked.joints)
+    return follows_history(asked) or falls or unstable or entering
+
+
+def difference(one: Files, other: Files) -> float:
+    """Return the largest difference of a jump in the last tables of two runs, over the largest
+    jump.
+    """
+    last = [jumps(files.joint_tables[-1]) for files in (one, other)]
+    return float(np.abs(last[0] - last[1]).max() / np.abs(last[0]).max())
+
+
+def jumps(table: Table) -> Any:
+    """Return the jumps (n, 3) of a table."""
+    return np.column_stack([table[f"delta_{axis}"] for axis in ("n", "t1", "t2")])
+
+
+def other_steps(asked: Asked, one: Files, other: Files) -> Iterator[str]:
+    """Yield how the last state differs between two numbers of load steps."""
+    if one.stopped or other.stopped or follows_steps(asked, one.record, other.record):
+        return
+    found = difference(one, other)
+    if found > SAME_STATE:
+        yield f"with twice the steps the jumps differ by {found:.3g} of the largest"
+
+
+# -- critical levels
+# --------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Critical:
+    """A critical level as run.json has it."""
+
+    level: float
+    mode: str
+    joint: str
+    #: the reason; empty: not confirmed
+    confirmed: str
+
+    @staticmethod
+    def of(record: dict[str, Any]) -> Critical | None:
+        """Return that of a run.json; None without a level."""
+        found = record.get("critical") or {}
+        if not found.get("value"):
+            return None
+        reason = "" if found["doubt"] else found["confirmed"]
+        return Critical(found["value"], found["mode"], found["joint"], reason)
+
+
+def starts(found: Sequence[Critical]) -> Iterator[str]:
+    """Yield how confirmed critical levels from several starts differ."""
+    levels = [critical.level for critical in found if critical.confirmed]
+    if len(levels) > 1 and np.ptp(levels) > SAME_LEVEL * max(levels):
+        yield f"critical levels from several starts: {', '.join(f'{x:.8g}' for x in levels)} m"
+
+
+def above(critical: Critical, files: Files, asked: Asked, steps: Table) -> Iterator[str]:
+    """Yield what statics says against a confirmed critical level; files, asked, steps: those of the
+    run to a level just below it.
+    """
+    if not critical.confirmed or not asked.sections:
+        return
+    beyond = replace(asked, levels=(ABOVE / BELOW * asked.levels[-1],))
+    verdict = f"{critical.mode} on {critical.joint}" if critical.joint else critical.mode
+    joints = stops.failing(files, beyond, steps, verdict)
+    if all(map(stops.equilibrium_is_certain, joints)):
+        yield f"above the critical level {critical.level:.6g} m there certainly is an equilibrium"
+    by_friction = critical.mode == "sliding" and all(map(has_constant_strength, joints))
+    least = min(stops.load_factor(j, j.forces(most_uplift=False)) for j in joints)
+    if by_friction and least > 1 + stops.AT_THE_BOUND:
+        yield (
+            f"sliding at the critical level {critical.level:.6g} m, but statics allows {least:.4g} "
+            "times the loads above it"
+        )
+
+
+def has_constant_strength(joint: stops.Joint) -> bool:
+    """Return whether the strength of a joint does not depend on its state, nor the loads on its
+    opening.
+    """
+    v = joint.values
+    dry = v["uplift"] not in ("flow", "cracked")
+    plastic = v["law"] == "friction" and not (v["hardening_asked"] and v["pena_tang"])
+    return bool(
+        dry and (plastic or (v["law"] == "bond" and not v["sigma_max"] and not v["adhesion"]))
+    )
