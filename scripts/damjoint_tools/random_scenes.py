@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 from damjoint.arrays import Setting
@@ -12,8 +13,8 @@ from damjoint.input.resolve import load
 from damjoint.input.values import has_drains
 
 #: Third number of the seed of the lift joints, and of temperature, works on the joint, waterstop,
-#: law = endo and variants of loads, which are drawn apart.
-LIFT_DRAWS, WORKS_DRAWS = 1, 3
+#: law = endo and variants of loads, and of joints that meet, which are drawn apart.
+LIFT_DRAWS, WORKS_DRAWS, NETWORK_DRAWS = 1, 3, 4
 #: Parameters that are drawn for each joint, but for the place of its drains.
 OF_JOINTS = (
     *("law", "K_N", "K_T", "sigma_max", "adhesion", "mu", "pena_rupture", "alpha", "pena_tang"),
@@ -32,6 +33,9 @@ class RandomScene:
     tail_levels: str
     steps: int
 
+    #: name of the case
+    base: ClassVar[str] = "dam"
+
     @property
     def words(self) -> list[str]:
         """Arguments of the command `damjoint`."""
@@ -41,7 +45,7 @@ class RandomScene:
             for word in ("--set", f"{name}={as_text(value)}")
         ]
         water = ["--levels", self.levels, "--tail-levels", self.tail_levels]
-        return ["run", "dam", *changed, *water, "--steps", str(self.steps)]
+        return ["run", self.base, *changed, *water, "--steps", str(self.steps)]
 
     def critical(self, start: float) -> list[str]:
         """Arguments of the command that finds its critical level from a start [m]."""
@@ -58,7 +62,14 @@ class RandomScene:
     @property
     def case(self) -> Case:
         """The case as the command loads it."""
-        return load("dam", self.settings, self.levels, self.tail_levels, self.steps)
+        return load(self.base, self.settings, self.levels, self.tail_levels, self.steps)
+
+
+@dataclass(frozen=True)
+class RandomNetwork(RandomScene):
+    """Two random blocks of a 45 m dam on a base each, with a contraction joint between them."""
+
+    base: ClassVar[str] = "monoliths"
 
 
 def as_text(value: Setting) -> str:
@@ -93,7 +104,35 @@ def random_scene(seed: int, number: int) -> RandomScene:
     """Draw scene `number` of a seed: a dam with one to four joints."""
     scene, rng = single_joint_scene(seed, number), RandomNumbers(seed, number, LIFT_DRAWS)
     scene = with_lifts(scene, rng) if rng.event(0.4) else scene
-    return with_works(scene, RandomNumbers(seed, number, WORKS_DRAWS))
+    scene = with_works(scene, RandomNumbers(seed, number, WORKS_DRAWS))
+    rng = RandomNumbers(seed, number, NETWORK_DRAWS)
+    return network(rng) if rng.event(0.06) else scene
+
+
+def network(rng: RandomNumbers) -> RandomNetwork:
+    """Draw joints that meet: law, strengths and water of each; water may flow in all of them."""
+    drawn = [joint(rng) | {"aperture_min": rng.log_uniform(1e-7, 1e-4)} for _ in range(3)]
+    wet = rng.choice("imposed", "flow", "cracked")
+    others = {
+        "imposed": ("imposed", "none"),
+        "flow": ("flow", "cracked"),
+        "cracked": ("cracked", "flow"),
+    }
+    drawn[0]["uplift"], drawn[1]["uplift"] = wet, rng.choice(wet, *others[wet])
+    drawn[2]["uplift"] = rng.choice("none", "none", "imposed", "flow" if wet == "flow" else "none")
+    for own in drawn[:2]:
+        own["drains"] = rng.choice(0, 1) if own["uplift"] in ("flow", "cracked") else 0
+    settings = of_joints(drawn) | {
+        "n_joint": rng.choice(10, 20, 30),
+        "order": rng.choice(1, 2),
+        "E": rng.log_uniform(5e9, 1e12),
+        "nu": rng.uniform(0, 0.35),
+        "drain_x": rng.uniform(2, 10),
+        "drain_effectiveness": rng.uniform(0, 1),
+    }
+    levels = sorted(rng.uniform(15, 45) for _ in range(int(rng.choice(1, 2))))
+    tail = rng.choice(0, rng.uniform(0, 12))
+    return RandomNetwork(settings, ",".join(map(str, levels)), str(tail), int(rng.choice(1, 2)))
 
 
 def with_works(scene: RandomScene, rng: RandomNumbers) -> RandomScene:

@@ -195,11 +195,10 @@ def critical_levels(
         return [], {}
     starts = [search(part * first.level, f"critical_{part:g}") for part in again.STARTS]
     results = [first, *filter(None, starts)]
-    found, levels = list(again.starts(results)), [result.level for result in results]
-    numbers = {
-        "critical_level": first.level,
-        "critical_difference": (max(levels) - min(levels)) / max(levels),
-    }
+    levels = [result.level for result in results if result.confirmed]
+    found, numbers = list(again.starts(results)), {"critical_level": first.level}
+    if len(levels) > 1:
+        numbers["critical_difference"] = (max(levels) - min(levels)) / max(levels)
     if first.confirmed:
         below = run_of(scene.up_to(again.BELOW * first.level), folder, name="below", fields=True)
         found += [f"below the critical level: {text}" for text in below.violations()]

@@ -54,6 +54,7 @@ from .solids import (
     PLACES,
     ROCK,
     SAME,
+    SHAPES,
     Array,
     IntArray,
     Points,
@@ -731,26 +732,41 @@ class JointForces:
 def wet_points(state: JointState, sides: Sides) -> Points:
     """Return the quadrature of the water in a joint: of elements that a waterstop cuts, over their
     wet part.
-
-    Raises ValueError if it cuts triangles.
     """
     points, stop = sides.points(), state.values["waterstop"]
     if state.values["uplift"] != "waterstop":
         return points
     positions, weights = [np.zeros((0, 3))], [np.zeros(0)]
     for corners in sides.corners:
-        s = state.distance(corners)
-        share = (stop - s.min()) / np.ptp(s)
-        if share <= 0:
-            continue
-        if share < 1 and sides.shape == "triangle":
-            raise ValueError("a waterstop that cuts triangles is not checked")
-        away = (min(share, 1.0) - 1) * (s - s.min())
-        wet = corners + np.outer(away, [*state.along, 0.0])
-        inner = Sides(sides.shape, wet[None], 1).points()
-        positions.append(inner.positions)
-        weights.append(inner.weights)
+        for part in wet_parts(corners, state.distance(corners) - stop):
+            inner = Sides(SHAPES[len(part)], part[None], 1).points()
+            positions.append(inner.positions)
+            weights.append(inner.weights)
     return sides.at(np.concatenate(positions), np.concatenate(weights))
+
+
+def wet_parts(corners: Array, beyond: Array) -> list[Array]:
+    """Return the part of an element where a linear function of its corners (n,) is negative: the
+    element itself, a part of a line, a rectangle, or triangles.
+    """
+    if beyond.min() >= 0:
+        return []
+    if beyond.max() <= 0:
+        return [corners]
+    if len(corners) != 3:  # shortened along the joint
+        share = beyond.min() / np.ptp(beyond)
+        ends = corners[beyond <= beyond.min() + SAME], corners[beyond >= beyond.max() - SAME]
+        along = ends[1].mean(axis=0) - ends[0].mean(axis=0)
+        far = (beyond > (beyond.min() + beyond.max()) / 2)[:, None]
+        return [corners - far * (1 + share) * along]
+    polygon = []
+    for i, k in ((0, 1), (1, 2), (2, 0)):
+        if beyond[i] <= 0:
+            polygon.append(corners[i])
+        if beyond[i] * beyond[k] < 0:
+            share = beyond[i] / (beyond[i] - beyond[k])
+            polygon.append(corners[i] + share * (corners[k] - corners[i]))
+    return [np.array([polygon[0], *polygon[i : i + 2]]) for i in range(1, len(polygon) - 1)]
 
 
 def violations(files: Files, asked: Asked, steps: Table) -> Iterator[str]:

@@ -162,6 +162,8 @@ def judge(files: Files, asked: Asked, steps: Table) -> tuple[bool, str]:
     verdict = str(files.record["verdict"])
     if files.record["state"] != "stopped":
         return True, str(files.record["statement"])
+    if not asked.sections:
+        return False, f"{verdict}, joints that meet: not judged"
     joints = failing(files, asked, steps, verdict)
     by_level = asked.joints[0]["drive"] == "level"
     if not by_level:

@@ -1,0 +1,84 @@
+"""Load steps and critical levels of the independent verification."""
+
+from dataclasses import replace
+
+import pytest
+from damjoint import cli
+from damjoint_tools.random_scenes import random_scene
+from damjoint_witness import again
+from damjoint_witness.files import Files, read_table
+from damjoint_witness.reader import read
+
+#: A dam that slides at 46.104 m (T = mu N).
+DAM = "run dam --set n_joint=10 --set order=1 --set law=friction --set adhesion=0 --set pena_tang=0"
+SLIDES = 46.1044
+
+
+def written(folder, level, steps):
+    words = tuple(f"{DAM} --levels {level} --steps {steps}".split())
+    cli.main([*words, "--no-picture", "--no-fields", "--all-steps", "--out", str(folder)])
+    return Files(folder, words)
+
+
+def test_state_after_twice_the_steps_is_compared(tmp_path):
+    one, other = (written(tmp_path / str(steps), 40, steps) for steps in (2, 4))
+    asked = read(one.words)
+    assert list(again.other_steps(asked, one, other)) == []
+    assert again.difference(one, other) < again.SAME_STATE
+    elsewhere = written(tmp_path / "elsewhere", 40.001, 4)
+    (found,) = again.other_steps(asked, one, elsewhere)
+    assert "with twice the steps the jumps differ by" in found
+
+
+@pytest.mark.parametrize(
+    "words, history, steps",
+    [
+        ("--levels 20,30", False, False),
+        ("--levels 30,20", False, True),
+        ("--set uplift=cracked", False, True),
+        ("--set temperature_dam=3", True, True),
+        ("--set weight_first=0", True, True),
+        ("--set drive=crest", True, True),
+        ("--set law=friction --set saw_thickness=1e-5", True, True),
+    ],
+)
+def test_states_that_follow_history_or_steps_are_not_compared(words, history, steps):
+    asked = read([*DAM.split(), *words.split()])
+    assert (again.follows_history(asked), again.follows_steps(asked)) == (history, steps)
+    assert again.follows_steps(asked, {"unstable_growth": [20.0]})
+
+
+def critical(value, confirmed="a reason", doubt="", joint=""):
+    found = {"value": value, "mode": "sliding", "joint": joint}
+    return again.Critical.of({"critical": found | {"confirmed": confirmed, "doubt": doubt}})
+
+
+def test_confirmed_levels_of_several_starts_agree():
+    assert again.Critical.of({}) is None and critical(None) is None
+    assert list(again.starts([critical(40.0), critical(40.003)])) == []
+    assert list(again.starts([critical(40.0), critical(41.0, doubt="another one")])) == []
+    (found,) = again.starts([critical(40.0), critical(40.005)])
+    assert found == "critical levels from several starts: 40, 40.005 m"
+
+
+def test_statics_confirms_a_critical_level_or_not(tmp_path):
+    below = written(tmp_path / "below", again.BELOW * SLIDES, 2)
+    steps = read_table(below.folder / "steps.csv")
+    asked = read(below.words)
+    assert list(again.above(critical(SLIDES), below, asked, steps)) == []
+    low = written(tmp_path / "low", again.BELOW * 35, 2)
+    steps, asked = read_table(low.folder / "steps.csv"), read(low.words)
+    certain, allowed = again.above(critical(35.0), low, asked, steps)
+    assert "above the critical level 35 m there certainly is an equilibrium" == certain
+    assert "sliding at the critical level 35 m, but statics allows" in allowed
+    assert not list(again.above(critical(35.0, doubt="not sure"), low, asked, steps))
+
+
+def test_commands_of_a_scene_for_its_critical_level():
+    scene = replace(random_scene(5, 2), levels="4,7,9", tail_levels="1,2,2.5")
+    words = scene.critical(6.0)
+    assert words[:2] == ["critical", "dam"] and "--steps" not in words
+    assert read(words).joints == read(scene.up_to(6.0).words).joints
+    assert read(words).levels == (6.0,) and read(words).tail_levels == (2.5,)
+    below = scene.up_to(8.5)
+    assert (below.levels, below.tail_levels, below.steps) == ("8.5", "2.5", 4)
