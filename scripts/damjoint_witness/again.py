@@ -32,14 +32,17 @@ FIRST_START, STARTS, BELOW, ABOVE = 0.5, (0.6, 0.9), 0.995, 1.005
 
 
 def follows_history(asked: Asked) -> bool:
-    """Return whether the state under rising water may depend on the way there: a joint that slips
-    under a change of temperature before the water turns the slip back, grouting and sawing, a first
-    step that bears the weight with a part of the water, a controlled displacement.
+    """Return whether the state under rising water may depend on the way there: where a joint slips
+    under a load that the water turns back (temperature; earthquake and anchor against the water),
+    grouting and sawing, a first step that bears the weight with a part of the water, a controlled
+    displacement.
     """
     first = asked.joints[0]
     heat = any(first[f"temperature_{part}"] for part in ("dam", "linear", "found"))
     works = any(v["grout_pressure"] or v["saw_thickness"] for v in asked.joints)
-    return bool(heat or works or first["drive"] != "level" or not first["weight_first"])
+    against = first["k_h"] < 0 or (first["anchor_force"] > 0 and first["anchor_angle"] > 0)
+    driven = first["drive"] != "level" or not first["weight_first"]
+    return bool(heat or works or against or driven)
 
 
 def follows_steps(asked: Asked, *records: dict[str, Any]) -> bool:

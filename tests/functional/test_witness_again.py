@@ -38,6 +38,8 @@ def test_state_after_twice_the_steps_is_compared(tmp_path):
         ("--set uplift=cracked", False, True),
         ("--set temperature_dam=3", True, True),
         ("--set weight_first=0", True, True),
+        ("--set k_h=-0.1", True, True),
+        ("--set anchor_force=1e5 --set anchor_angle=5", True, True),
         ("--set drive=crest", True, True),
         ("--set law=friction --set saw_thickness=1e-5", True, True),
     ],
