@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
@@ -104,28 +104,40 @@ def resolve(given: Values, levels: Sequence[float]) -> Values:
 
 @dataclass(frozen=True)
 class CaseFile:
-    """The statements of a case file: values, and lists."""
+    """The statements of a case file: values, lists, and the values of single joints by name."""
 
-    name: str
+    path: Path
     values: Values
     lists: dict[str, tuple[Any, ...]]
+    blocks: dict[str, Values]
+
+    def joint_names(self, dim: float) -> list[str]:
+        """Return the names of the joints of a geometry by a mesh, from its .geo file."""
+        text = without_comments((self.path.parent / self.values["geometry"]).read_text())
+        return re.findall(rf'Physical {"Curve" if dim == 2 else "Surface"}\("joint ([^"]+)"', text)
 
 
 def case_file(name: str) -> CaseFile:
-    """Read a case of the package, or a file, of statements `name = value;` and
-    `name() = {a, b};`, in which a value of a parameter is that of default_<name>.
+    """Read a case of the package, or a file, of statements `name = value;`, `name() = {a, b};` and
+    `Struct Joint::name [ parameter value, ... ];`. Without default_ a value is the same.
     """
     path = Path(name) if name.endswith(".case") else data(f"cases/{name}.case")
     text = without_comments(path.read_text())
     if "Include" in text:
         raise ValueError(f"{path}: a case that includes another one")
-    values, lists = {}, {}
-    for left, brackets, right in re.findall(r"(\w+)(\(\))?\s*=\s*([^;]*);", text):
+    values, lists, blocks = {}, {}, {}
+    block = r"Struct Joint::(\w+)\s*\[([^]]*)\];"
+    for joint, content in re.findall(block, text):
+        pairs = (part.split(maxsplit=1) for part in content.split(","))
+        blocks[joint] = {key: value_of(value) for key, value in pairs}
+    for left, brackets, right in re.findall(
+        r"(\w+)(\(\))?\s*=\s*([^;]*);", re.sub(block, "", text)
+    ):
         if brackets:
             lists[left] = tuple(map(value_of, right.strip(" {}\n").split(",")))
         else:
             values[left.removeprefix("default_")] = value_of(right)
-    return CaseFile(path.stem, values, lists)
+    return CaseFile(path, values, lists, blocks)
 
 
 # -- section
@@ -280,6 +292,7 @@ def read(words: Sequence[str]) -> Asked:
     command, case, *rest = words
     file = case_file(case)
     given, lists = dict(file.values), dict(file.lists)
+    blocks = {joint: dict(values) for joint, values in file.blocks.items()}
     options: dict[str, str] = {}
     words_left = iter(rest)
     for word in words_left:
@@ -292,19 +305,19 @@ def read(words: Sequence[str]) -> Asked:
             options[word.removeprefix("--")] = value
             continue
         name, _, text = value.partition("=")
-        lists.pop(name, None)
-        given.pop(name, None)
+        for known in (lists, given, *blocks.values()):
+            known.pop(name, None)
         parts = tuple(map(value_of, text.split(",")))
         if len(parts) > 1 or name == "lift_heights":
             lists[name] = parts
         else:
             given[name] = parts[0]
-    return asked(command, file.name, given, lists, options)
+    return asked(command, replace(file, blocks=blocks), given, lists, options)
 
 
 def asked(
     command: str,
-    case: str,
+    file: CaseFile,
     given: Values,
     lists: dict[str, tuple[Any, ...]],
     options: dict[str, str],
@@ -324,12 +337,18 @@ def asked(
     steps = int(options.pop("steps", 1))
     record = options.pop("record", None)
     lifts = lists.pop("lift_heights", ())
-    count = 1 + len(lifts) if not geometry else max([1, *map(len, lists.values())])
-    unknown = {*given, *lists} - defaults().keys()
+    names = [f"lift {heel:g} m" for heel in (given.get("joint_height", 0), *lifts)]
+    names[0] = names[0] if given.get("joint_height") else "base"
+    if geometry:
+        names = file.joint_names((defaults() | given)["dim"])
+    blocks = [file.blocks.get(re.sub(r"\W", "_", name), {}) for name in names]
+    count = len(names)
+    unknown = {*given, *lists, *(key for block in blocks for key in block)} - defaults().keys()
     if unknown or any(len(values) != count for values in lists.values()):
         raise ValueError(f"{unknown or lists}: unknown, or not a value for each of {count} joints")
     joints = [
         given
+        | blocks[k]
         | {name: values[k] for name, values in lists.items()}
         | ({"joint_height": lifts[k - 1]} if lifts and k else {})
         for k in range(count)
@@ -349,7 +368,7 @@ def asked(
     if resolved[0]["drive"] != "level":
         times |= {resolved[0]["drive_begin"], resolved[0]["drive_end"]} - {0.0}
     return Asked(
-        *(command, case, tuple(resolved), levels, tails, tuple(sorted(times)), geometry),
+        *(command, file.path.stem, tuple(resolved), levels, tails, tuple(sorted(times)), geometry),
         Path(record) if record else None,
         options,
     )

@@ -70,6 +70,20 @@ def test_case_file_with_joints_that_meet():
     assert asked.geometry and not asked.sections
 
 
+def test_blocks_of_single_joints(tmp_path):
+    path = tmp_path / "own.case"
+    path.write_text(
+        'default_law = "friction";  // of all\nlift_heights() = {12.5};\n'
+        "Struct Joint::base [ mu 0.7 ];\n"
+        'Struct Joint::lift_12_5_m [ mu 0.9, law "bond" ];\nlevels() = {30};\n'
+    )
+    asked = read(["run", str(path)])
+    assert [(v["mu"], v["law"]) for v in asked.joints] == [(0.7, "friction"), (0.9, "bond")]
+    assert [v["mu"] for v in read(["run", str(path), "--set", "mu=0.5"]).joints] == [0.5, 0.5]
+    contraction = read(["run", "monoliths"]).joints[2]
+    assert (contraction["mu"], contraction["uplift"]) == (0.6, "none")
+
+
 def test_sections_have_batter_neck_and_slopes():
     words = "run dam --set batter=4 --set batter_height=20 --set neck_height=5"
     asked = read(f"{words} --set lift_heights=10,42 --set joint_slope=5,-3,0".split())
