@@ -123,9 +123,8 @@ class TimeStep:
         if solution is None:
             return None
         laws = StepLaws(equilibrium.laws, equilibrium.laws)
-        state = replace(
-            start.update(equilibrium.interface, laws, solution.jump), pressures=pressure
-        )
+        state = start.update(equilibrium.interface, laws, solution.jump)
+        state = replace(state, pressures=pressure).after(now).traced(now, False)
         residual = solution.size / (model.reference or 1.0)
         step = StepResult(state, solution.iterations, residual, solution.criterion)
         return self.moved(begin, state, joints, lifted), step

@@ -173,7 +173,8 @@ class Model:
             before_quake=before_quake,
         )
         residual = solution.size / (self.reference or 1.0)
-        return StepResult(new.after(state), solution.iterations, residual, solution.criterion)
+        new = new.after(state).traced(state, frozen is not None)
+        return StepResult(new, solution.iterations, residual, solution.criterion)
 
     def advance_by_first(self, state: State, time: float, control: Control) -> StepResult | None:
         """A step by the first strategy only, from the extrapolation of the last two states."""

@@ -59,8 +59,8 @@ class State:
         """
         if begin.trace is None:
             return self
-        own = replace(self, previous=None, trace=None)
-        return replace(self, trace=Trace(own, begin.time, frozen, begin.trace))
+        update = replace(self, previous=None, trace=None)
+        return replace(self, trace=Trace(update, begin.time, frozen, begin.trace))
 
     def after(self, previous: State) -> State:
         """This state, as the one that follows another."""
@@ -116,8 +116,8 @@ class Trace:
     @property
     def updates(self) -> list[Trace]:
         """All updates, the first one first."""
-        found, one = list[Trace](), self
+        updates, one = list[Trace](), self
         while one.before is not None:
-            found.append(one)
+            updates.append(one)
             one = one.before
-        return found[::-1]
+        return updates[::-1]
