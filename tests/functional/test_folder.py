@@ -132,6 +132,33 @@ def test_a_search_that_fails_removes_the_value_of_an_earlier_one(command, tmp_pa
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["run.json"]
 
 
+@pytest.mark.parametrize(
+    "words, what",
+    [
+        (("run", "c", *BARE), "damjoint.runner.accuracy.solve"),
+        (("critical", "c"), "damjoint.studies.critical.FailurePath"),
+        (("quake", "dam", "--record", "wave.csv"), "damjoint.studies.quake.QuakeRun"),
+    ],
+)
+@pytest.mark.parametrize("error, state", [(RunError, "failed"), (KeyboardInterrupt, "interrupted")])
+def test_a_study_that_ends_without_results_says_where_and_when(
+    command, tmp_path, monkeypatch, words, what, error, state
+):
+    """The same entries for each study."""
+    (tmp_path / "wave.csv").write_text("time,horizontal\n0,0\n0.1,1\n0.2,0\n")
+
+    def ends(*_, **__):
+        raise error("no")
+
+    monkeypatch.setattr(what, ends)
+    settings = ("--set", "rho_dam=24") + (("--set", "record_unit=g") if words[0] == "quake" else ())
+    assert command(*words, *settings, "--out", "out")[0] in (1, 130)
+    info = json.loads((tmp_path / "out" / "run.json").read_text())
+    assert info["state"] == state and info["machine"] and info["peak_memory_mb"] > 10
+    assert {"commit", "wall_seconds", "statement"} <= info.keys() and info["versions"]["numpy"]
+    assert any(note.startswith("rho_dam = 24 ") for note in info["notes"])
+
+
 def test_a_removal_that_is_interrupted_is_completed_by_the_next_run(command, tmp_path, monkeypatch):
     """run.json, by which files are damjoint's, is removed last."""
     words = "run", "c", *SMALL, "--levels", "6", "--out", "out"

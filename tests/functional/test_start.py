@@ -48,3 +48,13 @@ sys.exit(main())
     words = [sys.executable, "-c", program]
     done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == "registered" and len(done.stdout.splitlines()) == 2
+
+
+def test_the_first_help_lists_the_commands_for_developers_apart(command):
+    """At its end, a line each; then the exit codes, that of a value that is not confirmed too."""
+    code, out, _ = command("--help")
+    users, developers = out.split("\nfor developers:\n")
+    names = [line.split()[0] for line in developers.split("\n\n")[0].splitlines()]
+    assert code == 0 and names == ["stress", "bench", "law"]
+    assert all(f"    {name} " not in users for name in names) and "    quake " in users
+    assert "  3    critical: the value is not confirmed" in developers
