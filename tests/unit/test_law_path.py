@@ -84,3 +84,9 @@ def test_a_path_of_a_thousand_rows():
     jumps = np.column_stack([closing, closing, 0 * closing])
     answer = law.evaluate("rupture", jumps, settings={"K_N": 1e12})
     assert_allclose(answer["sigma_n"], 1e12 * closing, rtol=1e-12)
+
+
+def test_a_law_has_no_values_of_several_joints(command, tmp_path):
+    (tmp_path / "path.csv").write_text("delta_n,delta_t1,delta_t2\n1e-6,0,0\n")
+    code, out, err = command("law", "friction", "--path", "path.csv", "--set", "mu=0.5,0.7")
+    assert (code, out) == (2, "") and "mu = 0.5,0.7: must be a single value" in err
