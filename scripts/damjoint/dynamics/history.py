@@ -96,11 +96,11 @@ class QuakeHistory:
     @staticmethod
     def of(quake: Earthquake, span: tuple[float, float] | None = None) -> QuakeHistory:
         """No rows, and the frame of the static state; span: as in `Frames`."""
-        joints = quake.problem.model.equilibrium.interface.joints
+        joints, graph = quake.problem.model.equilibrium.interface.joints, quake.case.graph
         return QuakeHistory(
             {name: [] for name in quake_columns(quake.case)},
             Frames.of(quake, span),
-            [quake.system.resultants(j, quake.case.above([k])) for k, j in enumerate(joints)],
+            [quake.system.resultants(j, graph.separated([k])) for k, j in enumerate(joints)],
         )
 
     def __len__(self) -> int:

@@ -23,6 +23,7 @@ from .constraints import (
     check_values,
     highest_level,
 )
+from .joint_graph import ROCK, JointGraph
 from .parameters import (
     constants,
     declared,
@@ -117,13 +118,13 @@ class Case(ParameterValues):
         return tuple(
             replace(
                 self,
-                values=self.values | own.values,
-                section=own.section,
-                hardening_asked=own.hardening_asked,
+                values=self.values | joint.values,
+                section=joint.section,
+                hardening_asked=joint.hardening_asked,
                 lift_heights=(),
                 of_joints=(),
             )
-            for own in self.of_joints
+            for joint in self.of_joints
         )
 
     @property
@@ -160,38 +161,21 @@ class Case(ParameterValues):
     @property
     def joint_names(self) -> tuple[str, ...]:
         """Names of the joints, for messages."""
-        return tuple(own.name for own in self.of_joints) or (joint_name(self["joint_height"]),)
+        return tuple(joint.name for joint in self.of_joints) or (joint_name(self["joint_height"]),)
 
     def of_all_joints(self, name: str) -> str:
         """The values of a parameter at all joints, each once, as text."""
         return ", ".join(dict.fromkeys(str(joint[name]) for joint in self.joints))
 
-    def above(self, numbers: Collection[int]) -> set[str]:
-        """The bodies that without the joints of these numbers have no connection to the rock."""
-        if not self.of_joints:
-            return {"dam"} if numbers else set()
-        pairs = [(own.lower, own.upper) for own in self.of_joints]
-        rest = [pair for k, pair in enumerate(pairs) if k not in numbers]
-        reached, before = {"foundation"}, set[str]()
-        while reached != before:
-            before = set(reached)
-            reached |= {name for pair in rest if reached & set(pair) for name in pair}
-        return {name for pair in pairs for name in pair} - reached
+    @cached_property
+    def graph(self) -> JointGraph:
+        """The bodies and the joints between them."""
+        pairs = tuple((joint.lower, joint.upper) for joint in self.of_joints)
+        return JointGraph(pairs or ((ROCK, "dam"),))
 
     def separates(self, numbers: Collection[int]) -> bool:
         """Whether without the joints of these numbers a body has no connection to the rock."""
-        return bool(self.above(numbers))
-
-    def separating(self, numbers: Sequence[int]) -> tuple[int, ...]:
-        """The first of some joints, by their numbers, that alone holds what is above it; or those
-        on the rock, if all of these are among them; else none.
-        """
-        alone = [(k,) for k in numbers if self.separates((k,))]
-        on_rock = tuple(
-            k for k, own in enumerate(self.of_joints) if own.lower == "foundation" != own.upper
-        )
-        together = [on_rock] if set(on_rock) <= set(numbers) else []
-        return next(iter([*alone, *together]), ())
+        return bool(self.graph.separated(numbers))
 
     def named(self, numbers: Sequence[int]) -> str:
         """The names of joints by their numbers; empty if there is only one joint."""
@@ -200,8 +184,8 @@ class Case(ParameterValues):
     def with_values(self, values: Values) -> Case:
         """The case with other values, the same for all joints; without the checks of `changed`."""
         others = tuple(
-            replace(own, values={n: v for n, v in own.values.items() if n not in values})
-            for own in self.of_joints
+            replace(joint, values={n: v for n, v in joint.values.items() if n not in values})
+            for joint in self.of_joints
         )
         return replace(self, values={**self.values, **values}, of_joints=others)
 
@@ -219,11 +203,13 @@ class Case(ParameterValues):
         )
         several = tuple(of_joints) if len(joints) > 1 else ()
         case = replace(self, section=ends[0], of_joints=several)
-        for own, joint in zip(case.joints, joints, strict=True):
-            length = own.section["joint_along"][0]
-            check_distances(own, length)
+        for joint_case, joint in zip(case.joints, joints, strict=True):
+            length = joint_case.section["joint_along"][0]
+            check_distances(joint_case, length)
             on_rock = joint.lower == "foundation" != joint.upper
-            check_stiffness(own, length, carries=on_rock, holds=len(joints) == 1)
+            check_stiffness(
+                joint_case, length, carries=on_rock, holds=len(joints) == 1 and self.has_water
+            )
         return case
 
     @cached_property
@@ -262,6 +248,11 @@ class Case(ParameterValues):
     def reached(self) -> float:
         """The highest level of the reservoir [m]; the highest allowed if it is not prescribed."""
         return max(self.levels) if self["drive"] == "level" else self.highest_level
+
+    @property
+    def has_water(self) -> bool:
+        """Whether water stands on either side of the dam at some time."""
+        return self["drive"] != "level" or max(*self.levels, *self.tail_levels) > 0
 
     def level_at(self, time: float) -> float:
         """Reservoir level [m] at a time, linear between the levels, from 0 at t = 0."""
@@ -325,6 +316,8 @@ def check_joints(case: Case) -> None:
     for joint, name in zip(case.joints, case.joint_names, strict=True):
         try:
             check_values(joint, joint.section, joint.geometry is None)
+            if joint.geometry is None:
+                check_stiffness(joint, joint.joint_along, holds=joint.has_water)
             check_acting(joint, joint.times[-1])
         except InputError as error:  # of a value for all joints the first one
             where = "" if joint is case.joints[0] else f"{name}: "

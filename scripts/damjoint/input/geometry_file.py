@@ -14,7 +14,7 @@ from ..arrays import Value
 from .parameters import assignments, start_gmsh
 
 
-def own_geometry(name: str) -> Path:
+def geometry_file(name: str) -> Path:
     """The file of a user's own geometry.
 
     Raises InputError if it does not exist, or may be a program that is not allowed to run.
@@ -24,8 +24,8 @@ def own_geometry(name: str) -> Path:
         raise InputError(f"geometry = {name}: must be a file, a mesh that Gmsh reads or a .geo")
     if not path.stat().st_size:
         raise InputError(f"geometry = {name}: is empty; must be a mesh that Gmsh reads or a .geo")
-    own = data("geo").resolve() in path.resolve().parents
-    if own or is_mesh(path) or os.environ.get(RUN_GEO) == "1":
+    packaged = data("geo").resolve() in path.resolve().parents
+    if packaged or is_mesh(path) or os.environ.get(RUN_GEO) == "1":
         return path
     if path.suffix == ".geo":
         raise InputError(

@@ -110,8 +110,8 @@ def parsed_by_joint(
     return [
         whole,
         *(
-            parse(assignments({**own, **sizes, "n_joint": n}) + listed + base + INCLUDE)
-            for own, n in zip(values, elements, strict=True)
+            parse(assignments({**settings, **sizes, "n_joint": n}) + listed + base + INCLUDE)
+            for settings, n in zip(values, elements, strict=True)
         ),
     ]
 

@@ -21,7 +21,7 @@ from .constraints import (
     check_tail_levels,
     check_times,
 )
-from .geometry_file import own_geometry
+from .geometry_file import geometry_file
 from .joints import names_of_section, parsed_by_joint, settings_of_joints, stacked_joints
 from .parameters import checked, declared, levels_of, listing
 from .refinement import first_mesh, relative_error
@@ -79,7 +79,7 @@ def resolve(source: Source) -> Case:
     if "lift_heights" in overrides:
         given = overrides.pop("lift_heights")
         lifts = levels_of("lift_heights", given) if given else ()
-    geometry = own_geometry(file.texts["geometry"]) if "geometry" in file.texts else None
+    geometry = geometry_file(file.texts["geometry"]) if "geometry" in file.texts else None
     settings = {**file.defaults, **file.of_joints, **overrides}
     names = () if geometry else names_of_section(settings, lifts)
     values = settings_of_joints(settings, source.blocks(names), lifts, geometry)
@@ -170,9 +170,9 @@ def equal_steps(levels: int, steps: int) -> tuple[float, ...]:
 def as_published(path: Path, overrides: Settings, *loading: str | Sequence[float] | None) -> bool:
     """Whether a case of the package is unchanged but for mesh, solver and uplift."""
     harmless = {n for n, p in declared().items() if p.group in ("Mesh", "Solver")}
-    own = path.resolve().parent == CASES.resolve()
+    packaged = path.resolve().parent == CASES.resolve()
     return (
-        own
+        packaged
         and set(overrides) <= harmless | {"order", "uplift"}
         and all(levels is None for levels in loading)
     )

@@ -111,7 +111,7 @@ def slipped_joints(results: Results) -> tuple[int, ...]:
     slipped = [
         k for k, joint_result in enumerate(results.joints) if slipped_from(joint_result) is not None
     ]
-    return results.case.separating(slipped)
+    return results.case.graph.separating(slipped)
 
 
 def slipped_from(results: Results) -> float | None:

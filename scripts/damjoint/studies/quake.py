@@ -311,7 +311,7 @@ def rigid_block(quake: Earthquake, number: int) -> RigidBlock:
     equilibrium = problem.model.equilibrium
     joint, law = equilibrium.interface.joints[number], equilibrium.laws.laws[number]
     row = joint_row(equilibrium, problem.static, number)
-    above = quake.case.above([number])
+    above = quake.case.graph.separated([number])
     along, across = (
         system.translation(joint, above, direction)
         for direction in (joint.chord.along, joint.chord.normal)
