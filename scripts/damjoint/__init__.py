@@ -23,7 +23,8 @@ solver/     load stepping, Newton's method, equilibrium path
 dynamics/   time integration of an earthquake
 engines/    the engines: condensed/ from the parts above, getdp/ by the problem definition
 statics/    gravity method, limit analysis, verdict
-post/       tables, pictures, fields and folders of results
+post/       tables, fields and folders of results
+pictures/   shapes of a scene; pictures of section, joint, history and check
 accuracy.py mesh refinement to a required accuracy, error estimate
 session.py  the life of a study in its output folder
 runner.py   solves a case and writes its results

@@ -219,7 +219,7 @@ class Run:
         """The picture of the run, as `damjoint run` writes it."""
         from matplotlib import pyplot
 
-        from .post.pictures import picture
+        from .pictures.run_picture import picture
 
         # loads the backend, by which a notebook shows a figure
         pyplot.draw_if_interactive()  # type: ignore[no-untyped-call]

@@ -15,7 +15,7 @@ from .progress import INTERVAL, Progress
 from .session import Session, end_of, session
 
 if TYPE_CHECKING:  # runs without a picture do not load it
-    from .post.drawing_process import DrawingProcess
+    from .pictures.drawing_process import DrawingProcess
 
 
 class RunProgress(Progress):
@@ -110,7 +110,7 @@ def write_fields_and_pictures(
 
             write_fields(solution, folder / "fields")
         if picture and not drawing:
-            from .post.pictures import draw
+            from .pictures.run_picture import draw
 
             draw(solution, folder)
 

@@ -10,7 +10,7 @@ import numpy as np
 from damjoint.arrays import Array
 from damjoint.input.resolve import load
 from damjoint.laws import LAWS, Law
-from damjoint.post.drawing import write_picture
+from damjoint.pictures.drawing import write_picture
 
 #: Strengths at which all laws have the same tensile strength, cohesion and fracture energies.
 MATERIAL = {"sigma_max": 2e5, "adhesion": 2e5, "mu": 0.8, "G_f": 100.0, "G_t": 100.0}

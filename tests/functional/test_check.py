@@ -12,8 +12,9 @@ import damjoint as dj
 import matplotlib.image
 import numpy as np
 import pytest
+from damjoint.pictures import check_picture
+from damjoint.pictures.check_picture import draw_check, draw_joint
 from damjoint.post import folder as folders
-from damjoint.post.check_picture import draw_check, draw_joint
 from damjoint.statics import gravity
 from damjoint.statics.verdict import verdict
 from damjoint.studies import check as check_study
@@ -24,12 +25,15 @@ from damjoint.studies.check import (
     compare_joints,
     compare_methods,
     hand_calculation,
+    joints_table,
     labelled_notes,
     picture_table,
     text_table,
 )
 from damjoint.studies.critical import last_state
 from matplotlib.figure import Figure
+from matplotlib.table import Table
+from matplotlib.text import Text
 from own_mesh import OwnMesh
 
 #: Parameters common to all load combinations: SSNP142's dam on a coarse mesh.
@@ -480,9 +484,10 @@ def test_picture_of_each_joint_of_a_dam_that_fails(solve, tmp_path):
     weak = {"law": "bond", "mu": 0.3, "adhesion": 1e5, "lift_heights": (15.0,)}
     (result,) = solve("dam", (45.0,), n_joint=24.0, order=1.0, **weak)
     assert verdict(result) == "sliding on base" and len(result.joints) == 2
-    for k, check in enumerate(compare_joints(result)):
-        method = hand_calculation(result.joints[k])
-        path = draw_check(result, k, method, picture_table(check), check.why, tmp_path)
+    methods, checks = [hand_calculation(own) for own in result.joints], compare_joints(result)
+    table = joints_table(checks)
+    for k, check in enumerate(checks):
+        path = draw_check(result, k, methods, picture_table(check), table, check.why, tmp_path)
         assert matplotlib.image.imread(path).std() > 0.1
         path.unlink()
 
@@ -554,3 +559,31 @@ def test_an_interrupted_check_continues(command, tmp_path, monkeypatch):
                 assert float(row[name]) == pytest.approx(float(cell), rel=1e-9, abs=1e-5)
             except ValueError:
                 assert row[name] == cell
+
+
+def test_the_picture_draws_and_judges_every_joint(solve, monkeypatch, tmp_path):
+    """Each with its verdict; the table beside; the earthquake with its coefficient."""
+    joints = {
+        "lift_heights": (15.0,),
+        "adhesion": 0.0,
+        "k_h": 0.1,
+        "required_SSF": 2.5,
+        "mu": (1.0, 2.0),
+    }
+    (result,) = solve("dam", (30.0, 30.0), n_joint=24.0, order=1.0, law="friction", **joints)
+    methods, checks = [hand_calculation(own) for own in result.joints], compare_joints(result)
+    drawn = []
+    monkeypatch.setattr(check_picture, "write_picture", lambda figure, *_: drawn.append(figure))
+    cells = picture_table(checks[0]), joints_table(checks)
+    draw_check(result, 0, methods, *cells, checks[0].why, tmp_path)
+    (figure,) = drawn
+    texts = [text.get_text() for text in figure.findobj(Text)]
+    *_, beside = figure.findobj(Table)
+    cells = {place: cell.get_text().get_text() for place, cell in beside.get_celld().items()}
+    verdicts = [check.finite_elements.verdict for check in checks]
+    assert len(set(verdicts)) == 2
+    for row, (name, judged) in enumerate(zip(result.case.joint_names, verdicts, strict=True), 1):
+        assert f"{name}: {judged}" in texts
+        assert (cells[row, 0], cells[row, 4]) == (name, judged)
+    assert "k_h = 0.1" in texts
+    assert any(text.startswith("loads: weight, water 30 m") for text in texts)

@@ -69,7 +69,7 @@ def test_an_interrupt_that_leaves_no_result_does_not_say_so(command, monkeypatch
         raise KeyboardInterrupt
 
     monkeypatch.setattr("damjoint.solver.model.Model.start", interrupted)
-    monkeypatch.setattr("damjoint.post.pictures.draw", interrupted)
+    monkeypatch.setattr("damjoint.pictures.run_picture.draw", interrupted)
     code, _, err = command(*words)
     assert (code, err) == (130, "damjoint: interrupted\n")
 

@@ -12,7 +12,7 @@ from damjoint.input.resolve import load
 from damjoint.joint.interface import interface_of
 from damjoint.laws import LAWS, Law
 from damjoint.mesh.mesh import mesh_of
-from damjoint.post.pictures import shear_limit
+from damjoint.pictures.run_picture import shear_limit
 from damjoint.solver.load_stepper import LoadStepper
 from damjoint.statics.hints import hints
 from damjoint.statics.verdict import verdict

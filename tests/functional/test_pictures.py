@@ -15,12 +15,15 @@ import pytest
 from damjoint import RunError
 from damjoint.input.resolve import load
 from damjoint.mesh.body import Body
-from damjoint.post import pictures
-from damjoint.post.drawing import runs_of
-from damjoint.post.drawing_process import DrawingProcess, joined
+from damjoint.pictures import run_picture as pictures
+from damjoint.pictures.drawing import runs_of, widen
+from damjoint.pictures.drawing_process import DrawingProcess, joined
+from damjoint.pictures.scene import water_surface
 from damjoint.statics import gravity
 from matplotlib.axes import Axes
 from matplotlib.legend import Legend
+from matplotlib.table import Table as MplTable
+from matplotlib.text import Text
 from numpy.testing import assert_allclose
 from PIL import Image
 from scipy.integrate import trapezoid
@@ -215,7 +218,7 @@ def test_an_error_of_the_drawing_process_is_raised(runs, tmp_path):
 def test_the_drawing_process_ends_with_its_parent():
     script = """
 import time
-from damjoint.post.drawing_process import DrawingProcess, joined
+from damjoint.pictures.drawing_process import DrawingProcess, joined
 with DrawingProcess() as drawing:
     print(drawing.group, flush=True)
     time.sleep(600)
@@ -303,3 +306,93 @@ def test_a_drawing_process_that_is_killed_is_an_error(runs, tmp_path, monkeypatc
             drawing.wait()
         drawing.send(runs("flow").solution, tmp_path)
         drawing.wait()
+
+
+def texts_of(figure):
+    """All texts of a figure that are shown."""
+    return [text.get_text() for text in figure.findobj(Text) if text.get_text()]
+
+
+def test_a_picture_says_verdict_loads_factor_and_position(figures, runs):
+    texts = texts_of(figures("sloping"))
+    result = runs("sloping").solution.result
+    assert texts[0].endswith("level 42 m, tailwater 4 m: stands")
+    facts = "\n".join(texts)
+    assert (
+        "loads: weight, water 42 m, tailwater 4 m, silt 10 m, uplift drained, k_h = 0.05" in facts
+    )
+    (factor,) = (
+        f for n, f in gravity.factors_of_state(result.case, result.last).items() if n == "SSF"
+    )
+    where = gravity.position(result.last["x_resultant"], result.case.joint_length)
+    assert f"SSF {factor:.3g}, N' at {result.last['x_resultant']:.3g} m: {where}" in facts
+
+
+def test_the_step_of_the_earthquake_is_marked_where_the_level_stands_twice(runs):
+    """With levels 30, 42, 42 the third step; with a level that no earlier step had, none is."""
+    result = runs("sloping").solution.result
+    assert pictures.changes_at_a_level(result) == [(len(result.history["time"]) - 1, "k_h = 0.05")]
+    rising = replace(result, history=result.history | {"level": np.array([30.0, 40.0, 42.0])})
+    assert pictures.changes_at_a_level(rising) == []
+
+
+def test_the_largest_opening_is_not_negative(runs):
+    result = runs("closed").solution.result
+    assert (result.history["max_opening"] < 0).all()
+    opening, *_ = pictures.history_panels(result)
+    assert_allclose(opening.lines[0][0], 0.0)
+
+
+def test_several_joints_are_shown_as_equals():
+    """Curves and a row of a table for each; the heading does not speak for the first one."""
+    run = dj.run(dj.case("dam", **COARSE, law="friction", levels=[40], lift_heights=[15, 30]))
+    figure, result = run.plot(), run.solution.result
+    names = result.case.joint_names
+    titles = [axes.get_title(loc="left") for axes in figure.findobj(Axes)]
+    assert [titles.count(name) for name in names] == [3, 3, 3]
+    (table,) = figure.findobj(MplTable)
+    cells = {place: cell.get_text().get_text() for place, cell in table.get_celld().items()}
+    heads = [cells[0, column].split("\n")[0] for column in range(7)]
+    assert heads == ["joint", "SSF", "N' at x", "crack", "broken", "slipped", "N' in"]
+    for row, own in enumerate(result.joints, 1):
+        factor = gravity.factors_of_state(own.case, own.last)["SSF"]
+        assert cells[row, 0] == names[row - 1] and cells[row, 1] == f"{factor:.3g}"
+    assert "curves" not in texts_of(figure)[0]
+    assert_nothing_is_clipped(figure)
+
+
+def test_an_axis_does_not_zoom_into_the_last_digits():
+    axes = pictures.figure_of(4, 3).subplots()
+    axes.plot([0, 1], [45.0, 45.01])
+    widen(axes.yaxis)
+    low, high = axes.get_ylim()
+    assert high - low == pytest.approx(0.05 * 45.01, rel=1e-2) and low < 45 < 45.01 < high
+    axes.set_ylim(0, 45)
+    widen(axes.yaxis)
+    assert axes.get_ylim() == (0, 45)
+
+
+def test_a_narrow_map_has_a_single_tick():
+    """Ticks of a joint 5 m long and 0.1 m thick would overlap."""
+    axes = pictures.figure_of(4, 3).subplots()
+    x, y = np.array([(0, 0), (5, 0), (5, 0.1), (0, 0.1)]).T
+    shape = pictures.Triangulation(x, y, [(0, 1, 2), (0, 2, 3)])
+    pictures.draw_map(axes, shape, np.arange(4.0), "opening [mm]", True)
+    assert axes.get_yticks().tolist() == [0.1]
+
+
+def test_the_surface_of_the_reservoir_ends_at_dam_and_ground():
+    """A valley 1:1 whose bottom is along x, a dam from x = 0 on: at a level of 5 m the water is
+    10 m wide and ends at the dam.
+    """
+    x, z = np.meshgrid(np.linspace(-20, 20, 41), np.linspace(-10, 10, 41))
+    points = np.column_stack([x.ravel(), np.abs(z).ravel(), z.ravel()])
+    corners = np.arange(41 * 41).reshape(41, 41)
+    quads = np.stack([corners[:-1, :-1], corners[:-1, 1:], corners[1:, 1:], corners[1:, :-1]], -1)
+    ground = Body(points, np.arange(len(points)), [("quad", quads.reshape(-1, 4))], np.arange(1600))
+    dam = Body(np.array([(0.0, 0, 0), (5, 0, 0)]), np.arange(2), [], np.arange(0))
+    cells = water_surface({"foundation": ground, "dam": dam}, 5.0)
+    assert_allclose(cells[:, :, 1], 5.0)
+    assert cells[:, :, 0].max() == pytest.approx(0) and cells[:, :, 0].min() == pytest.approx(-20)
+    assert np.ptp(cells[:, :, 2]) == pytest.approx(10, abs=1.7)
+    assert len(water_surface({"foundation": ground, "dam": dam}, -1.0)) == 0

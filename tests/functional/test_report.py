@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from damjoint import cli
 from damjoint.input.resolve import load
+from damjoint.pictures.run_picture import shear_limit
 from damjoint.post import stored
-from damjoint.post.pictures import shear_limit
 from damjoint.statics import gravity
 from damjoint.studies import report, report_input
 from numpy.testing import assert_allclose

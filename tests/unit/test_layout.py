@@ -13,8 +13,8 @@ WITNESS = PACKAGE.with_name("damjoint_witness")
 #: Each part uses only those before it.
 PARTS = ["", "csr", "threads", "storage", "progress", "processes", "versions", "laws", "input"]
 PARTS += ["mesh", "model", "fem", "joint", "solver", "dynamics", "engines", "statics", "post"]
-PARTS += ["accuracy", "session", "runner", "studies", "verification", "library", "gui", "cli"]
-PARTS += ["__main__"]
+PARTS += ["pictures", "accuracy", "session", "runner", "studies", "verification", "library"]
+PARTS += ["gui", "cli", "__main__"]
 
 
 def part_of(path):

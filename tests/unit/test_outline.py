@@ -14,7 +14,9 @@ from damjoint.model.fields import (
     row_of_nodes,
     state_of,
 )
-from damjoint.post.outline import JointLine, fill_to_level, section_of, skin
+from damjoint.model.loads import STAGED, Loading
+from damjoint.pictures.outline import JointLine, section_of, skin
+from damjoint.pictures.scene import displaced_faces, fluid_above, fluids
 from damjoint.post.units import FORCES, LENGTHS, unit, with_unit
 from numpy.testing import assert_allclose
 
@@ -63,9 +65,6 @@ def test_outlines_of_a_lift_joint(lift):
     assert_allclose(section.crest, [(4, 8), (2, 8)])
     assert_allclose(section.floor, [(1, 4), (0, 0), (-5, 0)])
     assert_allclose(section.bed, [(20, 0), (12, 0), (8, 4)])
-    ((*faces,),) = section.joint_faces
-    for body, face in faces:
-        assert_allclose(body.points[face], ends)
     assert {name: len(*tables) for name, tables in section.foundation.faces.items()} == {
         "foundation": 3,
         "lower": 1,
@@ -73,24 +72,44 @@ def test_outlines_of_a_lift_joint(lift):
     assert_allclose(section.dam.centroid[1], 4 + 4 / 3 * (7 + 2 * 2) / (7 + 2))
 
 
+def filled(section, still, level, tail=0.0, **settings):
+    """Areas of the fluids of a section at its levels."""
+    case = load("dam", settings, [30.0])
+    faces, dry = displaced_faces(section), displaced_faces(still)
+    now = Loading(level, tail, (1.0,) * len(STAGED))
+    return {name: sum(map(area, quads)) for name, quads in fluids(case, faces, now, dry).items()}
+
+
 @pytest.mark.parametrize(
     "level, held",
-    [(0, 0), (2, 2 * (5 + 2 / 8)), (6, 6 * (5 + 6 / 8)), (9, 8 * (5 + 1) + 5 + 2 + 2)],
+    [(0, 0), (2, 2 * (5 + 2 / 8)), (6, 6 * (5 + 6 / 8)), (9, 8 * (5 + 1) + 5 + 2)],
 )
-def test_area_of_water_up_to_a_level(lift, level, held):
-    """Beside a batter 1:4 from the end of the rock; over the crest over its whole length."""
-    polygon = section_of(*lift[:2], 1.0, joint_of(lift[2])).reservoir(level)
-    assert (area(polygon) if len(polygon) else 0) == pytest.approx(held)
+@pytest.mark.parametrize("on_crest", [0, 1])
+def test_area_of_water_up_to_a_level(lift, level, held, on_crest):
+    """Beside a batter 1:4 from the end of the rock; over the crest only if water loads it."""
+    section = section_of(*lift[:2], 1.0, joint_of(lift[2]))
+    areas = filled(section, section, level, crest_water=on_crest, silt_height=1.0)
+    assert areas["water"] == pytest.approx(held + 2 * on_crest * (level > 8))
+    assert areas["silt"] == pytest.approx(5 + 1 / 8)
 
 
 def test_water_follows_the_displaced_dam(lift):
-    """Tailwater beside a slope 1:1, displaced by 0.5 m, ten times exaggerated."""
+    """Tailwater beside a slope 1:1, displaced by -0.05 m, ten times exaggerated; the ground reaches
+    the displaced dam.
+    """
     bodies, still, ends = lift
-    moved = still | {"dam": still["dam"] + (0.05, 0, 0)}
-    section = section_of(bodies, moved, 10.0, joint_of(ends))
-    below, above = 4 * (8 + 2), 2 * (20 - 8 - 0.5 + 1)
-    assert area(section.tailwater(6)) == pytest.approx(below + above)
-    assert_allclose(section.crest[:, 0], (4.5, 2.5))
+    moved = still | {"dam": still["dam"] - (0.05, 0, 0)}
+    before, section = (section_of(bodies, u, 10.0, joint_of(ends)) for u in (still, moved))
+    areas = filled(section, before, 0.0, 6.0)
+    assert areas["water"] == pytest.approx(4 * (8 + 2) + 2 * (20 - 8 + 0.5 + 1))
+    assert_allclose(section.crest[:, 0], (3.5, 1.5))
+
+
+def test_ground_that_the_exaggerated_displacement_lowers_stays_dry(lift):
+    bodies, still, ends = lift
+    sunk = {name: u - (0, 0.3, 0) for name, u in still.items()}
+    before, section = (section_of(bodies, u, 10.0, joint_of(ends)) for u in (still, sunk))
+    assert filled(section, before, -1.0)["water"] == 0
 
 
 def test_a_body_without_a_face_at_the_lowest_z_has_no_section(lift):
@@ -100,8 +119,12 @@ def test_a_body_without_a_face_at_the_lowest_z_has_no_section(lift):
 
 
 def test_water_below_an_overhang():
-    shore = np.array([(0.0, 3.0), (1.0, 2.0), (0.0, 1.0), (0.0, 0.0), (-2.0, 0.0)])
-    assert area(fill_to_level(shore, 2.0)) == pytest.approx(2 * 2 + 0.5)
+    """It also fills the overhang, which the dam hides; none above a dry face."""
+    edges = np.array(
+        [((1.0, 2.0), (0.0, 1.0)), ((0.0, 1.0), (0.0, 0.0)), ((0.0, 0.0), (-2.0, 0.0))]
+    )
+    assert [area(quad) for quad in fluid_above(edges, 2.0)] == [0.5, 0.0, 4.0]
+    assert [area(quad) for quad in fluid_above(edges, 0.0)] == [0.0, 0.0, 0.0]
 
 
 def test_surface_of_a_solid():
@@ -190,7 +213,7 @@ def test_curves_of_a_joint_with_unordered_nodes():
         (1.2683e7, FORCES, "12.68 MN/m"),
         (150e3, FORCES, "150 kN/m"),
         (4.2e-7, LENGTHS, "420 nm"),
-        (0.0, LENGTHS, "0 nm"),
+        (0.0, LENGTHS, "0 m"),
     ],
 )
 def test_units_by_magnitude(value, units, text):

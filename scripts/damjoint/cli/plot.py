@@ -17,11 +17,12 @@ def add(command: Parser) -> None:
 
 def call(arguments: argparse.Namespace) -> int:
     """Run damjoint plot."""
-    from ..post import pictures, stored
+    from ..pictures import run_picture
+    from ..post import stored
 
     runs = [(folder, stored.read(folder)) for folder in stored.runs_in(arguments.out)]
     for folder, result in runs:
-        print(pictures.draw(result, folder))
+        print(run_picture.draw(result, folder))
         if "quake" in result.result.info:
             print(
                 "damjoint: of an earthquake only the static states are drawn again", file=sys.stderr

@@ -18,7 +18,7 @@ from .options import (
 )
 
 if TYPE_CHECKING:
-    from ..post.drawing_process import DrawingProcess
+    from ..pictures.drawing_process import DrawingProcess
 
 
 SUMMARY = "fill the reservoir of a case; exit code 1 if the dam fails or the run stops early"
@@ -42,7 +42,7 @@ def call(arguments: argparse.Namespace) -> int:
     """Run damjoint run; 0, or 1 if the dam fails or the run stopped before its last level."""
     if arguments.no_picture:
         return run_and_print(arguments, None)
-    from ..post.drawing_process import DrawingProcess
+    from ..pictures.drawing_process import DrawingProcess
 
     with DrawingProcess() as drawing:  # before the other libraries are loaded
         return run_and_print(arguments, drawing)

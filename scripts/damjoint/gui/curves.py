@@ -9,12 +9,12 @@ import numpy as np
 
 from ..arrays import Table
 from ..model.fields import along
+from ..pictures.scene import is_extruded
 from ..post.units import FORCES, LENGTHS, STRESSES, Units
 from .gallery import BLUE, DARK, GREEN, GREY, LAKE, ORANGE, RED, Color
 from .graphs import BEFORE, Curve, Graph, Graphs
 from .numbers import ACCELERATIONS, SECONDS
 from .scene import SolvedScene
-from .shapes import is_extruded
 
 METRES: Units = LENGTHS[:1]
 #: Parts of the time of an earthquake of which the smallest and the largest value are drawn.

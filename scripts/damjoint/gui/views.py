@@ -26,7 +26,7 @@ from ..model.fields import (
 )
 from ..post.units import LENGTHS, STRESSES, unit, with_unit
 from . import layout as places
-from .camera import CLIPPED
+from .camera import CLIPPED, undeformed_camera
 from .curves import show_graphs
 from .gallery import (
     BALANCED,
@@ -95,7 +95,7 @@ SIZES = 17, 13, 14, 12
 def show_undeformed_loads(case: Case) -> Gallery:
     """Show the loads of the last level on the undeformed dam, before a run."""
     gallery = Gallery()
-    loads, labels = undeformed_loads(case)
+    loads, labels = undeformed_loads(case, undeformed_camera(case).box)
     show_loads(gallery, case, loads, labels, {"ShowScale": 0, "Light": 0})
     return gallery
 
@@ -210,7 +210,7 @@ def show_deformed(gallery: Gallery, deformed: Deformed, display: Display) -> lis
     """Show dam and foundation, outline, loads, crack and slip, all displaced by one factor; returns
     their legend.
     """
-    case = deformed.scene.result.case
+    case = deformed.scene.case
     deformed.camera.clip(case.size)
     moves = {"VectorType": 5, "Clip": CLIPPED, "DisplacementFactor": deformed.scale}
     scale = {**color_bar(0), "Light": 0, "RangeType": 1 if display.common else 3}
@@ -240,7 +240,7 @@ def show_deformed(gallery: Gallery, deformed: Deformed, display: Display) -> lis
             color, text = STATES[state]
             gallery.add(text, [pieces], [color], **flat, **layer(case, 2), LineWidth=2)
             legend.append((color, text))
-    if deformed.undeformed:
+    if deformed.scene.undeformed:
         above = {**flat, **layer(case, 5), "LineWidth": 2.5}
         gallery.add("resultant", [deformed.resultant()], [GREEN], **above)
         legend.append((GREEN, "resultant, middle third"))
@@ -258,8 +258,8 @@ def show_strips(gallery: Gallery, deformed: Deformed, display: Display) -> None:
 
     From heel to toe to the right; of a user's own geometry upwards, as seen from upstream.
     """
-    scene = deformed.scene
-    case, rows = scene.own.case, deformed.joints[scene.joint].rows
+    scene = deformed.solved
+    case, rows = scene.own.case, deformed.scene.joints[scene.joint].rows
     joint = joint_body(scene.bodies, scene.joint)
     nearest = row_of_nodes(joint, rows[0])
     s, z = distance(rows[0])[nearest], joint.points[:, 2]

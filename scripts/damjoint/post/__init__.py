@@ -1,1 +1,1 @@
-"""What comes out: tables, verdict, fields, pictures, comparison with published numbers."""
+"""What comes out: tables, fields, folders of results, comparison with published numbers."""

@@ -49,18 +49,18 @@ class Table(NamedTuple):
         ]
 
 
-def table_of(columns: list[tuple[str, np.ndarray, Units]]) -> Table:
-    """Format columns (name, values, units) in units that suit their size; what is below 1e-9 of a
-    column's largest value is rounding and shown as 0.
+def table_of(columns: list[tuple[str, np.ndarray, Units]], digits: int = 4) -> Table:
+    """Format columns (name, values, units) with some digits in units that suit their size; what is
+    below 1e-9 of a column's largest value is rounding and shown as 0.
     """
     names, sizes, cells = [], [], []
     for name, values, units in columns:
-        size, factor = unit([np.nan_to_num(values)], units)
-        rounding = 1e-9 * np.abs(np.nan_to_num(values)).max(initial=0)
+        size, factor = unit([np.where(np.isfinite(values), values, 0.0)], units)
+        rounding = 1e-9 * np.abs(values[np.isfinite(values)]).max(initial=0)
         values = np.where(np.abs(values) < rounding, 0.0, values)
         names.append(name)
         sizes.append(size)
-        cells.append([f"{v * factor + 0.0:.4g}" if np.isfinite(v) else "-" for v in values])
+        cells.append([f"{v * factor + 0.0:.{digits}g}" if np.isfinite(v) else "-" for v in values])
     return Table(names, sizes, list(zip(*cells, strict=True)))
 
 
@@ -84,6 +84,40 @@ def levels_table(result: Results) -> Table:
     thirds = (gravity.position(x, case.joint_length) for x in history["x_resultant"][rows])
     cells = [(*row, third) for row, third in zip(cells, thirds, strict=True)]
     return Table([*names, "N' in"], [*sizes, ""], cells)
+
+
+#: Columns of the table of the joints: name in the history, heading.
+OF_JOINTS = (
+    ("x_resultant", "N' at x"),
+    ("crack_length", "crack"),
+    ("broken_length", "broken"),
+    ("process_zone", "softening"),
+    ("slip_length", "slipped"),
+)
+
+
+def joints_table(result: Results, time: float) -> Table:
+    """Tabulate the joints at a time, a row each: safety factor against sliding, place of N,
+    lengths that are open, broken, softening, slipped.
+    """
+    joints = [(own, own.state(time)) for own in result.joints]
+    factors = [
+        gravity.sliding_factor(own.case, state["N"], state["T"], state["bonded_length"])
+        if own.case.law.limits_shear
+        else np.inf
+        for own, state in joints
+    ]
+    columns: list[tuple[str, np.ndarray, Units]] = [("SSF", np.array(factors), (("", 1.0),))]
+    for name, head in OF_JOINTS:
+        values = np.array([state[name] for _, state in joints])
+        if name != "process_zone" or values.any():
+            columns.append((head, values, LENGTHS[:1]))
+    names, sizes, cells = table_of(columns, 3)
+    rows = [
+        (name, *row, gravity.position(state["x_resultant"], own.case.joint_length))
+        for name, row, (own, state) in zip(result.case.joint_names, cells, joints, strict=True)
+    ]
+    return Table(["joint", *names, "N' in"], ["", *sizes, ""], rows)
 
 
 def differs(broken: np.ndarray, crack: np.ndarray) -> bool:

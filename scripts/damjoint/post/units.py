@@ -17,8 +17,12 @@ FLUXES: Units = tuple((f"{name}g/(m s)", 1000.0**i) for i, name in enumerate(["k
 
 
 def unit(values: Iterable[np.ndarray], units: Units) -> tuple[str, float]:
-    """Choose the first unit in which the largest value is at least 1; name and factor."""
+    """Choose the first unit in which the largest value is at least 1, the first one if all values
+    are 0; name and factor.
+    """
     largest = max((np.abs(v).max(initial=0) for v in values), default=0)
+    if not largest:
+        return units[0]
     return next((u for u in units if largest * u[1] >= 1), units[-1])
 
 

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 
 from ..input import parameters
 from ..input.case import Case
-from ..post.drawing import BLUE, ORANGE, RED, write_picture
+from ..pictures.drawing import BLUE, ORANGE, RED, write_picture
 from ..post.units import LENGTHS, Units, unit
 from ..statics.gravity import sliding_factor
 from .plan import Plan, Row, column_of, numbers

@@ -20,9 +20,9 @@ from ..engines import engine_of
 from ..input.case import Case
 from ..model.fields import along
 from ..model.results import HISTORY, Results
+from ..pictures.check_picture import SIGN, draw_check
 from ..post import folder as folders
 from ..post import stored
-from ..post.check_picture import SIGN, draw_check
 from ..post.tables import write_csv
 from ..post.units import FORCES, MOMENTS, STRESSES, Units, unit
 from ..processes import in_processes
@@ -39,7 +39,7 @@ LONGER = "gravity method, longer crack"
 DIFFERENCE, REQUIRED = "difference", "required"
 #: Verdicts: nothing fails and nothing is required; nothing fails, but not all that is required
 #: could be judged.
-UNCHECKED, NOT_JUDGED = "not checked", "not judged"
+FAIL, PASS, UNCHECKED, NOT_JUDGED = "fail", "pass", "not checked", "not judged"
 #: Parameters that set requirements.
 REQUIREMENTS = ("required_SSF", "required_OSF", "f_c", "required_position")
 #: Value of a requirement that requires nothing.
@@ -158,10 +158,10 @@ class MethodResult:
     def verdict(self) -> str:
         """fail; not judged; pass if the case requires something; else not checked."""
         if self.failures:
-            return "fail"
+            return FAIL
         if self.not_judged:
             return NOT_JUDGED
-        return "pass" if self.requirements else UNCHECKED
+        return PASS if self.requirements else UNCHECKED
 
     @property
     def position(self) -> str:
@@ -482,7 +482,7 @@ def text_table(checks: list[SafetyCheck]) -> str:
         colalign=("left", "left", *("right" for _ in columns), "left", "left"),
     )
     lines = [
-        f"{scene}, {row['answer']}: {'fails, ' * (row['verdict'] == 'fail')}{row['why']}"
+        f"{scene}, {row['answer']}: {'fails, ' * (row['verdict'] == FAIL)}{row['why']}"
         for scene, row in zip(scenes, rows, strict=True)
         if row["why"]
     ]
@@ -573,8 +573,8 @@ def check_case(task: tuple[Case, Path], progress: bool) -> list[SafetyCheck]:
         write_csv(folder_of(result.case) / "gravity.csv", loads_table(methods))
         k = min(range(len(methods)), key=lambda k: of_joints[k].margin)
         worst = of_joints[k]
-        table = picture_table(worst)
-        draw_check(result, k, methods[k], table, worst.why, folder_of(result.case))
+        cells = picture_table(worst), joints_table(of_joints)
+        draw_check(result, k, methods, *cells, worst.why, folder_of(result.case))
     return checks
 
 
@@ -605,3 +605,19 @@ def picture_table(check: SafetyCheck) -> list[tuple[str, ...]]:
     if check.finite_elements.partial:
         cells.insert(1, ("load", "partial", "full", *("full" for _ in longer), ""))
     return [*cells, ("", *(result.verdict for result in check.results), "")]
+
+
+def joints_table(checks: list[SafetyCheck]) -> list[tuple[str, ...]]:
+    """Table of the joints of a scene: least factors of both methods, place of N by finite elements
+    and the worse verdict.
+    """
+    cells: list[tuple[str, ...]] = [("joint", "SSF", "OSF", "N' in", "verdict")]
+    for check in checks:
+        numbers = [result.numbers for result in check.results]
+        least = [np.nanmin([n[name] for n in numbers] + [np.inf]) for name in ("SSF", "OSF")]
+        verdicts = [result.verdict for result in check.results]
+        worst = min(verdicts, key=(FAIL, NOT_JUDGED, UNCHECKED, PASS).index)
+        position = check.finite_elements.position
+        name = check.finite_elements.joint
+        cells.append((name, *(f"{f:.3g}" if f < np.inf else "-" for f in least), position, worst))
+    return cells

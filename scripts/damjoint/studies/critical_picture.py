@@ -3,34 +3,70 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from ..post.drawing import BLUE, GREEN, ORANGE, RED, write_picture
+from ..input.case import Case
+from ..model.loads import Loading
+from ..model.results import Results
+from ..pictures.drawing import BLUE, GREEN, GREY, ORANGE, RED, WATER, widen, write_picture
+from ..pictures.scene import loads_label, state_label
 from ..post.units import LENGTHS, unit
 from ..solver.path import Point
+from .critical_value import CriticalValue
 from .failure_path import FailurePath, Trial
 
 #: Ratio of the largest to the smallest value above which the values have a logarithmic axis.
 WIDE = 30
+GRAVITY = "gravity method"
+#: Line styles of the gravity method's values, by its assumptions.
+DASHES: tuple[Any, ...] = ":", "--", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 3))
 
 
 class Content(NamedTuple):
-    """Content of the picture: title, varied quantity and its unit, trials, critical value by both
-    methods (None: not found), failure mode.
+    """Content of the picture: case, varied quantity and its unit, trials, what the search found,
+    its last equilibrium.
     """
 
-    title: str
+    case: Case
     of: str
     unit: str
-    trials: list[Trial]
-    value: float | None
-    gravity: float | None
-    mode: str
+    trials: Sequence[Trial]
+    answer: CriticalValue
+    result: Results | None
+
+    @property
+    def facts(self) -> list[str]:
+        """Why the value is confirmed or not; the loads; the joint that fails in its last
+        equilibrium.
+        """
+        answer, result = self.answer, self.result
+        facts = [answer.why or f"not confirmed: {answer.doubt}"]
+        if result and (last := result.last):
+            loading = Loading.at(self.case, self.case.times[-1], last["level"], last["tail_level"])
+            facts.append(f"loads: {loads_label(self.case, loading)}")
+            names = result.case.joint_names
+            k = names.index(answer.joint) if answer.joint in names else 0
+            name = f"{names[k]}, last equilibrium" if self.case.of_joints else "last equilibrium"
+            own = result.joints[k]
+            facts.append(f"{name}: {state_label(own.case, own.last)}")
+        return facts
+
+    @property
+    def by_hand(self) -> dict[str, float]:
+        """All values of the gravity method."""
+        answer = self.answer
+        if answer.gravity is None:
+            return {}
+        where = f" on {answer.gravity_joint}" if answer.gravity_joint else ""
+        there = {} if answer.gravity_there is None else {f"on {answer.joint}": answer.gravity_there}
+        named = {f"{GRAVITY} {n}": v for n, v in (there | {**answer.gravity_with}).items()}
+        return {f"{GRAVITY}{where}": answer.gravity} | named
 
 
 def draw(content: Content, path: Path) -> None:
@@ -38,27 +74,43 @@ def draw(content: Content, path: Path) -> None:
     level, also the highest level with each value.
     """
     single = content.of == "level"
-    figure = Figure(figsize=(7.5 if single else 12, 4.8), layout="constrained")
+    figure = Figure(figsize=(7.5 if single else 12, 5.4), layout="constrained")
     FigureCanvasAgg(figure)
     *of_trials, of_paths = figure.subplots(1, 1 if single else 2, squeeze=False)[0]
     title = textwrap.fill(heading(content), 75 if single else 120)
-    figure.suptitle(title, fontsize=11, parse_math=False)
+    lines = [textwrap.fill(fact, 100 if single else 160) for fact in content.facts]
+    figure.suptitle("\n".join([title, *lines]), fontsize=9.5, parse_math=False)
     for axes in of_trials:
         draw_trials(axes, content)
     draw_paths(of_paths, content)
     for axes in (*of_trials, of_paths):
+        draw_levels(axes, content)
+        widen(axes.yaxis)
         axes.grid(alpha=0.3)
         if axes.get_legend_handles_labels()[0]:  # an interrupted search may have no trial
             axes.legend(fontsize=8)
     write_picture(figure, path, 110)
 
 
+def draw_levels(axes: Axes, content: Content) -> None:
+    """Draw the required level, and the crest of a section by parameters."""
+    if content.of != "level":
+        level = max(content.case.levels)
+        label = f"required level {level:.5g} m"
+        axes.axhline(level, color=WATER, linewidth=0.9, label=label)
+    if not content.case.geometry:
+        crest = content.case["dam_height"]
+        axes.axhline(crest, color=GREY, linestyle="-.", lw=0.9, label=f"crest {crest:.5g} m")
+
+
 def heading(content: Content) -> str:
     """Title of the picture: critical value and failure mode."""
-    if content.value is None:
-        return f"{content.title}: no critical {content.of} found"
-    text = f"{content.title}: critical {content.of} {content.value:.5g}{content.unit}"
-    return text + (f", {content.mode}" if content.mode else "")
+    title, answer = content.case.title, content.answer
+    if answer.value is None:
+        return f"{title}: no critical {content.of} found"
+    text = f"{title}: critical {content.of} {answer.value:.5g}{content.unit}"
+    where = f" on {answer.joint}" if answer.joint else ""
+    return text + (f", {answer.mode}{where}" if answer.mode else "")
 
 
 def draw_trials(axes: Axes, content: Content) -> None:
@@ -79,9 +131,10 @@ def draw_trials(axes: Axes, content: Content) -> None:
     axes.set(xlabel=f"{content.of} [{content.unit.strip() or '-'}]", ylabel="level [m]")
 
 
-def critical_lines(content: Content) -> list[tuple[float, str, str]]:
+def critical_lines(content: Content) -> list[tuple[float, Any, str]]:
     """Lines that mark the critical values: value, line style, label."""
-    lines = ((content.value, "-", "critical"), (content.gravity, ":", "gravity method"))
+    by_hand = zip(content.by_hand.values(), DASHES, content.by_hand, strict=False)
+    lines = [(content.answer.value, "-", "critical"), *by_hand]
     return [(v, style, f"{name} {v:.5g}") for v, style, name in lines if v is not None]
 
 
@@ -92,13 +145,14 @@ def draw_paths(axes: Axes, content: Content) -> None:
     crests = [[p.last["crest_ux"] for p in points] for points in paths]
     name, factor = unit([abs(max(crest, key=abs)) for crest in crests], LENGTHS)
     for trial, points, crest in zip(last.values(), paths, crests, strict=True):
-        label = f"{content.of} {trial.value:.6g}{content.unit}"
+        end = "stands" if trial.stands else "fails"
+        label = f"{content.of} {trial.value:.7g}{content.unit}: {end}"
         axes.plot(
             [ux * factor for ux in crest],
             [p.level for p in points],
-            "o-" if trial.stands or len(paths) == 1 else "s--",
-            color=GREEN if trial.stands else BLUE,
-            markersize=3,
+            "o-" if trial.stands or len(paths) == 1 else "x--",
+            color=BLUE if len(paths) == 1 else GREEN if trial.stands else RED,
+            markersize=3 if trial.stands or len(paths) == 1 else 5,
             label="equilibria" if content.of == "level" else label,
         )
     for value, style, label in critical_lines(content) if content.of == "level" else ():

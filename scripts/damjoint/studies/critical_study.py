@@ -112,15 +112,15 @@ def save(study: Session, search: Search, answer: CriticalValue) -> None:
     """Write the last equilibrium as `damjoint run` does, critical.csv and its picture."""
     state, _ = end_of(answer.error)
     entries = {"critical": as_json(search, answer), "wall_seconds": {"search": study.seconds}}
-    if answer.point:
-        result = last_state(search, answer.point)
+    result = last_state(search, answer.point) if answer.point else None
+    if answer.point and result:
         result.info = about(answer.point.model.equilibrium.bulk) | entries
         study.save(result, *early_end(result, answer.error))
     else:
         study.save_without_results(state or folders.COMPLETE, answer.doubt, entries)
     write_csv(study.out / "critical.csv", table(search))
-    what = search.own.title, search.of, search.unit, search.trials
-    shown = picture.Content(*what, answer.value, answer.gravity, answer.mode)
+    what = search.own, search.of, search.unit, search.trials
+    shown = picture.Content(*what, answer, result)
     picture.draw(shown, study.out / f"{search.own.name}_critical.png")
 
 

@@ -4,14 +4,17 @@ axis; the dam at its peaks.
 
 from __future__ import annotations
 
+import textwrap
 from pathlib import Path
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
+from ..model.loads import Loading
 from ..model.results import column_of
-from ..post.drawing import (
+from ..pictures.drawing import (
     BLUE,
     CONCRETE,
     DARK,
@@ -20,15 +23,21 @@ from ..post.drawing import (
     ORANGE,
     RED,
     ROCK,
+    VIOLET,
     figure_of,
     panels,
     write_picture,
 )
-from ..post.outline import exaggeration
+from ..pictures.outline import exaggeration
+from ..pictures.scene import loads_label, state_label
 from .quake_result import QuakeResult
 
+#: Of accelerations in g [m/s2].
+GRAVITY = 9.81
 #: Height of the curves, and of the deformed dams below them [inches].
 CURVES, SHAPES = 12.0, 2.6
+#: Colors of heel and toe, joint by joint.
+COLORS = (RED, GREEN), (ORANGE, BLUE), (VIOLET, DARK), ("#6d4c41", "#00838f")
 #: Part of the stresses within the colors of the map [%].
 SHOWN = 99
 #: Largest number of rows of the map of the stress.
@@ -47,8 +56,14 @@ def figure(result: QuakeResult) -> Figure:
     case, rows, stress = result.case, result.rows, result.stress
     shapes = SHAPES if result.shapes else 0.0
     picture = figure_of(9.0, CURVES + shapes)
-    picture.text(0.05, 0.988, f"{case.title}: {result.statement}", va="top", fontsize=10)
-    axes = panels(picture, 7, left=0.9, right=1.1, top=0.6, bottom=0.5 + shapes, down=0.25)[:, 0]
+    title = textwrap.wrap(f"{case.title}: {result.statement}", 100)
+    facts = [line for text in facts_of(result) for line in textwrap.wrap(text, 125)]
+    picture.text(0.05, 0.992, "\n".join(title), va="top", fontsize=10, parse_math=False)
+    below = 0.992 - 0.2 * len(title) / (CURVES + shapes)
+    style = {"va": "top", "fontsize": 8, "color": DARK, "parse_math": False}
+    picture.text(0.05, below, "\n".join(facts), **style)
+    top = 0.4 + 0.2 * len(title) + 0.14 * len(facts)
+    axes = panels(picture, 7, left=0.9, right=1.1, top=top, bottom=0.5 + shapes, down=0.25)[:, 0]
     time, joints = rows["time"], result.joints
     curves = [
         ("ground [m/s$^2$]", [("along x", rows["ground_ax"], DARK)]),
@@ -62,11 +77,11 @@ def figure(result: QuakeResult) -> Figure:
         curves[0][1].append(("along y", rows["ground_ay"], ORANGE))
     for k in joints:
         name = f", {case.joint_names[k]}" if len(case.joints) > 1 else ""
-        style = (RED, GREEN) if k == 0 else (ORANGE, BLUE)
-        for end, color in zip(("heel", "toe"), style, strict=True):
+        heel, toe = COLORS[k % len(COLORS)]
+        for end, color in (("heel", heel), ("toe", toe)):
             opening = 1e3 * np.maximum(rows[column_of(f"{end}_opening", k)], 0)
             curves[3][1].append((f"{end}{name}", opening, color))
-        curves[4][1].append((f"mean{name}", 1e3 * rows[column_of("slip_mean", k)], style[0]))
+        curves[4][1].append((f"mean{name}", 1e3 * rows[column_of("slip_mean", k)], heel))
     block = result.summary["residual"].get("rigid_block")
     for ax, (label, lines) in zip(axes, curves, strict=False):
         for name, values, color in lines:
@@ -77,6 +92,7 @@ def figure(result: QuakeResult) -> Figure:
     if block is not None:
         words = "rigid block at the end" + (f", {case.joint_names[0]}" if len(joints) > 1 else "")
         axes[4].axhline(1e3 * block, color=DARK, lw=0.8, ls="--", label=words)
+    draw_strength(axes[5], result)
     for ax in axes[:6]:
         above = {"loc": "lower right", "bbox_to_anchor": (1, 0.97), "ncols": 4, "frameon": False}
         ax.legend(fontsize=7, **above)
@@ -107,16 +123,38 @@ def figure(result: QuakeResult) -> Figure:
     return picture
 
 
+def facts_of(result: QuakeResult) -> list[str]:
+    """The record with its largest acceleration; loads and state of each joint before it."""
+    case, before = result.case, result.before
+    peak = np.abs(result.rows["ground_ax"]).max() / GRAVITY
+    texts = [f"record {Path(result.summary['record']).name}, largest acceleration {peak:.3g} g"]
+    if last := before.last:
+        loading = Loading.at(case, last["time"], last["level"], last["tail_level"])
+        texts.append(f"before it: {loads_label(case, loading)}")
+    for name, own in zip(case.joint_names, before.joints, strict=True):
+        if own.last:
+            state = state_label(own.case, own.last)
+            texts.append(f"{name}: {state}" if case.of_joints else state)
+    return texts
+
+
 def forces(result: QuakeResult) -> list[tuple[str, np.ndarray, str]]:
-    """Curves of T, its strength and N' of the joint with the largest residual slip [MN/m]."""
+    """Curves of T and N' of the joint with the largest residual slip [MN/m]."""
     rows, name = result.rows_of(result.joint), result.case.named((result.joint,))
     end = f", {name}" if name else ""
-    strength = rows["shear_reserve"] + np.abs(rows["T"])
-    curves = [(f"N'{end}", rows["N"], GREY)]
-    if np.isfinite(strength).all():  # a law may not limit shear
-        curves.append((f"strength for T{end}", np.copysign(strength, rows["T"]), RED))
-    curves.append((f"T{end}", rows["T"], BLUE))
+    curves = (f"N'{end}", rows["N"], GREY), (f"T{end}", rows["T"], BLUE)
     return [(words, values / 1e6, color) for words, values, color in curves]
+
+
+def draw_strength(axes: Axes, result: QuakeResult) -> None:
+    """Draw the shear force that the same joint transmits as a band of both signs."""
+    rows = result.rows_of(result.joint)
+    strength = np.maximum(rows["shear_reserve"] + np.abs(rows["T"]), 0.0) / 1e6
+    if np.isfinite(strength).all():  # a law may not limit shear
+        style = {"color": RED, "alpha": 0.12, "linewidth": 0}
+        axes.fill_between(rows["time"], -strength, strength, **style, label="strength for T")
+        for side in (strength, -strength):
+            axes.plot(rows["time"], side, color=RED, lw=0.5)
 
 
 def draw_shapes(picture: Figure, result: QuakeResult) -> None:

@@ -21,8 +21,9 @@ from ..input.case import Case
 from ..input.case_names import is_name
 from ..model.fields import Solution
 from ..model.results import Results
-from ..post import pictures, stored
-from ..post.drawing import figure_of
+from ..pictures import run_picture
+from ..pictures.drawing import figure_of
+from ..post import stored
 from ..post.summary import Table, levels_table, table_of
 from ..post.units import FORCES, MOMENTS, Units, unit
 from ..statics.gravity import GravityMethod, force, resultant_of
@@ -436,7 +437,7 @@ def factored(case: Case, strength: str, unit: float) -> str:
 def pictures_of(solution: Solution) -> list[Picture]:
     """Draw the pictures of a run."""
     result = solution.result
-    time = pictures.shown_time(result)
+    time = run_picture.shown_time(result)
     at_level = f"at level {result.state(time)['level']:.4g} m"
     return [Picture(*words, embedded(figure)) for *words, figure in drawn(solution, time, at_level)]
 
@@ -448,23 +449,23 @@ def drawn(solution: Solution, time: float, at_level: str) -> Iterator[tuple[str,
     has_fields = bool(solution.fields)
     if has_fields:
         section = figure_of(*HALF)
-        pictures.draw_dam(section, solution, time)
+        run_picture.draw_dam(section, solution, time)
         yield "half", f"Section and loads {at_level}, deformed.", section
     number = decisive_joint(result)
     joint = figure_of(*(HALF if has_fields else SOLID))
-    pictures.draw_joint(joint, solution.of_joint(number), time)
+    run_picture.draw_joint(joint, solution.of_joint(number), time)
     name = result.case.named((number,)) or "joint"
     caption = f"{name[0].upper()}{name[1:]} {at_level}. {colors}"
     yield "half" if has_fields else "full", caption, joint
     history = figure_of(*WIDE)
-    pictures.draw_histories(history, result, time)
+    run_picture.draw_histories(history, result, time)
     yield "full", "", history
-    if result.case["dim"] == 3 and has_fields and not pictures.is_own_solid(result.case):
+    if result.case["dim"] == 3 and has_fields and not run_picture.is_own_solid(result.case):
         solid = figure_of(*SOLID)
-        pictures.draw_solid(solid, solution, time)
+        run_picture.draw_solid(solid, solution, time)
         yield "full", "In 3D: deformed, and maps of the joint.", solid
     if result.case["drive"] != "level":
-        yield "half", "Load against opening.", pictures.draw_curve(result)
+        yield "half", "Load against opening.", run_picture.draw_curve(result)
 
 
 def embedded(figure: Figure) -> str:

@@ -11,13 +11,17 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 
-from ..input.parameters import constants
+from ..input.case import Case
+from ..input.scene import BED, DOWN, FLOOR, UP
 from ..model.fields import BROKEN, SOFTENING, along, state_of
+from ..model.loads import Loading
 from ..model.results import Results
+from ..post.units import STRESSES, unit
 from ..statics.gravity import GravityMethod
 from .drawing import (
     BLUE,
     CONCRETE,
+    DARK,
     GREEN,
     ORANGE,
     RED,
@@ -26,8 +30,19 @@ from .drawing import (
     figure_of,
     write_picture,
 )
-from .pictures import gravity_profile, heading
-from .units import STRESSES, unit
+from .run_picture import gravity_profile, heading
+from .scene import (
+    QUAKE,
+    arrow,
+    fluids,
+    force_label,
+    forces_on,
+    level_label,
+    loads_label,
+    marked,
+    undeformed_faces,
+)
+from .section_picture import draw_fluid
 
 ROCK, SILT, EDGE = "#e6dcc8", "#a98d5d", "#5a5a5a"
 LOWER_BODY, LINES = "#dde2e8", "#b0b0b0"
@@ -43,11 +58,13 @@ BESIDE, BELOW = 0.6, 0.1
 DRAWN_RESULTANT = (-0.3, 1.3)
 #: Size of the figure [inches]; of the figure: left and width of section and table, their bottom,
 #: left margin, heights of a line of the title and of the reasons.
-SIZE = (11.2, 7.2)
-SECTION, TABLE = (0.06, 0.585), (0.665, 0.325)
-BOTTOM, MARGIN, TITLE, REASON = 0.075, 0.02, 0.035, 0.025
-#: Of the table's axes: height of a row and of the table at most.
-ROW, TALLEST = 0.045, 0.75
+SIZE = (11.2, 8.2)
+SECTION, TABLE = (0.06, 0.535), (0.61, 0.375)
+BOTTOM, LEGEND, MARGIN, TITLE, REASON = 0.02, 0.145, 0.02, 0.031, 0.022
+#: Of the tables' axes: height of a row and of the first table at most.
+ROW, TALLEST = 0.04, 0.7
+#: Length of a load's arrow over the dam's height.
+LOAD_ARROW = 0.12
 
 COMPUTED, HAND = "finite elements", "gravity method"
 #: Sign of stresses in every table and diagram.
@@ -58,59 +75,69 @@ ENDS = np.array([0.0, 1.0])
 def draw_check(
     result: Results,
     joint: int,
-    method: GravityMethod,
+    methods: list[GravityMethod],
     cells: list[tuple[str, ...]],
+    of_joints: list[tuple[str, ...]],
     why: str,
     folder: Path,
 ) -> Path:
-    """Draw the last saved state of a joint to folder/<case>_check.png and return its path.
+    """Draw the last saved state of a scene to folder/<case>_check.png and return its path.
 
-    joint: its number; method: the gravity method on it; cells: table beside the picture, headings
-    in the first row, quantities in the first column; why: the requirements that are not met.
+    joint: number of the joint with diagrams; methods: the gravity method on each joint; cells:
+    table beside the picture, headings in the first row, quantities in the first column; of_joints:
+    a row per joint, its verdict last; why: the requirements that are not met.
     """
     figure = figure_of(*SIZE)
-    own = result.joints[joint]
+    own, method = result.joints[joint], methods[joint]
     name = result.case.named((joint,))
-    title = textwrap.wrap(heading(own) + (f"; {name}" if name else ""), 100)
+    title = textwrap.wrap(heading(own) + (f"; diagrams: {name}" if name else ""), 100)
+    loads = textwrap.wrap(f"loads: {loads_label(result.case, loading_of(method))}", 150)
     reasons = textwrap.wrap(why, 150)
-    top = 0.97 - TITLE * len(title) - REASON * len(reasons)
-    section, beside = (
-        figure.add_axes((left, BOTTOM, width, top - BOTTOM)) for left, width in (SECTION, TABLE)
-    )
+    top = 0.97 - TITLE * len(title) - REASON * (len(loads) + len(reasons))
+    (left, width), bottom = SECTION, BOTTOM + LEGEND
+    section = figure.add_axes((left, bottom, width, top - bottom))
+    beside = figure.add_axes((TABLE[0], BOTTOM, TABLE[1], top - BOTTOM))
     figure.text(MARGIN, 0.985, "\n".join(title), fontsize=12, va="top", parse_math=False)
-    figure.text(
-        *(MARGIN, 0.98 - TITLE * len(title)),
-        "\n".join(reasons),
-        fontsize=9,
-        color=RED,
-        va="top",
-        parse_math=False,
-    )
-    draw_scene(section, method)
+    y = 0.98 - TITLE * len(title)
+    for lines, color in ((loads, EDGE), (reasons, RED)):
+        text = "\n".join(lines)
+        figure.text(MARGIN, y, text, fontsize=9, color=color, va="top", parse_math=False)
+        y -= REASON * len(lines)
+    draw_scene(section, method, result.case)
+    draw_joints(section, methods, of_joints)
     draw_joint(section, own, method)
     section.set_anchor("NW")
     handles, labels = section.get_legend_handles_labels()
-    labels = [textwrap.fill(label, 48) for label in labels]
-    beside.legend(handles, labels, loc="lower left", fontsize=8.5, frameon=False, handlelength=3)
+    place = {"loc": "lower left", "bbox_to_anchor": (left - 0.02, 0.005), "ncols": 2}
+    figure.legend(handles, labels, **place, fontsize=8, frameon=False, handlelength=3)
     beside.axis("off")
-    draw_cells(beside, cells)
+    height = min(ROW * len(cells), TALLEST)
+    draw_cells(beside, cells, 1 - height, height)
+    if len(methods) > 1:
+        below = min(ROW * len(of_joints), 0.97 - height)
+        draw_cells(beside, of_joints, 0.97 - height - below, below)
     path = folder / f"{method.case.name}_check.png"
     write_picture(figure, path, 120)
     return path
 
 
-def draw_cells(axes: Axes, cells: list[tuple[str, ...]]) -> None:
-    """Draw a table in the upper part of axes."""
-    height = min(ROW * len(cells), TALLEST)
-    others = len(cells[0]) - 1
-    first = 0.34 if others < 4 else 0.3
-    widths = [first, *[(1 - first) / others] * others]
+def loading_of(method: GravityMethod) -> Loading:
+    """The loading of the gravity method."""
+    return Loading.at(method.case, method.time, method.level, method.tail_level)
+
+
+def draw_cells(axes: Axes, cells: list[tuple[str, ...]], bottom: float, height: float) -> None:
+    """Draw a table into axes, from a bottom over a height of them."""
+    letters = np.array(
+        [max(len(cell) for cell in column) + 2 for column in zip(*cells, strict=True)]
+    )
+    widths = (letters / letters.sum()).tolist()
     table = axes.table(
         cells,
         colWidths=widths,
         cellLoc="right",
         edges="horizontal",
-        bbox=(0, 1 - height, 1, height),
+        bbox=(0, bottom, 1, height),
     )
     table.auto_set_font_size(False)
     table.set_fontsize(9)
@@ -127,52 +154,81 @@ def draw_cells(axes: Axes, cells: list[tuple[str, ...]]) -> None:
             text.set_color(RED)
 
 
-def face_line(method: GravityMethod, side: str) -> np.ndarray:
-    """Corners (n, 2) of the section's boundary on a side, by height, any lower body included."""
-    section = method.case.section
-    number = constants()[side][0]
-    segments = zip(*(section[f"seg_{n}"] for n in ("side", "x0", "y0", "x1", "y1")), strict=True)
-    corners = {end for s, x0, y0, x1, y1 in segments if s == number for end in ((x0, y0), (x1, y1))}
-    return np.array(sorted(corners, key=lambda corner: (corner[1], corner[0])))
-
-
-def draw_scene(axes: Axes, method: GravityMethod) -> None:
-    """Draw rock, dam, water and silt."""
-    case = method.case
-    up, down, bed = (face_line(method, side) for side in ("UP", "DOWN", "BED"))
+def draw_scene(axes: Axes, method: GravityMethod, scene: Case) -> None:
+    """Draw rock, all bodies of a scene, and its loads; the body above a joint in another color."""
+    case, body, loading = method.case, method.body, loading_of(method)
+    faces = undeformed_faces(scene)
+    up, down, floor, bed = (by_height(faces[side]) for side in (UP, DOWN, FLOOR, BED))
     base, height = case["dam_base"], case["dam_height"]
-    top = max(height, method.level)
     left, right = -BESIDE * base, (1 + BESIDE) * base
     lowest_diagram = UnderJoint(method).place(ENDS, STRESS_AT + 1.2 * TALL)[1].min()
-    floor = min(-BELOW * height, bed[0, 1] - BELOW * height, lowest_diagram)
-    toe = down[0]
-    rock = [(left, floor), (left, 0), (0, 0), toe, (right, toe[1]), (right, floor)]
-    axes.fill(*np.transpose(rock), color=ROCK, linewidth=0)
-    for face, outer, surface, color in (
-        (up, left, method.level, WATER),
-        (up, left, case["silt_height"], SILT),
-        (down, right, method.tail_level, WATER),
-    ):
-        draw_fluid(axes, face, outer, surface, color)
-    if method.level > height:
-        crest = [up[-1, 0], down[-1, 0]]
-        axes.fill_between(crest, height, method.level, color=WATER, alpha=0.4, linewidth=0)
+    lowest = min(-BELOW * height, bed[0, 1] - BELOW * height, lowest_diagram)
+    ground = np.unique(np.concatenate([floor, bed]), axis=0)
+    ends = [(ground[-1, 0], lowest), (ground[0, 0], lowest)]
+    axes.fill(*np.vstack([ground, ends]).T, color=ROCK, linewidth=0)
+    of_fluids = fluids(scene, faces, loading, faces)
+    for name, color in (("water", WATER), ("silt", SILT)):
+        draw_fluid(axes, of_fluids[name], facecolor=color, alpha=0.4)
+    for level, x in ((loading.level, left), (loading.tail, right)):
+        if level > 0:
+            axes.text(
+                x,
+                level,
+                f" {level_label(level)} ",
+                ha="left" if x < 0 else "right",
+                va="bottom",
+                fontsize=8,
+            )
     axes.fill(*np.vstack([up, down[::-1]]).T, facecolor=LOWER_BODY, edgecolor=EDGE, lw=0.8)
-    outline = method.body.outline + method.body.toe
+    outline = body.outline + body.toe
     axes.fill(*outline.T, facecolor=CONCRETE, edgecolor=EDGE, linewidth=0.8)
+    tips = {name: tip[:2] for name, tip in marked(scene, {}).items()}
+    length = LOAD_ARROW * height
+    for name, force in forces_on(scene, loading).items():
+        if not force.any():
+            continue
+        if name == QUAKE:  # inside the dam: from the centroid of the body
+            along = force / np.hypot(*force)
+            tips[name] = np.array(body.area_and_centroid[1:]) + body.toe + length * along
+        tail, tip = arrow(np.array([*tips[name], 0.0]), force, length)[0, :, :2]
+        color = RED if name == QUAKE else DARK
+        style = {"arrowstyle": "-|>", "color": color, "linewidth": 1.6, "shrinkA": 0, "shrinkB": 0}
+        axes.annotate("", tip, tail, arrowprops=style, zorder=5)
+        label = force_label(name, force)
+        axes.annotate(label, tail, (0, 4), textcoords="offset points", fontsize=8, color=color)
+    top = max(height, loading.level) + (length if len(tips) else 0)
     axes.set(
-        xlim=(left, right), ylim=(floor, 1.06 * top), aspect="equal", xlabel="x [m]", ylabel="y [m]"
+        xlim=(left, right),
+        ylim=(lowest, 1.06 * top),
+        aspect="equal",
+        xlabel="x [m]",
+        ylabel="y [m]",
     )
 
 
-def draw_fluid(axes: Axes, face: np.ndarray, outer: float, surface: float, color: str) -> None:
-    """Draw a fluid up to a surface between a face (n, 2) and an outer x."""
-    if surface <= face[0, 1]:
+def by_height(edges: np.ndarray) -> np.ndarray:
+    """Corners (n, 2) of a side's edges by height, those of the same height by x."""
+    corners = np.unique(edges.reshape(-1, 2), axis=0)
+    ordered: np.ndarray = corners[np.lexsort((corners[:, 0], corners[:, 1]))]
+    return ordered
+
+
+def draw_joints(axes: Axes, methods: list[GravityMethod], of_joints: list[tuple[str, ...]]) -> None:
+    """Draw each of several joints with its name and verdict beside its toe."""
+    if len(methods) == 1:
         return
-    y = np.union1d(np.clip(face[:, 1], None, surface), [surface])
-    x = np.interp(y, face[:, 1], face[:, 0])
-    axes.fill_betweenx(y, x, outer, color=color, alpha=0.4, linewidth=0)
-    axes.plot([outer, x[-1]], [surface, surface], color=color, linewidth=1)
+    for method, (name, *_, verdict) in zip(methods, of_joints[1:], strict=True):
+        color = RED if verdict in ("fail", "not judged") else "black"
+        ends = np.array([method.body.heel, method.body.toe])
+        axes.plot(*ends.T, color=color, linewidth=1.2, zorder=3)
+        axes.annotate(
+            f"{name}: {verdict}",
+            ends[1],
+            (6, 3),
+            textcoords="offset points",
+            fontsize=8,
+            color=color,
+        )
 
 
 class UnderJoint:

@@ -161,13 +161,9 @@ class Section:
         #: ends of the dam on the foundation (2,) [m]
         self.heel = min((joint.heel for joint in on_rock), key=lambda end: end[0])
         self.toe = max((joint.toe for joint in on_rock), key=lambda end: end[0])
-        #: both faces of each joint from heel to toe, as point numbers of their bodies
-        self.joint_faces = [self.faces_of(joint) for joint in self.joints]
         around = self.dam.between(self.toe, self.heel)
         height = self.dam.points[around, 1]
         crest = np.flatnonzero(height >= height.max() - LEVEL * np.ptp(height))
-        #: height of the undeformed crest [m]
-        self.top = height.max()
         #: displaced faces and crest of the dam, each from downstream to upstream (n, 2) [m]
         self.downstream = self.dam.moved[around[: crest[0] + 1]]
         self.crest = self.dam.moved[around[crest[0] : crest[-1] + 1]]
@@ -180,25 +176,6 @@ class Section:
         #: displaced ground: upstream from the heel outwards, downstream inwards to the toe
         self.floor = self.foundation.moved[ground[: left + 1]]
         self.bed = self.foundation.moved[ground[right:]]
-
-    def faces_of(
-        self, joint: JointLine
-    ) -> tuple[tuple[PlaneBody, np.ndarray], tuple[PlaneBody, np.ndarray]]:
-        """The upper and the lower face of a joint from heel to toe: body, numbers of its points."""
-        upper, lower = self.bodies[joint.upper], self.bodies[joint.lower]
-        return (
-            (upper, upper.between(joint.heel, joint.toe)),
-            (lower, lower.between(joint.toe, joint.heel)[::-1]),
-        )
-
-    def reservoir(self, level: float) -> np.ndarray:
-        """Polygon (n, 2) [m] of the water upstream, and above the crest, up to a level."""
-        crest = self.crest[: -1 if level > self.top else 0]
-        return fill_to_level(np.concatenate([crest, self.upstream, self.floor]), level)
-
-    def tailwater(self, level: float) -> np.ndarray:
-        """Polygon (n, 2) [m] of the water downstream up to a level."""
-        return fill_to_level(np.concatenate([self.bed, self.downstream]), level)
 
 
 def union(bodies: list[PlaneBody]) -> PlaneBody:
@@ -233,16 +210,3 @@ def section_of(
     planes = {n: plane_body(bodies[n], u, scale) for n, u in displacement.items()}
     shown = {name: plane for name, plane in planes.items() if plane}
     return Section(shown, joints) if len(shown) == len(planes) else None
-
-
-def fill_to_level(shore: np.ndarray, level: float) -> np.ndarray:
-    """Cut the space above a shore line (n, 2) at a level; a polygon, possibly empty."""
-    rim = max(level, shore[:, 1].max()) + 1
-    polygon = np.concatenate([[[shore[0, 0], rim]], shore, [[shore[-1, 0], rim]]])
-    corners = []
-    for start, end in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
-        if start[1] <= level:
-            corners.append(start)
-        if (start[1] - level) * (end[1] - level) < 0:
-            corners.append(start + (end - start) * (level - start[1]) / (end[1] - start[1]))
-    return np.array(corners).reshape(-1, 2)

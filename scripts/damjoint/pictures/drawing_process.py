@@ -47,7 +47,7 @@ class DrawingProcess:
 
     def send(self, solution: Solution, folder: Path) -> None:
         """Have the pictures of a solution drawn into a folder."""
-        from .validation import shown_time
+        from ..post.validation import shown_time
 
         result = solution.result
         shown = {t: field for t, field in solution.fields.items() if t == shown_time(result)}
@@ -78,9 +78,9 @@ def serve(pipe: Connection, of_parent: Connection) -> None:
             from matplotlib import artist
 
             artist.kwdoc = lambda _: ""  # makes the docstrings: a quarter of the time of loading it
-            from . import pictures
+            from . import run_picture
 
-            pictures.prepare()
+            run_picture.prepare()
         except Exception as error:
             pipe.send(error)
             return
@@ -88,7 +88,9 @@ def serve(pipe: Connection, of_parent: Connection) -> None:
         while True:
             for ready in wait([pipe, *drawing]):
                 if ready is pipe:
-                    process = FORK.Process(target=answer, args=(pipe, pictures.draw, *pipe.recv()))
+                    process = FORK.Process(
+                        target=answer, args=(pipe, run_picture.draw, *pipe.recv())
+                    )
                     process.start()
                     drawing[process.sentinel] = process
                 elif not has_answered(drawing.pop(ready)):

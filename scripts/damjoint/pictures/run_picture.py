@@ -6,16 +6,19 @@ Each is drawn into a figure or subfigure: side by side in CASE.png, alone in a r
 
 from __future__ import annotations
 
+import math
 import os
 import textwrap
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
 from matplotlib.collections import PolyCollection
-from matplotlib.colors import TwoSlopeNorm
+from matplotlib.colors import TwoSlopeNorm, to_rgba
 from matplotlib.figure import Figure, FigureBase
 from matplotlib.ticker import MaxNLocator
 from matplotlib.tri import Triangulation
@@ -23,18 +26,21 @@ from matplotlib.tri import Triangulation
 from .. import ROUND_OFF
 from ..input.case import Case
 from ..mesh.body import Body
-from ..model.fields import Solution, along, distance, row_of_nodes, state_of
+from ..model.fields import Solution, along, distance, joint_body, row_of_nodes, state_of
+from ..model.loads import Loading
 from ..model.results import Results
+from ..post import validation
+from ..post.summary import Table, joints_table
+from ..post.units import FLUXES, LENGTHS, STRESSES, Units, unit
+from ..post.validation import shown_time
 from ..statics import gravity
 from ..statics.statement import statement
-from ..statics.verdict import decisive_joint, overturning_level
-from . import validation
+from ..statics.verdict import decisive_joint, overturning_level, verdict
 from .drawing import (
     BLUE,
     DARK,
     GREEN,
     GREY,
-    LABEL,
     ORANGE,
     RED,
     STATES,
@@ -45,13 +51,13 @@ from .drawing import (
     panels,
     pixels_of,
     runs_of,
+    widen,
     write_picture,
     write_pixels,
 )
 from .outline import exaggeration, skin
-from .section_picture import draw_section
-from .units import FLUXES, LENGTHS, STRESSES, Units, unit
-from .validation import shown_time
+from .scene import grown_label, level_label, loads_label, state_label, water_surface
+from .section_picture import ABOVE_EDGE, draw_section
 
 DPI = 120
 #: Inches: size of the figure, which fits a page A4 across (in 3D with the maps: upright); height of
@@ -62,9 +68,10 @@ TITLE, MESSAGE = 0.3, 0.18
 MARGIN, PER_INCH = 0.15, (9.5, 15)
 #: Width of the panels on the right over that of the section on the left.
 RIGHT = 1.25
-#: Width of the bars of all joints beside the history, over that of the figure; inches per letter of
-#: their names.
-SHARES, PER_LETTER = 0.25, 0.068
+#: Width of the table of all joints beside the history, over that of the figure.
+BESIDE = 0.42
+#: Colors of the joints in a panel.
+COLORS = BLUE, ORANGE, GREEN, VIOLET, RED, DARK
 #: Share of the shear's range that must be negative for the limit to be drawn with both signs.
 BOTH_SIGNS = 0.02
 #: Limits of an axis in percent: lines at 0 and 100 are visible.
@@ -75,6 +82,10 @@ SCALED, CLIPPED = (2, 98), 0.25
 AROUND = 0.3
 #: Intervals of the scale of a map, about; its least range.
 LEVELS, TINY = 10, 1e-9
+#: Height of the curves of one of several joints, and of a row of their table [inches].
+PER_JOINT, TABLE_ROW = 1.3, 0.2
+#: Characters in a line of message and facts.
+MESSAGE_LETTERS = int(PER_INCH[1] * WIDTH)
 DISTANCE = "distance from the heel along the joint [m]"
 
 #: Pixels of a picture by a function that draws one of its halves, see `picture`.
@@ -107,68 +118,81 @@ def picture(solution: Solution, halves: tuple[int, ...] = (0, 1)) -> Figure:
     """Section and joint at the last state, or that of the published numbers; the history.
 
     halves: the parts that are drawn, which take about the same time: heading, section and history;
-    joint, view and maps.
+    joints, view and maps.
     """
     result = solution.result
-    case = result.case
+    case, several = result.case, len(result.joints) > 1
     has_states = bool(len(result.joint["time"]))
     title = textwrap.wrap(heading(result), int(PER_INCH[0] * WIDTH))
-    message = textwrap.wrap(statement(result), int(PER_INCH[1] * WIDTH))
-    head = TITLE * len(title) + MESSAGE * len(message) + 0.05
+    facts = [line for fact in facts_of(result) for line in textwrap.wrap(fact, MESSAGE_LETTERS)]
+    message = textwrap.wrap(statement(result), MESSAGE_LETTERS)
+    head = TITLE * len(title) + MESSAGE * (len(facts) + len(message)) + 0.05
     heights = [head]
     if has_states:
-        heights += [HEIGHT - head - HISTORY, HISTORY]
+        rows = len(result.joints) * PER_JOINT if several and not is_own_solid(case) else 0.0
+        middle = max(HEIGHT - head - HISTORY, rows)
+        heights += [middle, max(HISTORY, several * (1 + len(result.joints)) * TABLE_ROW)]
         if case["dim"] == 3 and solution.fields and not is_own_solid(case):
             heights.append(SOLID)
     figure = figure_of(WIDTH, sum(heights))
     top, *parts = np.ravel(figure.subfigures(len(heights), 1, height_ratios=heights))
     if has_states:
-        time, shares = shown_time(result), case.of_joints and is_own_solid(case)
+        time = shown_time(result)
         left, right = parts[0].subfigures(1, 2, width_ratios=(1, RIGHT))
-        own = solution.of_joint(decisive_joint(result))
-        if shares:
-            right, below = right.subfigures(2, 1)
     if 0 in halves:
-        write_heading(top, title, message)
+        write_heading(top, title, facts, message)
     if has_states and 0 in halves:
         draw_dam(left, solution, time)
-        if shares:
-            draw_history(parts[1], own.result)
-        else:
-            draw_histories(parts[1], result, time)
+        draw_histories(parts[1], result, time)
     if has_states and 1 in halves:
-        draw_joint(right, own, time)
-        if shares:
-            draw_shares(below, result, time)
+        draw_all_joints(right, solution, time)
         if len(parts) > 2:
             draw_solid(parts[2], solution, time)
     return figure
 
 
-def write_heading(figure: FigureBase, title: list[str], message: list[str]) -> None:
-    """Write the lines of title and message."""
+def write_heading(
+    figure: FigureBase, title: list[str], facts: list[str], message: list[str]
+) -> None:
+    """Write the lines of title, facts and message."""
     width, height = figure.bbox.size / figure.dpi
     x, y = MARGIN / width, 1 - 0.1 / height
     figure.text(x, y, "\n".join(title), fontsize=12, va="top", parse_math=False)
     y -= TITLE * len(title) / height
-    figure.text(x, y, "\n".join(message), fontsize=8.5, color=RED, va="top", parse_math=False)
+    for lines, color in ((facts, DARK), (message, RED)):
+        figure.text(x, y, "\n".join(lines), fontsize=8.5, color=color, va="top", parse_math=False)
+        y -= MESSAGE * len(lines) / height
 
 
 def heading(result: Results) -> str:
-    """Title of the picture: case, uplift, level, tailwater, leakage."""
+    """Title of the picture: case, uplift, level, tailwater, leakage; verdict."""
     case, state = result.case, result.last
     if len(result.joint["time"]):
         state = result.state(shown_time(result))
-    title = f"{case.title}, uplift {case['uplift']}"
-    if not state:
-        return title
-    title += f", level {state['level']:.4g} m"
-    if state["tail_level"] > 0:
-        title += f", tailwater {state['tail_level']:.4g} m"
-    if case["uplift"] == "flow":
-        title += f", leakage {state['flux']:.3g} kg/(m s)"
-    shown = case.named((decisive_joint(result),))
-    return title + (f"; curves: {shown}" if shown else "")
+    title = f"{case.title}, uplift {case.of_all_joints('uplift')}"
+    if state:
+        title += f", level {level_label(state['level'])}"
+        if state["tail_level"] > 0:
+            title += f", tailwater {level_label(state['tail_level'])}"
+    flowing = [own for own in result.joints if own.case["uplift"] == "flow"]
+    if state and flowing:
+        leakage = sum(own.state(state["time"])["flux"] for own in flowing)
+        title += f", leakage {leakage:.3g} kg/(m s)"
+    return f"{title}: {verdict(result)}"
+
+
+def facts_of(result: Results) -> list[str]:
+    """Loads at the state that is shown; of a single joint its resultants, SSF and place of N, of
+    several those of the decisive one.
+    """
+    if not len(result.joint["time"]):
+        return []
+    case, time = result.case, shown_time(result)
+    state, number = result.state(time), decisive_joint(result)
+    loading = Loading.at(case, time, state["level"], state["tail_level"])
+    own, name = result.joints[number], case.named((number,))
+    on_joint = state_label(own.case, own.state(time))
+    return [f"loads: {loads_label(case, loading)}", f"{name}: {on_joint}" if name else on_joint]
 
 
 def shear_limit(case: Case, rows: dict[str, np.ndarray]) -> tuple[str, np.ndarray] | None:
@@ -182,44 +206,98 @@ def shear_limit(case: Case, rows: dict[str, np.ndarray]) -> tuple[str, np.ndarra
 
 
 def draw_joint(figure: FigureBase, solution: Solution, time: float) -> None:
-    """Draw the joint: curves along it, or maps where it is a surface of any shape (without fields
-    its mesh is not known).
+    """Draw the only joint of a solution: curves along it, or maps where it is a surface of any
+    shape (without fields its mesh is not known).
     """
     if solution.fields and is_own_solid(solution.result.case):
         draw_maps(figure, solution, time)
     else:
-        draw_curves(figure, solution.result, time)
+        axes = panels(figure, 3, 1, bottom=0.62, top=0.28, down=0.32)[:, 0]
+        draw_curves(list(axes), solution.result, time)
+        finish_curves(figure, list(axes), [solution.result], time)
 
 
-def draw_curves(figure: FigureBase, result: Results, time: float) -> None:
-    """Draw jumps, normal stress and shear along the joint (means over z in 3D), with the published
-    values, or without any the stress of the gravity method.
+def draw_all_joints(figure: FigureBase, solution: Solution, time: float) -> None:
+    """Draw the joint, or several as equals: small curves of each, a row each from the highest; maps
+    of their openings where they are surfaces of any shape.
+    """
+    joints = solution.result.joints
+    if len(joints) == 1:
+        draw_joint(figure, solution, time)
+    elif solution.fields and is_own_solid(solution.result.case):
+        draw_openings(figure, solution, time)
+    else:
+        grid = panels(
+            figure, len(joints), 3, left=0.55, bottom=0.62, top=0.75, across=0.6, down=0.42
+        )[::-1]
+        for row, own, name in zip(grid, joints, solution.result.case.joint_names, strict=True):
+            draw_curves(list(row), own, time)
+            for axes in row:
+                axes.set_title(name, fontsize=7.5, loc="left", pad=2)
+                axes.yaxis.label.set_fontsize(7)
+                axes.tick_params(labelsize=7)
+                axes.yaxis.set_label_coords(-0.4 / (axes.bbox.width / axes.figure.dpi), 0.5)
+        for axes in grid[-1]:
+            axes.legend(
+                loc="lower left",
+                bbox_to_anchor=(-0.2, 1.12),
+                ncols=1,
+                fontsize=6,
+                frameon=False,
+                borderpad=0.1,
+                columnspacing=0.6,
+                handletextpad=0.3,
+                handlelength=1.6,
+                labelspacing=0.2,
+            )
+        mark_states(figure, joints, time)
+        for axes in grid[0]:
+            axes.set_xlabel("s from heel [m]", fontsize=8)
+
+
+def draw_curves(axes: list[Axes], result: Results, time: float) -> None:
+    """Draw jumps, normal stress and shear along the only joint of these results (means over z in
+    3D), with the published values, or without any the stress of the gravity method.
     """
     case, curves = result.case, along(result.at(time))
     s, states = curves["s"], state_of(curves, case.law)
-    jumps, normals, shears = panels(figure, 3, 1, bottom=0.62, top=0.28, down=0.32).flat
+    jumps, normals, shears = axes
     draw_jumps(jumps, case, curves)
     factor = draw_normal_stress(normals, case, curves)
     if not (validation.references(case) or case.geometry):
         draw_gravity_stress(normals, gravity.at(case, time, result.state(time)["level"]), factor)
     draw_shear(shears, case, curves)
     ends = np.concatenate([s[:1], (s[1:] + s[:-1]) / 2, s[-1:]])
-    for axes in (jumps, normals, shears):
-        full_height = axes.get_xaxis_transform()
+    for panel in axes:
+        full_height = panel.get_xaxis_transform()
         for number, first, end in runs_of(states):
             if number in STATES:
                 parts = [(ends[first], ends[end] - ends[first])]
                 style = STATES[number].area()
-                axes.broken_barh(parts, (0, 1), transform=full_height, zorder=0, **style)
-        axes.axhline(0, color="black", linewidth=0.5)
-        axes.grid(alpha=0.3)
-        axes.margins(x=0.01)
-        axes.tick_params(labelbottom=axes is shears)
-        legend_above(axes)
-    shears.set_xlabel(DISTANCE, fontsize=9)
-    occurring = [style.patch() for number, style in STATES.items() if (states == number).any()]
+                panel.broken_barh(parts, (0, 1), transform=full_height, zorder=0, **style)
+        panel.axhline(0, color="black", linewidth=0.5)
+        panel.grid(alpha=0.3)
+        panel.margins(x=0.01)
+
+
+def finish_curves(
+    figure: FigureBase, axes: list[Axes], results: list[Results], time: float
+) -> None:
+    """Write the legends of the curves along a joint and the axis below them."""
+    for panel in axes:
+        panel.tick_params(labelbottom=panel is axes[-1])
+        legend_above(panel)
+    axes[-1].set_xlabel(DISTANCE, fontsize=9)
+    mark_states(figure, results, time)
+
+
+def mark_states(figure: FigureBase, results: list[Results], time: float) -> None:
+    """Write the legend of the states that occur at some joints."""
+    states = [state_of(along(own.at(time)), own.case.law) for own in results]
+    occurring = [STATES[n].patch() for n in STATES if any((part == n).any() for part in states)]
     if occurring:
-        place = {"loc": "lower left", "bbox_to_anchor": (0.1, 0), "ncols": len(occurring)}
+        above = ABOVE_EDGE / (figure.bbox.height / figure.dpi)
+        place = {"loc": "lower left", "bbox_to_anchor": (0.1, above), "ncols": len(occurring)}
         figure.legend(handles=occurring, **place, fontsize=7.5, frameon=False, borderpad=0.2)
 
 
@@ -285,9 +363,13 @@ def draw_shear(axes: Axes, case: Case, curves: dict[str, np.ndarray]) -> None:
     axes.plot(curves["s"], shear, color=ORANGE, label="shear stress, downstream > 0")
     if limit:
         label, size = limit
+        size = np.maximum(size, 0.0)
         axes.plot(curves["s"], size * factor, "--", color=GREEN, label=label)
         if shear.min() < -BOTH_SIGNS * np.ptp(shear):
             axes.plot(curves["s"], -size * factor, "--", color=GREEN)
+            axes.fill_between(
+                curves["s"], -size * factor, size * factor, color=GREEN, alpha=0.08, linewidth=0
+            )
     axes.set_ylabel(f"shear stress [{stress}]", fontsize=9)
 
 
@@ -310,79 +392,141 @@ def draw_published(
             axes.errorbar([r.x for r in rows], value, spread, **style, label=label)
 
 
-class Line(NamedTuple):
-    """A line of a panel: column of the history, color, label."""
-
-    column: str
-    color: str
-    label: str = ""
-
-
 def draw_histories(figure: FigureBase, result: Results, time: float) -> None:
-    """Draw the history of the decisive joint and, beside it, the shares of all joints if there are
-    several.
-    """
-    own = result.joints[decisive_joint(result)]
+    """Draw the history of all joints and, if there are several, their table at a time beside it."""
     if not result.case.of_joints:
-        draw_history(figure, own)
+        draw_history(figure, history_panels(result), result)
         return
-    left, right = figure.subfigures(1, 2, width_ratios=(1 - SHARES, SHARES))
-    draw_history(left, own)
-    draw_shares(right, result, time)
+    left, right = figure.subfigures(1, 2, width_ratios=(1 - BESIDE, BESIDE))
+    draw_history(left, panels_of_joints(result), result)
+    draw_table(right, joints_table(result, time))
 
 
-def draw_history(figure: FigureBase, result: Results) -> None:
-    """Draw opening, crest displacement, crack and, with flow, leakage against the level."""
-    panels_shown = history_panels(result)
-    row = panels(figure, 1, len(panels_shown), bottom=0.42, top=0.25).flat
-    for axes, (quantity, units, lines) in zip(row, panels_shown, strict=True):
-        name, factor = unit([result.history[line.column] for line in lines], units)
+class Panel(NamedTuple):
+    """A panel of the history: quantity, units, lines with their values."""
+
+    quantity: str
+    units: Units
+    lines: list[tuple[np.ndarray, str, str]]
+
+
+def draw_history(figure: FigureBase, shown: list[Panel], result: Results) -> None:
+    """Draw panels over the level, and mark the steps at which other loads change."""
+    row = panels(figure, 1, len(shown), bottom=0.42, top=0.25)[0]
+    level, marks = result.history["level"], changes_at_a_level(result)
+    for axes, (quantity, units, lines) in zip(row, shown, strict=True):
+        name, factor = unit([values for values, *_ in lines], units)
         # the lines often coincide: those drawn later are dashed or dotted
-        for line, style in zip(lines, ("o-", "s--", "^:"), strict=False):
-            values = result.history[line.column] * factor
-            look = {"color": line.color, "markersize": 3, "label": line.label}
-            axes.plot(result.history["level"], values, style, **look)
+        for number, (values, color, label) in enumerate(lines):
+            style = LINES[number % len(LINES)]
+            axes.plot(level, values * factor, style, color=color, markersize=3, label=label)
+        for step, text in marks:
+            place = level[step], lines[0][0][step] * factor
+            axes.plot(*place, "o", color=RED, markersize=8, mfc="none", label="_changed")
+            away = {"xytext": (-7, 2), "textcoords": "offset points"}
+            axes.annotate(text, place, **away, ha="right", fontsize=7, color=RED)
         axes.set_xlabel("reservoir level [m]", fontsize=9)
         axes.set_ylabel(f"{quantity} [{name}]", fontsize=8.5)
         axes.grid(alpha=0.3)
+        widen(axes.yaxis)
         if name == "%":
             axes.set_ylim(*PERCENT)
-        if lines[0].label:
-            legend_above(axes)
+        if len(lines) > 1 and not (result.case.of_joints and axes is row[0]):
+            legend_above(axes)  # one for all panels of several joints
 
 
-def history_panels(result: Results) -> list[tuple[str, Units, list[Line]]]:
-    """Panels of the history: quantity, units, lines."""
-    lengths = [Line("broken_length", RED, "broken"), Line("slip_length", ORANGE, "slipped")]
-    if result.history["process_zone"].any():
-        lengths.append(Line("process_zone", VIOLET, "softening"))
-    shown: list[tuple[str, Units, list[Line]]] = [
-        ("largest opening", LENGTHS, [Line("max_opening", BLUE)]),
-        ("crest movement", LENGTHS, [Line("crest_ux", BLUE)]),
-        ("share of the joint", (("%", 100 / joint_length(result)),), lengths),
+#: Styles of the lines of a panel, so that they differ without colors.
+LINES = "o-", "s--", "^:", "D-.", "v-", "x--", "P:", "*-."
+
+
+def changes_at_a_level(result: Results) -> list[tuple[int, str]]:
+    """Steps of the history at a level that it had before, at which other loads than the water have
+    just changed, and which: of an earthquake its coefficients.
+    """
+    case, history, found = result.case, result.history, list[tuple[int, str]]()
+    loadings = [
+        Loading.at(case, *(history[name][k] for name in ("time", "level", "tail_level")))
+        for k in range(len(history["time"]))
+    ]
+    changed = [bool(grown_label(case, *pair)) for pair in pairwise(loadings)] + [False]
+    first = 0
+    for k, changes in enumerate(changed):
+        if changes and not changed[k + 1]:  # the last step of a change
+            before = history["level"][: k + 1]
+            if np.isclose(before, history["level"][k + 1]).any():
+                found.append((k + 1, grown_label(case, loadings[first], loadings[k + 1])))
+        first = first if changes else k + 1
+    return found
+
+
+def history_panels(result: Results) -> list[Panel]:
+    """Panels of the history of a single joint."""
+    history = result.history
+    share = {"broken": "broken_length", "slipped": "slip_length", "softening": "process_zone"}
+    lengths = [
+        (history[column], color, label)
+        for (label, column), color in zip(share.items(), (RED, ORANGE, VIOLET), strict=True)
+        if label != "softening" or history[column].any()
+    ]
+    shown = [
+        # the largest opening of a joint that is closed everywhere is an overlap
+        Panel("largest opening", LENGTHS, [(np.maximum(history["max_opening"], 0), BLUE, "")]),
+        Panel("crest movement", LENGTHS, [(history["crest_ux"], BLUE, "")]),
+        Panel("share of the joint", (("%", 100 / joint_length(result)),), lengths),
     ]
     if result.case["uplift"] == "flow":
-        shown.append(("leakage", FLUXES, [Line("flux", BLUE)]))
+        shown.append(Panel("leakage", FLUXES, [(history["flux"], BLUE, "")]))
     return shown
 
 
-def draw_shares(figure: FigureBase, result: Results, time: float) -> None:
-    """Draw which share of each joint is broken and has slipped at a requested time."""
-    names = result.case.joint_names
-    left = LABEL + PER_LETTER * max(map(len, names))
-    (axes,) = panels(figure, left=left, bottom=0.42, top=0.25).flat
-    for column, color, label, thick in (
-        ("slip_length", ORANGE, "slipped", 0.8),
-        ("broken_length", RED, "broken", 0.4),
-    ):
-        shares = [100 * own.state(time)[column] / own.case.joint_along for own in result.joints]
-        axes.barh(range(len(names)), shares, thick, color=color, label=label)
-    line = 72 * axes.bbox.height / axes.figure.dpi / len(names)  # [points]
-    axes.set_yticks(range(len(names)), names, fontsize=min(7, line))
-    axes.set_xlim(*PERCENT)
-    axes.set_xlabel("share of each joint [%]", fontsize=9)
-    axes.grid(axis="x", alpha=0.3)
-    legend_above(axes)
+def panels_of_joints(result: Results) -> list[Panel]:
+    """Panels of the history of several joints, a line each; of many the decisive one in color."""
+    names, joints = result.case.joint_names, result.joints
+    order, colors = list(range(len(joints))), [*COLORS]
+    if len(joints) > len(COLORS):
+        first = decisive_joint(result)
+        order.sort(key=lambda k: (k != first, k))
+        colors = [BLUE] + [GREY] * (len(joints) - 1)
+        names = tuple(n if k in order[:1] else "_" for k, n in enumerate(names))
+
+    def lines(values: Callable[[Results], np.ndarray]) -> list[tuple[np.ndarray, str, str]]:
+        return [(values(joints[k]), c, names[k]) for k, c in zip(order, colors, strict=False)]
+
+    opening = lines(lambda own: np.maximum(own.history["max_opening"], 0))
+    slipped = lines(lambda own: own.history["slip_length"] / own.case.joint_along)
+    return [
+        Panel("largest opening", LENGTHS, opening),
+        Panel("crest movement", LENGTHS, [(result.history["crest_ux"], BLUE, "")]),
+        Panel("slipped share", (("%", 100),), slipped),
+    ]
+
+
+def draw_table(figure: FigureBase, table: Table) -> None:
+    """Draw a table; its first and last columns to the left."""
+    (axes,) = panels(figure, left=0.05, right=0.1, bottom=0.1, top=0.1).flat
+    axes.set_axis_off()
+    heads = [f"{n}\n[{u}]" if u else n for n, u in zip(table.names, table.units, strict=True)]
+    columns = zip(table.names, *table.rows, strict=True)
+    letters = np.array([max(map(len, column)) for column in columns]) + 2
+    height = figure.bbox.height / figure.dpi - 0.2
+    cells = axes.table(
+        [heads, *table.rows],
+        colWidths=list(letters / letters.sum()),
+        cellLoc="right",
+        edges="horizontal",
+        bbox=(0, 0, 1, min(1, (2 + len(table.rows)) * 0.22 / height)),
+    )
+    cells.auto_set_font_size(False)
+    cells.set_fontsize(7)
+    for (row, column), cell in cells.get_celld().items():
+        cell.set_edgecolor("#b0b0b0")
+        cell.PAD = 0.02
+        cell.get_text().set_parse_math(False)
+        if column in (0, len(heads) - 1):
+            cell.get_text().set_horizontalalignment("left")
+        if row == 0:
+            cell.set_height(1.7 * cell.get_height())
+            cell.get_text().set_fontweight("bold")
 
 
 def joint_length(result: Results) -> float:
@@ -427,10 +571,18 @@ def draw_view(figure: FigureBase, solution: Solution, time: float) -> None:
             polygons += list(places[table, :2])
             depths.append(places[table, 2].mean(axis=1))
             values.append(sizes[name][table].mean(axis=1) * factor)
-    order = np.argsort(np.concatenate(depths))  # the nearest faces are drawn last
+    state = solution.result.state(time)
+    water = water_surface(solution.bodies, state["level"]) @ VIEW
+    order = np.argsort(np.concatenate([*depths, water[:, :, 2].mean(axis=1)]))
+    polygons += list(water[:, :, :2])
+    colors = ScalarMappable(cmap="YlGnBu")
+    shades = colors.to_rgba(np.concatenate(values))
+    shades = np.concatenate([shades, np.tile(to_rgba(WATER, 0.45), (len(water), 1))])
+    edges = [to_rgba(GREY)] * (len(shades) - len(water)) + [to_rgba(WATER, 0.0)] * len(water)
     (axes,) = panels(figure, left=0.15, right=0.85, bottom=0.15, top=0.3).flat
-    faces = PolyCollection([polygons[i] for i in order], cmap="YlGnBu", edgecolor=GREY)
-    faces.set(array=np.concatenate(values)[order], linewidth=0.1, rasterized=True)
+    faces = PolyCollection([polygons[i] for i in order])  # the nearest are drawn last
+    faces.set(facecolor=shades[order], edgecolor=[edges[i] for i in order], linewidth=0.1)
+    faces.set(rasterized=True)
     axes.add_collection(faces, autolim=False)
     dam = np.concatenate(near)[:, :2]
     around = AROUND * np.ptp(dam, axis=0).max()
@@ -440,7 +592,22 @@ def draw_view(figure: FigureBase, solution: Solution, time: float) -> None:
     axes.set_axis_off()
     title = f"displacement [{length}], drawn x {scale:g}"
     axes.set_title(title, fontsize=8, loc="left")
-    figure.colorbar(faces, ax=axes, shrink=0.7, aspect=25).ax.tick_params(labelsize=8)
+    figure.colorbar(colors, ax=axes, shrink=0.7, aspect=25).ax.tick_params(labelsize=8)
+    draw_directions(axes, level_label(state["level"]) if len(water) else "")
+
+
+def draw_directions(axes: Axes, level: str) -> None:
+    """Draw the directions of x, y and z in the lower left corner of a view, and its water level."""
+    start = np.array([0.12, 0.13])
+    for direction, name in zip(VIEW[:, :2], ("x, downstream", "y", "z"), strict=True):
+        end = start + 0.1 * direction
+        style = {"arrowstyle": "-|>", "color": DARK, "shrinkA": 0, "shrinkB": 0}
+        place = {"xycoords": "axes fraction", "textcoords": "axes fraction"}
+        axes.annotate("", end, start, **place, arrowprops=style, zorder=5)
+        beyond = start + 0.135 * direction
+        axes.text(*beyond, name, transform=axes.transAxes, ha="center", va="center", fontsize=8)
+    words = f"behind the dam, upstream: reservoir, {level}" if level else "upstream behind the dam"
+    axes.text(0.02, 0.97, words, transform=axes.transAxes, fontsize=8, va="top")
 
 
 def view_from(azimuth: float, elevation: float) -> np.ndarray:
@@ -457,6 +624,49 @@ def view_from(azimuth: float, elevation: float) -> np.ndarray:
 VIEW = view_from(-35, 30)
 
 
+def draw_openings(figure: FigureBase, solution: Solution, time: float) -> None:
+    """Draw a map of the opening of each joint, in colors of a common scale."""
+    joints = solution.result.joints
+    across = math.ceil(math.sqrt(len(joints)))
+    rows = [own.at(time) for own in joints]
+    length, factor = unit([row["delta_n"] for row in rows], LENGTHS)
+    openings = [np.maximum(row["delta_n"], 0.0) * factor for row in rows]
+    largest = max(np.percentile(opening, SCALED[1]) for opening in openings) or 1.0
+    shape = (math.ceil(len(joints) / across), across)
+    grid = panels(figure, *shape, left=0.3, right=0.7, bottom=0.3, top=0.5, across=0.25, down=0.35)
+    for number, axes in enumerate(grid.flat):
+        if number >= len(joints):
+            axes.remove()
+            continue
+        surface = joint_body(solution.bodies, number)
+        names, places = projected(surface)
+        values = openings[number][row_of_nodes(surface, rows[number])]
+        colors = axes.tripcolor(
+            Triangulation(*places, triangles_of(surface)),
+            values,
+            cmap="YlOrRd",
+            vmin=0,
+            vmax=largest,
+            shading="gouraud",
+            rasterized=True,
+        )
+        name = solution.result.case.joint_names[number]
+        axes.set_title(f"{name} ({names[0]}, {names[1]})", fontsize=7, pad=2)
+        axes.set_aspect("equal")
+        axes.tick_params(labelsize=6)
+        axes.locator_params(nbins=3)
+    figure.text(0.02, 0.965, f"opening of all joints [{length}], axes [m]", fontsize=8, va="top")
+    bar = figure.add_axes((0.93, 0.2, 0.015, 0.6))
+    figure.colorbar(colors, cax=bar, extend="max").ax.tick_params(labelsize=7)
+
+
+def triangles_of(surface: Body) -> np.ndarray:
+    """Triangles (n, 3) of the faces of a joint."""
+    return np.concatenate(
+        [table[:, part] for _, table in surface.cells for part in HALVES[table.shape[1]]]
+    )
+
+
 def draw_maps(figure: FigureBase, solution: Solution, time: float) -> None:
     """Draw maps of the joint in true shape: opening, effective normal stress, shear stress; below
     each other, or side by side if the joint is not much wider than high.
@@ -464,10 +674,7 @@ def draw_maps(figure: FigureBase, solution: Solution, time: float) -> None:
     rows, joint = solution.result.at(time), solution.bodies["joint"]
     nearest = row_of_nodes(joint, rows)
     names, places = projected(joint)
-    corners = np.concatenate(
-        [table[:, part] for _, table in joint.cells for part in HALVES[table.shape[1]]]
-    )
-    shape = Triangulation(*places, corners)
+    shape = Triangulation(*places, triangles_of(joint))
     shown = (
         ("delta_n", "opening", LENGTHS),
         ("sigma_n_eff", "effective normal stress, tension > 0", STRESSES),
@@ -490,6 +697,8 @@ def draw_maps(figure: FigureBase, solution: Solution, time: float) -> None:
 #: Width over height of the joint from which on its maps are below each other; letters in a line of
 #: a title beside others.
 WIDE, LETTERS = 2.0, 23
+#: Height over width of a map below which it has a single tick.
+NARROW = 0.08
 
 
 #: Triangles of a face by the number of its corners.
@@ -527,6 +736,9 @@ def draw_map(axes: Axes, shape: Triangulation, values: np.ndarray, title: str, w
     lines = [title] if wide else textwrap.wrap(title, LETTERS)
     axes.set_title("\n".join(lines), fontsize=8, loc="left")
     axes.set_aspect("equal")
+    narrow = np.ptp(shape.y) < NARROW * np.ptp(shape.x)
+    if narrow:  # ticks would overlap
+        axes.set_yticks([shape.y.max()])
     bar = axes.figure.colorbar(filled, ax=axes, pad=0.02, fraction=0.05, aspect=12)
     ticks = MaxNLocator(4).tick_values(levels[0], levels[-1])
     bar.set_ticks(ticks[(ticks >= levels[0]) & (ticks <= levels[-1])])

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg  # not pyplot: it costs half of a 2D run
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure, FigureBase
@@ -20,6 +21,7 @@ from ..model.fields import BROKEN, SLIPPED, SOFTENING
 from ..storage import atomic_write
 
 matplotlib.rcdefaults()  # a matplotlibrc in the current folder must not change the pictures
+matplotlib.rcParams["axes.formatter.useoffset"] = False
 matplotlib.rcParams["text.hinting"] = "none"  # takes a sixth of the time of a picture
 
 BLUE, ORANGE, WATER, RED, GREEN = "#0b5394", "#cc7a00", "#3d9be0", "#b3261e", "#2e7d32"
@@ -55,6 +57,12 @@ STATES = {
 }
 #: Distance of a y label from the left edge of its figure [inches].
 LABEL = 0.2
+
+
+#: Least distances of ticks [inches].
+TICK = 0.5, 0.25
+#: Least range of an axis over the largest value on it.
+RANGE = 0.05
 
 
 def figure_of(width: float, height: float) -> Figure:
@@ -108,10 +116,20 @@ def panels(
     }
     table = figure.subplots(rows, columns, squeeze=False, gridspec_kw=grid)
     for axes in table.flat:
-        axes.locator_params(nbins=5)  # ticks take most of the time of a picture
+        # ticks take most of the time of a picture
+        axes.locator_params(axis="x", nbins=max(2, min(5, int(axes_width / TICK[0]))))
+        axes.locator_params(axis="y", nbins=max(2, min(5, int(axes_height / TICK[1]))))
         axes.tick_params(labelsize=8)
         axes.yaxis.set_label_coords((LABEL - left) / axes_width, 0.5)
     return table
+
+
+def widen(axis: Axis) -> None:
+    """Show at least a part RANGE of the largest value: a change in the last digits is none."""
+    low, high = axis.get_view_interval()
+    missing = RANGE * max(abs(low), abs(high)) - (high - low)
+    if missing > 0:
+        axis.set_view_interval(low - missing / 2, high + missing / 2, ignore=True)
 
 
 def runs_of(values: np.ndarray) -> Iterator[tuple[int, int, int]]:
