@@ -587,3 +587,19 @@ def test_the_picture_draws_and_judges_every_joint(solve, monkeypatch, tmp_path):
         assert (cells[row, 0], cells[row, 4]) == (name, judged)
     assert "k_h = 0.1" in texts
     assert any(text.startswith("loads: weight, water 30 m") for text in texts)
+
+
+@pytest.mark.parametrize("width", [80, 120])
+def test_the_table_fits_the_terminal_with_named_columns(solve, width):
+    """Verdicts first; all columns without a width; forces in MN/m whatever their size."""
+    joints = {"lift_heights": (38.0,), "required_SSF": 1.5, "mu": 1.0, "adhesion": 1e5}
+    (result,) = solve("dam", (40.0,), n_joint=24.0, order=1.0, law="friction", **joints)
+    checks = compare_joints(result)
+    first, table, *_ = text_table(checks, width).split("\n\n")
+    assert first.splitlines()[0] == "dam, base: check: pass; equilibrium: yes"
+    assert max(map(len, table.splitlines())) <= width
+    heads = table.splitlines()[0].split()
+    assert {"case", "method", "SSF", "OSF", "check"} <= set(heads)
+    wide = text_table(checks).split("\n\n")[1]
+    assert max(map(len, wide.splitlines())) > 120 and "[kN/m]" not in wide
+    assert (" T " in table.splitlines()[0]) == (width == 120)

@@ -12,6 +12,7 @@ import meshio
 import numpy as np
 import pytest
 from damjoint import cli
+from damjoint.post import summary
 from damjoint.post.field_files import write_vtu
 from damjoint.post.tables import write_csv
 from numpy.testing import assert_allclose
@@ -268,3 +269,22 @@ def test_a_history_without_a_column_is_refused_as_of_an_earlier_version(command,
     code, _, error = command("plot", folder)
     assert code == 2 and error.count("\n") == 1
     assert "history.csv of damjoint" in error and "lacks process_zone" in error
+
+
+@pytest.mark.parametrize("joints", [{}, {"lift_heights": (15.0, 30.0)}])
+def test_printed_tables_fit_the_terminal(solve, joints):
+    """Of several joints a row for each; with all columns also the levels of each."""
+    settings = {"n_joint": 10.0, "h_dam": 12.0, "h_found": 60.0, "law": "bond"} | joints
+    (result,) = solve("dam", (30.0, 45.0), **settings)
+    for width in (80, 120):
+        lines = summary.text(result, width).splitlines()
+        assert max(map(len, lines)) <= width
+    wide = summary.text(result)
+    assert "uplift" in wide and "[nm]" not in wide and "[kN/m]" not in wide
+    if joints:
+        names = result.case.joint_names
+        assert [line.split("  ")[0] for line in lines[-3:]] == list(names)
+        assert all(f"{name}:\n" in wide for name in names)
+    else:
+        assert "uplift" not in summary.text(result, 80).splitlines()[0]
+        assert summary.text(result, 80).endswith("(--wide shows also: M, uplift U, softening)")

@@ -352,3 +352,18 @@ def test_rows_that_fail_do_not_set_the_scale_of_a_chart(command, tmp_path, monke
     (row,) = (row for row in rows(tmp_path / "s.csv") if row["failed"] == "1")
     (size,) = re.findall(r"\[(.*)\]", opening.get_ylabel())
     assert float(row["max_opening"]) * dict(LENGTHS)[size] > 3 * opening.get_ylim()[1]
+
+
+def test_rows_are_printed_in_a_table_that_fits_the_terminal():
+    """Numbers with four digits, forces in MN/m, no negative opening; the first twenty rows."""
+    plan = plan_of(["mu=0.5,0.7"], [], None, {}, "")
+    row = {"mu": "0.5", "verdict": "stands", "level": "45", "crack_length": "0", "N": "2.06612e7"}
+    row |= {"slip_length": "0", "max_opening": "-1e-6", "crest_ux": "0.0043", "T": "-1234567"}
+    table = sweep.rows_table(plan, [row] * 23)
+    lines = table.splitlines()
+    assert lines[0].split() == [*list(row)[:4], "slip_length", "max_opening", "crest_ux", "N", "T"]
+    assert lines[1].split() == ["[mm]", "[mm]", "[MN/m]", "[MN/m]"]
+    assert lines[3].split() == ["0.5", "stands", "45", "0", "0", "0", "4.3", "20.66", "-1.235"]
+    assert len(lines) == 3 + 20 + 1 and lines[-1] == "... and 3 rows more"
+    assert max(map(len, sweep.rows_table(plan, [row] * 2, 60).splitlines()[:-1])) <= 60
+    assert sweep.rows_table(plan, []) == ""

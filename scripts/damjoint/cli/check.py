@@ -6,7 +6,16 @@ import argparse
 from pathlib import Path
 
 from .cases import load_cases
-from .options import CASE, JOBS, Parser, accuracy_options, settings_options, water_options
+from .options import (
+    CASE,
+    JOBS,
+    Parser,
+    accuracy_options,
+    settings_options,
+    table_width,
+    water_options,
+    wide_option,
+)
 
 SUMMARY = (
     "safety factors by finite elements and by the gravity method; exit code 1 if one is too "
@@ -14,7 +23,7 @@ SUMMARY = (
 )
 
 #: Options that it shares with other commands.
-SHARED = settings_options, water_options, accuracy_options
+SHARED = settings_options, water_options, accuracy_options, wide_option
 
 
 def add(command: Parser) -> None:
@@ -36,5 +45,9 @@ def call(arguments: argparse.Namespace) -> int:
 
     checks = check_cases(load_cases(arguments, arguments.cases), arguments.out, arguments.jobs)
     errors = [f"{check.case.name}: {check.accuracy}" for check in checks if check.accuracy]
-    print("\n\n".join([text_table(checks), *errors, str(arguments.out / "check.csv")]))
+    print(
+        "\n\n".join(
+            [text_table(checks, table_width(arguments)), *errors, str(arguments.out / "check.csv")]
+        )
+    )
     return int(any(result.verdict in ("fail", NOT_JUDGED) for c in checks for result in c.results))

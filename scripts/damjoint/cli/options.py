@@ -188,6 +188,22 @@ def water_options() -> Parser:
     return options
 
 
+def wide_option() -> Parser:
+    """The option of the commands that print tables."""
+    options = Parser(add_help=False)
+    options.add_argument(
+        "--wide",
+        action="store_true",
+        help="print all columns of the tables (default: those that fit the terminal)",
+    )
+    return options
+
+
+def table_width(arguments: argparse.Namespace) -> int | None:
+    """The width of printed tables; None with --wide."""
+    return None if arguments.wide else terminal_width()
+
+
 def all_steps_option() -> Parser:
     """The option of a table of all steps."""
     options = Parser(add_help=False)

@@ -16,7 +16,9 @@ from .options import (
     all_steps_option,
     loading_options,
     settings_options,
+    table_width,
     time_span,
+    wide_option,
 )
 
 SUMMARY = (
@@ -25,7 +27,7 @@ SUMMARY = (
 )
 
 #: Options that it shares with other commands.
-SHARED = settings_options, loading_options, all_steps_option
+SHARED = settings_options, loading_options, all_steps_option, wide_option
 
 
 def add(command: Parser) -> None:
@@ -76,7 +78,8 @@ def call(arguments: argparse.Namespace) -> int:
     for result in results:
         steps = f"{result.summary['steps']} steps; {result.out}"
         print(f"{result.case.name}: {result.statement}; {steps}\n")
-        print(text(result.case, result.summary), end="\n\n" if len(results) > 1 else "\n")
+        tables = text(result.case, result.summary, table_width(arguments))
+        print(tables, end="\n\n" if len(results) > 1 else "\n")
     if len(results) > 1:
         print(records_table(results))
     return int(not all(result.stands for result in results))

@@ -15,6 +15,8 @@ from .options import (
     all_steps_option,
     loading_options,
     settings_options,
+    table_width,
+    wide_option,
 )
 
 if TYPE_CHECKING:
@@ -24,7 +26,7 @@ if TYPE_CHECKING:
 SUMMARY = "fill the reservoir of a case; exit code 1 if the dam fails or the run stops early"
 
 #: Options that it shares with other commands.
-SHARED = settings_options, loading_options, accuracy_options, all_steps_option
+SHARED = settings_options, loading_options, accuracy_options, all_steps_option, wide_option
 
 
 def add(command: Parser) -> None:
@@ -66,11 +68,14 @@ def run_and_print(arguments: argparse.Namespace, drawing: DrawingProcess | None)
             f"{case.name}, uplift {result.case['uplift']}: {verdict(result)}; "
             f"{len(history['time'])} steps, {history['iterations'].sum():.0f} iterations; {out}"
         )
-        if result.last:
-            print(f"\n{summary.text(result)}")
         driven = case["drive"] != "level"
-        lines = [path_statement(result) if driven else "", statement(result), *hints(result)]
-        lines.append(result.info.get("error_estimate", {}).get("statement", ""))
+        if reasons := [
+            *filter(None, [path_statement(result) if driven else "", statement(result)])
+        ]:
+            print(*reasons, sep="\n")
+        if result.last:
+            print(f"\n{summary.text(result, table_width(arguments))}")
+        lines = [*hints(result), result.info.get("error_estimate", {}).get("statement", "")]
         if any(lines):
             print("", *filter(None, lines), sep="\n")
         code = max(code, int(failed(result)))

@@ -20,6 +20,8 @@ from .options import (
     loading_options,
     settings_options,
     slip,
+    table_width,
+    wide_option,
 )
 
 if TYPE_CHECKING:
@@ -30,7 +32,7 @@ if TYPE_CHECKING:
 SUMMARY = "run a case with many values of its parameters, listed or random; CSV and chart"
 
 #: Options that it shares with other commands.
-SHARED = settings_options, loading_options, accuracy_options
+SHARED = settings_options, loading_options, accuracy_options, wide_option
 
 
 def add(command: Parser) -> None:
@@ -99,7 +101,7 @@ def call(arguments: argparse.Namespace) -> int:
     """Run damjoint sweep."""
     from ..input import parameters
     from ..studies.plan import cases_of, plan_of, sample_of
-    from ..studies.sweep import meshed, sweep
+    from ..studies.sweep import meshed, rows_table, sweep
 
     out = arguments.out or Path(f"{Path(arguments.case).stem}_sweep.csv")
     settings = parameters.settings(arguments.settings)
@@ -115,7 +117,8 @@ def call(arguments: argparse.Namespace) -> int:
         print(f"mesh of all rows, refined for the unchanged case: {estimate}")
     on_note = partial(print_note, case)
     count, rows = sweep(case, plan, out, arguments.jobs, arguments.scheduler, on_note)
-    print(f"{count} rows computed; {out}")
+    print(f"{count} rows computed; {out}\n")
+    print(f"{rows_table(plan, rows, table_width(arguments))}\n")
     loaded = () if plan.sampled else cases_of(case, plan)
     cases = [row_case for _, row_case in loaded]
     report_sweep(arguments.case, plan, rows, cases, out)

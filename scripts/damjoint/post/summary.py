@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import zip_longest
 from textwrap import wrap
 from typing import NamedTuple
@@ -74,7 +74,8 @@ def levels_table(result: Results) -> Table:
     history = history | {"max_opening": np.maximum(history["max_opening"], 0)}
     names, sizes, cells = table_of(
         [
-            (head, history[name][rows], units)
+            # one unit of forces in all tables
+            (head, history[name][rows], units[:1] if units in (FORCES, MOMENTS) else units)
             for name, head, units in SHOWN
             if (name != "flux" or case["uplift"] == "flow")
             and (name not in ("tail_level", "process_zone") or history[name].any())
@@ -133,37 +134,78 @@ def requested_rows(result: Results) -> np.ndarray:
     return np.flatnonzero(shown)
 
 
-def text(result: Results) -> str:
-    """Format the tables of the levels for the terminal, one for each joint."""
+#: Columns that a narrow table leaves out, in this order.
+LESS = ("M", "uplift U", "broken", "softening", "tailwater", "leakage", "crest movement", "T")
+
+
+def text(result: Results, width: int | None = None) -> str:
+    """Format the tables of the levels for the terminal: of a single joint its levels, of several a
+    row for each at the last level; the levels of each, too, with all columns (width = None).
+    """
     case = result.case
+    if not case.of_joints:
+        return text_of_joint(result, width)
+    last = result.last
+    table = joints_table(result, last["time"])
+    heads = [f"{n}\n[{u}]" if u else n for n, u in zip(table.names, table.units, strict=True)]
+    joints = f"joints at level {last['level']:.4g} m:\n{aligned(table.rows, heads, left=1)}"
+    if width is not None:
+        return joints
     tables = zip(case.joint_names, map(text_of_joint, result.joints), strict=True)
-    return "\n\n".join(f"{name}:\n{table}" if case.of_joints else table for name, table in tables)
+    return "\n\n".join([joints, *(f"{name}:\n{table}" for name, table in tables)])
 
 
-def text_of_joint(result: Results) -> str:
+def text_of_joint(result: Results, width: int | None = None) -> str:
     """Format the table of the levels of the only joint of these results."""
     names, sizes, rows = levels_table(result)
-    heads = [
-        "\n".join([*wrap(name, 10), f"[{size}]" if size else ""])
-        for name, size in zip(names, sizes, strict=True)
-    ]
-    return aligned(rows, heads)
+
+    def draw(shown: Sequence[int]) -> str:
+        heads = [
+            "\n".join([*wrap(names[k], 10), f"[{sizes[k]}]" if sizes[k] else ""]) for k in shown
+        ]
+        return aligned([tuple(row[k] for k in shown) for row in rows], heads)
+
+    return fitted(names, draw, LESS, width)
+
+
+def fitted(
+    names: Sequence[str],
+    draw: Callable[[Sequence[int]], str],
+    less: Sequence[str],
+    width: int | None,
+) -> str:
+    """Draw a table without those of the columns `less`, in their order, that a width has no room
+    for; draw: the table of some of its columns, by number; width = None: all.
+    """
+    shown, hidden = list(range(len(names))), list[str]()
+    table = draw(shown)
+    for name in less:
+        if width is None or max(map(len, table.splitlines())) <= width:
+            break
+        if name in names:
+            shown.remove(names.index(name))
+            hidden.append(name)
+            table = draw(shown)
+    if width is None or not hidden:
+        return table
+    return "\n".join([table, *wrap(f"(--wide shows also: {', '.join(hidden)})", width)])
 
 
 #: Blanks between two columns; a column is at least so much wider than its heading.
 GAP = 2
 
 
-def aligned(rows: list[tuple[str, ...]], heads: list[str]) -> str:
-    """Align rows of cells below headings of several lines; the last column to the left, the others
-    to the right. (A package for this takes longer to load than the run to compute.)
+def aligned(rows: list[tuple[str, ...]], heads: list[str], left: int = 0) -> str:
+    """Align rows of cells below headings of several lines; the first `left` columns and the last
+    one to the left, the others to the right. (A package for this takes longer to load than the run
+    to compute.)
     """
     lines = list(zip_longest(*(head.split("\n") for head in heads), fillvalue=""))
     widths = [
-        max(*(len(part) + GAP for part in head), *map(len, cells))
+        max(*map(len, head), *map(len, cells))
         for head, cells in zip(zip(*lines, strict=True), zip(*rows, strict=True), strict=True)
     ]
-    sides = [str.rjust] * (len(widths) - 1) + [str.ljust]
+    sides = [str.ljust] * left + [str.rjust] * (len(widths) - 1 - left) + [str.ljust]
 
     def line(cells: Sequence[str]) -> str:
         padded = (side(c, w) for side, c, w in zip(sides, cells, widths, strict=True))

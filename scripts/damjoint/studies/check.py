@@ -23,6 +23,7 @@ from ..model.results import HISTORY, Results
 from ..pictures.check_picture import SIGN, draw_check
 from ..post import folder as folders
 from ..post import stored
+from ..post.summary import fitted
 from ..post.tables import write_csv
 from ..post.units import FORCES, MOMENTS, STRESSES, Units, unit
 from ..processes import in_processes
@@ -458,35 +459,63 @@ def difference(first: float, second: float) -> float:
     return 0.0 if math.isclose(first, second, rel_tol=ROUND_OFF) else first - second
 
 
-def text_table(checks: list[SafetyCheck]) -> str:
-    """Format checks as a table in suitable units; below it the failures and notes."""
+#: Columns that a narrow table leaves out, in this order.
+LESS = ("level", "c L", "c B", "eff. toe", "eff. heel", "M", "N' at x", "U", "crack", "T", "N'")
+
+
+def text_table(checks: list[SafetyCheck], width: int | None = None) -> str:
+    """Format the verdicts, below them a table in suitable units, and the notes; width: of the
+    terminal, None: all columns.
+    """
     rows = [row for check in checks for row in check.printed_rows]
     is_difference = np.array([row["answer"] == DIFFERENCE for row in rows])
-    columns, heads = [], []
-    for units, names in SHOWN:
-        values = np.array([[row[name] for row in rows] for name in names], dtype=float)
+    columns, heads, names = [], [], ["case", "method"]
+    for units, shown in SHOWN:
+        values = np.array([[row[name] for row in rows] for name in shown], dtype=float)
         finite = values[np.isfinite(values)]
-        size, factor = unit([finite], units)
+        size, factor = units[0] if units in (FORCES, MOMENTS) else unit([finite], units)
         least = SHOWN_DIFFERENCE * np.abs(finite).max(initial=0)
         values[is_difference & (np.abs(values) < least)] = 0
         sign = f"\n{SIGN}" if units is STRESSES else ""
-        heads += [f"{title}\n[{size}]{sign}" for title in names.values()]
+        names += shown.values()
+        heads += [f"{title}\n[{size}]{sign}" for title in shown.values()]
         formats = [signed_cell if is_signed else number_cell for is_signed in is_difference]
         columns += [[f(v * factor) for f, v in zip(formats, line, strict=True)] for line in values]
     verdicts = ([row[name] for row in rows] for name in ("position", "verdict"))
     scenes, methods = [scene_label(checks, row) for row in rows], [method_label(r) for r in rows]
-    table = tabulate(
-        zip(scenes, methods, *columns, *verdicts, strict=True),
-        ["case", "", *heads, "N' in", ""],
-        disable_numparse=True,
-        colalign=("left", "left", *("right" for _ in columns), "left", "left"),
-    )
+    columns = [scenes, methods, *columns, *verdicts]
+    heads = ["case", "method", *heads, "N' in", "check"]
+    aligned = ["left", "left", *("right" for _ in heads[4:]), "left", "left"]
+
+    def draw(numbers: Sequence[int]) -> str:
+        return str(
+            tabulate(
+                zip(*(columns[k] for k in numbers), strict=True),
+                [heads[k] for k in numbers],
+                disable_numparse=True,
+                colalign=[aligned[k] for k in numbers],
+            )
+        )
+
+    table = fitted([*names, "N' in", "check"], draw, LESS, width)
     lines = [
         f"{scene}, {row['answer']}: {'fails, ' * (row['verdict'] == FAIL)}{row['why']}"
         for scene, row in zip(scenes, rows, strict=True)
         if row["why"]
     ]
-    return "\n\n".join(filter(None, [table, "\n".join([*lines, *labelled_notes(checks)])]))
+    verdict_lines = [
+        f"{scene_label(checks, check.finite_elements.row)}: check: {worst_verdict(check)}; "
+        f"equilibrium: {'no' if check.finite_elements.statement else 'yes'}"
+        for check in checks
+    ]
+    parts = "\n".join([*verdict_lines, *lines]), table, "\n".join(labelled_notes(checks))
+    return "\n\n".join(filter(None, parts))
+
+
+def worst_verdict(check: SafetyCheck) -> str:
+    """The worse verdict of both methods on a joint."""
+    verdicts = [result.verdict for result in check.results]
+    return min(verdicts, key=(FAIL, NOT_JUDGED, UNCHECKED, PASS).index)
 
 
 def labelled_notes(checks: list[SafetyCheck]) -> list[str]:
@@ -615,9 +644,14 @@ def joints_table(checks: list[SafetyCheck]) -> list[tuple[str, ...]]:
     for check in checks:
         numbers = [result.numbers for result in check.results]
         least = [np.nanmin([n[name] for n in numbers] + [np.inf]) for name in ("SSF", "OSF")]
-        verdicts = [result.verdict for result in check.results]
-        worst = min(verdicts, key=(FAIL, NOT_JUDGED, UNCHECKED, PASS).index)
         position = check.finite_elements.position
         name = check.finite_elements.joint
-        cells.append((name, *(f"{f:.3g}" if f < np.inf else "-" for f in least), position, worst))
+        cells.append(
+            (
+                name,
+                *(f"{f:.3g}" if f < np.inf else "-" for f in least),
+                position,
+                worst_verdict(check),
+            )
+        )
     return cells

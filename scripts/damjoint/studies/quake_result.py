@@ -163,9 +163,14 @@ def modes(found: dict[str, Any]) -> str:
     )
 
 
-def text(case: Case, found: dict[str, Any]) -> str:
-    """Notes, peaks and residual values of a summary as printed tables."""
+#: Width of a printed table beside its first column.
+NUMBERS = 40
+
+
+def text(case: Case, found: dict[str, Any], width: int | None = None) -> str:
+    """Notes, peaks and residual values of a summary as printed tables; width: of the terminal."""
     tables = peaks_table(found, case), residual_table(found, case)
-    parts = [tabulate(table.rows, table.heads, disable_numparse=True) for table in tables]
+    options = {} if width is None else {"maxcolwidths": [max(width - NUMBERS, 20)]}
+    parts = [tabulate(t.rows, t.heads, disable_numparse=True, **options) for t in tables]
     lines = [*(f"note: {note}" for note in found["notes"]), modes(found)]
     return "\n\n".join(["\n".join(lines), *parts])

@@ -21,6 +21,7 @@ from ..joint.interface import Interface, interface_of
 from ..model.notes import notes_on_settings
 from ..model.results import column_of as column_of_joint
 from ..model.results import history_columns
+from ..post.summary import aligned, fitted
 from ..processes import ProcessKilled, as_finished, check_jobs, number_of
 from ..progress import Progress, track
 from ..solver.load_stepper import LoadStepper
@@ -345,3 +346,43 @@ def sweep(
         file.check_exists()
         done = file.read()
     return len(missing), [done[key] for key, *_ in rows]
+
+
+#: Rows of a sweep that are printed at most; columns beside those varied and of critical values, of
+#: static runs and of earthquakes, the last ones left out first where the terminal is narrow.
+PRINTED = 20
+RESULTS = ("verdict", "level", "crack_length", "slip_length", "max_opening", "crest_ux", "N", "T")
+#: Their units in the printed table where it is not that of the CSV file.
+PRINTED_UNITS = dict.fromkeys(("max_opening", "crest_ux", "residual_slip"), ("mm", 1000.0))
+PRINTED_UNITS |= {"rigid_block_slip": ("mm", 1e3), "N": ("MN/m", 1e-6), "T": ("MN/m", 1e-6)}
+RESULTS_OF_QUAKES = ("verdict", "residual_slip", "residual_tilt", "rigid_block_slip")
+
+
+def rows_table(plan: Plan, rows: list[Row], width: int | None = None) -> str:
+    """Format the first rows of a sweep: what is varied, verdict, main results; width: of the
+    terminal, None: all columns.
+    """
+    results = RESULTS if plan.slip_limit is None else RESULTS_OF_QUAKES
+    shown_always = [*map(column_of, plan.names), *plan.critical_columns[:3]]
+    names = [n for n in dict.fromkeys([*shown_always, *results]) if rows and n in rows[0]]
+    cells = [[short(name, row[name]) for name in names] for row in rows[:PRINTED]]
+    heads = [f"{n}\n[{PRINTED_UNITS[n][0]}]" if n in PRINTED_UNITS else n for n in names]
+
+    def draw(shown: Sequence[int]) -> str:
+        picked = [tuple(line[k] for k in shown) for line in cells]
+        return aligned(picked, [heads[k] for k in shown])
+
+    if not rows:
+        return ""
+    table = fitted(names, draw, results[:0:-1], width)
+    more = len(rows) - PRINTED
+    return f"{table}\n... and {more} rows more" if more > 0 else table
+
+
+def short(name: str, cell: str) -> str:
+    """A cell of a row with four digits if it is a number; an overlap is no opening."""
+    try:
+        value = float(cell) * PRINTED_UNITS.get(name, ("", 1.0))[1]
+    except ValueError:
+        return cell
+    return f"{max(value, 0.0) if name == 'max_opening' else value:.4g}"
