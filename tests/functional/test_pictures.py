@@ -8,6 +8,7 @@ import sys
 import time
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import damjoint as dj
 import numpy as np
@@ -20,6 +21,9 @@ from damjoint.pictures.drawing import runs_of, widen
 from damjoint.pictures.drawing_process import DrawingProcess, joined
 from damjoint.pictures.scene import water_surface
 from damjoint.statics import gravity
+from damjoint.studies import critical_picture
+from damjoint.studies.critical_value import CriticalValue
+from damjoint.studies.quake_picture import draw_strength
 from matplotlib.axes import Axes
 from matplotlib.legend import Legend
 from matplotlib.table import Table as MplTable
@@ -396,3 +400,34 @@ def test_the_surface_of_the_reservoir_ends_at_dam_and_ground():
     assert cells[:, :, 0].max() == pytest.approx(0) and cells[:, :, 0].min() == pytest.approx(-20)
     assert np.ptp(cells[:, :, 2]) == pytest.approx(10, abs=1.7)
     assert len(water_surface({"foundation": ground, "dam": dam}, -1.0)) == 0
+
+
+def test_the_strength_of_a_joint_is_a_band_of_both_signs():
+    """Never negative, also where T exceeds it."""
+    rows = {"time": np.arange(2.0), "T": np.array([-2e6, 1e6]), "shear_reserve": [1e6, -3e6]}
+    axes = pictures.figure_of(4, 3).subplots()
+    draw_strength(axes, SimpleNamespace(joint=0, rows_of=lambda _: rows))
+    assert_allclose([line.get_ydata() for line in axes.get_lines()], [(3, 0), (-3, 0)])
+
+
+def test_the_picture_of_a_critical_level_names_the_joint_and_all_values():
+    answer = CriticalValue(
+        *(50.0, "sliding", "why", "", None),
+        gravity=48.0,
+        gravity_joint="base",
+        gravity_there=49.0,
+        gravity_with={"without tension on base": 47.0},
+        joint="lift 15 m",
+    )
+    content = critical_picture.Content(load("dam", {}, [45.0]), "level", " m", [], answer, None)
+    assert critical_picture.heading(content).endswith("level 50 m, sliding on lift 15 m")
+    named = {label for _, _, label in critical_picture.critical_lines(content)}
+    assert named == {
+        "critical 50",
+        "gravity method on base 48",
+        "gravity method on lift 15 m 49",
+        "gravity method without tension on base 47",
+    }
+    axes = pictures.figure_of(4, 3).subplots()
+    critical_picture.draw_levels(axes, content)
+    assert [line.get_label() for line in axes.get_lines()] == ["crest 45 m"]
