@@ -27,6 +27,9 @@ from .parameters import checked, declared, levels_of, listing
 from .refinement import first_mesh, relative_error
 from .source import Source
 
+#: Settings for a law at one point: no weight, water or mesh limits its stiffness.
+NO_DAM = {"rho_dam": 0.0, "rho_water": 0.0, "n_joint": 1.0}
+
 
 def load(
     case: str,

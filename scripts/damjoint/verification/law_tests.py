@@ -14,7 +14,7 @@ import numpy as np
 from scipy.optimize import toms748
 
 from ..arrays import Array, Value, Values
-from ..input.resolve import load
+from ..input.resolve import NO_DAM, load
 from ..laws import Law
 
 #: Largest jump that a loaded point is searched within, and accuracy of the search.
@@ -48,7 +48,7 @@ def follow(test: LawTest) -> dict[str, Array]:
     """Columns, a row per step: t, jump, effective traction, damage; u_x, u_y, the jump of a plane
     inclined by 30 degrees; total_sigma_n; largest_sigma_n up to the step.
     """
-    law = load("dam", {**test.settings, "law": test.law}).law
+    law = load("dam", {**NO_DAM, **test.settings, "law": test.law}).law
     variables, jump, rows, before = law.initial(1), np.zeros(3), [], 0.0
     for time, *controls in test.steps:
         variables, before = law.begin_step(variables, before, time), time

@@ -11,7 +11,7 @@ from ... import RunError, data
 from ...arrays import Values
 from ...input.constraints import WORKS, check_acting
 from ...input.parameters import assignments, listing, parameter
-from ...input.resolve import load
+from ...input.resolve import NO_DAM, load
 from ...storage import check_end
 from . import process
 
@@ -46,7 +46,7 @@ def evaluate(
     pressure = np.zeros(len(jumps)) if pressure is None else np.asarray(pressure, float)
     given = {**(settings or {}), "law": law}
     works = {f"{name}_t" for name in WORKS} & given.keys()  # their t are rows of the path
-    case = load("dam", {name: given[name] for name in given.keys() - works})
+    case = load("dam", NO_DAM | {name: given[name] for name in given.keys() - works})
     case = case.with_values({name: parameter(name).check(given[name]) for name in works})
     check_acting(case, len(jumps))
     values = case.values
