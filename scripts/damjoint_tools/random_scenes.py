@@ -155,7 +155,9 @@ def with_works(scene: RandomScene, rng: RandomNumbers) -> RandomScene:
             if law == "rupture" and rng.event(0.5):
                 drawn["grout_pressure"] = rng.log_uniform(1e3, 3e5)
             if law in ("rupture", "friction"):
-                drawn |= {"saw_thickness": rng.log_uniform(1e-6, 1e-4), "saw_t": rng.choice(1, 2)}
+                last = scene.levels.count(",") + 1
+                drawn["saw_thickness"] = rng.log_uniform(1e-6, 1e-4)
+                drawn["saw_t"] = min(rng.choice(1, 2), last)
         if uplift == "imposed" and rng.event(0.2):
             drawn |= {"uplift": "waterstop", "waterstop": rng.uniform(0, settings["dam_base"] / 3)}
     return replace(scene, settings=settings | drawn)

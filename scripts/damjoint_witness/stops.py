@@ -3,9 +3,10 @@
 *No equilibrium can be*: no distribution of stress over the integration points of a joint within the
 strength that is left there has the resultants of the loads of the next step (a linear program). The
 strength is what the law has left after the last state; where the law is not convex, its convex
-hull, so that a joint whose cohesion is lost point by point may fail below the bound. *Equilibrium
-is certain*: friction alone carries the resultant, well within the base, under the most uplift.
-Between the two a stop is undecided.
+hull, so that a joint whose cohesion is lost point by point may fail below the bound. Or the shear
+exceeds what friction and the cohesion that is left carry under the tension that acts in the last
+state. *Equilibrium is certain*: friction alone carries the resultant, well within the base, under
+the most uplift. Between the two a stop is undecided.
 """
 
 from __future__ import annotations
@@ -22,8 +23,6 @@ from .files import Files, Table, rows_where
 from .reader import Asked, Section, Values
 from .statics import along_joint, loads
 
-#: Relative reserve of the bound within which a stop is at it: steps end below the limit by less.
-AT_THE_BOUND = 2e-3
 #: Least safety of a rigid block whose equilibrium counts as certain, and the least distance of its
 #: resultant from the ends of the joint in elements, and relative to its length.
 CERTAIN_SAFETY, ELEMENTS_INSIDE, SHARE_INSIDE = 1.05, 3, 0.05
@@ -143,6 +142,17 @@ def load_factor(joint: Joint, forces: Forces) -> float:
     return -float(found.fun or 0.0) if found.status == 0 else 0.0
 
 
+def slides(joint: Joint, forces: Forces) -> bool:
+    """Whether the shear force exceeds the shear strength that is left under the normal force, and
+    under the tension that acts in the last state and presses on the other points.
+    """
+    rows, mu = joint.points, joint.values["mu"]
+    tension, shear = strengths(rows, joint.values)
+    cohesion = shear if joint.values["law"] == "bond" else shear + mu * tension
+    pulled = np.maximum(rows["sigma_n_eff"], 0) if joint.values["law"] == "bond" else 0 * cohesion
+    return bool(abs(forces.T) > mu * forces.N + rows["weight"] @ (cohesion + mu * pulled))
+
+
 def equilibrium_is_certain(joint: Joint) -> bool:
     """Whether there is an equilibrium beyond the last state, by the static theorem without any
     strength but friction.
@@ -170,8 +180,9 @@ def judge(files: Files, asked: Asked, steps: Table) -> tuple[bool, str]:
         return False, f"{verdict}, displacement control: the level beyond is not known"
     if all(map(equilibrium_is_certain, joints)):
         return True, f"{verdict}, but there certainly is an equilibrium"
-    least = min(load_factor(joint, joint.forces(most_uplift=False)) for joint in joints)
-    if least <= 1 + AT_THE_BOUND:
+    beyond = [(joint, joint.forces(most_uplift=False)) for joint in joints]
+    least = min(load_factor(*one) for one in beyond)
+    if least <= 1 or any(slides(*one) for one in beyond):
         return False, ""
     return False, f"{verdict}, below the limit analysis by a factor of {least:.4g}"
 
