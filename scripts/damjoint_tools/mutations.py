@@ -20,6 +20,7 @@ import damjoint
 from damjoint import RunError
 from damjoint.progress import track
 
+from .provenance import RECORDED, provenance
 from .random_quakes import random_quake
 from .random_scenes import RandomScene, random_scene
 from .stress import ONE_THREAD, run_of
@@ -27,7 +28,7 @@ from .stress import ONE_THREAD, run_of
 #: Folders beside scripts/ that the package reads.
 DATA = "pro", "geo", "cases", "reference"
 #: Columns of the result file.
-COLUMNS = ("mutation", "place", "relevant", "scene", "finding")
+COLUMNS = ("mutation", "place", "relevant", "scene", "finding", *RECORDED)
 #: Relevant scenes at most, and scenes that are drawn to find them.
 MOST_SCENES, MOST_DRAWN = 60, 600
 
@@ -244,7 +245,7 @@ MUTATIONS = (
     ),
     Mutation(
         "order of the levels",
-        "model/case.py",
+        "input/case.py",
         "points, time = (0.0, *levels), min(time, len(levels))",
         "points, time = (0.0, *levels[::-1]), min(time, len(levels))",
         levels,
@@ -292,16 +293,21 @@ def look_for(mutation: Mutation, seed: int) -> dict[str, object]:
     return row
 
 
+def look_for_number(number: int, seed: int) -> dict[str, object]:
+    """`look_for` a mutation by its number, in another process."""
+    return look_for(MUTATIONS[number], seed)
+
+
 def mutate(seed: int, out: Path, jobs: int | None = None) -> list[dict[str, str]]:
     """Look for all mutations in the scenes of a seed, and write a table into a file; returns its
     rows.
     """
-    rows: dict[str, dict[str, object]] = {}
+    rows, now = dict[str, dict[str, object]](), provenance()
     with ProcessPoolExecutor(jobs or os.cpu_count() or 1) as pool:
-        waiting = [pool.submit(look_for, mutation, seed) for mutation in MUTATIONS]
+        waiting = [pool.submit(look_for_number, k, seed) for k in range(len(MUTATIONS))]
         for future in track(as_completed(waiting), "mutate", len(waiting)):
             row = future.result()
-            rows[str(row["mutation"])] = row
+            rows[str(row["mutation"])] = row | now
     with out.open("w", newline="") as file:
         table = csv.DictWriter(file, COLUMNS, restval="", lineterminator="\n")
         table.writeheader()

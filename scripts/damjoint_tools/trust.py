@@ -14,27 +14,69 @@ from .stress import CLASSES, DEFECT, UNDECIDED, counts, read_rows
 #: A row of a result file.
 Row = dict[str, str]
 
-#: What `damjoint stress` verifies in every scene.
-VERIFIED = """\
-- *Equilibrium*: $N + U$ and $T$ of every row of `history.csv`, and $M$ where there is a joint
-  table, equal the closed forms of the [gravity method](theory.md#gravity-method), to 1e-5 of the
-  dam's weight (times its base).
-- *Water*: $U$ is the integral of `p`, and the closed form where there is one; heads are between
-  those of reservoir and tailwater; in 2D the flux is the same at every node, except for the flow
-  into drains.
-- *Joint law*: at every node of `joint.csv` the normal stress of a closed point is $K_N$ times
-  $\\delta_n$, and an open point is not in compression. The tension is at most that of the damaged
-  joint, the shear at most the strength by friction, cohesion and hardening. Damage, cumulated slip
-  (friction), crack (rupture) and slipped length never decrease.
-- *Command*: parameters, times, levels, tailwater and exit code are those of the command line.
-- *A run that stops* is justified if statics guarantees no equilibrium at a higher level (by the
-  safe bound of a rigid block with friction as its only strength, under the largest uplift that a
-  crack can cause, with a margin of 5 %), and if the block is within 10 % of the failure that the
-  run reports.
+#: What is compared: quantity, with what, and to which tolerance.
+COMPARED = (
+    (
+        "parameters of each joint, levels, times, verdict and exit code",
+        "the words of the command and the defaults of `pro/parameters.pro`, by a reader of its own",
+        "all digits",
+    ),
+    (
+        "$N + U$, $T$, $M + M_U$ of every row of `history.csv`",
+        "weight, water, tailwater, silt, ice, line forces, anchor, earthquake with added mass "
+        "on the polygon of the section, pressures by quadrature",
+        "1e-7 of the weight (times the base), and ten times the residual",
+    ),
+    (
+        "$N$, $T$, $M$; rows of `joint.csv`",
+        "integrals of the tractions, and rows of the nodes, in `steps.csv`",
+        "1e-9",
+    ),
+    (
+        "traction, damage, slip, hardening, grout and saw at every node and integration point "
+        "after every step",
+        "each law replayed along the jumps, a scalar implementation for each of rupture, "
+        "friction, bond and endo; also the rounds of unstable crack growth",
+        "1e-6 of the strength",
+    ),
+    (
+        "pressure and flux in the joint",
+        "the flow through the written openings: resistances in series or a network in 2D, "
+        "finite elements in 3D, with drains and waterstop",
+        "1e-9 of the largest pressure, 1e-6 in 3D",
+    ),
+    (
+        "displacement jumps",
+        "both bodies by scikit-fem on the written mesh, under the loads, temperature, and the "
+        "written tractions and pressures",
+        "the residual of the step, at least 1e-9 of the largest displacement",
+    ),
+    (
+        "a run that stops",
+        "limit analysis: it is *justified* if no distribution of stress within the strength "
+        "that is left has the resultants of the next step (a linear program over the "
+        "integration points), or if the shear exceeds friction and the cohesion that is left; "
+        "*wrong* if friction alone certainly bears the block, under the most uplift, with a "
+        "margin of 5 %",
+        "the smallest step",
+    ),
+)
 
-*Undecided* is a stop that these bounds neither justify nor refute: displacement control without a
-further equilibrium, or a joint that is too stiff for its mesh ($K_N h/E \\ge 100$, $h$ an element's
-length), which the run reports. A command that exceeds its time limit is a defect."""
+#: What `damjoint stress` verifies in every scene, around that table.
+VERIFIED = """\
+The package `damjoint_witness` reads the command line and the files of a run, with those of
+`--all-steps` and the mesh in `fields/`. It imports nothing of `damjoint` (a test) and computes
+everything again, slowly and plainly, from the formulas of [theory](theory.md)."""
+UNDECIDED_OR_NOT = """\
+*Undecided* is a stop between these two bounds: a joint whose cohesion or tensile strength is lost
+point by point may fail below the first one, and water may enter a crack beyond the last state; so
+is one under displacement control, whose level is not known beforehand. A command that exceeds its
+time limit is a defect.
+
+Not checked here: stresses in the bodies and pictures; the default values themselves; that the
+branch which the load steps follow is the one that a dam would take, where there are several
+equilibria; geometries of one's own; the reference GetDP model (the tests compare it with the
+engine of these runs)."""
 
 #: What `damjoint stress --quake` verifies in every scene, and beside it.
 QUAKES_VERIFIED = """\
@@ -42,11 +84,14 @@ QUAKES_VERIFIED = """\
 - *Motion*: the displacement of the crest is the integral of its acceleration, by Newmark's
   differences; the acceleration of the ground is that of the record, in rock with mass later by the
   travel time of the wave.
-- *Momentum*: $T$, $N + U$ and, if the water does not change, $M$ of every joint at every step equal
-  the static loads, the inertia of all that is above the joint, the mass of the water included, and
-  the damping by the mass (of concrete and water), to 1e-6 of the weight (times the base). Loads
-  and masses by the gravity method.
-- *Water, joint law*: as above, at every node of up to 200 frames.
+- *Momentum*: $T$, $N + U$ and, if the water does not change, $M$ of every joint at every step, with
+  the dashpots of the joint, equal the static loads, the inertia of all that is above the joint, the
+  mass of the water included, and the damping by the mass (of concrete and water), to 1e-6 of the
+  weight (times the base). Loads and masses by the polygon, dashpots from the jumps. Damping by the
+  stiffness and absorbing boundaries have no resultant there.
+- *Joint law*: replayed as above, at every node and integration point of every time step.
+- *Water*: $U$ of up to 200 frames is the integral of the pressure (2D); the flow is not computed
+  again.
 - *End*: the static state after the earthquake by hand, and that there is one if the rigid block
   certainly stands; peaks and residual slip are those of the rows; the exit code."""
 QUAKES_BESIDE = """\
@@ -55,7 +100,7 @@ QUAKES_BESIDE = """\
   static loads. *Energy*: the work of the ground equals kinetic and strain energy and the work on
   damping and joints, to 1e-8 with `hht_alpha = 0`, with which it also never rises while the ground
   is at rest; the time integration gives no energy with other `hht_alpha`. In half of the dams, all
-  dams with dashpots (which are not part of the balance of momentum above) and all rigid blocks.
+  dams with dashpots and all rigid blocks. The only check that uses matrices of the package.
 - *Elastic joint*: the reversed record gives the reversed motion, a hundredth of the record a
   hundredth of the motion, to 1e-5; the error falls with the square of the step, at least with its
   first power in the published scheme (if the steps resolve the first mode).
@@ -70,11 +115,13 @@ QUAKES_BESIDE = """\
 
 
 def trust_section(results: Path) -> tuple[str, str]:
-    """Return the name of a section, `dams` or `earthquakes`, and its text.
+    """Return the name of a section, `dams`, `earthquakes` or `mutations`, and its text.
 
     Raises ValueError if the rows are of different code.
     """
     rows = read_rows(results)
+    if "mutation" in rows[0]:
+        return "mutations", mutation_section(rows)
     quakes = rows[0]["command"].startswith("damjoint quake")
     return ("earthquakes", quake_section(rows)) if quakes else ("dams", dam_section(rows))
 
@@ -83,11 +130,12 @@ def dam_section(rows: list[Row]) -> str:
     """Return the section on dams under static loads."""
     parts = [
         f"{len(rows)} random scenes of `damjoint stress`. Each is computed by `damjoint "
-        "run` and verified from its result files, by code that is independent of the "
-        "engines. The scenes: dams from 5 to 150 m, $E$ from 1e9 to 1e13 Pa, $K_N$ from "
+        "run` and verified from its result files, by code that imports nothing "
+        "of the package. The scenes: dams from 5 to 150 m, $E$ from 1e9 to 1e13 Pa, $K_N$ from "
         "1e8 to 1e15 Pa/m, all laws and uplifts, sections with batter, neck, sloping and "
-        "lift joint, silt, ice, anchor and earthquake, rising and falling water; four in "
-        "ten have two to four joints, each with its own law and uplift (the rows of a law "
+        "lift joint, silt, ice, anchor, earthquake and temperature, rising and falling "
+        "water; grouted and sawn joints, waterstops; four in ten have two to "
+        "four joints, each with its own law and uplift (the rows of a law "
         "or an uplift below are of dams with one joint); one 2D "
         "scene in ten is a slender dam with the stiffness of concrete on a brittle joint. "
         "The name of a scene is SEED-NUMBER. Written by "
@@ -95,6 +143,8 @@ def dam_section(rows: list[Row]) -> str:
         source_line(rows),
         "## What is verified",
         VERIFIED,
+        markdown(COMPARED, ("quantity", "is compared with", "to")),
+        UNDECIDED_OR_NOT,
         "## Result",
         classes(rows, "law", "uplift", "joints", "dim", "drive"),
         "## Defects and undecided stops",
@@ -102,6 +152,31 @@ def dam_section(rows: list[Row]) -> str:
         "## The slowest scenes",
         SLOWEST,
         slowest(rows),
+    ]
+    return "\n\n".join(parts)
+
+
+def mutation_section(rows: list[Row]) -> str:
+    """Return the section on errors in copies of the package."""
+    noticed = sum(bool(row["scene"]) for row in rows)
+    lines = [
+        (
+            row["mutation"],
+            f"`{row['place']}`",
+            row["relevant"],
+            row["scene"] or "not noticed",
+            row["finding"].replace("|", "\\|"),
+        )
+        for row in rows
+    ]
+    parts = [
+        "## Would it notice an error?",
+        f"{noticed} of {len(rows)} mutations were noticed. Each is an error at one place in a copy "
+        "of the package; random scenes in which it can matter (at most 60) are run with the copy "
+        "until the verification finds something. Written by `damjoint stress --mutate` and "
+        "`python -m damjoint_tools.pages trust FILE`.",
+        source_line(rows),
+        markdown(lines, ("mutation", "place", "scenes", "noticed in", "by")),
     ]
     return "\n\n".join(parts)
 

@@ -147,9 +147,10 @@ def slides(joint: Joint, forces: Forces) -> bool:
     under the tension that acts in the last state and presses on the other points.
     """
     rows, mu = joint.points, joint.values["mu"]
-    tension, shear = strengths(rows, joint.values)
-    cohesion = shear if joint.values["law"] == "bond" else shear + mu * tension
-    pulled = np.maximum(rows["sigma_n_eff"], 0) if joint.values["law"] == "bond" else 0 * cohesion
+    tension, cohesion = strengths(rows, joint.values)
+    # of the other laws the strength is linear in the normal stress, tension included
+    bond = joint.values["law"] == "bond"
+    pulled = np.maximum(rows["sigma_n_eff"], 0) if bond else tension
     return bool(abs(forces.T) > mu * forces.N + rows["weight"] @ (cohesion + mu * pulled))
 
 
