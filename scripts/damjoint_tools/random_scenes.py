@@ -151,7 +151,7 @@ def with_works(scene: RandomScene, rng: RandomNumbers) -> RandomScene:
         if rng.event(0.15) and "mu" in settings:  # not a slender dam
             law, drawn = "endo", drawn | endo(rng, settings)
         still = uplift in ("none", "imposed", "drained")
-        if still and rng.event(0.3) and "drive" not in settings:
+        if still and rng.event(0.5) and "drive" not in settings:
             if law == "rupture" and rng.event(0.5):
                 drawn["grout_pressure"] = rng.log_uniform(1e3, 3e5)
             if law in ("rupture", "friction"):

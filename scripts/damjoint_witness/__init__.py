@@ -9,13 +9,15 @@ again, slowly and plainly, from the formulas of reference/theory.md.
 | `files` | reads the tables and run.json of a run |
 | `reader` | the values of each joint, levels and times, from the command line |
 | `statics` | weights and loads of the section's polygons: N + U, T, M of every step |
-| `laws/` | traction, damage, slip of every step at every node and integration point, replayed |
+| `laws/`, `replay` | traction, damage, slip of every step at every node and integration point |
+| `tables` | completeness of the tables, integrals over the joint, rows of the nodes |
 | `solids` | reads the bodies' mesh; functions and quadrature on their sides |
 | `water` | pressure and flux, from the openings |
 | `elasticity` | displacement jumps, from loads and tractions of the joints |
 | `again` | independence of steps; critical values |
 | `stops` | whether there is no equilibrium beyond the last state, by limit analysis |
-| `earthquake` | balance of momentum, motion and laws of every time step |
+| `earthquake` | balance of momentum and motion of every time step |
+| `verify` | all of them, for the files of a run |
 
 Each check is a generator of the rules that the files violate, in words.
 """

@@ -29,9 +29,12 @@ def rows_where(table: Table, which: NDArray[np.bool_]) -> Table:
 
 
 def split_by(table: Table, name: str) -> list[Table]:
-    """The parts of a table with the same value in a column, in the order of their first rows."""
-    values = table[name]
-    return [rows_where(table, values == value) for value in dict.fromkeys(values.tolist())]
+    """The parts of a table of successive rows with the same value in a column."""
+    ends = np.flatnonzero(np.diff(table[name])) + 1
+    parts = {column: np.split(values, ends) for column, values in table.items()}
+    if not len(table[name]):
+        return []
+    return [{column: parts[column][k] for column in parts} for k in range(len(ends) + 1)]
 
 
 @dataclass(frozen=True)
