@@ -29,6 +29,8 @@ from .stress import ONE_THREAD, run_of
 DATA = "pro", "geo", "cases", "reference"
 #: Columns of the result file.
 COLUMNS = ("mutation", "place", "relevant", "scene", "finding", *RECORDED)
+#: Begin of the message of a command that is refused, by which no mutation is noticed.
+REFUSED = "exit code 2:"
 #: Relevant scenes at most, and scenes that are drawn to find them.
 MOST_SCENES, MOST_DRAWN = 60, 600
 
@@ -277,6 +279,7 @@ def look_for(mutation: Mutation, seed: int) -> dict[str, object]:
         modules = mutation.make(folder)
         os.environ |= ONE_THREAD | {"PYTHONPATH": str(modules)}
         for scene_name, scene in scenes_of(mutation, seed, folder / "records"):
+            _ = scene.case  # of an earthquake it writes the record
             row["relevant"] = int(str(row["relevant"])) + 1
             out = folder / scene_name
             out.mkdir()
@@ -286,6 +289,8 @@ def look_for(mutation: Mutation, seed: int) -> dict[str, object]:
                 wrong, remark = run.stop() if run.files.stopped else (False, "")
                 found += [remark] if wrong else []
             except RunError as error:
+                if str(error).startswith(REFUSED):
+                    raise
                 found = [str(error)]
             shutil.rmtree(out)
             if found:

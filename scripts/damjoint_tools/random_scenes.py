@@ -20,6 +20,9 @@ OF_JOINTS = (
     *("law", "K_N", "K_T", "sigma_max", "adhesion", "mu", "pena_rupture", "alpha", "pena_tang"),
     *("G_f", "G_t", "joint_slope", "uplift", "aperture_min", "drains"),
 )
+#: Young's modulus [Pa] up to which a change of temperature is as large as in a dam; that of a
+#: stiffer body is smaller, so that the stress is not larger.
+CONCRETE = 4e10
 #: Height of the highest lift over the dam's.
 HIGHEST_LIFT = 0.85
 
@@ -139,7 +142,10 @@ def with_works(scene: RandomScene, rng: RandomNumbers) -> RandomScene:
     """Add to some scenes a change of temperature and variants of their loads; in some with a single
     joint the law endo, grouting or sawing, or a waterstop.
     """
-    settings, drawn = scene.settings, temperature(rng) if rng.event(0.25) else {}
+    settings, drawn = scene.settings, dict[str, Setting]()
+    if rng.event(0.25):
+        stiffest = max(settings["E"], settings.get("E_found", 0))
+        drawn |= temperature(rng, min(8.0, 8.0 * CONCRETE / stiffest))
     if "silt_height" in settings and rng.event(0.5):
         drawn |= {"silt_weight": 1, "silt_K0": rng.uniform(0.3, 0.8)}
     if "k_h" in settings:
@@ -163,12 +169,12 @@ def with_works(scene: RandomScene, rng: RandomNumbers) -> RandomScene:
     return replace(scene, settings=settings | drawn)
 
 
-def temperature(rng: RandomNumbers) -> dict[str, Setting]:
-    """Draw changes of temperature."""
+def temperature(rng: RandomNumbers, most: float) -> dict[str, Setting]:
+    """Draw changes of temperature up to a size [K]."""
     drawn = {
-        "temperature_dam": rng.uniform(-8, 8),
-        "temperature_linear": rng.choice(0, rng.uniform(-8, 8)),
-        "temperature_found": rng.choice(0, rng.uniform(-4, 4)),
+        "temperature_dam": rng.uniform(-most, most),
+        "temperature_linear": rng.choice(0, rng.uniform(-most, most)),
+        "temperature_found": rng.choice(0, rng.uniform(-most / 2, most / 2)),
     }
     return drawn | ({"temperature_period": rng.uniform(1, 4)} if rng.event(0.3) else {})
 
