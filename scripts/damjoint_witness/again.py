@@ -22,6 +22,8 @@ from .reader import Asked
 SAME_STATE = 1e-6
 #: Difference of confirmed critical levels over the level: their precision.
 SAME_LEVEL = 1e-4
+#: Relative reserve of the bound within which a level is at it: the precision of the search.
+AT_THE_BOUND = 2e-3
 #: Level of the first start over the dam's height; over the first critical level that is found those
 #: of the others, and of the states below and above it.
 FIRST_START, STARTS, BELOW, ABOVE = 0.5, (0.6, 0.9), 0.995, 1.005
@@ -121,7 +123,7 @@ def above(critical: Critical, files: Files, asked: Asked, steps: Table) -> Itera
         yield f"above the critical level {critical.level:.6g} m there certainly is an equilibrium"
     by_friction = critical.mode == "sliding" and all(map(has_constant_strength, joints))
     least = min(stops.load_factor(j, j.forces(most_uplift=False)) for j in joints)
-    if by_friction and least > 1 + stops.AT_THE_BOUND:
+    if by_friction and least > 1 + AT_THE_BOUND:
         yield (
             f"sliding at the critical level {critical.level:.6g} m, but statics allows {least:.4g} "
             "times the loads above it"
