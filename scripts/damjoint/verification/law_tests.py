@@ -153,9 +153,10 @@ def ssnp162() -> dict[str, LawTest]:
     tests["J I"] = LawTest("friction", wet, steps, p)
     # in 3D: sheared to and fro while it slips across
     soft: Values = {"K_N": 0.1, "K_T": 0.15, "mu": 0.2, "adhesion": 0.1, "pena_tang": 1e-7}
-    sheared = dict(ramp(quarters, (0, 0, 20, -20, 20)))
+    turns = (0, 15, 30, 45, 60)
+    sheared = dict(ramp(turns, (0, 0, 20, -20, 20)))
     across = dict(ramp((0, 30, 60), (0, 50 / 3, 50)))
-    closed = dict(ramp(quarters, (0, -50, -50, -50, -50)))
+    closed = dict(ramp(turns, (0, -50, -50, -50, -50)))
     to_and_fro = [(t, closed[t], sheared[t], across[t] if t > 15 else 0.0) for t in sheared]
     tests["E"] = LawTest("friction", soft, to_and_fro)
     return tests
