@@ -29,8 +29,9 @@ from .step import Plan, Start, solve
 LARGEST_JUMP = 0.1
 
 #: A step is extrapolated from the two states before it where it is at most this many times as long
-#: as the step between them.
-LONGEST_EXTRAPOLATION = 4
+#: as the step between them: of the level, of a displacement. Without the extrapolation all points
+#: begin elastic, and Newton's method may not find the state in which many of them yield.
+LONGEST_EXTRAPOLATION, LONGEST_ALONG_PATH = 4, 16
 
 
 @dataclass(frozen=True)
@@ -197,7 +198,8 @@ class Model:
             else:
                 new, (now, old) = control.value, (self.measure(control, s) for s in (state, before))
             ahead = (new - now) / (now - old) if now != old else 0.0
-            if 0 < ahead < LONGEST_EXTRAPOLATION:
+            longest = LONGEST_ALONG_PATH if prescribed is None else LONGEST_EXTRAPOLATION
+            if 0 < ahead < longest:
                 jump = state.jump + ahead * (state.jump - before.jump)
                 rise = level - before.loading.level
                 return jump, level + ahead * rise if prescribed is None else prescribed

@@ -68,6 +68,11 @@ SHORTENED, SMALLEST, LEAST = 1 / 16, 1e-6, 1e-8
 #: prescribed; less is that from one integration point to the next.
 FALL = 1e-3
 
+#: It is halved, too, as long as points whose damage grows by more than this in a half lose tensile
+#: strength of more than the part FALL of the water's thrust: where they soften in a single
+#: increment the level may fall within it.
+LARGEST_GROWTH = 0.5
+
 #: A fall of the level over which damage and slip grow by less than this part of what they did
 #: before, over the movement, is unloading.
 UNLOADING = 0.05
@@ -265,6 +270,27 @@ class Point:
         growth = self.irreversible(self.state) - self.irreversible(before)
         return float(np.abs(growth).sum() / np.abs(self.movement).max())
 
+    @cached_property
+    def damage(self) -> Array:
+        """The damage of all points (q,)."""
+        interface = self.model.equilibrium.interface
+        jumps = interface.jumps(interface.at_points, self.state.jump)
+        return self.model.equilibrium.laws.damage(jumps, self.state.variables)
+
+    def leaps(self, begin: Point) -> bool:
+        """Whether tension of more than the part FALL of the water's thrust has been lost since
+        another equilibrium by points that soften in a single increment.
+        """
+        case, equilibrium = self.model.case, self.model.equilibrium
+        growth = self.damage - begin.damage
+        lost = equilibrium.interface.weights * np.where(growth > LARGEST_GROWTH, growth, 0)
+        if not lost.any():
+            return False
+        parts = zip(equilibrium.laws.laws, self.state.variables.split(lost), strict=True)
+        force = sum(law.tensile_strength * part.sum() for law, part in parts if law.softens)
+        thrust = case["rho_water"] * case["g"] * self.level**2 / 2 * equilibrium.bulk.width
+        return bool(force > FALL * thrust)
+
     def unloads(self, begin: Point) -> bool:
         """Whether the level falls in the last step while damage and slip grow by a small part of
         what they did before another point: the way back, not the continuation of a path.
@@ -283,6 +309,10 @@ class Point:
 
 class EquilibriumPath:
     """Equilibria one after the other, each with a larger displacement than the one before."""
+
+    #: whether it is followed to the first unstable crack growth only, and increments are short
+    #: enough to find it
+    to_growth = False
 
     def __init__(self, points: list[Point], time: float, tick: float = 0.0) -> None:
         """points: the first ones, the last of them to continue from; time: whose loads act, but for
@@ -322,8 +352,12 @@ class EquilibriumPath:
     @property
     def ends_at_strength(self) -> bool:
         """Whether all strength of a joint is used at its highest level, and no way on is left."""
-        ends = self.ended and not self.exhausted
-        return bool(ends and self.points[self.top].slipping is not None)
+        return self.ends and self.points[self.top].slipping is not None
+
+    @property
+    def ends(self) -> bool:
+        """Whether increments have led to its highest level, and none leads on."""
+        return self.ended and not self.exhausted and self.points[self.top].control != "level"
 
     @property
     def exhausted(self) -> bool:
@@ -538,7 +572,15 @@ class EquilibriumPath:
                 return [whole]
             middle = self.step(point, point.further(control, by / 2), by / 2, kind)
             end = middle and self.step(middle, ahead, by / 2, kind)
-            if middle and end and not (whole.differs(end, point) or end.unloads(point)):
+            if (
+                middle
+                and end
+                and not (
+                    whole.differs(end, point)
+                    or end.unloads(point)
+                    or (self.to_growth and (middle.leaps(point) or end.leaps(middle)))
+                )
+            ):
                 short = np.abs(end.state.jump - point.state.jump).max() < SHORT * self.imposed(
                     point
                 )

@@ -28,7 +28,14 @@ from ..statics.verdict import bound, highest_by_statics
 from ..threads import limited_threads
 from .critical_gravity import GravityValues
 from .critical_value import CriticalValue
-from .critical_words import beyond_limit, by_increments, end_of_branch, events_on, lost_beyond_limit
+from .critical_words import (
+    beyond_limit,
+    by_increments,
+    end_of_branch,
+    events_on,
+    lost_beyond_limit,
+    slips_whole,
+)
 from .failure_path import FailurePath, Trial
 
 #: Parameters that are divided by the strength reduction factor. The fracture energies are included:
@@ -187,7 +194,7 @@ class Search:
     ) -> FailurePath:
         """The equilibrium path of a case, followed to a first estimate; adds a trial.
 
-        to_growth: with a law whose shear stiffness opening releases, only to the first unstable
+        to_growth: with a law that softens, only to the first unstable
         crack growth.
         """
         report = lambda level: self.on_progress(
@@ -195,8 +202,7 @@ class Search:
         )
         highest = max(target or 0, *case.levels)  # water may press on the crest
         interface = interface_of(replace(case, levels=(*case.levels[:-1], highest)))
-        path = FailurePath(case, interface, target, report)
-        path.to_growth = to_growth and path.stepper.model.equilibrium.laws.releases_shear
+        path = FailurePath(case, interface, target, report, to_growth)
         self.trials.append(Trial(value, path))
         path.follow(self.factor)
         return path
@@ -242,16 +248,22 @@ class Search:
                 None, "", "", f"there is an equilibrium at {beyond}", path.points[-1]
             )
         point = path.points[path.top] if path.admissible else None
+        after, ends = dict[str, float](), grows and path.ended
+        if point and grows:
+            after, path = self.after_growth(path)
         result = self.result(point and point.level, path, point)
         if point is None:
             return result
-        if grows:
-            return self.with_growth(result, path, certain)
-        if certain and not result.why and path.ends_at_strength:
-            result = replace(result, mode="sliding", why=end_of_branch(path), doubt="")
-        elif certain and not result.why and path.falls:
+        if after or ends:
+            mode = "unstable crack growth" if after else result.mode
+            result = replace(result, mode=mode, why=beyond_limit(path), doubt="", after=after)
+            result = replace(result, growth=point.level)
+        elif not result.why and path.ends_at_strength:
+            result = replace(result, mode="sliding", why=slips_whole(path), doubt="")
+        elif not result.why and path.falls:
             result = replace(result, why=lost_beyond_limit(path), doubt="")
-        result = replace(result, growth=path.first_growth)
+        elif not result.why and path.ends:
+            result = replace(result, why=end_of_branch(path), doubt="")
         return result if certain else replace(result, why="", doubt=by_increments(path))
 
     def certain(self, path: FailurePath) -> bool:
@@ -260,19 +272,21 @@ class Search:
         """
         if not path.starts or path.top < path.starts[0]:
             return path.certain()
-        other = FailurePath(path.case, path.interface, path.target)
-        other.rise, other.to_growth = SHORTER_RISE * path.rise, path.to_growth
+        other = FailurePath(path.case, path.interface, path.target, to_growth=path.to_growth)
+        other.rise = SHORTER_RISE * path.rise
         other.follow(SURE)
         other.refine()
         path.interval = tuple(sorted((float(path.highest), float(other.highest))))
         return bool(path.interval[1] - path.interval[0] <= PRECISION * path.interval[1])
 
-    def with_growth(self, result: CriticalValue, path: FailurePath, certain: bool) -> CriticalValue:
-        """A result with the unstable crack growth that ends a path, and the highest levels that are
-        reached after it; certain: whether its level is.
+    def after_growth(self, path: FailurePath) -> tuple[dict[str, float], FailurePath]:
+        """The highest levels [m] that are reached after the unstable crack growth that ends a path,
+        by how it is passed over; and the path, followed farther if there are none.
         """
-        after = {}
+        after, ended, farther = dict[str, float](), path.ended, path
         for name, relaxes in AFTER.items():
+            if relaxes and not (after or ended):
+                continue
             other = path.copied()
             other.relaxes, other.to_growth, other.ended = relaxes, False, False
             if relaxes:
@@ -282,10 +296,9 @@ class Search:
             other.refine()
             if other.highest > (1 + PRECISION) * path.highest:
                 after[name] = float(other.highest)
-        mode = "unstable crack growth" if after else result.mode
-        why, doubt = (beyond_limit(path), "") if certain else ("", by_increments(path))
-        growth = float(path.highest)
-        return replace(result, mode=mode, why=why, doubt=doubt, growth=growth, after=after)
+            elif not ended:
+                farther = other
+        return after, path if after else farther
 
     def value(self) -> CriticalValue:
         """Search outwards from the case's own value for a stand and a failure, then bisect."""

@@ -32,6 +32,14 @@ def lost_beyond_limit(path: FailurePath) -> str:
 
 
 def end_of_branch(path: FailurePath) -> str:
+    """What is said of a path that ends at its highest level."""
+    return (
+        "there the branch of equilibria ends: no increment of the crest, of the joints or of the "
+        "process zone, however short, leads on, and shorter ones end at the same level"
+    )
+
+
+def slips_whole(path: FailurePath) -> str:
     """What is said of a path that ends where the whole joint slips."""
     return (
         f"there the whole {path.joint or 'joint'} slips; no increment of the displacement leads "

@@ -69,17 +69,18 @@ class FailurePath(EquilibriumPath):
         interface: Interface,
         target: float | None = None,
         on_step: Callable[[float], None] = lambda level: None,
+        to_growth: bool = False,
     ) -> None:
         """target: the level [m] to reach, the highest still to come by default; on_step: called
-        with the level of each equilibrium.
+        with the level of each equilibrium; to_growth: whether it is followed, with a law that
+        softens, to the first unstable crack growth only.
         """
         self.case, self.interface, self.on_step = case, interface, on_step
-        #: whether it is followed to the first unstable crack growth only
-        self.to_growth = False
         self.points: list[Point] = []
         stepper = LoadStepper(case, interface, lambda _: self.add(point_of(stepper)))
         #: whether the loads of a time are those of the last one, but for the level
         self.stepper, self.same_loads = stepper, dict[float, bool]()
+        self.to_growth = to_growth and stepper.model.equilibrium.laws.softens
         # after a step of the weight alone steps can be halved; else the first includes the weight
         if not (case["weight_first"] and stepper.weigh()):
             stepper.advance_to(case.times[0])
@@ -125,7 +126,8 @@ class FailurePath(EquilibriumPath):
             middle = reach(point, begin + length / 2)
             if whole and middle:
                 end = reach(middle, begin + length)
-                if end and not whole.differs(end, point):
+                leaps = end and self.to_growth and (middle.leaps(point) or end.leaps(middle))
+                if end and not (leaps or whole.differs(end, point)):
                     return [middle, end]
             whole, length = middle, length / 2
         return []
