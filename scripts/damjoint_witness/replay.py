@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from copy import copy
 from math import hypot
 
 import numpy as np
@@ -47,7 +48,10 @@ def law_of_joint(rows: Table, values: Values, prefix: str) -> Iterator[str]:
             *row, damage, slip = history[n]
             jump = (row[0], row[1], row[2])
             point.step(jump, begin, end, frozen)
-            exact = point.traction(jump)
+            after = copy(point)
+            if frozen:  # with the damage that the step has done the point may slip further
+                after.step(jump, end, end, False)
+            exact = after.traction(jump)
             size = point.K_N * abs(jump[0]) + point.K_T * hypot(jump[1], jump[2])
             room = TOLERANCE * point.strength(exact[0]) + ROUNDING * (size + abs(row[3])) + NOTHING
             errors = {
