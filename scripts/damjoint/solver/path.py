@@ -313,6 +313,8 @@ class EquilibriumPath:
     #: whether it is followed to the first unstable crack growth only, and increments are short
     #: enough to find it
     to_growth = False
+    #: whether its increments are halved until their halves lead to the same state
+    verified = True
 
     def __init__(self, points: list[Point], time: float, tick: float = 0.0) -> None:
         """points: the first ones, the last of them to continue from; time: whose loads act, but for
@@ -568,7 +570,7 @@ class EquilibriumPath:
             if whole is None:
                 by *= SHRINKING
                 continue
-            if not point.model.equilibrium.path_dependent:
+            if not (self.verified and point.model.equilibrium.path_dependent):
                 return [whole]
             middle = self.step(point, point.further(control, by / 2), by / 2, kind)
             end = middle and self.step(middle, ahead, by / 2, kind)

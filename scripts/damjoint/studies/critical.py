@@ -289,6 +289,7 @@ class Search:
                 continue
             other = path.copied()
             other.relaxes, other.to_growth, other.ended = relaxes, False, False
+            other.verified = False
             if relaxes:
                 del other.points[path.top + 1 :]
                 other.pass_over(other.points[-1])
