@@ -221,6 +221,17 @@ def test_the_first_unstable_crack_growth_is_the_critical_level(brittle):
     assert line in "\n".join(printed_lines(answer, search))
 
 
+@pytest.mark.heavy
+def test_a_strength_beyond_unstable_crack_growth_says_so():
+    """The level is reached, but by equilibria beyond the branch that filling follows."""
+    settings = {"law": "bond", "mu": 5.0, "dam_base": 30.0, "sigma_max": 2e6, "G_f": 100.0}
+    settings |= {"adhesion": 5e6, "G_t": 1e5, "n_joint": 30.0}
+    search, answer = search_result("dam", "strength", settings, levels="40,51")
+    assert answer.value < 1 and 48 < answer.growth < 51
+    line = f"first unstable crack growth: {answer.growth:.6g} m"
+    assert line in "\n".join(printed_lines(answer, search))
+
+
 def test_only_hardening_set_by_the_user_counts_as_strength():
     """It carries the dam beyond T = mu N + c L; the default one is left out."""
     _, hard = search_result("c")
@@ -263,7 +274,7 @@ def test_bounds_of_statics(name, settings, limit, mode):
 def test_statics_confirms_a_level_near_its_bound(monkeypatch):
     """Only where the search does not progress; the value is that of an equilibrium."""
     monkeypatch.setattr(FailurePath, "advance", lambda self: vars(self).update(ended=True))
-    monkeypatch.setattr(FailurePath, "certain", lambda self: True)
+    monkeypatch.setattr(FailurePath, "repeated", lambda self: None)
     monkeypatch.setattr(failure_path, "SOFTENED", np.inf)
     settings = {"uplift": "imposed", "sigma_max": 0.0, "crest_water": 0.0, "n_joint": 20.0}
     _, answer = search_result("i", settings=settings, levels="9.95,10.1")
@@ -487,9 +498,9 @@ def test_the_critical_level_does_not_depend_on_the_increments(settings, level, m
 def test_a_highest_level_that_depends_on_the_increments_is_not_confirmed(monkeypatch):
     def differs(self):
         self.interval = 48.0, 49.0
-        return False
+        return self
 
-    monkeypatch.setattr(FailurePath, "certain", differs)
+    monkeypatch.setattr(FailurePath, "repeated", differs)
     search, answer = search_result("dam", settings=SNAP_BACKS[0][0])
     assert not answer.confirmed
     lines = "\n".join(printed_lines(answer, search))

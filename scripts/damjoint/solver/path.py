@@ -337,7 +337,7 @@ class EquilibriumPath:
         self.rise = RISE
         #: the next increment, over what the joints moved in the last one
         self.growth = 1.0
-        #: the last two estimates of the highest level [m], where they differ, see `certain`
+        #: the last two estimates of the highest level [m], where they differ, see `repeated`
         self.interval = np.nan, np.nan
         #: the longest increment [m]
         self.longest = np.inf
@@ -632,13 +632,13 @@ class EquilibriumPath:
         other.closed = list(self.closed)
         return other
 
-    def certain(self) -> bool:
-        """Whether shorter increments from before the highest level lead to the same one, to the
-        precision; else the path ends by them, and is to be continued.
+    def repeated(self: P) -> P | None:
+        """The path by shorter increments from before its highest level, to be continued; None if
+        they lead to the same level, to the precision.
         """
         top = self.points[self.top] if self.points else None
         if top is None or top.slides:
-            return True
+            return None
         again = self.copied()
         before = self.levels[: self.top] < (1 - REPEATED) * self.highest
         begin = max([0, *np.flatnonzero(before), *(n for n in self.starts if n <= self.top)])
@@ -657,16 +657,10 @@ class EquilibriumPath:
         again.refine()
         ends = sorted((float(again.highest), float(self.highest)))
         if ends[1] - ends[0] <= PRECISION / 2 * ends[1]:
-            return True
+            return None
         again.longest = np.inf
         again.interval = ends[0], ends[1]
-        vars(self).update(vars(again))
-        return False
-
-    @property
-    def first_growth(self) -> float | None:
-        """The level [m] of the first unstable crack growth on the way to the highest level."""
-        return self.growth_until(self.top + 1)
+        return again
 
     def growth_until(self, number: int) -> float | None:
         """The level [m] of the first limit point among so many points, after which the level falls

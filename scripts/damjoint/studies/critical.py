@@ -239,7 +239,8 @@ class Search:
             if grows and path.starts:
                 path = path.first_branch()
             path.refine()
-            certain = path.reached or self.certain(path)
+            other = None if path.reached else self.repeated(path)
+            certain, path = other is None, other or path
             if certain:
                 break
         if path.reached:
@@ -266,18 +267,22 @@ class Search:
             result = replace(result, why=end_of_branch(path), doubt="")
         return result if certain else replace(result, why="", doubt=by_increments(path))
 
-    def certain(self, path: FailurePath) -> bool:
-        """Whether shorter increments lead to the same highest level of a path: from before it, if
-        its branch has led there; else, from the beginning on. If not, the path is replaced.
+    def repeated(self, path: FailurePath) -> FailurePath | None:
+        """A path by shorter increments: from before its highest level, if its branch has led there;
+        else, from the beginning on. None if they lead to the same highest level.
         """
         if not path.starts or path.top < path.starts[0]:
-            return path.certain()
+            other = path.repeated()
+            if other:
+                self.trials[-1] = replace(self.trials[-1], path=other)
+            return other
         other = FailurePath(path.case, path.interface, path.target, to_growth=path.to_growth)
         other.rise = SHORTER_RISE * path.rise
         other.follow(SURE)
         other.refine()
-        path.interval = tuple(sorted((float(path.highest), float(other.highest))))
-        return bool(path.interval[1] - path.interval[0] <= PRECISION * path.interval[1])
+        low, high = sorted((float(path.highest), float(other.highest)))
+        other.interval = low, high
+        return None if high - low <= PRECISION * high else other
 
     def after_growth(self, path: FailurePath) -> tuple[dict[str, float], FailurePath]:
         """The highest levels [m] that are reached after the unstable crack growth that ends a path,
@@ -318,7 +323,9 @@ class Search:
             fails.path.follow(SURE)
             fails.path.refine()
             if not fails.stands:
-                return self.result(stands.value, fails.path, point_at_target(stands))
+                point, path = point_at_target(stands), stands.path
+                growth = path.growth_until(path.arrival + 1)  # on the way to the target
+                return replace(self.result(stands.value, fails.path, point), growth=growth)
             self.factor = SURE  # the first estimate is wrong for this dam
             ends = self.beyond(fails, fails.value - stands.value)
             if ends is None:
