@@ -194,8 +194,7 @@ class Search:
     ) -> FailurePath:
         """The equilibrium path of a case, followed to a first estimate; adds a trial.
 
-        to_growth: with a law that softens, only to the first unstable
-        crack growth.
+        to_growth: see `FailurePath`.
         """
         report = lambda level: self.on_progress(
             f"{self.of} {value:.6g}{self.unit}: level {level:.6g} m"

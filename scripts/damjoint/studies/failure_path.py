@@ -73,14 +73,16 @@ class FailurePath(EquilibriumPath):
     ) -> None:
         """target: the level [m] to reach, the highest still to come by default; on_step: called
         with the level of each equilibrium; to_growth: whether it is followed, with a law that
-        softens, to the first unstable crack growth only.
+        softens in tension or releases its shear, to the first unstable crack growth only.
         """
         self.case, self.interface, self.on_step = case, interface, on_step
         self.points: list[Point] = []
         stepper = LoadStepper(case, interface, lambda _: self.add(point_of(stepper)))
         #: whether the loads of a time are those of the last one, but for the level
         self.stepper, self.same_loads = stepper, dict[float, bool]()
-        self.to_growth = to_growth and stepper.model.equilibrium.laws.softens
+        laws = stepper.model.equilibrium.laws
+        brittle = any(law.softens and law.tensile_strength > 0 for law in laws.laws)
+        self.to_growth = to_growth and (brittle or laws.releases_shear)
         # after a step of the weight alone steps can be halved; else the first includes the weight
         if not (case["weight_first"] and stepper.weigh()):
             stepper.advance_to(case.times[0])
