@@ -49,12 +49,14 @@ def follows_history(asked: Asked) -> bool:
 
 def follows_steps(asked: Asked, *records: dict[str, Any]) -> bool:
     """Return whether a state may depend on the load steps: on the history; after levels that fall;
-    of water that enters a crack after the step that has opened it; after unstable crack growth.
+    of water that enters a crack after the step that has opened it; after unstable crack growth; of
+    slip whose direction in a 3D joint turns, which a step takes as constant.
     """
     falls = any(list(levels) != sorted(levels) for levels in (asked.levels, asked.tail_levels))
     unstable = any(record.get(n) for record in records for n in ("unstable_growth", "limit_points"))
     entering = any(v["uplift"] == "cracked" for v in asked.joints)
-    return follows_history(asked) or falls or unstable or entering
+    turns = asked.joints[0]["dim"] == 3 and any(v["law"] != "rupture" for v in asked.joints)
+    return follows_history(asked) or falls or unstable or entering or turns
 
 
 def difference(one: Files, other: Files) -> float:
