@@ -58,7 +58,8 @@ add_module_names = False
 #: list is a statement of Sphinx.
 CONTENTS = {
     "Use": (
-        *("reference/usage", "reference/choosing", "reference/tour", "reference/window"),
+        *("reference/usage", "reference/studies", "reference/cluster", "reference/choosing"),
+        *("reference/tour", "reference/window"),
         *("reference/python", "reference/notebooks/tour", "reference/notebooks/law"),
     ),
     "Reference": (
