@@ -71,7 +71,7 @@ FALL = 1e-3
 #: It is halved, too, as long as points whose damage grows by more than this in a half lose tensile
 #: strength of more than the part FALL of the water's thrust: where they soften in a single
 #: increment the level may fall within it.
-LARGEST_GROWTH = 0.5
+LARGEST_GROWTH = 0.35
 
 #: A fall of the level over which damage and slip grow by less than this part of what they did
 #: before, over the movement, is unloading.

@@ -81,8 +81,10 @@ class FailurePath(EquilibriumPath):
         #: whether the loads of a time are those of the last one, but for the level
         self.stepper, self.same_loads = stepper, dict[float, bool]()
         laws = stepper.model.equilibrium.laws
+        #: whether water enters the crack element by element, at each of which the level falls
+        self.entering = any(joint["uplift"] == "cracked" for joint in case.joints)
         brittle = any(law.softens and law.tensile_strength > 0 for law in laws.laws)
-        self.to_growth = to_growth and (brittle or laws.releases_shear)
+        self.to_growth = to_growth and (laws.releases_shear or (brittle and not self.entering))
         # after a step of the weight alone steps can be halved; else the first includes the weight
         if not (case["weight_first"] and stepper.weigh()):
             stepper.advance_to(case.times[0])
@@ -142,6 +144,11 @@ class FailurePath(EquilibriumPath):
 
     # -- its shape
     # ----------------------------------------------------------------------------------------------
+
+    @property
+    def ends(self) -> bool:
+        """See `EquilibriumPath.ends`; where water enters the crack another element may follow."""
+        return super().ends and not self.entering
 
     @property
     def crushed(self) -> bool:
