@@ -29,7 +29,14 @@ from .input.resolve import load, varied
 from .laws import LAWS, Law
 from .model.fields import Solution
 from .model.notes import notes
-from .model.results import HISTORY, Results, joint_columns, quake_columns
+from .model.results import (
+    HISTORY,
+    LATERAL,
+    Results,
+    history_columns,
+    joint_columns,
+    quake_columns,
+)
 from .progress import track
 from .solver.load_stepper import LoadStepper
 from .solver.state import State
@@ -254,7 +261,8 @@ class Run:
         """
         data_set, columns = optional("xarray").Dataset, self.table(table)
         if table == "history":
-            return data_set({n: ("time", v, attributes(HISTORY[n])) for n, v in columns.items()})
+            units = history_columns(self.case)
+            return data_set({n: ("time", v, attributes(units[n])) for n, v in columns.items()})
         times = len(np.unique(columns["time"]))
         blocks = {name: column.reshape(times, -1) for name, column in columns.items()}
         placed: dict[str, Any] = {name: (("time", "node"), b) for name, b in blocks.items()}
@@ -680,7 +688,7 @@ class Sweep:
 
 def column_array(name: str, values: list[Value]) -> np.ndarray:
     """A column of a sweep; an empty cell of a result that is a number becomes nan."""
-    numeric = name in HISTORY or name.startswith("critical_")
+    numeric = name in HISTORY | LATERAL or name.startswith("critical_")
     return np.array([np.nan if numeric and value == "" else value for value in values])
 
 

@@ -18,7 +18,7 @@ from pathlib import Path
 from damjoint.dynamics.frames import MOST_FRAMES
 from damjoint.input.parameters import declared
 from damjoint.laws import COLUMNS
-from damjoint.model.results import FLUX, HISTORY, JOINT, QUAKE, STEPS, THICKNESS
+from damjoint.model.results import FLUX, HISTORY, JOINT, LATERAL, QUAKE, STEPS, THICKNESS
 from damjoint.post.validation import Comparison
 from damjoint.statics.gravity import LOADS
 from damjoint.studies.check import CHECK
@@ -80,7 +80,7 @@ def results_page() -> str:
         markdown([(f"`{n}`", u, m) for n, (u, m) in columns.items()], ("column", "unit", "meaning"))
         for columns in (
             JOINT | COLUMNS | FLUX | THICKNESS,
-            HISTORY,
+            HISTORY | LATERAL,
             STEPS,
             CHECK,
             LOADS,
@@ -157,9 +157,13 @@ def results_page() -> str:
         "- `.png`: a chart of one or two varied parameters, or of the sample.",
         "## fields/",
         "`bulk.msh` and `joint.msh` for Gmsh (a view per field with all levels as its steps); "
-        "`fields.pvd` with `bulk_t*.vtu` and `joint_t*.vtu` for ParaView. Bulk: `displacement` "
-        "[m], `stress` [Pa] (xx, yy, zz, xy, yz, xz), `body` (1 dam, 2 foundation). Joint: `jump` "
-        "[m] and `traction` [Pa] along x, y, z, and the columns of joint.csv.",
+        "`fields.pvd` for ParaView, with the blocks bodies (`bulk_t*.vtu`) and joints "
+        "(`joint_t*.vtu`). Arrays have their unit in their name; `level [m]` is a value of each "
+        "file. Bodies: `displacement [m]`, `stress [Pa]` (xx, yy, zz, xy, yz, xz), `largest "
+        "principal stress [Pa]`, `smallest principal stress [Pa]` (tension > 0), `body` (1 dam, 2 "
+        "foundation, 1001 dam 2, ...). Joints: `displacement [m]` of the body below, so that Warp "
+        "By Vector moves both blocks; `opening [m]`, never negative; `jump [m]` and `traction "
+        "[Pa]` along x, y, z, the columns of joint.csv, and `joint`, its number.",
     ]
     return "\n\n".join(parts) + "\n"
 

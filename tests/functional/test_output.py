@@ -137,18 +137,53 @@ def test_fields_for_paraview(folder):
     joint, history = read(folder / "joint.csv"), read(folder / "history.csv")
     for time in (1, 2):
         bulk, lips = (meshio.read(fields / f"{name}_t{time}.vtu") for name in ("bulk", "joint"))
-        moved, bottom = bulk.point_data["displacement"], np.isclose(bulk.points[:, 1], -5)
+        moved, bottom = bulk.point_data["displacement [m]"], np.isclose(bulk.points[:, 1], -5)
         crest = np.all(np.isclose(bulk.points, (0, 10, 0)), axis=1)
         assert_allclose(moved[crest, 0], history["crest_ux"][history["time"] == time], rtol=1e-6)
         assert_allclose(moved[bottom], 0, atol=1e-15)
         assert_allclose(
-            np.sort(lips.point_data["jump"][:, 1]),
+            np.sort(lips.point_data["jump [m]"][:, 1]),
             np.sort(joint["delta_n"][joint["time"] == time]),
             rtol=1e-6,
         )
-        assert bulk.cell_data["stress"][0].shape == (918, 6)
+        assert bulk.cell_data["stress [Pa]"][0].shape == (918, 6)
+        top = joint["level"][joint["time"] == time][0]
+        for block in ("bodies", "joints"):
+            assert f'timestep="{time}.0" name="{block}"' in (fields / "fields.pvd").read_text()
+        assert bulk.field_data["level [m]"] == lips.field_data["level [m]"] == top
+        largest, smallest = (
+            bulk.cell_data[f"{which} principal stress [Pa]"][0] for which in ("largest", "smallest")
+        )
+        xx, yy, zz, xy, _, _ = bulk.cell_data["stress [Pa]"][0].T
+        middle, radius = (xx + yy) / 2, np.hypot((xx - yy) / 2, xy)
+        assert_allclose(largest, np.maximum(middle + radius, zz), atol=1e-6 * np.abs(yy).max())
+        assert_allclose(smallest, np.minimum(middle - radius, zz), atol=1e-6 * np.abs(yy).max())
+        jump = lips.point_data["jump [m]"][:, 1]
+        assert_allclose(lips.point_data["opening [m]"], np.maximum(jump, 0))
         right = bulk.points[bulk.cells[0].data].mean(axis=1)[:, 1] > 0
         assert np.array_equal(bulk.cell_data["body"][0] == 1, right)  # 1 dam, 2 foundation
+
+
+@pytest.mark.parametrize("engine", ["condensed", "getdp"])
+def test_the_points_of_each_joint_move_with_the_body_below_it(command, tmp_path, engine):
+    """Above it the displacement is larger by the jump: x, y of a horizontal joint."""
+    settings = "--set", "n_joint=10", "--set", "h_dam=30", "--set", "h_found=30"
+    lifts = "--set", "lift_heights=10,20", "--levels", "25", "--no-picture", "--engine", engine
+    # else displacements count from the state under the weight, jumps from none
+    assert command("run", "dam", *settings, *lifts, "--set", "weight_first=0")[0] == 0
+    fields = tmp_path / "out" / "dam" / "fields"
+    bulk, lips = (meshio.read(fields / f"{name}_t1.vtu") for name in ("bulk", "joint"))
+    (table,), (regions,) = (block.data for block in bulk.cells), bulk.cell_data["body"]
+    names = "displacement [m]", "jump [m]"
+    moved, (at_joint, jump) = bulk.point_data[names[0]], (lips.point_data[n] for n in names)
+    for joint, lower, upper in ((1, 2, 1), (2, 1, 1001), (3, 1001, 2001)):
+        on = lips.point_data["joint"] == joint
+        for body, expected in ((lower, at_joint[on]), (upper, at_joint[on] + jump[on])):
+            nodes = np.unique(table[regions == body])
+            away = np.abs(bulk.points[nodes][:, None] - lips.points[on]).max(axis=2)
+            assert away.min(axis=0).max() == 0
+            assert_allclose(moved[nodes[away.argmin(axis=0)]], expected, atol=1e-9)
+        assert np.abs(at_joint[on]).max() > 1e-4
 
 
 def test_fields_of_any_cells_are_read_as_they_were_written(tmp_path):
@@ -157,10 +192,13 @@ def test_fields_of_any_cells_are_read_as_they_were_written(tmp_path):
     shapes = {"triangle": 3, "quad": 4, "tetra": 4, "wedge": 6, "hexahedron": 8, "line": 2}
     cells = [(n, np.arange(2 * k).reshape(2, k) % 9) for n, k in shapes.items()]
     on_points = {"u": points / 7, "number": np.arange(9)}
+    of_all = {"level [m]": np.array([7.5])}
     in_cells = {"stress": np.arange(72.0).reshape(12, 6), "body": np.repeat([1, 2], 6)}
-    write_vtu(tmp_path / "some.vtu", points, cells, on_points, in_cells)
+    write_vtu(tmp_path / "some.vtu", points, cells, on_points, in_cells, of_all)
     mesh = meshio.read(tmp_path / "some.vtu")
     assert np.array_equal(mesh.points, points)
+    assert mesh.field_data == of_all
+    assert 'Name="level [m]" NumberOfTuples="1"' in (tmp_path / "some.vtu").read_text()
     assert [block.type for block in mesh.cells] == [*shapes]
     assert all(np.array_equal(b.data, t) for b, (_, t) in zip(mesh.cells, cells, strict=True))
     for name, values in on_points.items():
@@ -199,13 +237,13 @@ def test_flux_in_the_fields(command, tmp_path):
     assert command("run", "e", *small, "--levels", "6", "--no-picture")[0] == 0
     lips = meshio.read(tmp_path / "out/e/fields/joint_t1.vtu")
     joint = read(tmp_path / "out/e/joint.csv")
-    assert_allclose(lips.point_data["flux"], joint["flux"][0], rtol=1e-6)
+    assert_allclose(lips.point_data["flux [kg/(m s)]"], joint["flux"][0], rtol=1e-6)
 
 
 def test_vertical_stress_in_the_dam_balances_its_weight(folder):
     """At 6 m, over the elements that a horizontal section cuts near the crest: the weight above."""
     bulk = meshio.read(folder / "none" / "fields" / "bulk_t1.vtu")
-    cells, stress = bulk.cells[0].data, bulk.cell_data["stress"][0]
+    cells, stress = bulk.cells[0].data, bulk.cell_data["stress [Pa]"][0]
     middle = bulk.points[cells].mean(axis=1)
     high = np.abs(middle[:, 1] - 8) < 1
     above = (

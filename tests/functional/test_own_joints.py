@@ -148,6 +148,23 @@ def test_monoliths_are_in_equilibrium(dim):
         assert bases[1].last["T"] == pytest.approx(contraction.last["N"], rel=1e-6)
 
 
+def test_lateral_forces_of_each_monolith_balance():
+    """Without a load along z: what its base carries is what its contraction joint presses."""
+    case = load("monoliths", {"dim": 3.0, "n_joint": 10.0, "h_dam": 10.0, "h_found": 30.0}, [45.0])
+    interface = interface_of(case)
+    results = LoadStepper(case, interface).run()
+    total = dict.fromkeys(("dam", "dam 2", "foundation"), 0.0)
+    for own, joint, of_joint in zip(
+        results.joints, interface.joints, results.case.of_joints, strict=True
+    ):
+        force = own.last["T_z"] * joint.width
+        total[of_joint.upper] += force
+        total[of_joint.lower] -= force
+    contraction = results.joints[results.case.joint_names.index("contraction")].last
+    assert contraction["N"] > 1e4 and contraction["N"] == pytest.approx(abs(contraction["T_z"]))
+    assert list(total.values()) == pytest.approx([0, 0, 0], abs=1e-6 * contraction["N"])
+
+
 @pytest.mark.heavy
 def test_each_block_of_a_dam_across_a_valley_is_in_equilibrium():
     """Weight and reservoir by the mesh; base and contraction joints by contact and water. In the

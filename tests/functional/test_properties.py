@@ -178,7 +178,7 @@ def test_results_of_a_mirrored_valley(solve, own, joint):
     solid = {"dim": 3.0, "n_joint": 4.0, "mesh_pattern": "split", "thickness": 20.0}
     mesh, joint = OwnMesh.of(load("dam", SECTION | solid)), joint | {"dim": 3.0, "order": 1.0}
     one, other = (solve(own(m, joint, 44.0)) for m in (mesh, mesh.moved((0, 0, 20), "z")))
-    mirrored = {"z": lambda v: 20 - v} | dict.fromkeys(["delta_t2", "tau_2"], np.negative)
+    mirrored = {"z": lambda v: 20 - v} | dict.fromkeys(["delta_t2", "tau_2", "T_z"], np.negative)
     # rows of a level are sorted by s, then by z
     order = np.lexsort((20 - one.joint["z"].round(6), one.joint["s"].round(6), one.joint["time"]))
     one.joint = {name: column[order] for name, column in one.joint.items()}

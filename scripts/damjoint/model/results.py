@@ -82,10 +82,12 @@ HISTORY = {
     "broken_length": ("m", "length of joint that is broken: D = 1; endo: D > 0.72; friction: open"),
     "bonded_length": ("m", "length of joint, weighted with the part of the cohesion that is left"),
 }
+#: Additional column in 3D.
+LATERAL = {"T_z": ("N/m", "force on the joint along z, of the effective stress, 3D")}
 #: Those of a joint. With several joints: of the first one; of joint 2, 3, ... by `column_of`.
 HISTORY_OF_JOINTS = (
     *("crack_length", "process_zone", "slip_length", "max_opening"),
-    *("N", "T", "M", "flux", "U", "x_resultant", "M_U", "broken_length", "bonded_length"),
+    *("N", "T", "M", "flux", "U", "x_resultant", "M_U", "broken_length", "bonded_length", "T_z"),
 )
 
 
@@ -118,7 +120,7 @@ def with_all_joints(columns: Columns, case: Case) -> Columns:
 
 def history_columns(case: Case) -> Columns:
     """The columns of a case's history.csv: unit and meaning."""
-    return with_all_joints(HISTORY, case)
+    return with_all_joints(HISTORY | LATERAL if case["dim"] == 3 else HISTORY, case)
 
 
 #: Columns of quake.csv: unit and meaning. Displacements are relative to the ground.
@@ -197,13 +199,15 @@ class Results:
 
     def of_joint(self, number: int) -> Results:
         """The results of a joint, by its number from 0."""
-        history = {n: self.history[n] for n in HISTORY if n not in HISTORY_OF_JOINTS}
-        history |= {n: self.history[column_of(n, number)] for n in HISTORY_OF_JOINTS}
         case = self.case.joints[number]
+        history = {
+            n: self.history[column_of(n, number) if n in HISTORY_OF_JOINTS else n]
+            for n in history_columns(case)
+        }
         return replace(
             self,
             case=case,
-            history={name: history[name] for name in HISTORY},
+            history=history,
             joint=rows_of(self.joint, number, joint_columns(case)),
             extrapolated=rows_of(self.extrapolated, number, joint_columns(case)),
             heel=self.heel if number == 0 else np.zeros(0),

@@ -31,6 +31,11 @@ VTK_WEDGE = [0, 2, 1, 3, 5, 4]
 #: Components xx, xy, xz, yx, ... of a Gmsh tensor among those of `Field.stress`.
 TENSOR = [0, 3, 5, 3, 1, 4, 5, 4, 2]
 
+#: Names of the blocks in ParaView, by those of the files.
+BLOCKS = {"bulk": "bodies", "joint": "joints"}
+#: Names of fields with their units; the level is a value of the whole file.
+DISPLACEMENT, STRESS, LEVEL = "displacement [m]", "stress [Pa]", "level [m]"
+
 Cells = list[tuple[str, np.ndarray]]
 #: A field on a mesh: name, kind (NodeData or ElementData), values by time.
 View = tuple[str, str, dict[float, np.ndarray]]
@@ -41,7 +46,8 @@ def write_fields(solution: Solution, folder: Path) -> None:
     with fields.pvd (ParaView); bulk.msh and joint.msh with a view per field, all times in each
     (Gmsh).
 
-    Dam and foundation have their own points on the joint, so that the opening is visible.
+    Dam and foundation have their own points on the joint, so that the opening is visible; the
+    points of a joint move with the body below it.
     """
     folder.mkdir(exist_ok=True)
     fields, joint = solution.fields, all_joints(solution)
@@ -52,19 +58,32 @@ def write_fields(solution: Solution, folder: Path) -> None:
     stress = {t: np.vstack([f.stress[n] for n in bodies]) for t, f in fields.items()}
     on_joint = {time: joints_data(solution, time) for time in fields}
 
-    for time in fields:
-        at_nodes = {"displacement": displacement[time]}
-        in_elements = {"stress": stress[time], "body": regions}
-        write_vtu(folder / f"bulk_t{time:g}.vtu", points, cells, at_nodes, in_elements)
-        write_vtu(folder / f"joint_t{time:g}.vtu", joint.points, joint.cells, on_joint[time], {})
+    for time, field in fields.items():
+        whole = {LEVEL: solution.result.at(time)["level"][:1]}
+        smallest, _, largest = principal(stress[time]).T
+        in_elements = {
+            STRESS: stress[time],
+            "largest principal stress [Pa]": largest,
+            "smallest principal stress [Pa]": smallest,
+            "body": regions,
+        }
+        at_nodes = {DISPLACEMENT: displacement[time]}
+        write_vtu(folder / f"bulk_t{time:g}.vtu", points, cells, at_nodes, in_elements, whole)
+        on_faces = {
+            DISPLACEMENT: displacement_of_joints(solution, field),
+            "opening [m]": np.maximum(on_joint[time]["jump"][:, 1], 0),
+            **{with_unit(name): values for name, values in on_joint[time].items()},
+        }
+        path = folder / f"joint_t{time:g}.vtu"
+        write_vtu(path, joint.points, joint.cells, on_faces, {}, whole)
     write_collection(folder, fields)
     bulk_views: list[View] = [
-        ("displacement [m]", "NodeData", displacement),
-        ("stress [Pa]", "ElementData", {t: s[:, TENSOR] for t, s in stress.items()}),
+        (DISPLACEMENT, "NodeData", displacement),
+        (STRESS, "ElementData", {t: s[:, TENSOR] for t, s in stress.items()}),
     ]
     joint_views: list[View] = [
-        (f"{name} [{unit}]", "NodeData", {t: d[name] for t, d in on_joint.items()})
-        for name, (unit, _) in OF_JOINT.items()
+        (with_unit(name), "NodeData", {t: d[name] for t, d in on_joint.items()})
+        for name in OF_JOINT
         if name in next(iter(on_joint.values()))
     ]
     with atomic_write(folder / "bulk.msh") as path:
@@ -106,6 +125,27 @@ def joints_data(solution: Solution, time: float) -> Table:
     }
 
 
+def with_unit(name: str) -> str:
+    """The name of an array of a joint with its unit: jump [m]; joint, a number, has none."""
+    return f"{name} [{OF_JOINT[name][0]}]" if name in OF_JOINT else name
+
+
+def displacement_of_joints(solution: Solution, field: Field) -> np.ndarray:
+    """Displacement (n, 3) [m] of the bodies below the joints, at the points of all joints."""
+    parts = []
+    lower_bodies = [joint.lower for joint in solution.result.case.of_joints] or ["foundation"]
+    for k, lower in enumerate(lower_bodies):
+        tags, wanted = solution.bodies[lower].node_tags, joint_body(solution.bodies, k).node_tags
+        order = np.argsort(tags)
+        parts.append(field.displacement[lower][order[np.searchsorted(tags, wanted, sorter=order)]])
+    return np.concatenate(parts)
+
+
+def principal(stress: np.ndarray) -> np.ndarray:
+    """Principal stresses (n, 3), ascending, of stresses (n, 6): xx, yy, zz, xy, yz, xz."""
+    return np.linalg.eigvalsh(stress[:, TENSOR].reshape(-1, 3, 3))
+
+
 def bulk_cells(bodies: dict[str, Body]) -> tuple[Cells, np.ndarray]:
     """Collect the cells of bodies with common point numbers, and the region number of each cell
     (n,).
@@ -132,11 +172,13 @@ def write_vtu(
     cells: Cells,
     point_data: Mapping[str, np.ndarray],
     cell_data: Mapping[str, np.ndarray],
+    field_data: Mapping[str, np.ndarray],
 ) -> None:
     """Write a mesh with its data for ParaView, in VTK's XML format: arrays in base64, each after
     the number of its bytes.
 
-    points: (n, 3); point_data, cell_data: arrays (n,) or (n, components) by name.
+    points: (n, 3); point_data, cell_data: arrays (n,) or (n, components) by name; field_data:
+    arrays (1,) of the whole file.
     """
     counts = [len(table) for _, table in cells]
     corners = np.repeat([table.shape[1] for _, table in cells], counts)
@@ -153,14 +195,11 @@ def write_vtu(
         "PointData": point_data,
         "CellData": cell_data,
     }
-    content = "".join(
-        f"<{tag}>\n{''.join(data_array(*item) for item in arrays.items())}</{tag}>\n"
-        for tag, arrays in parts.items()
-    )
+    content = "".join(data_arrays(tag, arrays) for tag, arrays in parts.items())
     order = f'byte_order="{sys.byteorder.title()}Endian" header_type="UInt64"'
     lines = [
         f'<VTKFile type="UnstructuredGrid" version="1.0" {order}>',
-        "<UnstructuredGrid>",
+        f"<UnstructuredGrid>\n{data_arrays('FieldData', field_data)}"
         f'<Piece NumberOfPoints="{len(points)}" NumberOfCells="{sum(counts)}">',
         f"{content}</Piece>",
         "</UnstructuredGrid>",
@@ -170,22 +209,29 @@ def write_vtu(
         part.write_text("\n".join(lines) + "\n")
 
 
+def data_arrays(tag: str, arrays: Mapping[str, np.ndarray]) -> str:
+    """XML element of arrays by name."""
+    return f"<{tag}>\n{''.join(data_array(*item) for item in arrays.items())}</{tag}>\n"
+
+
 def data_array(name: str, values: np.ndarray) -> str:
-    """XML element of an array of floats or integers (n,) or (n, components)."""
+    """XML element of an array of floats or integers (n,) or (n, components), with its length, which
+    VTK reads in FieldData.
+    """
     kind = {"f": "Float", "i": "Int"}[values.dtype.kind] + str(8 * values.itemsize)
-    components = f' NumberOfComponents="{values.shape[1]}"' if values.ndim > 1 else ""
+    size = f'NumberOfTuples="{len(values)}"'
+    if values.ndim > 1:
+        size += f' NumberOfComponents="{values.shape[1]}"'
     text = base64.b64encode(np.uint64(values.nbytes).tobytes() + values.tobytes()).decode()
-    return (
-        f'<DataArray type="{kind}" Name="{name}"{components} format="binary">{text}</DataArray>\n'
-    )
+    return f'<DataArray type="{kind}" Name="{name}" {size} format="binary">{text}</DataArray>\n'
 
 
 def write_collection(folder: Path, fields: dict[float, Field]) -> None:
     """Write fields.pvd, which lists the .vtu files of all times."""
     entries = [
-        f'<DataSet timestep="{time!r}" part="{part}" file="{name}_t{time:g}.vtu"/>\n'
+        f'<DataSet timestep="{time!r}" name="{block}" part="{part}" file="{name}_t{time:g}.vtu"/>\n'
         for time in fields
-        for part, name in enumerate(("bulk", "joint"))
+        for part, (name, block) in enumerate(BLOCKS.items())
     ]
     collection = f"<Collection>\n{''.join(entries)}</Collection>"
     with atomic_write(folder / "fields.pvd") as path:

@@ -20,7 +20,8 @@ from ..input.parameters import INCLUDE, assignments, constants, declared, listin
 from ..input.scene import numbered
 from ..mesh.body import Body
 from ..model.fields import Field, Solution
-from ..model.results import HISTORY, Results
+from ..model.results import Results, history_columns
+from .field_files import DISPLACEMENT, STRESS
 from .folder import read_info, scene_folders
 
 #: Errors that reading damaged files can raise; SyntaxError: by XML.
@@ -65,11 +66,12 @@ def read_results(info: dict[str, Any], folder: Path) -> Results:
     """
     history = read_csv(folder / "history.csv")
     joint = read_csv(folder / "joint.csv")
-    for name, table, columns in (("history", history, HISTORY), ("joint", joint, ("joint",))):
+    case = case_of(info)
+    required = ("history", history, history_columns(case)), ("joint", joint, ("joint",))
+    for name, table, columns in required:
         if missing := [column for column in columns if column not in table]:
             version, lacks = info["versions"]["damjoint"], ", ".join(missing)
             raise InputError(f"{name}.csv of damjoint {version} lacks {lacks}: run the case again")
-    case = case_of(info)
     heel = np.zeros(0)
     if case["drive"] != "level":
         heel = read_csv(folder / "curve.csv")["heel_opening"]
@@ -178,7 +180,7 @@ def read_fields(folder: Path, times: np.ndarray) -> tuple[dict[str, Body], dict[
             parts = {name: extract_body(bulk, regions) for name, regions in parts_of(bulk).items()}
             bodies = {name: body for name, (body, _, _) in parts.items()}
             bodies |= extract_joints(joint)
-            displacement = bulk.point_data["displacement"]
+            displacement = bulk.point_data[DISPLACEMENT]
             fields[time] = Field(
                 {name: displacement[points] for name, (_, points, _) in parts.items()},
                 {name: stress for name, (_, _, stress) in parts.items()},
@@ -220,7 +222,7 @@ def extract_body(bulk: meshio.Mesh, numbers: dict[int, str]) -> tuple[Body, np.n
     blocks = [
         (numbers[number], block.type, block.data[region == number], stress[region == number])
         for block, region, stress in zip(
-            bulk.cells, bulk.cell_data["body"], bulk.cell_data["stress"], strict=True
+            bulk.cells, bulk.cell_data["body"], bulk.cell_data[STRESS], strict=True
         )
         for number in numbers
         if (region == number).any()

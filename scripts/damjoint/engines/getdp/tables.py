@@ -28,7 +28,7 @@ from .process import numbers
 PRINTED = ["time", "level", "iterations", "cuts", "residual", "crest_ux", "heel"]
 PRINTED_OF_JOINTS = [
     *("crack_length", "process_zone", "slip_length", "max_opening"),
-    *("N", "T", "M", "flux", "U", "M_U", "broken_length", "bonded_length"),
+    *("N", "T", "M", "flux", "U", "M_U", "broken_length", "bonded_length", "T_z"),
 ]
 
 
