@@ -291,7 +291,7 @@ def test_invalid_output_of_getdp_is_reported(command, tmp_path, fake_getdp, prin
         ("echo 0 > status.txt; head -c 900 /dev/urandom > history.txt", "tables can not be read"),
         (
             "echo 1 > status.txt; echo step 1 3 1 1 1 1 1 > history.txt; "
-            "echo joint 1 1 1 1 1 1 1 1 1 1 1 1 > joints.txt",
+            "echo joint 1 1 1 1 1 1 1 1 1 1 1 1 1 > joints.txt",
             "jump_0_1",
         ),
         ("head -c 3000000 /dev/zero", "ended without writing status.txt"),

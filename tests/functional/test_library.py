@@ -106,6 +106,13 @@ def test_tables_for_pandas_and_xarray(run):
         run.to_pandas("curve")
 
 
+def test_history_of_several_joints_for_xarray():
+    size = {"n_joint": 10, "h_dam": 17, "h_found": 60}
+    lifts = dj.run(dj.case("dam", levels=[30.0], lift_heights=[15.0], **size))
+    units = {name: column.attrs["units"] for name, column in lifts.to_xarray("history").items()}
+    assert units["N"] == units["N_2"] == "N/m" and units["x_resultant_2"] == "m"
+
+
 @pytest.mark.parametrize("package", ["pandas", "xarray"])
 def test_a_package_that_is_not_installed(run, monkeypatch, package):
     monkeypatch.setitem(sys.modules, package, None)
