@@ -562,6 +562,18 @@ def test_several_records_in_several_processes(command, case_file, tmp_path, reco
     assert quakes(tmp_path / "one") == quakes(tmp_path / "two")
 
 
+def test_the_table_of_several_records_fits_the_terminal():
+    """Of long names and verdicts; what has no room is named."""
+    numbers = dict.fromkeys(quake_study.QUAKE_COLUMNS, -0.0012345)
+    row = {"folder": "irpinia_1980_sturno_090", "verdict": "sliding on lift 12.5 m"} | numbers
+    results = [SimpleNamespace(row=row)] * 2
+    widest = quake_study.records_table(results).split("\n")
+    assert "block [m]" in widest[1] and max(map(len, widest)) > 80
+    lines = quake_study.records_table(results, 80).split("\n")
+    assert max(map(len, lines)) <= 80 and lines[-1].endswith("rigid_block_slip)")
+    assert row["folder"] in lines[-2] and row["verdict"] in lines[-2]
+
+
 def test_earthquakes_that_are_finished_are_not_computed_again(
     command, case_file, tmp_path, records, monkeypatch
 ):

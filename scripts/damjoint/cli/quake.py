@@ -81,5 +81,5 @@ def call(arguments: argparse.Namespace) -> int:
         tables = text(result.case, result.summary, table_width(arguments))
         print(tables, end="\n\n" if len(results) > 1 else "\n")
     if len(results) > 1:
-        print(records_table(results))
+        print(records_table(results, table_width(arguments)))
     return int(not all(result.stands for result in results))

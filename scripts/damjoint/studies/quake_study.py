@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from tabulate import tabulate
 
 from .. import InputError
 from ..arrays import Value
@@ -20,6 +19,7 @@ from ..model.fields import Solution
 from ..post import folder as folders
 from ..post import tables
 from ..post.field_files import write_fields
+from ..post.summary import aligned, fitted
 from ..processes import in_processes
 from ..session import Session, finished, session, several
 from ..storage import atomic_write
@@ -180,15 +180,22 @@ def run_record(task: tuple[Case, Path, Options], progress: bool) -> Ended:
     return Ended.of(run(case, out, replace(options, progress=progress), key), out)
 
 
-#: Columns of the printed table of several earthquakes.
+#: Columns of the printed table of several earthquakes, and their headings.
 SHOWN = ("folder", *QUAKE_COLUMNS, "verdict")
+HEADS = "record", "ground\n[m/s2]", "residual\nslip [m]", "tilt", "rigid\nblock [m]", "verdict"
 
 
-def records_table(results: Sequence[Ended]) -> str:
-    """Table of several earthquakes: largest acceleration, residual values, verdict."""
-    heads = ["record", "ground [m/s2]", "residual slip [m]", "tilt", "rigid block [m]", ""]
+def records_table(results: Sequence[Ended], width: int | None = None) -> str:
+    """Table of several earthquakes: largest acceleration, residual values, verdict; width: of the
+    terminal, None: all columns.
+    """
     cells = [
         [v if isinstance(v, str) else f"{v:.4g}" for v in (r.row[name] for name in SHOWN)]
         for r in results
     ]
-    return str(tabulate(cells, heads, disable_numparse=True))
+
+    def draw(shown: Sequence[int]) -> str:
+        picked = [tuple(row[k] for k in shown) for row in cells]
+        return aligned(picked, [HEADS[k] for k in shown], left=1)
+
+    return fitted(SHOWN, draw, ("rigid_block_slip", "residual_tilt", "peak_ground_ax"), width)
