@@ -325,15 +325,17 @@ def test_a_parameter_without_effect_is_not_varied(case, of, message):
 
 @pytest.mark.heavy
 def test_a_step_does_not_pass_over_the_highest_level(monkeypatch):
-    """A brittle bond, whose level falls by 6 % within a step from 48.8 m, and rises in shorter ones
-    to 49.62 m: the same level with steps of any length.
+    """A brittle bond, whose crack grows unstably and whose level then rises again: the same levels
+    with steps of any length, before and after.
     """
     brittle = {"law": "bond", "sigma_max": 2e5, "adhesion": 3e5, "G_f": 20.0, "G_t": 50.0}
     _, usual = search_result("dam", settings={"n_joint": 40.0} | brittle)
     monkeypatch.setattr(path, "RISE", path.RISE / 2)
     _, short = search_result("dam", settings={"n_joint": 40.0} | brittle)
     assert usual.value == pytest.approx(short.value, rel=path.PRECISION)
-    assert usual.confirmed and usual.mode == short.mode == "sliding"
+    assert usual.confirmed and usual.mode == short.mode == "unstable crack growth"
+    after, other = (answer.after["by displacement"] for answer in (usual, short))
+    assert after > usual.value and other == pytest.approx(after, rel=path.PRECISION)
 
 
 def test_the_limit_of_a_joint_that_softens_and_slips_whole_is_between_the_steps(monkeypatch):

@@ -22,14 +22,18 @@ SLENDER = {"dam_height": 40, "dam_base": 28.8, "E": 1e10, "h_found": 7, "sigma_m
 )
 @pytest.mark.parametrize("n_joint", [50, pytest.param(100, marks=pytest.mark.heavy)])
 def test_a_slender_dam_fills_to_its_crest(command, uplift, n_joint):
-    """The result files satisfy equilibrium and law, also in the rounds with frozen damage."""
+    """The result files satisfy equilibrium and law, also in the rounds with frozen damage that
+    the flow needs.
+    """
     overrides = SLENDER | {"uplift": uplift, "n_joint": n_joint}
     words = [w for name, value in overrides.items() for w in ("--set", f"{name}={value}")]
     words = ["run", "ssnp142", *words, "--levels", "40"]
     code, *_ = command(*words, "--out", "out", "--no-fields", "--no-picture", "--all-steps")
     run = Witness(Files(Path("out"), tuple(words), code))
     assert code == 0 and run.files.record["state"] == "complete"
-    assert run.violations() == [] and run.steps["frozen"].any()
+    assert run.violations() == []
+    if uplift == "flow":
+        assert run.steps["frozen"].any()
 
 
 @pytest.mark.heavy

@@ -35,6 +35,7 @@ from .critical_words import (
     events_on,
     lost_beyond_limit,
     slips_whole,
+    withdrawn,
 )
 from .failure_path import FailurePath, Trial
 
@@ -264,6 +265,8 @@ class Search:
             result = replace(result, why=lost_beyond_limit(path), doubt="")
         elif not result.why and path.ends:
             result = replace(result, why=end_of_branch(path), doubt="")
+        if path.water_withdraws:
+            result = replace(result, why="", doubt=withdrawn(path))
         return result if certain else replace(result, why="", doubt=by_increments(path))
 
     def repeated(self, path: FailurePath) -> FailurePath | None:

@@ -39,6 +39,14 @@ def end_of_branch(path: FailurePath) -> str:
     )
 
 
+def withdrawn(path: FailurePath) -> str:
+    """What is said of a path on which the water leaves the crack."""
+    return (
+        f"at {path.points[-1].level:.6g} m points of the crack close again and part its water from "
+        "the reservoir: the equilibria beyond it have less uplift than an open crack"
+    )
+
+
 def slips_whole(path: FailurePath) -> str:
     """What is said of a path that ends where the whole joint slips."""
     return (

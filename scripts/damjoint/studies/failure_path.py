@@ -16,7 +16,7 @@ from ..arrays import Array
 from ..input.case import Case
 from ..joint.interface import Interface
 from ..model.loads import Loading
-from ..model.results import HISTORY, Columns, with_all_joints
+from ..model.results import HISTORY, Columns, column_of, with_all_joints
 from ..solver.controls import LevelControl
 from ..solver.history import joint_row
 from ..solver.load_stepper import SAME_TIME, LoadStepper
@@ -40,6 +40,9 @@ CRITICAL = {
 #: The part of a joint that may open or soften before a displacement is prescribed. How often a step
 #: of the level is halved at most, until its two halves lead to the same state.
 SOFTENED, HALVINGS = 0.1, 4
+
+#: The part of the uplift by which it falls under a rising level where the water withdraws.
+WITHDRAWN = 0.005
 
 #: Time of an increment of displacement, after the last level, where all loads act in full.
 TICK = 1e-3
@@ -236,7 +239,23 @@ class FailurePath(EquilibriumPath):
         """
         if self.reached or self.crushed or self.slides or self.settled(factor):
             return True
+        if self.water_withdraws:
+            return True
         return self.to_growth and self.grows
+
+    @property
+    def water_withdraws(self) -> bool:
+        """Whether the water leaves the crack under a higher level: single points that close again
+        part it from the reservoir. From there on the uplift is less than that of an open crack.
+        """
+        if not self.entering or not self.points:
+            return False
+        last, numbers = self.points[-1], range(len(self.case.joints))
+        before = [p for p in self.points if p.level < last.level]
+        return any(
+            last.last[name] < (1 - WITHDRAWN) * max((p.last[name] for p in before), default=0.0)
+            for name in (column_of("U", k) for k in numbers)
+        )
 
     @property
     def grows(self) -> bool:
