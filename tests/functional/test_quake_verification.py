@@ -220,7 +220,9 @@ def scene_of(tmp_path, kind, checks, **settings):
     wave = 4 * np.sin(np.pi * times / 0.39) ** 2 * np.sin(15 * times)
     record = np.column_stack([times, wave, 0.3 * wave])
     given = {n: v for n, v in DAM.items() if n not in settings} | settings
-    return RandomQuake(given, "30", "0", 1, record, tmp_path / "r.csv", kind, checks)
+    scene = RandomQuake(given, "30", "0", 1, record, tmp_path / "r.csv", kind, checks)
+    _ = scene.case  # writes the record
+    return scene
 
 
 ELASTIC = {"adhesion": 1e9, "quake_uplift": "unchanged", "dt": 0.005}
