@@ -188,15 +188,20 @@ def water_options() -> Parser:
     return options
 
 
+def option(name: str, **settings: Any) -> Parser:
+    """A parser of one option that several commands share."""
+    options = Parser(add_help=False)
+    options.add_argument(name, **settings)
+    return options
+
+
 def wide_option() -> Parser:
     """The option of the commands that print tables."""
-    options = Parser(add_help=False)
-    options.add_argument(
+    return option(
         "--wide",
         action="store_true",
         help="print all columns of the tables (default: those that fit the terminal)",
     )
-    return options
 
 
 def table_width(arguments: argparse.Namespace) -> int | None:
@@ -206,26 +211,22 @@ def table_width(arguments: argparse.Namespace) -> int | None:
 
 def all_steps_option() -> Parser:
     """The option of a table of all steps."""
-    options = Parser(add_help=False)
-    options.add_argument(
+    return option(
         "--all-steps",
         action="store_true",
         help="also write steps.csv: jumps, tractions and internal variables of every step at all "
         "nodes and integration points of the joints",
     )
-    return options
 
 
 def accuracy_options() -> Parser:
     """The option of the commands that choose the mesh."""
-    options = Parser(add_help=False)
-    options.add_argument(
+    return option(
         "--accuracy",
         metavar="PERCENT",
         help="refine the mesh until the estimated errors are smaller: coarse (3 %%), standard "
         "(1 %%), fine (0.2 %%) or a percentage such as 0.5%% (default: no refinement)",
     )
-    return options
 
 
 def loading_options() -> Parser:

@@ -255,11 +255,12 @@ class Point:
 
     def irreversible(self, state: State) -> Array:
         """Damage and slip of all points in a state, (2 q,)."""
-        interface, variables = self.model.equilibrium.interface, state.variables
-        jump = variables.split(interface.jumps(interface.at_points, state.jump))
-        pairs = zip(self.model.equilibrium.laws.laws, jump, variables.joints, strict=True)
-        parts = [(law.damage(d, v), law.slip(v, len(d))) for law, d, v in pairs]
-        return np.concatenate([values for part in parts for values in part])
+        interface, laws = self.model.equilibrium.interface, self.model.equilibrium.laws
+        variables = state.variables
+        jumps = interface.jumps(interface.at_points, state.jump)
+        parts = zip(laws.laws, variables.split(jumps), variables.joints, strict=True)
+        slips = (law.slip(own, len(jump)) for law, jump, own in parts)
+        return np.concatenate([laws.damage(jumps, variables), *slips])
 
     @cached_property
     def dissipation(self) -> float:
@@ -273,9 +274,7 @@ class Point:
     @cached_property
     def damage(self) -> Array:
         """The damage of all points (q,)."""
-        interface = self.model.equilibrium.interface
-        jumps = interface.jumps(interface.at_points, self.state.jump)
-        return self.model.equilibrium.laws.damage(jumps, self.state.variables)
+        return np.split(self.irreversible(self.state), 2)[0]
 
     def leaps(self, begin: Point) -> bool:
         """Whether tension of more than the part FALL of the water's thrust has been lost since
@@ -574,22 +573,19 @@ class EquilibriumPath:
                 return [whole]
             middle = self.step(point, point.further(control, by / 2), by / 2, kind)
             end = middle and self.step(middle, ahead, by / 2, kind)
-            if (
-                middle
-                and end
-                and not (
-                    whole.differs(end, point)
-                    or end.unloads(point)
-                    or (self.to_growth and (middle.leaps(point) or end.leaps(middle)))
-                )
-            ):
-                short = np.abs(end.state.jump - point.state.jump).max() < SHORT * self.imposed(
-                    point
-                )
-                if short or self.straight(point, middle, end):
+            if middle and end and self.agree(point, whole, middle, end) and not end.unloads(point):
+                moved = np.abs(end.state.jump - point.state.jump).max()
+                if moved < SHORT * self.imposed(point) or self.straight(point, middle, end):
                     return [middle, end]
             whole, by = middle, by / 2
         return []
+
+    def agree(self, begin: Point, whole: Point, middle: Point, end: Point) -> bool:
+        """Whether one step and two halves lead to the same state; up to unstable growth, also
+        whether no tension is lost at once in one of the halves.
+        """
+        leaps = self.to_growth and (middle.leaps(begin) or end.leaps(middle))
+        return not (leaps or whole.differs(end, begin))
 
     def straight(self, begin: Point, middle: Point, end: Point) -> bool:
         """Whether no limit point is between three equilibria: the levels are in line, or low."""

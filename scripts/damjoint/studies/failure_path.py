@@ -133,8 +133,7 @@ class FailurePath(EquilibriumPath):
             middle = reach(point, begin + length / 2)
             if whole and middle:
                 end = reach(middle, begin + length)
-                leaps = end and self.to_growth and (middle.leaps(point) or end.leaps(middle))
-                if end and not (leaps or whole.differs(end, point)):
+                if end and self.agree(point, whole, middle, end):
                     return [middle, end]
             whole, length = middle, length / 2
         return []
@@ -250,12 +249,11 @@ class FailurePath(EquilibriumPath):
         """
         if not self.entering or not self.points:
             return False
-        last, numbers = self.points[-1], range(len(self.case.joints))
-        before = [p for p in self.points if p.level < last.level]
-        return any(
-            last.last[name] < (1 - WITHDRAWN) * max((p.last[name] for p in before), default=0.0)
-            for name in (column_of("U", k) for k in numbers)
-        )
+        rows = self.points[-1].history.rows
+        level = np.array(rows["level"])
+        uplifts = (np.array(rows[column_of("U", k)]) for k in range(len(self.case.joints)))
+        lower = level < level[-1]
+        return any(U[-1] < (1 - WITHDRAWN) * U[lower].max(initial=0.0) for U in uplifts)
 
     @property
     def grows(self) -> bool:
