@@ -103,16 +103,17 @@ def files_of(words: list[str], folder: Path, *options: str, name: str) -> Files:
 
     Raises RunError if it has written no result, or exceeds the time limit.
     """
-    environment = os.environ | ONE_THREAD | {"DAMJOINT_CACHE": str(folder / "cache")}
+    own = {"DAMJOINT_CACHE": str(folder / "cache"), "TMPDIR": str(folder)}
     out = "--out", str(folder / name)
     try:
         done = subprocess.run(
             [sys.executable, "-m", "damjoint", *words, *options, *out],
-            env=environment,
+            env=os.environ | ONE_THREAD | own,
             capture_output=True,
             text=True,
             timeout=LONGEST * TIME_LIMIT,
             preexec_fn=limit,
+            start_new_session=True,
         )
     except subprocess.TimeoutExpired:
         raise RunError(f"not finished after {LONGEST * TIME_LIMIT} s") from None
@@ -133,9 +134,9 @@ LIBC = ctypes.CDLL(None)
 
 
 def limit() -> None:
-    """Limit the CPU time of this process, and end it with its parent."""
+    """Limit the CPU time of this process, and kill it with its parent, whose folder it writes."""
     resource.setrlimit(resource.RLIMIT_CPU, (TIME_LIMIT, TIME_LIMIT + 1))
-    LIBC.prctl(SIGNAL_OF_PARENT, signal.SIGTERM)
+    LIBC.prctl(SIGNAL_OF_PARENT, signal.SIGKILL)
 
 
 def with_further_checks(
@@ -231,8 +232,9 @@ def row_of(seed: int, number: int, records: Path | None, parent: Path) -> dict[s
     """Return the row of a scene; records: folder of the records of earthquakes; parent: of the
     folder of its runs.
     """
+    tempfile.tempdir = str(parent)  # of all that this process writes, as it may be killed
     scene = random_quake(seed, number, records) if records else random_scene(seed, number)
-    with tempfile.TemporaryDirectory(dir=parent) as folder:
+    with tempfile.TemporaryDirectory() as folder:
         row = run_and_verify(scene, Path(folder), twice=number % AGAIN == 0)
     return {"scene": f"{seed}-{number}"} | row
 

@@ -2,6 +2,9 @@
 
 import os
 import subprocess
+import sys
+import sysconfig
+from pathlib import Path
 
 import gmsh
 import pytest
@@ -10,6 +13,9 @@ from damjoint.input import casefile, parameters
 from damjoint.input.case_names import CASES
 from damjoint.input.resolve import load
 from damjoint.post import validation
+
+#: Gmsh, as installed with its Python module: a script, for this Python.
+GMSH = sys.executable, str(Path(sysconfig.get_path("scripts"), "gmsh"))
 
 #: Cases that add to the block of a joint of an included case, which Gmsh takes for a second one.
 ADDED = {path.stem for path in CASES.glob("ssnp143?*.case")} - {"ssnp143c"}
@@ -49,7 +55,7 @@ def test_gmsh_and_getdp_read_the_block_of_a_joint(tmp_path, name):
         for name, value in values.items()
     ]
     text = "\n".join([f'Include "{CASES / name}.case";', *printed]) + "\n"
-    for file, words in (("all.geo", ("gmsh", "-parse_and_exit")), ("all.pro", ("getdp",))):
+    for file, words in (("all.geo", (*GMSH, "-parse_and_exit")), ("all.pro", ("getdp",))):
         write(tmp_path, text, file)
         done = subprocess.run([*words, file], cwd=tmp_path, capture_output=True, text=True)
         read = dict(
