@@ -229,7 +229,7 @@ class Run:
         from .pictures.run_picture import picture
 
         # loads the backend, by which a notebook shows a figure
-        pyplot.draw_if_interactive()  # type: ignore[no-untyped-call]
+        pyplot.draw_if_interactive()
         return picture(self.solution)
 
     @property

@@ -7,9 +7,11 @@ from __future__ import annotations
 import textwrap
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.transforms import Bbox
 
 from ..input.case import Case
 from ..input.scene import BED, DOWN, FLOOR, UP
@@ -17,7 +19,7 @@ from ..model.fields import BROKEN, SOFTENING, along, state_of
 from ..model.loads import Loading
 from ..model.results import Results
 from ..post.units import STRESSES, unit
-from ..statics.gravity import GravityMethod
+from ..statics.gravity import GravityMethod, RigidBlock
 from .drawing import (
     BLUE,
     CONCRETE,
@@ -108,7 +110,11 @@ def draw_check(
     draw_joint(section, own, method)
     section.set_anchor("NW")
     handles, labels = section.get_legend_handles_labels()
-    place = {"loc": "lower left", "bbox_to_anchor": (left - 0.02, 0.005), "ncols": 2}
+    place: dict[str, Any] = {
+        "loc": "lower left",
+        "bbox_to_anchor": (left - 0.02, 0.005),
+        "ncols": 2,
+    }
     figure.legend(handles, labels, **place, fontsize=8, frameon=False, handlelength=3)
     beside.axis("off")
     height = min(ROW * len(cells), TALLEST)
@@ -137,7 +143,7 @@ def draw_cells(axes: Axes, cells: list[tuple[str, ...]], bottom: float, height: 
         colWidths=widths,
         cellLoc="right",
         edges="horizontal",
-        bbox=(0, bottom, 1, height),
+        bbox=Bbox.from_bounds(0, bottom, 1, height),
     )
     table.auto_set_font_size(False)
     table.set_fontsize(9)
@@ -157,6 +163,7 @@ def draw_cells(axes: Axes, cells: list[tuple[str, ...]], bottom: float, height: 
 def draw_scene(axes: Axes, method: GravityMethod, scene: Case) -> None:
     """Draw rock, all bodies of a scene, and its loads; the body above a joint in another color."""
     case, body, loading = method.case, method.body, loading_of(method)
+    assert isinstance(body, RigidBlock)  # no picture is drawn of a geometry of a user
     faces = undeformed_faces(scene)
     up, down, floor, bed = (by_height(faces[side]) for side in (UP, DOWN, FLOOR, BED))
     base, height = case["dam_base"], case["dam_height"]
@@ -223,7 +230,7 @@ def draw_joints(axes: Axes, methods: list[GravityMethod], of_joints: list[tuple[
         axes.plot(*ends.T, color=color, linewidth=1.2, zorder=3)
         axes.annotate(
             f"{name}: {verdict}",
-            ends[1],
+            tuple(ends[1]),
             (6, 3),
             textcoords="offset points",
             fontsize=8,
@@ -320,23 +327,26 @@ def draw_diagram(axes: Axes, under: UnderJoint, diagram: Diagram, label: str) ->
     both = by_hand[1], computed[1]
     size, factor = unit(list(both), STRESSES)
     scale = diagram.sign * TALL / (max(np.abs(v).max(initial=0) for v in both) or 1.0)
-    outline = lambda s, v: under.place(
-        np.concatenate([[0], s, [1]]), depth + scale * np.concatenate([[0], v, [0]])
-    )
+
+    def outline(s: np.ndarray, values: np.ndarray) -> np.ndarray:
+        closed = np.concatenate([[0], values, [0]])
+        return under.place(np.concatenate([[0], s, [1]]), depth + scale * closed)
+
     axes.plot(*under.place(ENDS, depth), color="black", linewidth=0.6)
     if len(computed[0]):
         axes.fill(*outline(*computed), color=diagram.color, alpha=0.35, linewidth=0)
         line = under.place(computed[0], depth + scale * computed[1])
         axes.plot(*line, color=diagram.color, label=label)
     axes.plot(*outline(*by_hand), "--", color="black", linewidth=1)
-    above = {"xytext": (0, NAME_ABOVE), "textcoords": "offset points"}
-    axes.annotate(diagram.name, under.place(0.5, depth), **above, ha="center", fontsize=9)
+    above: dict[str, Any] = {"xytext": (0, NAME_ABOVE), "textcoords": "offset points"}
+    axes.annotate(diagram.name, tuple(under.place(0.5, depth)), **above, ha="center", fontsize=9)
     for end, s, side in ((0, -0.015, "right"), (-1, 1.015, "left")):
         values = {"FE": computed[1], "gravity": by_hand[1]}
         shown = {name: f"{v[end] * factor:.3g} {size}" for name, v in values.items() if len(v)}
         same = len(set(shown.values())) == 1
         lines = [shown["gravity"]] if same else [f"{name} {v}" for name, v in shown.items()]
-        axes.text(*under.place(s, depth), "\n".join(lines), ha=side, va="center", fontsize=8)
+        x, y = under.place(s, depth)
+        axes.text(x, y, "\n".join(lines), ha=side, va="center", fontsize=8)
 
 
 def draw_resultant(
@@ -351,8 +361,8 @@ def draw_resultant(
     start, end = under.place(s - back * last["T"], -height), under.place(s, 0)
     axes.annotate(
         "",
-        end,
-        start,
+        tuple(end),
+        tuple(start),
         arrowprops={
             "arrowstyle": "-|>",
             "color": color,

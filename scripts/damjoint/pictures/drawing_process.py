@@ -77,7 +77,8 @@ def serve(pipe: Connection, of_parent: Connection) -> None:
         try:
             from matplotlib import artist
 
-            artist.kwdoc = lambda _: ""  # makes the docstrings: a quarter of the time of loading it
+            # it makes the docstrings: a quarter of the time of loading it
+            artist.kwdoc = lambda artist: ""
             from . import run_picture
 
             run_picture.prepare()
@@ -93,7 +94,7 @@ def serve(pipe: Connection, of_parent: Connection) -> None:
                     )
                     process.start()
                     drawing[process.sentinel] = process
-                elif not has_answered(drawing.pop(ready)):
+                elif isinstance(ready, int) and not has_answered(drawing.pop(ready)):
                     pipe.send(RunError(ENDED))
 
 

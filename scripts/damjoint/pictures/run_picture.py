@@ -12,14 +12,14 @@ import textwrap
 from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import TwoSlopeNorm, to_rgba
-from matplotlib.figure import Figure, FigureBase
+from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from matplotlib.tri import Triangulation
 
@@ -46,11 +46,13 @@ from .drawing import (
     STATES,
     VIOLET,
     WATER,
+    AnyFigure,
     figure_of,
     legend_above,
     panels,
     pixels_of,
     runs_of,
+    size_of,
     widen,
     write_picture,
     write_pixels,
@@ -135,7 +137,7 @@ def picture(solution: Solution, halves: tuple[int, ...] = (0, 1)) -> Figure:
         if case["dim"] == 3 and solution.fields and not is_own_solid(case):
             heights.append(SOLID)
     figure = figure_of(WIDTH, sum(heights))
-    top, *parts = np.ravel(figure.subfigures(len(heights), 1, height_ratios=heights))
+    top, *parts = figure.subfigures(len(heights), 1, squeeze=False, height_ratios=heights)[:, 0]
     if has_states:
         time = shown_time(result)
         left, right = parts[0].subfigures(1, 2, width_ratios=(1, RIGHT))
@@ -152,10 +154,10 @@ def picture(solution: Solution, halves: tuple[int, ...] = (0, 1)) -> Figure:
 
 
 def write_heading(
-    figure: FigureBase, title: list[str], facts: list[str], message: list[str]
+    figure: AnyFigure, title: list[str], facts: list[str], message: list[str]
 ) -> None:
     """Write the lines of title, facts and message."""
-    width, height = figure.bbox.size / figure.dpi
+    width, height = size_of(figure)
     x, y = MARGIN / width, 1 - 0.1 / height
     figure.text(x, y, "\n".join(title), fontsize=12, va="top", parse_math=False)
     y -= TITLE * len(title) / height
@@ -205,7 +207,7 @@ def shear_limit(case: Case, rows: dict[str, np.ndarray]) -> tuple[str, np.ndarra
     return f"limit: {law.shear_strength_formula}{hardening}", strength
 
 
-def draw_joint(figure: FigureBase, solution: Solution, time: float) -> None:
+def draw_joint(figure: AnyFigure, solution: Solution, time: float) -> None:
     """Draw the only joint of a solution: curves along it, or maps where it is a surface of any
     shape (without fields its mesh is not known).
     """
@@ -217,7 +219,7 @@ def draw_joint(figure: FigureBase, solution: Solution, time: float) -> None:
         finish_curves(figure, list(axes), [solution.result], time)
 
 
-def draw_all_joints(figure: FigureBase, solution: Solution, time: float) -> None:
+def draw_all_joints(figure: AnyFigure, solution: Solution, time: float) -> None:
     """Draw the joint, or several as equals: small curves of each, a row each from the highest; maps
     of their openings where they are surfaces of any shape.
     """
@@ -280,9 +282,7 @@ def draw_curves(axes: list[Axes], result: Results, time: float) -> None:
         panel.margins(x=0.01)
 
 
-def finish_curves(
-    figure: FigureBase, axes: list[Axes], results: list[Results], time: float
-) -> None:
+def finish_curves(figure: AnyFigure, axes: list[Axes], results: list[Results], time: float) -> None:
     """Write the legends of the curves along a joint and the axis below them."""
     for panel in axes:
         panel.tick_params(labelbottom=panel is axes[-1])
@@ -291,13 +291,17 @@ def finish_curves(
     mark_states(figure, results, time)
 
 
-def mark_states(figure: FigureBase, results: list[Results], time: float) -> None:
+def mark_states(figure: AnyFigure, results: list[Results], time: float) -> None:
     """Write the legend of the states that occur at some joints."""
     states = [state_of(along(own.at(time)), own.case.law) for own in results]
     occurring = [STATES[n].patch() for n in STATES if any((part == n).any() for part in states)]
     if occurring:
-        above = ABOVE_EDGE / (figure.bbox.height / figure.dpi)
-        place = {"loc": "lower left", "bbox_to_anchor": (0.1, above), "ncols": len(occurring)}
+        above = ABOVE_EDGE / size_of(figure)[1]
+        place: dict[str, Any] = {
+            "loc": "lower left",
+            "bbox_to_anchor": (0.1, above),
+            "ncols": len(occurring),
+        }
         figure.legend(handles=occurring, **place, fontsize=7.5, frameon=False, borderpad=0.2)
 
 
@@ -325,7 +329,7 @@ def draw_normal_stress(axes: Axes, case: Case, curves: dict[str, np.ndarray]) ->
     if case["uplift"] != "none":
         effective = curves["sigma_n_eff"] * factor
         axes.plot(s, effective, "--", color=DARK, label="effective")
-        style = {"color": WATER, "alpha": 0.25, "linewidth": 0}
+        style: dict[str, Any] = {"color": WATER, "alpha": 0.25, "linewidth": 0}
         axes.fill_between(s, -curves["p"] * factor, 0, **style, label="uplift")
     draw_published(axes, case, curves, {"sigma_n": BLUE}, factor)
     axes.set_ylabel(f"normal stress [{stress}]", fontsize=9)
@@ -336,7 +340,7 @@ def draw_gravity_stress(axes: Axes, method: gravity.GravityMethod, factor: float
     """Draw the effective stress of the gravity method."""
     if method.stands:
         s, stress = gravity_profile(method)
-        style = {"color": GREY, "linewidth": 1.8, "label": "gravity method"}
+        style: dict[str, Any] = {"color": GREY, "linewidth": 1.8, "label": "gravity method"}
         axes.plot(s, stress * factor, ":", **style)
 
 
@@ -387,17 +391,18 @@ def draw_published(
         if rows:
             value = np.array([r.value for r in rows]) * factor
             spread = np.abs(value) * [r.tolerance for r in rows]
-            style = {"fmt": "o", "markersize": 4, "color": color, "mfc": "white", "capsize": 2}
+            style: dict[str, Any] = {"fmt": "o", "markersize": 4, "color": color}
+            style |= {"mfc": "white", "capsize": 2}
             label = "published" if name != "delta_t1" else None  # delta_n has the label
-            axes.errorbar([r.x for r in rows], value, spread, **style, label=label)
+            axes.errorbar(np.array([r.x for r in rows], float), value, spread, **style, label=label)
 
 
-def draw_histories(figure: FigureBase, result: Results, time: float) -> None:
+def draw_histories(figure: AnyFigure, result: Results, time: float) -> None:
     """Draw the history of all joints and, if there are several, their table at a time beside it."""
     if not result.case.of_joints:
         draw_history(figure, history_panels(result), result)
         return
-    left, right = figure.subfigures(1, 2, width_ratios=(1 - BESIDE, BESIDE))
+    left, right = figure.subfigures(1, 2, squeeze=False, width_ratios=(1 - BESIDE, BESIDE))[0]
     draw_history(left, panels_of_joints(result), result)
     draw_table(right, joints_table(result, time))
 
@@ -410,7 +415,7 @@ class Panel(NamedTuple):
     lines: list[tuple[np.ndarray, str, str]]
 
 
-def draw_history(figure: FigureBase, shown: list[Panel], result: Results) -> None:
+def draw_history(figure: AnyFigure, shown: list[Panel], result: Results) -> None:
     """Draw panels over the level, and mark the steps at which other loads change."""
     row = panels(figure, 1, len(shown), bottom=0.42, top=0.25)[0]
     level, marks = result.history["level"], changes_at_a_level(result)
@@ -501,14 +506,14 @@ def panels_of_joints(result: Results) -> list[Panel]:
     ]
 
 
-def draw_table(figure: FigureBase, table: Table) -> None:
+def draw_table(figure: AnyFigure, table: Table) -> None:
     """Draw a table; its first and last columns to the left."""
     (axes,) = panels(figure, left=0.05, right=0.1, bottom=0.1, top=0.1).flat
     axes.set_axis_off()
     heads = [f"{n}\n[{u}]" if u else n for n, u in zip(table.names, table.units, strict=True)]
     columns = zip(table.names, *table.rows, strict=True)
     letters = np.array([max(map(len, column)) for column in columns]) + 2
-    height = figure.bbox.height / figure.dpi - 0.2
+    height = size_of(figure)[1] - 0.2
     cells = axes.table(
         [heads, *table.rows],
         colWidths=list(letters / letters.sum()),
@@ -539,20 +544,20 @@ def is_own_solid(case: Case) -> bool:
     return case["dim"] == 3 and case.geometry is not None
 
 
-def draw_dam(figure: FigureBase, solution: Solution, time: float) -> None:
+def draw_dam(figure: AnyFigure, solution: Solution, time: float) -> None:
     """Draw the section, or a 3D view if one section does not represent the geometry."""
     draw = draw_view if is_own_solid(solution.result.case) else draw_section
     draw(figure, solution, time)
 
 
-def draw_solid(figure: FigureBase, solution: Solution, time: float) -> None:
+def draw_solid(figure: AnyFigure, solution: Solution, time: float) -> None:
     """Draw what an extruded section in 3D has besides: a view and maps of the joint."""
-    left, right = figure.subfigures(1, 2, width_ratios=(1, RIGHT))
+    left, right = figure.subfigures(1, 2, squeeze=False, width_ratios=(1, RIGHT))[0]
     draw_view(left, solution, time)
     draw_maps(right, solution.of_joint(decisive_joint(solution.result)), time)
 
 
-def draw_view(figure: FigureBase, solution: Solution, time: float) -> None:
+def draw_view(figure: AnyFigure, solution: Solution, time: float) -> None:
     """Draw the deformed skin of all bodies, in colors of the displacement; no view without
     fields.
     """
@@ -602,10 +607,10 @@ def draw_directions(axes: Axes, level: str) -> None:
     for direction, name in zip(VIEW[:, :2], ("x, downstream", "y", "z"), strict=True):
         end = start + 0.1 * direction
         style = {"arrowstyle": "-|>", "color": DARK, "shrinkA": 0, "shrinkB": 0}
-        place = {"xycoords": "axes fraction", "textcoords": "axes fraction"}
-        axes.annotate("", end, start, **place, arrowprops=style, zorder=5)
-        beyond = start + 0.135 * direction
-        axes.text(*beyond, name, transform=axes.transAxes, ha="center", va="center", fontsize=8)
+        place: dict[str, Any] = {"xycoords": "axes fraction", "textcoords": "axes fraction"}
+        axes.annotate("", tuple(end), tuple(start), **place, arrowprops=style, zorder=5)
+        x, y = start + 0.135 * direction
+        axes.text(x, y, name, transform=axes.transAxes, ha="center", va="center", fontsize=8)
     words = f"behind the dam, upstream: reservoir, {level}" if level else "upstream behind the dam"
     axes.text(0.02, 0.97, words, transform=axes.transAxes, fontsize=8, va="top")
 
@@ -624,7 +629,7 @@ def view_from(azimuth: float, elevation: float) -> np.ndarray:
 VIEW = view_from(-35, 30)
 
 
-def draw_openings(figure: FigureBase, solution: Solution, time: float) -> None:
+def draw_openings(figure: AnyFigure, solution: Solution, time: float) -> None:
     """Draw a map of the opening of each joint, in colors of a common scale."""
     joints = solution.result.joints
     across = math.ceil(math.sqrt(len(joints)))
@@ -642,7 +647,7 @@ def draw_openings(figure: FigureBase, solution: Solution, time: float) -> None:
         names, places = projected(surface)
         values = openings[number][row_of_nodes(surface, rows[number])]
         colors = axes.tripcolor(
-            Triangulation(*places, triangles_of(surface)),
+            Triangulation(places[0], places[1], triangles_of(surface)),
             values,
             cmap="YlOrRd",
             vmin=0,
@@ -667,14 +672,14 @@ def triangles_of(surface: Body) -> np.ndarray:
     )
 
 
-def draw_maps(figure: FigureBase, solution: Solution, time: float) -> None:
+def draw_maps(figure: AnyFigure, solution: Solution, time: float) -> None:
     """Draw maps of the joint in true shape: opening, effective normal stress, shear stress; below
     each other, or side by side if the joint is not much wider than high.
     """
     rows, joint = solution.result.at(time), solution.bodies["joint"]
     nearest = row_of_nodes(joint, rows)
     names, places = projected(joint)
-    shape = Triangulation(*places, triangles_of(joint))
+    shape = Triangulation(places[0], places[1], triangles_of(joint))
     shown = (
         ("delta_n", "opening", LENGTHS),
         ("sigma_n_eff", "effective normal stress, tension > 0", STRESSES),
@@ -740,8 +745,8 @@ def draw_map(axes: Axes, shape: Triangulation, values: np.ndarray, title: str, w
     if narrow:  # ticks would overlap
         axes.set_yticks([shape.y.max()])
     bar = axes.figure.colorbar(filled, ax=axes, pad=0.02, fraction=0.05, aspect=12)
-    ticks = MaxNLocator(4).tick_values(levels[0], levels[-1])
-    bar.set_ticks(ticks[(ticks >= levels[0]) & (ticks <= levels[-1])])
+    ticks = np.asarray(MaxNLocator(4).tick_values(levels[0], levels[-1]))
+    bar.set_ticks(ticks[(ticks >= levels[0]) & (ticks <= levels[-1])].tolist())
     bar.ax.tick_params(labelsize=7)
 
 
@@ -753,7 +758,7 @@ def scale_of(values: np.ndarray) -> tuple[float, float]:
     return least if low - least <= near else low, most if most - high <= near else high
 
 
-def draw_curve(result: Results) -> FigureBase:
+def draw_curve(result: Results) -> Figure:
     """Draw the level against the heel's opening; for a uniform pressure also the level at which the
     rigid dam overturns.
     """

@@ -224,7 +224,7 @@ class JointShape:
     @property
     def damage_states(self) -> IntArray:
         """CLOSED to BROKEN on the near side, (steps, n)."""
-        return self.along(lambda rows: state_of(rows, self.case.law))
+        return np.array([state_of(rows, self.case.law)[self.row] for rows in self.rows])
 
     @property
     def segment_states(self) -> IntArray:

@@ -9,8 +9,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import PolyCollection
-from matplotlib.figure import FigureBase
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path
@@ -29,8 +27,11 @@ from .drawing import (
     SILT,
     STATES,
     WATER,
+    AnyFigure,
     panels,
+    polygons,
     runs_of,
+    size_of,
 )
 from .outline import Section
 from .scene import (
@@ -56,10 +57,10 @@ RESULTANT, LABEL = 2.5, 0.05
 BOTTOM, LEGEND, ROWS = 0.4, 0.68, 4
 #: Distance of the legend from the edge of its figure, which else cuts its symbols [inches].
 ABOVE_EDGE = 0.06
-DRAINS = {"color": "#1565c0", "linestyle": "-.", "linewidth": 1.5}
+DRAINS: dict[str, Any] = {"color": "#1565c0", "linestyle": "-.", "linewidth": 1.5}
 
 
-def draw_section(figure: FigureBase, solution: Solution, time: float) -> None:
+def draw_section(figure: AnyFigure, solution: Solution, time: float) -> None:
     """Draw the section at a requested time; a note instead if there is none."""
     (axes,) = panels(figure, left=0.55, right=0.1, bottom=BOTTOM + LEGEND, top=0.25).flat
     axes.set_anchor("N")
@@ -110,7 +111,7 @@ class SectionDrawing:
         handles, labels = zip(*self.legend, strict=True) if self.legend else ((), ())
         figure, more = self.axes.figure, -(-len(labels) // 2) - ROWS
         if more > 0:
-            height = figure.bbox.height / figure.dpi
+            height = size_of(figure)[1]
             box = self.axes.get_position(original=True)
             box.y0 = (BOTTOM + LEGEND * (1 + more / ROWS)) / height
             self.axes.set_position(box)
@@ -118,7 +119,7 @@ class SectionDrawing:
             handles,
             labels,
             loc="lower left",
-            bbox_to_anchor=(0.01, ABOVE_EDGE / (figure.bbox.height / figure.dpi)),
+            bbox_to_anchor=(0.01, ABOVE_EDGE / size_of(figure)[1]),
             ncols=2,
             fontsize=7.5,
             frameon=False,
@@ -161,7 +162,7 @@ class SectionDrawing:
         for height, x in ((level, left + MARK * self.height), (tail, right - MARK * self.height)):
             if height > 0:
                 self.surface(x, height)
-        style = {"facecolor": SILT, "alpha": 0.6, "hatch": "..."}
+        style: dict[str, Any] = {"facecolor": SILT, "alpha": 0.6, "hatch": "..."}
         if draw_fluid(self.axes, fluids["silt"], **style, zorder=0.5):
             self.legend.append(
                 (Patch(**style, linewidth=0), f"silt, {self.case['silt_height']:g} m")
@@ -170,7 +171,7 @@ class SectionDrawing:
     def surface(self, x: float, level: float) -> None:
         """Mark a water surface with its level."""
         self.axes.plot(x, level, "v", color=WATER, markersize=6, zorder=5)
-        offset = {"xytext": (0, 6), "textcoords": "offset points"}
+        offset: dict[str, Any] = {"xytext": (0, 6), "textcoords": "offset points"}
         self.axes.annotate(level_label(level), (x, level), **offset, ha="center", fontsize=8)
 
     def bodies(self) -> None:
@@ -179,7 +180,7 @@ class SectionDrawing:
             for name, tables in body.faces.items():
                 for table in tables:
                     color = ROCK if name == "foundation" else CONCRETE
-                    cells = PolyCollection(body.moved[table], facecolor=color, zorder=1)
+                    cells = polygons(body.moved[table], facecolor=color, zorder=1)
                     cells.set(edgecolor=GREY, linewidth=0.15, rasterized=True)
                     self.axes.add_collection(cells, autolim=False)
             outline = body.points[[*body.loop, body.loop[0]]]
@@ -196,7 +197,7 @@ class SectionDrawing:
                     if number in STATES:
                         part = line[first : end + 1]
                         self.axes.plot(*part.T, **self.joint_style(number), zorder=3)
-            cracks = PolyCollection(self.scene.crack(joint)[0, :, :, :2], color=WATER, zorder=2)
+            cracks = polygons(self.scene.crack(joint)[0, :, :, :2], color=WATER, zorder=2)
             self.axes.add_collection(cracks, autolim=False)
         shown = np.concatenate([joint.segment_states[0] for joint in self.joints])
         for number, style in STATES.items():
@@ -255,13 +256,13 @@ class SectionDrawing:
         x, y = np.asarray(along) / math.hypot(*along)
         tail = np.asarray(tip) - longer * ARROW * self.height * np.array([x, y])
         style = {"arrowstyle": "-|>", "color": color, "linewidth": 1.6, "shrinkB": 0}
-        self.axes.annotate("", tip, tail, arrowprops=style, zorder=6)
-        aligned = {
+        self.axes.annotate("", tuple(tip), tuple(tail), arrowprops=style, zorder=6)
+        aligned: dict[str, Any] = {
             "ha": "center" if abs(x) < 0.5 else "right" if x > 0 else "left",
             "va": "center" if abs(y) < 0.5 else "top" if y > 0 else "bottom",
         }
-        away = {"xytext": (-4 * x, -4 * y), "textcoords": "offset points"}
-        self.axes.annotate(label, tail, **away, **aligned, fontsize=8, color=color, zorder=6)
+        away: dict[str, Any] = {"xytext": (-4 * x, -4 * y), "textcoords": "offset points"}
+        self.axes.annotate(label, tuple(tail), **away, **aligned, fontsize=8, color=color, zorder=6)
 
 
 def arrow_handle(color: str) -> Line2D:

@@ -7,7 +7,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterator
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -97,10 +97,10 @@ def draw(plan: Plan, rows: list[Row], cases: list[Case], title: str, path: Path)
     return ""
 
 
-def is_number(text: str) -> bool:
+def is_number(value: float | str) -> bool:
     """Whether a varied value is a number."""
     try:
-        float(text)
+        float(value)
     except ValueError:
         return False
     return True
@@ -180,13 +180,17 @@ def draw_curves(figure: Figure, table: Table, names: list[str]) -> None:
         for number, (key, members) in enumerate(sorted(curves.items(), key=lambda item: item[1])):
             color, mark = CURVES[number % len(CURVES)]
             good = np.where(bad[members], np.nan, values[members] * factor)
-            style = {"color": color, "markersize": 4.5, "linestyle": "none" if categories else "-"}
+            style: dict[str, Any] = {
+                "color": color,
+                "markersize": 4.5,
+                "linestyle": "none" if categories else "-",
+            }
             panel.plot(x[members], good, mark, **style, label=key)
             failing, cross = [i for i in members if bad[i]], color if others else RED
             at_value = [i for i in failing if valued and np.isfinite(values[i])]
             panel.plot(x[at_value], values[at_value] * factor, "x", color=cross)
             at_edge = [i for i in failing if i not in at_value]
-            edge = {"transform": panel.get_xaxis_transform(), "color": cross}
+            edge: dict[str, Any] = {"transform": panel.get_xaxis_transform(), "color": cross}
             panel.plot(x[at_edge], np.full(len(at_edge), EDGE * (1 + number)), "x", **edge)
         if categories:
             panel.set_xticks(range(len(categories)), categories)
@@ -202,7 +206,7 @@ def draw_curves(figure: Figure, table: Table, names: list[str]) -> None:
             panel.text(0.5, 0.6, text, ha="center", transform=panel.transAxes)
         if drawn == FACTOR:
             draw_verdicts(panel, table, x, values)
-        if drawn == SLIP:
+        if drawn == SLIP and plan.slip_limit is not None:
             draw_limit(panel, plan.slip_limit * factor, np.nanmin(values, initial=0.0) < 0)
     handles, labels = panel.get_legend_handles_labels()
     named = {text: handle for text, handle in zip(labels, handles, strict=True) if text in curves}
@@ -211,8 +215,12 @@ def draw_curves(figure: Figure, table: Table, names: list[str]) -> None:
         (named[meaning],) = panel.plot([], [], "x", color="black" if others else RED)
     named.pop("", None)
     if named:
-        style = {"loc": "outside lower center", "ncols": min(len(named), 4), "fontsize": 8}
-        figure.legend(named.values(), named.keys(), **style)
+        place: dict[str, Any] = {
+            "loc": "outside lower center",
+            "ncols": min(len(named), 4),
+            "fontsize": 8,
+        }
+        figure.legend(list(named.values()), list(named), **place)
 
 
 def draw_verdicts(panel: Axes, table: Table, x: np.ndarray, values: np.ndarray) -> None:
@@ -220,7 +228,7 @@ def draw_verdicts(panel: Axes, table: Table, x: np.ndarray, values: np.ndarray) 
     verdicts = np.array([row["verdict"] for row in table.rows])
     for mark, verdict in zip(VERDICTS, dict.fromkeys(verdicts.tolist()), strict=False):
         alike = verdicts == verdict
-        style = {"color": "black", "mfc": "white", "markersize": 7, "zorder": 4}
+        style: dict[str, Any] = {"color": "black", "mfc": "white", "markersize": 7, "zorder": 4}
         panel.plot(x[alike], values[alike], mark, **style, label=verdict)
     required = {case["required_SSF"] for case in table.cases}
     if len(required) == 1 and (least := required.pop()):
@@ -233,8 +241,8 @@ def draw_verdicts(panel: Axes, table: Table, x: np.ndarray, values: np.ndarray) 
 def draw_limit(panel: Axes, limit: float, both: bool) -> None:
     """Draw the slip beyond which a row fails, in the panel's unit; both: in both directions."""
     for side in (1, -1)[: 1 + both]:
-        words = {"label": "limit"} if side == 1 else {}
-        panel.axhline(side * limit, color="black", linestyle="--", lw=0.9, **words)
+        words = "limit" if side == 1 else None
+        panel.axhline(side * limit, color="black", linestyle="--", lw=0.9, label=words)
     panel.legend(*[parts[-1:] for parts in panel.get_legend_handles_labels()], fontsize=8)
 
 

@@ -85,6 +85,7 @@ class Search:
 
         Raises InputError.
         """
+        assert own.source  # input.resolve.load has it
         self.of, self.name = of, {"uplift": "drain_effectiveness"}.get(of, of)
         #: partial factors of the case; they are part of the reduced strength, not of a check
         self.partial = {name: own[factor] for name, factor in PARTIAL.items()}
@@ -151,12 +152,14 @@ class Search:
         """The case with the settings of the search; those that nothing else follows are set after
         Gmsh's parser, which the rows of a sweep then share.
         """
+        assert self.own.source
         source, alone = self.own.source.with_overrides(self.settings), independent()
-        single = {n for n, v in source.overrides.items() if n in alone and not isinstance(v, tuple)}
-        rest = {n: v for n, v in source.overrides.items() if n not in single}
+        overrides = source.overrides.items()
+        single = {n: v for n, v in overrides if n in alone and not isinstance(v, tuple)}
+        rest = {n: v for n, v in overrides if n not in single}
         try:
             case = resolve(replace(source, overrides=rest))
-            return case.changed({n: source.overrides[n] for n in single})
+            return case.changed(single)
         except InputError:  # the others are not allowed without these
             return resolve(source)
 
@@ -252,7 +255,7 @@ class Search:
         after, ends = dict[str, float](), grows and path.ended
         if point and grows:
             after, path = self.after_growth(path)
-        result = self.result(point and point.level, path, point)
+        result = self.result(point.level if point else None, path, point)
         if point is None:
             return result
         if after or ends:
@@ -326,6 +329,7 @@ class Search:
             fails.path.refine()
             if not fails.stands:
                 point, path = point_at_target(stands), stands.path
+                assert path.arrival is not None
                 growth = path.growth_until(path.arrival + 1)  # on the way to the target
                 return replace(self.result(stands.value, fails.path, point), growth=growth)
             self.factor = SURE  # the first estimate is wrong for this dam
@@ -339,7 +343,10 @@ class Search:
         failed by their first estimate, now followed further; else at distances doubled from a step
         on. None if all values that the case allows stand.
         """
-        ahead = lambda trial: (trial.value - stands.value) * np.sign(step)
+
+        def ahead(trial: Trial) -> float:
+            return float((trial.value - stands.value) * np.sign(step))
+
         known = sorted((t for t in self.trials if not t.stands and ahead(t) > 0), key=ahead)
         for trial in known:
             trial.path.follow(SURE)
@@ -389,12 +396,15 @@ class Search:
         """Values beside the gravity method's critical value, the farther from the first trial
         first; empty if the gravity method has none, or another result for the first trial.
         """
-        stands = lambda value: self.gravity.stands(value)
+        stands = self.gravity.stands
         if stands(first.value) != first.stands:
             return []
         for value in self.outwards(first):
             if stands(value) == (not first.stands):
-                sign = lambda v: 1.0 if stands(v) == first.stands else -1.0
+
+                def sign(value: float) -> float:
+                    return 1.0 if stands(value) == first.stands else -1.0
+
                 guess = float(bisect(sign, first.value, value, rtol=GUESS_PRECISION))
                 margin = BESIDE_GRAVITY * abs(guess) * np.sign(value - first.value)
                 return [guess + margin, guess - margin]
@@ -480,8 +490,8 @@ class Search:
             what = failing.joint or "joint"
             why = f"there the whole {what} slips: T = {last['T']:.5g} N/m is its shear strength"
         elif failing.settled(SURE):
-            top, limit = failing.points[failing.top], failing.points[failing.limit_point]
-            ratio = failing.points[-1].imposed / failing.imposed(limit)
+            top, limit_point = failing.points[failing.top], failing.points[failing.limit_point]
+            ratio = failing.points[-1].imposed / failing.imposed(limit_point)
             why = (
                 f"the equilibrium path, followed to {ratio:.2g} times that displacement, reaches "
                 f"{top.level:.6g} m at most"
@@ -520,6 +530,7 @@ def of_each(values: list[float]) -> Setting:
 def point_at_target(trial: Trial) -> Point:
     """The equilibrium at the target level of a trial that stands."""
     path = trial.path
+    assert path.arrival is not None
     if path.points[path.arrival].control != "level":
         path.refine()
     return path.points[path.arrival]

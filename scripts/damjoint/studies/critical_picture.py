@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -143,7 +144,7 @@ def draw_paths(axes: Axes, content: Content) -> None:
     last = {trial.stands: trial for trial in content.trials if trial.path.points}
     paths = [points_shown(trial.path) for trial in last.values()]
     crests = [[p.last["crest_ux"] for p in points] for points in paths]
-    name, factor = unit([abs(max(crest, key=abs)) for crest in crests], LENGTHS)
+    name, factor = unit([np.array(crest) for crest in crests], LENGTHS)
     for trial, points, crest in zip(last.values(), paths, crests, strict=True):
         end = "stands" if trial.stands else "fails"
         label = f"{content.of} {trial.value:.7g}{content.unit}: {end}"

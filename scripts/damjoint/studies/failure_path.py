@@ -125,9 +125,10 @@ class FailurePath(EquilibriumPath):
         point, up to a length in time, whose halves lead to the same state; empty if there is none.
         """
         begin, case = point.state.time, self.case
-        reach = lambda start, time: start.step(
-            time, LevelControl(case.level_at(time)), 0.0, "level"
-        )
+
+        def reach(start: Point, time: float) -> Point | None:
+            return start.step(time, LevelControl(case.level_at(time)), 0.0, "level")
+
         whole = reach(point, begin + length)
         for _ in range(HALVINGS):
             middle = reach(point, begin + length / 2)
@@ -273,8 +274,9 @@ class FailurePath(EquilibriumPath):
 
     def uncertain(self) -> tuple[int, float]:
         """See `EquilibriumPath.uncertain`: also where it passes the target or f_c."""
-        if self.crushed_at_top or self.arrival is not None:
-            right = len(self.points) - 1 if self.crushed else self.arrival
+        arrival = self.arrival
+        if self.crushed_at_top or arrival is not None:
+            right = len(self.points) - 1 if self.crushed or arrival is None else arrival
             ends = [p.level for p in self.points[max(right - 1, 0) : right + 1]]
             return right - 1, self.highest + max(ends) - min(ends)
         return super().uncertain()

@@ -6,10 +6,10 @@ from __future__ import annotations
 
 import textwrap
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
 from ..model.loads import Loading
@@ -26,6 +26,7 @@ from ..pictures.drawing import (
     VIOLET,
     figure_of,
     panels,
+    polygons,
     write_picture,
 )
 from ..pictures.outline import exaggeration
@@ -60,7 +61,7 @@ def figure(result: QuakeResult) -> Figure:
     facts = [line for text in facts_of(result) for line in textwrap.wrap(text, 125)]
     picture.text(0.05, 0.992, "\n".join(title), va="top", fontsize=10, parse_math=False)
     below = 0.992 - 0.2 * len(title) / (CURVES + shapes)
-    style = {"va": "top", "fontsize": 8, "color": DARK, "parse_math": False}
+    style: dict[str, Any] = {"va": "top", "fontsize": 8, "color": DARK, "parse_math": False}
     picture.text(0.05, below, "\n".join(facts), **style)
     top = 0.4 + 0.2 * len(title) + 0.14 * len(facts)
     axes = panels(picture, 7, left=0.9, right=1.1, top=top, bottom=0.5 + shapes, down=0.25)[:, 0]
@@ -151,7 +152,7 @@ def draw_strength(axes: Axes, result: QuakeResult) -> None:
     rows = result.rows_of(result.joint)
     strength = np.maximum(rows["shear_reserve"] + np.abs(rows["T"]), 0.0) / 1e6
     if np.isfinite(strength).all():  # a law may not limit shear
-        style = {"color": RED, "alpha": 0.12, "linewidth": 0}
+        style: dict[str, Any] = {"color": RED, "alpha": 0.12, "linewidth": 0}
         axes.fill_between(rows["time"], -strength, strength, **style, label="strength for T")
         for side in (strength, -strength):
             axes.plot(rows["time"], side, color=RED, lw=0.5)
@@ -170,7 +171,7 @@ def draw_shapes(picture: Figure, result: QuakeResult) -> None:
             points = solid.points[:, :2]
             color = ROCK if body == "foundation" else CONCRETE
             for _, table in solid.cells:
-                cells = PolyCollection((points + scale * displacement)[table], facecolor=color)
+                cells = polygons((points + scale * displacement)[table], facecolor=color)
                 cells.set(edgecolor=GREY, linewidth=0.15, rasterized=True)
                 axes.add_collection(cells)
         dams = np.vstack(

@@ -26,6 +26,7 @@ from ..pictures.drawing import figure_of
 from ..post import stored
 from ..post.summary import Table, levels_table, table_of
 from ..post.units import FORCES, MOMENTS, Units, unit
+from ..post.validation import shown_time
 from ..statics.gravity import GravityMethod, force, resultant_of
 from ..statics.verdict import decisive_joint, stiffness_ratio
 from ..storage import atomic_write
@@ -330,7 +331,8 @@ def notes_of(checks: list[SafetyCheck]) -> list[str]:
 
 def describe_scene(case: Case) -> str:
     """Describe geometry, dimension, law and uplift in a line."""
-    size = "{dam_height:g} m high, base {dam_base:g} m, crest {dam_crest:g} m".format(**case.values)
+    height, base, crest = (case[name] for name in ("dam_height", "dam_base", "dam_crest"))
+    size = f"{height:g} m high, base {base:g} m, crest {crest:g} m"
     size = f"geometry {case.geometry.name}" if case.geometry else size
     solid = "3D" if case.geometry else f"3D, {case['thickness']:g} m thick"
     plane = "plane strain" if case["dim"] == 2 else solid
@@ -363,7 +365,7 @@ def methods_table(case: Case, checks: list[SafetyCheck], judged: bool) -> Table:
     factors = required_by_case(case)
     if np.isfinite([*factors.values()]).any():
         rows.append((REQUIRED, factors, ""))
-    columns = []
+    columns = list[Column]()
     for units, heads in SHOWN:
         values = [[numbers.get(n, math.nan) for _, numbers, _ in rows] for n in heads]
         columns += in_one_unit(heads.values(), np.array(values), units)
@@ -437,9 +439,9 @@ def factored(case: Case, strength: str, unit: float) -> str:
 def pictures_of(solution: Solution) -> list[Picture]:
     """Draw the pictures of a run."""
     result = solution.result
-    time = run_picture.shown_time(result)
+    time = shown_time(result)
     at_level = f"at level {result.state(time)['level']:.4g} m"
-    return [Picture(*words, embedded(figure)) for *words, figure in drawn(solution, time, at_level)]
+    return [Picture(n, text, embedded(fig)) for n, text, fig in drawn(solution, time, at_level)]
 
 
 def drawn(solution: Solution, time: float, at_level: str) -> Iterator[tuple[str, str, Figure]]:
@@ -471,7 +473,7 @@ def drawn(solution: Solution, time: float, at_level: str) -> Iterator[tuple[str,
 def embedded(figure: Figure) -> str:
     """Encode a figure with all its legends as a data address: SVG with rasterised meshes."""
     file = io.BytesIO()
-    whole = {"bbox_inches": "tight", "pad_inches": 0.05}
+    whole: dict[str, Any] = {"bbox_inches": "tight", "pad_inches": 0.05}
     figure.savefig(file, format="svg", dpi=DPI, metadata={"Date": None}, **whole)
     return "data:image/svg+xml;base64," + base64.b64encode(file.getvalue()).decode()
 

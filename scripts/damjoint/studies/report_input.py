@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -180,7 +180,8 @@ def entry(parameter: Parameter, values: Sequence[Value], default: Value) -> Entr
     compared = values[:1] if parameter.automatic else values
     others = [] if all(same(v, default) for v in compared) else [default]
     if parameter.text:
-        return Entry(parameter.description, ", ".join(map(str, shown)), "", "".join(others))
+        words = ", ".join(map(str, shown)), "", "".join(map(str, others))
+        return Entry(parameter.description, *words)
     numbers = np.array([*shown, *others], float)
     name, factor = unit([numbers], UNITS.get(parameter.unit, ((parameter.unit, 1),)))
     texts = [f"{v * factor:.6g}" for v in numbers]
@@ -197,7 +198,10 @@ def same(value: Value, default: Value) -> bool:
 
 def loading(case: Case) -> dict[str, Entry]:
     """List geometry file, water levels and load steps of a case."""
-    listed = lambda values: ", ".join(f"{v:.6g}" for v in values)
+
+    def listed(values: Iterable[float]) -> str:
+        return ", ".join(f"{v:.6g}" for v in values)
+
     steps = len(case.times) // len(case.levels)
     equal = np.array_equal(case.times, equal_steps(len(case.levels), steps)) if steps else False
     entries = {
@@ -286,7 +290,7 @@ def limits(case: Case, earthquake: bool = False) -> Iterator[str]:
     if not case["floor_water"]:
         yield "No water pressure acts on the reservoir floor and on the tailwater bed."
     if case["k_h"] or case["k_v"]:
-        pressure = ADDED_MASS.get(case["added_mass"])
+        pressure = ADDED_MASS.get(int(case["added_mass"]))
         yield (
             "The earthquake is pseudo-static: seismic coefficients times the weight"
             f"{f', added water pressure after {pressure}' if pressure else ''}; uplift: "
