@@ -1,6 +1,7 @@
 """Closed forms of a rigid dam (weight, thrust, moments), and the comparison of two runs."""
 
 import numpy as np
+from scipy.optimize import brentq
 
 BASE, CREST, HEIGHT = 5.0, 1.5, 10.0
 WATER = 1000 * 9.81
@@ -38,6 +39,37 @@ def slide_level(mu, adhesion, wet):
     """Level at which T = mu N + adhesion BASE."""
     a, b, c = WATER / 2, wet * mu * WATER * BASE / 2, -(mu * WEIGHT + adhesion * BASE)
     return (-b + np.sqrt(b**2 - 4 * a * c)) / (2 * a)
+
+
+def resultants_of_45_m_dam(level, tail=3.0):
+    """N and T of the joint of cases/dam.case [N/m]: base 34 m, crest 5 m; linear uplift."""
+    n = 2400 * 9.81 * 45 * (34 + 5) / 2 + (34 - 5) / 45 * thrust(tail)
+    return n - WATER * 34 * (level + tail) / 2, thrust(level) - thrust(tail)
+
+
+def slide_level_of_45_m_dam(mu):
+    """Level at which T = mu N on the joint of cases/dam.case, with a tailwater of 3 m."""
+
+    def excess(level):
+        n, t = resultants_of_45_m_dam(level)
+        return mu * n - t
+
+    return brentq(excess, 20, 60)
+
+
+def overturning_level(wet, arm=0.0):
+    """Level at which N acts at a distance arm [m] from the toe; above the crest, the trapezoid of
+    pressure below it acts. wet: linear uplift.
+    """
+
+    def moment(level):
+        depth = min(level, HEIGHT)
+        push = WATER * (level * depth**2 / 2 - depth**3 / 3)
+        normal = WEIGHT - wet * WATER * BASE * level / 2
+        about_toe = WEIGHT * (BASE - CENTROID) - push - wet * WATER * BASE**2 * level / 3
+        return about_toe - normal * arm
+
+    return brentq(moment, 5, 15)
 
 
 def integral(x, *factors):

@@ -7,7 +7,9 @@ import pytest
 from damjoint import runner
 from damjoint.__main__ import OBJECTS
 from damjoint.input.resolve import load
+from damjoint.pictures import drawing, run_picture
 from damjoint.threads import limited_threads
+from matplotlib.text import Text
 
 
 def pytest_collection_finish():
@@ -63,6 +65,21 @@ def solve(tmp_path_factory):
         return done[key]
 
     return once
+
+
+@pytest.fixture
+def texts_drawn(monkeypatch):
+    """The texts of each picture that this process writes."""
+    pictures = []
+    for module in (drawing, run_picture):
+        original = module.pixels_of
+
+        def pixels_of(figure, dpi, original=original):
+            pictures.append([t.get_text() for t in figure.findobj(Text) if t.get_text()])
+            return original(figure, dpi)
+
+        monkeypatch.setattr(module, "pixels_of", pixels_of)
+    return pictures
 
 
 @pytest.fixture

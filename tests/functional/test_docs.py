@@ -117,4 +117,4 @@ def test_notebooks_are_stored_without_results(path):
     cells = json.loads(path.read_text())["cells"]
     code = [cell for cell in cells if cell["cell_type"] == "code"]
     assert len(code) > 5 and any("assert " in "".join(cell["source"]) for cell in code)
-    assert not any(cell["outputs"] or cell["execution_count"] for cell in code)
+    assert all(cell["outputs"] == [] and cell["execution_count"] is None for cell in code)

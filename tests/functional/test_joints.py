@@ -141,11 +141,13 @@ def test_flow_in_each_joint_has_its_own_heads():
     strong = {"law": "friction", "adhesion": 1e30}
     results = solved([40], uplift="flow", aperture_min=apertures, **strong)
     case = results.case
-    for k, own in enumerate(case.joints):
+    closed = [k for k, own in enumerate(results.joints) if own.at()["delta_n"].max() <= 0]
+    assert len(closed) >= 2
+    for k in closed:
+        own = case.joints[k]
         head = max(40 - max(0.0, own.section["toe_y"][0]), 0)  # a dry toe has its own height
         flux = 1000 * 1000 * 9.81 * head * apertures[k] ** 3 / (12e-3 * own.joint_along)
-        opened = results.joints[k].at()["delta_n"].max() > 0
-        assert opened or results.last[column_of("flux", k)] == pytest.approx(flux, rel=1e-9)
+        assert results.last[column_of("flux", k)] == pytest.approx(flux, rel=1e-9)
 
 
 def test_the_table_has_the_rows_of_each_joint():
@@ -245,13 +247,18 @@ def test_the_mesh_of_one_joint_does_not_depend_on_an_earlier_mesh_of_several():
 
 
 @pytest.mark.parametrize(
-    ("number", "failure"),
+    ("number", "failure", "factor"),
     [
-        pytest.param(271, "sliding on lift 3.109 m", marks=pytest.mark.heavy),
-        (317, "overturning on lift 12.21 m"),
+        pytest.param(271, "sliding on lift 3.109 m", "SSF", marks=pytest.mark.heavy),
+        (317, "overturning on lift 12.21 m", "OSF"),
     ],
 )
-def test_the_joint_that_fails_is_named(number, failure, tmp_path):
-    """Not one that slips on a hardening of its own, nor one that its tension holds."""
+def test_the_joint_that_fails_is_named(number, failure, factor, tmp_path):
+    """Not one that slips on a hardening of its own, nor one that its tension holds: by statics
+    without them the base would have failed first.
+    """
     (result,) = runner.run(random_scene(7, number).case, tmp_path / "out", False, False, False)
     assert verdict(result) == failure
+    level = result.last["level"]
+    base, lift = (getattr(gravity.at(own, 1, level), factor) for own in result.case.joints[:2])
+    assert base < lift and lift == pytest.approx(1, abs=0.021)

@@ -205,8 +205,8 @@ def test_each_block_of_a_dam_across_a_valley_is_in_equilibrium():
             height = 45 - joint.surface.points[:, 1].min()
             assert pressure.sum() == pytest.approx(WATER * 1.5 * height**2 / 2, rel=1e-9)
     assert len(total) == 9
-    for name in total:
-        assert name == "foundation" or np.abs(total[name]).max() < 1e-6 * weight
+    for name in set(total) - {"foundation"}:
+        assert np.abs(total[name]).max() < 1e-6 * weight
 
 
 @pytest.mark.parametrize("order", [1.0, 2.0])

@@ -1,5 +1,7 @@
 """The eleven modelings of SSNP142 against the published numbers; numbers of iterations."""
 
+import math
+
 import numpy as np
 import pytest
 from damjoint.input.resolve import load
@@ -12,21 +14,21 @@ from damjoint.verification import validate
 #: at most so many Newton iterations: in one step, in all of them (both uplifts of a, b, i counted
 #: apart)
 ITERATIONS = {
-    "a": (6, None),
-    "b": (6, None),
-    "c": (5, None),
-    "d": (5, None),
-    "e": (None, 45),
-    "f": (None, 50),
-    "g": (None, 32),
-    "h": (None, 14),
-    "i": (6, None),
-    "j": (5, None),
-    "k": (None, 120),
-    "a_file": (6, None),
-    "c_file": (5, None),
-    "d_file": (5, None),
-    "j_file": (5, None),
+    "a": (6, math.inf),
+    "b": (6, math.inf),
+    "c": (5, math.inf),
+    "d": (5, math.inf),
+    "e": (math.inf, 45),
+    "f": (math.inf, 50),
+    "g": (math.inf, 32),
+    "h": (math.inf, 14),
+    "i": (6, math.inf),
+    "j": (5, math.inf),
+    "k": (math.inf, 120),
+    "a_file": (6, math.inf),
+    "c_file": (5, math.inf),
+    "d_file": (5, math.inf),
+    "j_file": (5, math.inf),
 }
 MODELINGS = [
     pytest.param(name, marks=pytest.mark.heavy) if name[0] in "bdfh" else name
@@ -50,8 +52,8 @@ def test_iterations_at_the_published_steps(solve, name):
         assert not result.stopped
         assert len(history["time"]) == len(result.case.times)  # no step was cut
         assert history["cuts"].sum() == 0
-        assert in_a_step is None or history["iterations"].max() <= in_a_step
-        assert in_all is None or history["iterations"].sum() <= in_all
+        assert history["iterations"].max() <= in_a_step
+        assert history["iterations"].sum() <= in_all
 
 
 def test_validate_prints_the_table(command, tmp_path):

@@ -276,14 +276,19 @@ def test_files_that_are_no_cases_are_refused(command, tmp_path):
         assert code == 2 and message in err and len(err.splitlines()) == 1
 
 
-@pytest.mark.parametrize("text", ['Include "other.case";' * 51, 'Include "pipe.case";'])
-def test_endless_inclusion_is_refused(command, tmp_path, text):
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('Include "other.case";' * 51, "more than 50 files"),
+        ('Include "pipe.case";', "must be a regular file"),
+    ],
+)
+def test_endless_inclusion_is_refused(command, tmp_path, text, message):
     """Of many files in few lines; of a pipe."""
     write(tmp_path, "", "other.case")
     os.mkfifo(tmp_path / "pipe.case")
     code, _, err = command("run", write(tmp_path, text))
-    assert code == 2 and len(err.splitlines()) == 1
-    assert "must be a regular file" in err or "more than 50 files" in err
+    assert code == 2 and len(err.splitlines()) == 1 and message in err
 
 
 def test_without_times_each_level_is_a_step(tmp_path):
@@ -337,4 +342,5 @@ def test_only_published_cases_have_references(tmp_path):
     copy.write_text("levels() = {45};")
     assert load("a").published and load("a", {"n_joint": 20.0, "order": 2.0}).published
     others = load("a", levels="6"), load("a", {"sigma_max": 5e4}), load(str(copy))
-    assert not any(case.published or validation.references(case) for case in others)
+    assert not any(case.published for case in others)
+    assert [validation.references(case) for case in others] == [[]] * len(others)

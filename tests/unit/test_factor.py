@@ -60,7 +60,8 @@ def test_loads_as_a_border(system, method):
     schur = factor.dense_schur(with_loads, np.append(keep, np.arange(size, with_loads.shape[0])))
     assert schur[:5, :5] == pytest.approx(expected, rel=1e-12, abs=1e-13)
     assert schur[:5, 5:] == pytest.approx(reduced, rel=1e-12, abs=1e-13)
-    assert np.array_equal(schur, schur.T) or factor.is_slow()
+    rounding = 1e-12 if factor.is_slow() else 0.0
+    assert np.abs(schur - schur.T).max() <= rounding * np.abs(schur).max()
     inside = np.setdiff1d(np.arange(size), keep)
     moved = np.linalg.solve(matrix.toarray()[np.ix_(inside, inside)], loads[inside])
     assert -schur[5:, 5:] == pytest.approx(loads[inside].T @ moved, rel=1e-12, abs=1e-13)

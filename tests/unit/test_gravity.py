@@ -6,7 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from closed_forms import BASE, CENTROID, WEIGHT, resultants, slide_level
+from closed_forms import (
+    BASE,
+    CENTROID,
+    WEIGHT,
+    integral,
+    resultants,
+    slide_level,
+    slide_level_of_45_m_dam,
+)
 from damjoint.input.resolve import load
 from damjoint.statics import gravity
 from numpy.testing import assert_allclose
@@ -74,10 +82,10 @@ def test_crack_of_the_45_m_dam():
 
 def test_sliding_of_the_45_m_dam():
     assert gravity.at(large({"mu": 1.0, "adhesion": 2e5}), 1).SSF == pytest.approx(1.97, abs=5e-3)
-    for mu, level in ((0.6, 40.619), (0.7, 43.161)):
+    for mu in (0.6, 0.7):
         case = large({"mu": mu, "adhesion": 0.0})
         slides = brentq(lambda h, case=case: gravity.at(case, 1, h).SSF - 1, 30, 45)
-        assert slides == pytest.approx(level, abs=5e-4)
+        assert slides == pytest.approx(slide_level_of_45_m_dam(mu), abs=5e-4)
 
 
 @pytest.mark.parametrize(
@@ -467,16 +475,33 @@ def test_drains_have_no_effect_if_the_crack_passes_them():
 
 
 def test_two_cracks_in_equilibrium():
-    """Drains stop a crack of 2.09 m; a crack of 12.4 m past them is in equilibrium, too."""
+    """Drains stop a crack of 2.09 m; a crack of 12.4 m past them is in equilibrium, too: N B = 3 M,
+    B uncracked, with full head in the crack and the drained diagram beyond it.
+    """
     drains = {"uplift": "cracked", "drains": 1.0, "drain_x": 6.0}
     settings = drains | {"dam_base": 30.0, "law": "bond", "sigma_max": 0.0, "adhesion": 0.0}
     found = gravity.at(load("dam", settings | {"mu": 1.2}, "44", "3"), 1)
     (longer,) = found.further
-    assert (found.crack_length, found.SSF) == pytest.approx((2.088, 1.732), abs=1e-3)
-    assert (longer.crack_length, longer.SSF) == pytest.approx((12.401, 1.162), abs=1e-3)
+    dry = gravity.at(load("dam", settings | {"mu": 1.2, "uplift": "none"}, "44", "3"), 1)
+    effectiveness = found.case["drain_effectiveness"]
+
+    def forces(crack):
+        x = np.array([0, crack, max(6.0, crack), 30])
+        head = np.interp(x, [crack, 30], [44, 3])
+        head[2] -= effectiveness * (head[2] - 3) * (crack < 6)
+        p = WATER * head
+        return dry.N - integral(x, p), dry.M - integral(x, p, 30 - x)
+
+    def excess(crack):
+        normal, moment = forces(crack)
+        return normal * (30 - crack) - 3 * moment
+
+    for method, crack in ((found, brentq(excess, 0, 5.9)), (longer, brentq(excess, 6.1, 25))):
+        assert method.crack_length == pytest.approx(crack, rel=1e-9)
+        assert method.SSF == pytest.approx(1.2 * forces(crack)[0] / dry.T, rel=1e-9)
     assert longer.tip_stress == pytest.approx(0, abs=1) and not longer.further
     (note,) = found.notes
-    assert "if it grows further, crack 12.4 m past the drains (6 m), SSF 1.162" in note
+    assert f"if it grows further, crack {longer.crack_length:.3g} m past the drains (6 m)" in note
     better = settings | {"drain_x": 4.0, "drain_effectiveness": 1.0}
     stopped = gravity.at(load("dam", better, "46.8", "3"), 1)
     (through,) = stopped.further

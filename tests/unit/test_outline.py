@@ -180,7 +180,12 @@ def test_endo_is_broken_where_linear_softening_would_end():
     after = ENDO.update_internal_variables(jumps, ENDO.initial(201))
     first = np.argmax(ENDO.is_broken(jumps, after))
     assert after.plastic[first, 2] == pytest.approx(ENDO.delta_c, rel=2e-3)
-    assert ENDO.cohesion_left(jumps, after)[first] == pytest.approx(0.0875, abs=2e-3)
+    # strength^2 is as S^2/(-S'), S = (1 - alpha)^3/sqrt(alpha)
+    alphas = np.append(np.linspace(1e-3, 0.9, 100_001), after.alpha[first])
+    S = (1 - alphas) ** 3 / np.sqrt(alphas)
+    squares = S**2 / (S * (3 / (1 - alphas) + 0.5 / alphas))
+    left = np.sqrt(squares[-1] / squares.max())
+    assert ENDO.cohesion_left(jumps, after)[first] == pytest.approx(left, rel=1e-6)
 
 
 def test_rows_of_a_stepped_joint():

@@ -213,8 +213,9 @@ def test_a_bad_case_file_is_refused(tmp_path, text, message):
 
 
 def test_every_parameter_has_a_label_with_its_unit():
-    for parameter in parameters.declared().values():
-        assert parameter.text or parameter.label.endswith("]"), parameter.name
+    numbers = [parameter for parameter in parameters.declared().values() if not parameter.text]
+    for parameter in numbers:
+        assert parameter.label.endswith("]"), parameter.name
     names = """dim order mesh_pattern n_joint h_dam h_found dam_base dam_crest dam_height found_side
     found_depth thickness
         E nu rho_dam rho_found rho_water g law K_N K_T sigma_max alpha pena_rupture pena_contact mu
