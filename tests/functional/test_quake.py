@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -660,6 +661,14 @@ def test_the_command_writes_rows_summary_and_picture(command, case_file, tmp_pat
     assert command("report", folder)[0] == 0
     page = Path("report.html").read_text()
     assert "earthquake wave.csv, " in page and "data:image/png" in page
+    # of the ground: its largest acceleration in g, Arias' intensity
+    ground = np.abs(rows["ground_ax"])
+    arias = np.pi / (2 * 9.80665) * np.trapezoid(ground**2, rows["time"])
+    cells = re.findall(r"<td>(.*?)</td>", page.split("Earthquake: ground motion")[1])
+    assert cells[0] == "horizontal"
+    assert float(cells[1]) == pytest.approx(ground.max() / 9.80665, rel=5e-3)
+    assert float(cells[3]) == pytest.approx(arias, rel=1e-2)
+    assert "its stiffness part alone acts" in page and "The rigid block [Newmark 1965]" in page
 
 
 def test_run_json_has_what_that_of_a_run_has(command, case_file, tmp_path):
@@ -791,7 +800,10 @@ def test_a_joint_that_stays_closed_has_no_peak_of_its_opening(command, case_file
     assert "Water pressure in the joint: as before the earthquake." in page
     assert "none of them halved" in page
     # nor is what is required of the static loads judged after the record
-    assert '<p class="fail">required_SSF: not judged in the state after the earthquake</p>' in page
+    assert (
+        '<p class="fail lead">required_SSF: not judged in the state after the earthquake</p>'
+        in page
+    )
     assert 'class="verdict not-judged">not judged<' in page
 
 

@@ -1,7 +1,9 @@
 """Pictures and report of runs, made from their files."""
 
+import base64
 import csv
 import html
+import io
 import json
 import re
 import shutil
@@ -9,12 +11,13 @@ import sys
 
 import numpy as np
 import pytest
-from damjoint import cli
+from damjoint import cli, runner
 from damjoint.input.resolve import load
 from damjoint.pictures.run_picture import shear_limit
 from damjoint.post import stored
 from damjoint.statics import gravity
-from damjoint.studies import report, report_input
+from damjoint.studies import body_stress, report, report_input, report_picture
+from damjoint.studies.check import compare_joints
 from numpy.testing import assert_allclose
 from PIL import Image
 
@@ -155,13 +158,13 @@ def test_report_has_results_and_parameters(command, folder, tmp_path):
     assert not re.search(r"(src|href)=\"(?!data:|#)|url\(|@import", page)
     assert "<i>" not in page and "&lt;i&gt;my&lt;/i&gt; dam &amp; joint" in page
     mine, first, second, common = page.split("<section")[1:]  # a has two scenes
-    assert mine.count("data:image/svg+xml;base64,") == 3
+    assert mine.count("data:image/svg+xml;base64,") == 4
     assert re.search(r"SSF [\d.]+ &lt; 50", mine) and ">fail<" in mine  # required by the case
     for scene in (first, second):  # case a requires none
         assert ">not checked<" in scene and 'class="verdict not-checked"' in scene
     assert ">pass<" not in page
-    assert "not estimated; damjoint run --accuracy 1% estimates it" in mine
     words = words_of(common)
+    assert "Error of the mesh: not estimated; damjoint run --accuracy 1% estimates it." in words
     assert "K_N Normal stiffness K_N 1 20 GPa/m 100" in words
     assert "sigma_max Tensile strength sigma_max, not friction 2, 3" in words
     assert "levels Reservoir levels at t = 1, 2, ... 1 8, 10 m" in words
@@ -192,7 +195,7 @@ def test_tables_of_the_report_have_the_values_of_the_files(page, ran):
         assert_allclose(column(levels, head), result.history[name], rtol=1e-3)
 
     method = gravity.at(result.case, 2.0)
-    both = rows_below(page, "Finite elements and gravity method, at the last level")
+    both = rows_below(page, "Finite elements and gravity method, at level 10 m")
     assert [row[0] for row in both[1:]] == ["finite elements", "gravity method", "required"]
     assert_allclose(column(both, "SSF"), [method.SSF, method.SSF, 50], rtol=1e-3)
     assert_allclose(column(both, "U")[:2], method.U, rtol=1e-3)
@@ -286,10 +289,9 @@ def test_report_of_a_critical_value(command, tmp_path):
     assert command("report", "limit")[0] == 0
     page = (tmp_path / "report.html").read_text()
     assert 'class="verdict not-judged">not judged<' in page and ">fail<" not in page
-    assert '<p class="fail">required_SSF: not judged in the state before failure</p>' in page
+    assert '<p class="fail lead">required_SSF: not judged in the state before failure</p>' in page
     assert f"critical level {level:.6g} m" in words_of(page)
-    both = rows_below(page, "Finite elements and gravity method, at the last level")
-    assert_allclose(column(both, "level")[:2], level, rtol=1e-3)
+    both = rows_below(page, f"Finite elements and gravity method, at level {level:.4g} m")
     assert_allclose(column(both, "N'")[0], column(both, "N'")[1], rtol=1e-3)
 
 
@@ -337,10 +339,85 @@ def test_report_of_several_joints_has_the_levels_of_each(command, tmp_path):
     command("run", "dam", *SMALL, *lifts, "--out", "dam")
     assert command("report", "dam")[0] == 0
     page = (tmp_path / "report.html").read_text()
-    history = stored.read(tmp_path / "dam").result.history
-    for joint, normal in (("base", history["N"]), ("lift 15 m", history["N_2"])):
+    result = stored.read(tmp_path / "dam").result
+    history = result.history
+    for joint, normal in (("Base", history["N"]), ("Lift 15 m", history["N_2"])):
         rows = rows_below(page, f"{joint}: at the requested levels, by finite elements")
         assert_allclose(column(rows, "N'"), normal, rtol=1e-3)
+        assert rows[0][-2:] == ["crest movement [mm]", "N' in"]
+    # as equals: a row of each in the summary, the loads of each
+    summary = rows_below(page, "Summary")
+    assert [row[2] for row in summary[1:]] == ["base", "lift 15 m"]
+    assert_allclose(column(summary, "T"), [history["T"][-1], history["T_2"][-1]], rtol=1e-3)
+    for joint, own in zip(("Base", "Lift 15 m"), result.joints, strict=True):
+        words = "loads of the gravity method on the body above the joint, at the last level"
+        loads = rows_below(page, f"{joint}: {words}")
+        method = gravity.at(own.case, 2.0)
+        assert_allclose(column(loads, "moment about the toe")[-1], method.M, rtol=1e-3)
+    assert page.count("SSF = (µ N") == 2
+
+
+def test_stress_on_the_faces_is_that_of_water_and_of_a_beam(tmp_path):
+    """Of a wall: along its faces weight and bending stress, normal to them the water; the mean
+    pressure on the rock is that of the weight.
+    """
+    wall = {"dam_height": 40, "dam_base": 6, "dam_crest": 6, "h_dam": 0.8, "n_joint": 20}
+    joint = {"law": "friction", "adhesion": 1e8, "uplift": "none"}
+    runner.run(load("dam", wall | joint, "30"), tmp_path, picture=False, progress=False)
+    solution = stored.read(tmp_path)
+    section = body_stress.undeformed(solution, 1.0)
+    rows = np.array(body_stress.faces(solution, 1.0, section).rows, float)
+    height, up, water, down, dry = rows.T
+    assert_allclose(height, [4, 10, 20, 30])
+    water_above = np.maximum(30 - height, 0)
+    assert_allclose(-1e6 * water, 9810 * water_above, atol=3e3)  # 1 % of the largest
+    assert_allclose(dry, 0, atol=2e-3)
+    bending = 9810 * water_above**3 / 6**2 / 1e6  # 6 M/b^2
+    weight = 2400 * 9.81 * (40 - height) / 1e6
+    # a load that is not at the ends adds about 0.2 of its pressure [Timoshenko]
+    assert_allclose(up[1:], (bending - weight)[1:], atol=0.25 * 9810e-6 * 20)
+    assert_allclose(down[1:], -(bending + weight)[1:], atol=0.25 * 9810e-6 * 20)
+    result = solution.result
+    pressure = body_stress.rock_pressure(solution, compare_joints(result), 1.0)
+    assert_allclose([float(row[1]) for row in pressure.rows], 2400 * 9.81 * 40 / 1e6, rtol=1e-2)
+    mean, edge = 2400 * 9.81 * 40 / 1e6, 9810 * 30**3 / 6**2 / 1e6
+    ends = [float(value) for value in pressure.rows[1][2:4]]
+    assert_allclose(ends, [mean - edge, mean + edge], rtol=1e-2)
+    # the largest tension and compression are near the two edges of the base
+    dam = [float(value) for value in body_stress.extremes(solution, 1.0).rows[0][1:]]
+    assert 0 < dam[1] < 2 and 4 < dam[4] < 6 and dam[0] > up[1] and dam[3] < down[1]
+
+
+def test_principal_stresses_are_those_of_mohr():
+    """In the plane, of a rotated state, and in space."""
+    rotated = np.array([[3.0, 1.0, 0.5, 2.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 4.0, 0.0]])
+    found = body_stress.principal(rotated)
+    radius = np.hypot(1, 2)
+    assert_allclose(found[0], sorted([2 - radius, 0.5, 2 + radius]))
+    assert_allclose(found[1], [-4, 0, 4], atol=1e-12)
+
+
+def test_the_name_of_the_dam_is_in_the_report(command, page, folder, tmp_path):
+    """By default the title of the case."""
+    assert '<td contenteditable="true">&lt;i&gt;my&lt;/i&gt; dam &amp; joint</td>' in page
+    assert command("report", folder, "--dam", "Pine Flat")[0] == 0
+    named = (tmp_path / "report.html").read_text()
+    assert "<h1>Pine Flat</h1>" in named and '<td contenteditable="true">Pine Flat</td>' in named
+
+
+def test_a_picture_is_cut_where_it_is_white(tmp_path):
+    """Into bands that have all of it; none is cut within what is drawn."""
+    drawn = np.full((300, 100, 3), 255, np.uint8)
+    for top in (10, 60, 110, 200):
+        drawn[top : top + 40, 20:80] = 0
+    Image.fromarray(drawn).save(tmp_path / "all.png")
+    parts = [
+        np.asarray(Image.open(io.BytesIO(base64.b64decode(address.split(",")[1]))))
+        for address in report_picture.bands(tmp_path / "all.png")
+    ]
+    assert [len(part) for part in parts] == [55, 50, 70, 95, 30]
+    assert np.array_equal(np.concatenate(parts), drawn)
+    assert all(part[0].min() == part[-1].min() == 255 for part in parts)
 
 
 def test_parameters_of_a_report_are_those_of_its_own_case():
@@ -359,7 +436,7 @@ def test_values_are_merged_over_runs():
 
 @pytest.mark.heavy
 def test_pages_of_the_report_as_pdf(command, checked, page_of_check, tmp_path, monkeypatch):
-    """A summary, a page per run, a page of input; nothing is wider than the page's text."""
+    """Nothing is wider than the page's text, no page ends with a heading, none is half empty."""
     weasyprint = pytest.importorskip("weasyprint", exc_type=(ImportError, OSError))
     render, documents = weasyprint.HTML.render, []
 
@@ -368,17 +445,16 @@ def test_pages_of_the_report_as_pdf(command, checked, page_of_check, tmp_path, m
         return documents[-1]
 
     monkeypatch.setattr(weasyprint.HTML, "render", kept)
-    monkeypatch.setattr(report, "read_section", lambda _: None)
-    monkeypatch.setattr(report, "page_of", lambda _: page_of_check)
+    monkeypatch.setattr(report, "read_section", lambda *_: None)
+    monkeypatch.setattr(report, "page_of", lambda *_: page_of_check)
     assert command("report", checked, "--to", "my.PDF") == (0, "my.PDF\n", "")
     content = (tmp_path / "my.PDF").read_bytes()
     assert content.startswith(b"%PDF-") and content.rstrip().endswith(b"%%EOF")
     (pages,) = (document.pages for document in documents)
-    assert len(pages) == 1 + len(COMBINATIONS) + 1
     chapters = [label for part in pages for level, label, *_ in part.bookmarks if level == 2]
     assert [chapter.split()[0] for chapter in chapters[:5]] == ["Summary", "Limits", *["Run"] * 3]
-    for part in pages:
-        box = part._page_box
+    for number, part in enumerate(pages):
+        box, ends = part._page_box, dict[float, str]()
         left, right = box.content_box_x(), box.content_box_x() + box.width
         bottom = box.content_box_y() + box.height
         for child in box.children[0].descendants():
@@ -386,6 +462,10 @@ def test_pages_of_the_report_as_pdf(command, checked, page_of_check, tmp_path, m
                 assert left - 0.1 <= child.position_x, words_of(str(child))
                 assert child.position_x + child.border_width() <= right + 0.1
                 assert child.position_y + child.border_height() <= bottom + 0.1
+            if child.element_tag in ("td", "img", "p", "li", "h2", "h3"):
+                ends[child.position_y + child.border_height()] = child.element_tag
+        assert ends[max(ends)] not in ("h2", "h3")
+        assert max(ends) > bottom / 2 or number == len(pages) - 1
 
 
 def test_a_pdf_without_weasyprint_is_refused(command, checked, tmp_path, monkeypatch):

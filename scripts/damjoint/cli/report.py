@@ -22,12 +22,15 @@ def add(command: Parser) -> None:
         help="the report; a PDF if the name ends in .pdf, which needs weasyprint (default: "
         "report.html)",
     )
+    command.add_argument(
+        "--dam", default="", metavar="NAME", help="name of the dam (default: the title of the runs)"
+    )
 
 
 def call(arguments: argparse.Namespace) -> int:
     """Run damjoint report."""
     from ..studies import report
 
-    report.write(arguments.out, arguments.to)
+    report.write(arguments.out, arguments.to, arguments.dam)
     print(arguments.to)
     return 0

@@ -416,8 +416,12 @@ class Panel(NamedTuple):
 
 
 def draw_history(figure: AnyFigure, shown: list[Panel], result: Results) -> None:
-    """Draw panels over the level, and mark the steps at which other loads change."""
-    row = panels(figure, 1, len(shown), bottom=0.42, top=0.25)[0]
+    """Draw panels over the level, side by side or in a high figure below each other, and mark the
+    steps at which other loads change.
+    """
+    high = figure.bbox.width < 2 * figure.bbox.height
+    shape = (len(shown), 1) if high else (1, len(shown))
+    row = panels(figure, *shape, bottom=0.42, top=0.25, down=0.55).ravel()
     level, marks = result.history["level"], changes_at_a_level(result)
     for axes, (quantity, units, lines) in zip(row, shown, strict=True):
         name, factor = unit([values for values, *_ in lines], units)
@@ -430,14 +434,17 @@ def draw_history(figure: AnyFigure, shown: list[Panel], result: Results) -> None
             axes.plot(*place, "o", color=RED, markersize=8, mfc="none", label="_changed")
             away = {"xytext": (-7, 2), "textcoords": "offset points"}
             axes.annotate(text, place, **away, ha="right", fontsize=7, color=RED)
-        axes.set_xlabel("reservoir level [m]", fontsize=9)
+        if not high or axes is row[-1]:
+            axes.set_xlabel("reservoir level [m]", fontsize=9)
         axes.set_ylabel(f"{quantity} [{name}]", fontsize=8.5)
         axes.grid(alpha=0.3)
         widen(axes.yaxis)
         if name == "%":
             axes.set_ylim(*PERCENT)
-        if len(lines) > 1 and not (result.case.of_joints and axes is row[0]):
-            legend_above(axes)  # one for all panels of several joints
+        # one legend for all panels of several joints
+        without = row[-1] if high else row[0]
+        if len(lines) > 1 and not (result.case.of_joints and axes is without):
+            legend_above(axes)
 
 
 #: Styles of the lines of a panel, so that they differ without colors.

@@ -64,9 +64,9 @@ def table_of(columns: list[tuple[str, np.ndarray, Units]], digits: int = 4) -> T
     return Table(names, sizes, list(zip(*cells, strict=True)))
 
 
-def levels_table(result: Results) -> Table:
+def levels_table(result: Results, displacements: Units | None = None) -> Table:
     """Tabulate the history of a joint, the only one of these results, at the requested levels and
-    at the end of the run.
+    at the end of the run; displacements: their units, by default those that suit their size.
     """
     history, case = result.history, result.case
     rows = requested_rows(result)
@@ -75,7 +75,7 @@ def levels_table(result: Results) -> Table:
     names, sizes, cells = table_of(
         [
             # one unit of forces in all tables
-            (head, history[name][rows], units[:1] if units in (FORCES, MOMENTS) else units)
+            (head, history[name][rows], units_shown(units, displacements))
             for name, head, units in SHOWN
             if (name != "flux" or case["uplift"] == "flow")
             and (name not in ("tail_level", "process_zone") or history[name].any())
@@ -85,6 +85,13 @@ def levels_table(result: Results) -> Table:
     thirds = (gravity.position(x, case.joint_length) for x in history["x_resultant"][rows])
     cells = [(*row, third) for row, third in zip(cells, thirds, strict=True)]
     return Table([*names, "N' in"], [*sizes, ""], cells)
+
+
+def units_shown(units: Units, displacements: Units | None) -> Units:
+    """The units of a column of `levels_table`: a single one of forces, in all tables."""
+    if units is LENGTHS and displacements:
+        return displacements
+    return units[:1] if units in (FORCES, MOMENTS) else units
 
 
 #: Columns of the table of the joints: name in the history, heading.

@@ -39,6 +39,8 @@ GRAVITY = 9.81
 CURVES, SHAPES = 12.0, 2.6
 #: Colors of heel and toe, joint by joint.
 COLORS = (RED, GREEN), (ORANGE, BLUE), (VIOLET, DARK), ("#6d4c41", "#00838f")
+#: Entries of a legend in a row with large letters.
+IN_ROW = 5
 #: Part of the stresses within the colors of the map [%].
 SHOWN = 99
 #: Largest number of rows of the map of the stress.
@@ -76,7 +78,7 @@ def figure(result: QuakeResult) -> Figure:
     ]
     if rows["ground_ay"].any():
         curves[0][1].append(("along y", rows["ground_ay"], ORANGE))
-    for k in joints:
+    for k in most_slip(result):
         name = f", {case.joint_names[k]}" if len(case.joints) > 1 else ""
         heel, toe = COLORS[k % len(COLORS)]
         for end, color in (("heel", heel), ("toe", toe)):
@@ -95,8 +97,10 @@ def figure(result: QuakeResult) -> Figure:
         axes[4].axhline(1e3 * block, color=DARK, lw=0.8, ls="--", label=words)
     draw_strength(axes[5], result)
     for ax in axes[:6]:
-        above = {"loc": "lower right", "bbox_to_anchor": (1, 0.97), "ncols": 4, "frameon": False}
-        ax.legend(fontsize=7, **above)
+        above = {"loc": "lower right", "bbox_to_anchor": (1.01, 0.97), "frameon": False}
+        number = len(ax.get_legend_handles_labels()[0])
+        close = {"handlelength": 1.2, "columnspacing": 0.8, "handletextpad": 0.3}
+        ax.legend(fontsize=7 if number <= IN_ROW else 5.5, ncols=number, **above, **close)
         ax.tick_params(labelbottom=False, labelsize=8)
     step = max(1, len(time) // MOST_ROWS)
     values = stress["sigma_n_eff"][::step].T / 1e6
@@ -122,6 +126,12 @@ def figure(result: QuakeResult) -> Figure:
     bar.tick_params(labelsize=7)
     draw_shapes(picture, result)
     return picture
+
+
+def most_slip(result: QuakeResult) -> list[int]:
+    """The joints that are drawn, by number: as many as there are colors, those that slip most."""
+    slip = [np.abs(result.rows[column_of("slip_mean", k)]).max() for k in result.joints]
+    return sorted(sorted(result.joints, key=lambda k: -slip[k])[: len(COLORS)])
 
 
 def facts_of(result: QuakeResult) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -108,27 +109,70 @@ class QuakeResult(QuakeTables):
         return {name: self.rows[of_joint.get(name, name)] for name in QUAKE}
 
 
-def peaks_table(found: dict[str, Any], case: Case) -> Table:
-    """Tabulate the peaks of a summary."""
+#: Peaks that are printed in mm: columns of quake.csv, of all joints.
+DISPLACEMENTS = "crest_ux", "heel_opening", "toe_opening", "slip_mean"
+
+
+def peak_cells(name: str, peak: dict[str, float], unit: str) -> tuple[str, str, str]:
+    """Unit, value and time [s] of a peak; name: its column of quake.csv."""
+    if "opening" in name and peak["value"] <= 0:
+        return unit, "closed", ""
+    in_mm = name.startswith(DISPLACEMENTS)
+    value = peak["value"] * (1e3 if in_mm else 1)
+    return "mm" if in_mm else unit, f"{value:.4g}", f"{peak['time']:.3f}"
+
+
+def peaks_table(found: dict[str, Any], case: Case, of_joints: bool = True) -> Table:
+    """Tabulate the peaks of a summary; of_joints: also those of the joints."""
     columns, rows = quake_columns(case), list[tuple[str, ...]]()
     for name, peak in found["peaks"].items():
         unit, meaning = columns[name]
-        closed = "opening" in name and peak["value"] <= 0
-        value = ("closed", "") if closed else (f"{peak['value']:.4g}", f"{peak['time']:.3f}")
-        rows.append((meaning, unit, *value))
+        if of_joints or name in quake_summary.PEAKS:
+            rows.append((meaning, *peak_cells(name, peak, unit)))
     return Table(["peak of", "unit", "value", "at t"], ["", "", "", "s"], rows)
+
+
+#: Columns of the table of the joints: heading, unit, name in the peaks or the values at the end.
+OF_JOINTS = (
+    ("opening, heel", "mm", "heel_opening"),
+    ("toe", "mm", "toe_opening"),
+    ("open", "m", "open_length"),
+    ("broken", "m", "broken_length"),
+    ("slip", "mm", "slip_mean"),
+)
+
+
+def joints_table(found: dict[str, Any], case: Case) -> Table:
+    """Tabulate the joints after an earthquake, a row each: peaks, then the values at its end."""
+    ends = AT_REST if found["at_rest"] else MOVING
+    rows = []
+    for k, joint in enumerate(case.joint_names):
+        peaks = [
+            peak_cells(name, found["peaks"][column_of(name, k)], unit)[1]
+            for _, unit, name in OF_JOINTS
+        ]
+        values = [(found[group].get(column_of(n, k)), unit) for group, n, _, unit in ends]
+        at_end = [
+            "-" if value is None else f"{value * (1e3 if unit == 'mm' else 1):.4g}"
+            for value, unit in values
+        ]
+        rows.append((joint, *peaks, *at_end))
+    heads = [(f"peak of {h}" if "," in h else h, unit) for h, unit, _ in OF_JOINTS]
+    heads += [(meaning, unit.strip("-")) for _, _, meaning, unit in ends]
+    names, units = zip(*heads, strict=True)
+    return Table(["joint", *names], ["", *units], rows)
 
 
 #: Values of a summary at rest, and at the end of a dam that is not: group, name, meaning, unit.
 AT_REST = [
-    ("residual", "slip", "residual slip", "m"),
+    ("residual", "slip", "residual slip", "mm"),
     ("residual", "tilt", "residual tilt", "-"),
-    ("residual", "rigid_block", "rigid block, slip", "m"),
+    ("residual", "rigid_block", "rigid block, slip", "mm"),
 ]
 MOVING = [
-    ("end", "slip", "slip, not at rest", "m"),
-    ("end", "change", "its change without shaking", "m"),
-    ("residual", "rigid_block", "rigid block, slip", "m"),
+    ("end", "slip", "slip, not at rest", "mm"),
+    ("end", "change", "its change without shaking", "mm"),
+    ("residual", "rigid_block", "rigid block, slip", "mm"),
 ]
 
 
@@ -139,7 +183,7 @@ def residual_table(found: dict[str, Any], case: Case) -> Table:
         of = f" ({case.named((k,))})" if case.of_joints else ""
         for group, name, meaning, unit in AT_REST if found["at_rest"] else MOVING:
             if (value := found[group].get(column_of(name, k))) is not None:
-                rows.append((meaning + of, unit, f"{value:.4g}"))
+                rows.append((meaning + of, unit, f"{value * (1e3 if unit == 'mm' else 1):.4g}"))
     head = "at rest" if found["at_rest"] else "not at rest"
     return Table([head, "unit", "value"], ["", "", ""], rows)
 
@@ -153,14 +197,19 @@ def modes(found: dict[str, Any]) -> str:
             f"{mode['frequency']:.3g} Hz ({share:.0%} of the mass along {axis}, damping "
             f"{mode['damping']:.1%})"
         )
+    return f"natural modes, joint closed, with the water: {', '.join(texts)}; {damping_of(found)}"
+
+
+def damping_of(found: dict[str, Any]) -> str:
+    """What Rayleigh's damping of a summary is set to, and which part of it acts."""
     damping = found["damping"]
-    part = "stiffness"
+    first, second = damping["first"], damping["second"]
+    ratio = math.pi * damping["a1"] * (first + second)
+    acts = "its stiffness part alone acts (damping_mass = 0), with less damping in these modes"
     if damping["a0"]:
-        part += " and mass of concrete" + (" and water" if damping["with_water"] else "")
-    return (
-        f"natural modes, joint closed, with the water: {', '.join(texts)}; Rayleigh damping by "
-        f"{part}, set at {damping['first']:.3g} and {damping['second']:.3g} Hz"
-    )
+        acts = "mass of concrete" + (" and water" if damping["with_water"] else "")
+        acts = f"its parts by stiffness and {acts} act"
+    return f"Rayleigh damping set to {100 * ratio:.3g} % at {first:.3g} and {second:.3g} Hz: {acts}"
 
 
 #: Width of a printed table beside its first column.

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import base64
 import csv
-import io
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
@@ -17,6 +15,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from matplotlib.figure import Figure
 
 from .. import ROUND_OFF, InputError, RunError, __version__
+from ..dynamics.record import STANDARD_GRAVITY
 from ..input.case import Case
 from ..input.case_names import is_name
 from ..model.fields import Solution
@@ -24,13 +23,13 @@ from ..model.results import Results
 from ..pictures import run_picture
 from ..pictures.drawing import figure_of
 from ..post import stored
-from ..post.summary import Table, levels_table, table_of
+from ..post.summary import Table, joints_table, levels_table, table_of
 from ..post.units import FORCES, MOMENTS, Units, unit
 from ..post.validation import shown_time
 from ..statics.gravity import GravityMethod, force, resultant_of
-from ..statics.verdict import decisive_joint, stiffness_ratio
+from ..statics.verdict import stiffness_ratio
 from ..storage import atomic_write
-from . import quake_result, report_input
+from . import body_stress, report_input, report_quake
 from .check import (
     NOT_JUDGED,
     REQUIRED,
@@ -44,15 +43,17 @@ from .check import (
     requirements,
 )
 from .report_input import Entry, by_runs, in_table
+from .report_picture import Picture, embedded
 
-#: Resolution of the rasterised parts of a picture.
-DPI = 160
 #: Sizes of the pictures [inches]: half of the page's width; its width; its width, in 3D.
 HALF, WIDE, SOLID = (5.2, 4.9), (10.6, 2.1), (10.6, 4.4)
+#: That of the stress, and height of the curves of one of several joints.
+STRESS, PER_JOINT = (10.6, 4.2), 1.35
 MINUTE = "%Y-%m-%d %H:%M"
 #: A column for `table_of`: heading, values, units.
 Column = tuple[str, np.ndarray, Units]
 METRES: Units = (("m", 1.0),)
+MILLIMETRES: Units = (("mm", 1e3),)
 RATIO: Units = (("", 1.0),)
 
 #: Columns of the summary: name, heading, units. A column without values is left out.
@@ -73,28 +74,23 @@ SUMMARY: tuple[tuple[str, str, Units], ...] = (
 
 
 @dataclass(frozen=True)
-class Picture:
-    """A picture of the report: CSS class of its size, caption, data address."""
+class JointSection:
+    """A joint in the report."""
 
-    size: str
-    caption: str
-    address: str
-
-
-@dataclass(frozen=True)
-class Earthquake:
-    """An earthquake in the report."""
-
-    pictures: list[Picture]
-    tables: list[Table]
-    #: uplift, natural frequencies and damping
-    notes: list[str]
+    #: its name, as the begin of a heading; empty if there is only one
+    name: str
+    #: at the requested levels, by finite elements
+    levels: Table
+    #: of the gravity method; None for a user's own geometry
+    loads: Table | None
+    formulas: list[str]
 
 
 @dataclass(frozen=True)
 class RunSection:
     """A run in the report."""
 
+    number: int
     folder: str
     title: str
     scene: str
@@ -109,21 +105,25 @@ class RunSection:
     #: hints on the result, critical value, discretisation error
     hints: list[str]
     pictures: list[Picture]
-    #: tables at the requested levels, by name of the joint, empty if there is only one
-    levels: dict[str, Table]
-    #: of an earthquake: its picture, peaks and residual values, modes; else None
-    earthquake: Earthquake | None
+    joints: list[JointSection]
+    #: several joints at the last level; else None
+    of_joints: Table | None
+    #: of `damjoint quake`; else None
+    earthquake: report_quake.Earthquake | None
+    #: level of the last state, as text
+    level: str
     #: both methods
     methods: Table
-    #: loads and formulas of the gravity method; None for a user's own geometry
-    loads: Table | None
-    formulas: list[str]
     #: notes on the comparison of both methods
     notes: list[str]
-    #: values of the columns SUMMARY
-    summary: dict[str, float]
+    #: of the bodies, at the last level
+    stress: Stress
+    #: values of the columns SUMMARY of each joint, by its name
+    summary: dict[str, dict[str, float]]
     #: mesh, steps, engine: text by heading
     computation: dict[str, str]
+    #: error of the mesh, as far as it is known
+    error: str
     materials: dict[str, Entry]
     other_input: dict[str, Entry]
     limits: list[str]
@@ -131,9 +131,18 @@ class RunSection:
     versions: dict[str, str]
 
 
-def write(folders: list[Path], to: Path) -> None:
+@dataclass(frozen=True)
+class Stress:
+    """Stress in the bodies of a run: pictures, tables, and what is missing."""
+
+    pictures: list[Picture]
+    tables: list[Table]
+    note: str
+
+
+def write(folders: list[Path], to: Path, dam: str = "") -> None:
     """Write the report on the runs in folders, those of their further scenes included: a PDF if its
-    name ends in .pdf, else HTML.
+    name ends in .pdf, else HTML. dam: its name, by default the title of the runs.
 
     A folder of `damjoint check` has a run per load combination. Raises InputError if a folder is
     not that of a run, or the file can not be written; RunError if weasyprint is not installed.
@@ -145,7 +154,8 @@ def write(folders: list[Path], to: Path) -> None:
         raise InputError(
             f"to = {to}: must be a file; in the folder of a run it must end in .html or .pdf"
         )
-    page = rendered(page_of([read_section(folder) for folder in runs]))
+    sections = [read_section(folder, number) for number, folder in enumerate(runs, start=1)]
+    page = rendered(page_of(sections, dam))
     try:
         with atomic_write(to) as path:
             path.write_bytes(page)
@@ -171,8 +181,9 @@ def renderer(to: Path) -> Callable[[str], bytes]:
     return lambda page: weasyprint.HTML(string=page).write_pdf()
 
 
-def page_of(sections: list[RunSection]) -> str:
-    """Render the page."""
+def page_of(sections: list[RunSection], dam: str = "") -> str:
+    """Render the page; dam: its name, by default the title that all runs have."""
+    titles = {section.title for section in sections}
     environment = Environment(
         loader=FileSystemLoader(Path(__file__).parent),
         autoescape=True,
@@ -186,12 +197,16 @@ def page_of(sections: list[RunSection]) -> str:
     listed = {name for name, entry, _ in entries if in_table(name, entry)}
     return environment.get_template("report.html.j2").render(
         runs=sections,
+        dam=dam or (titles.pop() if len(titles) == 1 else ""),
+        corner=f"{body_stress.CORNER:.0%}",
         summary=summary_table(sections),
+        of_joints=any(name for section in sections for name in section.summary),
         computations=Table(heads, ["" for _ in heads], rows),
         materials=by_runs([section.materials for section in sections]),
         other_input=[row for row in entries if row[0] in listed],
         at_default=[row for row in entries if row[0] not in listed],
         limits=by_runs([dict.fromkeys(section.limits, "") for section in sections]),
+        errors=by_runs([{section.error: ""} for section in sections]),
         versions=by_runs([section.versions for section in sections]),
         version=__version__,
         now=f"{datetime.now():{MINUTE}}",
@@ -218,36 +233,33 @@ def parts_of(folder: Path) -> list[Path]:
 
 
 def summary_table(sections: list[RunSection]) -> Table:
-    """Tabulate the last state of each run."""
-    columns = []
+    """Tabulate the last state of each run, a row for each of its joints."""
+    columns = list[Column]()
+    states = [state for section in sections for state in section.summary.values()]
     for name, head, units in SUMMARY:
-        values = np.array([section.summary.get(name, math.nan) for section in sections])
+        values = np.array([state.get(name, math.nan) for state in states])
         if np.isfinite(values).any():
             columns.append((head, values, units))
     return table_of(columns)
 
 
-def read_section(folder: Path) -> RunSection:
-    """Make the section of a run from its folder.
+def read_section(folder: Path, number: int) -> RunSection:
+    """Make the section of a run, the number of the report's, from its folder.
 
     Raises InputError if files are damaged.
     """
     solution = stored.read(folder)
     try:
-        return run_section(folder, solution)
+        return run_section(folder, number, solution)
     except stored.DAMAGED as error:
         raise InputError(f"out = {folder}: damaged ({error!r}); run the case again") from None
 
 
-def run_section(folder: Path, solution: Solution) -> RunSection:
-    """Make the section of a run."""
+def run_section(folder: Path, number: int, solution: Solution) -> RunSection:
+    """Make the section of a run; number: in the report."""
     result = solution.result
-    case, info = result.case, result.info
+    case, info, last = result.case, result.info, result.last
     checks = compare_joints(result)
-    number = decisive_joint(result)
-    joint_result, check = result.joints[number], checks[number]
-    # the loads one by one need a section by parameters
-    rigid = None if case.geometry else hand_calculation(joint_result)
     critical = critical_value(info.get("critical"))
     # requirements do not apply to the last state before a failure, nor to that after an earthquake,
     # in which the whole joint has slipped
@@ -261,6 +273,7 @@ def run_section(folder: Path, solution: Solution) -> RunSection:
         failures = [f"{', '.join(required)}: {NOT_JUDGED} in the state {state}"]
     made = datetime.fromtimestamp((folder / "run.json").stat().st_mtime)
     return RunSection(
+        number=number,
         folder=str(folder),
         title=case.title,
         scene=describe_scene(case),
@@ -270,20 +283,25 @@ def run_section(folder: Path, solution: Solution) -> RunSection:
         run_verdict="critical value" if critical else info["verdict"],
         failures=failures,
         hints=[
-            *filter(None, [which_joint(result), critical, earthquake(info), *info["hints"]]),
+            *filter(None, [critical, earthquake(info), *info["hints"]]),
             *info.get("notes", []),
             *(info.get("critical") or {}).get("gravity_method_notes", ()),
-            *filter(None, [discretisation_error(result)]),
         ],
         pictures=pictures_of(solution) if len(result.joint["time"]) else [],
-        levels={result.case.named((k,)): levels_table(o) for k, o in enumerate(result.joints)},
-        earthquake=earthquake_section(folder, case, info),
+        joints=[
+            joint_section(joint, result.case.named((k,))) for k, joint in enumerate(result.joints)
+        ],
+        of_joints=joints_table(result, result.last["time"])
+        if case.of_joints and result.last
+        else None,
+        earthquake=report_quake.read(folder, case, info),
+        level=f"{last['level']:.4g} m" if last else "",
         methods=methods_table(case, checks, judged=judged),
-        loads=loads_table(rigid) if rigid else None,
-        formulas=formulas(rigid) if rigid and rigid.stands else [],
         notes=notes_of(checks),
-        summary=summary_of(joint_result, check),
+        stress=stress_of(solution, checks),
+        summary={case.named((k,)): summary_of(check.case, check) for k, check in enumerate(checks)},
         computation=computation(result),
+        error=discretisation_error(result),
         materials=report_input.materials(case),
         other_input=report_input.other_input(case),
         limits=[*report_input.limits(case, earthquake="quake" in info)],
@@ -291,11 +309,35 @@ def run_section(folder: Path, solution: Solution) -> RunSection:
     )
 
 
-def which_joint(result: Results) -> str:
-    """Which of several joints the curves and the table of loads are of; else empty."""
-    name = result.case.named((decisive_joint(result),))
-    shown = "curves" if result.case.geometry else "curves and table of loads"
-    return f"{shown}: {name}" if name else ""
+def joint_section(result: Results, name: str) -> JointSection:
+    """Make the section of a joint, the only one of these results; name: empty if it is alone."""
+    # the loads one by one need a section by parameters
+    rigid = None if result.case.geometry else hand_calculation(result)
+    return JointSection(
+        name=f"{name[0].upper()}{name[1:]}: " if name else "",
+        levels=levels_table(result, MILLIMETRES),
+        loads=loads_table(rigid) if rigid else None,
+        formulas=formulas(rigid) if rigid and rigid.stands else [],
+    )
+
+
+def stress_of(solution: Solution, checks: list[SafetyCheck]) -> Stress:
+    """Stress in the bodies at the last level."""
+    result = solution.result
+    if not len(result.joint["time"]):
+        return Stress([], [], "")
+    time = shown_time(result)
+    pressure = body_stress.rock_pressure(solution, checks, time)
+    tables = [pressure] if pressure else []
+    if time not in solution.fields:
+        return Stress([], tables, "Principal stresses: not known, the run has no fields.")
+    pictures, section = [], body_stress.undeformed(solution, time)
+    if section:
+        figure = figure_of(*STRESS)
+        body_stress.draw_principal(figure, solution, time, section)
+        pictures.append(Picture("full", "", embedded(figure)))
+        tables.append(body_stress.faces(solution, time, section))
+    return Stress(pictures, [body_stress.extremes(solution, time), *tables], "")
 
 
 #: States of a run that has not ended by itself.
@@ -340,9 +382,9 @@ def describe_scene(case: Case) -> str:
     return f"{size}; {plane}; joint law {law}; water in the joint: {water}"
 
 
-def summary_of(result: Results, check: SafetyCheck) -> dict[str, float]:
-    """Values of the columns SUMMARY in SI units."""
-    factors = required_by_case(result.case)
+def summary_of(case: Case, check: SafetyCheck) -> dict[str, float]:
+    """Values of the columns SUMMARY of a joint in SI units; case: of the joint."""
+    factors = required_by_case(case)
     values = dict(check.finite_elements.numbers)
     for name, factor in factors.items():
         values[f"{name}_required"] = factor
@@ -357,21 +399,31 @@ def label(result: MethodResult, case: Case) -> str:
 
 
 def methods_table(case: Case, checks: list[SafetyCheck], judged: bool) -> Table:
-    """Tabulate both methods at the last level for each joint, what is required and, if judged, the
-    verdicts.
+    """Tabulate both methods at the last level for each joint, what is required and, if something is
+    and is judged, the verdicts.
     """
     results = [result for check in checks for result in check.results]
-    rows = [(label(r, case), r.numbers, r.verdict if judged else "") for r in results]
+    rows = [((r.joint, r.method), r.numbers, r.verdict) for r in results]
     factors = required_by_case(case)
     if np.isfinite([*factors.values()]).any():
-        rows.append((REQUIRED, factors, ""))
+        rows.append((("", REQUIRED), factors, ""))
     columns = list[Column]()
-    for units, heads in SHOWN:
+    levels = {r.numbers["level"] for r in results}
+    for units, heads in SHOWN[len(levels) == 1 :]:  # a single level is in the heading
         values = [[numbers.get(n, math.nan) for _, numbers, _ in rows] for n in heads]
         columns += in_one_unit(heads.values(), np.array(values), units)
     names, sizes, cells = table_of(columns)
-    table = [(m, *row, verdict) for (m, _, verdict), row in zip(rows, cells, strict=True)]
-    return Table(["", *names, ""], ["", *(s.strip("-") for s in sizes), ""], table)
+    verdicts = judged and any(r.verdict != UNCHECKED for r in results)
+    first = 0 if case.of_joints else 1
+    table = [
+        (*words[first:], *row, *([verdict] if verdicts else []))
+        for (words, _, verdict), row in zip(rows, cells, strict=True)
+    ]
+    words, end = ["joint", "method"][first:], [""] * verdicts
+    without = [""] * len(words)
+    return Table(
+        [*words, *names, *end], [*without, *(size.strip("-") for size in sizes), *end], table
+    )
 
 
 def in_one_unit(heads: Iterable[str], values: np.ndarray, units: Units) -> Iterator[Column]:
@@ -447,21 +499,25 @@ def pictures_of(solution: Solution) -> list[Picture]:
 def drawn(solution: Solution, time: float, at_level: str) -> Iterator[tuple[str, str, Figure]]:
     """Yield the figures of a run: CSS class of the size, caption, figure."""
     result = solution.result
+    several = len(result.joints) > 1
     colors = "Red: broken; violet: softening; orange: slipped."
     has_fields = bool(solution.fields)
     if has_fields:
         section = figure_of(*HALF)
         run_picture.draw_dam(section, solution, time)
         yield "half", f"Section and loads {at_level}, deformed.", section
-    number = decisive_joint(result)
-    joint = figure_of(*(HALF if has_fields else SOLID))
-    run_picture.draw_joint(joint, solution.of_joint(number), time)
-    name = result.case.named((number,)) or "joint"
-    caption = f"{name[0].upper()}{name[1:]} {at_level}. {colors}"
-    yield "half" if has_fields else "full", caption, joint
-    history = figure_of(*WIDE)
-    run_picture.draw_histories(history, result, time)
-    yield "full", "", history
+    maps = has_fields and run_picture.is_own_solid(result.case)
+    rows = several and not maps
+    changes = len(np.unique(result.history["level"])) > 1  # else a single point or line
+    if rows and has_fields and changes:
+        yield "half", "", history_of(result, HALF)
+    size = (WIDE[0], 1 + PER_JOINT * len(result.joints)) if rows else HALF if has_fields else SOLID
+    joint = figure_of(*size)
+    run_picture.draw_all_joints(joint, solution, time)
+    place = "half" if size is HALF else "full"
+    yield place, f"Joint{'s' if several else ''} {at_level}. {colors}", joint
+    if changes and not (rows and has_fields):
+        yield "full", "", history_of(result, WIDE)
     if result.case["dim"] == 3 and has_fields and not run_picture.is_own_solid(result.case):
         solid = figure_of(*SOLID)
         run_picture.draw_solid(solid, solution, time)
@@ -470,12 +526,12 @@ def drawn(solution: Solution, time: float, at_level: str) -> Iterator[tuple[str,
         yield "half", "Load against opening.", run_picture.draw_curve(result)
 
 
-def embedded(figure: Figure) -> str:
-    """Encode a figure with all its legends as a data address: SVG with rasterised meshes."""
-    file = io.BytesIO()
-    whole: dict[str, Any] = {"bbox_inches": "tight", "pad_inches": 0.05}
-    figure.savefig(file, format="svg", dpi=DPI, metadata={"Date": None}, **whole)
-    return "data:image/svg+xml;base64," + base64.b64encode(file.getvalue()).decode()
+def history_of(result: Results, size: tuple[float, float]) -> Figure:
+    """Draw the history of the joint, or of several as equals."""
+    figure = figure_of(*size)
+    shown = run_picture.panels_of_joints if result.case.of_joints else run_picture.history_panels
+    run_picture.draw_history(figure, shown(result), result)
+    return figure
 
 
 def critical_value(info: dict[str, Any] | None) -> str:
@@ -501,32 +557,10 @@ def earthquake(info: dict[str, Any]) -> str:
         return ""
     ground = abs(found["peaks"]["ground_ax"]["value"])
     return (
-        f"earthquake {Path(found['record']).name}, {ground:.3g} m/s2: {info['statement']}; N', T "
-        "and the last row of the levels are those of the static state after it"
+        f"earthquake {Path(found['record']).name}, {ground / STANDARD_GRAVITY:.3g} g: "
+        f"{info['statement']}; N', T and the last row of the levels are those of the static state "
+        "after it"
     )
-
-
-def earthquake_section(folder: Path, case: Case, info: dict[str, Any]) -> Earthquake | None:
-    """The section on `damjoint quake`, if run.json has its results."""
-    found = info.get("quake")
-    if not found or "at_rest" not in found:
-        return None
-    pictures, path = [], folder / f"{info['case']}_quake.png"
-    if path.is_file():
-        address = "data:image/png;base64," + base64.b64encode(path.read_bytes()).decode()
-        caption = "Earthquake: relative to the ground, since the static state before it."
-        pictures.append(Picture("full", caption, address))
-    halved = "none of them halved"
-    if found["halvings"]:
-        halved = f"halved up to {found['halvings']} times where they did not converge"
-    notes = [
-        *(f"{note}." for note in found["notes"]),
-        f"{quake_result.modes(found)}.",
-        f"{found['steps']} steps of {found['dt']:g} s over {found['time']:g} s, {halved}.",
-        f"Water pressure in the joint: {report_input.uplift_in_earthquake(case)}.",
-    ]
-    tables = [quake_result.peaks_table(found, case), quake_result.residual_table(found, case)]
-    return Earthquake(pictures, tables, [note[0].upper() + note[1:] for note in notes])
 
 
 def discretisation_error(result: Results) -> str:
@@ -535,7 +569,7 @@ def discretisation_error(result: Results) -> str:
         return str(result.info["error_estimate"]["statement"])
     of_mesh = result.case.geometry and result.case.geometry.suffix != ".geo"
     how = "compare a run on a finer mesh" if of_mesh else "damjoint run --accuracy 1% estimates it"
-    return f"error of the mesh: not estimated; {how}"
+    return f"not estimated; {how}"
 
 
 def computation(result: Results) -> dict[str, str]:
