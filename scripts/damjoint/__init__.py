@@ -47,6 +47,7 @@ if TYPE_CHECKING:
 
     from .library import LAWS as LAWS
     from .library import Case as Case
+    from .library import Checks as Checks
     from .library import Critical as Critical
     from .library import JointTable as JointTable
     from .library import Law as Law
@@ -101,7 +102,8 @@ def data(folder: str) -> Path:
 #: What `import damjoint` offers, see library.py; imported when it is used.
 LIBRARY = (
     *("case", "run", "fill", "check", "critical", "quake", "sweep"),
-    *("Case", "Run", "JointTable", "Step", "Critical", "Quake", "Sample", "Sweep", "Law", "LAWS"),
+    *("Case", "Run", "JointTable", "Step", "Checks", "Critical", "Quake", "Sample", "Sweep"),
+    *("Law", "LAWS"),
 )
 __all__ = [*LIBRARY, "InputError", "RunError"]
 
@@ -115,4 +117,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return [*globals(), *LIBRARY]
+    return [*__all__, "__version__"]

@@ -4,6 +4,8 @@
     run = dj.run(case)
     run.verdict, run.joint.at(level=45).opening.max()
 
+Results have `plot()`, the picture of the command, and `to_pandas()`, a table as a DataFrame.
+
 Names and units are those of the parameters and of the tables (reference/parameters.md, results.md).
 Only `Run.save` writes to disk.
 """
@@ -16,7 +18,7 @@ from dataclasses import dataclass, replace
 from html import escape
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
@@ -25,6 +27,7 @@ from .arrays import Array, Table, Value
 from .engines import Outcome, engine_of
 from .engines.condensed.solve import threads_of
 from .input.case import Case
+from .input.case_names import is_name
 from .input.resolve import load, varied
 from .laws import LAWS, Law
 from .model.fields import Solution
@@ -32,6 +35,7 @@ from .model.notes import notes
 from .model.results import (
     HISTORY,
     LATERAL,
+    Columns,
     Results,
     history_columns,
     joint_columns,
@@ -43,7 +47,7 @@ from .solver.state import State
 from .statics.hints import hints
 from .statics.statement import statement
 from .statics.verdict import verdict
-from .studies.plan import Plan, Sample, column_of, in_file, listed, plan_with
+from .studies.plan import Plan, Sample, cases_of, column_of, in_file, listed, plan_with
 from .threads import limited_threads
 
 if TYPE_CHECKING:  # loaded when they are used, with what they draw with
@@ -59,6 +63,7 @@ if TYPE_CHECKING:  # loaded when they are used, with what they draw with
 __all__ = [
     "LAWS",
     "Case",
+    "Checks",
     "Critical",
     "JointTable",
     "Law",
@@ -84,11 +89,15 @@ def case(
     tail_levels: Sequence[float] | float | None = None,
     steps: int | None = None,
     accuracy: str | None = None,
+    record: str | Path | None = None,
+    name: str | None = None,
     **parameters: Value,
 ) -> Case:
     """A case of the package, of a case file, or a variation of another case.
 
-    What is not given is that of the source. `case["mu"]` is the value of a parameter.
+    What is not given is that of the source. A case is a mapping of all parameters: `case["mu"]` or
+    `case.mu` is a value, `"mu" in case`, `case.keys()`; printed, it shows what differs from the
+    defaults. `case.law` is the joint law itself, `case["law"]` its name.
 
     Args:
         source: letter or name of a case of the package, path of a case file, or a case.
@@ -96,6 +105,8 @@ def case(
         tail_levels: of the tailwater [m] at t = 1, 2, ..., or the same at all times.
         steps: equal load steps between two levels.
         accuracy: coarse, standard, fine or a percentage; mesh and steps are refined for it.
+        record: CSV of the ground's acceleration, for `quake`.
+        name: of the case in tables and of its files, by default that of the source.
         parameters: by name, in SI units, as in reference/parameters.md, or as a text with a unit,
             "20*GPa".
 
@@ -106,11 +117,18 @@ def case(
         >>> dam = case("dam", levels=[30, 40], mu=0.8, n_joint=10)
         >>> dam["mu"], dam.levels
         (0.8, (30.0, 40.0))
+        >>> dam
+        dam: levels 30, 40 m; n_joint = 10
     """
     loading = as_list(levels), as_list(tail_levels), steps, accuracy
     if isinstance(source, Case):
-        return varied(source, parameters, *loading)
-    return load(str(source), parameters, *loading)
+        result = varied(source, parameters, *loading)
+    else:
+        result = load(str(source), parameters, *loading)
+    if name is not None and not is_name(name):
+        raise InputError(f"name = {name!r}: must be a text that can be the name of a file")
+    path = result.record if record is None else Path(record)
+    return replace(result, name=result.name if name is None else name, record=path)
 
 
 def as_case(source: Case | str | Path) -> Case:
@@ -134,6 +152,11 @@ class JointTable(np.recarray):
     """Rows of joint.csv as a record array: a column by its name, and by some names in full.
 
     Signs: opening, tension and the downstream direction are positive.
+
+    Example:
+        >>> rows = run(case("dam", levels=[30, 40], n_joint=10)).joint.at(level=40)
+        >>> len(rows), bool(rows.normal_stress.max() < 0)
+        (21, True)
     """
 
     @property
@@ -183,7 +206,15 @@ class JointTable(np.recarray):
 
 @dataclass(frozen=True, repr=False)
 class Run:
-    """The results of a case, made by `run`."""
+    """The results of a case, made by `run`.
+
+    Example:
+        >>> result = run(case("dam", levels=[30, 40], n_joint=10))
+        >>> result
+        dam: stands, level 40 m
+        >>> result.history.level.tolist(), result.case.levels
+        ([30.0, 40.0], (30.0, 40.0))
+    """
 
     outcome: Outcome
 
@@ -224,13 +255,9 @@ class Run:
 
     def plot(self) -> Figure:
         """The picture of the run, as `damjoint run` writes it."""
-        from matplotlib import pyplot
-
         from .pictures.run_picture import picture
 
-        # loads the backend, by which a notebook shows a figure
-        pyplot.draw_if_interactive()
-        return picture(self.solution)
+        return displayed(picture(self.solution))
 
     @property
     def solution(self) -> Solution:
@@ -248,11 +275,11 @@ class Run:
         write_outcomes(self.case, [self.outcome], Path(out))
 
     def to_pandas(self, table: str = "joint") -> pandas.DataFrame:
-        """joint or history as a DataFrame.
+        """joint or history as a DataFrame with units in its `attrs`.
 
         Raises ImportError without pandas, InputError for another table.
         """
-        return optional("pandas").DataFrame(self.table(table))
+        return frame(self.table(table), UNITS_OF[table](self.case))
 
     def to_xarray(self, table: str = "joint") -> xarray.Dataset:
         """joint or history as a Dataset with units: dimensions time and node, or time.
@@ -302,6 +329,32 @@ def records(table: Mapping[str, Any]) -> np.recarray:
     """A table as a record array."""
     arrays = {name: np.asarray(column) for name, column in table.items()}
     return np.rec.fromarrays(arrays.values(), dtype=[(n, a.dtype) for n, a in arrays.items()])
+
+
+#: Units and meanings of the columns of a table, by its name.
+UNITS_OF = {"joint": joint_columns, "history": history_columns}
+
+
+def frame(table: Mapping[str, Any], columns: Columns) -> pandas.DataFrame:
+    """A table as a DataFrame; `attrs["units"]` are the units of its columns.
+
+    Raises ImportError without pandas.
+    """
+    data_frame = optional("pandas").DataFrame(dict(table))
+    data_frame.attrs["units"] = {name: columns[name][0] for name in table if name in columns}
+    return data_frame
+
+
+def displayed(figure: Figure) -> Figure:
+    """A figure with its ticks, after the backend is loaded by which a notebook shows it."""
+    from matplotlib import pyplot
+
+    from .pictures.drawing import picture_style
+
+    pyplot.draw_if_interactive()
+    with picture_style():
+        figure.draw_without_rendering()
+    return figure
 
 
 def attributes(column: tuple[str, str]) -> dict[str, str]:
@@ -355,9 +408,15 @@ def solved(case: Case, engine: str = "auto") -> Run:
     return Run(outcome)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Step:
-    """A converged step of `fill`."""
+    """A converged step of `fill`.
+
+    Example:
+        >>> step = next(fill(case("dam", levels=30, n_joint=10)))
+        >>> step, round(step.row["N"] / 1e6, 1)
+        (t = 1, level 30 m, 15.7)
+    """
 
     #: to start another step from, with `Model.advance`
     state: State
@@ -373,6 +432,9 @@ class Step:
     def level(self) -> float:
         """Level of the reservoir [m]."""
         return self.state.loading.level
+
+    def __repr__(self) -> str:
+        return f"t = {self.time:g}, level {self.level:.6g} m"
 
 
 def fill(source: Case | str | Path) -> Iterator[Step]:
@@ -404,11 +466,77 @@ def fill(source: Case | str | Path) -> Iterator[Step]:
         yield Step(state, stepper.history.last)
 
 
-def check(cases: Case | str | Path | Sequence[Case | str | Path]) -> list[SafetyCheck]:
+@dataclass(frozen=True, repr=False)
+class Checks(Sequence["SafetyCheck"]):
+    """Safety checks, made by `check`: one for each case and joint.
+
+    Of each check, `rows` are those of check.csv, `why` is the reason if it fails or is not judged,
+    else empty, and `notes` are remarks on the result.
+
+    Example:
+        >>> usual = case("dam", levels=40, n_joint=10, required_SSF=1.5, name="usual")
+        >>> checks = check([usual, case(usual, k_h=0.2, name="earthquake")])
+        >>> [(one.case.name, one.rows[0]["verdict"]) for one in checks]
+        [('usual', 'pass'), ('earthquake', 'fail')]
+    """
+
+    #: of each case, its results and the checks of its joints
+    cases: Sequence[tuple[Results, list[SafetyCheck]]]
+
+    @overload
+    def __getitem__(self, number: int) -> SafetyCheck: ...
+
+    @overload
+    def __getitem__(self, number: slice) -> list[SafetyCheck]: ...
+
+    def __getitem__(self, number: int | slice) -> SafetyCheck | list[SafetyCheck]:
+        return [check for _, checks in self.cases for check in checks][number]
+
+    def __len__(self) -> int:
+        return sum(len(checks) for _, checks in self.cases)
+
+    @property
+    def rows(self) -> np.recarray:
+        """check.csv: a row per case, joint and method, and one of the methods' difference."""
+        return records(self.table)
+
+    @property
+    def table(self) -> dict[str, list[Any]]:
+        """The rows by column."""
+        return by_column([row for check in self for row in check.rows])
+
+    def plot(self, number: int = 0) -> Figure:
+        """The picture of a case, by its number from 0, as `damjoint check` writes it.
+
+        Raises InputError for a user's own geometry, which has none.
+        """
+        from .pictures.check_picture import figure_of_check
+        from .studies.check import picture_content
+
+        result, checks = self.cases[number]
+        if result.case.geometry:
+            raise InputError(
+                f"case {result.case.name}: must be a section by parameters to be drawn"
+            )
+        return displayed(figure_of_check(*picture_content(result, checks)))
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """The rows as a DataFrame with units in its `attrs`.
+
+        Raises ImportError without pandas.
+        """
+        from .studies.check import CHECK
+
+        return frame(self.table, CHECK)
+
+    def __repr__(self) -> str:
+        return "\n".join(map(repr, self))
+
+
+def check(cases: Case | str | Path | Sequence[Case | str | Path]) -> Checks:
     """Safety factors of a case or of several, by the finite elements and by the gravity method.
 
-    Each is computed up to its last level. Of each check, `rows` are those of check.csv, `why` is
-    the reason if it fails or is not judged, else empty, and `notes` are remarks on the result.
+    Each is computed up to its last level. The result is a sequence of checks, see `Checks`.
 
     Args:
         cases: the load combinations, or a single one; cases, or their names or paths, see `case`.
@@ -428,13 +556,19 @@ def check(cases: Case | str | Path | Sequence[Case | str | Path]) -> list[Safety
     combinations = [as_case(combination) for combination in listed]
     for combination in combinations:
         noted(combination)
-    runs = map(solved, combinations)
-    return [check for run in runs for check in compare_joints(run.results)]
+    results = [solved(combination).results for combination in combinations]
+    return Checks([(result, compare_joints(result)) for result in results])
 
 
 @dataclass(frozen=True, repr=False)
 class Critical:
-    """A critical value, made by `critical`."""
+    """A critical value, made by `critical`.
+
+    Example:
+        >>> limit = critical("dam", levels=40, n_joint=10, law="friction", adhesion=0.0)
+        >>> round(limit.value, 1), limit.equilibria.dtype.names[:3]
+        (46.1, ('trial', 'value', 'stands'))
+    """
 
     answer: CriticalValue
     search: Search
@@ -442,7 +576,7 @@ class Critical:
     @property
     def value(self) -> float | None:
         """The largest load or smallest strength with an equilibrium; None if there is no limit."""
-        return self.answer.value
+        return None if self.answer.value is None else float(self.answer.value)
 
     @property
     def mode(self) -> str:
@@ -467,6 +601,24 @@ class Critical:
         from .studies.critical_study import table
 
         return records(table(self.search))
+
+    def plot(self) -> Figure:
+        """The picture of the search, as `damjoint critical` writes it."""
+        from .studies.critical_picture import figure_of
+        from .studies.critical_study import content
+
+        return displayed(figure_of(content(self.search, self.answer)))
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """The equilibria as a DataFrame with units in its `attrs`.
+
+        Raises ImportError without pandas.
+        """
+        from .studies.critical_study import table
+        from .studies.failure_path import critical_columns
+
+        columns = critical_columns(self.search.own)
+        return frame(table(self.search), columns | {"value": (self.search.unit.strip(), "")})
 
     def __repr__(self) -> str:
         return "\n".join(self.statement)
@@ -516,7 +668,16 @@ def on_fixed_mesh(chosen: Case) -> Case:
 
 @dataclass(frozen=True, repr=False)
 class Quake:
-    """An earthquake of a case, made by `quake`."""
+    """An earthquake of a case, made by `quake`.
+
+    Example:
+        >>> wave = [f"{i / 50},{2 * (i % 10 == 0)}" for i in range(20)]
+        >>> _ = Path("wave.csv").write_text("time,horizontal\\n" + "\\n".join(wave))
+        >>> shaken = case("dam", levels=30, n_joint=10, record="wave.csv", record_unit="m/s2")
+        >>> result = quake(case(shaken, record_rest=0.5))
+        >>> result.stands, result.units["crest_ux"]
+        (True, 'm')
+    """
 
     #: summary (see results.md), verdict, statement, stands
     tables: QuakeTables
@@ -579,14 +740,31 @@ class Quake:
         """What the end of the earthquake amounts to."""
         return self.tables.statement
 
-    def to_pandas(self) -> pandas.DataFrame:
-        """The rows as a DataFrame with units in its `attrs`.
+    def plot(self) -> Figure:
+        """The picture of the earthquake, as `damjoint quake` writes it.
 
-        Raises ImportError without pandas.
+        Raises InputError if it is by GetDP, which has none.
         """
-        frame = optional("pandas").DataFrame(self.tables.rows)
-        frame.attrs["units"] = self.units
-        return frame
+        from .studies.quake_picture import figure
+        from .studies.quake_result import QuakeResult
+
+        if not isinstance(self.tables, QuakeResult):
+            raise InputError("engine = getdp: must be condensed for a picture of the earthquake")
+        return displayed(figure(self.tables))
+
+    def to_pandas(self, table: str = "rows") -> pandas.DataFrame:
+        """rows, history, joint or frames as a DataFrame with units in its `attrs`.
+
+        Raises ImportError without pandas, InputError for another table.
+        """
+        static, frames = self.tables.static, getattr(self.tables, "frames", None)
+        tables = {"rows": self.tables.rows, "history": static.history, "joint": static.joint}
+        tables |= {"frames": frames.joint} if frames else {}
+        if table not in tables:
+            raise InputError(f"table = {table}: must be one of {', '.join(tables)}")
+        columns = {"rows": quake_columns, **UNITS_OF}.get(table, joint_columns)(self.case)
+        in_seconds = {"time": ("s", "")} if table == "frames" else {}
+        return frame(tables[table], columns | in_seconds)
 
     def __repr__(self) -> str:
         return f"{self.case.name}: {self.statement}"
@@ -632,10 +810,20 @@ def quake(
 
 @dataclass(frozen=True, repr=False)
 class Sweep:
-    """The rows of a sweep, made by `sweep`."""
+    """The rows of a sweep, made by `sweep`.
+
+    Example:
+        >>> rows = sweep(case("dam", levels=40, n_joint=10), mu=[0.7, 0.9], jobs=1)
+        >>> rows
+        sweep of mu: 2 rows, 0 fail
+        >>> rows.rows.mu.tolist(), rows.units["crest_ux"]
+        ([0.7, 0.9], 'm')
+    """
 
     plan: Plan
     table: Mapping[str, list[Value]]
+    #: the case that is varied, on the mesh of all rows
+    case: Case
 
     @property
     def rows(self) -> np.recarray:
@@ -674,12 +862,37 @@ class Sweep:
         columns = ([in_file(value) for value in column] for column in self.table.values())
         return [dict(zip(self.table, row, strict=True)) for row in zip(*columns, strict=True)]
 
+    def plot(self) -> Figure:
+        """The chart of the rows, as `damjoint sweep` writes it.
+
+        Raises InputError if there is none for what was varied.
+        """
+        from .studies.chart import figure_of
+
+        cases = [] if self.plan.sampled else [case for _, case in cases_of(self.case, self.plan)]
+        title = f"{self.case.name}: {len(self.rows)} rows"
+        return displayed(figure_of(self.plan, self.texts, cases, title))
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Units of the columns of `rows`."""
+        from .studies.chart import quantity
+        from .studies.quake_summary import QUAKE_UNITS
+
+        varied = {column_of(name): quantity(name)[1] for name in self.plan.names}
+        results = {name: unit for name, (unit, _) in history_columns(self.case).items()}
+        if self.plan.critical:
+            varied[self.plan.critical_columns[0]] = quantity(self.plan.critical)[1]
+        return {n: u for n, u in (QUAKE_UNITS | results | varied).items() if n in self.table}
+
     def to_pandas(self) -> pandas.DataFrame:
-        """The rows as a DataFrame.
+        """The rows as a DataFrame with units in its `attrs`.
 
         Raises ImportError without pandas.
         """
-        return optional("pandas").DataFrame.from_records(self.rows)
+        rows = self.rows
+        columns = {name: rows[name] for name in self.table}
+        return frame(columns, {name: (unit, "") for name, unit in self.units.items()})
 
     def __repr__(self) -> str:
         fails = sum(map(bool, self.table["failed"]))
@@ -688,7 +901,9 @@ class Sweep:
 
 def column_array(name: str, values: list[Value]) -> np.ndarray:
     """A column of a sweep; an empty cell of a result that is a number becomes nan."""
-    numeric = name in HISTORY | LATERAL or name.startswith("critical_")
+    from .studies.quake_summary import QUAKE_UNITS
+
+    numeric = name in HISTORY | LATERAL | QUAKE_UNITS or name.startswith("critical_")
     return np.array([np.nan if numeric and value == "" else value for value in values])
 
 
@@ -703,6 +918,7 @@ def sweep(
     sample: Sample | None = None,
     tie: Mapping[str, str] | None = None,
     critical: str = "",
+    quake: float | None = None,
     jobs: int | None = None,
     progress: bool = False,
     **values: Sequence[Value] | Value,
@@ -717,6 +933,8 @@ def sweep(
         sample: random values, such as `Sample(100, {"mu": "normal(0.8,0.1)"})`.
         tie: parameters computed from the others, such as `{"adhesion": "2e5*mu"}`.
         critical: also find the critical level, strength, ... of each row, see `critical`.
+        quake: each row is the earthquake of the case's record; it fails if the residual slip
+            exceeds this limit [m].
         jobs: number of processes (default: one per core).
         progress: show a bar, or where there is no terminal a line every ten seconds.
         values: lists of values of parameters, by name; `level` [m] is the last level.
@@ -735,14 +953,18 @@ def sweep(
     check_jobs(jobs)
     if not values and not sample:
         raise InputError("sweep: must have values or a sample, such as mu=[0.8, 1.0]")
+    if quake is not None and not quake > 0:
+        raise InputError(f"quake = {quake}: must be a slip > 0 m")
     axes = [(name, listed(name, np.atleast_1d(v).tolist())) for name, v in values.items()]
     plan = plan_with(axes, list((tie or {}).items()), sample, {}, critical)
+    plan = replace(plan, slip_limit=quake)
     base = noted(as_case(source))
-    rows = list(planned(on_fixed_mesh(base), plan))
+    meshed = on_fixed_mesh(base)
+    rows = list(planned(meshed, plan))
     tasks = {key: task for key, _, task in rows}
     computed = compute(tasks, jobs)
     for note in notes_on_rows(base, [task.case for task in tasks.values()]):
         warnings.warn(f"{base.name}: {note}", stacklevel=2)
     results = dict(track(computed, "sweep", len(tasks)) if progress else computed)
     cells = [{column_of(n): v for n, v in row.items()} | results[key] for key, row, _ in rows]
-    return Sweep(plan, by_column(cells))
+    return Sweep(plan, by_column(cells), meshed)

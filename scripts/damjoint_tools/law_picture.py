@@ -10,7 +10,7 @@ import numpy as np
 from damjoint.arrays import Array
 from damjoint.input.resolve import load
 from damjoint.laws import LAWS, Law
-from damjoint.pictures.drawing import write_picture
+from damjoint.pictures.drawing import picture_style, write_picture
 
 #: Strengths at which all laws have the same tensile strength, cohesion and fracture energies.
 MATERIAL = {"sigma_max": 2e5, "adhesion": 2e5, "mu": 0.8, "G_f": 100.0, "G_t": 100.0}
@@ -46,6 +46,7 @@ def pressed(law: Law[Any], tangential: float, variables: Any) -> tuple[float, fl
     return high, tangential
 
 
+@picture_style()
 def draw(path: Path) -> None:
     """Tension, shear under constant compression, and both together, a line for each law."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg

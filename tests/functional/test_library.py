@@ -1,20 +1,24 @@
 """The interface for Python: import damjoint as dj."""
 
 import ast
+import copy
 import csv
 import doctest
+import pickle
 import re
 import subprocess
 import sys
 from pathlib import Path
 
 import damjoint as dj
+import matplotlib
 import numpy as np
 import pytest
 from damjoint import library
 from damjoint.post import stored
 from damjoint.solver.load_stepper import LoadStepper
 from damjoint.threads import limited_threads
+from matplotlib.text import Text
 from threadpoolctl import threadpool_info
 
 PAGE = Path(__file__).parents[2] / "reference" / "python.md"
@@ -47,7 +51,8 @@ def test_an_import_loads_nothing_else():
     code = "import sys; old = set(sys.modules); import damjoint; print(set(sys.modules) - old)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert ast.literal_eval(done.stdout) <= {"damjoint", "__future__"}
-    assert set(library.__all__) == set(dj.LIBRARY) <= set(dir(dj))
+    assert set(library.__all__) == set(dj.LIBRARY)
+    assert set(dir(dj)) == {*dj.LIBRARY, "InputError", "RunError", "__version__"}
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
         _ = dj.nothing
 
@@ -104,6 +109,93 @@ def test_tables_for_pandas_and_xarray(run):
     assert history.N.attrs["units"] == "N/m"
     with pytest.raises(dj.InputError, match="table = curve: must be one of joint, history"):
         run.to_pandas("curve")
+
+
+def test_frames_have_the_units_of_their_columns(run, quaked):
+    """Of every study; the same as in the tables' documentation."""
+    case = dj.case("dam", **CASE, law="friction", adhesion=0.0)
+    frames = {
+        "joint": run.to_pandas(),
+        "history": run.to_pandas("history"),
+        "check": dj.check(case).to_pandas(),
+        "critical": dj.critical(case).to_pandas(),
+        "sweep": dj.sweep(case, mu=[0.8], critical="level", jobs=1).to_pandas(),
+        "quake": quaked.to_pandas(),
+        "frames": quaked.to_pandas("frames"),
+    }
+    for name, frame in frames.items():
+        texts = {n for n in frame if not np.issubdtype(frame[n].to_numpy().dtype, np.number)}
+        unnamed = {"failed", "confirmed"} if name == "sweep" else set()
+        assert set(frame) - texts - unnamed <= set(frame.attrs["units"]), name
+    units = {name: frame.attrs["units"] for name, frame in frames.items()}
+    assert (units["joint"]["delta_n"], units["history"]["N"], units["check"]["f_c"]) == (
+        *("m", "N/m"),
+        "Pa",
+    )
+    assert units["critical"]["value"] == units["sweep"]["critical_level"] == "m"
+    assert (units["joint"]["time"], units["frames"]["time"]) == ("-", "s")
+    with pytest.raises(dj.InputError, match="table = curve: must be one of rows, history, joint"):
+        quaked.to_pandas("curve")
+
+
+@pytest.fixture(scope="module")
+def quaked(tmp_path_factory):
+    record = tmp_path_factory.mktemp("quake") / "wave.csv"
+    rows = [f"{i / 50},{2 * (i % 10 == 0)}" for i in range(20)]
+    record.write_text("\n".join(["time,horizontal", *rows]))
+    small = {"levels": 30, "n_joint": 10, "record_unit": "m/s2", "record_rest": 0.5}
+    return dj.quake(dj.case("dam", **small, record=record, name="shaken"))
+
+
+@pytest.mark.heavy
+def test_each_study_has_its_picture_in_the_style_of_the_commands(run, quaked):
+    """Whatever the style of the notebook, which stays as it is."""
+    case = dj.case("dam", **CASE, law="friction", adhesion=0.0)
+    with matplotlib.rc_context({"axes.grid": True, "font.size": 20.0, "figure.dpi": 70}):
+        pictures = {
+            "run": run.plot(),
+            "check": dj.check([case, dj.case(case, k_h=0.1)]).plot(1),
+            "critical": dj.critical(case).plot(),
+            "sweep": dj.sweep(case, mu=[0.8, 0.9], jobs=1).plot(),
+            "quake": quaked.plot(),
+        }
+        assert matplotlib.rcParams["font.size"] == 20.0
+    for name, figure in pictures.items():
+        sizes = [text.get_fontsize() for text in figure.findobj(Text) if text.get_text()]
+        assert figure.axes and len(sizes) > 10 and max(sizes) <= 12, name
+    sampled = dj.sweep(case, law=["friction", "bond"], mu=[0.8, 0.9], n_joint=[10, 12], jobs=1)
+    with pytest.raises(dj.InputError, match="no chart of 3 varied parameters"):
+        sampled.plot()
+
+
+def test_a_case_is_a_mapping_that_prints_what_differs_from_the_defaults():
+    case = dj.case("dam", **CASE, mu=0.7, name="weak")
+    assert repr(case) == "weak: levels 30, 40 m; n_joint = 20, mu = 0.7"
+    assert repr(dj.case("dam")) == "dam: levels 30, 40, 45 m"
+    lifts = repr(dj.case("lifts"))
+    assert "lift_heights 12, 25, 38 m" in lifts and "lift 25 m: sigma_max = 0, mu = 0.7" in lifts
+    assert "mu" in case and "mue" not in case and case.get("mue", 1.0) == 1.0
+    assert dict(case)["mu"] == dict(case.items())["mu"] == case.mu == 0.7
+    assert list(case.keys()) == list(case) == case._ipython_key_completions_()
+    assert len(case) == len(case.values) and {"mu", "sigma_max", "joint"} <= set(dir(case))
+    assert "sigma_max" in dir(case.joint) and repr(case.joint).startswith("K_N = 1e+11, K_T")
+    assert repr(case.law) == "law bond" and case["law"] == "bond"
+    for missing in ("mue", "__array__"):
+        with pytest.raises(AttributeError, match=missing):
+            getattr(case, missing)
+    assert copy.deepcopy(case) == pickle.loads(pickle.dumps(case)) == case
+
+
+def test_names_of_cases_and_records_stay_in_their_variations(tmp_path):
+    """So that the rows of several combinations can be told apart."""
+    usual = dj.case("dam", **CASE, name="usual", record=tmp_path / "wave.csv")
+    assert dj.case(usual, mu=0.7).name == "usual" and dj.case(usual, mu=0.7).record == usual.record
+    checks = dj.check([usual, dj.case(usual, k_h=0.1, name="flood")])
+    assert list(dict.fromkeys(checks.rows.case)) == ["usual", "flood"]
+    assert repr(checks[1]).startswith("flood, base: check: not checked; equilibrium: yes; finite")
+    assert len(checks) == 2 and checks[:1] == [checks[0]]
+    with pytest.raises(dj.InputError, match="name = 'a/b': must be a text"):
+        dj.case(usual, name="a/b")
 
 
 def test_history_of_several_joints_for_xarray():
@@ -307,9 +399,12 @@ def test_a_check_of_a_single_case():
         dj.check("no")
 
 
-@pytest.mark.parametrize("name", ["case", "run", "fill", "check", "critical", "sweep", "quake"])
+@pytest.mark.parametrize("name", sorted({*library.__all__} - {"Case", "LAWS"}))
 def test_the_examples_of_the_docstrings(name, tmp_path, monkeypatch):
+    """Of all functions and classes; that of Case is in `case`."""
     monkeypatch.chdir(tmp_path)
-    (example,) = doctest.DocTestFinder().find(getattr(library, name), name, library, vars(library))
+    example = doctest.DocTestParser().get_doctest(
+        getattr(dj, name).__doc__, {**vars(library), "np": np}, name, None, None
+    )
     result = doctest.DocTestRunner().run(example)
     assert result.attempted and not result.failed

@@ -30,7 +30,7 @@ from .parameters import (
     independent,
 )
 from .source import Source
-from .values import ParameterValues
+from .values import ParameterValues, listed
 from .values import flows as flows
 from .values import freezes_uplift as freezes_uplift
 from .values import has_drains as has_drains
@@ -69,6 +69,12 @@ class OfJoint:
     section: dict[str, list[float]] = field(compare=False, repr=False)
     #: as in Case
     hardening_asked: bool = False
+
+    @property
+    def joint_values(self) -> dict[str, Value]:
+        """The values of parameters that each joint may have for itself."""
+        known = declared()
+        return {n: value for n, value in self.values.items() if known[n].of_joints}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,6 +115,29 @@ class Case(ParameterValues):
     lift_heights: tuple[float, ...] = ()
     #: an entry for each joint, from the lowest; empty if there is only one
     of_joints: tuple[OfJoint, ...] = ()
+
+    def __repr__(self) -> str:
+        levels = ", ".join(f"{level:g}" for level in self.levels)
+        lifts = ", ".join(f"{height:g}" for height in self.lift_heights)
+        several = f", lift_heights {lifts} m" if lifts else ""
+        parts = [f"{self.name}: levels {levels} m{several}", listed(self.not_default)]
+        parts += [f"{joint.name}: {listed(joint.joint_values)}" for joint in self.of_joints]
+        return "; ".join(part for part in parts if part and not part.endswith(": "))
+
+    @property
+    def not_default(self) -> dict[str, Value]:
+        """The parameters that differ from their default; of those that follow others only what is
+        set, of a case of stored results none.
+        """
+        of_source: set[str] = set()
+        if self.source is not None:
+            of_source = {*self.source.text.defaults, *self.source.overrides}
+        return {
+            name: self.values[name]
+            for name, known in declared().items()
+            if self.values[name] != constants()[name][0]
+            and (name in of_source or not known.automatic)
+        }
 
     @cached_property
     def joints(self) -> tuple[Case, ...]:

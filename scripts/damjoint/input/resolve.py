@@ -130,7 +130,8 @@ def varied(
     accuracy: str | None = None,
 ) -> Case:
     """The case with other values of any parameters, and with another loading or accuracy where they
-    are not None; arguments as in `load`. The parameters that follow others follow them.
+    are not None; arguments as in `load`. The parameters that follow others follow them; name and
+    record stay.
 
     Raises InputError.
     """
@@ -138,7 +139,8 @@ def varied(
         raise InputError(f"case {case.name}: of stored results; must be a case that was loaded")
     given = {"levels": levels, "tail_levels": tail_levels, "steps": steps, "accuracy": accuracy}
     changes: dict[str, Any] = {n: value for n, value in given.items() if value is not None}
-    return resolve(replace(case.source.with_overrides(overrides or {}), **changes))
+    result = resolve(replace(case.source.with_overrides(overrides or {}), **changes))
+    return replace(result, name=case.name, record=case.record)
 
 
 def check_loading(case: Case, tails: Sequence[float], of_case: bool) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import ItemsView, Iterator, KeysView
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias, overload
 
@@ -37,6 +38,9 @@ class Group:
 
     def __setattr__(self, name: str, value: Any) -> None:
         raise AttributeError(f"{name}: values of a case can not be set")
+
+    def __repr__(self) -> str:
+        return listed(vars(self))
 
     if TYPE_CHECKING:
 
@@ -88,7 +92,9 @@ class EarthquakeGroup(Group):
 
 
 class ParameterValues:
-    """The values of all parameters, those that follow others resolved."""
+    """The values of all parameters, those that follow others resolved: a mapping, whose values are
+    attributes, too.
+    """
 
     values: dict[str, Value]
 
@@ -100,6 +106,41 @@ class ParameterValues:
 
     def __getitem__(self, name: str) -> Value:
         return self.values[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.values
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.values)
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def keys(self) -> KeysView[str]:
+        """Names of all parameters."""
+        return self.values.keys()
+
+    def items(self) -> ItemsView[str, Value]:
+        """All parameters: name and value."""
+        return self.values.items()
+
+    def get(self, name: str, default: Value | None = None) -> Value | None:
+        """The value of a parameter, or the default if there is no parameter of this name."""
+        return self.values.get(name, default)
+
+    if not TYPE_CHECKING:  # a type checker shall report unknown attributes
+
+        def __getattr__(self, name: str) -> Value:
+            values = vars(self).get("values", {})  # empty while it is copied
+            if name in values and not hasattr(type(self), name):
+                return values[name]
+            raise AttributeError(f"{type(self).__name__!r} has no attribute {name!r}")
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *self.values]
+
+    def _ipython_key_completions_(self) -> list[str]:
+        return list(self.values)
 
     def _group(self, name: str) -> dict[str, Value]:
         """The values of a group of parameters."""
@@ -154,6 +195,14 @@ class ParameterValues:
     def checks(self) -> CheckGroup:
         """Safety factors, position of the resultant and strength that are required."""
         return CheckGroup(self._group("Checks"))
+
+
+def listed(values: Values) -> str:
+    """Values by name as text: mu = 0.8, law = bond."""
+    return ", ".join(
+        f"{name} = {value if isinstance(value, str) else format(value, 'g')}"
+        for name, value in values.items()
+    )
 
 
 def flows(values: Values | ParameterValues) -> bool:

@@ -40,6 +40,9 @@ class Laws(MutableMapping[str, type[Law[Any]]]):
     def __len__(self) -> int:
         return len(self._laws)
 
+    def __repr__(self) -> str:
+        return f"laws {', '.join(self)}"
+
 
 #: By the value of the parameter `law`.
 LAWS = Laws(sorted(f.stem for f in Path(__file__).parent.glob("[a-z]*.py") if f.stem != "base"))

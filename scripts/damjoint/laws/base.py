@@ -33,6 +33,14 @@ class Evidence:
 class Law(Generic[V]):
     """A law's response, internal variables V, strength and meaning; the defaults are those of an
     elastic joint of one law-specific method, `traction_and_tangent`.
+
+    Example:
+        >>> class Springs(Law):
+        ...     def traction_and_tangent(self, jump, variables):
+        ...         return 1e10 * jump, np.broadcast_to(1e10 * np.eye(3), (len(jump), 3, 3))
+        >>> traction, tangent = Springs({}).traction_and_tangent(np.array([[1e-3, 0, 0]]), None)
+        >>> traction.tolist(), tangent.shape
+        ([[10000000.0, 0.0, 0.0]], (1, 3, 3))
     """
 
     #: names of the scalars in V, in the order of `LawVariables` of its .pro file
@@ -67,6 +75,9 @@ class Law(Generic[V]):
 
     def __init__(self, parameters: Mapping[str, Any]) -> None:
         """parameters: of pro/parameters.pro, by name."""
+
+    def __repr__(self) -> str:
+        return f"law {type(self).__name__.lower()}"
 
     @classmethod
     def least_energies(cls, parameters: Mapping[str, Any]) -> dict[str, tuple[float, str]]:

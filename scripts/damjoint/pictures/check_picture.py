@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox
 
 from ..input.case import Case
@@ -30,6 +31,7 @@ from .drawing import (
     STATES,
     WATER,
     figure_of,
+    picture_style,
     write_picture,
 )
 from .run_picture import gravity_profile, heading
@@ -83,7 +85,22 @@ def draw_check(
     why: str,
     folder: Path,
 ) -> Path:
-    """Draw the last saved state of a scene to folder/<case>_check.png and return its path.
+    """Write the picture of `figure_of_check` to folder/<case>_check.png and return its path."""
+    path = folder / f"{result.case.name}_check.png"
+    write_picture(figure_of_check(result, joint, methods, cells, of_joints, why), path, 120)
+    return path
+
+
+@picture_style()
+def figure_of_check(
+    result: Results,
+    joint: int,
+    methods: list[GravityMethod],
+    cells: list[tuple[str, ...]],
+    of_joints: list[tuple[str, ...]],
+    why: str,
+) -> Figure:
+    """Draw the last saved state of a scene.
 
     joint: number of the joint with diagrams; methods: the gravity method on each joint; cells:
     table beside the picture, headings in the first row, quantities in the first column; of_joints:
@@ -122,9 +139,7 @@ def draw_check(
     if len(methods) > 1:
         below = min(ROW * len(of_joints), 0.97 - height)
         draw_cells(beside, of_joints, 0.97 - height - below, below)
-    path = folder / f"{method.case.name}_check.png"
-    write_picture(figure, path, 120)
-    return path
+    return figure
 
 
 def loading_of(method: GravityMethod) -> Loading:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
@@ -21,15 +22,23 @@ from matplotlib.patches import Patch
 from ..model.fields import BROKEN, SLIPPED, SOFTENING
 from ..storage import atomic_write
 
-matplotlib.rcdefaults()  # a matplotlibrc in the current folder must not change the pictures
-matplotlib.rcParams["axes.formatter.useoffset"] = False
-matplotlib.rcParams["text.hinting"] = "none"  # takes a sixth of the time of a picture
-
 AnyFigure = Figure | SubFigure
 
 BLUE, ORANGE, WATER, RED, GREEN = "#0b5394", "#cc7a00", "#3d9be0", "#b3261e", "#2e7d32"
 VIOLET = "#8e24aa"
 GREY, DARK, CONCRETE, ROCK, SILT = "#8a8a8a", "#333333", "#c3ccd6", "#d8c9ae", "#a1866f"
+
+
+@contextlib.contextmanager
+def picture_style() -> Iterator[None]:
+    """Draw in the same style whatever that of a notebook, or of a matplotlibrc in the current
+    folder, which is left as it is; also a decorator.
+    """
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams["axes.formatter.useoffset"] = False
+        matplotlib.rcParams["text.hinting"] = "none"  # takes a sixth of the time of a picture
+        yield
 
 
 class StateStyle(NamedTuple):
@@ -80,6 +89,7 @@ def size_of(figure: AnyFigure) -> tuple[float, float]:
     return figure.bbox.width / figure.dpi, figure.bbox.height / figure.dpi
 
 
+@picture_style()
 def pixels_of(figure: Figure, dpi: int) -> np.ndarray:
     """The pixels of a figure (height, width, RGBA)."""
     figure.set_dpi(dpi)

@@ -50,6 +50,7 @@ from .drawing import (
     figure_of,
     legend_above,
     panels,
+    picture_style,
     pixels_of,
     runs_of,
     size_of,
@@ -116,6 +117,7 @@ def prepare() -> None:
     write_picture(figure, Path(os.devnull), DPI)
 
 
+@picture_style()
 def picture(solution: Solution, halves: tuple[int, ...] = (0, 1)) -> Figure:
     """Section and joint at the last state, or that of the published numbers; the history.
 
@@ -765,6 +767,7 @@ def scale_of(values: np.ndarray) -> tuple[float, float]:
     return least if low - least <= near else low, most if most - high <= near else high
 
 
+@picture_style()
 def draw_curve(result: Results) -> Figure:
     """Draw the level against the heel's opening; for a uniform pressure also the level at which the
     rigid dam overturns.

@@ -14,9 +14,10 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from .. import InputError
 from ..input import parameters
 from ..input.case import Case
-from ..pictures.drawing import BLUE, ORANGE, RED, write_picture
+from ..pictures.drawing import BLUE, ORANGE, RED, picture_style, write_picture
 from ..post.units import LENGTHS, Units, unit
 from ..statics.gravity import sliding_factor
 from .plan import Plan, Row, column_of, numbers
@@ -72,6 +73,19 @@ def draw(plan: Plan, rows: list[Row], cases: list[Case], title: str, path: Path)
 
     Returns a message if there is no chart for what was varied, else an empty text.
     """
+    try:
+        write_picture(figure_of(plan, rows, cases, title), path, 110)
+    except InputError as error:
+        return str(error)
+    return ""
+
+
+@picture_style()
+def figure_of(plan: Plan, rows: list[Row], cases: list[Case], title: str) -> Figure:
+    """The chart of the rows of a sweep, each with its case.
+
+    Raises InputError if there is none for what was varied.
+    """
     axes = [name for name, values in plan.varied.items() if all(map(is_number, values))]
     others = [name for name in plan.varied if name not in axes]
     counts = {name: len(set(plan.varied[name])) for name in axes}
@@ -83,7 +97,7 @@ def draw(plan: Plan, rows: list[Row], cases: list[Case], title: str, path: Path)
         many = len(axes) == 2 and min(counts.values()) > FEW
         drawing = draw_maps if many else draw_curves
     if not fits:
-        return (
+        raise InputError(
             f"no chart of {len(plan.varied)} varied parameters ({', '.join(plan.varied)}): needs "
             "at most two with numbers as values, beside a sample at most one"
         )
@@ -93,8 +107,7 @@ def draw(plan: Plan, rows: list[Row], cases: list[Case], title: str, path: Path)
     figure.suptitle(textwrap.fill(title, 100), fontsize=11, parse_math=False)
     along = sorted(axes, key=lambda name: -counts[name]) if drawing is draw_curves else axes
     drawing(figure, Table(plan, rows, cases), along or others[:1])
-    write_picture(figure, path, 110)
-    return ""
+    return figure
 
 
 def is_number(value: float | str) -> bool:

@@ -89,6 +89,9 @@ NO_VERDICT = {"position": "", "verdict": "", "why": ""}
 SHOWN_DIFFERENCE = 1e-5
 
 Row = dict[str, Any]
+#: Result, number of the joint with diagrams, gravity method by joint, both tables, reasons.
+Cells = list[tuple[str, ...]]
+PictureContent = tuple[Results, int, list[GravityMethod], Cells, Cells, str]
 
 #: Columns of the printed table: heading by name, in groups that share a unit.
 SHOWN: tuple[tuple[Units, dict[str, str]], ...] = (
@@ -306,7 +309,7 @@ def compare_joints(result: Results) -> list[SafetyCheck]:
     return checks
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class SafetyCheck:
     """Results of both methods for a joint of a scene."""
 
@@ -319,6 +322,12 @@ class SafetyCheck:
     longer: Sequence[MethodResult] = ()
     #: notes on the results of the gravity method
     gravity_notes: Sequence[str] = ()
+
+    def __repr__(self) -> str:
+        scene = f"{self.case.name}, {self.finite_elements.joint}"
+        factors = [f"{r.method} SSF {r.numbers['SSF']:.4g}" for r in self.results]
+        reasons = [self.why] if self.why else []
+        return "; ".join([f"{scene}: {verdict_line(self)}", *factors, *reasons])
 
     @property
     def results(self) -> list[MethodResult]:
@@ -504,12 +513,17 @@ def text_table(checks: list[SafetyCheck], width: int | None = None) -> str:
         if row["why"]
     ]
     verdict_lines = [
-        f"{scene_label(checks, check.finite_elements.row)}: check: {worst_verdict(check)}; "
-        f"equilibrium: {'no' if check.finite_elements.statement else 'yes'}"
+        f"{scene_label(checks, check.finite_elements.row)}: {verdict_line(check)}"
         for check in checks
     ]
     parts = "\n".join([*verdict_lines, *lines]), table, "\n".join(labelled_notes(checks))
     return "\n\n".join(filter(None, parts))
+
+
+def verdict_line(check: SafetyCheck) -> str:
+    """The verdict on a joint, and whether it is in equilibrium."""
+    equilibrium = "no" if check.finite_elements.statement else "yes"
+    return f"check: {worst_verdict(check)}; equilibrium: {equilibrium}"
 
 
 def worst_verdict(check: SafetyCheck) -> str:
@@ -596,15 +610,23 @@ def check_case(task: tuple[Case, Path], progress: bool) -> list[SafetyCheck]:
         checks += of_joints
         if case.geometry:
             continue
-        methods = [
-            method for joint_result in result.joints if (method := hand_calculation(joint_result))
-        ]
+        methods = hand_calculations(result)
         write_csv(folder_of(result.case) / "gravity.csv", loads_table(methods))
-        k = min(range(len(methods)), key=lambda k: of_joints[k].margin)
-        worst = of_joints[k]
-        cells = picture_table(worst), joints_table(of_joints)
-        draw_check(result, k, methods, *cells, worst.why, folder_of(result.case))
+        draw_check(*picture_content(result, of_joints), folder_of(result.case))
     return checks
+
+
+def hand_calculations(result: Results) -> list[GravityMethod]:
+    """The gravity method on each joint of a section by parameters."""
+    return [method for joint in result.joints if (method := hand_calculation(joint))]
+
+
+def picture_content(result: Results, checks: list[SafetyCheck]) -> PictureContent:
+    """What the picture of a scene shows: the arguments of `figure_of_check`."""
+    methods = hand_calculations(result)
+    k = min(range(len(methods)), key=lambda k: checks[k].margin)
+    cells = picture_table(checks[k]), joints_table(checks)
+    return result, k, methods, *cells, checks[k].why
 
 
 def loads_table(methods: list[GravityMethod]) -> dict[str, list[Any]]:

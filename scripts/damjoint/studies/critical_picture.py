@@ -15,7 +15,17 @@ from matplotlib.figure import Figure
 from ..input.case import Case
 from ..model.loads import Loading
 from ..model.results import Results
-from ..pictures.drawing import BLUE, GREEN, GREY, ORANGE, RED, WATER, widen, write_picture
+from ..pictures.drawing import (
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    RED,
+    WATER,
+    picture_style,
+    widen,
+    write_picture,
+)
 from ..pictures.scene import loads_label, state_label
 from ..post.units import LENGTHS, unit
 from ..solver.path import Point
@@ -71,6 +81,12 @@ class Content(NamedTuple):
 
 
 def draw(content: Content, path: Path) -> None:
+    """Write the picture of a critical value."""
+    write_picture(figure_of(content), path, 110)
+
+
+@picture_style()
+def figure_of(content: Content) -> Figure:
     """Draw level against crest displacement on both sides of the critical value; unless that is a
     level, also the highest level with each value.
     """
@@ -90,7 +106,7 @@ def draw(content: Content, path: Path) -> None:
         axes.grid(alpha=0.3)
         if axes.get_legend_handles_labels()[0]:  # an interrupted search may have no trial
             axes.legend(fontsize=8)
-    write_picture(figure, path, 110)
+    return figure
 
 
 def draw_levels(axes: Axes, content: Content) -> None:

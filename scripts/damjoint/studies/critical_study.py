@@ -119,9 +119,14 @@ def save(study: Session, search: Search, answer: CriticalValue) -> None:
     else:
         study.save_without_results(state or folders.COMPLETE, answer.doubt, entries)
     write_csv(study.out / "critical.csv", table(search))
+    picture.draw(content(search, answer), study.out / f"{search.own.name}_critical.png")
+
+
+def content(search: Search, answer: CriticalValue) -> picture.Content:
+    """The content of the picture."""
+    result = last_state(search, answer.point) if answer.point else None
     what = search.own, search.of, search.unit, search.trials
-    shown = picture.Content(*what, answer, result)
-    picture.draw(shown, study.out / f"{search.own.name}_critical.png")
+    return picture.Content(*what, answer, result)
 
 
 def as_json(search: Search, answer: CriticalValue) -> dict[str, Any]:

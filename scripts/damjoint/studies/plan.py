@@ -37,6 +37,11 @@ class Sample:
 
     Sample(100, {"mu": "normal(0.8,0.1)"}); design: latin (hypercube) or monte-carlo; correlate:
     rank correlations, "A,B=R" each. Raises InputError.
+
+    Example:
+        >>> sample = Sample(3, {"mu": "normal(0.8,0.1)"})
+        >>> len(sample.values()["mu"])
+        3
     """
 
     number: int

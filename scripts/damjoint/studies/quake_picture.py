@@ -26,6 +26,7 @@ from ..pictures.drawing import (
     VIOLET,
     figure_of,
     panels,
+    picture_style,
     polygons,
     write_picture,
 )
@@ -54,6 +55,7 @@ def draw(result: QuakeResult, folder: Path) -> Path:
     return path
 
 
+@picture_style()
 def figure(result: QuakeResult) -> Figure:
     """The figure."""
     case, rows, stress = result.case, result.rows, result.stress

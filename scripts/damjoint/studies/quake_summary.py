@@ -34,6 +34,7 @@ PEAKS_OF_JOINTS = ("heel_opening", "toe_opening", "slip_mean", "open_length", "b
 #: Columns of an earthquake in a table of several: largest ground acceleration along x [m/s2]; of
 #: the joint with the largest slip: residual slip [m] and tilt, slip of the rigid block [m].
 QUAKE_COLUMNS = ("peak_ground_ax", "residual_slip", "residual_tilt", "rigid_block_slip")
+QUAKE_UNITS = dict(zip(QUAKE_COLUMNS, ("m/s2", "m", "-", "m"), strict=True))
 #: Those by their names in the summary of an earthquake; empty if the dam is not at rest.
 RESIDUAL = dict(zip(("slip", "tilt", "rigid_block"), QUAKE_COLUMNS[1:], strict=True))
 

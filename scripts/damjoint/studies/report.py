@@ -21,7 +21,7 @@ from ..input.case_names import is_name
 from ..model.fields import Solution
 from ..model.results import Results
 from ..pictures import run_picture
-from ..pictures.drawing import figure_of
+from ..pictures.drawing import figure_of, picture_style
 from ..post import stored
 from ..post.summary import Table, joints_table, levels_table, table_of
 from ..post.units import FORCES, MOMENTS, Units, unit
@@ -488,6 +488,7 @@ def factored(case: Case, strength: str, unit: float) -> str:
     return f"{value / unit:.4g}" + (f"/{factor:.4g}" if factor != 1 else "")
 
 
+@picture_style()
 def pictures_of(solution: Solution) -> list[Picture]:
     """Draw the pictures of a run."""
     result = solution.result
