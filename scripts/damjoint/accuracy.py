@@ -31,8 +31,10 @@ REFINED = ("n_joint", "n_layers")
 #: Most elements along the joint: in the plane, in 3D with one layer, in 3D with several.
 FINEST = {"plane": 512, "slice": 128, "solid": 32}
 
-#: Share of the accuracy that the error of the load steps may use, and most halvings of them.
-STEP_SHARE, HALVINGS = 0.25, 6
+#: Share of the accuracy that the error of the load steps may use; the meshes use the rest.
+STEP_SHARE = 0.25
+#: Most halvings of the load steps; usually none to two. Beyond, the estimate says that they matter.
+HALVINGS = 6
 #: Shift of a new step's time off the integer times, at which levels are prescribed.
 OFF_LEVEL = 1e-3
 
@@ -53,11 +55,14 @@ COUNTED_IN_ELEMENTS = ("crack_length", "slip_length")
 #: Largest K_N h/E of a joint so soft that the stress at its ends is not singular.
 REGULAR_CORNER = 1.0
 
-#: Bounds of the ratio of a change to the one before: 0.25 is second order; above 0.75 there is
-#: hardly any convergence, and the error is three times the change.
-MIN_RATIO, MAX_RATIO = 0.25, 0.75
-#: Roache's factors of safety for three meshes and for two.
-SAFETY_OF_THREE, SAFETY_OF_TWO = 1.25, 3.0
+#: Least ratio of a change to the one before: second order. A faster decay counts as this one.
+MIN_RATIO = 0.25
+#: Largest ratio: hardly any convergence; the error is then three times the change, not more.
+MAX_RATIO = 0.75
+#: Roache's factor of safety for three meshes.
+SAFETY_OF_THREE = 1.25
+#: The same for two meshes, which show no order of convergence.
+SAFETY_OF_TWO = 3.0
 #: Number of elements by which a length may differ, with a margin for round-off.
 ONE_ELEMENT = 1.001
 #: Relative error of the load steps below which the summary does not mention it.

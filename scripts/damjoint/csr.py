@@ -18,9 +18,10 @@ from .arrays import Array, IntArray
 if TYPE_CHECKING:
     from scipy import sparse
 
-#: Numbers of entries up to which numpy takes less time: for products; if scipy is not loaded yet,
-#: for the assembly, for a transposed matrix and a product with a vector.
-LARGE, LARGER = 100_000, 1_000_000
+#: Number of entries up to which numpy takes less time than scipy.
+LARGE = 100_000
+#: The same where scipy would have to be loaded first, which takes 0.1 s.
+LARGER = 1_000_000
 
 
 def is_large(entries: int) -> bool:

@@ -19,10 +19,16 @@ from ..storage import text_of
 #: Standard gravity [m/s2], for records in g.
 STANDARD_GRAVITY = 9.80665
 
-#: Limits of a record: rows, bytes of its file; largest acceleration [m/s2], largest time and
-#: shortest interval [s].
-MOST_ROWS, LONGEST = 1_000_000, 200_000_000
-LARGEST, LATEST, SHORTEST = 1e4, 1e10, 1e-9
+#: Limits of a record, beyond which it is refused. Rows; strong motion has 1e3 to 1e5.
+MOST_ROWS = 1_000_000
+#: Bytes of its file.
+LONGEST = 200_000_000
+#: Acceleration [m/s2]; the strongest that were recorded reach 40.
+LARGEST = 1e4
+#: Time [s], with room for times since an epoch.
+LATEST = 1e10
+#: Interval [s]; usually 5e-3 to 2e-2.
+SHORTEST = 1e-9
 
 #: Differences of intervals by the digits of the times in a file, relative.
 DIGITS = 0.01

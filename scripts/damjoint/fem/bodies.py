@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .. import ROUND_OFF
 from ..arrays import Array, IntArray, distinct
 from ..csr import CsrMatrix
 from ..input.case import Case
@@ -162,7 +163,7 @@ class Bodies:
         body, dim, dofs = self.by_name[name], self.mesh.dim, [np.zeros(0, int)]
         for face, of_face in body.face_dofs.items():
             normals = self.mesh.faces[face].surface.normals[:, :dim]
-            loaded = np.abs(normals).max(axis=0) > 1e-9
+            loaded = np.abs(normals).max(axis=0) > ROUND_OFF
             dofs.append(of_face.reshape(-1, dim)[:, loaded].ravel())
         every = distinct(np.concatenate(dofs))
         return every[~np.isin(every, body.fixed_dofs)]

@@ -25,8 +25,10 @@ def lame(young: float, poisson: float) -> tuple[float, float]:
     return young * poisson / ((1 + poisson) * (1 - 2 * poisson)), young / (2 * (1 + poisson))
 
 
-#: Numbers of elements computed and of entries assembled at a time.
-MOST_ELEMENTS, MOST_ENTRIES = 50_000, 5_000_000
+#: Number of elements computed at a time: limits memory, not the result.
+MOST_ELEMENTS = 50_000
+#: Number of entries assembled at a time, for the same reason.
+MOST_ENTRIES = 5_000_000
 
 
 def elasticity(space: Space, dim: int, material: Material) -> CsrMatrix:

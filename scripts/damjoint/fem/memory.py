@@ -13,10 +13,15 @@ from ..progress import INTERVAL, clock
 #: Part of a limited address space that buffers of libraries take [bytes].
 BUFFERS = 0.15e9
 
-#: Seconds of bodies of a million unknowns and the power by which they grow, by dimension; of the
-#: elimination of joints and of an iteration, over the cube of their unknowns; iterations of a step.
+#: Seconds of bodies of a million unknowns and the power by which they grow, by dimension; measured
+#: by `damjoint bench`, as all of these.
 OF_BODIES = {2: (24.0, 1.12), 3: (350.0, 1.45)}
-ELIMINATION, FACTORISATION, ITERATIONS = 2e-10, 1.1e-11, 5.0
+#: Seconds of the elimination of joints, over the cube of their unknowns.
+ELIMINATION = 2e-10
+#: Seconds of an iteration, over the same.
+FACTORISATION = 1.1e-11
+#: Iterations of a step, usually.
+ITERATIONS = 5.0
 
 #: Memory of a factorised body [bytes per unknown], measured in 2D by `damjoint bench`.
 PER_UNKNOWN = 2400

@@ -38,7 +38,7 @@ from .values import has_drains as has_drains
 #: Constants of pro/parameters.pro that both engines use.
 SHARED = (
     *("strategy_growth", "strategy_secant", "strategy_release", "strategy_iterations", "cut"),
-    *("round_off", "coarsest", "artificial", "yield_tolerance", "release_length"),
+    *("round_off", "rounding_ceiling", "artificial", "yield_tolerance", "release_length"),
     *("crack_aperture", "crack_most", "zangar_angle", "zangar_cm"),
 )
 

@@ -35,8 +35,10 @@ from .arithmetic import arithmetic_value, explained
 from .parameters import TEXTS, Parameter, assignments, checked, declared, parameter
 
 LISTS = ("levels", "tail_levels", "times", "lift_heights")
-#: Limits: bytes of a case file, files of a case.
-LONGEST, MOST_FILES = 1_000_000, 50
+#: Most bytes of a case file.
+LONGEST = 1_000_000
+#: Most files that a case includes: more are an endless inclusion.
+MOST_FILES = 50
 
 TOKEN = re.compile(
     r"""(?P<nothing>\s+|//[^\n]*|/\*.*?\*/) |(?P<text>"[^"\\\n]*")

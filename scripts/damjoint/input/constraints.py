@@ -45,14 +45,19 @@ LARGEST = {
 LEAST_LENGTH = 1e-6
 #: The least Young's modulus [Pa], that of a soft soil.
 LEAST_MODULUS = 1e6
-#: The largest closure and shear of an undamaged joint under a column of concrete or water as high
-#: as the dam, over its height; the largest strain of the bodies under that of concrete. Beyond
-#: them the limit of small displacements would end a run, not the strength of the dam.
-LARGEST_CLOSURE, LARGEST_STRAIN = 0.01, 0.1
-#: The least stiffness of a joint, K L / (E n^2) with n elements, and the largest, K L / E. Below
-#: the first, rounding of the rigid motion on the joint in the stiffness of the dam exceeds 1e-4 of
-#: the stress; above the second, rounding of a slip or an opening in the points beside it does.
-LOOSEST, STIFFEST = 3e-12, 2e8
+#: The largest closure and shear of an undamaged joint, rho g H/K over H, under a column of concrete
+#: or water as high as the dam; usually 1e-7 to 1e-4. Beyond it the limit of small displacements
+#: would end a run, not the strength of the dam.
+LARGEST_CLOSURE = 0.01
+#: The largest strain of the bodies, rho g H/E, under a column of concrete; usually 1e-6 to 1e-4.
+#: Beyond it as before.
+LARGEST_STRAIN = 0.1
+#: The least stiffness of a joint, K L / (E n^2) with n elements; usually 1e-4 to 1. Below it
+#: rounding of the rigid motion on the joint in the stiffness of the dam exceeds 1e-4 of the stress.
+LOOSEST = 3e-12
+#: The largest, K L / E; usually 1 to 1e4. Above it rounding of a slip or an opening in the points
+#: beside it exceeds 1e-4 of the stress.
+STIFFEST = 2e8
 #: Value of added_mass: Zangar's pressure in place of Westergaard's.
 ZANGAR = 2
 
@@ -68,8 +73,10 @@ STAGED = {
 }
 WORKS = {"grout": ("grout_pressure",), "saw": ("saw_thickness",)}
 
-#: Limits of the numbers of steps between two levels, and of levels, each of which has its table.
-MOST_STEPS, MOST_LEVELS = 100_000, 10_000
+#: Most steps between two levels.
+MOST_STEPS = 100_000
+#: Most levels, each of which has its table.
+MOST_LEVELS = 10_000
 
 
 def check_values(

@@ -37,8 +37,12 @@ OF_JOINTS = (
 )
 #: Texts of a case that are no parameters, and options of commands that set them, too.
 TEXTS = {"title": "", "also_uplift": "", "geometry": "", "record": " or by --record FILE.csv"}
-#: Limits that mean > 0 and < 0.5 in the declarations; limit of ONELAB that means none.
-TINY, BELOW_HALF, ANY = 1e-30, 0.5 - 1e-9, 1e200
+#: Limit that means > 0 in the declarations.
+TINY = 1e-30
+#: Limit that means < 0.5 there.
+BELOW_HALF = 0.5 - 1e-9
+#: Limit of ONELAB that means none.
+ANY = 1e200
 
 
 #: Texts that a process caches: those of a run, but not of all rows of a sweep.

@@ -9,6 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
+from .. import ROUND_OFF
 from ..arrays import Array, BoolArray, IntArray, distinct, others
 from ..csr import CsrMatrix, added
 from ..fem import elements
@@ -79,7 +80,7 @@ class JointFields:
         self.xi = harmonic(self.laplace, self.ends, np.isin(self.ends, toe).astype(float))
         self.heel_y, self.toe_y = (
             np.full(number, y[nodes[0]])
-            if np.ptp(y[nodes]) < 1e-9 * np.abs(surface.points).max()
+            if np.ptp(y[nodes]) < ROUND_OFF * np.abs(surface.points).max()
             else harmonic(self.laplace, nodes, y[nodes])
             for nodes in (heel, toe)
         )

@@ -9,6 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
+from .. import ROUND_OFF
 from ..arrays import Array, IntArray, distinct
 from ..csr import CsrMatrix, added, stacked
 from ..fem import elements
@@ -31,7 +32,7 @@ def frames(normals: Array) -> Array:
     """
     along = np.array([1.0, 0, 0]) - normals[:, :1] * normals
     # an element perpendicular to x: tangent 1 is the normal turned by a right angle, as elsewhere
-    risers = np.linalg.norm(along, axis=1) < 1e-9
+    risers = np.linalg.norm(along, axis=1) < ROUND_OFF
     along[risers] = np.column_stack(
         [np.zeros(risers.sum()), -normals[risers, 0], np.zeros(risers.sum())]
     )
@@ -60,7 +61,7 @@ class JointInterface:
         self.points = elements.points_of(space, self.rule)
         self.frames = frames(self.surface.normals)
         #: whether the joint is a plane, up to rounding of its nodes
-        self.flat = np.allclose(self.frames, self.frames[0], rtol=0, atol=1e-9)
+        self.flat = np.allclose(self.frames, self.frames[0], rtol=0, atol=ROUND_OFF)
         #: jump at the Gauss points from the unknowns, dim rows each: normal, tangent 1, tangent 2
         self.at_points = self.components(self.points.values, self.frames[self.points.elements])
         #: jump at the nodes likewise, dim rows for each of `rows`, indices of locations; where the
@@ -184,7 +185,7 @@ class JointInterface:
         points of their elements.
         """
         xi, tables = self.fields.xi, [table for _, table in self.surface.cells]
-        at, near, same = distance / self.length, [], 1e-9
+        at, near, same = distance / self.length, [], ROUND_OFF
         for table in tables:  # in each element that the line crosses, its nearest nodes
             low, high = xi[table].min(axis=1) - same, xi[table].max(axis=1) + same
             crossed = table[(low <= at) & (at <= high)]

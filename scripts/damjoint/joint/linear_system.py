@@ -227,6 +227,14 @@ FEW = 600
 #: Number of unknowns from which on single precision pays: fewer save less than it takes to load
 #: scipy.
 SINGLE_PRECISION = 450
+#: Residual of a refined solution over the right side [-], as by double precision; usually reached
+#: by two or three refinements.
+REFINED = 1e-12
+#: Most refinements, and ...
+MOST_REFINEMENTS = 8
+#: ... largest ratio of a residual to the one before [-]; usually 1e-5. Beyond either the matrix is
+#: too ill-conditioned for single precision, and is factorised again in double precision.
+DECAY = 0.1
 
 
 def lu_solve(matrix: Array, right: Array) -> Array:
@@ -242,13 +250,13 @@ def lu_solve(matrix: Array, right: Array) -> Array:
         factors, pivots, info = lapack.sgetrf(matrix.T.astype(np.float32), overwrite_a=True)
         solution: Array = np.zeros_like(right)
         residual, size = right, norm(right)
-        for _ in range(0 if info else 8):
+        for _ in range(0 if info else MOST_REFINEMENTS):
             correction = lapack.sgetrs(factors, pivots, residual / size, trans=1)[0]
             solution = solution + size * correction
             residual, before = right - matrix @ solution, size
             size = norm(residual)
-            if size <= 1e-12 * norm(right):
+            if size <= REFINED * norm(right):
                 return solution
-            if not size < 0.1 * before:
+            if not size < DECAY * before:
                 break
     return np.asarray(np.linalg.solve(matrix, right))

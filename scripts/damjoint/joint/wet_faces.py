@@ -13,6 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
+from .. import ROUND_OFF
 from ..arrays import Array, IntArray
 from ..csr import CsrMatrix
 from ..fem import elements
@@ -37,7 +38,7 @@ class WetFace:
         self.to_functions = self.points.values.T
         self.y, self.tilt = self.points.positions[:, 1], np.abs(self.normals[:, 0])
         straight, self.exact = self.high > self.low, not side_points
-        self.flat = np.ptp(surface.points[:, 1]) < 1e-9 * np.abs(surface.points).max()
+        self.flat = np.ptp(surface.points[:, 1]) < ROUND_OFF * np.abs(surface.points).max()
         #: whether the quadrature is corrected
         self.corrects = self.exact and straight and not self.flat
 
@@ -114,9 +115,12 @@ class WetFace:
 #: No functions.
 NONE = np.zeros(0, int)
 
-#: m0 m2 - m1^2 over m1^2 from which force and lever can be distinguished; and part of the face's
-#: height by which the waterline is raised until they can.
-DISTINCT, RAISE = 1e-3, 0.01
+#: Least variance over square of the mean of the heights of the points, (m0 m2 - m1^2)/m1^2 [-];
+#: usually 0.1 to 1. Below it force and lever of the water can not be corrected both.
+DISTINCT = 1e-3
+#: Part of the face's height by which the waterline that weighs the points is raised until they can
+#: [-]; usually never, a few times with water at the foot of the face.
+RAISE = 0.01
 
 
 def points_below(shape: str, nodes: Array, height: Array) -> Iterator[tuple[Array, Array, float]]:

@@ -25,11 +25,15 @@ STEEPEST = 0.2
 #: plastic opening is then 2 G_f/sigma_max, where linear softening would end; 9 % of the strengths
 #: are left.
 BROKEN = 0.7203615675
-#: Range of the damage of a point that has yielded.
-LEAST, LARGEST = 1e-18, 1 - 1e-12
-#: Iterations for the damage, as in pro/law_endo.pro, and where they end: change of
-#: log(alpha/(1 - alpha)).
-MOST_ITERATIONS, ACCURACY = 32, 1e-10
+#: Least damage of a point that has yielded [-], at which S = 1e9.
+LEAST = 1e-18
+#: Largest damage [-], at which S = 1e-36.
+LARGEST = 1 - 1e-12
+#: Most iterations for the damage, as in pro/law_endo.pro; usually 3 to 7. The bracket is then at
+#: most 2e-8 wide.
+MOST_ITERATIONS = 32
+#: Where they end: change of log(alpha/(1 - alpha)) [-]. Newton's method has then rounded digits.
+ACCURACY = 1e-10
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .. import InputError
+from .. import ROUND_OFF, InputError
 from ..arrays import Array, BoolArray, IntArray, distinct
 from ..input.scene import BED, DOWN, FLOOR, LINES, TOP, UP, Joint
 from .body import Body
@@ -36,16 +36,22 @@ from .topology import (
 CONCRETE = ("dam", "lower")
 
 
-#: Greatest height of a dam [m], that of a section, too; the least that is not named.
-HIGHEST, LOWEST = 1000.0, 0.5
+#: Greatest height of a dam [m], that of a section, too; the highest dams reach 335.
+HIGHEST = 1000.0
+#: Least height of a dam that is not named in a note [m].
+LOWEST = 0.5
 
 
 #: Distance from the origin, over the size of the mesh, from which on coordinates lack digits.
 FARTHEST = 1e4
 
 
-#: Part of a normal along an axis from which on it faces along it, and from which on mostly.
-FACING, MOSTLY = 1e-3, 0.9
+#: Part of a normal along an axis from which on a face counts as facing along it [-].
+FACING = 1e-3
+
+
+#: The same from which on it does so mostly [-]: up to 26 degrees from the axis.
+MOSTLY = 0.9
 
 
 #: Relative size below which an extent or size is 0.
@@ -389,7 +395,7 @@ class UserGeometry:
         if self.dim == 3:
             self.check_rim(joint)
         ends = [self.regions[region].points[:, 0].mean() for region in (joint.heel, joint.toe)]
-        if ends[1] < ends[0] - 1e-9 * np.ptp(self.points[1]):
+        if ends[1] < ends[0] - ROUND_OFF * np.ptp(self.points[1]):
             raise self.bad(
                 f"toe at x = {ends[1]:g}, heel at {ends[0]:g}: x must point downstream (mirror it)"
             )

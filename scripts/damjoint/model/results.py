@@ -10,6 +10,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from .. import ROUND_OFF
 from ..arrays import Array, Table
 from ..input.case import Case
 
@@ -239,7 +240,7 @@ class Results:
         False with a prescribed displacement.
         """
         time = self.last.get("time", 0.0)
-        return self.case["drive"] == "level" and time < self.case.times[-1] - 1e-9
+        return self.case["drive"] == "level" and time < self.case.times[-1] - ROUND_OFF
 
 
 def rows_of(table: Table, number: int, columns: Collection[str]) -> Table:

@@ -51,12 +51,12 @@ class Table(NamedTuple):
 
 def table_of(columns: list[tuple[str, np.ndarray, Units]], digits: int = 4) -> Table:
     """Format columns (name, values, units) with some digits in units that suit their size; what is
-    below 1e-9 of a column's largest value is rounding and shown as 0.
+    below ROUND_OFF of a column's largest value is rounding and shown as 0.
     """
     names, sizes, cells = [], [], []
     for name, values, units in columns:
         size, factor = unit([np.where(np.isfinite(values), values, 0.0)], units)
-        rounding = 1e-9 * np.abs(values[np.isfinite(values)]).max(initial=0)
+        rounding = ROUND_OFF * np.abs(values[np.isfinite(values)]).max(initial=0)
         values = np.where(np.abs(values) < rounding, 0.0, values)
         names.append(name)
         sizes.append(size)

@@ -25,13 +25,16 @@ from .newton import BY_TOLERANCE, Convergence, Strategy
 from .state import State, StepLaws
 from .step import Plan, Start, solve
 
-#: Largest jump of an equilibrium of small displacements, over the size of the dam.
+#: Largest jump of an equilibrium of small displacements, over the size of the dam [-]; usually
+#: below 1e-2. Beyond it a strategy has diverged.
 LARGEST_JUMP = 0.1
 
-#: A step is extrapolated from the two states before it where it is at most this many times as long
-#: as the step between them: of the level, of a displacement. Without the extrapolation all points
-#: begin elastic, and Newton's method may not find the state in which many of them yield.
-LONGEST_EXTRAPOLATION, LONGEST_ALONG_PATH = 4, 16
+#: A step of the level is extrapolated from the two states before it where it is at most this many
+#: times as long as the step between them [-]. Without the extrapolation all points begin elastic,
+#: and Newton's method may not find the state in which many of them yield.
+LONGEST_EXTRAPOLATION = 4
+#: The same of a step of a displacement, along which the path is smoother.
+LONGEST_ALONG_PATH = 16
 
 
 @dataclass(frozen=True)
@@ -103,7 +106,7 @@ class Model:
         return Convergence(
             reference=reference,
             tolerance=self.case["tolerance"] * reference,
-            rounding_ceiling=shared["coarsest"][0] * reference,
+            rounding_ceiling=shared["rounding_ceiling"][0] * reference,
             round_off=shared["round_off"][0],
             largest_jump=LARGEST_JUMP * self.case.size,
         )

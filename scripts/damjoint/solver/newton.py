@@ -63,7 +63,7 @@ class Convergence:
     #: [N]; parameter `tolerance` times the reference, 1e-9 by default: smaller ones are not
     #: reached, larger ones show in the resultants
     tolerance: float
-    #: [N]; `coarsest` times the reference: a larger residual is never put down to rounding
+    #: [N]; `rounding_ceiling` times the reference: a larger residual is never put down to rounding
     rounding_ceiling: float
     #: [-]; how many times the residual of unknowns rounded in the last bit it may be, a few
     round_off: float

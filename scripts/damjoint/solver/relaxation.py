@@ -11,10 +11,12 @@ from .model import Model, StepResult
 from .newton import repeats
 from .state import State
 
-#: Rounds of the alternate minimisation at most.
+#: Most rounds of the alternate minimisation; usually fewer than 70. Then the last state is returned
+#: as one in which the law is not in equilibrium.
 ROUNDS = 100
 
-#: Relative difference of residuals below which a round has led to the same state again.
+#: Relative difference of the residuals of two rounds below which they have led to the same state
+#: [-]; rounding alone makes 1e-9 of it. The rounds then repeat themselves, and end without a state.
 SAME = 1e-6
 
 

@@ -769,9 +769,14 @@ def pieces(case: Case, body: JointLine, level: float, tail: float) -> list[tuple
 
 #: Degree of the polynomial of `arrest_lengths`.
 DEGREE = 4
-#: Relative tolerances: imaginary part of a real root of it, over the length of its span; crack
-#: length, over that of the joint; distance within which a root is first looked for, over the same.
-REAL_ROOT, CRACK_TOLERANCE, REACH = 1e-6, 1e-12, 1e-11
+#: Imaginary part of a real root of it over the length of its span [-]: rounding makes 1e-8 of a
+#: double root. Larger ones are complex, and leave the spans as they are.
+REAL_ROOT = 1e-6
+#: Accuracy of a crack length over that of the joint [-].
+CRACK_TOLERANCE = 1e-12
+#: Distance within which a root is looked for first, over the same: a few times the rounding of the
+#: polynomial. If it is not there, it is looked for in the whole span.
+REACH = 1e-11
 
 
 def arrest_lengths(

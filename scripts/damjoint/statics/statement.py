@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .. import ROUND_OFF
 from ..input.case import Case
 from ..input.values import has_drains
 from ..model.results import Results
@@ -116,7 +117,7 @@ def path_statement(results: Results) -> str:
     level, time = history["level"], history["time"]
     if not len(level):
         return "no step has converged"
-    driven = (time > case["drive_begin"] - 1e-9) & (time < case["drive_end"] + 1e-9)
+    driven = (time > case["drive_begin"] - ROUND_OFF) & (time < case["drive_end"] + ROUND_OFF)
     load = case["rho_water"] * case["g"] * level.max()
     text = f"largest load: level {level.max():.5g} m ({load / 1e3:.5g} kPa)"
     if case["drive_by"] < 0:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .. import ROUND_OFF
 from ..input.case import Case
 from ..input.values import freezes_uplift
 from ..model.loads import COMPLETE, thermal_strains
@@ -129,7 +130,7 @@ def slipped_from(results: Results) -> float | None:
         if abs(results.last["T"]) < (1 - AT_BOUND) * resistance < np.inf:
             return None
     history, base = results.history, results.case.joint_length
-    slipped = np.maximum(history["slip_length"], history["crack_length"]) > base * (1 - 1e-9)
+    slipped = np.maximum(history["slip_length"], history["crack_length"]) > base * (1 - ROUND_OFF)
     if slipped.any() and slipped[-1]:
         return float(history["level"][np.flatnonzero(~slipped)[-1] + 1 if not slipped.all() else 0])
     rows = results.at() if len(results.joint["time"]) else {}
@@ -168,9 +169,11 @@ def shear_resistance(results: Results, normal: float) -> float:
 #: Relative distance to a bound of statics within which a state has reached it: the last step of a
 #: run is known to 1/1024 of the step between two levels.
 AT_BOUND = 5e-3
-#: Distance of the resultant from the toe, over the joint's length, within which the dam overturns:
-#: at least, and in elements.
-ARM_AT_TOE, ELEMENTS_AT_TOE = 0.01, 0.5
+#: Distance of the resultant from the toe, over the joint's length, within which the dam overturns.
+ARM_AT_TOE = 0.01
+#: The same over the length of an element of the joint, if that is more: the last integration point
+#: is up to 0.2 elements from the toe.
+ELEMENTS_AT_TOE = 0.5
 
 
 def bound(results: Results) -> Bound:

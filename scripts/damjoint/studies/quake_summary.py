@@ -17,8 +17,11 @@ from ..model.results import column_of
 MEAN_OVER = 1.0
 
 #: A joint is at rest if in this time its plastic slip changes at most by this share of its largest
-#: slip, and its openings by this share of their largest value, or all by LEAST_MOTION [m].
-REST_OF_SLIP, REST_OF_OPENING = 0.01, 0.1
+#: slip; otherwise the verdict is `not at rest`.
+REST_OF_SLIP = 0.01
+#: The same of its openings, which still vibrate after the slip has ended.
+REST_OF_OPENING = 0.1
+#: Changes below this one count as none [m].
 LEAST_MOTION = 1e-5
 
 #: Time steps in the first period that resolve a joint which opens and slips.

@@ -21,8 +21,10 @@ for slow in ("ksone", "kstwo", "levy_stable", "studentized_range"):
 #: Confidence level of the interval of a probability.
 CONFIDENCE = 0.95
 
-#: Limit of the iterations for a correlated sample, and tolerance of its rank correlations.
-MOST_ITERATIONS, TOLERANCE = 30, 1e-4
+#: Most iterations for a correlated sample; usually three to five. Then it stays as it is.
+MOST_ITERATIONS = 30
+#: Tolerance of its rank correlations [-].
+TOLERANCE = 1e-4
 
 
 def distribution(name: str, text: str) -> stats.distributions.rv_frozen:

@@ -59,8 +59,10 @@ UNDECIDED = (ERROR, "not converged", "interrupted", NOT_AT_REST, NO_FRICTION)
 #: Limit of the rows that are computed together: they share the steps up to their common level.
 MOST_TOGETHER = 8
 
-#: Bundles in a task of a scheduler: at most, and so few that each of its threads has some tasks.
-MOST_IN_TASK, TASKS_PER_THREAD = 50, 10
+#: Most bundles in a task of a scheduler.
+MOST_IN_TASK = 50
+#: Least tasks for each of its threads: bundles in a task are so few that there are these.
+TASKS_PER_THREAD = 10
 
 #: Solved cases that differ in levels only, by levels, tailwater and times.
 Solved: TypeAlias = dict[tuple[tuple[float, ...], ...], LoadStepper]

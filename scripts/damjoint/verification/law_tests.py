@@ -17,8 +17,10 @@ from ..arrays import Array, Value, Values
 from ..input.resolve import NO_DAM, load
 from ..laws import Law
 
-#: Largest jump that a loaded point is searched within, and accuracy of the search.
-LARGEST_JUMP, ACCURACY = 10.0, 1e-20
+#: Largest jump that a loaded point is searched within [m].
+LARGEST_JUMP = 10.0
+#: Accuracy of the search [m].
+ACCURACY = 1e-20
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ... import InputError
+from ... import ROUND_OFF, InputError
 from ...input.case import Case
 from ...input.parameters import listing
 from ...mesh.joint_mesh import JointMesh
@@ -79,7 +79,7 @@ def side_by_side(network: Network, mesh: Mesh, case: Case) -> dict[int, WaterPat
     heel, toe = (end.points[:, 1] for end in (network.mesh.heel, network.mesh.toe))
     if network.branched or network.in_series:
         raise refused(network, mesh, case, "as they do not lie side by side")
-    if max(np.ptp(heel), np.ptp(toe)) > 1e-9 * case.size:
+    if max(np.ptp(heel), np.ptp(toe)) > ROUND_OFF * case.size:
         raise refused(network, mesh, case, "as their heels or toes are not level")
     ends = float(heel[0]), float(toe[0])
     path = WaterPath(heel_y=ends[0], toe_y=ends[1], rest_y=min(ends))

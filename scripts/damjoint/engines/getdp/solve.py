@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ... import InputError, RunError, data
+from ... import ROUND_OFF, InputError, RunError, data
 from ...fem.memory import bulk_size, check_memory
 from ...input.case import Case
 from ...input.values import flows, freezes_uplift, has_drains
@@ -78,7 +78,7 @@ def check_own(mesh: Mesh, case: Case) -> None:
                 "engine = getdp"
             )
         ends = (joint.heel, joint.toe)
-        level = all(np.ptp(end.points[:, 1]) < 1e-9 * case.size for end in ends)
+        level = all(np.ptp(end.points[:, 1]) < ROUND_OFF * case.size for end in ends)
         if not level and own["uplift"] != "none":
             raise InputError(
                 f"uplift = {own['uplift']}: must be none with engine = getdp where heel or toe are "
