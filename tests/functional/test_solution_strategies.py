@@ -7,7 +7,7 @@ from damjoint.input.resolve import load
 from damjoint.laws.friction import FrictionVariables
 from damjoint.mesh.mesh import mesh_of
 from damjoint.solver.load_stepper import LoadStepper
-from damjoint.solver.newton import Convergence, Iterate, Strategy, newton
+from damjoint.solver.newton import Convergence, Iterate, NotConverged, Strategy, newton
 from damjoint.statics.verdict import verdict
 
 #: A dam of realistic stiffness; the shear release of its joint is far shorter than its jumps.
@@ -148,7 +148,7 @@ def test_unstable_crack_growth_ends_in_equilibrium(solve):
 
 @pytest.mark.parametrize(
     "rest, ceiling, criterion",
-    [(0.0, 1.0, "tolerance"), (1e-6, 1.0, "round-off"), (1e-6, 1e-7, None), (1e-3, 1.0, None)],
+    [(0.0, 1.0, "tolerance"), (1e-6, 1.0, "round-off"), (1e-6, 1e-7, ""), (1e-3, 1.0, "")],
 )
 def test_the_criterion_by_which_a_solution_ends(rest, ceiling, criterion):
     """A spring of 1e12 N/m to 0.1 m whose residual keeps a rest [N]: the last bit of the jump is
@@ -162,8 +162,47 @@ def test_the_criterion_by_which_a_solution_ends(rest, ceiling, criterion):
 
     start = evaluate(np.zeros(1), 0.0, None)
     convergence = Convergence(1e11, 1e-9, ceiling, 5.0, 10.0)
-    solution = newton(evaluate, start, convergence, Strategy(3.0, 0, 0, 20, 4))
-    assert (solution and solution[2]) == criterion
+    strategy = Strategy(3.0, 0, 0, 20, 4)
+    if criterion:
+        assert newton(evaluate, start, convergence, strategy)[2] == criterion
+    else:
+        message = f"the iterates repeat, with a residual of {rest / 1e11:.2g} of the loads"
+        with pytest.raises(NotConverged, match=message):
+            newton(evaluate, start, convergence, strategy)
+
+
+@pytest.mark.parametrize(
+    ("factor", "message"),
+    [
+        (0.5, "after 20 iterations the residual is 9.5e-07 of the loads"),
+        (1e-9, "the residual stagnates at 1 of the loads"),
+        (-2.0, "a displacement jump exceeds 10 m"),
+        (np.nan, "the residual is not a finite number"),
+    ],
+)
+def test_how_a_solution_ends_that_does_not_converge(factor, message):
+    """A spring whose corrections are a part of what is missing, too small, or in the wrong
+    direction.
+    """
+
+    def evaluate(jump, level, last):
+        residual = 1e12 * (jump - 0.1)
+        size = float(abs(residual)[0])
+        return Iterate(jump, level, residual, size, lambda _: (-factor * residual / 1e12, 0.0))
+
+    start = evaluate(np.zeros(1), 0.0, None)
+    convergence = Convergence(1e11, 1e-9, 1.0, 5.0, 10.0)
+    with pytest.raises(NotConverged, match=message):
+        newton(evaluate, start, convergence, Strategy(1e30, 0, 0, 20, 4))
+
+
+def test_a_run_that_stops_says_how_its_last_solution_ended(solve):
+    """A dam that overturns, on a joint whose equilibrium path is not followed."""
+    overturns = {"uplift": "none", "rho_dam": 1200, "K_N": 1e13, "K_T": 1e13}
+    (result,) = solve("i", "5,10", **overturns)
+    assert result.info["end_of_solution"] == "a displacement jump exceeds 1 m"
+    (result,) = solve("i", "5", **overturns)
+    assert "end_of_solution" not in result.info
 
 
 def test_steps_that_converge_by_round_off_are_listed(solve):

@@ -87,7 +87,9 @@ def test_the_statement_gives_the_mechanism_found_on_the_path():
     result = stopped("bond")
     statement = statement_of(result)
     assert statement.startswith("not converged: no equilibrium is found beyond level 2 m")
-    assert "the resultant is 2.5 m from the toe" in statement
+    assert "and no mechanism either; there the resultant is 2.5 m from the toe" in statement
+    result.info["end_of_solution"] = "the residual stagnates at 0.1 of the loads"
+    assert "either; the residual stagnates at 0.1 of the loads; there the" in statement_of(result)
     result.info["mechanism"] = {
         "mode": "sliding",
         "level": 2.5,

@@ -23,6 +23,7 @@ from ..joint.linear_system import many_systems
 from ..joint.problem import Dashpots, JointProblem
 from ..joint.water import Pressure
 from ..solver.model import Model, StepResult
+from ..solver.newton import NotConverged
 from ..solver.state import State, StepLaws
 from ..solver.step import Plan, Start, solve
 from .scheme import HHT, Motion
@@ -119,8 +120,10 @@ class TimeStep:
         if not persist:  # where points stick and slip by turns, only a descent of the residual ends
             strategies = strategies[0], replace(strategies[0], growth=1.0)
         starts = [Start(strategy, guess, loading.level) for strategy in strategies]
-        solution = solve(joints, loading, Plan(starts, model.convergence, persist))
-        if solution is None:
+        try:
+            solution = solve(joints, loading, Plan(starts, model.convergence, persist))
+        except NotConverged as error:
+            model.end_of_solution = str(error)
             return None
         laws = StepLaws(equilibrium.laws, equilibrium.laws)
         state = start.update(equilibrium.interface, laws, solution.jump)

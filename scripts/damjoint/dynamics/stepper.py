@@ -193,7 +193,8 @@ class Earthquake:
         if halvings == MOST_HALVINGS:
             largest, limit = np.abs(self.now.state.jump).max(), LARGEST_JUMP * self.case.size
             reason = (
-                f"no equilibrium with a time step of {self.dt / 2**halvings:.3g} s"
+                f"no equilibrium with a time step of {self.dt / 2**halvings:.3g} s: "
+                f"{self.problem.model.end_of_solution}"
                 if largest < 0.9 * limit
                 else f"the displacement jump reaches {limit:.3g} m, beyond small displacements"
             )

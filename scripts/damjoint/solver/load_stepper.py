@@ -59,6 +59,8 @@ class LoadStepper:
         start = self.model.start()
         self.state = Trace.start(start) if case.all_steps else start
         self.stopped = False
+        #: by which criterion the fallback has ended, where the run has stopped
+        self.end_of_solution = ""
         #: whether an equilibrium path has been followed to its end
         self.path_ended = False
         #: how the dam fails, once its equilibrium path has shown that it does
@@ -240,6 +242,7 @@ class LoadStepper:
         if self.mechanism is None:
             control, fallback = self.control(target), self.model.strategies[-1:]
             step = self.model.advance(self.state, target, control, strategies=fallback)
+            self.end_of_solution = "" if step else self.model.end_of_solution
         self.stopped = step is None
         return step
 
@@ -386,6 +389,7 @@ class LoadStepper:
             "mechanism": self.mechanism and asdict(self.mechanism),
             "limit_points": self.limit_points,
             "unstable_growth": self.relaxed_at,
+            "end_of_solution": self.end_of_solution,
             "converged_by_round_off": self.history.by_round_off,
         }
         results.info = {name: value for name, value in info.items() if value}

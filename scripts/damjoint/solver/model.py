@@ -21,7 +21,7 @@ from ..joint.water import BeforeQuake
 from ..model.loads import COMPLETE, Loading
 from ..model.network import with_paths
 from .controls import Control, DisplacementControl, LevelControl, Prescribed
-from .newton import BY_TOLERANCE, Convergence, Strategy
+from .newton import BY_TOLERANCE, Convergence, NotConverged, Strategy
 from .state import State, StepLaws
 from .step import Plan, Start, solve
 
@@ -60,6 +60,8 @@ class Model:
             case = with_paths(case, [joint.mesh for joint in interface.joints])
         self.case, self.equilibrium = case, Equilibrium(case, interface)
         self.reference = self.unbalanced()
+        #: by which criterion the last solution ended that has not converged
+        self.end_of_solution = ""
 
     def with_case(self, case: Case) -> Model:
         """The same for another case that differs in its levels and times, or in values that the
@@ -69,7 +71,7 @@ class Model:
             return self
         other = object.__new__(Model)
         other.case, other.equilibrium = case, self.equilibrium
-        other.reference = other.unbalanced()
+        other.reference, other.end_of_solution = other.unbalanced(), ""
         return other
 
     def unbalanced(self) -> float:
@@ -165,8 +167,10 @@ class Model:
         if isinstance(control, DisplacementControl):
             constraint = Prescribed(control, equilibrium)
         loading = self.loading(time, state.loading.level)
-        solution = solve(problem, loading, plan, constraint)
-        if solution is None:
+        try:
+            solution = solve(problem, loading, plan, constraint)
+        except NotConverged as error:
+            self.end_of_solution = str(error)
             return None
         reached = replace(loading, level=solution.level)
         new = replace(

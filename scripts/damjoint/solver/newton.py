@@ -11,7 +11,11 @@ from numpy.typing import NDArray
 from ..arrays import Array
 
 
-class Diverged(Exception):
+class NotConverged(Exception):
+    """A solution has ended without convergence; its text says by which criterion."""
+
+
+class Diverged(NotConverged):
     """An iterate exceeds the displacement limit."""
 
 
@@ -112,28 +116,29 @@ def rounding(now: Iterate, evaluate: Evaluate) -> float:
 
 def newton(
     evaluate: Evaluate, start: Iterate, convergence: Convergence, strategy: Strategy
-) -> tuple[Iterate, int, str] | None:
-    """The converged iterate, the number of iterations and the criterion; None if there is none.
+) -> tuple[Iterate, int, str]:
+    """The converged iterate, the number of iterations and the criterion.
 
-    Raises Diverged.
+    Raises NotConverged.
 
     A correction is halved only while it makes the residual grow more than strategy.growth times:
     while points open or break the residual has to rise, which a monotone line search prevents.
     """
     now, sizes = start, list[float]()
-    for iterations in range(strategy.iterations + 1):
+    while True:
+        iterations = len(sizes)
         criterion = convergence.reached(now, sizes[-1] if sizes else np.inf, evaluate)
         if criterion:
             return now, iterations, criterion
-        if not np.isfinite(now.size) or iterations == strategy.iterations or stagnates(now, sizes):
-            return None
+        if end := end_of(now, sizes, strategy.iterations):
+            raise NotConverged(end.format(now.size / (convergence.reference or 1.0)))
         if np.abs(now.jump).max() > convergence.largest_jump:
-            raise Diverged
+            raise Diverged(f"a displacement jump exceeds {convergence.largest_jump:.3g} m")
         sizes.append(now.size)
         try:
             jump, level = now.correction(iterations < strategy.secant)
         except (np.linalg.LinAlgError, ValueError):  # singular, or not a number
-            return None
+            raise NotConverged("the tangent is singular") from None
         fraction = 1.0
         for _ in range(strategy.halvings + 1):
             new = evaluate(now.jump + fraction * jump, now.level + fraction * level, now)
@@ -141,15 +146,24 @@ def newton(
                 break
             fraction /= 2
         now = new
-    return None
 
 
-def stagnates(now: Iterate, sizes: list[float]) -> bool:
-    """Whether the residual repeats, or has not changed over STAGNATING_ITERATIONS."""
-    unchanged = len(sizes) >= STAGNATING_ITERATIONS and all(
+def end_of(now: Iterate, sizes: list[float], most: int) -> str:
+    """Why an iterate that has not converged is the last one; empty if it is not.
+
+    sizes: norms of the residual before it; most: iterations.
+    """
+    if not np.isfinite(now.size):
+        return "the residual is not a finite number"
+    if repeats(now.size, sizes, SAME):
+        return "the iterates repeat, with a residual of {:.2g} of the loads"
+    if len(sizes) >= STAGNATING_ITERATIONS and all(
         repeats(now.size, [size], STAGNATION) for size in sizes[-STAGNATING_ITERATIONS:]
-    )
-    return unchanged or repeats(now.size, sizes, SAME)
+    ):
+        return "the residual stagnates at {:.2g} of the loads"
+    if len(sizes) == most:
+        return f"after {most} iterations the residual is {{:.2g}} of the loads"
+    return ""
 
 
 def repeats(size: float, sizes: list[float], tolerance: float) -> bool:

@@ -14,7 +14,7 @@ from ..arrays import Array
 from ..joint.linear_system import Border
 from ..joint.problem import JointProblem
 from ..model.loads import Loading
-from .newton import Convergence, Diverged, Iterate, Strategy, newton
+from .newton import Convergence, Diverged, Iterate, NotConverged, Strategy, newton
 
 
 class Constraint(Protocol):
@@ -69,22 +69,21 @@ class Solution:
 
 def solve(
     problem: JointProblem, loading: Loading, plan: Plan, constraint: Constraint | None = None
-) -> Solution | None:
-    """Solve a step from the first start that leads to convergence; None if none does.
+) -> Solution:
+    """Solve a step from the first start that leads to convergence.
 
     loading: at the end of the step, but for the level: that of the start or, with a constraint,
-    unknown.
+    unknown. Raises NotConverged, for the last start, if none does.
     """
+    end = NotConverged("there is no strategy")
     for begin in plan.starts:
         try:
-            solution = solve_from(problem, loading, begin, plan.convergence, constraint)
-        except Diverged:
-            if not plan.persist:
-                return None
-            continue
-        if solution:
-            return solution
-    return None
+            return solve_from(problem, loading, begin, plan.convergence, constraint)
+        except NotConverged as error:
+            end = error
+            if isinstance(error, Diverged) and not plan.persist:
+                break
+    raise end
 
 
 def solve_from(
@@ -93,8 +92,8 @@ def solve_from(
     begin: Start,
     convergence: Convergence,
     constraint: Constraint | None,
-) -> Solution | None:
-    """From one start, see `solve`. Raises Diverged."""
+) -> Solution:
+    """From one start, see `solve`. Raises NotConverged."""
     strategy = begin.strategy
 
     def evaluate(jump: Array, level: float, last: Iterate | None) -> Iterate:
@@ -123,12 +122,9 @@ def solve_from(
 
     with np.errstate(over="ignore", invalid="ignore"):  # a diverging iterate is discarded
         first = evaluate(begin.jump, begin.level, None)
-        converged = newton(evaluate, first, convergence, strategy)
-    if converged is None:
-        return None
-    end, iterations, criterion = converged
+        end, iterations, criterion = newton(evaluate, first, convergence, strategy)
     if np.abs(end.jump).max() > convergence.largest_jump:
-        raise Diverged
+        raise Diverged(f"a displacement jump exceeds {convergence.largest_jump:.3g} m")
     if constraint and not 0 <= end.level <= constraint.highest_level:
-        return None
+        raise NotConverged(f"the displacement needs a level of {end.level:.6g} m")
     return Solution(end.jump, end.level, iterations, end.size, criterion)

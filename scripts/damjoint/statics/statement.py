@@ -58,9 +58,11 @@ def reason_of_stop(results: Results) -> str:
         at_joint = f"{joint}: " if joint else ""
         return f"no equilibrium beyond {where}: {at_joint}{words_of_bound(reached)}"
     arm = case.joint_along - last["x_resultant"]
+    end = results.info.get("end_of_solution")
     return (
         f"no equilibrium is found beyond {where}, and no mechanism either{stiff_joint(results)}; "
-        f"there the resultant is {arm:.3g} m from the toe, T/N' = {last['T'] / last['N']:.3g}"
+        + (f"{end}; " if end else "")
+        + f"there the resultant is {arm:.3g} m from the toe, T/N' = {last['T'] / last['N']:.3g}"
     )
 
 
