@@ -30,7 +30,7 @@ session.py  the life of a study in its output folder
 runner.py   solves a case and writes its results
 studies/    checks, sweeps, critical values, a law along a path, reports
 verification/  published tests, for `damjoint validate`
-library.py  the interface for Python: case, run, fill, check, critical, quake, sweep, laws
+library.py  the interface for Python: case, run, check, quake, modes, ...
 gui/        the Gmsh window
 cli/        the command line, a file for each command; __main__.py prepares its process
 
@@ -51,6 +51,7 @@ if TYPE_CHECKING:
     from .library import Critical as Critical
     from .library import JointTable as JointTable
     from .library import Law as Law
+    from .library import Modes as Modes
     from .library import Quake as Quake
     from .library import Run as Run
     from .library import Sample as Sample
@@ -60,6 +61,7 @@ if TYPE_CHECKING:
     from .library import check as check
     from .library import critical as critical
     from .library import fill as fill
+    from .library import modes as modes
     from .library import quake as quake
     from .library import run as run
     from .library import sweep as sweep
@@ -101,8 +103,9 @@ def data(folder: str) -> Path:
 
 #: What `import damjoint` offers, see library.py; imported when it is used.
 LIBRARY = (
-    *("case", "run", "fill", "check", "critical", "quake", "sweep"),
-    *("Case", "Run", "JointTable", "Step", "Checks", "Critical", "Quake", "Sample", "Sweep"),
+    *("case", "run", "fill", "check", "critical", "quake", "modes", "sweep"),
+    *("Case", "Run", "JointTable", "Step", "Checks", "Critical", "Quake", "Modes", "Sample"),
+    "Sweep",
     *("Law", "LAWS"),
 )
 __all__ = [*LIBRARY, "InputError", "RunError"]

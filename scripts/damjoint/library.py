@@ -35,6 +35,7 @@ from .model.notes import notes
 from .model.results import (
     HISTORY,
     LATERAL,
+    MODES,
     Columns,
     Results,
     history_columns,
@@ -55,6 +56,7 @@ if TYPE_CHECKING:  # loaded when they are used, with what they draw with
     import xarray
     from matplotlib.figure import Figure
 
+    from .dynamics.modes import NaturalModes
     from .studies.check import SafetyCheck
     from .studies.critical import Search
     from .studies.critical_value import CriticalValue
@@ -67,6 +69,7 @@ __all__ = [
     "Critical",
     "JointTable",
     "Law",
+    "Modes",
     "Quake",
     "Run",
     "Sample",
@@ -76,6 +79,7 @@ __all__ = [
     "check",
     "critical",
     "fill",
+    "modes",
     "quake",
     "run",
     "sweep",
@@ -806,6 +810,81 @@ def quake(
     if tables.error:
         raise tables.error
     return Quake(tables)
+
+
+@dataclass(frozen=True, repr=False)
+class Modes:
+    """The natural modes of a case, made by `modes`.
+
+    Example:
+        >>> found = modes(case("dam", levels=40, n_joint=10, order=1), number=2)
+        >>> found.units["frequency"], found.rows.mode.tolist()
+        ('Hz', [1, 2, 1, 2, 1, 2, 1, 2])
+    """
+
+    #: the modes of each water on each rock, with their shapes
+    natural: NaturalModes
+
+    @property
+    def case(self) -> Case:
+        """The case."""
+        return self.natural.case
+
+    @property
+    def rows(self) -> np.recarray:
+        """modes.csv: a row per mode of each water on each rock."""
+        return records(self.natural.table)
+
+    @property
+    def frequencies(self) -> Array:
+        """Frequencies [Hz] with the reservoir on massless rock, as in an earthquake."""
+        return np.array([mode.frequency for mode in self.natural.variants[0].modes])
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Units of the columns of `rows`."""
+        return {name: unit for name, (unit, _) in MODES.items()}
+
+    def plot(self) -> Figure:
+        """The picture of the modes, as `damjoint modes` writes it."""
+        from .studies.modes_study import figure
+
+        return displayed(figure(self.natural))
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """The rows as a DataFrame with units in its `attrs`.
+
+        Raises ImportError without pandas.
+        """
+        return frame(self.natural.table, MODES)
+
+    def __repr__(self) -> str:
+        listed = ", ".join(f"{frequency:.4g}" for frequency in self.frequencies)
+        return f"{self.case.name}: {listed} Hz"
+
+
+def modes(source: Case | str | Path = "dam", *, number: int = 5) -> Modes:
+    """Natural modes of a case, without a record: joints closed and undamaged, with and without the
+    mass of the water, on massless and on rigid rock; nothing is written.
+
+    Args:
+        source: a case, or its name or path, see `case`.
+        number: modes of each, the lowest ones.
+
+    Raises:
+        InputError: bad input, or fewer unknowns than modes.
+        RunError: too little memory.
+
+    Example:
+        >>> found = modes(case("dam", levels=40, n_joint=10, order=1), number=2)
+        >>> sorted(set(found.rows.rock.tolist())), len(found.frequencies)
+        (['massless', 'rigid'], 2)
+    """
+    from .studies import modes_study
+
+    if number < 1:
+        raise InputError(f"number = {number}: must be an integer >= 1")
+    return Modes(modes_study.compute(noted(as_case(source)), number, progress=False))
 
 
 @dataclass(frozen=True, repr=False)

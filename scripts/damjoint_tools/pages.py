@@ -18,7 +18,7 @@ from pathlib import Path
 from damjoint.dynamics.frames import MOST_FRAMES
 from damjoint.input.parameters import declared
 from damjoint.laws import COLUMNS
-from damjoint.model.results import FLUX, HISTORY, JOINT, LATERAL, QUAKE, STEPS, THICKNESS
+from damjoint.model.results import FLUX, HISTORY, JOINT, LATERAL, MODES, QUAKE, STEPS, THICKNESS
 from damjoint.post.validation import Comparison
 from damjoint.statics.gravity import LOADS
 from damjoint.studies.check import CHECK
@@ -76,7 +76,7 @@ def parameters_page() -> str:
 
 def results_page() -> str:
     """reference/results.md: the columns of the tables."""
-    joint, history, steps, check, loads, critical, quake = (
+    joint, history, steps, check, loads, critical, quake, modes = (
         markdown([(f"`{n}`", u, m) for n, (u, m) in columns.items()], ("column", "unit", "meaning"))
         for columns in (
             JOINT | COLUMNS | FLUX | THICKNESS,
@@ -86,6 +86,7 @@ def results_page() -> str:
             LOADS,
             CRITICAL,
             QUAKE,
+            MODES,
         )
     )
     parts = [
@@ -137,6 +138,9 @@ def results_page() -> str:
         "`records.csv` has a row for each: `folder`, `record`, then as in a row of a sweep with "
         "`--quake`, `verdict` and `statement`.",
         quake,
+        "## modes.csv",
+        "Written by `damjoint modes`, and in `run.json` under `modes`, with the parameters.",
+        modes,
         "## CASE_sweep.csv",
         "Written by `damjoint sweep`, a row per combination, in the order of computation: `key`, "
         "of all that decides the row (values, loading, mesh, record, code), by which an "

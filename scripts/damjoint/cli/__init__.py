@@ -16,7 +16,7 @@ from .options import HelpWithLines, Parser
 #: The commands: names of modules. Each has SUMMARY, the shared options SHARED if there are any,
 #: `add`, which adds its own options, and `call`, which runs it and returns the exit code.
 COMMANDS = (
-    *("run", "check", "critical", "quake", "sweep"),
+    *("run", "check", "critical", "quake", "modes", "sweep"),
     *("plot", "report", "gui", "new", "validate"),
 )
 DEVELOPERS = ("stress", "bench", "law")

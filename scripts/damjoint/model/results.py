@@ -150,6 +150,18 @@ QUAKE = {
     "dt": ("s", "length of the step"),
     "residual": ("-", "norm of the out-of-balance forces over that of the static loads"),
 }
+#: Columns of modes.csv: a row per natural mode, with each water on each rock.
+MODES = {
+    "rock": ("", "massless: elastic, without mass; or rigid"),
+    "water": ("", "reservoir: its added mass at the last level; or none"),
+    "mode": ("-", "number of the mode, from the lowest"),
+    "frequency": ("Hz", "natural frequency, undamped, joints closed and undamaged"),
+    "period": ("s", "its inverse"),
+    "mass_x": ("-", "effective modal mass along x over the mass that moves along x"),
+    "mass_y": ("-", "the same along y; in 3D, modes along z have neither"),
+    "damping": ("-", "damping ratio by the Rayleigh damping of an earthquake of this row"),
+}
+
 #: Those of a joint. With several joints: of the first one; of joint 2, 3, ... by `column_of`.
 QUAKE_OF_JOINTS = (
     *("heel_opening", "toe_opening", "slip_mean", "slip_heel", "slip_toe"),

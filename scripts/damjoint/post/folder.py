@@ -28,9 +28,10 @@ from ..storage import PART, atomic_write, locked_folder
 #: Files of a run: tables, pictures CASE....png, fields.
 TABLES = (
     *("joint.csv", "history.csv", "curve.csv", "steps.csv", "gravity.csv", "critical.csv"),
-    *("quake.csv", "quake_joint.csv", "quake_stress.npz", "quake_state.npz", "run.json"),
+    *("quake.csv", "quake_joint.csv", "quake_stress.npz", "quake_state.npz"),
+    *("modes.csv", "run.json"),
 )
-PICTURES = ("", "_curve", "_check", "_critical", "_quake")
+PICTURES = ("", "_curve", "_check", "_critical", "_quake", "_modes")
 FIELDS = r"(bulk|joint)(_t[\w.+-]+\.vtu|\.msh)|fields\.pvd"
 #: States of a run that has come to its end: the last one; of the loads or of the equilibria.
 COMPLETE, STOPPED = "complete", "stopped"

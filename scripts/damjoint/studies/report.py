@@ -255,6 +255,7 @@ def read_section(folder: Path, number: int) -> RunSection:
         raise InputError(f"out = {folder}: damaged ({error!r}); run the case again") from None
 
 
+@picture_style()
 def run_section(folder: Path, number: int, solution: Solution) -> RunSection:
     """Make the section of a run; number: in the report."""
     result = solution.result
@@ -488,7 +489,6 @@ def factored(case: Case, strength: str, unit: float) -> str:
     return f"{value / unit:.4g}" + (f"/{factor:.4g}" if factor != 1 else "")
 
 
-@picture_style()
 def pictures_of(solution: Solution) -> list[Picture]:
     """Draw the pictures of a run."""
     result = solution.result

@@ -1,0 +1,36 @@
+"""damjoint modes."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from .cases import load_case
+from .options import CASE, Parser, settings_options, water_options
+
+SUMMARY = (
+    "natural frequencies and shapes, without a record: joints closed, with and without water, on "
+    "elastic and on rigid rock"
+)
+
+#: Options that it shares with other commands.
+SHARED = settings_options, water_options
+
+
+def add(command: Parser) -> None:
+    """Add the options."""
+    command.add_argument("case", metavar="CASE", help=CASE)
+    command.add_integer("--number", 1, default=5, help="number of modes (default: 5)")
+    command.add_path("--out", "FOLDER", help="output folder (default: out/CASE_modes)")
+    command.add_argument("--no-picture", action="store_true", help="draw no PNG")
+
+
+def call(arguments: argparse.Namespace) -> int:
+    """Run damjoint modes."""
+    from ..studies import modes_study
+
+    case = load_case(arguments, arguments.case)
+    out = arguments.out or Path("out") / f"{case.name}_modes"
+    found = modes_study.run(case, arguments.number, out, not arguments.no_picture)
+    print(f"{case.name}: {modes_study.about(found)}; {out}\n\n{modes_study.text(found)}")
+    return 0
