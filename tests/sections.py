@@ -33,7 +33,7 @@ def outline(case):
     points = [
         (0, 0),
         (v["dam_base"], toe_y),
-        (crest, v["dam_height"] - v["neck_height"]),
+        (crest + bool(v["neck_height"]) * v["neck_batter"], v["dam_height"] - v["neck_height"]),
         (crest, v["dam_height"]),
         (v["batter"], v["dam_height"]),
         (v["batter"], v["batter_height"]),

@@ -211,7 +211,7 @@ def section_above_base(first: Values) -> Section:
     toe_y = base * math.tan(math.radians(first["joint_slope"])) if on_base else 0.0
     crest_x, neck_y = batter + first["dam_crest"], height - first["neck_height"]
     bend = [(batter, first["batter_height"])] if batter and first["batter_height"] < height else []
-    neck = [(crest_x, neck_y)] if first["neck_height"] else []
+    neck = [(crest_x + first["neck_batter"], neck_y)] if first["neck_height"] else []
     return Section(
         (0.0, 0.0),
         (base, toe_y),

@@ -170,7 +170,7 @@ SCENES = {
 }
 #: Sections and loads of the 45 m dam: parameters, levels, tailwater.
 SMALL = {"n_joint": 20.0, "h_dam": 8.0, "h_found": 30.0}
-SHAPE = {"batter": 4.0, "batter_height": 20.0, "neck_height": 6.0}
+SHAPE = {"batter": 4.0, "batter_height": 20.0, "neck_height": 6.0, "neck_batter": 2.0}
 STAGED = {"silt_height": 12.0, "ice_force": 1e5, "ice_level": 40.0, "anchor_force": 2e6}
 STAGED |= {"anchor_angle": 10.0, "k_h": 0.1, "k_v": 0.05, "floor_water": 1.0, "force_x": 3e4}
 STEEP = {"batter": 5.0, "batter_height": 35.0}

@@ -60,6 +60,10 @@ def press_run(folder, changed):
         ("dam_height 4", "Level 4 = 9 m: must be between 0 and 8 m"),
         ("batter 5", "batter = 5: must be below dam_base (5 m)"),
         ("neck_height 10", "neck_height = 10: must be below dam_height (10 m)"),
+        (
+            "neck_height 3 -setnumber neck_batter 4",
+            "neck_batter = 4: must be at most 3.5 m (dam_base - batter - dam_crest)",
+        ),
         ("joint_height 11", "joint_height = 11: must be below dam_height (10 m)"),
         (
             "joint_slope 60 -setnumber dam_base 6",

@@ -14,12 +14,19 @@ from sections import resultants
 SHAPES = {
     "plain": {},
     "batter and neck": {"batter": 4, "batter_height": 20, "neck_height": 6},
+    "sloping neck": {"batter": 4, "neck_height": 15, "neck_batter": 5},
     "rising base": {"batter": 4, "neck_height": 6, "joint_slope": 5},
     "falling base": {"batter": 4, "neck_height": 6, "joint_slope": -4},
     "lift": {"joint_height": 20, "neck_height": 6},
     "sloping lift": {"joint_height": 20, "batter": 4, "batter_height": 15, "joint_slope": 3},
     "lift in the batter": {"joint_height": 10, "batter": 4, "batter_height": 20},
     "lift in the neck": {"joint_height": 41, "neck_height": 6, "batter": 2},
+    "sloping lift in a sloping neck": {
+        "joint_height": 34,
+        "joint_slope": 4,
+        "neck_height": 15,
+        "neck_batter": 5,
+    },
 }
 LOADS = {
     "silt_height": 12,
@@ -78,7 +85,7 @@ def test_resultants_of_low_water(solve):
 @pytest.mark.heavy
 def test_resultants_in_3d(solve):
     solid = {"dim": 3, "mesh_pattern": "split", "thickness": 3, "n_layers": 2, "n_joint": 10}
-    shape = {"batter": 4, "batter_height": 20, "neck_height": 6, "joint_slope": 4}
+    shape = {"batter": 4, "batter_height": 20, "neck_height": 6, "neck_batter": 2, "joint_slope": 4}
     (result,) = solve(
         "dam", "20,41", **solid, **shape, **{n: LOADS[n] for n in ("silt_height", "k_h")}
     )
@@ -160,6 +167,8 @@ def test_uplift_cracked_has_no_water_in_an_intact_bond(solve):
     "settings, message",
     [
         ({"neck_height": 45}, "neck_height = 45: must be < dam_height"),
+        ({"neck_height": 9, "neck_batter": 30}, "neck_batter = 30: must be at most 29 m"),
+        ({"neck_height": 9, "neck_batter": 1e-9}, "neck_batter = 1e-09: must be >= 4.5e-05 m"),
         ({"batter_height": 46}, "batter_height = 46: must be <= dam_height"),
         ({"joint_height": 50}, "joint_height = 50: must be < dam_height"),
         ({"batter": 34}, "batter = 34: must be < dam_base"),

@@ -34,6 +34,7 @@ SECTIONS = {
     "plain": {},
     "batter": {"batter": 4.0, "batter_height": 20.0},
     "neck": {"neck_height": 6.0},
+    "sloping neck": {"neck_height": 6.0, "neck_batter": 2.0},
     "lift": {"joint_height": 8.0, "batter": 4.0},
     "rising": {"joint_slope": 7.0},
     "whole": WHOLE,
@@ -57,6 +58,29 @@ def test_table_of_the_45_m_dam(level, normal, shear, moment):
     assert found.N / 1e3 == pytest.approx(normal, abs=0.5)
     assert found.T / 1e3 == pytest.approx(shear, abs=0.5)
     assert found.M / 1e6 == pytest.approx(moment, abs=0.05)
+
+
+def test_weight_and_centroid_of_koyna():
+    """Two trapezoids with a vertical upstream face: below the neck and the neck itself."""
+    empty = gravity.at(load("koyna", {"uplift": "none"}, "0"), 1)
+    parts = [(66.5, 70.2, 19.25), (36.5, 19.25, 14.8)]  # height, width at foot and top
+    areas = [h * (a + b) / 2 for h, a, b in parts]
+    moments = [h * (a * a + a * b + b * b) / 6 for h, a, b in parts]  # about the upstream face
+    weight = 2643 * 9.81 * sum(areas)
+    assert empty.N == pytest.approx(weight, rel=1e-12)
+    assert empty.M == pytest.approx(weight * (70.2 - sum(moments) / sum(areas)), rel=1e-12)
+
+
+def test_a_neck_in_line_with_the_slope_is_none():
+    """The same resultants as without a neck, on the base and on a lift joint within the neck."""
+    lift = {"joint_height": 40.0, "joint_slope": 3.0}
+    for joint in ({}, lift):
+        straight, necked = (
+            gravity.at(load("dam", {**joint, **neck}, "45", "3"), 1)
+            for neck in ({}, {"neck_height": 9.0, "neck_batter": 29 / 45 * 9})
+        )
+        for name in ("N", "T", "M", "U"):
+            assert getattr(necked, name) == pytest.approx(getattr(straight, name), rel=1e-12)
 
 
 def test_crack_of_the_45_m_dam():

@@ -92,6 +92,8 @@ def test_sections_have_batter_neck_and_slopes():
     assert low.heel == pytest.approx((2, 10)) and low.upstream[1:] == ((4, 20), (4, 45))
     assert high.downstream == (pytest.approx((9, 42)), (9, 45)) and high.length == pytest.approx(5)
     assert low.slope == pytest.approx(-0.0523598775598)
+    sloping = read([*words.split(), "--set", "neck_batter=3"]).sections[0]
+    assert sloping.downstream == ((34, 0), (12, 40), (9, 45))
     assert replace(low, heel=base.heel).heel == (0, 0) and len(base.outline) == 6
 
 

@@ -203,7 +203,7 @@ def check_lengths(case: ParameterValues) -> None:
     """Lengths of the dam's section and of the foundation: none, or such that a mesh can have."""
     height = case["dam_height"]
     least = LEAST_LENGTH * height
-    names = ["dam_base", "dam_crest", "batter_height", "neck_height", "joint_height"]
+    names = ["dam_base", "dam_crest", "batter_height", "neck_height", "neck_batter", "joint_height"]
     names += ["found_side", "found_depth", *(["thickness"] if case["dim"] == 3 else [])]
     for name in names:
         if 0 < case[name] < least:
@@ -235,6 +235,12 @@ def check_section(case: ParameterValues, section: Mapping[str, Sequence[float]])
             raise InputError(f"{name} = {case[name]:g}: must be {sign} dam_height ({height:g} m)")
     if not dam.batter < dam.dam_base:
         raise InputError(f"batter = {dam.batter:g}: must be < dam_base ({dam.dam_base:g} m)")
+    widest = max(dam.dam_base - dam.batter - dam.dam_crest, 0)
+    if dam.neck_height and dam.neck_batter > widest * (1 + 1e-12):
+        raise InputError(
+            f"neck_batter = {dam.neck_batter:g}: must be at most {widest:g} m "
+            "(dam_base - batter - dam_crest)"
+        )
     if not (section["toe_x"][0] > section["heel_x"][0] and section["toe_y"][0] < height):
         raise InputError(
             f"joint_slope = {dam.joint_slope:g}: must let the joint leave the dam below its "

@@ -15,7 +15,7 @@ from ..input.values import has_drains
 GEOMETRY = (
     *("dim", "mesh_pattern", "n_joint", "n_layers", "h_dam", "h_found"),
     *("dam_base", "dam_crest", "dam_height", "batter", "batter_height", "neck_height"),
-    *("joint_slope", "joint_height", "found_side", "found_depth", "thickness"),
+    *("neck_batter", "joint_slope", "joint_height", "found_side", "found_depth", "thickness"),
 )
 
 
