@@ -5,7 +5,6 @@ import signal
 
 import pytest
 from damjoint import runner
-from damjoint.__main__ import OBJECTS
 from damjoint.input.resolve import load
 from damjoint.pictures import drawing, run_picture
 from damjoint.threads import limited_threads
@@ -13,9 +12,9 @@ from matplotlib.text import Text
 
 
 def pytest_collection_finish():
-    """Search for garbage as rarely as the commands do, and not among the tests themselves."""
+    """Search for garbage rarely, and not among the tests themselves."""
     gc.freeze()
-    gc.set_threshold(OBJECTS)
+    gc.set_threshold(50_000)
 
 
 @pytest.fixture(scope="session", autouse=True)

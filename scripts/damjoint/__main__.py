@@ -3,7 +3,6 @@ streams, signals, address space) before the libraries are imported.
 """
 
 import atexit
-import gc
 import os
 import resource
 import signal
@@ -15,9 +14,6 @@ from types import FrameType
 LEAST_ADDRESS_SPACE = 0.9e9
 #: Below this [bytes] the libraries run in one thread, as each thread takes address space.
 THREADED_ADDRESS_SPACE = 8e9
-
-#: New objects between two searches for garbage; the libraries alone make 1e5 that stay.
-OBJECTS = 50_000
 
 #: Signals that end a command as Ctrl-C does.
 INTERRUPTS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
@@ -116,7 +112,6 @@ def main() -> int:
     """Run the command: 0 done, 1 failed, 2 bad input, 130 interrupted."""
     open_streams()
     os.environ["MPLBACKEND"] = "agg"  # pictures are files; another one may not be installed
-    gc.set_threshold(OBJECTS)
     try:
         handle_signals()
         if not enough_address_space():

@@ -121,26 +121,13 @@ TRIANGLE: dict[int, tuple[list[tuple[float, ...]], list[float]]] = {
         [0.1125] + [0.0629695902724135] * 3 + [0.066197076394253] * 3,
     ),
 }
-#: Gauss-Legendre rules with 1 to 4 points: values of numpy.polynomial, which takes long to load.
-GAUSS: dict[int, tuple[list[float], list[float]]] = {
-    1: ([0.0], [2.0]),
-    2: ([-0.5773502691896257, 0.5773502691896257], [1.0, 1.0]),
-    3: (
-        [-0.7745966692414834, 0.0, 0.7745966692414834],
-        [0.5555555555555557, 0.8888888888888888, 0.5555555555555557],
-    ),
-    4: (
-        [-0.8611363115940526, -0.33998104358485626, 0.33998104358485626, 0.8611363115940526],
-        [0.34785484513745357, 0.6521451548625464, 0.6521451548625464, 0.34785484513745357],
-    ),
-}
 # Tetrahedron with 4 points (degree 2)
 _A4, _B4 = 0.1381966011250105, 0.5854101966249685
 
 
 def tensor(n: int, d: int) -> tuple[Array, Array]:
     """Gauss points (n^d, d) and weights on [-1, 1]^d."""
-    x, w = GAUSS[n]
+    x, w = np.polynomial.legendre.leggauss(n)
     return np.array(list(product(x, repeat=d))), np.array(
         [np.prod(v) for v in product(w, repeat=d)]
     )
