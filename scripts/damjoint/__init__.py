@@ -16,13 +16,13 @@ versions.py versions of the code and of what it uses, machine
 laws/       the joint laws, one file each
 input/      parameters, case files, a case and its checks
 mesh/       meshes, by Gmsh or a user's own, with their regions and joints
-model/      loads, water between joints, results, notes on a case
+model/      loads, water between joints, results
 fem/        finite elements of the bodies, condensed onto the joint
 joint/      the joint between them: interpolation, water, residual and tangent
 solver/     load stepping, Newton's method, equilibrium path
 dynamics/   time integration of an earthquake
 engines/    the engines: condensed/ from the parts above, getdp/ by the problem definition
-statics/    gravity method, limit analysis, verdict
+statics/    gravity method, limit analysis, verdict; in words: notes on a case, hints, end of a run
 post/       tables, fields and folders of results
 pictures/   shapes of a scene; pictures of section, joint, history and check
 accuracy.py mesh refinement to a required accuracy, error estimate

@@ -21,8 +21,8 @@ from . import RunError
 from .engines import OnStep, Outcome
 from .input.case import Case
 from .input.refinement import has_plane_fields
-from .model.notes import remarks
 from .model.results import Results
+from .statics.notes import remarks
 from .statics.verdict import stiffness_ratio
 
 #: Parameters that set the mesh, besides the sizes h_dam and h_found, which follow.

@@ -31,7 +31,6 @@ from .input.case_names import is_name
 from .input.resolve import load, varied
 from .laws import LAWS, Law
 from .model.fields import Solution
-from .model.notes import notes
 from .model.results import (
     HISTORY,
     LATERAL,
@@ -46,6 +45,7 @@ from .progress import track
 from .solver.load_stepper import LoadStepper
 from .solver.state import State
 from .statics.hints import hints
+from .statics.notes import notes
 from .statics.statement import statement
 from .statics.verdict import verdict
 from .studies.plan import Plan, Sample, cases_of, column_of, in_file, listed, plan_with

@@ -15,11 +15,11 @@ from typing import Any
 from . import versions
 from .fem.memory import seconds, sizes
 from .input.case import Case
-from .model.notes import remarks
 from .model.results import Results
 from .post import folder as folders
 from .post import tables
 from .progress import INTERVAL, Progress
+from .statics.notes import remarks
 
 
 def end_of(error: BaseException | None, where: str = "") -> tuple[str, str]:

@@ -8,7 +8,7 @@ from blocks import write_blocks
 from damjoint import InputError
 from damjoint.input.resolve import load
 from damjoint.mesh.mesh import Mesh, mesh_of
-from damjoint.model.notes import notes, understood
+from damjoint.statics.notes import notes, understood
 from own_mesh import OwnMesh
 
 COARSE = {"n_joint": 12.0, "h_dam": 12.0, "h_found": 50.0}

@@ -10,7 +10,7 @@ from damjoint.gui.numbers import warnings
 from damjoint.input.constraints import STAGED, WORKS
 from damjoint.input.parameters import independent
 from damjoint.input.resolve import load, varied
-from damjoint.model.notes import notes
+from damjoint.statics.notes import notes
 from quakes import smooth_record
 
 #: A coarse dam with a law that has all works on the joint.

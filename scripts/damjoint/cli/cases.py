@@ -29,7 +29,7 @@ def load_cases(
     """
     from ..input import parameters
     from ..input.resolve import load
-    from ..model.notes import remarks
+    from ..statics.notes import remarks
 
     options = ("levels", "tail_levels", "steps", "accuracy")
     given = {option: getattr(arguments, option, None) for option in options}

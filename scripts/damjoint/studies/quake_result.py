@@ -14,9 +14,9 @@ from ..arrays import Table as Columns
 from ..input.case import Case
 from ..mesh.mesh import Mesh
 from ..model.fields import Field
-from ..model.notes import remarks
 from ..model.results import QUAKE, QUAKE_OF_JOINTS, Results, column_of, quake_columns
 from ..post.summary import Table
+from ..statics.notes import remarks
 from . import quake_summary
 
 if TYPE_CHECKING:

@@ -18,7 +18,6 @@ from ..input.refinement import first_mesh
 from ..input.resolve import equal_steps, resolve, with_drive_times
 from ..input.source import Source
 from ..joint.interface import Interface, interface_of
-from ..model.notes import notes_on_settings
 from ..model.results import column_of as column_of_joint
 from ..model.results import history_columns
 from ..post.summary import aligned, fitted
@@ -26,6 +25,7 @@ from ..processes import ProcessKilled, as_finished, check_jobs, number_of
 from ..progress import Progress, track
 from ..solver.load_stepper import LoadStepper
 from ..statics.limit import mechanism
+from ..statics.notes import notes_on_settings
 from ..statics.statement import statement
 from ..statics.verdict import failed, verdict
 from ..threads import limited_threads
