@@ -175,13 +175,16 @@ def test_only_what_matters_shows_and_followers_say_what_they_follow(open_window)
     assert user.entry("mu")["visible"] and not user.entry("sigma_max")["visible"]
     user.type("E", 2e10)
     entry = user.entry("E_dam")
-    assert entry["values"] == [-1] and "= 2e+10 (-1: E)" in entry["help"]
-    assert entry["label"] == "[Pa] = 2e+10: Young's modulus of the dam"
+    assert entry["values"] == [2e10] and "= 2e+10 (-1: E)" in entry["help"]
+    assert entry["label"] == "Young's modulus of the dam [Pa], follows"
+    assert entry["attributes"]["Highlight"] == tree.FOLLOWS
     assert user.session.tree.sheet.case["E_dam"] == 2e10
     user.type("E_dam", 3e10)
     assert user.session.tree.sheet.case["E_dam"] == 3e10
-    assert user.entry("E_dam")["label"] == "[Pa] Young's modulus of the dam"
+    assert user.entry("E_dam")["label"] == "Young's modulus of the dam [Pa]"
+    assert "Highlight" not in user.entry("E_dam")["attributes"]
     user.type("E_dam", -1.0)
+    assert user.entry("E_dam")["values"] == [2e10]
     assert user.session.tree.sheet.case["E_dam"] == 2e10
 
 
@@ -226,21 +229,21 @@ def test_results_of_the_step_shown_are_in_the_tree_beside_the_gravity_method(ope
     check = compare_methods(result)
     both = [method.numbers for method in (check.finite_elements, check.gravity)]
     for label, column, factor in (
-        ("[kN/m] N'", "N", 1e-3),
-        ("[m] N' at x", "x_resultant", 1),
+        ("N' [kN/m]", "N", 1e-3),
+        ("N' at x [m]", "x_resultant", 1),
         ("SSF with mu, adhesion", "SSF", 1),
         ("OSF", "OSF", 1),
     ):
         values = [float(text) for text in shown[label].split(" | ")]
         assert values == pytest.approx([n[column] * factor for n in both], rel=5e-3), label
     assert shown["At t = 4"] == "finite elements | gravity method"
-    assert shown["[m] level"] == "9" and not any("leakage" in label for label in shown)
+    assert shown["level [m]"] == "9" and not any("leakage" in label for label in shown)
     assert tree.get_text(tree.VERDICT) == "sliding"
     user.session.gallery.set_step(0)  # as Gmsh's arrows do
     user.session.turn()
     first = numbers_shown(user)
-    assert first["[m] level"] == "3" and "At t = 1" in first
-    uplift = float(first["[kN/m] uplift U"].partition(" | ")[0])
+    assert first["level [m]"] == "3" and "At t = 1" in first
+    uplift = float(first["uplift U [kN/m]"].partition(" | ")[0])
     assert 1e3 * uplift == pytest.approx(result.state(1.0)["U"], rel=5e-3)
 
 
@@ -252,6 +255,50 @@ def test_warnings_of_the_command_line_are_shown(open_window):
     assert notes == scene.warnings == hints(scene.result) and len(notes) >= 2
     start = "! the foundation reaches 5 m"
     assert any(line.startswith(start) for line in shown_results()[2])
+
+
+def test_playing_shows_all_steps_with_their_numbers(open_window, monkeypatch):
+    """From the first level to the last one; pressed again it stops, and a change ends it."""
+    monkeypatch.setattr(window.export, "LEVEL", 0.05)
+    user = open_window("c", **SMALL)
+    user.press(tree.PLAY_ACTION)  # nothing to play
+    assert user.session.next_play is None
+    user.run()
+    levels = []
+    user.press(tree.PLAY_ACTION)
+    while user.session.next_play is not None:
+        levels.append(numbers_shown(user)["level [m]"])
+        user.session.turn(0.01)
+    assert list(dict.fromkeys(levels)) == ["3", "6", "8", "9"]
+    user.press(tree.PLAY_ACTION)
+    user.press(tree.PLAY_ACTION)
+    assert user.session.next_play is None and user.session.gallery.step < 3
+
+
+def test_lines_mark_the_step_shown_in_the_curves_of_the_level(open_window):
+    """Over the level and the opening, crest and crack; the level of each step at its height."""
+    user = open_window("c", **SMALL)
+    user.run()
+    assert user.views.count("level shown") == user.views.count("now") == 3
+    _, (count,), (values,) = gmsh.view.getListData(tagged(user, "level shown"))
+    heights = values.reshape(count, -1)[1, 6:].reshape(-1, 2)  # of both ends, step by step
+    history = user.session.scenes[0].result.history["level"]
+    scale = Scale.of(history, METRES)
+    np.testing.assert_allclose(heights[:, 0], scale.intervals(np.array([3.0, 6.0, 8.0, 9.0])))
+    np.testing.assert_allclose(heights[:, 0], heights[:, 1])
+
+
+def test_nothing_above_the_parameters_moves_when_a_run_ends(open_window):
+    """The same rows before and after it, and the case in the window's title."""
+    user = open_window("a", **SMALL)
+    above = lambda: [
+        n for n in gmsh.onelab.getNames() if n < "0Modules" and user.entry(n)["visible"]
+    ]
+    before = above()
+    assert {tree.FIELD, tree.JOINT, tree.UPLIFT, tree.MOTION, tree.VERDICT} <= set(before)
+    assert gmsh.model.getFileName() == "a: A: rupture, 2D, order 1"
+    user.run()
+    assert above() == before and gmsh.onelab.getNames(f"{tree.NUMBERS}.*")
 
 
 def test_the_table_shows_all_levels_and_marks_the_one_shown(open_window):
@@ -273,7 +320,7 @@ def test_a_softening_joint_has_a_length_and_a_colour(open_window):
     user.run()
     (scene,) = user.session.scenes
     zone = scene.result.last["process_zone"]
-    assert float(numbers_shown(user)["[m] softening"]) == pytest.approx(zone, rel=5e-3)
+    assert float(numbers_shown(user)["softening [m]"]) == pytest.approx(zone, rel=5e-3)
     assert zone > 5 and user.views.count("joint softening") == 1
     assert "joint softening" in shown_results()[2]
     before, now = (caption(scene, step)[1] for step in range(2))
@@ -362,9 +409,7 @@ SHOWN = "Visible", "TimeStep", "NbTimeStep"
 
 def shown_results():
     """The verdict, the names of the numbers beside it, and the visible lines of text."""
-    numbers = [
-        n for n in gmsh.onelab.getNames("01Results/.*") if n not in (tree.STATUS, tree.VERDICT)
-    ]
+    numbers = gmsh.onelab.getNames(f"{tree.NUMBERS}.*")
     lines = []
     for tag in gmsh.view.getTags():
         option = {n: gmsh.view.option.getNumber(tag, n) for n in SHOWN}
@@ -458,16 +503,16 @@ def test_each_joint_of_a_case_with_several_is_shown_and_saved(open_window, comma
     )
     user = open_window(str(mine), **SMALL)
     law = user.entry("law")
-    assert law["values"] == ["bond"] and law["label"] == "= bond, friction, friction: Joint law"
+    assert law["values"] == ["bond"] and law["label"] == "Joint law = bond, friction, friction"
     assert user.entry("G_t")["visible"] and user.entry("pena_tang")["visible"]
     assert tree.get_text(tree.LIFTS) == "15, 25"
     user.type(tree.LIFTS, "15, 20")
     user.type("mu", 0.8)
     assert user.run().startswith("done in")
-    assert sorted(user.entry(tree.SCENE)["choices"]) == ["base", "lift 15 m", "lift 20 m"]
+    assert sorted(user.entry(tree.JOINT)["choices"]) == ["base", "lift 15 m", "lift 20 m"]
     for scene in user.session.scenes:
-        user.type(tree.SCENE, scene.name)
-        assert numbers_shown(user)["Joint"] == scene.name
+        user.type(tree.JOINT, scene.choices[0])
+        assert numbers_shown(user)["Joint"] == scene.choices[0]
         normal = scene.own.last["N"]
         assert scene.numbers[0].elements["N"] == normal
         assert scene.numbers[0].rigid["N"] == pytest.approx(normal, rel=1e-8)
@@ -502,22 +547,22 @@ def test_all_blocks_of_a_dam_are_shown():
 
 def test_lists_of_several_joints_on_the_command_line(open_window):
     user = open_window("dam", lift_heights=(15.0,), mu=(0.9, 1.0), **SMALL)
-    assert user.entry("mu")["label"] == "= 0.9, 1: Friction coefficient mu"
+    assert user.entry("mu")["label"] == "Friction coefficient mu = 0.9, 1"
     assert len(user.session.tree.sheet.case.joints) == 2
 
 
 BAD_VALUES = [
-    (tree.LEVELS, "3, 60", "levels = 60: must be between 0 and 20 m"),
-    (tree.LEVELS, "high", "levels = high: must be a list of levels in metres"),
-    (tree.TAIL_LEVELS, "1, 2", "tail_levels = 1,2: must be one level or as many"),
-    (tree.STEPS, "0", "steps = 0: must be an integer >= 1"),
-    (tree.STEPS, "two", "steps = two: must be an integer >= 1"),
-    (tree.ACCURACY, "best", "accuracy = best: must be one of coarse, standard, fine"),
+    (tree.LEVELS, "3, 60", "Levels at t = 1, 2, ... [m] = 60: must be between 0 and 20 m"),
+    (tree.LEVELS, "high", "Levels at t = 1, 2, ... [m] = high: must be a list of levels in metres"),
+    (tree.TAIL_LEVELS, "1, 2", "Tailwater [m] = 1,2: must be one level or as many"),
+    (tree.STEPS, "0", "Steps between two levels = 0: must be an integer >= 1"),
+    (tree.STEPS, "two", "Steps between two levels = two: must be an integer >= 1"),
+    (tree.ACCURACY, "best", "Accuracy = best: must be one of coarse, standard, fine"),
     (tree.FILE, "nowhere.case", "case nowhere.case: there is no such file"),
     (tree.CASE, float(len(titles())), "case file: choose it"),
-    ("nu", 0.6, "nu = 0.6: must be"),
-    ("n_joint", 10.5, "n_joint = 10.5: must be an integer"),
-    ("law", "glue", "law = glue: must be one of rupture, friction"),
+    ("nu", 0.6, "Poisson's ratio of dam and foundation = 0.6: must be"),
+    ("n_joint", 10.5, "Elements from heel to toe = 10.5: must be an integer"),
+    ("law", "glue", "Joint law = glue: must be one of rupture, friction"),
 ]
 
 
@@ -530,11 +575,17 @@ def test_a_bad_value_is_reported_in_one_line_and_not_run(open_window):
         was = tree.value_of(name) if "/" in name else user.session.tree.sheet.case[name]
         assert user.type(name, value).startswith(why)
         assert "\n" not in user.session.status
+        if "must be" in why:  # beside the field, too, until it is good
+            field = user.session.tree.marked
+            assert field == (name if "/" in name else user.session.tree.known[name].label)
+            entry = gmsh.onelab.get(field)  # Gmsh does not escape quotes
+            assert ": must be" in entry and re.search(f'"Highlight":"{tree.BAD}"', entry)
         scenes = user.session.scenes
         assert user.run().startswith(why) and user.session.scenes is scenes
         assert user.entry(tree.STATUS)["attributes"]["Highlight"] == tree.BAD
         user.type(name, before[0] if before is not None else was)
         assert user.run().startswith("done in"), name
+        assert not user.session.tree.marked and ": must be" not in gmsh.onelab.get(field)
 
 
 def test_buttons_pressed_during_a_run_act_after_it(open_window, tmp_path):
@@ -654,9 +705,9 @@ def test_other_cases_and_files_can_be_opened(open_window, tmp_path):
 def test_both_uplifts_of_a_published_case_are_run(open_window):
     user = open_window("a", **SMALL)
     user.run()
-    assert user.entry(tree.SCENE)["choices"] == ["imposed", "none"]
+    assert user.entry(tree.UPLIFT)["choices"] == ["imposed", "none"]
     assert any(view.startswith("water pressure") for view in user.views)
-    user.type(tree.SCENE, "none")
+    user.type(tree.UPLIFT, "none")
     assert not any(view.startswith("water pressure") for view in user.views)
     user.type("uplift", "imposed")  # the value of the case: both again
     user.run()
@@ -673,19 +724,20 @@ def test_an_earthquake_follows_the_static_loads(open_window, command, tmp_path):
     hidden = "record_scale", "quake_uplift", tree.RECORD, tree.FRAMES
     assert not any(user.entry(name)["visible"] for name in hidden)
     user.type(tree.LEVELS, "30")
-    assert "record: must be" in user.type(tree.QUAKE, 1.0)
+    assert user.type(tree.QUAKE, 1.0) == "Record: CSV file: must be chosen"
     assert all(user.entry(name)["visible"] for name in hidden)
-    assert "record: must be" in user.run()
+    assert user.run() == user.entry(tree.RECORD)["label"] == "Record: CSV file: must be chosen"
     record = smooth_record(tmp_path / "wave.csv", 5.0, duration=0.5)
-    assert "record_unit = unstated: must be" in user.type(tree.RECORD, str(record))
+    assert "= unstated: must be m/s2 or g" in user.type(tree.RECORD, str(record))
+    assert user.entry("record_unit")["attributes"]["Highlight"] == tree.BAD
     assert user.type("record_unit", "m/s2") == "ready: press Run"
+    assert "Highlight" not in user.entry("record_unit").get("attributes", {})
     assert "must be two times" in user.type(tree.FRAMES, "0.5")
     user.type(tree.FRAMES, "0:0.5")
     assert user.run().startswith("done in") and "residual slip" in user.session.status
     before, earthquake = user.session.scenes
     assert before.times.tolist() == [1] and len(earthquake.times) == 101
-    assert user.entry(tree.SCENE)["choices"] == ["static loads", "earthquake"]
-    assert user.entry(tree.FIELD)["visible"] and not user.entry(tree.SCALES)["visible"]
+    assert user.entry(tree.MOTION)["choices"] == ["static loads", "earthquake"]
     user.session.gallery.set_step(40)
     user.session.turn()
     shown, (_, _, lines) = numbers_shown(user), shown_results()
@@ -698,9 +750,8 @@ def test_an_earthquake_follows_the_static_loads(open_window, command, tmp_path):
     user.type(tree.CONTENT, views.TABLE)
     assert {"ground", "slip"} <= set(shown_results()[2])
     user.type(tree.CONTENT, views.SCENE)
-    user.type(tree.SCENE, "static loads")
+    user.type(tree.MOTION, "static loads")
     assert any(line.startswith("level 30 m") for line in shown_results()[2])
-    assert user.entry(tree.SCALES)["visible"]
     user.type(tree.QUAKE, 0.0)
     assert tree.get_text(tree.VERDICT) == tree.NOT_RUN
     assert user.run().startswith("done in") and len(user.session.scenes) == 1
@@ -721,7 +772,11 @@ def test_stop_keeps_the_steps_of_an_earthquake(open_window, tmp_path):
     user.type(tree.RECORD, str(record))
     user.type(tree.QUAKE, 1.0)
     user.press("run")
-    user.wait(lambda session: "earthquake, t = 1." in session.status)
+    user.wait(lambda session: session.live)  # its results so far, while it is computed
+    assert tree.get_text(tree.VERDICT) == "running" and user.session.busy == "running"
+    live = len(user.session.scenes[1].times)
+    assert live > 1 and numbers_shown(user)["At t = " + f"{user.session.scenes[1].times[-1]:.4g} s"]
+    user.wait(lambda session: len(session.scenes[1].times) > live)
     user.press("stop")
     user.wait()
     assert re.match(r"interrupted after t = [\d.]+ s of the record", user.session.status)

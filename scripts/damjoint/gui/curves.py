@@ -50,8 +50,11 @@ def show_graphs(graphs: Graphs, scene: SolvedScene, before: Sequence[SolvedScene
             graphs.add(*graph, now=scene.times.clip(rows["time"][0]))
     elif len(scene.result.history["time"]):
         levels = graphs_of_history(scene, before)
-    for graph in (*joint[:2], *levels[:1], *joint[2:], *levels[1:]):
-        graphs.add(*graph)
+    places = marks_of_steps(scene) if levels else []
+    marked = list(zip(levels, places, strict=True))
+    unmarked = [(graph, UNMARKED) for graph in joint]
+    for graph, (now, level) in (*unmarked[:2], *marked[:1], *unmarked[2:], *marked[1:]):
+        graphs.add(*graph, now=now, level=level)
     graphs.write_names()
 
 
@@ -121,21 +124,47 @@ def graphs_along_joint(scene: SolvedScene, before: Sequence[SolvedScene]) -> lis
     return shown
 
 
+#: Curves of the level: title, column, units, color.
+OVER_LEVELS: tuple[tuple[str, str, Units, Color], ...] = (
+    ("largest opening", "max_opening", LENGTHS, BLUE),
+    ("crest movement", "crest_ux", LENGTHS, BLUE),
+    ("crack length", "crack_length", METRES, RED),
+)
+
+
+def column_of_levels(scene: SolvedScene, column: str) -> np.ndarray:
+    """A column of the history as it is drawn: the opening of the heel under displacement control,
+    else no opening below 0, as in a closed joint.
+    """
+    if column != "max_opening":
+        return scene.own.history[column]
+    driven = scene.result.case["drive"] != "level"
+    return scene.result.heel if driven else np.maximum(scene.own.history[column], 0.0)
+
+
+#: Places of the steps on both axes; None: not marked.
+Places = tuple[np.ndarray | None, np.ndarray | None]
+UNMARKED: Places = None, None
+
+
+def marks_of_steps(scene: SolvedScene) -> list[Places]:
+    """Places of the steps shown on both axes of the graphs of the history."""
+    history = scene.own.history
+    rows = [int(np.argmin(np.abs(history["time"] - time))) for time in scene.times]
+    if not rows:
+        return [UNMARKED] * len(OVER_LEVELS)
+    columns = [column_of_levels(scene, column) for _, column, *_ in OVER_LEVELS]
+    return [(x[rows] if len(x) else None, history["level"][rows]) for x in columns]
+
+
 def graphs_of_history(scene: SolvedScene, before: Sequence[SolvedScene]) -> list[Graph]:
     """The level over opening, crest displacement and crack length, all converged steps."""
     driven, shown = scene.result.case["drive"] != "level", []
-    quantities = (
-        ("heel opening" if driven else "largest opening", "max_opening", LENGTHS, BLUE),
-        ("crest movement", "crest_ux", LENGTHS, BLUE),
-        ("crack length", "crack_length", METRES, RED),
-    )
-    for title, column, units, color in quantities:
+    for title, column, units, color in OVER_LEVELS:
+        title = "heel opening" if driven and column == "max_opening" else title
         curves = []
         for other in (scene, *before):
-            history = other.own.history
-            x = history[column]
-            if column == "max_opening":  # below 0 in a closed joint
-                x = other.result.heel if driven else np.maximum(x, 0.0)
+            history, x = other.own.history, column_of_levels(other, column)
             if len(x):
                 name, kind = ("", color) if other is scene else (BEFORE, GREY)
                 curves.append(Curve(name, x, history["level"][None], kind, points=other is scene))

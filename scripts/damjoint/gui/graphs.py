@@ -100,9 +100,10 @@ class Graphs:
         x_axis: tuple[str, Units],
         curves: list[Curve],
         now: np.ndarray | None = None,
+        level: np.ndarray | None = None,
     ) -> None:
-        """Add a graph, axes by title and units, if there is space for it; now: a place on the x
-        axis for each step, marked by a line.
+        """Add a graph, axes by title and units, if there is space for it; now, level: places on the
+        x and on the y axis for each step, marked by lines.
         """
         if self.count >= self.layout.most_graphs:
             return
@@ -117,6 +118,12 @@ class Graphs:
         self.frame((x, y), (y_axis[0], x_axis[0]), (along_x, x_range), scales)
         if now is not None:
             tag = self.line("now", (x, y), marks(along_x.intervals(now), x_range), DARK)
+            gmsh.view.option.setNumber(tag, "LineWidth", 1)
+        if level is not None:
+            own = [scales[min(step, count - 1)] for step in range(len(level))]
+            at_y = np.array([scale.intervals(y) for scale, y in zip(own, level, strict=True)])
+            pieces = pieces_of(np.array(x_range), at_y[:, None].repeat(2, axis=1), x_range)
+            tag = self.line("level shown", (x, y), pieces, DARK)
             gmsh.view.option.setNumber(tag, "LineWidth", 1)
         named = [curve for curve in curves if curve.name not in ("", BEFORE)]
         for curve in sorted(curves, key=lambda curve: curve.name != BEFORE):  # drawn below others
@@ -168,9 +175,10 @@ class Graphs:
         pieces = pieces_of(at_x, zeros, (left, right))
         tag = self.line(f"{titles[0]}, zero", place, pieces, GREY)
         self.gallery.color_texts(tag, DARK)
-        text = lambda at_x, at_y, lines, align: self.gallery.label(
-            tag, at_x, at_y, lines, TEXT, align
-        )
+
+        def text(at_x: float, at_y: float, lines: list[str], align: str) -> None:
+            self.gallery.label(tag, at_x, at_y, lines, TEXT, align)
+
         for row in rows.tolist():
             at_y = y + height * (high - row) / (high - low)
             text(x - 5, at_y + 4, [s.label(row) for s in scales], "Right")

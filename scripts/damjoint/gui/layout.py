@@ -46,19 +46,19 @@ BESIDE_AXES, BEYOND_AXES, ABOVE_AXES, BELOW_AXES = 66, 24, 31, 38
 
 #: Options with the sizes of Gmsh's window; GraphicsWidth includes the menu.
 WINDOW = "GraphicsWidth", "GraphicsHeight", "MenuWidth"
-#: Desired size of the window: drawing area with menu. Space for the title bar and the panels of a
-#: desktop, beside and above and below the window.
-DESIRED, DESKTOP = (1600, 900), (0, 70)
+#: Usual size of the window: drawing area with menu. Size that no screen has; space for the title
+#: bar that a window manager puts above the window, and for its border below.
+USUAL, UNLIMITED, TITLE_BAR, BORDER = (1600, 900), 10000, 36, 6
 #: Share of the window's width that the menu takes, and its largest width.
 MENU, MENU_WIDTH = 0.38, 560
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Layout for a drawing area of a size; by default that of the desired window."""
+    """Layout for a drawing area of a size; by default that of a usual window."""
 
-    width: float = DESIRED[0] - MENU_WIDTH
-    height: float = DESIRED[1]
+    width: float = USUAL[0] - MENU_WIDTH
+    height: float = USUAL[1]
 
     @staticmethod
     def of_window(scratch: Path) -> Layout:
@@ -122,12 +122,19 @@ class Layout:
 
 
 def open_window() -> None:
-    """Open Gmsh's window, no larger than the screen."""
-    for name, value, desktop in zip(WINDOW, DESIRED, DESKTOP, strict=False):
-        gmsh.option.setNumber(f"General.{name}", value + desktop)
-    gmsh.option.setNumber("General.GraphicsPositionX", 0)
-    gmsh.option.setNumber("General.GraphicsPositionY", DESKTOP[1] / 2)
-    gmsh.fltk.initialize()  # limits the sizes to the screen
+    """Open Gmsh's window as large as the screen, its title bar on the screen."""
+    for name in WINDOW[:2]:
+        gmsh.option.setNumber(f"General.{name}", UNLIMITED)
+    gmsh.fltk.initialize()  # limits the sizes to the screen, and puts such a window at its top
     width, height = (gmsh.option.getNumber(f"General.{name}") for name in WINDOW[:2])
-    gmsh.option.setNumber("General.GraphicsHeight", height - DESKTOP[1])
+    gmsh.fltk.finalize()
+    places = {
+        "GraphicsPositionX": 0,
+        "GraphicsPositionY": TITLE_BAR,
+        "GraphicsWidth": width,
+        "GraphicsHeight": height - TITLE_BAR - BORDER,
+    }
+    for name, value in places.items():
+        gmsh.option.setNumber(f"General.{name}", value)
+    gmsh.fltk.initialize()
     gmsh.option.setNumber("General.MenuWidth", min(MENU_WIDTH, int(MENU * width)))

@@ -99,7 +99,7 @@ class Numbers:
             size, factor = unit([finite], units) if finite.any() else units[0]
             values = BESIDE.join(three_digits(value * factor) for value in both)
             if both and not (name in OPTIONAL and not any(both)):
-                rows.append((f"[{size}] {head}".removeprefix("[-] "), values, meaning))
+                rows.append((f"{head} [{size}]".removesuffix(" [-]"), values, meaning))
         where = "part of the joint where its normal force acts"
         return [*rows, ("N' in", BESIDE.join(self.positions), where)]
 

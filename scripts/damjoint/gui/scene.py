@@ -20,13 +20,16 @@ from ..statics.verdict import decisive_joint, failed, verdict
 from ..studies.quake_result import QuakeResult
 from .numbers import Numbers, QuakeNumbers, shown_rows, table_of_frames, table_of_levels, warnings
 
+#: At rest, and after it.
+MOTIONS = "static loads", "earthquake"
+
 
 @dataclass(kw_only=True)
 class SolvedScene:
     """The results of a scene, for the window."""
 
-    #: its name among the scenes of a run
-    name: str
+    #: its place among the scenes of a run: joint, uplift, motion
+    choices: tuple[str, str, str]
     result: Results
     bodies: dict[str, Body]
     #: displacement and stress by time of the steps
@@ -49,9 +52,9 @@ class SolvedScene:
     quake: Columns | None = None
 
     @staticmethod
-    def of(outcome: Outcome, name: str) -> list[SolvedScene]:
+    def of(outcome: Outcome) -> list[SolvedScene]:
         """The scenes of an outcome, one for each joint, that of the decisive joint first; computes
-        the bodies' fields. name: of the outcome, empty if it is the only one.
+        the bodies' fields.
         """
         result, (state, _) = outcome.result, early_end(outcome.result, outcome.error)
         bodies, fields, times = outcome.mesh().bodies, outcome.fields(), times_of(result)
@@ -62,7 +65,7 @@ class SolvedScene:
             message = reached(state, result)
         return [
             SolvedScene(
-                name=scene_name(name, result, joint),
+                choices=choices_of(result, joint, MOTIONS[0]),
                 result=result,
                 bodies=bodies,
                 fields=fields,
@@ -86,11 +89,11 @@ class SolvedScene:
         """
         static = Outcome(found.before, lambda: found.mesh, found.static_fields)
         fields = found.fields()
-        scenes = SolvedScene.of(static, "static loads")
+        scenes = SolvedScene.of(static)
         for joint, _ in first_of(found.joint, found.frames):
             numbers = QuakeNumbers.of(found, joint)
             earthquake = SolvedScene(
-                name=scene_name("earthquake", found.frames, joint),
+                choices=choices_of(found.frames, joint, MOTIONS[1]),
                 result=found.frames,
                 bodies=found.mesh.bodies,
                 fields=fields,
@@ -130,9 +133,9 @@ def first_of(joint: int, result: Results) -> list[tuple[int, Results]]:
     return sorted(enumerate(result.joints), key=lambda pair: pair[0] != joint)
 
 
-def scene_name(name: str, result: Results, joint: int) -> str:
-    """A scene's name with that of its joint, if there are several."""
-    return ", ".join(filter(None, [name, result.case.named((joint,))]))
+def choices_of(result: Results, joint: int, motion: str) -> tuple[str, str, str]:
+    """See `SolvedScene.choices`; joint: its number."""
+    return result.case.joint_names[joint], result.case.of_all_joints("uplift"), motion
 
 
 def times_of(result: Results) -> np.ndarray:

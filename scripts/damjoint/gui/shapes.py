@@ -161,8 +161,8 @@ def undeformed_loads(case: Case, box: np.ndarray) -> tuple[dict[str, Pieces], li
     labels = arrow_labels([(a, [force_label(n, np.array(forces[n]))]) for n, a in arrows.items()])
     labels += level_labels([loading.level], [loading.tail], box)
     loads["forces"] = np.concatenate([np.zeros((0, 2, 3)), *arrows.values()])
-    fixed = lambda corners: Pieces(corners, np.ones((1, *corners.shape[:2], 1)))
-    return {n: fixed(corners) for n, corners in loads.items() if has_extent(corners)}, labels
+    shown = {n: corners for n, corners in loads.items() if has_extent(corners)}
+    return {n: Pieces(c, np.ones((1, *c.shape[:2], 1))) for n, c in shown.items()}, labels
 
 
 class Deformed:
@@ -272,9 +272,9 @@ class Deformed:
             ]
         )
         if self.scene.undeformed:
-            loadings = self.scene.loadings
-            levels = ([getattr(now, name) for now in loadings] for name in ("level", "tail"))
-            labels += level_labels(*levels, self.camera.box)
+            levels = [(now.level, now.tail) for now in self.scene.loadings]
+            reservoir, tail = ([pair[k] for pair in levels] for k in range(2))
+            labels += level_labels(reservoir, tail, self.camera.box)
         return labels
 
     def resultant(self) -> Pieces:

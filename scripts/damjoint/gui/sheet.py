@@ -22,6 +22,7 @@ from ..input.parameters import INCLUDE, assignments, checked, declared, listing,
 from ..input.refinement import first_mesh
 from ..input.resolve import load
 from ..studies import quake
+from ..studies.quake import Span
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,7 @@ class Request:
     frames: str | None = None
 
     @property
-    def span(self) -> quake.Span:
+    def span(self) -> Span:
         """`frames` as numbers. Raises InputError."""
         return quake.span_of("frames =", self.frames) if self.frames else None
 
@@ -96,8 +97,8 @@ class Sheet:
             title = f"case {case.name}, changed"
         water = " and ".join([case.of_all_joints("uplift"), *case.also_uplift])
         scene = f"law {case.of_all_joints('law')}, uplift {water}"
-        shaken = self.request.quake and case.record
-        return title, f"{scene}, {case.record.name}" if shaken else scene
+        record = case.record if self.request.quake else None
+        return title, f"{scene}, {record.name}" if record else scene
 
 
 def check_request(request: Request) -> Sheet:
@@ -177,7 +178,10 @@ def case_text(sheet: Sheet, run: Case) -> str:
             file.of_joints.pop(name, None)
             for values in file.blocks.values():
                 values.pop(name, None)
-            (file.of_joints if isinstance(setting, tuple) else file.defaults)[name] = setting
+            if isinstance(setting, tuple):
+                file.of_joints[name] = setting
+            else:
+                file.defaults[name] = setting
     file.defaults |= {name: run[name] for name in REFINED} if request.accuracy else {}
     file.texts = {"title": case.title}
     if case.record:

@@ -6,7 +6,10 @@ Works on the current Gmsh session, with or without a window.
 from __future__ import annotations
 
 import contextlib
+import itertools
 import json
+import operator
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -15,34 +18,37 @@ from typing import Any
 import gmsh
 
 from .. import InputError
+from ..arrays import Setting
 from ..dynamics.frames import MOST_FRAMES
 from ..input.case import Case
 from ..input.parameters import AUTOMATIC, Parameter, levels_of
 from ..input.refinement import ACCURACIES
+from ..studies.quake import RUNNING
 from . import views
-from .scene import SolvedScene
+from .scene import MOTIONS, SolvedScene
 from .sheet import Request, Sheet
 from .views import CONTENTS, FIELDS, Display
 
-# Names in the tree. Digits order it and are not shown; Gmsh's own "0Modules" follows the results.
+# Names in the tree. Digits order it and are not shown. The numbers of a run come last, below the
+# parameters, which so stay where they are; Gmsh's own "0Modules" comes before these.
 CASE = "00Case/0Case"
 FILE = "00Case/1Case file"
-STATUS = "01Results/00Status"
-VERDICT = "01Results/01Verdict"
-NUMBERS = "01Results/1"
-LEVELS = "Parameters/1Water levels/0[m] Levels at t = 1, 2, ..."
-TAIL_LEVELS = "Parameters/1Water levels/1[m] Tailwater"
+STATUS = "01Run/00Status"
+VERDICT = "01Run/01Verdict"
+NUMBERS = "Results/1"
+LEVELS = "Parameters/1Water levels/0Levels at t = 1, 2, ... [m]"
+TAIL_LEVELS = "Parameters/1Water levels/1Tailwater [m]"
 STEPS = "Parameters/1Water levels/2Steps between two levels"
 TIMES = "Parameters/1Water levels/3Steps at t"
 #: Switch of the earthquake; its group of parameters, with the record and the times shown.
 QUAKE = "Parameters/0Scene/9Earthquake after the last level"
 EARTHQUAKE = "Earthquake"
 RECORD = "Parameters/91Earthquake/01Record: CSV file"
-FRAMES = "Parameters/91Earthquake/02[s] Show from : to"
+FRAMES = "Parameters/91Earthquake/02Show from : to [s]"
 #: Parameters of other groups that an earthquake needs, too.
 OF_EARTHQUAKE = "added_mass", "quake_uplift"
 #: Heights of the lift joints; text of none.
-LIFTS = "Parameters/2Geometry/26[m] Lift joints above the first one"
+LIFTS = "Parameters/2Geometry/26Lift joints above the first one [m]"
 NO_LIFTS = "none"
 #: Entries on the water levels.
 OF_LEVELS = (LEVELS, TAIL_LEVELS, STEPS, TIMES)
@@ -50,8 +56,15 @@ ACCURACY = "Parameters/3Mesh/0Accuracy"
 FIELD = "02Display/0Color of the bodies"
 SCALES = "02Display/1Scales"
 CONTENT = "02Display/2Show"
-SCENE = "02Display/3Scene"
-KEEP = "02Display/4Keep the last curves"
+#: What is shown of a run: choosers in the order of `SolvedScene.choices`.
+JOINT = "02Display/3Joint"
+UPLIFT = "02Display/4Uplift"
+MOTION = "02Display/5Motion"
+CHOOSERS = JOINT, UPLIFT, MOTION
+PLAY = "02Display/6Play all steps"
+KEEP = "02Display/7Keep the last curves"
+#: Groups of parameters that are closed at first, so that the results are not far below.
+CLOSED = ("3Mesh", "4Bulk", "6Water", "7Loads", "8Solver", "9Checks")
 FOLDER = "03Output/0Folder"
 SAVE = "03Output/1Save"
 PICTURE = "03Output/2Export picture"
@@ -59,7 +72,9 @@ ANIMATION = "03Output/3Export animation"
 
 #: Actions of the buttons; "save" is Gmsh's own, for the database.
 SAVE_ACTION, PICTURE_ACTION, ANIMATION_ACTION = "save results", "export picture", "export animation"
+PLAY_ACTION = "play"
 BUTTONS = (
+    (PLAY, PLAY_ACTION, "show all steps with their numbers, one after the other; again: stop"),
     (SAVE, SAVE_ACTION, "tables, fields, picture and case file, into the folder"),
     (PICTURE, PICTURE_ACTION, "the drawing area as window.png, into the folder"),
     (ANIMATION, ANIMATION_ACTION, "all levels as window.gif, into the folder"),
@@ -76,6 +91,8 @@ NOT_RUN = "not run yet"
 
 #: Colors of the status line.
 CALM, GOOD, WARN, BAD = "LightSteelBlue1", "DarkSeaGreen1", "Orange", "LightCoral"
+#: Color of the value of a parameter that follows others.
+FOLLOWS = "Gray90"
 
 
 def put(*entries: dict[str, Any]) -> None:
@@ -133,18 +150,31 @@ class Tree:
         self.short = short_labels(known)
         #: value of each parameter when it was last set: only what differs is a change of the user
         self.shown: dict[str, float | str] = {}
-        self.sheet: Sheet | None = None
+        #: the last checked sheet; None before the first one
+        self.checked: Sheet | None = None
+        #: entries of the fields as they were last set, by name; that with an error beside it
+        self.fields: dict[str, dict[str, Any]] = {}
+        self.marked = ""
+
+    @property
+    def sheet(self) -> Sheet:
+        """The last checked sheet."""
+        assert self.checked
+        return self.checked
 
     def show(self, sheet: Sheet) -> None:
         """Put a sheet into the tree."""
-        new_case = self.sheet is None or sheet.path != self.sheet.path or not get_text(SAVE)
-        self.sheet = sheet
-        put(*self.scene_entries(sheet), *self.quake_entries(sheet))
-        put(*map(self.entry, sheet.entries))
+        self.clear_error()
+        new_case = not (self.checked and sheet.path == self.checked.path and get_text(SAVE))
+        self.checked = sheet
+        fields = [*self.scene_entries(sheet), *self.quake_entries(sheet)]
+        fields += map(self.entry, sheet.entries)
+        put(*fields)
+        self.fields = {entry["name"]: entry for entry in fields}
         if new_case:
             put(
                 text(FOLDER, str(Path("out") / sheet.case.name), help="folder that Save writes"),
-                *display_entries(),
+                *display_entries(sheet.case),
                 *(
                     text(name, action, help=note, attributes=BUTTON)
                     for name, action, note in BUTTONS
@@ -169,7 +199,7 @@ class Tree:
                 valueLabels={title: index for index, title in enumerate(menu)},
                 help="the modelings of SSNP142, your own dam, a case file",
             ),
-            text(FILE, sheet.path, kind="file", help="choose a case file of your own"),
+            text(FILE, sheet.path, kind="file", help=f"{sheet.path}; choose one of your own"),
             text(
                 LEVELS,
                 texts[LEVELS],
@@ -240,7 +270,7 @@ class Tree:
         return [*own, *([] if title in own else [title]), OPEN]
 
     def entry(self, declared: dict[str, Any]) -> dict[str, Any]:
-        """Entry of a declared parameter; the label of an automatic one has its value.
+        """Entry of a declared parameter; one that follows others shows the value that results.
 
         Has no step, and labels for its choices: else Gmsh shows buttons for loops, which have no
         effect.
@@ -259,10 +289,10 @@ class Tree:
         allowed = f"{parameter.name}: {parameter.allowed()}"
         note = declared.get("help", "") if not parameter.automatic else ""
         entry["help"] = ". ".join(filter(None, [allowed, parameter.meaning, note]))
-        unit = f"[{parameter.unit}] " if parameter.unit not in ("", "-") else ""
-        entry["label"] = unit + self.short[parameter.name]
+        unit = f" [{parameter.unit}]" if parameter.unit not in ("", "-") else ""
+        entry["label"] = self.short[parameter.name] + unit
         if own := self.of_joints(parameter):
-            entry["label"] = f"{unit}= {own}: {self.short[parameter.name]}"
+            entry["label"] += f" = {own}"
             names = ", ".join(self.sheet.case.joint_names)
             entry["help"] += f". Values of {names}: {own}; one typed here is that of all joints"
         if parameter.text:
@@ -278,13 +308,16 @@ class Tree:
         }
         if parameter.automatic and declared["values"][0] == AUTOMATIC:
             value = self.sheet.case[parameter.name]
-            entry["label"] = f"{unit}= {value:.6g}: {self.short[parameter.name]}"
+            entry["values"] = [value]
+            entry["label"] += ", follows"
             entry["help"] = f"{entry['help']} = {value:.6g} ({parameter.help})"
+            entry["attributes"]["Highlight"] = FOLLOWS
         return entry
 
     def of_joints(self, parameter: Parameter) -> str:
         """The values of the joints, if the case sets some for itself; else empty."""
         source, name = self.sheet.case.source, parameter.name
+        assert source  # the case has been loaded
         setting = {**source.text.of_joints, **source.overrides}.get(name)
         in_blocks = name in source.text.in_blocks and name not in source.overrides
         if not (isinstance(setting, tuple) or in_blocks):
@@ -310,7 +343,7 @@ class Tree:
             if self.menu(self.sheet)[int(case)] == OPEN:
                 raise InputError("case file: choose it in the field Case file, below the menu")
         labels = {parameter.label: name for name, parameter in self.known.items()}
-        changed = {
+        changed: dict[str, Setting] = {
             labels[label]: value_of(label)
             for label in labels
             if label in shown and value_of(label) != shown[label]
@@ -330,6 +363,33 @@ class Tree:
             quake=bool(get_number(QUAKE)),
             frames=chosen(FRAMES, WHOLE),
         )
+
+    def in_window_words(self, message: str) -> str:
+        """A message on a value by the label of its field, beside which it is written, too; any
+        other message as it is.
+        """
+        self.clear_error()
+        found = re.fullmatch(ON_VALUE, message)
+        names = FIELDS_OF_NAMES | {name: known.label for name, known in self.known.items()}
+        name = names.get(found["name"], "") if found else ""
+        if not found or name not in self.fields:
+            return message
+        self.marked, field, why = name, self.fields[name], found["why"]
+        for words, own in WINDOW_WORDS.items():
+            why = why.replace(words, own)
+        label = shown_label(field)
+        attributes = {**field.get("attributes", {}), "Highlight": BAD}
+        changes = {"label": f"{label}: {why}", "help": why, "attributes": attributes}
+        put({**field, "values": [value_of(name)], **changes})
+        value = "" if found["value"] is None else f" = {found['value']}"
+        return f"{label}{value}: {why}"
+
+    def clear_error(self) -> None:
+        """Remove the error beside a field."""
+        if self.marked:
+            field = self.fields[self.marked]
+            put({"label": "", **field, "values": [value_of(self.marked)]})
+        self.marked = ""
 
     def levels(self, name: str, before: str | None) -> str | None:
         """Read a list of levels; the earlier text if the numbers have not changed."""
@@ -370,8 +430,8 @@ def show_verdict(name: str, color: str, why: str) -> None:
     put(text(VERDICT, name, readOnly=True, help=why, attributes={"Highlight": color}))
 
 
-def display_entries() -> list[dict[str, Any]]:
-    """Entries of what is shown, each with its first choice."""
+def display_entries(case: Case) -> list[dict[str, Any]]:
+    """Entries of what is shown of a case, each with its first choice."""
     choices = {
         FIELD: (FIELDS, "field of dam and foundation"),
         SCALES: (views.SCALES, "scales of curves and colors"),
@@ -380,18 +440,20 @@ def display_entries() -> list[dict[str, Any]]:
     entries = [
         text(name, own[0], choices=list(own), help=note) for name, (own, note) in choices.items()
     ]
+    uplifts = [case.of_all_joints("uplift"), *case.also_uplift]
+    entries += choosers(list(itertools.product(case.joint_names, uplifts, MOTIONS[:1])), 0)
     help_of_keep = "curves of the last run stay in grey, its views in Modules / Post-processing"
-    entries.append(number(KEEP, 0, choices=[0, 1], help=help_of_keep))
-    return [{**entry, "visible": False} for entry in entries]
+    return [*entries, number(KEEP, 0, choices=[0, 1], help=help_of_keep)]
 
 
-def show_display(visible: bool, scales: bool = True) -> None:
-    """Show or hide the entries of what is shown; they keep their values. scales: whether there is a
-    choice of scales.
-    """
-    for name in gmsh.onelab.getNames("02Display/.*"):
-        shown = visible and (scales or name != SCALES)
-        gmsh.onelab.set(json.dumps({**json.loads(gmsh.onelab.get(name)), "visible": shown}))
+def choosers(choices: list[tuple[str, str, str]], shown: int) -> list[dict[str, Any]]:
+    """Entries of joint, uplift and motion, of scenes with these choices."""
+    notes = "whose curves and numbers are shown", "of both published ones", "loads or earthquake"
+    listed = (list(dict.fromkeys(names)) for names in zip(*choices, strict=True))
+    return [
+        text(name, now, choices=names, help=note, readOnly=len(names) == 1)
+        for name, now, names, note in zip(CHOOSERS, choices[shown], listed, notes, strict=True)
+    ]
 
 
 def display() -> Display:
@@ -403,16 +465,20 @@ def show_results(scenes: list[SolvedScene], shown: int, step: int) -> None:
     """Show the results of a scene at a step: finite elements beside the gravity method."""
     scene = scenes[shown]
     color = WARN if scene.failed or scene.message else GOOD
-    names = [s.name for s in scenes]
+    color = CALM if scene.end_state == RUNNING else color
     show_verdict(scene.end_state or scene.verdict, color, scene.statement)
-    show_display(True, scales=scene.quake is None)
-    put(text(SCENE, names[shown], choices=names, visible=len(names) > 1))
+    put(*choosers([s.choices for s in scenes], shown))
+    show_numbers(scene, step)
+
+
+def show_numbers(scene: SolvedScene, step: int) -> None:
+    """Show the numbers of a scene at a step, and its warnings."""
     clear_numbers()
     if not scene.numbers:
         return
     rows = scene.numbers[step].rows()
     if joint := scene.result.case.named((scene.joint,)):
-        rows.insert(0, ("Joint", joint, "whose numbers and curves are shown: Display / Scene"))
+        rows.insert(0, ("Joint", joint, "whose numbers and curves are shown: Display / Joint"))
     entries = [(*row, "LightYellow") for row in rows]
     entries += [(f"Note {i + 1}", w, w, WARN) for i, w in enumerate(scene.warnings)]
     for i, (label, value, note, highlight) in enumerate(entries):
@@ -429,15 +495,40 @@ def clear_numbers() -> None:
 def hide_results() -> None:
     """Remove the results from the tree: they are not those of its parameters."""
     clear_numbers()
-    show_display(False)
     show_verdict(NOT_RUN, CALM, "press Run")
 
 
 def chosen_scene(scenes: list[SolvedScene]) -> int:
-    """Index of the scene that the user has chosen."""
-    names = [scene.name for scene in scenes]
-    name = get_text(SCENE)
-    return names.index(name) if name in names else 0
+    """Index of the scene that the user has chosen: that with most of the choices."""
+    chosen = [get_text(name) for name in CHOOSERS]
+    alike = [sum(map(operator.eq, scene.choices, chosen)) for scene in scenes]
+    return alike.index(max(alike))
+
+
+def shown_label(entry: Mapping[str, Any]) -> str:
+    """The label of an entry in the tree."""
+    label: str = entry.get("label") or re.sub(r"^\d+", "", entry["name"].rsplit("/", 1)[-1])
+    return label
+
+
+#: A message on a value: of a joint, if there are several; name, value, what is allowed.
+ON_VALUE = r"(?:[\w ]+: )?(?P<name>\w+)(?: = (?P<value>.*?))?: (?P<why>must .*)"
+#: Words of the command line and of case files, and those of the window.
+WINDOW_WORDS = {
+    'must be set, record = "FILE.csv"; in the case, or --record FILE.csv': "must be chosen",
+    " for damjoint quake": " for an earthquake",
+}
+#: What the window has in place of parameters, by the names in messages.
+FIELDS_OF_NAMES = {
+    "levels": LEVELS,
+    "tail_levels": TAIL_LEVELS,
+    "steps": STEPS,
+    "lift_heights": LIFTS,
+    "accuracy": ACCURACY,
+    "record": RECORD,
+    "frames": FRAMES,
+    "fields": FRAMES,
+}
 
 
 def drop_level_entries() -> None:

@@ -163,7 +163,7 @@ def show(
         for place, (color, words) in zip(layout.legend, legend, strict=False):
             gallery.write(*place, [words], color, SIZES[3])
         show_warnings(gallery, scene.warnings, layout)
-    record = f", {case.record.name}" if scene.quake is not None else ""
+    record = f", {case.record.name}" if scene.quake is not None and case.record else ""
     law, uplift = (case.of_all_joints(name) for name in ("law", "uplift"))
     words = f"law {law}, uplift {uplift}{record}"
     show_heading(gallery, (title, words), layout)
@@ -266,14 +266,19 @@ def show_strips(gallery: Gallery, deformed: Deformed, display: Display) -> None:
     axes = (z, s) if case.geometry else (s, -z)
     shares = np.column_stack([(v - v.min()) / (np.ptp(v) or 1.0) for v in axes])
 
-    def add(number: int, name: str, pieces: list[np.ndarray], *style: object) -> int:
+    def add(
+        number: int,
+        name: str,
+        pieces: list[np.ndarray],
+        colors: Sequence[tuple[int, ...]],
+        options: dict[str, float],
+    ) -> int:
         low, high = deformed.camera.strip(number)
         points = deformed.camera.place(low + shares * (high - low))
         faces = [
             Pieces(points[table], values)
             for (_, table), values in zip(joint.cells, pieces, strict=True)
         ]
-        colors, options = style
         tag = gallery.add(name, faces, colors, **options, Light=0)
         head = low + [0, 1.12] * (high - low)
         gallery.label_point(tag, deformed.camera.place(head[None])[0], [name], SIZES[3])

@@ -70,6 +70,11 @@ class Session:
         self.drawn: tuple[Any, ...] = ()
         self.fitted: tuple[Any, ...] = ()
         self.started = self.next_progress = self.next_look = 0.0
+        #: when the next step is shown while the steps are played
+        self.next_play: float | None = None
+        #: the request that runs; whether its results so far are shown
+        self.running: Request | None = None
+        self.live = False
         self.layout = Layout()
         #: what the user has chosen to see, and the step shown, at the last turn
         self.display, self.step = views.Display(), 0
@@ -79,10 +84,11 @@ class Session:
         if kind != "ready":
             raise RunError(f"gui: the engine's process has not started ({kind}); try again")
         self.tree = tree.Tree(*content)
+        self.check(request)
         if windowed:
             self.update()
-            gmsh.fltk.closeTreeItem("0Modules")
-        self.check(request)
+            for group in ("0Modules", *(f"Parameters/{name}" for name in tree.CLOSED)):
+                gmsh.fltk.closeTreeItem(group)
 
     def close(self) -> None:
         """End the engine's process and Gmsh, and remove temporary files."""
@@ -101,6 +107,7 @@ class Session:
         for kind, *content in self.engine.messages(wait):
             getattr(self, f"on_{kind}")(*content)
         self.follow_window()
+        self.play()
         self.follow_step()
 
     def follow_window(self) -> None:
@@ -118,17 +125,44 @@ class Session:
         if self.shows_results and self.gallery and self.gallery.step != self.step:
             self.step = self.gallery.step
             self.gallery.set_step(self.step)
-            tree.show_results(self.scenes, self.scene_shown, self.step)
+            tree.show_numbers(self.scenes[self.scene_shown], self.step)
             self.update()
+
+    def play(self) -> None:
+        """Show the next step, if the steps are played and it is time; the numbers follow. (Gmsh's
+        own animation returns only at its end.)
+        """
+        if self.next_play is None or time.perf_counter() < self.next_play:
+            return
+        last = len(self.scenes[self.scene_shown].times) - 1 if self.scenes else 0
+        if not (self.shows_results and self.gallery) or self.gallery.step >= last:
+            self.next_play = None
+            return
+        self.next_play = time.perf_counter() + self.seconds_of_step
+        self.gallery.set_step(self.gallery.step + 1)
+
+    @property
+    def seconds_of_step(self) -> float:
+        """How long a step is shown while they are played."""
+        return export.LEVEL if self.scenes[self.scene_shown].quake is None else export.FRAME
+
+    def start_or_stop_playing(self) -> None:
+        """Play all steps from the first one; stop if they are played."""
+        playing, self.next_play = self.next_play is not None, None
+        if not playing and self.shows_results and self.gallery:
+            self.gallery.set_step(0)
+            self.next_play = time.perf_counter() + self.seconds_of_step
 
     def act(self, action: str) -> None:
         """Do an action."""
         if action == STOP[1]:
             self.stop()
-        elif action == RUN[1] and (self.busy == "saving" or not self.tree.sheet):
+        elif action == RUN[1] and (self.busy == "saving" or not self.tree.checked):
             self.pending = "run"
         elif action == RUN[1] and self.busy != "running":
             self.run()
+        elif action == tree.PLAY_ACTION:
+            self.start_or_stop_playing()
         elif action == tree.SAVE_ACTION and not self.busy:
             self.busy = "saving"
             self.show_status("saving ...", tree.CALM)
@@ -204,6 +238,7 @@ class Session:
         if not request:
             return
         self.busy, self.started = "running", time.perf_counter()
+        self.running, self.live = request, False
         tree.put(button(STOP))
         self.show_status("running: mesh and bodies", tree.CALM)
         self.engine.send("run", request)
@@ -215,7 +250,7 @@ class Session:
 
     def on_checked(self, sheet: Sheet) -> None:
         """A request is good: update parameters, drawing and loads."""
-        before = self.tree.sheet
+        before = self.tree.checked
         self.tree.show(sheet)
         drawn = drawing_key(sheet)
         if drawn != self.drawn:
@@ -231,7 +266,7 @@ class Session:
         if before and before.path != sheet.path:
             self.drop_results()
         if sheet.problem:
-            self.free(sheet.problem, tree.BAD)
+            self.free(self.tree.in_window_words(sheet.problem), tree.BAD)
         elif not self.scenes:
             self.free("ready: press Run", tree.CALM)
         elif sheet.request != self.last_request:
@@ -242,7 +277,11 @@ class Session:
 
     def on_failed(self, message: str) -> None:
         """A value is bad; a run, check or save has failed; or the engine's process has ended."""
-        self.free(message, tree.BAD)
+        if self.live:
+            self.live = False
+            self.drop_results()
+            self.outline(True)
+        self.free(self.tree.in_window_words(message), tree.BAD)
 
     def on_step(self, reached: str) -> None:
         """A step has converged: show what it has reached, a few times a second."""
@@ -251,13 +290,27 @@ class Session:
         self.next_progress = time.perf_counter() + PROGRESS
         self.show_status(f"running: {reached}", tree.CALM)
 
-    def on_done(self, scenes: list[SolvedScene]) -> None:
-        """A run has ended, at its last level or before: show its results."""
-        self.keep_or_drop()
+    def on_live(self, scenes: list[SolvedScene]) -> None:
+        """An earthquake goes on: show its last time, if it is of the tree's request."""
+        if self.busy != "running" or self.tree.request() != self.running:
+            return
+        self.show_run(scenes)
+        self.live = True
+
+    def show_run(self, scenes: list[SolvedScene]) -> int:
+        """Show the last step of a run; the number of the scene shown first."""
+        if not self.live:
+            self.keep_or_drop()
         self.scenes, self.title = scenes, self.tree.sheet.heading[0]
         first = next((k for k, scene in enumerate(scenes) if scene.quake), 0)
         self.step = max(len(scenes[first].times) - 1, 0)
         self.show(first)
+        return first
+
+    def on_done(self, scenes: list[SolvedScene]) -> None:
+        """A run has ended, at its last level or before: show its results."""
+        first = self.show_run(scenes)
+        self.live = False
         took = f"{time.perf_counter() - self.started:.2f} s"
         problems = [scene.message for scene in scenes[first:] if scene.message]
         self.last_status = f"done in {took}: {scenes[first].statement}", tree.GOOD
@@ -314,6 +367,7 @@ class Session:
             drawing.write_text(f'{text}Include "{source}";\n')
         gmsh.model.remove()
         gmsh.open(str(drawing))
+        gmsh.model.setFileName(f"{case.name}: {case.title}")  # the window's title
         tree.drop_level_entries()
         if self.loads:
             self.loads.close()
@@ -356,7 +410,7 @@ class Session:
         """Draw again what is shown, in the current layout."""
         if self.shows_results:
             self.show(self.scene_shown)
-        elif self.tree.sheet:
+        elif self.tree.checked:
             self.heading.close()
             views.show_heading(self.heading, self.tree.sheet.heading, self.layout)
             self.fit_view()
@@ -392,7 +446,7 @@ class Session:
         tree.hide_results()
         self.heading.close()
         self.outline(True)
-        if self.tree.sheet:
+        if self.tree.checked:
             self.fit_view()
         self.update()
 

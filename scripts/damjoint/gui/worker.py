@@ -10,6 +10,7 @@ import contextlib
 import multiprocessing
 import os
 import signal
+import time
 from collections.abc import Callable, Iterator
 from functools import partial
 from multiprocessing.connection import Connection
@@ -28,6 +29,8 @@ from ..studies import quake, quake_study
 from .scene import SolvedScene
 from .sheet import Request, Sheet, case_text, check_request, titles
 
+#: Least time between two pictures of an earthquake while it is computed [s].
+LIVE = 1.5
 #: First line of case files that Save may replace.
 SAVED = "// Saved by the window of damjoint; replaced when a run is saved to this folder again.\n"
 
@@ -68,8 +71,8 @@ def serve(pipe: Connection) -> None:
     """Process the messages of the window until it closes.
 
     In: ("check", Request), ("run", Request), ("save", folder). Out: ("ready", titles, parameters),
-    ("checked", Sheet), ("step", what was reached), ("done", [SolvedScene]), ("failed", message),
-    ("saved", folder).
+    ("checked", Sheet), ("step", what was reached), ("live", [SolvedScene] so far), ("done",
+    [SolvedScene]), ("failed", message), ("saved", folder).
     """
     stop = Stop()
     pipe.send(("ready", titles(), declared()))
@@ -130,8 +133,7 @@ def run_case(sheet: Sheet, pipe: Connection, stop: Stop) -> tuple[list[SolvedSce
         raise outcomes[-1].error
     scenes = []
     for outcome in outcomes:
-        name = str(outcome.result.case["uplift"]) if case.also_uplift else ""
-        scenes += SolvedScene.of(outcome, name)
+        scenes += SolvedScene.of(outcome)
     return scenes, partial(write_outcomes, case, outcomes)
 
 
@@ -146,11 +148,13 @@ def run_quake(sheet: Sheet, pipe: Connection, stop: Stop) -> tuple[list[SolvedSc
     with quake.single_thread():
         with stop:
             under_way = quake.QuakeRun(case, sheet.request.span, on_step)
+            live = Live(pipe)
             try:
                 for _ in under_way.steps():
                     now = under_way.quake.now.time, under_way.quake.record.duration
                     pipe.send(("step", "earthquake, t = {:.2f} s of {:.2f} s".format(*now)))
                     stop.after_step()
+                    live.send(under_way)
             except (Exception, KeyboardInterrupt) as caught:
                 if not len(under_way.history):
                     raise
@@ -162,6 +166,24 @@ def run_quake(sheet: Sheet, pipe: Connection, stop: Stop) -> tuple[list[SolvedSc
             quake_study.save(study, result, fields=True, picture=True)
 
     return SolvedScene.of_earthquake(result), write
+
+
+class Live:
+    """Sends the scenes of an earthquake while it is computed: after LIVE seconds, and so seldom
+    that it takes a fifth of the time.
+    """
+
+    def __init__(self, pipe: Connection) -> None:
+        self.pipe, self.next, self.frames = pipe, time.perf_counter() + LIVE, 1
+
+    def send(self, under_way: quake.QuakeRun) -> None:
+        """Send the scenes so far, if it is time and there are further frames."""
+        start, frames = time.perf_counter(), len(under_way.history.frames)
+        if start < self.next or frames == self.frames:
+            return
+        self.frames = frames
+        self.pipe.send(("live", SolvedScene.of_earthquake(under_way.result_so_far())))
+        self.next = time.perf_counter() + max(LIVE, 4 * (time.perf_counter() - start))
 
 
 def level_reached(case: Case, time: float) -> str:
@@ -234,6 +256,7 @@ class EngineProcess:
             self.killed = True
             self.process.kill()
         else:
+            assert self.process.pid is not None  # it has been started
             os.kill(self.process.pid, signal.SIGINT)
         self.interrupted = True
 

@@ -78,6 +78,10 @@ def check(case: Case, span: Span = None) -> None:
         )
 
 
+#: State of an earthquake that goes on.
+RUNNING = "running"
+
+
 class QuakeRun:
     """An earthquake of a case under way."""
 
@@ -131,10 +135,12 @@ class QuakeRun:
             found["after"]["equilibrium_with_full_uplift_in_the_crack"] = full
         return self._result_of(found)
 
-    def result_so_far(self, error: BaseException) -> QuakeResult:
-        """The result up to an error or interrupt."""
+    def result_so_far(self, error: BaseException | None = None) -> QuakeResult:
+        """The result up to now, or up to an error or interrupt."""
         self.history.end_at_complete_row(self.quake)
-        return self._result_of(self.summary(), error)
+        where = f" after t = {self.quake.now.time:.6g} s of the record"
+        end = end_of(error, where) if error else (RUNNING, f"{RUNNING}{where}")
+        return self._result_of(self.summary(), end, error)
 
     def summary(self) -> dict[str, Any]:
         """See `quake_summary`, of the rows so far; with the slip of the rigid blocks."""
@@ -146,8 +152,15 @@ class QuakeRun:
                 found["residual"][column_of("rigid_block", k)] = block
         return found
 
-    def _result_of(self, found: dict[str, Any], error: BaseException | None = None) -> QuakeResult:
-        """The result with a summary; error: that ended it early."""
+    def _result_of(
+        self,
+        found: dict[str, Any],
+        end: tuple[str, str] = ("", ""),
+        error: BaseException | None = None,
+    ) -> QuakeResult:
+        """The result with a summary; end: state and message before the end of the record; error:
+        that ended it early.
+        """
         quake, history, static = self.quake, self.history, self.static.results()
         if trace := quake.now.state.trace:
             equilibrium = quake.problem.model.equilibrium
@@ -158,7 +171,7 @@ class QuakeRun:
             quake.case,
             static,
             found,
-            end_of(error, f" after t = {quake.now.time:.6g} s of the record"),
+            end,
             error=error,
             rows=history.table,
             stress=self.stress_table(),
