@@ -46,6 +46,21 @@ class EndoVariables:
     plastic: Array
 
 
+class Flow(NamedTuple):
+    """The plastic flow of a step; components of a vector: n, t1, t2."""
+
+    #: growth of the plastic jump (q, 3) and its multiplier (q,) [m]
+    growth: Array
+    multiplier: Array
+    #: normal of the yield surface (q, 3): mu and the direction of the shear
+    normal: Array
+    #: shear of the elastic trial (q,) [Pa]; stiffness of X against the plastic jump (q, 3) [Pa/m]
+    size: Array
+    stiffness: Array
+    #: whether X returns to the apex (q,)
+    apex: BoolArray
+
+
 class PlasticReturn(NamedTuple):
     """The return to the yield surface at a given damage; components of a vector: n, t1, t2."""
 
@@ -126,31 +141,44 @@ class Endo(SofteningLaw[EndoVariables]):
         plastic = self.plastic_return(jump, variables, alpha).plastic
         return EndoVariables(alpha, plastic[:, [1, 2, 0]])
 
-    # -- response
+    # -- the return at a given damage, as in pro/law_endo.pro
 
-    def plastic_return(self, jump: Array, variables: EndoVariables, alpha: Array) -> PlasticReturn:
-        """The plastic jump that minimises the energy at a damage (q,)."""
-        S, dS, d2S = degradation(np.maximum(alpha, LEAST))
-        before = variables.plastic[:, [2, 0, 1]]
-        trial = self.K * (jump - before) - S[:, None] * self.B * before
-        stiffness = self.K + S[:, None] * self.B  # of X, with p
+    def elastic_trial(self, jump: Array, before: Array, S: Array) -> Array:
+        """X with the plastic jump before the step (q, 3) [Pa]."""
+        return np.asarray(self.K * (jump - before) - S[:, None] * self.B * before)
+
+    def flow(self, trial: Array, S: Array) -> Flow:
+        """The flow that returns an elastic trial of X to the yield surface, or to its apex."""
+        stiffness = self.K + S[:, None] * self.B
         size = np.linalg.norm(trial[:, 1:], axis=1)
         direction = trial[:, 1:] / np.maximum(size, 1e-300)[:, None]
-        friction = np.full(len(direction), self.mu)
-        normal = np.column_stack([friction, direction])  # of the yield surface
+        normal = np.column_stack([np.full(len(direction), self.mu), direction])
         stiff = stiffness[:, 1] + self.mu**2 * stiffness[:, 0]
-        slip = np.maximum(size + self.mu * trial[:, 0], 0) / stiff
-        flows = slip > 0
-        apex = flows & (size < stiffness[:, 1] * slip)
-        flow = np.where(apex[:, None], trial / stiffness, slip[:, None] * normal)
-        plastic = before + flow
+        multiplier = np.maximum(size + self.mu * trial[:, 0], 0) / stiff
+        apex = (multiplier > 0) & (size < stiffness[:, 1] * multiplier)
+        growth = np.where(apex[:, None], trial / stiffness, multiplier[:, None] * normal)
+        return Flow(growth, multiplier, normal, size, stiffness, apex)
 
-        compliance = flows[:, None, None] * normal[:, :, None] * normal[:, None, :]
+    def compliance(self, flow: Flow) -> Array:
+        """Derivative of the plastic jump with the elastic trial (q, 3, 3) [m/Pa]."""
+        stiff = flow.stiffness[:, 1] + self.mu**2 * flow.stiffness[:, 0]
+        flows, direction = flow.multiplier > 0, flow.normal[:, 1:]
+        compliance = flows[:, None, None] * flow.normal[:, :, None] * flow.normal[:, None, :]
         compliance /= stiff[:, None, None]
-        across = slip / np.maximum(size, 1e-300)
+        across = flow.multiplier / np.maximum(flow.size, 1e-300)
         outer = direction[:, :, None] * direction[:, None, :]
         compliance[:, 1:, 1:] += across[:, None, None] * (np.eye(2) - outer)
-        compliance[apex] = np.eye(3) / stiffness[apex][:, None, :]
+        compliance[flow.apex] = np.eye(3) / flow.stiffness[flow.apex][:, None, :]
+        return np.asarray(compliance)
+
+    def plastic_return(self, jump: Array, variables: EndoVariables, alpha: Array) -> PlasticReturn:
+        """The plastic jump that minimises the energy at a damage (q,), and what one unit of damage
+        then releases.
+        """
+        S, dS, d2S = degradation(np.maximum(alpha, LEAST))
+        before = variables.plastic[:, [2, 0, 1]]
+        flow = self.flow(self.elastic_trial(jump, before, S), S)
+        plastic, compliance = before + flow.growth, self.compliance(flow)
         back = self.B * plastic
         relief = np.einsum("qij,qj->qi", compliance, back)  # -dp/dS
         work = np.einsum("qi,qi->q", back, plastic)
@@ -189,6 +217,8 @@ class Endo(SofteningLaw[EndoVariables]):
                 break
         alpha[grows] = np.maximum(1 / (1 + np.exp(-odds)), variables.alpha)
         return alpha
+
+    # -- response
 
     def traction_and_tangent(
         self, jump: Array, variables: EndoVariables, frozen: Array | None = None
