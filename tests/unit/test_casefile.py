@@ -1,6 +1,7 @@
 """Case files are data: their statements; nothing in them is executed."""
 
 import os
+import re
 import subprocess
 import sys
 import sysconfig
@@ -11,7 +12,8 @@ import pytest
 from damjoint import InputError
 from damjoint.input import casefile, parameters
 from damjoint.input.case_names import CASES
-from damjoint.input.resolve import load
+from damjoint.input.parameters import settings
+from damjoint.input.resolve import load, varied
 from damjoint.post import validation
 
 #: Gmsh, as installed with its Python module: a script, for this Python.
@@ -328,6 +330,50 @@ def test_a_written_case_is_read_again(tmp_path):
     case.defaults |= {"law": "friction", "drive_by": 1 / 3}
     (tmp_path / "again.case").write_text(casefile.written(case))
     assert casefile.read(tmp_path / "again.case") == case
+
+
+def mu_of(*words):
+    return [joint["mu"] for joint in load("lifts", settings(words)).joints]
+
+
+def test_a_value_of_one_joint_is_set_by_its_name():
+    """As messages print it or as in a case file; beside a value for all it is the one of its joint,
+    in either order; a list that comes later, as of `critical --of strength`, replaces it.
+    """
+    assert mu_of("lift 25 m.mu=0.5") == mu_of("lift_25_m.mu=0.5") == [0.9, 1.0, 0.5, 1.0]
+    assert mu_of("base.mu=0.5", "lift 38 m.mu=2") == [0.5, 1.0, 0.7, 2.0]
+    assert mu_of("mu=0.8", "lift 25 m.mu=0.5") == [0.8, 0.8, 0.5, 0.8]
+    assert mu_of("lift 25 m.mu=0.5", "mu=0.8") == [0.8, 0.8, 0.5, 0.8]
+    assert mu_of("lift_heights=12,30,38", "lift 30 m.adhesion=0") == [0.9, 1.0, 0.7, 1.0]
+    case = load("lifts", {"lift 25 m.mu": 0.5})
+    for further, expected in (
+        ({"mu": (1.0, 2.0, 3.0, 4.0)}, [1.0, 2.0, 3.0, 4.0]),
+        ({"base.mu": 0.6}, [0.6, 1.0, 0.5, 1.0]),
+    ):
+        assert [joint["mu"] for joint in varied(case, further).joints] == expected
+    moved = load("lifts", settings(["lift_heights=12,30,38", "lift 30 m.adhesion=0"]))
+    assert [joint["adhesion"] for joint in moved.joints] == [2e5, 1e6, 0, 1e6]
+    assert load("lifts").joints[2]["mu"] == 0.7
+
+
+def test_a_published_case_with_a_value_of_one_joint_is_another_case():
+    assert load("a").published and not load("a", {"base.mu": 0.5}).published
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["lift 26 m.mu=1"], "lift_26_m: there is no such joint; must be one of Joint::base"),
+        (["base.E_dam=1e10"], "base.E_dam: E_dam is of the whole dam"),
+        (["base.mus=1"], "mus: unknown parameter"),
+        (["base.mu=1,2"], "base.mu = 1,2: must be a single value"),
+        (["base.mu=-1"], "mu = -1"),
+        (["base.mu=1", "mu=1,2,3,4"], "base.mu = 1.0: mu is a list for all joints"),
+    ],
+)
+def test_bad_values_of_one_joint(words, message):
+    with pytest.raises(InputError, match=re.escape(message)):
+        load("lifts", settings(words))
 
 
 def test_a_case_file_from_windows_is_read(tmp_path):

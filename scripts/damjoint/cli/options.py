@@ -165,7 +165,7 @@ def settings_options() -> Parser:
         "NAME=VALUE",
         dest="settings",
         help="value of a parameter, in the unit of reference/parameters.md or with one of its own: "
-        "E_dam=20*GPa (repeatable; default: that of the case)",
+        "E_dam=20*GPa; of one joint: 'lift 25 m.mu=0.7' (repeatable; default: that of the case)",
     )
     options.add_argument(
         "--run-geo",

@@ -334,8 +334,8 @@ def parameter(name: str) -> Parameter:
 
 
 def settings(pairs: Iterable[str]) -> dict[str, Setting]:
-    """{name: checked value} from texts 'name=value', or 'name=value,value' with a value for each
-    joint.
+    """{name: checked value} from texts 'name=value', 'name=value,value' with a value for each
+    joint, or 'joint.name=value' for one of them.
 
     Raises InputError.
     """
@@ -355,6 +355,8 @@ def checked(name: str, value: Any) -> Setting:
     """
     if name == "lift_heights":
         return levels_of(name, value) if value else ()
+    if "." in name:
+        return of_one_joint(name, value)[2]
     known = parameter(name)
     if isinstance(value, (str, float, int)):
         return known.check(value)
@@ -365,6 +367,20 @@ def checked(name: str, value: Any) -> Setting:
             "can have one for each joint"
         )
     return tuple(known.check(v) for v in value)
+
+
+def of_one_joint(name: str, value: Any) -> tuple[str, str, Value]:
+    """Joint, parameter and checked value of a setting 'joint.parameter' of one joint.
+
+    Raises InputError.
+    """
+    joint, _, of_joint = name.rpartition(".")
+    known = parameter(of_joint)
+    if not known.of_joints:
+        raise InputError(f"{name}: {of_joint} is of the whole dam: must be set without a joint")
+    if isinstance(value, (list, tuple)):
+        raise InputError(f"{name} = {','.join(map(str, value))}: must be a single value")
+    return joint, of_joint, known.check(value)
 
 
 def levels_of(name: str, levels: Any) -> tuple[float, ...]:

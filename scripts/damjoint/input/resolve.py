@@ -43,16 +43,17 @@ def load(
     """Read a case file, apply overrides, resolve the parameters that follow others, check all.
 
     case: letter, name or path; overrides: {name: value, or a value for each joint}, also
-    lift_heights [m]; levels, tail_levels: [m] at t = 1, 2, 3, also as a text 'a,b,c'; steps: equal
-    steps between two levels; accuracy: coarse, standard, fine or a percentage, chooses order, first
-    mesh (overrides win) and one step per level; record: file of the ground's acceleration. Raises
-    InputError.
+    lift_heights [m], and of one joint "lift 25 m.mu"; levels, tail_levels: [m] at t = 1, 2, 3, also
+    as a text 'a,b,c'; steps: equal steps between two levels; accuracy: coarse, standard, fine or a
+    percentage, chooses order, first mesh (overrides win) and one step per level; record: file of
+    the ground's acceleration. Raises InputError.
     """
     path = case_file(case)
     text = casefile.read(path)
     if record:
         text.texts["record"] = str(record)
-    return resolve(Source(path, text, dict(overrides or {}), levels, tail_levels, steps, accuracy))
+    source = Source(path, text, {}, levels, tail_levels, steps, accuracy)
+    return resolve(source.with_overrides(overrides or {}))
 
 
 def resolve(source: Source) -> Case:
@@ -103,7 +104,7 @@ def resolve(source: Source) -> Case:
         tail_levels=tails[:1] * len(heights) if len(set(tails)) == 1 else tails,
         times=tuple(variables["times"]) if steps is None else equal_steps(len(heights), steps),
         also_uplift=also,
-        published=as_published(path, overrides, levels, tail_levels),
+        published=not file.of_user and as_published(path, overrides, levels, tail_levels),
         hardening_asked=bool(variables["hardening_asked"][0]),
         accuracy=error,
         geometry=geometry,

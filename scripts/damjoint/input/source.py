@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import deepcopy
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from .. import InputError
 from ..arrays import Setting, Settings, Value
 from . import casefile
-from .parameters import checked
+from .parameters import checked, of_one_joint, parameter
 
 
 @dataclass(frozen=True)
@@ -55,12 +56,31 @@ class Source:
             if len(before) == len(names) or len(names) == 1:
                 moved = dict(zip(before, map(casefile.key_of, names), strict=False))
                 gone = before[len(names) :]
-                given = {moved.get(k, k): values for k, values in given.items() if k not in gone}
+                of_file, given = given, {}
+                kept = [key for key in of_file if key not in gone]
+                for key in sorted(kept, key=lambda key: key not in moved):  # those of overrides win
+                    given.setdefault(moved.get(key, key), {}).update(of_file[key])
         return {key: values for key, values in given.items() if values}
 
     def with_overrides(self, overrides: Settings) -> Source:
-        """The source with further overrides, which win."""
-        return replace(self, overrides={**self.overrides, **overrides})
+        """The source with further overrides, which win. Those of one joint, "lift 25 m.mu", become
+        values of its block; one of all joints beside them is for the others.
+
+        Raises InputError.
+        """
+        merged, text = {**self.overrides, **overrides}, deepcopy(self.text)
+        for name in [name for name in merged if "." in name]:
+            joint, of_joint, value = of_one_joint(name, merged.pop(name))
+            others = merged.pop(of_joint, text.of_joints.get(of_joint))
+            if isinstance(others, (list, tuple)):
+                raise InputError(f"{name} = {value}: {of_joint} is a list for all joints")
+            if others is not None:
+                text.defaults[of_joint] = parameter(of_joint).check(others)
+                for values in text.blocks.values():
+                    values.pop(of_joint, None)
+            text.blocks.setdefault(casefile.key_of(joint), {})[of_joint] = value
+            text.of_user.add(of_joint)
+        return replace(self, overrides=merged, text=text)
 
 
 def lists_of_joints(settings: Settings) -> dict[str, tuple[Value, ...]]:
