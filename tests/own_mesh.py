@@ -9,7 +9,7 @@ import numpy as np
 from damjoint.input.case import Case
 from damjoint.mesh.body import Body
 from damjoint.mesh.mesh import Mesh
-from damjoint.mesh.regions import OWN_FACES, OWN_NAMES, SHAPES, dimension
+from damjoint.mesh.regions import SHAPES, USER_FACES, USER_NAMES, dimension
 
 KINDS = {shape: kind for kind, shape in SHAPES.items()}
 
@@ -72,9 +72,9 @@ class OwnMesh:
             rows = np.searchsorted(tags, body.node_tags)
             return [(KINDS[shape], rows[table]) for shape, table in body.cells]
 
-        own = {region: name for name, region in OWN_NAMES.items()}
+        own = {region: name for name, region in USER_NAMES.items()}
         regions = {own[n]: (dimension(n, dim), cells(b)) for n, b in mesh.bodies.items()}
-        own = {what: name for name, what in OWN_FACES.items()}
+        own = {what: name for name, what in USER_FACES.items()}
         for face in mesh.faces.values():  # straight ones; one region for all of a side
             _, before = regions.get(own[face.body, face.side], (0, []))
             regions[own[face.body, face.side]] = dim - 1, before + cells(face.surface)

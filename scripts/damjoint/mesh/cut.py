@@ -28,8 +28,8 @@ def cut(body: Body, surface: Body, upwards: Array, new_tag: int) -> tuple[Body, 
 
     def is_above(cell: int, tag: int) -> bool:
         """Whether a cell has a facet of the surface at a node, and is above it."""
-        own = [e for e, facet in enumerate(facets) if tag in facet and facet <= set(cells[cell])]
-        return any((sides[0][cell] - sides[1][e]) @ upwards[e] > 0 for e in own)
+        beside = [e for e, facet in enumerate(facets) if tag in facet and facet <= set(cells[cell])]
+        return any((sides[0][cell] - sides[1][e]) @ upwards[e] > 0 for e in beside)
 
     moved: dict[int, list[int]] = {}
     for tag in tags:
@@ -43,10 +43,10 @@ def cut(body: Body, surface: Body, upwards: Array, new_tag: int) -> tuple[Body, 
     for shape, table in body.cells:
         changed = table.copy()
         for k, (tag, numbers) in enumerate(moved.items()):
-            own = np.array([n - start for n in numbers if start <= n < start + len(table)], int)
-            rows = changed[own]
+            here = np.array([n - start for n in numbers if start <= n < start + len(table)], int)
+            rows = changed[here]
             rows[rows == place[tag]] = len(body.points) + k
-            changed[own] = rows
+            changed[here] = rows
         tables.append((shape, changed))
         start += len(table)
     old = np.array([place[tag] for tag in moved], int)

@@ -69,26 +69,26 @@ def generate(case: Case) -> None:
     gmsh.onelab.clear()
     for option in SIZE_OPTIONS:  # of an earlier geometry in this process
         gmsh.option.setNumber(f"Mesh.{option}", 1)
-    own = case.geometry
+    geometry = case.geometry
     # in a folder of its own: Gmsh runs a file of options, FILE.opt, beside the file it opens
     with tempfile.TemporaryDirectory(prefix="damjoint-") as folder:
-        path = Path(folder) / f"scene{own.suffix if own else '.geo'}"
-        if not own:
+        path = Path(folder) / f"scene{geometry.suffix if geometry else '.geo'}"
+        if not geometry:
             path.write_text(as_text(shares(case)) + f'Include "{data("geo")}/dam.geo";\n')
-        elif own.suffix == ".geo":  # it may take sizes from the case
-            path.write_text(assignments(case.values) + f'Include "{own}";\n')
+        elif geometry.suffix == ".geo":  # it may take sizes from the case
+            path.write_text(assignments(case.values) + f'Include "{geometry}";\n')
         else:
-            path.symlink_to(own)
+            path.symlink_to(geometry)
         try:
             gmsh.open(str(path))
             if not len(gmsh.model.mesh.getElements(int(case["dim"]))[0]):
                 gmsh.model.mesh.generate(int(case["dim"]))
         except Exception as error:  # what gmsh raises
-            if own:
+            if geometry:
                 gmsh.finalize()  # else Gmsh remains busy with a file that it could not read
-                raise InputError(f"geometry = {own}: {error}") from None
+                raise InputError(f"geometry = {geometry}: {error}") from None
             raise RunError(f"mesh: {error}") from None
-    if own:
+    if geometry:
         # format MSH 2.2 has an element once for each of its groups: a point that is heel and toe
         ends = [e for d in range(int(case["dim"]) - 1) for e in gmsh.model.getEntities(d)]
         if ends:  # else of all entities

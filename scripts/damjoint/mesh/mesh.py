@@ -31,10 +31,10 @@ from .regions import (
     LOADED,
     NEEDED,
     OF_JOINTS,
-    OWN_FACES,
-    OWN_NAMES,
     REGIONS,
     SHAPES,
+    USER_FACES,
+    USER_NAMES,
     FaceRegion,
     dimension,
 )
@@ -48,7 +48,7 @@ MOST_TAGS = 1_000_000
 
 
 @lru_cache(maxsize=1)
-def mesh_of_own(geometry: GeometryFiles) -> Mesh:
+def mesh_of_files(geometry: GeometryFiles) -> Mesh:
     """The mesh of a user's own geometry, stored: its fingerprint is needed before the run."""
     return Mesh(geometry.case)
 
@@ -65,10 +65,10 @@ def mesh_of(case: Case) -> Mesh:
     words = set(re.findall(r"\w+", " ".join(texts.values())))
     used = shares(case) | {n: v for n, v in case.values.items() if n in words}
     geometry = GeometryFiles(files, tuple(used.items()), case)
-    mesh = mesh_of_own(geometry)
+    mesh = mesh_of_files(geometry)
     if not mesh.is_current:
-        mesh_of_own.cache_clear()
-        mesh = mesh_of_own(geometry)
+        mesh_of_files.cache_clear()
+        mesh = mesh_of_files(geometry)
     check_loads(case, mesh)
     return mesh
 
@@ -80,10 +80,10 @@ def check_loads(case: Case, mesh: Mesh) -> None:
     for name, region in LOADED.items():
         needed = case[name] and (name != "hold_z" or mesh.dim == 3)
         if needed and region not in mesh.bodies:
-            own = {what: n for n, what in OWN_NAMES.items()}[region]
+            group = {what: n for n, what in USER_NAMES.items()}[region]
             raise InputError(
                 f"{name} = {case[name]:g}: must be 0, or geometry = {case.geometry} have the "
-                f"region {own}"
+                f"region {group}"
             )
     if case.source:
         case.source.check_lists([joint.name for joint in mesh.joints])
@@ -106,12 +106,14 @@ class Mesh:
     def __init__(self, case: Case) -> None:
         gmsh = start_gmsh()
         start = time.perf_counter()
-        self.dim, self.own = int(case["dim"]), case.geometry
+        self.dim, self.geometry = int(case["dim"]), case.geometry
         generate(case)
         #: Gmsh's name of it
         self.model = gmsh.model.getFileName()
         self._read()
-        names, bodies, faces = self._own_regions() if self.own else self._section_regions(case)
+        names, bodies, faces = (
+            self._user_regions() if self.geometry else self._section_regions(case)
+        )
         # from the highest: a line force at the end of a joint acts on the body above it
         dams = [name for name in bodies if name.split(" ")[0] == "dam"]
         solids = [*reversed(dams), "foundation"]
@@ -123,10 +125,10 @@ class Mesh:
             name: self._body(dimension(name, self.dim), parts) for name, parts in groups.items()
         }
         self.solids = {name: self.bodies[name] for name in solids}
-        scene = self._own_scene(names) if self.own else stacked(names)
+        scene = self._user_scene(names) if self.geometry else stacked(names)
         surfaces = [self._body(self.dim - 1, [(f"face{i}", f.tag)]) for i, f in enumerate(faces)]
-        if self.own:
-            self.user_geometry = self._checked(self.own, scene, faces, surfaces)
+        if self.geometry:
+            self.user_geometry = self._checked(self.geometry, scene, faces, surfaces)
         self.joints = [
             JointMesh(
                 dim=self.dim,
@@ -140,7 +142,7 @@ class Mesh:
             )
             for joint in scene
         ]
-        if self.own:
+        if self.geometry:
             self._mark_junctions()
         self.faces: dict[str, Face] = {}
         for face, surface in zip(faces, surfaces, strict=True):
@@ -192,7 +194,7 @@ class Mesh:
             faces.append(FaceRegion(tag, body, SIDES[int(side)], min(ends), max(ends)))
         return case.joint_names, bodies, faces
 
-    def _own_regions(self) -> tuple[tuple[str, ...], dict[str, int], list[FaceRegion]]:
+    def _user_regions(self) -> tuple[tuple[str, ...], dict[str, int], list[FaceRegion]]:
         """As `_section_regions`, by the names of the physical groups, which get the numbers of the
         package's own geometries.
         """
@@ -202,22 +204,22 @@ class Mesh:
         parts: dict[str, list[str]] = {region: [] for region in OF_JOINTS}
         for d, tag in gmsh.model.getPhysicalGroups():
             if name := gmsh.model.getPhysicalName(d, tag).strip().lower():
-                region, _, own = name.partition(" ")
-                if name in OWN_NAMES | OWN_FACES and region not in OF_JOINTS:
+                region, _, joint = name.partition(" ")
+                if name in USER_NAMES | USER_FACES and region not in OF_JOINTS:
                     pass
                 elif region in OF_JOINTS:
-                    parts[region].append(own)
+                    parts[region].append(joint)
                 else:
-                    allowed = ", ".join([*OWN_NAMES, *OWN_FACES])
+                    allowed = ", ".join([*USER_NAMES, *USER_FACES])
                     raise self._bad(
                         f'region "{name}" is not known; allowed: {allowed}, and with several '
                         f"joints {', '.join(f'{region} NAME' for region in OF_JOINTS)}"
                     )
                 named[name] = d, gmsh.model.getEntitiesForPhysicalGroup(d, tag)
         joints = parts["joint"] or [""]
-        needed = [name for name, region in OWN_NAMES.items() if region in NEEDED]
+        needed = [name for name, region in USER_NAMES.items() if region in NEEDED]
         needed = [name for name in needed if name not in OF_JOINTS]
-        needed += [f"{n} {own}".strip() for n in ("joint", "heel", "toe") for own in joints]
+        needed += [f"{n} {joint}".strip() for n in ("joint", "heel", "toe") for joint in joints]
         needed += [] if parts["dam"] else ["dam"]
         if missing := [name for name in needed if name not in named]:
             raise self._bad(f"no region {', '.join(missing)}; the names of physical groups count")
@@ -226,9 +228,9 @@ class Mesh:
         faces: list[FaceRegion] = []
         order = {"dam": parts["dam"], **dict.fromkeys(("joint", "heel", "toe"), joints)}
         for name, (d, entities) in named.items():
-            kind, _, own = name.partition(" ")
+            kind, _, joint = name.partition(" ")
             # a face is as large as the joint
-            region = kind if kind in OF_JOINTS else OWN_NAMES.get(name, "joint")
+            region = kind if kind in OF_JOINTS else USER_NAMES.get(name, "joint")
             if d != dimension(region, self.dim):
                 raise self._bad(
                     f'region "{name}" has dimension {d}: must be {dimension(region, self.dim)} '
@@ -236,24 +238,24 @@ class Mesh:
                 )
             tag = int(numbers[region.upper()][0])
             if kind in OF_JOINTS:
-                if own not in order[kind]:
-                    raise self._bad(f'region "{name}": there is no joint {own}')
-                number = order[kind].index(own)
+                if joint not in order[kind]:
+                    raise self._bad(f'region "{name}": there is no joint {joint}')
+                number = order[kind].index(joint)
                 tag += number * int(numbers["LAYER"][0])
                 bodies[numbered(kind, number)] = tag
-            elif name in OWN_NAMES:
+            elif name in USER_NAMES:
                 bodies[region] = tag
             else:
                 tag = int(numbers["SEGMENT"][0]) + len(faces)
-                faces.append(FaceRegion(tag, *OWN_FACES[name]))
+                faces.append(FaceRegion(tag, *USER_FACES[name]))
             gmsh.model.addPhysicalGroup(d, entities, tag)
-        return tuple(own or "joint" for own in joints), bodies, faces
+        return tuple(joint or "joint" for joint in joints), bodies, faces
 
     def _checked(
         self, file: Path, scene: list[Joint], faces: list[FaceRegion], surfaces: list[Body]
     ) -> UserGeometry:
         """The regions of a user's own geometry, complete."""
-        kinds = {what: name for name, what in OWN_FACES.items()}
+        kinds = {what: name for name, what in USER_FACES.items()}
         named = [
             NamedFace(kinds[face.body, face.side], face.body, face.side, surface)
             for face, surface in zip(faces, surfaces, strict=True)
@@ -261,7 +263,7 @@ class Mesh:
         regions = {name: body for name, body in self.bodies.items() if name not in self.solids}
         return UserGeometry(file, self.dim, regions, self.solids, scene, named)
 
-    def _own_scene(self, names: tuple[str, ...]) -> list[Joint]:
+    def _user_scene(self, names: tuple[str, ...]) -> list[Joint]:
         """The joints of a user's own geometry, each between the two bodies that share it.
 
         The lower one is the foundation; of two others, that on the right of the way from heel to
@@ -349,7 +351,7 @@ class Mesh:
         side of.
         """
         bodies = [name for name in self.solids if name.split(" ")[0] == body]
-        if not self.own or len(bodies) == 1:
+        if not self.geometry or len(bodies) == 1:
             return [(body, surface)]
         masks = {name: sides(surface, self.solids[name]) for name in bodies}
         if not np.any(list(masks.values()), axis=0).all():
@@ -358,7 +360,7 @@ class Mesh:
 
     def _bad(self, why: str) -> InputError:
         """The error of a user's own geometry."""
-        return InputError(f"geometry = {self.own}: {why}")
+        return InputError(f"geometry = {self.geometry}: {why}")
 
     def _read(self) -> None:
         """Read the nodes of Gmsh's current mesh."""
@@ -407,7 +409,7 @@ class Mesh:
         its body.
         """
         gmsh = start_gmsh()
-        kinds = {kind: name for name, kind in OWN_FACES.items()}
+        kinds = {kind: name for name, kind in USER_FACES.items()}
         surfaces = [("joint", joint.surface, self.solids[joint.lower]) for joint in self.joints]
         for face in self.faces.values():
             kind = "foundation" if face.body == "foundation" else "dam"
@@ -417,7 +419,7 @@ class Mesh:
             if normals is None:
                 raise self._bad(f"{name}: its elements must be sides of its body's (conforming)")
             surface.normals, turned = normals
-            if self.own and turned.any():  # for GetDP, which goes by the elements
+            if self.geometry and turned.any():  # for GetDP, which goes by the elements
                 gmsh.model.mesh.reverseElements(surface.element_tags[turned])
 
     def bearer(self, line: str) -> str:

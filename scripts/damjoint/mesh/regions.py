@@ -63,7 +63,7 @@ SHAPES = {
 
 
 #: Names of the physical groups of a user's own geometry: bodies and lines, faces by side and body.
-OWN_NAMES = {
+USER_NAMES = {
     "dam": "dam",
     "foundation": "foundation",
     "lower dam": "lower",
@@ -77,7 +77,7 @@ OWN_NAMES = {
 }
 
 
-OWN_FACES = {
+USER_FACES = {
     "upstream": ("dam", UP),
     "downstream": ("dam", DOWN),
     "crest surface": ("dam", TOP),

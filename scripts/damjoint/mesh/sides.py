@@ -66,7 +66,9 @@ def part_of(surface: Body, selected: BoolArray) -> Body:
     """Some elements of a surface."""
     ends = np.cumsum([len(table) for _, table in surface.cells])[:-1]
     chosen = np.split(selected, ends)
-    cells = [(shape, table[own]) for (shape, table), own in zip(surface.cells, chosen, strict=True)]
+    cells = [
+        (shape, table[part]) for (shape, table), part in zip(surface.cells, chosen, strict=True)
+    ]
     used = np.unique(np.concatenate([table.ravel() for _, table in cells]))
     return Body(
         surface.points[used],

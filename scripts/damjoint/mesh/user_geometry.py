@@ -181,8 +181,8 @@ class UserGeometry:
         tags, points = self.points
         cells, start = list[tuple[str, IntArray]](), 0
         for table in self.rows:
-            own = self.skin[(start <= self.skin) & (self.skin < start + len(table))] - start
-            cells.append((SHAPE_OF_SIDE[table.shape[1]], np.searchsorted(tags, table[own])))
+            sides = self.skin[(start <= self.skin) & (self.skin < start + len(table))] - start
+            cells.append((SHAPE_OF_SIDE[table.shape[1]], np.searchsorted(tags, table[sides])))
             start += len(table)
         surface = Body(points, tags, cells, np.zeros(0, int))
         normals = surface.unit_normals()
@@ -242,8 +242,8 @@ class UserGeometry:
         """Length or area of the dam's surface that is fixed [m, m2]."""
         is_dam = np.array([name != "foundation" for name in self.solids])
         sizes, names = sizes_of(self.surface), np.array(self.name_of_skin)
-        own = is_dam[self.body_of[self.owners[self.skin]]] & (names == "fixed")
-        return float(sizes[own].sum())
+        fixed = is_dam[self.body_of[self.owners[self.skin]]] & (names == "fixed")
+        return float(sizes[fixed].sum())
 
     @property
     def coincident(self) -> str:
@@ -299,7 +299,9 @@ class UserGeometry:
             count = np.bincount(np.concatenate(numbers))
             if (count > 1).any():
                 twice = int(np.argmax(count > 1))
-                names = [n for (n, _), own in zip(group, numbers, strict=True) if twice in own]
+                names = [
+                    n for (n, _), elements in zip(group, numbers, strict=True) if twice in elements
+                ]
                 number = int((count > 1).sum())
                 occur = f"{number} elements occur" if number > 1 else "1 element occurs"
                 raise self.bad(
@@ -380,13 +382,13 @@ class UserGeometry:
         if (count > 2).any():
             where = surface.middles()[owner[np.argmax(count[sides] > 2)]]
             raise self.bad(f"{whole}; it branches at {at(where)}")
-        for name, region, own in (("heel", joint.heel, of_heel), ("toe", joint.toe, of_toe)):
-            if self.dim == 2 and len(own) != 1:
-                raise self.bad(f"{name} of {label(joint)}: must be one point, not {len(own)}")
-            off = count[own] != 1
+        for name, region, nodes in (("heel", joint.heel, of_heel), ("toe", joint.toe, of_toe)):
+            if self.dim == 2 and len(nodes) != 1:
+                raise self.bad(f"{name} of {label(joint)}: must be one point, not {len(nodes)}")
+            off = count[nodes] != 1
             if off.any():
                 where = self.regions[region].middles()[np.argmax(off)]
-                lies = "inside it" if count[own][off][0] else "not on it"
+                lies = "inside it" if count[nodes][off][0] else "not on it"
                 raise self.bad(
                     f"{name} of {label(joint)}: must be its end; {at(where)} lies {lies}"
                 )
@@ -413,8 +415,8 @@ class UserGeometry:
         place = np.searchsorted(surface.node_tags, rows[outer])
         rim = Body(surface.points, surface.node_tags, [("line", place)], np.zeros(0, int))
         names = np.full(len(outer), "", dtype="<U4")
-        for name, own in zip(("heel", "toe"), ends, strict=True):
-            names[np.isin(sides[outer], own)] = name
+        for name, end in zip(("heel", "toe"), ends, strict=True):
+            names[np.isin(sides[outer], end)] = name
         for part in unnamed_parts(rim, names.tolist(), {}):
             if len(part.names) == 1:
                 (name,), where = part.names, rim.middles()[part.elements[0]]
@@ -448,10 +450,10 @@ class UserGeometry:
         named = [(face.name, face.surface, is_dam == (face.kind == "dam")) for face in self.faces]
         every = np.ones(len(is_dam), bool)
         named += [(name, self.regions[name], every) for name in self.supports]
-        for (name, surface, own), numbers in zip(
+        for (name, surface, bodies), numbers in zip(
             named, [*self.of_faces, *self.of_supports], strict=True
         ):
-            if not np.isin(numbers, self.sides[own]).all():
+            if not np.isin(numbers, self.sides[bodies]).all():
                 raise self.bad(f"{name}: its elements must be sides of its body's (conforming)")
             inside = ~np.isin(numbers, self.sides[self.skin])
             if inside.any():
@@ -473,10 +475,10 @@ class UserGeometry:
         """
         normals, sizes = self.surface.normals, sizes_of(self.surface)
         for face, numbers in zip(self.faces, self.of_faces, strict=True):
-            own = np.isin(self.sides[self.skin], numbers)
+            on_face = np.isin(self.sides[self.skin], numbers)
             axis, sign = DIRECTIONS[face.side]
-            along = sign * (normals[own, axis] * sizes[own]).sum()
-            if along < -FACING * sizes[own].sum():
+            along = sign * (normals[on_face, axis] * sizes[on_face]).sum()
+            if along < -FACING * sizes[on_face].sum():
                 raise self.bad(
                     f"{face.name}: looks along {'-' if sign > 0 else ''}{'xy'[axis]}: x must point "
                     "downstream, y up"
@@ -512,9 +514,9 @@ class UserGeometry:
         rock = ~self.is_concrete[self.owners[self.skin]]
         names = {face.side: face.name for face in self.faces}
         for part in self.unnamed:
-            for own, end, sign in ((RESERVOIR, "heel", -1), (TAILWATER, "toe", 1)):
-                faces = part.names & own
-                rest = part.names - own
+            for wet, end, sign in ((RESERVOIR, "heel", -1), (TAILWATER, "toe", 1)):
+                faces = part.names & wet
+                rest = part.names - wet
                 to_end = rest == {end} and bool(
                     (rock | (sign * normals[:, 0] > FACING))[part.elements].all()
                 )

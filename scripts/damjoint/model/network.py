@@ -49,10 +49,10 @@ def starts_inside(joint: JointMesh, case: Case) -> bool:
 def sealed(joint: JointMesh, number: int) -> JointMesh:
     """A joint, by its number, that meets no other one at its toe: its waterstop ends the path."""
     tags, toe = joint.surface.node_tags.astype(int), joint.toe.node_tags.astype(int)
-    own = np.where(np.isin(tags, toe), (number + 1 << 40) + tags, tags)
+    distinct_tags = np.where(np.isin(tags, toe), (number + 1 << 40) + tags, tags)
     return replace(
         joint,
-        surface=replace(joint.surface, node_tags=own),
+        surface=replace(joint.surface, node_tags=distinct_tags),
         toe=replace(joint.toe, node_tags=(number + 1 << 40) + toe),
         inner_ends=np.union1d(joint.inner_ends.astype(int), (number + 1 << 40) + toe),
     )
@@ -80,9 +80,9 @@ def networks_of(joints: Sequence[JointMesh], cases: Sequence[Case]) -> list[Netw
     groups = [g for g in groups if len(g) > 1 or len(joints[min(g)].inner_ends)]
     networks = []
     for numbers in (tuple(sorted(group)) for group in groups):
-        members, own = [joints[k] for k in numbers], [cases[k] for k in numbers]
-        networks.append(connected(members, own, numbers))
-        check(networks[-1], members, own)
+        members, member_cases = [joints[k] for k in numbers], [cases[k] for k in numbers]
+        networks.append(connected(members, member_cases, numbers))
+        check(networks[-1], members, member_cases)
     return networks
 
 
@@ -104,8 +104,8 @@ def connected(
         np.concatenate([s.points for s in surfaces])[index],
         tags,
         [
-            (shape, own[table])
-            for s, own in zip(surfaces, nodes, strict=True)
+            (shape, numbers[table])
+            for s, numbers in zip(surfaces, nodes, strict=True)
             for shape, table in s.cells
         ],
         np.concatenate([s.element_tags for s in surfaces]),
@@ -115,8 +115,8 @@ def connected(
     count = np.bincount(np.concatenate(nodes))
 
     def outer(ends: list[Body]) -> Body:
-        own = np.setdiff1d(np.concatenate([end.node_tags for end in ends]), inner)
-        return Body(surface.points[np.searchsorted(tags, own)], own, [], np.zeros(0, int))
+        exits = np.setdiff1d(np.concatenate([end.node_tags for end in ends]), inner)
+        return Body(surface.points[np.searchsorted(tags, exits)], exits, [], np.zeros(0, int))
 
     heel, toe = outer([j.heel for j in joints]), outer([j.toe for j in joints])
     closed = distinct(np.searchsorted(tags, inner)) if len(inner) else np.zeros(0, int)
@@ -299,7 +299,8 @@ def with_paths(case: Case, joints: Sequence[JointMesh]) -> Case:
     if not paths:
         return case
     of_joints = tuple(
-        replace(own, section=own.section | paths.get(k, {})) for k, own in enumerate(case.of_joints)
+        replace(joint, section=joint.section | paths.get(k, {}))
+        for k, joint in enumerate(case.of_joints)
     )
     return replace(case, of_joints=of_joints)
 
@@ -326,8 +327,8 @@ def plane_paths(network: Network, joints: Sequence[JointMesh], case: Case) -> di
     heel_y, toe_y = (float(y[nodes[0]]) if len(nodes) else NOWHERE for nodes in (first, toes))
     paths, drains = {}, []
     for k, nodes in zip(network.numbers, network.nodes, strict=True):
-        own = [nodes[places[0]] for places in (joints[k].heel_nodes, joints[k].toe_nodes)]
-        (begin, end), *further = ((float(along[own[0]]), float(along[own[1]])) for along in alongs)
+        heel, toe = nodes[joints[k].heel_nodes[0]], nodes[joints[k].toe_nodes[0]]
+        (begin, end), *further = ((float(along[heel]), float(along[toe])) for along in alongs)
         paths[k] = WaterPath(
             heel_y=heel_y,
             toe_y=toe_y,
@@ -336,8 +337,8 @@ def plane_paths(network: Network, joints: Sequence[JointMesh], case: Case) -> di
             end=end,
             highest_tail=highest_tail,
             exits=network.branched,
-            open_heel=own[0] in first,
-            open_toe=own[1] in toes,
+            open_heel=heel in first,
+            open_toe=toe in toes,
             higher_heels=tuple(
                 HigherHeel(level, *ends) for level, ends in zip(levels, further, strict=True)
             ),
@@ -345,7 +346,7 @@ def plane_paths(network: Network, joints: Sequence[JointMesh], case: Case) -> di
         of_joint = case.joints[k]
         if of_joint["uplift"] == "drained":
             share = of_joint["drain_x"] / of_joint.joint_along
-            at, height = ((1 - share) * v[own[0]] + share * v[own[1]] for v in (alongs[0], y))
+            at, height = ((1 - share) * v[heel] + share * v[toe] for v in (alongs[0], y))
             outlet = max(of_joint["drain_level"], float(height))
             reference = float(at) if of_joint["drain_reference"] == "linear" else 0.0
             effect = of_joint["drain_effectiveness"]
@@ -367,7 +368,7 @@ def path_coordinate(surface: Body, heel: IntArray, toe: IntArray) -> Array:
     along[toe] = 1
     if not len(fixed):
         return along
-    table = np.concatenate([own for _, own in surface.cells])
+    table = np.concatenate([rows for _, rows in surface.cells])
     lengths = np.linalg.norm(np.diff(surface.points[table], axis=1)[:, 0], axis=1)
     laplace = np.zeros((len(along),) * 2)
     for (a, b), length in zip(table, lengths, strict=True):

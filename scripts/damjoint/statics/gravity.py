@@ -65,9 +65,9 @@ def resultant_of(name: str, loads: list[Load]) -> Load:
     return Load(name, *map(math.fsum, components))
 
 
-def force(name: str, fx: float, fy: float, place: tuple[float, float]) -> Load:
-    """The load of a force at a place [m from the joint's toe]."""
-    return Load(name, fx, fy, -place[1] * fx, place[0] * fy)
+def force(name: str, fx: float, fy: float, point: tuple[float, float]) -> Load:
+    """The load of a force at a point [m from the joint's toe]."""
+    return Load(name, fx, fy, -point[1] * fx, point[0] * fy)
 
 
 class Segment(NamedTuple):
@@ -207,8 +207,8 @@ class RigidBlock(JointLine):
 
     def force_at(self, mark: str, name: str, fx: float, fy: float) -> Load:
         """A force at a mark of pro/section.pro; none where that lies below the joint."""
-        place = self.marks.get(int(constants()[mark][0]))
-        return force(name, fx, fy, place) if place else force(name, 0.0, 0.0, (0.0, 0.0))
+        point = self.marks.get(int(constants()[mark][0]))
+        return force(name, fx, fy, point) if point else force(name, 0.0, 0.0, (0.0, 0.0))
 
 
 def fluid_on(segments: list[Segment], weight: float, surface: float) -> list[Load]:
@@ -293,7 +293,7 @@ def path_of(case: Case, tail: float) -> WaterPath | None:
 
 class Uplift:
     """The water in the joint for a crack of length a from the heel: pressure [Pa] linear between
-    places s [m].
+    positions s [m].
 
     Heads as in `heads_at_ends`. By `uplift`: none; imposed: linear from heel to toe; drained:
     reduced at the drains; cracked: that of the heel in the crack, beyond it as imposed or, with
@@ -332,19 +332,19 @@ class Uplift:
         drained = mode == "drained" or (mode == "cracked" and case["drains"])
         if mode == "waterstop" and not path.goes_on:
             first = last = level + case["joint_head_offset"]
-        places, heads = [0.0, crack, self.length], [first, first, last]
+        positions, heads = [0.0, crack, self.length], [first, first, last]
         at = case["drain_x"]
         if path.goes_on:
-            places, heads = self._on_path(case, body, path, tail, crack)
+            positions, heads = self._on_path(case, body, path, tail, crack)
         elif drained and crack <= at < self.length:
             outlet = max(case["drain_level"], tail, body.heel[1] + at * body.along[1])
             self.drains = at, outlet
-            undrained = float(np.interp(at, places[1:], heads[1:]))
+            undrained = float(np.interp(at, positions[1:], heads[1:]))
             if mode == "drained" and case["drain_reference"] == "reservoir":
                 undrained = first
-            places.insert(2, at)
+            positions.insert(2, at)
             heads.insert(2, drained_head(case, undrained, outlet))
-        self.s = np.array(places)
+        self.s = np.array(positions)
         height = np.interp(self.s, [0.0, self.length], [body.heel[1], body.toe[1]])
         weight = case["rho_water"] * case["g"] if mode != "none" else 0.0
         self.p = weight * (np.array(heads) - height)
@@ -380,18 +380,18 @@ class Uplift:
             self.drains = at, max(outlet, tail)
             drains = [(along(at), outlet, case["drain_effectiveness"], along(at))]
         ends = [0.0, whole - crack], [self.first, self.last]
-        knots, places = dict(zip(*ends, strict=True)), [0.0, crack, length]
+        knots, positions = dict(zip(*ends, strict=True)), [0.0, crack, length]
         before, head = 0.0, self.first
-        for place, outlet, effect, reference in drains:
-            share = (place - before if before else reference) / (whole - crack - before)
+        for drain, outlet, effect, reference in drains:
+            share = (drain - before if before else reference) / (whole - crack - before)
             undrained = head + (self.last - head) * share
-            knots[place] = undrained - effect * max(undrained - max(outlet, tail), 0.0)
-            before, head = place, knots[place]
-            distance = (place - start) * (1 if forwards else -1) + crack
-            places += [distance] if crack < distance < length else []
-        places, way = sorted(places), sorted(knots)
-        heads = np.interp([along(s) for s in places], way, [knots[x] for x in way])
-        return places, heads.tolist()
+            knots[drain] = undrained - effect * max(undrained - max(outlet, tail), 0.0)
+            before, head = drain, knots[drain]
+            distance = (drain - start) * (1 if forwards else -1) + crack
+            positions += [distance] if crack < distance < length else []
+        positions, way = sorted(positions), sorted(knots)
+        heads = np.interp([along(s) for s in positions], way, [knots[x] for x in way])
+        return positions, heads.tolist()
 
     def cut_off_suction(self) -> None:
         """Set negative pressures to zero."""
@@ -411,7 +411,7 @@ class Uplift:
         self.p = np.concatenate([self.p[before], [pressure, 0.0, 0.0]])
 
     def dry(self, start: float, end: float) -> None:
-        """Take the pressure away between two places [m from the heel]."""
+        """Take the pressure away between two positions [m from the heel]."""
         s, p = self.s, self.p
         first, last = np.interp([start, end], s, p)
         wet = [(s[s < start], p[s < start]), ([start], [first])] if start > 0 else []

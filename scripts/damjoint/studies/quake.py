@@ -118,10 +118,10 @@ class QuakeRun:
         history.
         """
         quake, static = self.quake, self.static
-        found = self.summary()
-        found["seconds"] = {name: round(value, 3) for name, value in self.seconds.items()}
+        summary = self.summary()
+        summary["seconds"] = {name: round(value, 3) for name, value in self.seconds.items()}
         after = self.static_state_after()
-        found["after"] = {"equilibrium": after is not None}
+        summary["after"] = {"equilibrium": after is not None}
         if after is not None:
             number = len(quake.case.levels) + 1.0
             state = replace(after.state, time=number)
@@ -129,11 +129,11 @@ class QuakeRun:
             static.history.save(state)
             last = static.history.last
             names = "crest_ux", "N", "T", "M", "crack_length", "broken_length"
-            found["after"] |= {name: last[name] for name in names}
+            summary["after"] |= {name: last[name] for name in names}
         full = self.stands_with_full_uplift()
         if full is not None:
-            found["after"]["equilibrium_with_full_uplift_in_the_crack"] = full
-        return self._result_of(found)
+            summary["after"]["equilibrium_with_full_uplift_in_the_crack"] = full
+        return self._result_of(summary)
 
     def result_so_far(self, error: BaseException | None = None) -> QuakeResult:
         """The result up to now, or up to an error or interrupt."""
@@ -145,16 +145,16 @@ class QuakeRun:
     def summary(self) -> dict[str, Any]:
         """See `quake_summary`, of the rows so far; with the slip of the rigid blocks."""
         quake = self.quake
-        found = quake_summary.summary(quake, self.history.table, quake.halvings)
+        summary = quake_summary.summary(quake, self.history.table, quake.halvings)
         for k, joint in enumerate(quake.case.joints if len(self.history) else ()):
             block = rigid_block(quake, k).slip(quake.record) if joint.law.limits_shear else None
             if block is not None:
-                found["residual"][column_of("rigid_block", k)] = block
-        return found
+                summary["residual"][column_of("rigid_block", k)] = block
+        return summary
 
     def _result_of(
         self,
-        found: dict[str, Any],
+        summary: dict[str, Any],
         end: tuple[str, str] = ("", ""),
         error: BaseException | None = None,
     ) -> QuakeResult:
@@ -170,7 +170,7 @@ class QuakeRun:
         return QuakeResult.of(
             quake.case,
             static,
-            found,
+            summary,
             end,
             error=error,
             rows=history.table,
@@ -246,11 +246,11 @@ def outcome_of(case: Case) -> tuple[LoadStepper, dict[str, Any]]:
     Raises RunError.
     """
     with single_thread():
-        under_way = QuakeRun(case)
-        for _ in under_way.steps():
+        run = QuakeRun(case)
+        for _ in run.steps():
             pass
-        after = under_way.static_state_after()
-    return under_way.static, under_way.summary() | {"after": {"equilibrium": after is not None}}
+        after = run.static_state_after()
+    return run.static, run.summary() | {"after": {"equilibrium": after is not None}}
 
 
 @dataclass(frozen=True)
@@ -266,13 +266,13 @@ class Checkpoint:
         """Whether the file has an earthquake of this key."""
         return checkpoint.exists(self.path, self.key)
 
-    def read(self, under_way: QuakeRun) -> None:
+    def read(self, run: QuakeRun) -> None:
         """Continue from the file."""
-        checkpoint.read(self.path, self.key, under_way.quake, under_way.history)
+        checkpoint.read(self.path, self.key, run.quake, run.history)
 
-    def write(self, under_way: QuakeRun) -> None:
+    def write(self, run: QuakeRun) -> None:
         """Write the last converged step and all rows."""
-        checkpoint.write(self.path, self.key, under_way.quake, under_way.history)
+        checkpoint.write(self.path, self.key, run.quake, run.history)
 
 
 def compute(
@@ -285,17 +285,17 @@ def compute(
     """
     with single_thread():
         with preparation(case, progress):
-            under_way = QuakeRun(case, span)
+            run = QuakeRun(case, span)
         if kept and kept.exists:
-            kept.read(under_way)
+            kept.read(run)
         try:
-            follow(under_way, kept, progress)
-            return under_way.result()
+            follow(run, kept, progress)
+            return run.result()
         except BaseException as error:
-            result = under_way.result_so_far(error)
+            result = run.result_so_far(error)
             if kept:
                 with contextlib.suppress(OSError):
-                    kept.write(under_way)
+                    kept.write(run)
             return result
 
 
@@ -304,15 +304,15 @@ def bar_of(case: Case, record: Record, show: bool) -> Progress:
     return Progress(case.name, record.duration, show, bar_format=BAR, leave=False)
 
 
-def follow(under_way: QuakeRun, kept: Checkpoint | None, progress: bool) -> None:
+def follow(run: QuakeRun, kept: Checkpoint | None, progress: bool) -> None:
     """Compute the steps to the end of the record; kept: is written meanwhile."""
-    written, quake = time.perf_counter(), under_way.quake
+    written, quake = time.perf_counter(), run.quake
     with bar_of(quake.case, quake.record, progress) as bar:
         bar.update(quake.now.time)
-        for step in under_way.steps():
+        for step in run.steps():
             bar.update(step)
             if kept and time.perf_counter() - written > BETWEEN_WRITES:
-                kept.write(under_way)
+                kept.write(run)
                 written = time.perf_counter()
 
 

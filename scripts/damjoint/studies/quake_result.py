@@ -122,10 +122,10 @@ def peak_cells(name: str, peak: dict[str, float], unit: str) -> tuple[str, str, 
     return "mm" if in_mm else unit, f"{value:.4g}", f"{peak['time']:.3f}"
 
 
-def peaks_table(found: dict[str, Any], case: Case, of_joints: bool = True) -> Table:
+def peaks_table(summary: dict[str, Any], case: Case, of_joints: bool = True) -> Table:
     """Tabulate the peaks of a summary; of_joints: also those of the joints."""
     columns, rows = quake_columns(case), list[tuple[str, ...]]()
-    for name, peak in found["peaks"].items():
+    for name, peak in summary["peaks"].items():
         unit, meaning = columns[name]
         if of_joints or name in quake_summary.PEAKS:
             rows.append((meaning, *peak_cells(name, peak, unit)))
@@ -142,16 +142,16 @@ OF_JOINTS = (
 )
 
 
-def joints_table(found: dict[str, Any], case: Case) -> Table:
+def joints_table(summary: dict[str, Any], case: Case) -> Table:
     """Tabulate the joints after an earthquake, a row each: peaks, then the values at its end."""
-    ends = AT_REST if found["at_rest"] else MOVING
+    ends = AT_REST if summary["at_rest"] else MOVING
     rows = []
     for k, joint in enumerate(case.joint_names):
         peaks = [
-            peak_cells(name, found["peaks"][column_of(name, k)], unit)[1]
+            peak_cells(name, summary["peaks"][column_of(name, k)], unit)[1]
             for _, unit, name in OF_JOINTS
         ]
-        values = [(found[group].get(column_of(n, k)), unit) for group, n, _, unit in ends]
+        values = [(summary[group].get(column_of(n, k)), unit) for group, n, _, unit in ends]
         at_end = [
             "-" if value is None else f"{value * (1e3 if unit == 'mm' else 1):.4g}"
             for value, unit in values
@@ -176,33 +176,33 @@ MOVING = [
 ]
 
 
-def residual_table(found: dict[str, Any], case: Case) -> Table:
+def residual_table(summary: dict[str, Any], case: Case) -> Table:
     """Tabulate the residual values of a summary."""
     rows = list[tuple[str, ...]]()
     for k in range(len(case.joints)):
         of = f" ({case.named((k,))})" if case.of_joints else ""
-        for group, name, meaning, unit in AT_REST if found["at_rest"] else MOVING:
-            if (value := found[group].get(column_of(name, k))) is not None:
+        for group, name, meaning, unit in AT_REST if summary["at_rest"] else MOVING:
+            if (value := summary[group].get(column_of(name, k))) is not None:
                 rows.append((meaning + of, unit, f"{value * (1e3 if unit == 'mm' else 1):.4g}"))
-    head = "at rest" if found["at_rest"] else "not at rest"
+    head = "at rest" if summary["at_rest"] else "not at rest"
     return Table([head, "unit", "value"], ["", "", ""], rows)
 
 
-def modes(found: dict[str, Any]) -> str:
+def modes(summary: dict[str, Any]) -> str:
     """Natural modes of a summary with their damping, and the frequencies of the damping."""
     texts = []
-    for mode in found["modes"]:
+    for mode in summary["modes"]:
         axis, share = max((mode[f"along_{a}"], a) for a in "xy")[::-1]
         texts.append(
             f"{mode['frequency']:.3g} Hz ({share:.0%} of the mass along {axis}, damping "
             f"{mode['damping']:.1%})"
         )
-    return f"natural modes, joint closed, with the water: {', '.join(texts)}; {damping_of(found)}"
+    return f"natural modes, joint closed, with the water: {', '.join(texts)}; {damping_of(summary)}"
 
 
-def damping_of(found: dict[str, Any]) -> str:
+def damping_of(summary: dict[str, Any]) -> str:
     """What Rayleigh's damping of a summary is set to, and which part of it acts."""
-    damping = found["damping"]
+    damping = summary["damping"]
     first, second = damping["first"], damping["second"]
     ratio = math.pi * damping["a1"] * (first + second)
     acts = "its stiffness part alone acts (damping_mass = 0), with less damping in these modes"
@@ -216,10 +216,10 @@ def damping_of(found: dict[str, Any]) -> str:
 NUMBERS = 40
 
 
-def text(case: Case, found: dict[str, Any], width: int | None = None) -> str:
+def text(case: Case, summary: dict[str, Any], width: int | None = None) -> str:
     """Notes, peaks and residual values of a summary as printed tables; width: of the terminal."""
-    tables = peaks_table(found, case), residual_table(found, case)
+    tables = peaks_table(summary, case), residual_table(summary, case)
     options = {} if width is None else {"maxcolwidths": [max(width - NUMBERS, 20)]}
     parts = [tabulate(t.rows, t.heads, disable_numparse=True, **options) for t in tables]
-    lines = [*(f"note: {note}" for note in found["notes"]), modes(found)]
+    lines = [*(f"note: {note}" for note in summary["notes"]), modes(summary)]
     return "\n\n".join(["\n".join(lines), *parts])

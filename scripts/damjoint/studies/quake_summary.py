@@ -143,31 +143,31 @@ def values_at_end(case: Case, rows: Table, period: float) -> dict[str, Any]:
     }
 
 
-def verdict(case: Case, found: dict[str, Any]) -> str:
+def verdict(case: Case, summary: dict[str, Any]) -> str:
     """The verdict of a summary that has its `after`: STANDS or why not."""
-    if not found["after"]["equilibrium"]:
+    if not summary["after"]["equilibrium"]:
         return NO_EQUILIBRIUM
-    if any(share > BROKEN for share in broken_shares(case, found).values()):
+    if any(share > BROKEN for share in broken_shares(case, summary).values()):
         return NO_FRICTION
-    return STANDS if found["at_rest"] else NOT_AT_REST
+    return STANDS if summary["at_rest"] else NOT_AT_REST
 
 
-def columns(case: Case, found: dict[str, Any]) -> dict[str, Value]:
+def columns(case: Case, summary: dict[str, Any]) -> dict[str, Value]:
     """QUAKE_COLUMNS of a summary; empty where a value is not known."""
-    residual, worst = found["residual"], largest_slip(case, found)
+    residual, worst = summary["residual"], largest_slip(case, summary)
     slips = {column: residual.get(column_of(name, worst), "") for name, column in RESIDUAL.items()}
-    return {"peak_ground_ax": abs(found["peaks"]["ground_ax"]["value"]), **slips}
+    return {"peak_ground_ax": abs(summary["peaks"]["ground_ax"]["value"]), **slips}
 
 
-def largest_slip(case: Case, found: dict[str, Any]) -> int:
+def largest_slip(case: Case, summary: dict[str, Any]) -> int:
     """The number of the joint with the largest slip at the end."""
-    slips = [abs(found["end"][column_of("slip", k)]) for k in range(len(case.joints))]
+    slips = [abs(summary["end"][column_of("slip", k)]) for k in range(len(case.joints))]
     return int(np.argmax(slips))
 
 
-def broken_shares(case: Case, found: dict[str, Any]) -> dict[int, float]:
+def broken_shares(case: Case, summary: dict[str, Any]) -> dict[int, float]:
     """The broken part of the joints, by their numbers, that have broken and have no friction."""
-    lengths = found["broken_without_friction"]
+    lengths = summary["broken_without_friction"]
     return {
         k: length / joint.joint_length
         for k, joint in enumerate(case.joints)
@@ -181,32 +181,32 @@ def of(case: Case, joint: int) -> str:
     return f" ({name})" if name else ""
 
 
-def statement(case: Case, found: dict[str, Any]) -> str:
+def statement(case: Case, summary: dict[str, Any]) -> str:
     """What a summary says of the end of an earthquake."""
     joints = range(len(case.joints))
     parts = [
         f"law = {case.joints[k]['law']}{of(case, k)} has no friction, and the joint has broken "
         f"over {share:.0%} of its length (law = bond keeps the friction)"
-        for k, share in broken_shares(case, found).items()
+        for k, share in broken_shares(case, summary).items()
     ]
 
     def millimetres(values: dict[str, float], name: str, k: int) -> str:
         return f"{1e3 * values[column_of(name, k)]:.3g} mm"
 
-    if found["at_rest"]:
-        slips = [millimetres(found["residual"], "slip", k) + of(case, k) for k in joints]
+    if summary["at_rest"]:
+        slips = [millimetres(summary["residual"], "slip", k) + of(case, k) for k in joints]
         parts.append(f"residual slip {', '.join(slips)}")
     else:
         ends = [
-            f"{millimetres(found['end'], 'slip', k)}{of(case, k)}, changed by "
-            f"{millimetres(found['end'], 'change', k)}"
+            f"{millimetres(summary['end'], 'slip', k)}{of(case, k)}, changed by "
+            f"{millimetres(summary['end'], 'change', k)}"
             for k in joints
         ]
         parts.append(
-            f"not at rest in the last {found['mean_over']:.3g} of {found['rest']:.3g} s without "
-            f"shaking, no residual slip: slip {'; '.join(ends)}; set a longer record_rest"
+            f"not at rest in the last {summary['mean_over']:.3g} of {summary['rest']:.3g} s "
+            f"without shaking, no residual slip: slip {'; '.join(ends)}; set a longer record_rest"
         )
-    parts.append(ENDS[verdict(case, found)])
+    parts.append(ENDS[verdict(case, summary)])
     return "; ".join(parts)
 
 
