@@ -1,6 +1,7 @@
 """The GetDP model in the window of Gmsh: cases/*.pro, without Python."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -12,7 +13,7 @@ import pytest
 from damjoint import data, runner
 from damjoint.engines.getdp.process import find_getdp
 from damjoint.engines.getdp.tables import PRINTED, PRINTED_OF_JOINTS, complete_rows
-from damjoint.input.parameters import parameter, start_gmsh
+from damjoint.input.parameters import declared, parameter, start_gmsh
 from damjoint.input.resolve import load
 from matplotlib.image import imread
 
@@ -84,39 +85,88 @@ def test_impossible_sections_are_refused_before_the_run(project, words, message)
     assert done.returncode and not (project / "res").exists()
 
 
+#: Joints that differ in law, water, strength; in what is computed from these; a name with a point
 LIFTS = """
-lift_heights() = {12, 25};
+lift_heights() = {12.5, 25};
 default_n_joint = 20;
 default_h_dam = 8;
 default_h_found = 30;
 default_law = "friction";
 default_adhesion = 5e4;
-levels() = {40, 46};
+default_mu = 0.75;
+Struct Joint::base [ mu 0.7, K_N 2e11 ];
+Struct Joint::lift_12_5_m [ law "rupture", sigma_max 3e4, pena_rupture 4, uplift "cracked" ];
+levels() = {40, 50};
 """
+
+
+def run_in_gmsh(project, name, settings):
+    """Mesh and run a case with Gmsh and GetDP alone; settings: numbers. The last row of each joint,
+    by the columns of PRINTED_OF_JOINTS (joints, columns).
+    """
+    words = [word for item in settings.items() for word in ("-setnumber", item[0], str(item[1]))]
+    dim = int(settings.get("dim", load(str(project / f"{name}.case"))["dim"]))
+    mesh = [sys.executable, "-c", GMSH, f"{name}.geo", f"-{dim}", "-o", f"{name}.msh", *words]
+    subprocess.run(mesh, cwd=project, check=True, capture_output=True)
+    solve = [find_getdp(), f"{name}.pro", "-msh", f"{name}.msh", "-solve", "Fill", "-v", "2"]
+    done = subprocess.run([*solve, *words], cwd=project, check=True, capture_output=True, text=True)
+    assert "Error" not in done.stdout + done.stderr
+    rows = complete_rows(project / f"res/{name}/joints.txt", PRINTED_OF_JOINTS)
+    steps = complete_rows(project / f"res/{name}/history.txt", PRINTED)
+    return rows.reshape(len(steps), -1, len(PRINTED_OF_JOINTS))[-1]
+
+
+def assert_as_in_python(rows, case, folder):
+    """Compare the last rows of the joints with the default engine's."""
+    (result, *_) = runner.run(case, folder, False, False, False)
+    joints = result.joints or [result]
+    assert len(rows) == len(joints)
+    for name in ("N", "T", "M", "U", "crack_length", "slip_length", "max_opening"):
+        expected = np.array([own.last[name] for own in joints])
+        printed = rows[:, PRINTED_OF_JOINTS.index(name)]
+        assert printed == pytest.approx(expected, rel=1e-5, abs=1e-8 * np.abs(expected).max()), name
+    return joints
 
 
 @pytest.mark.heavy
 def test_lifts_without_python(project):
-    """Three joints with the same parameters: their resultants at each step, by the default
-    engine.
-    """
-    (project / "lifts.case").write_text(LIFTS)
+    """Three joints, two with values of their own, which Gmsh reads from their blocks."""
+    (project / "own.case").write_text(LIFTS)
     for kind in ("geo", "pro"):
         text = (project / f"dam.{kind}").read_text()
-        (project / f"lifts.{kind}").write_text(text.replace("dam.case", "lifts.case"))
-    mesh = [sys.executable, "-c", GMSH, "lifts.geo", "-2", "-o", "lifts.msh"]
-    subprocess.run(mesh, cwd=project, check=True, capture_output=True)
-    solve = [find_getdp(), "lifts.pro", "-msh", "lifts.msh", "-solve", "Fill", "-v", "2"]
-    subprocess.run(solve, cwd=project, check=True, capture_output=True)
-    rows = complete_rows(project / "res/dam/joints.txt", PRINTED_OF_JOINTS)
-    case = load(str(project / "lifts.case"))
-    (result,) = runner.run(case, project / "other", False, False, False)
-    assert len(rows) == 2 * 3 and result.joints[0].last["slip_length"] > 0
-    for name in ("N", "T", "M", "U", "slip_length"):
-        expected = [own.history[name][step] for step in range(2) for own in result.joints]
-        printed = rows[:, PRINTED_OF_JOINTS.index(name)]
-        scale = np.abs(expected).max()
-        assert printed == pytest.approx(expected, rel=1e-6, abs=1e-9 * scale), name
+        text = text.replace("dam.case", "own.case").replace("res/dam", "res/own")
+        (project / f"own.{kind}").write_text(text)
+    rows = run_in_gmsh(project, "own", {})
+    case = load(str(project / "own.case"))
+    base, lift, _ = assert_as_in_python(rows, case, project / "other")
+    assert base.last["slip_length"] > 0 and lift.last["max_opening"] > 0
+    # each joint has its own curves
+    (lengths,) = {len(list((project / "res/own").glob(f"opening_{j}_*.pos"))) for j in range(3)}
+    assert lengths == 2
+
+
+WINDOWED = sorted(path.stem for path in data("cases").glob("*.pro"))
+#: Of a case in Gmsh: another level of the mesh than the case's
+COARSER = {"n_joint": 10.0}
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("name", WINDOWED)
+def test_every_case_runs_in_gmsh(project, name):
+    case = load(str(project / f"{name}.case"), COARSER)
+    assert_as_in_python(run_in_gmsh(project, name, COARSER), case, project / "other")
+
+
+def test_values_of_joints_are_those_of_python():
+    """The lists of pro/joints.pro."""
+    text = (data("pro") / "joints.pro").read_text()
+    listed = lambda name: re.findall(r'"(\w+)"', text.split(f"{name}() = Str[")[1].split("]")[0])
+    own = {n: known for n, known in declared().items() if known.of_joints and n != "joint_slope"}
+    assert listed("joint_numbers") == [n for n, known in own.items() if not known.text]
+    assert listed("joint_texts") == [n for n, known in own.items() if known.text]
+    for k, name in enumerate(listed("joint_texts")):
+        assert listed(f"joint_choices_{k}") == list(own[name].choices)
+    assert set(listed("joint_automatic")) == {n for n, known in own.items() if known.automatic}
 
 
 CHANGES = (

@@ -293,7 +293,8 @@ def independent() -> frozenset[str]:
     """Names of the numbers on which neither another parameter nor the section depends: those that
     occur only in their own declaration.
     """
-    texts = (DECLARATIONS, DECLARATIONS.with_name("section.pro"))
+    others = ("section.pro", "automatic_of_joint.pro")
+    texts = (DECLARATIONS, *(DECLARATIONS.with_name(name) for name in others))
     rest = "".join(re.sub(DECLARED, "", re.sub(r"//[^\n]*", "", t.read_text())) for t in texts)
     used = set(re.findall(r"\w+", rest))
     return frozenset(n for n, p in declared().items() if n not in used and not p.text)
