@@ -63,8 +63,11 @@ def defaults() -> Values:
 
 @cache
 def rules() -> tuple[tuple[str, str], ...]:
-    """Return the automatic values in the order of pro/parameters.pro: names and expressions."""
-    text = without_comments(data("pro/parameters.pro").read_text())
+    """Return the automatic values in the order of pro/parameters.pro, then those of a joint: names
+    and expressions.
+    """
+    files = "pro/parameters.pro", "pro/automatic_of_joint.pro"
+    text = "".join(without_comments(data(file).read_text()) for file in files)
     pattern = r"(\w+) = \(\1 == automatic\) \? ([^:;]+) : \1;"
     return tuple((m[1], m[2]) for m in re.finditer(pattern, text))
 
