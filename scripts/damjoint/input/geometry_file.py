@@ -24,6 +24,11 @@ def geometry_file(name: str) -> Path:
         raise InputError(f"geometry = {name}: must be a file, a mesh that Gmsh reads or a .geo")
     if not path.stat().st_size:
         raise InputError(f"geometry = {name}: is empty; must be a mesh that Gmsh reads or a .geo")
+    if path.suffix.lower() == ".inp":
+        raise InputError(
+            f"geometry = {name}: Gmsh does not read it; must be converted to a .msh: "
+            'reference/usage.md, "Meshes and drawings of other programs"'
+        )
     packaged = data("geo").resolve() in path.resolve().parents
     if packaged or is_mesh(path) or os.environ.get(RUN_GEO) == "1":
         return path
