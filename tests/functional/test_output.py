@@ -55,8 +55,8 @@ def test_a_table_of_all_steps_is_written_on_demand(command, tmp_path):
 def test_a_matplotlibrc_in_the_current_folder_has_no_effect(tmp_path):
     (tmp_path / "matplotlibrc").write_text("axes.facecolor: red\nfont.size: 40\n")
     script = (
-        "from damjoint.pictures import drawing\nimport matplotlib as m\n"
-        "print(m.rcParams['axes.facecolor'], m.rcParams['font.size'])"
+        "from damjoint.pictures.drawing import picture_style\nimport matplotlib as m\n"
+        "with picture_style(): print(m.rcParams['axes.facecolor'], m.rcParams['font.size'])"
     )
     done = subprocess.run(
         [sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True
