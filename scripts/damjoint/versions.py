@@ -9,9 +9,9 @@ import platform
 import re
 import resource
 import subprocess
-import sys
 from collections.abc import Mapping
 from functools import lru_cache
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -60,21 +60,8 @@ def peak_memory() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
-@lru_cache(maxsize=1)
-def in_folder_names() -> dict[str, str]:
-    """Return the versions that the folders NAME-VERSION.dist-info of installed packages name."""
-    folders = [path for path in sys.path if path.endswith("-packages") and os.path.isdir(path)]
-    names = [name for folder in reversed(folders) for name in os.listdir(folder)]
-    found = (re.fullmatch(r"([^-]+)-([^-]+)\.dist-info", name) for name in names)
-    return {match[1]: match[2] for match in found if match}
-
-
 def installed(name: str) -> str:
     """Return the version of a package; empty if it is not installed."""
-    if name in in_folder_names():
-        return in_folder_names()[name]
-    from importlib.metadata import PackageNotFoundError, version  # takes long to load
-
     try:
         return version(name)
     except PackageNotFoundError:

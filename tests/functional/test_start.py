@@ -7,7 +7,7 @@ import sys
 import pytest
 from damjoint.fem import factor
 
-HEAVY = "gmsh", "scipy", "matplotlib", "tabulate", "tqdm", "importlib.metadata"
+HEAVY = "gmsh", "scipy", "matplotlib", "tabulate", "tqdm"
 PROGRAM = f"""
 import sys
 from damjoint.cli import main

@@ -70,11 +70,7 @@ def test_readme_and_tour_have_a_place_for_the_line():
         assert "\nnew\n<!-- /" in pages.between(mark, (ROOT / page).read_text(), "new")
 
 
-def test_versions_are_those_of_the_installed_packages(monkeypatch):
-    """By the names of their folders, or by what is in them."""
+def test_versions_are_those_of_the_installed_packages():
     expected = {name: metadata.version(name) for name in versions.PACKAGES}
-    assert expected.items() <= versions.versions().items()
-    assert expected.items() <= versions.in_folder_names().items()
-    monkeypatch.setattr(versions, "in_folder_names", dict)
     assert expected.items() <= versions.versions().items()
     assert versions.installed("damjoint-nowhere") == ""

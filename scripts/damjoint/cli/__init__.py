@@ -11,7 +11,7 @@ from types import ModuleType
 
 from .. import RUN_GEO, InputError, RunError, __version__
 from ..storage import SAVED
-from .options import HelpWithLines, Parser
+from .options import Parser
 
 #: The commands: names of modules. Each has SUMMARY, the shared options SHARED if there are any,
 #: `add`, which adds its own options, and `call`, which runs it and returns the exit code.
@@ -37,7 +37,7 @@ def parser(word: str = "") -> Parser:
     modules = {name: import_module(f".{name}", __name__) for name in chosen}
     of_developers = (f"  {n:<10}  {modules[n].SUMMARY}" for n in DEVELOPERS if n in modules)
     top = Parser(
-        HelpWithLines,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
         prog="damjoint",
         description="Concrete gravity dams on a thin joint: opening, cracking, sliding and uplift.",
         epilog="\n".join(

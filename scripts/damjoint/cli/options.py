@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
-import os
-import sys
+import shutil
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -28,9 +26,12 @@ class Checked(argparse.Action):
     argparse would replace its message.
     """
 
-    def __init__(self, *, convert: Callable[[str, str], object], **options: Any) -> None:
+    def __init__(
+        self, *, convert: Callable[[str, str], object], repeats: bool = False, **options: Any
+    ) -> None:
+        """repeats: whether the option may be repeated, which makes a list of its values."""
         super().__init__(**options)
-        self.convert = partial(convert, self.dest)
+        self.convert, self.repeats = partial(convert, self.dest), repeats
 
     def __call__(
         self,
@@ -42,22 +43,8 @@ class Checked(argparse.Action):
         """Store the value, or the list of values."""
         listed = values if isinstance(values, list) else None
         value = self.convert(str(values)) if listed is None else list(map(self.convert, listed))
-        setattr(namespace, self.dest, value)
-
-
-class CheckedList(Checked):
-    """The same of an option that may be repeated: a list of its values."""
-
-    def __call__(
-        self,
-        parser: argparse.ArgumentParser,
-        namespace: argparse.Namespace,
-        values: object,
-        _: str | None = None,
-    ) -> None:
-        """Add the value to the list."""
-        listed = [*(getattr(namespace, self.dest) or []), self.convert(str(values))]
-        setattr(namespace, self.dest, listed)
+        before = getattr(namespace, self.dest) or [] if self.repeats else []
+        setattr(namespace, self.dest, [*before, value] if self.repeats else value)
 
 
 def integer(name: str, text: str, least: int) -> int:
@@ -101,35 +88,8 @@ def levels(name: str, text: str) -> tuple[float, ...]:
     return levels_of(name, text)
 
 
-class Help(argparse.HelpFormatter):
-    """Help as wide as the terminal. (argparse loads shutil for it, and that what compresses.)"""
-
-    def __init__(self, prog: str) -> None:
-        super().__init__(prog, width=terminal_width() - 2)
-
-
-class HelpWithLines(Help, argparse.RawDescriptionHelpFormatter):
-    """The same, with the lines of its text as they are."""
-
-
-def terminal_width() -> int:
-    """Number of columns: $COLUMNS, else of the terminal, else 80."""
-    with contextlib.suppress(KeyError, ValueError):
-        if int(os.environ["COLUMNS"]) > 0:
-            return int(os.environ["COLUMNS"])
-    with contextlib.suppress(OSError, ValueError):
-        if sys.__stdout__:
-            return os.get_terminal_size(sys.__stdout__.fileno()).columns or 80
-    return 80
-
-
 class Parser(argparse.ArgumentParser):
     """Parser of arguments that raises InputError."""
-
-    def __init__(
-        self, formatter_class: type[argparse.HelpFormatter] = Help, **options: Any
-    ) -> None:
-        super().__init__(formatter_class=formatter_class, **options)
 
     def error(self, message: str) -> NoReturn:
         """Raise InputError instead of printing the usage."""
@@ -146,7 +106,8 @@ class Parser(argparse.ArgumentParser):
 
     def add_paths(self, name: str, metavar: str, **options: Any) -> None:
         """Add an option that is a path and may be repeated."""
-        self.add_argument(name, action=CheckedList, convert=path, metavar=metavar, **options)
+        options |= {"action": Checked, "convert": path, "repeats": True}
+        self.add_argument(name, metavar=metavar, **options)
 
     def add_levels(self, name: str, **options: Any) -> None:
         """Add an option that is a list of water levels."""
@@ -206,7 +167,7 @@ def wide_option() -> Parser:
 
 def table_width(arguments: argparse.Namespace) -> int | None:
     """The width of printed tables; None with --wide."""
-    return None if arguments.wide else terminal_width()
+    return None if arguments.wide else shutil.get_terminal_size().columns
 
 
 def all_steps_option() -> Parser:

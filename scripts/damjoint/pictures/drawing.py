@@ -166,12 +166,12 @@ def polygons(corners: np.ndarray, **style: Any) -> PolyCollection:
     return PolyCollection(vertices, **style)
 
 
-def legend_above(axes: Axes, columns: int = 4) -> None:
+def legend_above(axes: Axes) -> None:
     """Put the legend above the axes."""
     axes.legend(
         loc="lower left",
         bbox_to_anchor=(-0.01, 0.99),
-        ncols=columns,
+        ncols=4,
         frameon=False,
         fontsize=7.5,
         borderpad=0.2,
