@@ -946,10 +946,10 @@ class Sweep:
 
         Raises InputError if there is none for what was varied.
         """
-        from .studies.chart import figure_of
+        from .studies.chart import figure_of, heading
 
         cases = [] if self.plan.sampled else [case for _, case in cases_of(self.case, self.plan)]
-        title = f"{self.case.name}: {len(self.rows)} rows"
+        title = heading(self.case, self.plan, len(self.rows))
         return displayed(figure_of(self.plan, self.texts, cases, title))
 
     @property

@@ -359,6 +359,23 @@ def test_rows_that_fail_do_not_set_the_scale_of_a_chart(command, tmp_path, monke
     assert float(row["max_opening"]) * dict(LENGTHS)[size] > 3 * opening.get_ylim()[1]
 
 
+def test_axes_of_a_chart_suit_what_was_varied(command, tmp_path, monkeypatch):
+    """More than a decade is logarithmic, in the unit that suits the values; a change in the last
+    digits is none, and a joint that stays closed has no negative opening.
+    """
+    words = "dam", "--vary", "K_N=3e10,1e11,1e12", "--levels", "20"
+    panels = chart_panels(command, tmp_path, monkeypatch, *words)
+    factor, opening = panels["safety factor against sliding"], panels["largest opening"]
+    assert factor.get_xscale() == "log" and factor.get_xlabel() == "K_N [GPa/m]"
+    assert [text.get_text() for text in factor.get_xticklabels()] == ["30", "100", "1000"]
+    low, high = factor.get_ylim()
+    assert high - low > 0.04 * high
+    assert all(float(row["max_opening"]) < 0 for row in rows(tmp_path / "s.csv"))
+    assert [text.get_text() for text in opening.texts] == ["zero in all rows"]
+    title = factor.figure.get_suptitle()
+    assert title == "own dam: 3 rows, law bond, uplift imposed, level 20 m"
+
+
 def test_rows_are_printed_in_a_table_that_fits_the_terminal():
     """Numbers with four digits, forces in MN/m, no negative opening; the first twenty rows."""
     plan = plan_of(["mu=0.5,0.7"], [], None, {}, "")

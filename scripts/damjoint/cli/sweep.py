@@ -121,11 +121,11 @@ def call(arguments: argparse.Namespace) -> int:
     print(f"{rows_table(plan, rows, table_width(arguments))}\n")
     loaded = () if plan.sampled else cases_of(case, plan)
     cases = [row_case for _, row_case in loaded]
-    report_sweep(arguments.case, plan, rows, cases, out)
+    report_sweep(case, plan, rows, cases, out)
     return 0
 
 
-def report_sweep(case: str, plan: Plan, rows: list[Row], cases: list[Case], out: Path) -> None:
+def report_sweep(case: Case, plan: Plan, rows: list[Row], cases: list[Case], out: Path) -> None:
     """Print the statistics of a sweep and draw its chart beside its CSV file."""
     from ..studies import chart
     from ..studies.plan import CHART, beside
@@ -135,5 +135,5 @@ def report_sweep(case: str, plan: Plan, rows: list[Row], cases: list[Case], out:
 
         print(outcome.report(plan, rows, out))
     picture = beside(out, CHART)
-    reason = chart.draw(plan, rows, cases, f"{Path(case).stem}: {len(rows)} rows", picture)
+    reason = chart.draw(plan, rows, cases, chart.heading(case, plan, len(rows)), picture)
     print(reason or picture)

@@ -11,21 +11,25 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import XAxis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, NullLocator
 
 from .. import InputError
 from ..input import parameters
 from ..input.case import Case
-from ..pictures.drawing import BLUE, ORANGE, RED, picture_style, write_picture
+from ..pictures.drawing import BLUE, ORANGE, RED, picture_style, widen, write_picture
 from ..post.units import LENGTHS, Units, unit
 from ..statics.gravity import sliding_factor
 from .plan import Plan, Row, column_of, numbers
+from .report_input import UNITS
 
 #: Quantities drawn: label and units.
+OPENING = "max_opening"
 DRAWN: dict[str, tuple[str, Units]] = {
     "crack_length": ("crack", LENGTHS[:1]),
-    "max_opening": ("largest opening", LENGTHS),
+    OPENING: ("largest opening", LENGTHS),
     "crest_ux": ("crest, downstream", LENGTHS),
 }
 #: Those of earthquakes.
@@ -132,10 +136,33 @@ def quantity(name: str) -> tuple[str, str]:
     return QUANTITIES.get(name) or (name, parameters.parameter(name).unit)
 
 
-def label(name: str) -> str:
-    """The label of the axis of a varied or sampled name: name and unit."""
+def axis_of(name: str, values: np.ndarray) -> tuple[str, float]:
+    """The label of the axis of a varied or sampled name, and the factor from its values to the unit
+    that suits them.
+    """
     words, size = quantity(name) if name == "level" else (name, parameters.parameter(name).unit)
-    return f"{words} [{size}]" if size else words
+    size, factor = unit([values], UNITS.get(size, ((size, 1),)))
+    return f"{words} [{size}]" if size else words, factor
+
+
+def heading(case: Case, plan: Plan, number: int) -> str:
+    """The title of the chart of a sweep of a case: its rows, and what is common to all of them."""
+    common = [name for name in ("law", "uplift") if name not in plan.names]
+    facts = [f"{name} {case.of_all_joints(name)}" for name in common]
+    if "level" not in plan.names and plan.critical != "level":
+        facts.append(f"level {case.levels[-1]:g} m")
+    return f"{case.title}: {', '.join([f'{number} rows', *facts])}"
+
+
+#: Largest value of a varied name over its smallest from which its axis is logarithmic.
+DECADE = 10
+
+
+def is_logarithmic(values: np.ndarray) -> bool:
+    """Whether values (n,) are shown on a logarithmic axis: their larger ones would hide the
+    others.
+    """
+    return bool(values.min() > 0 and values.max() >= DECADE * values.min())
 
 
 def fails(rows: list[Row]) -> np.ndarray:
@@ -179,6 +206,8 @@ def draw_curves(figure: Figure, table: Table, names: list[str]) -> None:
     texts = [row[column] for row in table.rows]
     categories = None if all(map(is_number, texts)) else list(dict.fromkeys(texts))
     x = np.array([categories.index(t) if categories else float(t) for t in texts])
+    x_label, x_factor = (name, 1.0) if categories else axis_of(name, x)
+    x = x * x_factor
     curves: dict[str, list[int]] = {}
     for i in np.argsort(x, kind="stable"):
         key = ", ".join(f"{o} {table.rows[i][column_of(o)]}" for o in others)
@@ -188,6 +217,8 @@ def draw_curves(figure: Figure, table: Table, names: list[str]) -> None:
     valued = bool(plan.critical) or plan.slip_limit is not None
     for panel, drawn, (words, units) in panels_of(figure, table):
         values = table.values(drawn)
+        if drawn == OPENING:  # of a joint that is closed everywhere it is an overlap
+            values = np.maximum(values, 0.0)
         shown = values if valued else values[~bad]
         size, factor = unit([np.nan_to_num(shown)], units)
         for number, (key, members) in enumerate(sorted(curves.items(), key=lambda item: item[1])):
@@ -199,6 +230,8 @@ def draw_curves(figure: Figure, table: Table, names: list[str]) -> None:
                 "linestyle": "none" if categories else "-",
             }
             panel.plot(x[members], good, mark, **style, label=key)
+            if plan.critical and not categories:  # values that are not confirmed are on it, too
+                panel.plot(x[members], values[members] * factor, color=color, lw=0.8, zorder=1)
             failing, cross = [i for i in members if bad[i]], color if others else RED
             at_value = [i for i in failing if valued and np.isfinite(values[i])]
             panel.plot(x[at_value], values[at_value] * factor, "x", color=cross)
@@ -208,9 +241,9 @@ def draw_curves(figure: Figure, table: Table, names: list[str]) -> None:
         if categories:
             panel.set_xticks(range(len(categories)), categories)
             panel.set_xlim(-0.5, len(categories) - 0.5)
-        elif len(set(x)) <= FEW:
-            panel.set_xticks(sorted(set(x)))
-        panel.set(xlabel=label(name), ylabel=f"{words} [{size}]")
+        else:
+            scale_axis(panel.xaxis, x)
+        panel.set(xlabel=x_label, ylabel=f"{words} [{size}]")
         panel.grid(alpha=0.3)
         if not np.nan_to_num(shown).any():
             panel.set(yticks=[0] if len(shown) else [], ylim=(-1, 1))
@@ -221,6 +254,8 @@ def draw_curves(figure: Figure, table: Table, names: list[str]) -> None:
             draw_verdicts(panel, table, x, values)
         if drawn == SLIP and plan.slip_limit is not None:
             draw_limit(panel, plan.slip_limit * factor, np.nanmin(values, initial=0.0) < 0)
+        if np.nan_to_num(shown).any():
+            widen(panel.yaxis)
     handles, labels = panel.get_legend_handles_labels()
     named = {text: handle for text, handle in zip(labels, handles, strict=True) if text in curves}
     if bad.any():
@@ -234,6 +269,18 @@ def draw_curves(figure: Figure, table: Table, names: list[str]) -> None:
             "fontsize": 8,
         }
         figure.legend(list(named.values()), list(named), **place)
+
+
+def scale_axis(axis: XAxis, values: np.ndarray) -> None:
+    """Scale the axis of varied values (n,): logarithmic over more than a decade; few of them are
+    its ticks.
+    """
+    if is_logarithmic(values):
+        axis.axes.set_xscale("log")
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    if len(set(values)) <= FEW:
+        axis.set_ticks(sorted(set(values)), labels=[f"{v:g}" for v in sorted(set(values))])
+        axis.set_minor_locator(NullLocator())
 
 
 def draw_verdicts(panel: Axes, table: Table, x: np.ndarray, values: np.ndarray) -> None:
@@ -265,19 +312,27 @@ def draw_maps(figure: Figure, table: Table, names: list[str]) -> None:
     x, y = (numbers(rows, column_of(name)) for name in names)
     (across, i), (up, j) = (np.unique(v, return_inverse=True) for v in (x, y))
     bad = is_marked(plan, rows)
-    for panel, column, (words, units) in panels_of(figure, table):
+    for panel, column, (quantity_drawn, units) in panels_of(figure, table):
         hidden = bad & (plan.slip_limit is None)
         values = np.where(hidden, np.nan, table.values(column))
+        values = np.maximum(values, 0.0) if column == OPENING else values
         size, factor = unit([np.nan_to_num(values)], units)
         grid = np.full((len(up), len(across)), np.nan)
         grid[j, i] = values * factor
         colors = panel.pcolormesh(grid, cmap="Blues")
+        if np.isfinite(values).any() and not np.nan_to_num(values).any():
+            colors.set_clim(0, 1)
+            words = "zero in all rows that stand" if bad.any() else "zero in all rows"
+            panel.text(0.5, 0.5, words, ha="center", transform=panel.transAxes)
         panel.plot(i[bad] + 0.5, j[bad] + 0.5, "x", color=RED, markersize=4)
-        figure.colorbar(colors, ax=panel, label=f"{words} [{size}]")
-        for axis, ends in ((panel.xaxis, across), (panel.yaxis, up)):
+        bar = figure.colorbar(colors, ax=panel, label=f"{quantity_drawn} [{size}]")
+        if not np.nan_to_num(values).any():
+            bar.set_ticks([0])
+        for axis, ends, name in ((panel.xaxis, across, names[0]), (panel.yaxis, up, names[1])):
+            words, size_factor = axis_of(name, ends)
             shown = np.arange(0, len(ends), -(-len(ends) // LABELS))
-            axis.set_ticks(shown + 0.5, [f"{v:g}" for v in ends[shown]])
-        panel.set(xlabel=label(names[0]), ylabel=label(names[1]))
+            axis.set_ticks(shown + 0.5, [f"{v * size_factor:g}" for v in ends[shown]])
+            axis.set_label_text(words)
         panel.label_outer()
     if bad.any():
         meaning = "not confirmed" if plan.critical else "the dam fails"
@@ -286,16 +341,21 @@ def draw_maps(figure: Figure, table: Table, names: list[str]) -> None:
 
 def draw_probability(figure: Figure, table: Table, names: list[str]) -> None:
     """Draw the probability of failure over the varied parameter, with its interval."""
+    from . import sampling
     from .outcome import probabilities
 
     (name,), axes = names, figure.subplots()
     shares = probabilities(table.plan, table.rows)
     x = np.array([float(row[column_of(name)]) for row in shares])
+    words, factor = axis_of(name, x)
+    x *= factor
     order = np.argsort(x)
     share, low, high = (np.array([row[n] for row in shares])[order] for n in COLUMNS)
-    axes.fill_between(x[order], low, high, color=BLUE, alpha=0.2, linewidth=0, label="interval")
+    interval = f"its {sampling.CONFIDENCE:.0%} interval"
+    axes.fill_between(x[order], low, high, color=BLUE, alpha=0.2, linewidth=0, label=interval)
     axes.plot(x[order], share, "o-", markersize=4, color=BLUE, label="share of the sample")
-    axes.set(xlabel=label(name), ylabel="probability of failure [-]", ylim=(-0.02, 1.02))
+    scale_axis(axes.xaxis, x)
+    axes.set(xlabel=words, ylabel="probability of failure [-]", ylim=(-0.02, 1.02))
     axes.legend(fontsize=8)
     axes.grid(alpha=0.3)
 
@@ -334,7 +394,10 @@ def draw_sample(figure: Figure, table: Table, names: list[str]) -> None:
 def draw_points(axes: Axes, rows: list[Row], names: list[str]) -> None:
     """Draw the rows over two inputs, failures in red; over one input, histograms."""
     bad, inputs = fails(rows), [numbers(rows, column_of(name)) for name in names]
-    axes.set(xlabel=label(names[0]))
+    axes_of = [axis_of(name, values) for name, values in zip(names, inputs, strict=True)]
+    labels = [words for words, _ in axes_of]
+    inputs = [values * factor for values, (_, factor) in zip(inputs, axes_of, strict=True)]
+    axes.set(xlabel=labels[0])
     if len(names) == 1:
         parts = [inputs[0][~bad], inputs[0][bad]]
         axes.hist(parts, bins=30, stacked=True, color=[BLUE, RED], label=["stands", "fails"])
@@ -344,7 +407,7 @@ def draw_points(axes: Axes, rows: list[Row], names: list[str]) -> None:
             if shown.any():
                 places = [v[shown] for v in inputs]
                 axes.plot(*places, mark, color=color, markersize=3.5, label=text)
-        axes.set(ylabel=label(names[1]))
+        axes.set(ylabel=labels[1])
         axes.grid(alpha=0.3)
         axes.ticklabel_format(scilimits=(-3, 4))
     axes.legend(fontsize=8)
