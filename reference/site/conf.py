@@ -5,13 +5,16 @@ search and fonts are files of the site.
 
 from __future__ import annotations
 
+import json
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
 
 import damjoint
 import ziamath
 from docutils import nodes
 from latex2mathml.converter import convert
+from pygments.lexers.special import TextLexer
 from sphinx.application import Sphinx
 from sphinx.ext.napoleon import Config, GoogleDocstring
 from sphinx.util.logging import getLogger
@@ -34,7 +37,7 @@ html_theme = "furo"
 html_copy_source = False
 html_show_sourcelink = False
 # a font with the large brackets and roots of formulas, which few systems have
-html_static_path = ["site.css", str(Path(ziamath.__file__).parent / "fonts" / FONT)]
+html_static_path = ["site.css", "search.js", str(Path(ziamath.__file__).parent / "fonts" / FONT)]
 html_css_files = ["site.css"]
 smartquotes = False
 highlight_language = "none"
@@ -110,9 +113,39 @@ def add_index(app: Sphinx, error: Exception | None) -> None:
         shutil.copy(Path(app.outdir, f"{root_doc}.html"), Path(app.outdir, "index.html"))
 
 
+def sections_of(app: Sphinx) -> Iterator[tuple[str, str, str, str, str]]:
+    """Page, its title, heading, anchor and text of each section, without that of its sections."""
+    for page in sorted(app.env.found_docs):
+        title = app.env.titles[page].astext()
+        for section in app.env.get_doctree(page).findall(nodes.section):
+            parts = [part for part in section.children if not isinstance(part, nodes.section)]
+            heading, *others = (part.astext() for part in parts)
+            text = " ".join(" ".join(others).split())
+            yield page, title, heading, section["ids"][0], text
+
+
+def add_search(
+    app: Sphinx, page: str, template: str, context: dict[str, object], _: object
+) -> None:
+    """Load the search by section in the page of the search."""
+    if page == "search":
+        for name in ("search_text.js", "search.js"):  # after searchtools.js
+            app.add_js_file(name, loading_method="defer")
+
+
+def write_search_text(app: Sphinx, error: Exception | None) -> None:
+    """Write the texts of all sections for search.js."""
+    if not error:
+        text = f"const SEARCH_TEXT = {json.dumps([*sections_of(app)], ensure_ascii=False)};\n"
+        Path(app.outdir, "_static", "search_text.js").write_text(text)
+
+
 def setup(app: Sphinx) -> None:
     """Called by Sphinx."""
     app.add_html_math_renderer("mathml", (visit_math, None), (visit_math, None))
+    app.add_lexer("gmsh", TextLexer)  # Pygments has none for .geo files
     app.connect("source-read", add_contents)
     app.connect("autodoc-process-docstring", parse_sections)
     app.connect("build-finished", add_index)
+    app.connect("html-page-context", add_search)
+    app.connect("build-finished", write_search_text)

@@ -4,6 +4,7 @@ from the network. The notebooks, which compare their results with closed forms, 
 
 import json
 import re
+import shutil
 import subprocess
 import sys
 from html.parser import HTMLParser
@@ -92,6 +93,9 @@ def test_formulas_search_and_notebooks(site, pages):
     names |= {"README", "reference/theory", "reference/site/library"}
     assert names <= set(index["docnames"])
     assert "uplift" in index["terms"]
+    start = (site / "README.html").read_text().split("<pre>", 1)[1].split("</pre>", 1)[0]
+    lines = re.sub(r"<[^>]*>", "", start).splitlines()
+    assert max(map(len, lines)) <= 76  # what a window of 1280 pixels shows
     for path in NOTEBOOKS:
         html = site / path.relative_to(ROOT).with_suffix(".html")
         pictures = [file for file in pages[html].loaded if file.endswith(".png")]
@@ -99,10 +103,52 @@ def test_formulas_search_and_notebooks(site, pages):
         assert len(pictures) == len(plots), path
 
 
+#: Runs the search of a site (its folder) for stemmed words, each an argument, as a browser would.
+SEARCH = """
+const fs = require("fs"), [folder, ...words] = process.argv.slice(1);
+const read = (name) => fs.readFileSync(`${folder}/_static/${name}`, "utf8");
+const root = { dataset: { content_root: "./" } };
+globalThis.document = { documentElement: root };
+globalThis.window = {};
+globalThis.DOCUMENTATION_OPTIONS = { FILE_SUFFIX: ".html" };
+const found = `Search.performTermsSearch(new Set(${JSON.stringify(words)}), new Set()).map(
+  (r) => [...r, Search.htmlToText("./" + r[0] + ".html", r[2])])`;
+const code = ["searchtools.js", "search_text.js", "search.js"].map(read);
+const all = ["const _ready = () => 0;", ...code, `JSON.stringify(${found})`].join("\\n");
+console.log(require("vm").runInThisContext(all));
+"""
+
+
+@pytest.mark.heavy
+def test_the_search_finds_sections_ranked_with_their_text(site, pages):
+    """Of every section anchor and text are there; without a network."""
+    text = (site / "_static" / "search_text.js").read_text()
+    sections = json.loads(text.removeprefix("const SEARCH_TEXT = ").rstrip(";\n"))
+    assert len(sections) > 100
+    for page, _, heading, anchor, _ in sections:
+        assert anchor in pages[site / f"{page}.html"].anchors, (page, heading)
+    loaded = [file.split("?")[0] for file in pages[site / "search.html"].loaded]
+    assert {"_static/search_text.js", "_static/search.js"} <= set(loaded)
+    if not (node := shutil.which("node")):
+        pytest.skip("node is not installed")
+    for words, page, anchor in (
+        (["exit", "code"], "reference/usage", "#exit-codes"),
+        (["natur", "mode"], "reference/studies", "#natural-modes"),
+    ):
+        command = [node, "-e", SEARCH, str(site), *words]
+        output = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+        results = json.loads(output)
+        assert (results[0][0], results[0][2]) == (page, anchor)
+        scores = [result[4] for result in results]
+        assert scores == sorted(scores, reverse=True) and len(set(scores)) == len(scores)
+        _, title, *_, excerpt = results[0]
+        assert all(word in f"{title} {excerpt}".lower() for word in words)
+
+
 @pytest.mark.heavy
 def test_a_dead_link_and_an_unknown_command_are_errors(tmp_path):
     """What the site's build has to refuse."""
-    for name in ("conf.py", "site.css"):
+    for name in ("conf.py", "site.css", "search.js"):
         (tmp_path / name).write_text((ROOT / "reference" / "site" / name).read_text())
     (tmp_path / "README.md").write_text("# Page\n\n[a](#nowhere), [b](none.md), $\\nothing{a}$\n")
     command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", ".", "site"]
