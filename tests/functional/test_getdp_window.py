@@ -13,6 +13,7 @@ import pytest
 from damjoint import data, runner
 from damjoint.engines.getdp.process import find_getdp
 from damjoint.engines.getdp.tables import PRINTED, PRINTED_OF_JOINTS, complete_rows
+from damjoint.input.casefile import read
 from damjoint.input.parameters import declared, parameter, start_gmsh
 from damjoint.input.resolve import load
 from matplotlib.image import imread
@@ -155,6 +156,15 @@ COARSER = {"n_joint": 10.0}
 def test_every_case_runs_in_gmsh(project, name):
     case = load(str(project / f"{name}.case"), COARSER)
     assert_as_in_python(run_in_gmsh(project, name, COARSER), case, project / "other")
+
+
+def test_every_section_has_its_files_for_gmsh():
+    """All cases but the common part of SSNP142 and those with a mesh of their own."""
+    names = {path.stem for path in data("cases").glob("*.case")} - {"ssnp142"}
+    sections = {
+        name for name in names if "geometry" not in read(data("cases") / f"{name}.case").texts
+    }
+    assert sections == set(WINDOWED) == {path.stem for path in data("cases").glob("*.geo")}
 
 
 def test_values_of_joints_are_those_of_python():
