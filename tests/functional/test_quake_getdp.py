@@ -1,12 +1,17 @@
 """An earthquake by the reference GetDP model against the condensed engine."""
 
 import json
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from damjoint import data
 from damjoint.dynamics.history import QuakeHistory
 from damjoint.engines.getdp import quake as engine
+from damjoint.engines.getdp.process import find_getdp
 from damjoint.input.resolve import load
 from damjoint.post import folder
 from damjoint.studies import quake_getdp
@@ -187,3 +192,36 @@ def test_a_dam_without_static_equilibrium_is_a_failed_run(command, case_file):
     code, _, err = command("quake", case_file, "--engine", "getdp", "--set", "mu=0.1")
     assert code == 1 and "static loads have no equilibrium" in err
     assert json.loads(Path("out/my_quake/run.json").read_text())["state"] == "failed"
+
+
+@pytest.mark.heavy
+def test_an_earthquake_without_python(tmp_path):
+    """A .pro file with record, damping and time step as reference/usage.md describes it."""
+    times = np.arange(0, 0.2001, 0.005)
+    wave = 5 * np.sin(np.pi * times / 0.2) ** 2 * np.sin(10 * np.pi * times)
+    quake = earthquake(write_record(tmp_path / "r.csv", times, wave), SHORT | BOND, "30")
+    expected = engine.solve(quake.case, quake.record, quake.damping, quake.dt, lambda _: None)
+    for name in ("geo", "pro"):
+        shutil.copytree(data(name), tmp_path / name)
+    values = "".join(
+        f'default_{name} = "{v}";\n' if isinstance(v, str) else f"default_{name} = {v!r};\n"
+        for name, v in (SHORT | BOND | {"dt": float(quake.dt)}).items()
+    )
+    pairs = np.column_stack([quake.record.times, quake.record.acceleration[:, 0]]).ravel()
+    (tmp_path / "own.case").write_text(values + "levels() = {30};\n")
+    (tmp_path / "own.geo").write_text('Include "own.case";\nInclude "geo/dam.geo";\n')
+    (tmp_path / "own.pro").write_text(
+        'Include "own.case";\n'
+        f"record_x() = {{{', '.join(map(repr, pairs.tolist()))}}};\n"
+        f"record_y() = {{0, 0, {float(quake.record.times[-1])!r}, 0}};\n"
+        f"damping_a0 = {float(quake.damping.a0)!r};\ndamping_a1 = {float(quake.damping.a1)!r};\n"
+        'out_dir = StrCat[CurrentDirectory, "res/"];\nInclude "pro/damjoint.pro";\n'
+    )
+    gmsh = "import sys, gmsh; gmsh.initialize(['gmsh', *sys.argv[1:]], run=True)"
+    mesh = [sys.executable, "-c", gmsh, "own.geo", "-2", "-o", "own.msh"]
+    subprocess.run(mesh, cwd=tmp_path, check=True, capture_output=True)
+    solve = [find_getdp(), "own.pro", "-msh", "own.msh", "-solve", "Fill", "-v", "2"]
+    done = subprocess.run(solve, cwd=tmp_path, check=True, capture_output=True, text=True)
+    assert "Error" not in done.stdout + done.stderr
+    rows = engine.read_rows(quake.case, tmp_path / "res")
+    agree(rows, expected.rows)
