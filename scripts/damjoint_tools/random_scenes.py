@@ -27,6 +27,10 @@ CONCRETE = 4e10
 HIGHEST_LIFT = 0.85
 
 
+#: Times at which other loads than the water's and the weight act in full.
+LOAD_TIMES = "silt_t", "ice_t", "force_t", "anchor_t", "quake_t"
+
+
 @dataclass(frozen=True)
 class RandomScene:
     """Random dam: parameters that differ from the default dam's, and levels as in the command."""
@@ -50,17 +54,21 @@ class RandomScene:
         water = ["--levels", self.levels, "--tail-levels", self.tail_levels]
         return ["run", self.base, *changed, *water, "--steps", str(self.steps)]
 
-    def critical(self, start: float) -> list[str]:
-        """Arguments of the command that finds its critical level from a start [m]."""
-        words = self.words
+    def rising_from(self, first: float, *levels: float) -> RandomScene:
+        """The scene with a first level [m], at which all loads act in full and the ice presses, and
+        others above it: the loads at a level are the same, whatever the levels before it.
+        """
         tail = self.tail_levels.split(",")[-1]
-        given = words[1 : words.index("--levels")]
-        return ["critical", *given, "--levels", f"{start:.10g}", "--tail-levels", tail]
+        heights = [first, *(level for level in levels if level > first)]
+        text = ",".join(f"{height:.10g}" for height in heights)
+        settings = self.settings | dict.fromkeys(LOAD_TIMES, 1) | {"ice_level": first}
+        return replace(self, settings=settings, levels=text, tail_levels=tail, steps=4)
 
-    def up_to(self, level: float) -> RandomScene:
-        """The scene with a single level [m], reached in four steps."""
-        tail = self.tail_levels.split(",")[-1]
-        return replace(self, levels=f"{level:.10g}", tail_levels=tail, steps=4)
+    @property
+    def critical(self) -> list[str]:
+        """Arguments of the command that finds its critical level."""
+        words = self.words
+        return ["critical", *words[1 : words.index("--steps")]]
 
     @property
     def case(self) -> Case:

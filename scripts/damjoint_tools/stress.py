@@ -18,6 +18,7 @@ import time
 from collections.abc import Iterator
 from concurrent.futures import as_completed
 from dataclasses import replace
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -172,7 +173,7 @@ def computed_again(
         if not doubled.stopped:
             numbers["steps_difference"] = again.difference(run.files, doubled)
     case = scene.case
-    if case["dim"] == 2 and not again.follows_history(run.asked):
+    if case["dim"] == 2 and not again.follows_history(run.asked, first_step=False):
         more, differences = critical_levels(scene, case["dam_height"], folder)
         found, numbers = [*found, *more], numbers | differences
     if found:
@@ -188,20 +189,22 @@ def critical_levels(
     one; returns what is found, and numbers for the row.
     """
 
-    def search(start: float, name: str) -> again.Critical | None:
-        return again.Critical.of(files_of(scene.critical(start), folder, name=name).record)
+    rising = partial(scene.rising_from, again.FIRST_START * height)
 
-    first = search(again.FIRST_START * height, "critical")
+    def search(name: str, *levels: float) -> again.Critical | None:
+        return again.Critical.of(files_of(rising(*levels).critical, folder, name=name).record)
+
+    first = search("critical")
     if first is None:
         return [], {}
-    starts = [search(part * first.level, f"critical_{part:g}") for part in again.STARTS]
+    starts = [search(f"critical_{part:g}", part * first.level) for part in again.STARTS]
     results = [first, *filter(None, starts)]
     levels = [result.level for result in results if result.confirmed]
     found, numbers = list(again.starts(results)), {"critical_level": first.level}
     if len(levels) > 1:
         numbers["critical_difference"] = (max(levels) - min(levels)) / max(levels)
     if first.confirmed:
-        below = run_of(scene.up_to(again.BELOW * first.level), folder, name="below", fields=True)
+        below = run_of(rising(again.BELOW * first.level), folder, name="below", fields=True)
         found += [f"below the critical level: {text}" for text in below.violations()]
         if below.files.stopped:
             found.append(f"no equilibrium at {again.BELOW:g} of the critical level")

@@ -1,9 +1,10 @@
 """A scene again: with twice as many load steps, and its critical level from several starts.
 
 Under a water level that rises step by step the state does not depend on the steps (section 8 of
-reference/theory.md). The critical level does not depend on the level that the search starts from;
-just below it there is an equilibrium, which is verified like any other run, and just above it none
-is certain by statics, nor possible where the strength cannot change in between.
+reference/theory.md). The critical level does not depend on the level that the search starts from,
+if the way of the loads is the same; just below it there is an equilibrium, which is verified like
+any other run, and just above it none is certain by statics, nor possible where the strength cannot
+change in between.
 """
 
 from __future__ import annotations
@@ -24,26 +25,26 @@ SAME_STATE = 1e-6
 SAME_LEVEL = 1e-4
 #: Relative reserve of the bound within which a level is at it: the precision of the search.
 AT_THE_BOUND = 2e-3
-#: Level of the first start over the dam's height; over the first critical level that is found those
-#: of the others, and of the states below and above it.
-FIRST_START, STARTS, BELOW, ABOVE = 0.5, (0.6, 0.9), 0.995, 1.005
+#: Level from which all searches rise, over the dam's height; over the first critical level that is
+#: found those of the second and third start, and of the states below and above it.
+FIRST_START, STARTS, BELOW, ABOVE = 0.3, (0.6, 0.9), 0.995, 1.005
 
 
 # -- load steps
 # --------------------------------------------------------------------------------------------------
 
 
-def follows_history(asked: Asked) -> bool:
+def follows_history(asked: Asked, first_step: bool = True) -> bool:
     """Return whether the state under rising water may depend on the way there: where a joint slips
     under a load that the water turns back (temperature; earthquake and anchor against the water),
-    grouting and sawing, a first step that bears the weight with a part of the water, a controlled
-    displacement.
+    grouting and sawing, a first step that bears the weight with a part of the water (unless
+    first_step is false: it is the same), a controlled displacement.
     """
     first = asked.joints[0]
     heat = any(first[f"temperature_{part}"] for part in ("dam", "linear", "found"))
     works = any(v["grout_pressure"] or v["saw_thickness"] for v in asked.joints)
     against = first["k_h"] < 0 or (first["anchor_force"] > 0 and first["anchor_angle"] > 0)
-    driven = first["drive"] != "level" or not first["weight_first"]
+    driven = first["drive"] != "level" or (first_step and not first["weight_first"])
     return bool(heat or works or against or driven)
 
 

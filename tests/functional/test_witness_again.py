@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 from damjoint import cli
-from damjoint_tools.random_scenes import random_scene
+from damjoint_tools.random_scenes import LOAD_TIMES, random_scene
 from damjoint_witness import again
 from damjoint_witness.files import Files, read_table
 from damjoint_witness.reader import read
@@ -78,9 +78,10 @@ def test_statics_confirms_a_critical_level_or_not(tmp_path):
 
 def test_commands_of_a_scene_for_its_critical_level():
     scene = replace(random_scene(5, 2), levels="4,7,9", tail_levels="1,2,2.5")
-    words = scene.critical(6.0)
-    assert words[:2] == ["critical", "dam"] and "--steps" not in words
-    assert read(words).joints == read(scene.up_to(6.0).words).joints
-    assert read(words).levels == (6.0,) and read(words).tail_levels == (2.5,)
-    below = scene.up_to(8.5)
-    assert (below.levels, below.tail_levels, below.steps) == ("8.5", "2.5", 4)
+    rising = scene.rising_from(3.0, 6.0)
+    assert rising.critical[:2] == ["critical", "dam"] and "--steps" not in rising.critical
+    assert read(rising.critical).joints == read(rising.words).joints
+    asked = read(rising.words)
+    assert (asked.levels, asked.tail_levels, rising.steps) == ((3.0, 6.0), (2.5, 2.5), 4)
+    assert all(asked.joints[0][time] == 1 for time in LOAD_TIMES)
+    assert scene.rising_from(3.0, 2.0).levels == "3"
