@@ -274,9 +274,12 @@ class Search:
 
     def repeated(self, path: FailurePath) -> FailurePath | None:
         """A path by shorter increments: from before its highest level, if its branch has led there;
-        else, from the beginning on. None if they lead to the same highest level.
+        else, and if it ends by unstable growth where opening releases shear, from the beginning on:
+        an increment may pass over the release of single points. None if they lead to the same
+        highest level.
         """
-        if not path.starts or path.top < path.starts[0]:
+        single = path.releases_shear and path.to_growth and path.grows
+        if not (single or path.starts) or (path.starts and path.top < path.starts[0]):
             other = path.repeated()
             if other:
                 self.trials[-1] = replace(self.trials[-1], path=other)

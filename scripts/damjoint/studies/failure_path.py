@@ -87,7 +87,8 @@ class FailurePath(EquilibriumPath):
         #: whether water enters the crack element by element, at each of which the level falls
         self.entering = any(joint["uplift"] == "cracked" for joint in case.joints)
         brittle = any(law.softens and law.tensile_strength > 0 for law in laws.laws)
-        self.to_growth = to_growth and (laws.releases_shear or (brittle and not self.entering))
+        self.releases_shear = laws.releases_shear
+        self.to_growth = to_growth and (self.releases_shear or (brittle and not self.entering))
         # after a step of the weight alone steps can be halved; else the first includes the weight
         if not (case["weight_first"] and stepper.weigh()):
             stepper.advance_to(case.times[0])
