@@ -472,15 +472,18 @@ class EquilibriumPath:
         ends or its increments stay short, the next one, whether of the branch or not.
         """
         last = self.points[-1]
-        falls = last.level < (1 - FALL) * self.highest
-        if falls or self.crawled > MOST_SHORT or not self.advance_branch():
+        if not self.advance_branch():
             self.crawled = 0
             self.pass_over(last)
 
     def advance_branch(self) -> bool:
-        """Append the next equilibria of the branch; whether there are any."""
+        """Append the next equilibria of the branch; whether there are any. Below its highest level,
+        or where increments stay short, none are sought; where a joint slips whole, no short ones.
+        """
         last, part = self.points[-1], 1.0
-        while part > SMALLEST:
+        if last.level < (1 - FALL) * self.highest or self.crawled > MOST_SHORT:
+            return False
+        while part > (SHORTENED if last.slipping is not None else SMALLEST):
             for kind, control in last.controls.items():
                 by = part * self.increment(control)
                 if abs(by) < LEAST * self.imposed(last):
@@ -630,11 +633,23 @@ class EquilibriumPath:
 
     def repeated(self: P) -> P | None:
         """The path by shorter increments from before its highest level, to be continued; None if
-        they lead to the same level, to the precision.
+        they lead to the same level, to the precision, by single increments or else by those whose
+        halves lead to the same state.
         """
         top = self.points[self.top] if self.points else None
         if top is None or top.slides:
             return None
+        for verified in (False, True):
+            again = self.by_shorter(verified)
+            ends = sorted((float(again.highest), float(self.highest)))
+            if ends[1] - ends[0] <= PRECISION / 2 * ends[1]:
+                return None
+        again.longest = np.inf
+        again.interval = ends[0], ends[1]
+        return again
+
+    def by_shorter(self: P, verified: bool) -> P:
+        """The path with shorter increments from before its highest level to beyond it."""
         again = self.copied()
         before = self.levels[: self.top] < (1 - REPEATED) * self.highest
         begin = max([0, *np.flatnonzero(before), *(n for n in self.starts if n <= self.top)])
@@ -643,19 +658,14 @@ class EquilibriumPath:
         again.starts = [number for number in self.starts if number <= begin]
         again.closed, again.ended = list[Point](), False
         again.growth, again.longest = 1.0, max(lengths, default=0.0) / SHORTER
-        distance, branches = 0.0, len(again.starts)
+        again.verified, distance = verified, 0.0
         while not again.ended and distance < sum(lengths) + 2 * again.longest:
             number = len(again.points)
-            again.advance()
-            if len(again.starts) > branches or len(again.points) == number:
+            if not again.advance_branch():
                 break
             distance += sum(again.length(n) for n in range(number - 1, len(again.points) - 1))
+        again.verified = self.verified
         again.refine()
-        ends = sorted((float(again.highest), float(self.highest)))
-        if ends[1] - ends[0] <= PRECISION / 2 * ends[1]:
-            return None
-        again.longest = np.inf
-        again.interval = ends[0], ends[1]
         return again
 
     def growth_until(self, number: int) -> float | None:
