@@ -527,13 +527,20 @@ class EquilibriumPath:
         return None
 
     def by_relaxation(self, last: Point) -> Point | None:
-        """The equilibrium after unstable crack growth at a level higher by the precision."""
-        time, control = max(last.state.time, self.time), LevelControl(last.level * (1 + PRECISION))
-        result, _ = over_unstable_growth(last.model, last.state, time + self.tick, control, True)
-        if result is None:
-            return None
-        by = float(np.abs(result.state.jump - last.state.jump).max())
-        return last.after(result, self.imposed(last) + by, "level")
+        """The equilibrium after unstable crack growth at a level higher by the precision, and twice
+        as much from one relaxation to the next, as long as there is one.
+        """
+        time, number = max(last.state.time, self.time) + self.tick, len(self.points)
+        again = 0
+        while number - 1 - again in self.starts:
+            again += 1
+        for power in range(again, -1, -1):
+            control = LevelControl(last.level * (1 + 2**power * PRECISION))
+            result, _ = over_unstable_growth(last.model, last.state, time, control, True)
+            if result is not None:
+                by = float(np.abs(result.state.jump - last.state.jump).max())
+                return last.after(result, self.imposed(last) + by, "level")
+        return None
 
     def append(self, new: list[Point], another: bool = False, shortened: bool = False) -> None:
         """Append equilibria, reached by an increment, and choose the next increment; another:
