@@ -278,14 +278,16 @@ class Search:
         an increment may pass over the release of single points. None if they lead to the same
         highest level.
         """
-        single = path.releases_shear and path.to_growth and path.grows
+        single = path.releases_shear and path.to_growth and (path.grows or path.ended)
         if not (single or path.starts) or (path.starts and path.top < path.starts[0]):
             other = path.repeated()
             if other:
                 self.trials[-1] = replace(self.trials[-1], path=other)
             return other
-        other = FailurePath(path.case, path.interface, path.target, to_growth=path.to_growth)
-        other.rise = SHORTER_RISE * path.rise
+        rise = SHORTER_RISE * path.rise
+        other = FailurePath(
+            path.case, path.interface, path.target, to_growth=path.to_growth, rise=rise
+        )
         other.follow(SURE)
         other.refine()
         low, high = sorted((float(path.highest), float(other.highest)))

@@ -20,7 +20,7 @@ from ..model.results import HISTORY, Columns, column_of, with_all_joints
 from ..solver.controls import LevelControl
 from ..solver.history import joint_row
 from ..solver.load_stepper import SAME_TIME, LoadStepper
-from ..solver.path import EquilibriumPath, Point
+from ..solver.path import RISE, EquilibriumPath, Point
 
 #: Columns of critical.csv: a row per equilibrium of each dam that was tried. With several joints:
 #: of the first one; see `critical_columns`.
@@ -73,14 +73,19 @@ class FailurePath(EquilibriumPath):
         target: float | None = None,
         on_step: Callable[[float], None] = lambda level: None,
         to_growth: bool = False,
+        rise: float = RISE,
     ) -> None:
         """target: the level [m] to reach, the highest still to come by default; on_step: called
         with the level of each equilibrium; to_growth: whether it is followed, with a law that
-        softens in tension or releases its shear, to the first unstable crack growth only.
+        softens in tension or releases its shear, to the first unstable crack growth only; rise: of
+        the level that an increment aims at, relative. With a smaller one the levels are prescribed
+        up to a smaller part of a joint.
         """
         self.case, self.interface, self.on_step = case, interface, on_step
         self.points: list[Point] = []
         stepper = LoadStepper(case, interface, lambda _: self.add(point_of(stepper)))
+        #: the part of a joint that may open or soften before a displacement is prescribed
+        self.softened = SOFTENED * rise / RISE
         #: whether the loads of a time are those of the last one, but for the level
         self.stepper, self.same_loads = stepper, dict[float, bool]()
         laws = stepper.model.equilibrium.laws
@@ -98,6 +103,7 @@ class FailurePath(EquilibriumPath):
         ahead = [v for t, v in enumerate(case.levels, 1) if t >= time]
         self.target = max(ahead) if target is None else target
         super().__init__(self.points, len(case.levels), TICK)
+        self.rise = rise
 
     def fill(self, point: Point) -> None:
         """Prescribe the levels, from a point on, until all other loads act in full and a part
@@ -111,7 +117,7 @@ class FailurePath(EquilibriumPath):
                 if not new:
                     return
                 end, length = new[-1], new[-1].state.time - point.state.time
-                softens = self.on_path(end) and softened(end) > at_rest + SOFTENED
+                softens = self.on_path(end) and softened(end) > at_rest + self.softened
                 if softens and length > smallest:
                     length /= 2
                     continue
