@@ -690,7 +690,7 @@ def draw_maps(figure: AnyFigure, solution: Solution, time: float) -> None:
     names, places = projected(joint)
     shape = Triangulation(places[0], places[1], triangles_of(joint))
     shown = (
-        ("delta_n", "opening", LENGTHS),
+        ("delta_n", "opening > 0, overlap < 0", LENGTHS),
         ("sigma_n_eff", "effective normal stress, tension > 0", STRESSES),
         ("tau_1", "shear stress, downstream > 0", STRESSES),
     )
