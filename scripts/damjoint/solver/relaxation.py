@@ -16,7 +16,7 @@ from .state import State
 ROUNDS = 100
 
 #: Relative difference of the residuals of two rounds below which they have led to the same state
-#: [-]; rounding alone makes 1e-9 of it. The rounds then repeat themselves, and end without a state.
+#: [-]. The rounds then repeat themselves, and end without a state.
 SAME = 1e-6
 
 

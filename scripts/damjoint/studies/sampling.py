@@ -21,7 +21,7 @@ for slow in ("ksone", "kstwo", "levy_stable", "studentized_range"):
 #: Confidence level of the interval of a probability.
 CONFIDENCE = 0.95
 
-#: Most iterations for a correlated sample; usually three to five. Then it stays as it is.
+#: Most iterations for a correlated sample, which then stays as it is.
 MOST_ITERATIONS = 30
 #: Tolerance of its rank correlations [-].
 TOLERANCE = 1e-4
