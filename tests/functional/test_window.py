@@ -18,7 +18,8 @@ from damjoint.gui import tree, views, window
 from damjoint.gui.camera import result_camera
 from damjoint.gui.curves import METRES
 from damjoint.gui.graphs import INTERVALS, MARGIN, Scale, thinned
-from damjoint.gui.layout import ABOVE_AXES, BELOW_AXES, BESIDE_AXES, Layout
+from damjoint.gui.layout import ABOVE_AXES, BELOW, BELOW_AXES, BESIDE_AXES, Layout
+from damjoint.gui.layout import MARGIN as MARGIN_OF_SCENE
 from damjoint.gui.sheet import Request, case_text, check_request, titles
 from damjoint.gui.views import caption
 from damjoint.gui.window import ACTION, Session
@@ -928,8 +929,9 @@ def test_run_in_the_window_on_a_virtual_screen(tmp_path, screen):
     output = done.stdout + done.stderr
     assert done.returncode == 0, output
     assert "done in" in output and "exported: out/e/window.gif" in output
-    width, height = map(int, re.search(r"window (\d+) x (\d+)", output).groups())
-    assert width <= screen[0] and height <= screen[1]
+    top, width, height = map(int, re.search(r"window (\d+): (\d+) x (\d+)", output).groups())
+    assert width <= screen[0] and 30 <= top and screen[1] - 10 <= height <= screen[1]
+    assert "title Gmsh - e: E: rupture" in output
     areas = [tuple(map(float, size)) for size in re.findall(r"area (\S+) x (\S+)", output)]
     assert areas[-1][0] < areas[0][0] and areas[-1][1] < areas[0][1]  # after the resize
     for name in ("window", "resized"):
@@ -938,6 +940,11 @@ def test_run_in_the_window_on_a_virtual_screen(tmp_path, screen):
         assert animation.n_frames == 2 and animation.size == areas[0]  # at 8 and 9 m
     with Image.open(tmp_path / "out/e/window.png") as picture:
         assert picture.size == areas[0]
+        pixels = np.asarray(picture.convert("RGB"))
+    layout = Layout(*areas[0])  # the rock ends before the graphs, which it nearly reaches
+    right, row = round(layout.scene_width), -BELOW - MARGIN_OF_SCENE - 5
+    assert (pixels[row, right - 1 : right + 3] == 255).all()
+    assert (pixels[row, : right // 2] < 255).any()
 
 
 #: Prints the states of the session; Run is clicked, a picture and an animation exported, the window
@@ -967,7 +974,8 @@ wait_for 'xdotool search --onlyvisible --name Gmsh > windows.txt'
 window=$(tail -1 windows.txt)
 wait_for 'grep -q area status.txt'
 eval $(xdotool getwindowgeometry --shell $window)
-echo "window $((X + WIDTH)) x $((Y + HEIGHT))"
+echo "window $Y: $((X + WIDTH)) x $((Y + HEIGHT))"
+echo "title $(xdotool getwindowname $window)"
 menu=$((WIDTH - $(grep area status.txt | tail -1 | sed "s/area \\([0-9]*\\).*/\\1/")))
 xdotool mousemove $((X + menu - 80)) $((Y + HEIGHT - 42))
 wait_for 'xdotool click 1; sleep 1; grep -q running status.txt'

@@ -99,8 +99,10 @@ class Camera:
         )
         seen = seen - (self.rotation @ (low + high) / 2)[:2]
         wide, tall = np.maximum(np.ptp(seen, axis=0), 1e-300)  # may be flat
-        # without scaling, Gmsh fits the diagonal of the bounding box, seen along z, into the window
-        per_metre = min(layout.width, layout.height) / np.hypot(*(high - low)[:2])
+        # without scaling, Gmsh fits the bounding box, seen along z, with a border into the window
+        border = 1 + 2 * gmsh.option.getNumber("General.DisplayBorderFactor")
+        sizes = np.maximum(high - low, 1e-300)[:2]
+        per_metre = min(layout.width / sizes[0], layout.height / sizes[1]) / border
         room = width - 2 * MARGIN, layout.height - ABOVE - BELOW - 2 * MARGIN
         scale = max(min(room[0] / wide, room[1] / tall), 1e-9) / per_metre
         offset = (width - layout.width) / 2, (BELOW - ABOVE) / 2

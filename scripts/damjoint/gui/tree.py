@@ -64,7 +64,9 @@ CHOOSERS = JOINT, UPLIFT, MOTION
 PLAY = "02Display/6Play all steps"
 KEEP = "02Display/7Keep the last curves"
 #: Groups of parameters that are closed at first, so that the results are not far below.
-CLOSED = ("3Mesh", "4Bulk", "6Water", "7Loads", "8Solver", "9Checks")
+CLOSED = tuple(
+    f"Parameters/{n}" for n in ("3Mesh", "4Bulk", "6Water", "7Loads", "8Solver", "9Checks")
+)
 FOLDER = "03Output/0Folder"
 SAVE = "03Output/1Save"
 PICTURE = "03Output/2Export picture"
@@ -92,7 +94,7 @@ NOT_RUN = "not run yet"
 #: Colors of the status line.
 CALM, GOOD, WARN, BAD = "LightSteelBlue1", "DarkSeaGreen1", "Orange", "LightCoral"
 #: Color of the value of a parameter that follows others.
-FOLLOWS = "Gray90"
+FOLLOWS = "LightGrey"
 
 
 def put(*entries: dict[str, Any]) -> None:

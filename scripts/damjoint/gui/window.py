@@ -85,10 +85,6 @@ class Session:
             raise RunError(f"gui: the engine's process has not started ({kind}); try again")
         self.tree = tree.Tree(*content)
         self.check(request)
-        if windowed:
-            self.update()
-            for group in ("0Modules", *(f"Parameters/{name}" for name in tree.CLOSED)):
-                gmsh.fltk.closeTreeItem(group)
 
     def close(self) -> None:
         """End the engine's process and Gmsh, and remove temporary files."""
@@ -257,6 +253,8 @@ class Session:
             self.draw(sheet.case)
             self.drawn = drawn
             self.tree.show(sheet)  # opening the geometry has declared the parameters again
+        if not before:
+            self.close_groups()
         if sheet.request != self.last_request:
             self.hide_results()
             views.show_heading(self.heading, sheet.heading, self.layout)
@@ -274,6 +272,12 @@ class Session:
         else:  # unchanged, or changed back
             self.show(self.scene_shown)
             self.free(*self.last_status)
+
+    def close_groups(self) -> None:
+        """Close the groups of the tree that are closed at first."""
+        self.update()
+        for group in ("0Modules", *tree.CLOSED) if self.windowed else ():
+            gmsh.fltk.closeTreeItem(group)
 
     def on_failed(self, message: str) -> None:
         """A value is bad; a run, check or save has failed; or the engine's process has ended."""
