@@ -18,7 +18,7 @@ from damjoint.gui import tree, views, window
 from damjoint.gui.camera import result_camera
 from damjoint.gui.curves import METRES
 from damjoint.gui.graphs import INTERVALS, MARGIN, Scale, thinned
-from damjoint.gui.layout import ABOVE_AXES, BELOW, BELOW_AXES, BESIDE_AXES, Layout
+from damjoint.gui.layout import ABOVE, ABOVE_AXES, BELOW, BELOW_AXES, BESIDE_AXES, Layout
 from damjoint.gui.layout import MARGIN as MARGIN_OF_SCENE
 from damjoint.gui.sheet import Request, case_text, check_request, titles
 from damjoint.gui.views import caption
@@ -941,10 +941,10 @@ def test_run_in_the_window_on_a_virtual_screen(tmp_path, screen):
     with Image.open(tmp_path / "out/e/window.png") as picture:
         assert picture.size == areas[0]
         pixels = np.asarray(picture.convert("RGB"))
-    layout = Layout(*areas[0])  # the rock ends before the graphs, which it nearly reaches
-    right, row = round(layout.scene_width), -BELOW - MARGIN_OF_SCENE - 5
-    assert (pixels[row, right - 1 : right + 3] == 255).all()
-    assert (pixels[row, : right // 2] < 255).any()
+    # the scene ends before the graphs, which it nearly reaches, below the texts
+    right, scene = round(Layout(*areas[0]).scene_width), pixels[ABOVE : -BELOW - MARGIN_OF_SCENE]
+    assert (scene[:, right - 1 : right + 3] == 255).all()
+    assert (scene[:, : right // 2] < 255).any()
 
 
 #: Prints the states of the session; Run is clicked, a picture and an animation exported, the window
