@@ -17,7 +17,7 @@ from .options import Parser
 #: `add`, which adds its own options, and `call`, which runs it and returns the exit code.
 COMMANDS = (
     *("run", "check", "critical", "quake", "modes", "sweep"),
-    *("plot", "report", "gui", "new", "validate"),
+    *("plot", "report", "tables", "gui", "new", "validate"),
 )
 DEVELOPERS = ("stress", "bench", "law")
 
