@@ -254,7 +254,10 @@ class Search:
         point = path.points[path.top] if path.admissible else None
         after, ends = dict[str, float](), grows and path.ended
         if point and grows:
-            after, path = self.after_growth(path)
+            first, (after, path) = path, self.after_growth(path)
+            if certain and after and first.releases_shear:  # that of a point may be passed over
+                other = self.from_beginning(first)
+                certain = other is None
         result = self.result(point.level if point else None, path, point)
         if point is None:
             return result
@@ -270,25 +273,28 @@ class Search:
             result = replace(result, why=end_of_branch(path), doubt="")
         if path.water_withdraws:
             result = replace(result, why="", doubt=withdrawn(path))
-        return result if certain else replace(result, why="", doubt=by_increments(path))
+        return result if certain else replace(result, why="", doubt=by_increments(other or path))
 
     def repeated(self, path: FailurePath) -> FailurePath | None:
         """A path by shorter increments: from before its highest level, if its branch has led there;
-        else, and if it ends by unstable growth where opening releases shear, from the beginning on:
-        an increment may pass over the release of single points. None if they lead to the same
-        highest level.
+        else, from the beginning on. None if they lead to the same highest level.
         """
-        single = path.releases_shear and path.to_growth and (path.grows or path.ended)
-        if not (single or path.starts) or (path.starts and path.top < path.starts[0]):
-            other = path.repeated()
-            if other:
-                self.trials[-1] = replace(self.trials[-1], path=other)
-            return other
-        rise = SHORTER_RISE * path.rise
-        other = FailurePath(
-            path.case, path.interface, path.target, to_growth=path.to_growth, rise=rise
-        )
+        if path.starts and path.top >= path.starts[0]:
+            return self.from_beginning(path)
+        other = path.repeated()
+        if other:
+            self.trials[-1] = replace(self.trials[-1], path=other)
+        return other
+
+    def from_beginning(self, path: FailurePath) -> FailurePath | None:
+        """The path by shorter increments from its beginning on, to the first unstable growth if it
+        is; None if they lead to the same highest level.
+        """
+        rise, to_growth = SHORTER_RISE * path.rise, path.to_growth
+        other = FailurePath(path.case, path.interface, path.target, to_growth=to_growth, rise=rise)
         other.follow(SURE)
+        if to_growth and other.starts:
+            other = other.first_branch()
         other.refine()
         low, high = sorted((float(path.highest), float(other.highest)))
         other.interval = low, high
