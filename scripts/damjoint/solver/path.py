@@ -668,8 +668,8 @@ class EquilibriumPath:
         again.verified, distance = verified, 0.0
         while not again.ended and distance < sum(lengths) + 2 * again.longest:
             number = len(again.points)
-            if not again.advance_branch():
-                break
+            if not again.advance_branch() or len(again.points) == number:
+                break  # the branch ends, or its next points are not admissible
             distance += sum(again.length(n) for n in range(number - 1, len(again.points) - 1))
         again.verified = self.verified
         again.refine()
