@@ -254,7 +254,9 @@ def test_critical_level_of_a_crushed_toe():
 
 
 def test_a_limit_without_a_mechanism_is_not_confirmed(monkeypatch, command):
-    monkeypatch.setattr(FailurePath, "advance", lambda self: vars(self).update(ended=True))
+    monkeypatch.setattr(FailurePath, "advance_branch", lambda self: False)
+    ends = lambda self, last: vars(self).update(ended=True)
+    monkeypatch.setattr(FailurePath, "pass_over", ends)
     code, out, _ = command("critical", "c", "--set", "pena_tang=0", "--levels", "6,8")
     assert code == 3 and "not confirmed: " in out
 

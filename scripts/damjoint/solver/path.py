@@ -547,7 +547,7 @@ class EquilibriumPath:
         whether they may be of another branch; shortened: whether a longer one was tried first.
         """
         last = self.points[-1]
-        if another:
+        if another and len(self.points) > 1:  # nothing has led to the first point
             self.starts.append(len(self.points))
         rise = (new[-1].level - last.level) / new[-1].level
         growth = min(max(self.rise / max(rise, 1e-12), SHRINKING), 1.0 if shortened else GROWTH)
