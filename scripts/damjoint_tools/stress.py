@@ -104,12 +104,12 @@ def files_of(words: list[str], folder: Path, *options: str, name: str) -> Files:
 
     Raises RunError if it has written no result, or exceeds the time limit.
     """
-    own = {"DAMJOINT_CACHE": str(folder / "cache"), "TMPDIR": str(folder)}
+    folders = {"DAMJOINT_CACHE": str(folder / "cache"), "TMPDIR": str(folder)}
     out = "--out", str(folder / name)
     try:
         done = subprocess.run(
             [sys.executable, "-m", "damjoint", *words, *options, *out],
-            env=os.environ | ONE_THREAD | own,
+            env=os.environ | ONE_THREAD | folders,
             capture_output=True,
             text=True,
             timeout=LONGEST * TIME_LIMIT,

@@ -150,6 +150,12 @@ QUAKE = {
     "dt": ("s", "length of the step"),
     "residual": ("-", "norm of the out-of-balance forces over that of the static loads"),
 }
+#: Those of a joint. With several joints: of the first one; of joint 2, 3, ... by `column_of`.
+QUAKE_OF_JOINTS = (
+    *("heel_opening", "toe_opening", "slip_mean", "slip_heel", "slip_toe"),
+    *("N", "T", "M", "U", "T_inertia", "N_inertia", "M_inertia", "shear_reserve"),
+    *("open_length", "broken_length"),
+)
 #: Columns of modes.csv: a row per natural mode, with each water on each rock.
 MODES = {
     "rock": ("", "massless: elastic, without mass; or rigid"),
@@ -161,13 +167,6 @@ MODES = {
     "mass_y": ("-", "the same along y; in 3D, modes along z have neither"),
     "damping": ("-", "damping ratio by the Rayleigh damping of an earthquake of this row"),
 }
-
-#: Those of a joint. With several joints: of the first one; of joint 2, 3, ... by `column_of`.
-QUAKE_OF_JOINTS = (
-    *("heel_opening", "toe_opening", "slip_mean", "slip_heel", "slip_toe"),
-    *("N", "T", "M", "U", "T_inertia", "N_inertia", "M_inertia", "shear_reserve"),
-    *("open_length", "broken_length"),
-)
 
 
 def quake_columns(case: Case) -> dict[str, tuple[str, str]]:

@@ -85,7 +85,7 @@ class FailurePath(EquilibriumPath):
         self.points: list[Point] = []
         stepper = LoadStepper(case, interface, lambda _: self.add(point_of(stepper)))
         #: the part of a joint that may open or soften before a displacement is prescribed
-        self.softened = SOFTENED * rise / RISE
+        self.most_softened = SOFTENED * rise / RISE
         #: whether the loads of a time are those of the last one, but for the level
         self.stepper, self.same_loads = stepper, dict[float, bool]()
         laws = stepper.model.equilibrium.laws
@@ -117,7 +117,7 @@ class FailurePath(EquilibriumPath):
                 if not new:
                     return
                 end, length = new[-1], new[-1].state.time - point.state.time
-                softens = self.on_path(end) and softened(end) > at_rest + self.softened
+                softens = self.on_path(end) and softened(end) > at_rest + self.most_softened
                 if softens and length > smallest:
                     length /= 2
                     continue
