@@ -30,10 +30,12 @@ def outline(case):
     slope = np.radians(v["joint_slope"])
     toe_y = 0 if v["joint_height"] else v["dam_base"] * np.tan(slope)
     crest = v["batter"] + v["dam_crest"]
+    neck = (crest + bool(v["neck_height"]) * v["neck_batter"], v["dam_height"] - v["neck_height"])
+    face = case.downstream_face or neck
     points = [
         (0, 0),
         (v["dam_base"], toe_y),
-        (crest + bool(v["neck_height"]) * v["neck_batter"], v["dam_height"] - v["neck_height"]),
+        *zip(face[::2], face[1::2], strict=True),
         (crest, v["dam_height"]),
         (v["batter"], v["dam_height"]),
         (v["batter"], v["batter_height"]),

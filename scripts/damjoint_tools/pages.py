@@ -51,6 +51,9 @@ def parameters_page() -> str:
         "joint; then the parameters of a joint may have a list with a value for each joint, "
         "`mu() = {0.9, 1, 1};` (`--set mu=0.9,1,1`): those of the group Joint, law, uplift, slope, "
         "aperture, drains, grouting and sawing. "
+        "`downstream_face()` (`--set downstream_face=22,30,15,62`): $x$ and height of each corner "
+        "of the downstream face between base and crest, upwards, in place of `neck_height` and "
+        "`neck_batter`. "
         "Default levels: two thirds and eight ninths of the height, and the crest. In the Gmsh "
         "window they are in the group Water levels.",
     ]

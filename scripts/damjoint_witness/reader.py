@@ -213,13 +213,14 @@ def section_above_base(first: Values) -> Section:
     on_base = first["joint_height"] == 0
     toe_y = base * math.tan(math.radians(first["joint_slope"])) if on_base else 0.0
     crest_x, neck_y = batter + first["dam_crest"], height - first["neck_height"]
+    face = first["downstream_face"]
     bend = [(batter, first["batter_height"])] if batter and first["batter_height"] < height else []
     neck = [(crest_x + first["neck_batter"], neck_y)] if first["neck_height"] else []
     return Section(
         (0.0, 0.0),
         (base, toe_y),
         ((0.0, 0.0), *bend, (batter, height)),
-        ((base, toe_y), *neck, (crest_x, height)),
+        ((base, toe_y), *neck, *zip(face[::2], face[1::2], strict=True), (crest_x, height)),
     )
 
 
@@ -311,7 +312,7 @@ def read(words: Sequence[str]) -> Asked:
         for known in (lists, given, *blocks.values()):
             known.pop(name, None)
         parts = tuple(map(value_of, text.split(",")))
-        if len(parts) > 1 or name == "lift_heights":
+        if len(parts) > 1 or name in ("lift_heights", "downstream_face"):
             lists[name] = parts
         else:
             given[name] = parts[0]
@@ -339,7 +340,7 @@ def asked(
     tails = tails * len(levels) if len(tails) == 1 else tails
     steps = int(options.pop("steps", 1))
     record = options.pop("record", None)
-    lifts = lists.pop("lift_heights", ())
+    lifts, face = (lists.pop(name, ()) for name in ("lift_heights", "downstream_face"))
     names = [f"lift {heel:g} m" for heel in (given.get("joint_height", 0), *lifts)]
     names[0] = names[0] if given.get("joint_height") else "base"
     if geometry:
@@ -358,6 +359,7 @@ def asked(
     ]
     resolved = [resolve(joint, levels) for joint in joints]
     for joint, own in zip(resolved, joints, strict=True):
+        joint["downstream_face"] = face
         joint["hardening_asked"] = float(own.get("pena_tang", AUTOMATIC) != AUTOMATIC)
         if lifts:  # the sizes of the mesh are those of the first joint
             joint |= {name: resolved[0][name] for name in ("h_dam", "h_found")}

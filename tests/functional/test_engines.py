@@ -171,6 +171,7 @@ SCENES = {
 #: Sections and loads of the 45 m dam: parameters, levels, tailwater.
 SMALL = {"n_joint": 20.0, "h_dam": 8.0, "h_found": 30.0}
 SHAPE = {"batter": 4.0, "batter_height": 20.0, "neck_height": 6.0, "neck_batter": 2.0}
+POLYGON = {"batter": 2.0, "downstream_face": (30.0, 12.0, 12.0, 30.0, 6.0, 40.0)}
 STAGED = {"silt_height": 12.0, "ice_force": 1e5, "ice_level": 40.0, "anchor_force": 2e6}
 STAGED |= {"anchor_angle": 10.0, "k_h": 0.1, "k_v": 0.05, "floor_water": 1.0, "force_x": 3e4}
 STEEP = {"batter": 5.0, "batter_height": 35.0}
@@ -184,6 +185,8 @@ BROKEN = {"uplift": "cracked", "law": "friction", "adhesion": 2e5}
 SECTIONS = {
     "all loads": (SHAPE | STAGED, "20,41", "0"),
     "lift, all loads": (SHAPE | STAGED | {"joint_height": 10.0, "law": "bond"}, "20,41", "0"),
+    "polygon, all loads": (POLYGON | STAGED | WARM, "20,41", "0,14"),
+    "solid polygon": (SOLID | POLYGON | {"joint_height": 20.0}, "20,45", "0,30"),
     "falling base": ({"joint_slope": -4.0, "law": "friction", "adhesion": 4e5}, "30,44", "2"),
     "bed below the heel": ({"joint_slope": -4.0, "floor_water": 1.0}, "30,44", "0,5"),
     "sloping lift": ({"joint_height": 20.0, "joint_slope": 3.0} | SHAPE, "30,46.5", "0,24"),

@@ -86,6 +86,25 @@ def test_impossible_sections_are_refused_before_the_run(project, words, message)
     assert done.returncode and not (project / "res").exists()
 
 
+@pytest.mark.parametrize(
+    "text, message",
+    [
+        ("{20, 30, 25, 20}", "its corners up to (25, 20) must rise from one to the next"),
+        ("{-2, 30}", "its corners up to (-2, 30) must rise from one to the next, downstream"),
+        ("{20, 30, 9}", "downstream_face: must be pairs x, y of corners, upwards"),
+        ("{20, 30}; default_neck_height = 3", "neck_height = 3: must be 0 with downstream_face"),
+    ],
+)
+def test_an_impossible_downstream_face_is_refused_before_the_run(project, text, message):
+    (project / "dam.case").write_text(f"downstream_face() = {text};")
+    gmsh_command = [sys.executable, "-c", GMSH, str(project / "dam.geo"), "-"]
+    for command in (gmsh_command, [find_getdp(), str(project / "dam.pro")]):
+        done = subprocess.run([*command, "-v", "2"], capture_output=True, text=True, check=False)
+        lines = [line for line in (done.stdout + done.stderr).splitlines() if line.strip()]
+        assert len(lines) == 1 and message in lines[0]
+    assert done.returncode and not (project / "res").exists()
+
+
 #: Joints that differ in law, water, strength; in what is computed from these; a name with a point
 LIFTS = """
 lift_heights() = {12.5, 25};

@@ -15,6 +15,12 @@ SHAPES = {
     "plain": {},
     "batter and neck": {"batter": 4, "batter_height": 20, "neck_height": 6},
     "sloping neck": {"batter": 4, "neck_height": 15, "neck_batter": 5},
+    "polygon": {"batter": 4, "downstream_face": (30, 12, 12, 30, 7, 40)},
+    "lift in a polygon": {
+        "joint_height": 26,
+        "joint_slope": -5,
+        "downstream_face": (30, 12, 12, 28, 7, 40),
+    },
     "rising base": {"batter": 4, "neck_height": 6, "joint_slope": 5},
     "falling base": {"batter": 4, "neck_height": 6, "joint_slope": -4},
     "lift": {"joint_height": 20, "neck_height": 6},

@@ -492,6 +492,26 @@ def test_lift_joints_are_drawn(open_window, tmp_path):
     assert pytest.approx(20, abs=1e-6) in heights
 
 
+def test_the_corners_of_the_downstream_face_can_be_changed(open_window, tmp_path):
+    mine = tmp_path / "mine.case"
+    mine.write_text("downstream_face() = {30, 12, 12, 30}; levels() = {30};")
+    user = open_window(str(mine))
+    assert tree.get_text(tree.CORNERS) == "30, 12, 12, 30"
+
+    def corner(x, y):
+        points = (gmsh.model.getBoundingBox(*point)[:2] for point in gmsh.model.getEntities(0))
+        return any(point == pytest.approx((x, y), abs=1e-6) for point in points)
+
+    assert corner(30, 12) and corner(12, 30)
+    user.type(tree.CORNERS, "25, 14")
+    assert corner(25, 14) and not corner(12, 30)
+    sheet = user.session.tree.sheet
+    (tmp_path / "saved.case").write_text(case_text(sheet, sheet.case))
+    assert load(str(tmp_path / "saved.case")).downstream_face == (25, 14)
+    user.type(tree.CORNERS, "none")
+    assert not corner(25, 14) and not user.session.tree.sheet.case.downstream_face
+
+
 @pytest.mark.heavy
 def test_each_joint_of_a_case_with_several_is_shown_and_saved(open_window, command, tmp_path):
     """A changed value is that of all joints, and the heights can be changed; the saved case gives

@@ -26,8 +26,10 @@ SCENES = {
     "lifts": "run dam --set order=1 --set lift_heights=14,30 --set joint_slope=4,-2,0 "
     "--set uplift=cracked,drained,waterstop --set waterstop=3 --set sigma_max=0 --levels 44 "
     "--tail-levels 18",
-    "sloping neck": "run koyna --set order=1 --set lift_heights=50,80 --set joint_slope=2,0,4 "
+    "sloping lifts": "run koyna --set order=1 --set lift_heights=50,80 --set joint_slope=2,0,4 "
     "--set temperature_linear=-6 --set k_h=0.05 --levels 91.75 --tail-levels 75",
+    "polygon": "run dam --set downstream_face=30,12,12,30,4,40 --set lift_heights=20,36 --set "
+    "temperature_linear=-6 --set k_h=0.05 --levels 44 --tail-levels 25",
     "monoliths": "run monoliths --run-geo --set uplift=flow,cracked,imposed --levels 43",
 }
 SCENES_3D = {

@@ -383,6 +383,12 @@ def test_within_the_range_of_moduli_a_dam_stands(modulus):
         ("lift_heights=1e-9,20", "lift_heights = 1e-09,20: each must be at least 4.5e-05 m"),
         ("lift_heights=20,20.00000001", "must increase from above the first joint"),
         ("lift_heights=44.99999999", "and below the crest"),
+        ("downstream_face=20", "downstream_face = 20: must be pairs x,y"),
+        ("downstream_face=20,x", "downstream_face = 20,x: must be a list of x,y of each corner"),
+        ("downstream_face=20,30,10,30", "heights of its corners must increase from above the base"),
+        ("downstream_face=20,-1", "increase from above the base's toe (0 m) to below the crest"),
+        ("downstream_face=20,44.99999999", "to below the crest (45 m), each by 4.5e-05 m"),
+        ("downstream_face=-1,30", "must lie downstream of the upstream face, at x > 0 m at a"),
         ("joint_height=1e-9", "joint_height = 1e-09: must be >= 4.5e-05 m"),
         ("joint_height=44.99999999", "joint_height = 44.99999999: must be at least 4.5e-05 m"),
         ("neck_height=1e-9", "neck_height = 1e-09: must be >= 4.5e-05 m"),
@@ -396,6 +402,35 @@ def test_within_the_range_of_moduli_a_dam_stands(modulus):
 def test_lengths_that_no_mesh_can_have_are_refused_before_meshing(command, words, message):
     """Not in the mesh generator's words."""
     code, out, err = command("run", "dam", "--set", words)
+    assert (code, out) == (2, "") and len(err.splitlines()) == 1 and message in err
+
+
+@pytest.mark.parametrize(
+    "case, words, message",
+    [
+        ("dam", "neck_height=5 downstream_face=20,30", "neck_height = 5: must be 0 with downst"),
+        ("stepped", "downstream_face=20,30", "downstream_face: must not be set for a geometry of"),
+        ("dam", "mesh_pattern=regular downstream_face=20,30", "mesh_pattern = regular: must be"),
+        (
+            "dam",
+            "batter=9 batter_height=20 downstream_face=8.9,18,9.05,30",
+            "at x > 9 m at a height of 20 m",
+        ),
+        (
+            "dam",
+            "downstream_face=20,-1,10,30 joint_slope=-2",
+            "corner at (20, -1) must be above the line of the joint from (0, 0) to (34, -1.18731)",
+        ),
+        (
+            "dam",
+            "joint_height=20 joint_slope=-5 downstream_face=30,19.5,5,19.53",
+            "its corner at (5, 19.53) must be above the line of the joint from (0, 20) to",
+        ),
+    ],
+)
+def test_a_downstream_face_that_no_section_can_have(command, case, words, message):
+    settings = (word for setting in words.split() for word in ("--set", setting))
+    code, out, err = command("run", case, *settings)
     assert (code, out) == (2, "") and len(err.splitlines()) == 1 and message in err
 
 

@@ -35,6 +35,7 @@ SECTIONS = {
     "batter": {"batter": 4.0, "batter_height": 20.0},
     "neck": {"neck_height": 6.0},
     "sloping neck": {"neck_height": 6.0, "neck_batter": 2.0},
+    "polygon": {"downstream_face": (30.0, 12.0, 12.0, 30.0, 7.0, 40.0)},
     "lift": {"joint_height": 8.0, "batter": 4.0},
     "rising": {"joint_slope": 7.0},
     "whole": WHOLE,
@@ -81,6 +82,34 @@ def test_a_neck_in_line_with_the_slope_is_none():
         )
         for name in ("N", "T", "M", "U"):
             assert getattr(necked, name) == pytest.approx(getattr(straight, name), rel=1e-12)
+
+
+#: Koyna's section with a third corner of the downstream face, on the neck: widens upwards there.
+POLYGON = ((70.2, 0.0), (45.0, 30.0), (19.25, 66.5), (12.0, 90.0), (14.8, 103.0))
+
+
+def test_weight_and_centroid_of_a_polygonal_downstream_face():
+    """A trapezoid between each two corners, above the base and above a lift joint."""
+    face = tuple(v for corner in POLYGON[1:-1] for v in corner)
+    settings = {"uplift": "none", "downstream_face": face}
+    for above, corners in ((0.0, POLYGON), (40.0, ((45 - 25.75 / 3.65, 40.0), *POLYGON[2:]))):
+        empty = gravity.at(load("koyna", settings | {"joint_height": above}, "0"), 1)
+        area = moment = 0.0  # about the upstream face
+        for (a, low), (b, high) in itertools.pairwise(corners):
+            area += (high - low) * (a + b) / 2
+            moment += (high - low) * (a * a + a * b + b * b) / 6
+        weight = 2643 * 9.81 * area
+        assert empty.N == pytest.approx(weight, rel=1e-12)
+        assert empty.M == pytest.approx(weight * (corners[0][0] - moment / area), rel=1e-12)
+
+
+def test_a_polygon_of_one_corner_is_a_neck():
+    """The same resultants as by neck_height and neck_batter, on the base and on lift joints."""
+    neck = {"neck_height": 36.5, "neck_batter": 4.45, "downstream_face": ()}
+    for lift in ({}, {"joint_height": 50.0, "joint_slope": 4.0}, {"joint_height": 80.0}):
+        one, other = (gravity.at(load("koyna", s | lift, "95", "75"), 1) for s in ({}, neck))
+        for name in ("N", "T", "M", "U"):
+            assert getattr(one, name) == pytest.approx(getattr(other, name), rel=1e-12)
 
 
 def test_crack_of_the_45_m_dam():

@@ -94,6 +94,9 @@ def test_sections_have_batter_neck_and_slopes():
     assert low.slope == pytest.approx(-0.0523598775598)
     sloping = read([*words.split(), "--set", "neck_batter=3"]).sections[0]
     assert sloping.downstream == ((34, 0), (12, 40), (9, 45))
+    words = "run dam --set downstream_face=30,12,8,40 --set joint_height=20"
+    polygon = read(words.split()).sections[0]
+    assert polygon.downstream == (pytest.approx((30 - 22 * 8 / 28, 20)), (8, 40), (5, 45))
     assert replace(low, heel=base.heel).heel == (0, 0) and len(base.outline) == 6
 
 

@@ -18,7 +18,15 @@ from ..arrays import Setting, Settings
 from ..input import casefile
 from ..input.case import Case
 from ..input.case_names import CASES, case_file
-from ..input.parameters import INCLUDE, assignments, checked, declared, listing, parse_by_gmsh
+from ..input.parameters import (
+    GEOMETRY_LISTS,
+    INCLUDE,
+    assignments,
+    checked,
+    declared,
+    listing,
+    parse_by_gmsh,
+)
 from ..input.refinement import first_mesh
 from ..input.resolve import load
 from ..studies import quake
@@ -134,9 +142,12 @@ def fill_database(request: Request, case: Case) -> None:
     settings |= first_block(case)
     settings |= first_mesh(case) if request.accuracy else {}
     settings |= {name: checked(name, value) for name, value in request.overrides.items()}
-    settings.pop("lift_heights", None)
+    for name in GEOMETRY_LISTS:
+        settings.pop(name, None)
     first = {n: v[0] if isinstance(v, tuple) else v for n, v in settings.items()}
     lists = listing("levels", case.levels) + listing("times", case.times)
+    if case.downstream_face:
+        lists += listing("downstream_face", case.downstream_face)
     parse_by_gmsh(assignments(first) + lists + INCLUDE)
 
 
@@ -195,8 +206,7 @@ def case_text(sheet: Sheet, run: Case) -> str:
         "tail_levels": list(case.tail_levels),
         "times": list(case.times),
     }
-    if case.lift_heights:
-        file.lists["lift_heights"] = list(case.lift_heights)
+    file.lists |= {n: list(values) for n in GEOMETRY_LISTS if (values := getattr(case, n))}
     names = run.joint_names
     if file.of_joints and len(set(names)) == len(next(iter(file.of_joints.values()))):
         for k, name in enumerate(names):

@@ -21,7 +21,7 @@ from .. import InputError
 from ..arrays import Setting
 from ..dynamics.frames import MOST_FRAMES
 from ..input.case import Case
-from ..input.parameters import AUTOMATIC, Parameter, levels_of
+from ..input.parameters import AUTOMATIC, GEOMETRY_LISTS, Parameter, levels_of
 from ..input.refinement import ACCURACIES
 from ..studies.quake import RUNNING
 from . import views
@@ -49,7 +49,8 @@ FRAMES = "Parameters/91Earthquake/02Show from : to [s]"
 OF_EARTHQUAKE = "added_mass", "quake_uplift"
 #: Heights of the lift joints; text of none.
 LIFTS = "Parameters/2Geometry/26Lift joints above the first one [m]"
-NO_LIFTS = "none"
+CORNERS = "Parameters/2Geometry/232Downstream face: x, y of corners, upwards [m]"
+NONE_LISTED = "none"
 #: Entries on the water levels.
 OF_LEVELS = (LEVELS, TAIL_LEVELS, STEPS, TIMES)
 ACCURACY = "Parameters/3Mesh/0Accuracy"
@@ -184,7 +185,8 @@ class Tree:
             )
         # read back, since the database may round a number
         self.shown = {e["name"]: value_of(e["name"]) for e in sheet.entries} | {
-            name: value_of(name) for name in (CASE, FILE, LEVELS, TAIL_LEVELS, LIFTS, RECORD)
+            name: value_of(name)
+            for name in (CASE, FILE, LEVELS, TAIL_LEVELS, LIFTS, CORNERS, RECORD)
         }
 
     def scene_entries(self, sheet: Sheet) -> list[dict[str, Any]]:
@@ -217,10 +219,17 @@ class Tree:
             text(TIMES, times, readOnly=True, help=f"t = {times}"),
             text(
                 LIFTS,
-                levels_text(case.lift_heights) or NO_LIFTS,
+                levels_text(case.lift_heights) or NONE_LISTED,
                 visible=not case.geometry,
-                help=f"heights of their heels, from the lowest, or {NO_LIFTS}; values of each joint"
-                " are set in a case file",
+                help=f"heights of their heels, from the lowest, or {NONE_LISTED}; values of each "
+                "joint are set in a case file",
+            ),
+            text(
+                CORNERS,
+                levels_text(case.downstream_face) or NONE_LISTED,
+                visible=not case.geometry,
+                help="x, y of each corner between the base and the crest, from the lowest, or "
+                f"{NONE_LISTED}: a straight face, or one with a neck",
             ),
             text(
                 ACCURACY,
@@ -350,10 +359,10 @@ class Tree:
             for label in labels
             if label in shown and value_of(label) != shown[label]
         }
-        lifts = get_text(LIFTS)
-        if lifts != shown[LIFTS]:
-            none = lifts in (NO_LIFTS, "")
-            changed["lift_heights"] = () if none else levels_of("lift_heights", lifts)
+        for name in GEOMETRY_LISTS:
+            listed = get_text(FIELDS_OF_NAMES[name])
+            if listed != shown[FIELDS_OF_NAMES[name]]:
+                changed[name] = () if listed in (NONE_LISTED, "") else levels_of(name, listed)
         return replace(
             request,
             overrides={**request.overrides, **changed},
@@ -526,6 +535,7 @@ FIELDS_OF_NAMES = {
     "tail_levels": TAIL_LEVELS,
     "steps": STEPS,
     "lift_heights": LIFTS,
+    "downstream_face": CORNERS,
     "accuracy": ACCURACY,
     "record": RECORD,
     "frames": FRAMES,

@@ -17,6 +17,8 @@ from .constraints import (
     USUAL,
     check_acting,
     check_distances,
+    check_downstream_face,
+    check_joints_on_face,
     check_lift_heights,
     check_lifts,
     check_stiffness,
@@ -25,6 +27,7 @@ from .constraints import (
 )
 from .joint_graph import ROCK, JointGraph
 from .parameters import (
+    GEOMETRY_LISTS,
     constants,
     declared,
     independent,
@@ -50,7 +53,7 @@ SOLVER = "artificial", "yield_tolerance", "release_length"
 #: Variables of pro/section.pro: the joint's ends, the segments of the faces, the marks of line
 #: forces.
 SECTION = (
-    *("heel_x", "heel_y", "toe_x", "toe_y", "joint_length", "joint_along", "crest_x", "neck_y"),
+    *("heel_x", "heel_y", "toe_x", "toe_y", "joint_length", "joint_along"),
     *("seg_side", "seg_body", "seg_x0", "seg_y0", "seg_x1", "seg_y1"),
     *("mark_region", "mark_x", "mark_y", "mark_segment"),
 )
@@ -113,14 +116,19 @@ class Case(ParameterValues):
     section: dict[str, list[float]] = field(default_factory=dict, compare=False, repr=False)
     #: heights of the joints above the first one [m]
     lift_heights: tuple[float, ...] = ()
+    #: corners of the downstream face between base and crest, upwards: x, y, x, y, ... [m]
+    downstream_face: tuple[float, ...] = ()
     #: an entry for each joint, from the lowest; empty if there is only one
     of_joints: tuple[OfJoint, ...] = ()
 
     def __repr__(self) -> str:
         levels = ", ".join(f"{level:g}" for level in self.levels)
-        lifts = ", ".join(f"{height:g}" for height in self.lift_heights)
-        several = f", lift_heights {lifts} m" if lifts else ""
-        parts = [f"{self.name}: levels {levels} m{several}", listed(self.not_default)]
+        lists = "".join(
+            f", {name} {', '.join(f'{value:g}' for value in values)} m"
+            for name in GEOMETRY_LISTS
+            if (values := getattr(self, name))
+        )
+        parts = [f"{self.name}: levels {levels} m{lists}", listed(self.not_default)]
         parts += [f"{joint.name}: {listed(joint.joint_values)}" for joint in self.of_joints]
         return "; ".join(part for part in parts if part and not part.endswith(": "))
 
@@ -342,6 +350,8 @@ def check_joints(case: Case) -> None:
     """
     if case.lift_heights:
         check_lift_heights(case.lift_heights, case["dam_height"])
+    if case.downstream_face:
+        check_downstream_face(case, case.downstream_face)
     for joint, name in zip(case.joints, case.joint_names, strict=True):
         try:
             check_values(joint, joint.section, joint.geometry is None)
@@ -351,6 +361,8 @@ def check_joints(case: Case) -> None:
         except InputError as error:  # of a value for all joints the first one
             where = "" if joint is case.joints[0] else f"{name}: "
             raise InputError(f"{where}{error}") from None
+    sections = [joint.section for joint in case.joints]
+    if case.downstream_face:
+        check_joints_on_face(case, case.downstream_face, sections)
     if case.lift_heights:
-        sections = [joint.section for joint in case.joints]
         check_lifts(case, case.lift_heights, sections)

@@ -10,7 +10,8 @@ A case is a list of statements, in any layout, with // and /* */ comments:
     record = "quake.csv";            accelerations of the ground, beside this file
     default_<parameter> = value;     a text; arithmetic with + - * / ^ ( ), Pi, the units of
                                      pro/units.pro and defaults set before
-    levels() = {value, ...};         tail_levels(), times() and lift_heights() likewise
+    levels() = {value, ...};         tail_levels(), times(), lift_heights() and, with x, y of each
+                                     corner, downstream_face() likewise
     Struct Joint::<joint> [ <parameter> value, ... ];
                                      values of the joint of this name, in which _ stands for all but
                                      letters and digits: Joint::lift_25_m
@@ -32,9 +33,9 @@ from .. import InputError, data
 from ..arrays import Value
 from ..storage import text_of
 from .arithmetic import arithmetic_value, explained
-from .parameters import TEXTS, Parameter, assignments, checked, declared, parameter
+from .parameters import GEOMETRY_LISTS, TEXTS, Parameter, assignments, checked, declared, parameter
 
-LISTS = ("levels", "tail_levels", "times", "lift_heights")
+LISTS = ("levels", "tail_levels", "times", *GEOMETRY_LISTS)
 #: Most bytes of a case file.
 LONGEST = 1_000_000
 #: Most files that a case includes: more are an endless inclusion.
@@ -179,9 +180,10 @@ def add_statement(case: CaseText, statement: list[Token], path: Path, where: str
         if not file.exists():
             raise InputError(f"{where}: there is no such file beside {path.name}, and no preset")
         read_into(case, file)
-    elif name == "lift_heights" and tokens[1:] == ("(", ")", "=", "{", "}"):
+    elif name in GEOMETRY_LISTS and tokens[1:] == ("(", ")", "=", "{", "}"):
         case.lists.pop(name, None)
-        keep_first_block(case)
+        if name == "lift_heights":
+            keep_first_block(case)
     elif name in LISTS and tokens[1:4] == ("(", ")", "="):
         case.lists[name] = numbers(items_of(kinds[4:], tokens[4:], where), case, where)
         note_owner(case, name, path)

@@ -10,6 +10,8 @@ import math
 import operator
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
 from .. import InputError
 from ..laws import LAWS
 from .parameters import constants, declared
@@ -261,6 +263,71 @@ def check_section(case: ParameterValues, section: Mapping[str, Sequence[float]])
             "mesh_pattern = regular: must be free, layers or split for a section with batter, "
             "neck, lift joint or line forces"
         )
+
+
+def check_downstream_face(case: ParameterValues, face: Sequence[float]) -> None:
+    """Corners of the downstream face between base and crest (x, y, x, y, ... [m]): upwards, and
+    downstream of the upstream face.
+    """
+    listed = f"downstream_face = {','.join(f'{v:g}' for v in face)}"
+    dam, height = case.dimensions, case["dam_height"]
+    least = LEAST_LENGTH * height
+    if len(face) % 2:
+        raise InputError(f"{listed}: must be pairs x,y, for each corner its x and its height")
+    if dam.neck_height:
+        raise InputError(f"neck_height = {dam.neck_height:g}: must be 0 with downstream_face")
+    if case.mesh.mesh_pattern == "regular":
+        raise InputError(
+            "mesh_pattern = regular: must be free, layers or split with downstream_face"
+        )
+    corners = downstream_corners(case, face)
+    for (_, low), (_, high) in itertools.pairwise(corners):
+        if not high - low >= least:
+            raise InputError(
+                f"{listed}: the heights of its corners must increase from above the base's toe "
+                f"({corners[0][1]:g} m) to below the crest ({height:g} m), each by {least:g} m or "
+                f"more ({OF_HEIGHT})"
+            )
+    x, y = zip(*corners, strict=True)
+    # the upstream face is straight between these heights, the other one between its corners
+    for at in sorted({*y, dam.batter_height} if dam.batter else y):
+        upstream = dam.batter * min(max(at, 0.0) / dam.batter_height, 1.0)
+        if not np.interp(at, y, x) - upstream >= least:
+            raise InputError(
+                f"{listed}: must lie downstream of the upstream face, at x > {upstream:g} m at a "
+                f"height of {at:g} m"
+            )
+
+
+def downstream_corners(case: ParameterValues, face: Sequence[float]) -> list[tuple[float, float]]:
+    """Corners of the downstream face [m] from the base to the crest; face: those between."""
+    dam = case.dimensions
+    slope = 0.0 if dam.joint_height else math.tan(math.radians(dam.joint_slope))
+    between = zip(face[::2], face[1::2], strict=True)
+    ends = (dam.dam_base, dam.dam_base * slope), (dam.batter + dam.dam_crest, dam.dam_height)
+    return [ends[0], *between, ends[1]]
+
+
+def check_joints_on_face(
+    case: ParameterValues,
+    face: Sequence[float],
+    sections: Sequence[Mapping[str, Sequence[float]]],
+) -> None:
+    """Joints of a section with corners of the downstream face as in `check_downstream_face`: the
+    line of a joint meets the face only at its toe. sections: of each joint.
+    """
+    for section in sections:
+        x0, y0, x1, y1 = (section[name][0] for name in ("heel_x", "heel_y", "toe_x", "toe_y"))
+        for x, y in downstream_corners(case, face):
+            beyond = (x1 - x0) * (y - y0) - (y1 - y0) * (x - x0)  # > 0: above the line
+            near = LEAST_LENGTH * case["dam_height"]
+            if abs(y - y1) > near and (y > y1) != (beyond > near * (x1 - x0)):
+                listed = ",".join(f"{v:g}" for v in face)
+                raise InputError(
+                    f"downstream_face = {listed}: its corner at ({x:g}, {y:g}) must be "
+                    f"{'above' if y > y1 else 'below'} the line of the joint from ({x0:g}, {y0:g}) "
+                    f"to ({x1:g}, {y1:g})"
+                )
 
 
 def check_lift_heights(heights: Sequence[float], height: float) -> None:

@@ -37,6 +37,8 @@ OF_JOINTS = (
 )
 #: Texts of a case that are no parameters, and options of commands that set them, too.
 TEXTS = {"title": "", "also_uplift": "", "geometry": "", "record": " or by --record FILE.csv"}
+#: Lists of a section's geometry, which are settings like parameters: empty by default.
+GEOMETRY_LISTS = "lift_heights", "downstream_face"
 #: Limit that means > 0 in the declarations.
 TINY = 1e-30
 #: Limit that means < 0.5 there.
@@ -354,7 +356,7 @@ def checked(name: str, value: Any) -> Setting:
 
     Raises InputError.
     """
-    if name == "lift_heights":
+    if name in GEOMETRY_LISTS:
         return levels_of(name, value) if value else ()
     if "." in name:
         return of_one_joint(name, value)[2]
@@ -391,10 +393,11 @@ def levels_of(name: str, levels: Any) -> tuple[float, ...]:
     """
     values = levels.split(",") if isinstance(levels, str) else levels
     listed = levels if isinstance(levels, str) else ",".join(map(str, levels))
-    message = f"{name} = {listed}: must be a list of levels in metres, such as 3,6,8,9"
+    kind = "x,y of each corner in metres" if name == "downstream_face" else "levels in metres"
+    message = f"{name} = {listed}: must be a list of {kind}, such as 3,6,8,9"
     try:
         result = tuple(quantity(v) if isinstance(v, str) else float(v) for v in values)
-    except ValueError as error:
+    except (TypeError, ValueError) as error:
         raise InputError(explained(message, error)) from None
     if not result or not all(map(math.isfinite, result)):
         raise InputError(message)

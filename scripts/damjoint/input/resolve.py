@@ -23,7 +23,7 @@ from .constraints import (
 )
 from .geometry_file import geometry_file
 from .joints import names_of_section, parsed_by_joint, settings_of_joints, stacked_joints
-from .parameters import checked, declared, levels_of, listing
+from .parameters import GEOMETRY_LISTS, checked, declared, levels_of, listing
 from .refinement import first_mesh, relative_error
 from .source import Source
 
@@ -43,10 +43,10 @@ def load(
     """Read a case file, apply overrides, resolve the parameters that follow others, check all.
 
     case: letter, name or path; overrides: {name: value, or a value for each joint}, also
-    lift_heights [m], and of one joint "lift 25 m.mu"; levels, tail_levels: [m] at t = 1, 2, 3, also
-    as a text 'a,b,c'; steps: equal steps between two levels; accuracy: coarse, standard, fine or a
-    percentage, chooses order, first mesh (overrides win) and one step per level; record: file of
-    the ground's acceleration. Raises InputError.
+    lift_heights, downstream_face [m], and of one joint "lift 25 m.mu"; levels, tail_levels: [m] at
+    t = 1, 2, 3, also as a text 'a,b,c'; steps: equal steps between two levels; accuracy: coarse,
+    standard, fine or a percentage, chooses order, first mesh (overrides win) and one step per
+    level; record: file of the ground's acceleration. Raises InputError.
     """
     path = case_file(case)
     text = casefile.read(path)
@@ -79,14 +79,20 @@ def resolve(source: Source) -> Case:
     if tail_levels is not None:
         tails = levels_of("tail_levels", tail_levels)
     overrides = {name: checked(name, value) for name, value in overrides.items()}
-    lifts = lists.pop("lift_heights", ())
-    if "lift_heights" in overrides:
-        given = overrides.pop("lift_heights")
-        lifts = levels_of("lift_heights", given) if given else ()
+    for name in GEOMETRY_LISTS:
+        if name in overrides:
+            given = overrides.pop(name)
+            lists[name] = levels_of(name, given) if given else ()
+    lifts, face = (lists.pop(name, ()) for name in GEOMETRY_LISTS)
     geometry = geometry_file(file.texts["geometry"]) if "geometry" in file.texts else None
     settings = {**file.defaults, **file.of_joints, **overrides}
     names = () if geometry else names_of_section(settings, lifts)
     values = settings_of_joints(settings, source.blocks(names), lifts, geometry)
+    if geometry and face:
+        raise InputError(
+            "downstream_face: must not be set for a geometry of one's own, whose mesh has the faces"
+        )
+    lists |= {"downstream_face": face} if face else {}
     listed = "".join(listing(n, v) for n, v in lists.items())
     variables, *of_joints = parsed_by_joint(values, listed, lifts)
     if accuracy is not None and geometry and geometry.suffix != ".geo":
@@ -113,6 +119,7 @@ def resolve(source: Source) -> Case:
         shared={n: variables[n] for n in SHARED},
         section={n: variables[n] for n in SECTION},
         lift_heights=lifts,
+        downstream_face=face,
         of_joints=stacked_joints(variables, of_joints),
     )
     for joint, parsed in zip(result.joints, of_joints or [variables], strict=True):

@@ -29,13 +29,17 @@ MARKS = {
 
 
 def shares(case: Case) -> dict[str, Setting]:
-    """The parameters that the mesh of a case depends on, and the lists of its lifts."""
+    """The parameters that the mesh of a case depends on, and the lists of its downstream face and
+    of its lifts.
+    """
     names = [*GEOMETRY, *(n for force, needs in MARKS.items() if case[force] for n in needs)]
     values: dict[str, Setting] = {name: case[name] for name in names}
     # of a force only whether it acts
     values |= {name: float(bool(case[name])) for name in MARKS}
     if has_drains(case):  # they need a node in all modes of uplift
         values |= {"uplift": "drained", "drain_x": case["drain_x"]}
+    if case.downstream_face:
+        values["downstream_face"] = case.downstream_face
     if case.lift_heights:
         _, *lifts = case.joints
         values["lift_heights"] = case.lift_heights

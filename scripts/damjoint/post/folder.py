@@ -18,7 +18,7 @@ from typing import Any
 from .. import InputError, __version__
 from ..input.case import Case, OfJoint
 from ..input.case_names import is_name
-from ..input.parameters import declared
+from ..input.parameters import GEOMETRY_LISTS, declared
 from ..model.results import Results, history_columns, joint_columns
 from ..statics.hints import hints
 from ..statics.statement import statement
@@ -200,7 +200,7 @@ def write_info(results: Results, folder: Path, state: str = "", why: str = "") -
             "statement": why or statement(results),
             "hints": hints(results),
             "parameters": case.values,
-            "lift_heights": case.lift_heights,
+            **{name: getattr(case, name) for name in GEOMETRY_LISTS},
             "joints": [stored(case, joint) for joint in case.of_joints],
             "levels": case.levels,
             "tail_levels": case.tail_levels,

@@ -16,7 +16,14 @@ from ..arrays import Value
 from ..input.case import SECTION, SHARED, Case
 from ..input.case_names import is_name
 from ..input.joints import parsed_by_joint, stacked_joints
-from ..input.parameters import INCLUDE, assignments, constants, declared, listing
+from ..input.parameters import (
+    GEOMETRY_LISTS,
+    INCLUDE,
+    assignments,
+    constants,
+    declared,
+    listing,
+)
 from ..input.scene import numbered
 from ..mesh.body import Body
 from ..model.fields import Field, Solution
@@ -98,13 +105,15 @@ def case_of(info: dict[str, Any]) -> Case:
         raise InputError(f"run.json of damjoint {version} lacks parameters: {', '.join(missing)}")
     values = {n: p.check(info["parameters"][n]) for n, p in declared().items()}
     levels, tail_levels, times = (finite(n, info[n]) for n in ("levels", "tail_levels", "times"))
-    lifts = finite("lift_heights", info["lift_heights"])
+    lifts, face = (finite(name, info[name]) for name in GEOMETRY_LISTS)
     of_joints_given = [
         values | {n: declared()[n].check(v) for n, v in joint["values"].items()}
         for joint in info["joints"]
     ]
     parsed, *of_joints = parsed_by_joint(
-        of_joints_given or [values], listing("levels", levels), lifts
+        of_joints_given or [values],
+        listing("levels", levels) + listing("downstream_face", face) * bool(face),
+        lifts,
     )
     # a section by parameters is computed again
     ends = ("name", "upper", "lower", "section") if info["geometry"] else ()
@@ -125,6 +134,7 @@ def case_of(info: dict[str, Any]) -> Case:
         geometry=Path(info["geometry"]) if info["geometry"] else None,
         section={n: parsed[n] for n in SECTION} | info["section"],
         lift_heights=lifts,
+        downstream_face=face,
         of_joints=joints,
     )
 

@@ -214,6 +214,9 @@ def loading(case: Case) -> dict[str, Entry]:
     if case.lift_heights:
         text = "Heights of the heels of the lift joints"
         entries = {"lift_heights": Entry(text, listed(case.lift_heights), "m")} | entries
+    if case.downstream_face:
+        text = "Corners of the downstream face, x and height of each"
+        entries = {"downstream_face": Entry(text, listed(case.downstream_face), "m")} | entries
     if case.of_joints:
         text = "Joints, in the order of values that differ"
         entries = {"joints": Entry(text, ", ".join(case.joint_names))} | entries

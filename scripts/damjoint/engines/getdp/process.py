@@ -160,6 +160,8 @@ def write_problem(
         paths = values_of_paths(mesh, case) if mesh else [""] * number
         macros = (values_of_joint(case, mesh, k, paths[k]) for k in range(number))
         of_joints = "of_joints = 1;\n" + "".join(macros)
+    if case.downstream_face:
+        lists["downstream_face"] = case.downstream_face
     if case.lift_heights:
         lists["lift_heights"] = case.lift_heights
         lists["lift_slopes"] = [lift["joint_slope"] for lift in case.joints[1:]]
