@@ -9,6 +9,7 @@
 The package:
 
 arrays.py   types of arrays; csr.py: sparse matrices; threads.py: threads of the linear algebra
+units.py    units in which values are shown
 storage.py  atomic writes, locks on files and folders
 progress.py progress of long work, on a terminal and in redirected output
 processes.py work in several processes

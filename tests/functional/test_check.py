@@ -103,7 +103,7 @@ def test_two_load_combinations(command, combinations, tmp_path, texts_drawn):
     [
         ({"required_SSF": 3.0}, "SSF {SSF:.4g} < 3"),
         ({"required_OSF": 5.0}, "OSF {OSF:.4g} < 5"),
-        ({"f_c": 1.5e5}, "compression {toe:.4g} Pa at the toe > f_c = 150000 Pa"),
+        ({"f_c": 1.5e5}, "compression {toe:.4g} kPa at the toe > f_c = 150 kPa"),
     ],
 )
 def test_a_factor_below_the_required_one_fails(solve, setting, message):
@@ -113,7 +113,7 @@ def test_a_factor_below_the_required_one_fails(solve, setting, message):
         met = replace(answer.case, values=answer.case.values | {"required_OSF": 1.01})
         assert replace(answer, case=met).row["verdict"] == "pass"
         stricter = replace(answer, case=replace(answer.case, values=answer.case.values | setting))
-        expected = message.format(**answer.numbers, toe=-answer.numbers["sigma_n_toe"])
+        expected = message.format(**answer.numbers, toe=-answer.numbers["sigma_n_toe"] / 1e3)
         assert stricter.failures == [expected]
         assert (stricter.row["verdict"], stricter.row["why"]) == ("fail", expected)
 
@@ -222,7 +222,7 @@ def test_a_second_crack_in_equilibrium_has_its_own_row(command, tmp_path):
 def test_a_note_gives_the_crack_without_tensile_strength(solve):
     (result,) = solve("dam", "45", law="rupture", sigma_max=2e6, G_f=100.0, n_joint=20.0)
     (note,) = (note for note in compare_methods(result).notes if "tension" in note)
-    assert "below the strength of 2000 kPa; without tension: crack 0." in note
+    assert "below the strength of 2 MPa; without tension: crack 0." in note
 
 
 #: A dam whose elastic crack passes the drains, while that of the rigid block ends before them.

@@ -21,6 +21,7 @@ from damjoint.fem.bodies import Bodies, material_of
 from damjoint.fem.elasticity import stress
 from damjoint.input.resolve import load
 from damjoint.joint import linear_system
+from damjoint.post import stored
 from damjoint.solver.history import joint_row
 from damjoint.studies import chart, outcome, quake_study, quake_summary, sweep
 from damjoint.studies.plan import Plan
@@ -668,6 +669,8 @@ def test_the_command_writes_rows_summary_and_picture(command, case_file, tmp_pat
     assert cells[0] == "horizontal"
     assert float(cells[1]) == pytest.approx(ground.max() / 9.80665, rel=5e-3)
     assert float(cells[3]) == pytest.approx(arias, rel=1e-2)
+    assert "tension &gt; 0, at level 30 m, static, after the earthquake</h3>" in page
+    assert "principal stress" in page.split("static, after the earthquake")[1]
     assert "its stiffness part alone acts" in page and "The rigid block [Newmark 1965]" in page
 
 
@@ -822,6 +825,9 @@ def test_frames_are_states_of_the_bodies_and_the_joint(command, case_file, tmp_p
     assert {f"{part}_t{t:g}.vtu" for part in ("bulk", "joint") for t in times} < names
     listed = (folder / "fields" / "fields.pvd").read_text()
     assert listed.count("<DataSet") == 2 * len(times)
+    for part in ("bulk", "joint"):  # a frame at 1 s is not the static state of t = 1
+        (folder / f"fields/{part}_t0.1.vtu").rename(folder / f"fields/{part}_t1.vtu")
+    assert not stored.read(folder).fields
     case = load("dam", DAM | {"weight_first": 0.0}, "30", record=tmp_path / "wave.csv")
     under_way = QuakeRun(case)
     for _ in under_way.steps():

@@ -293,6 +293,11 @@ def test_report_of_a_critical_value(command, tmp_path):
     assert f"critical level {level:.6g} m" in words_of(page)
     both = rows_below(page, f"Finite elements and gravity method, at level {level:.4g} m")
     assert_allclose(column(both, "N'")[0], column(both, "N'")[1], rtol=1e-3)
+    heading = f"Stress in the bodies, by finite elements, tension &gt; 0, at level {level:.4g} m"
+    stress = rows_below(page, heading)
+    largest, smallest = column(stress, "largest"), column(stress, "smallest")
+    assert [row[0] for row in stress[1:]] == ["dam", "rock"] and (smallest < 0).all()
+    assert (largest > smallest).all()
 
 
 def test_limits_of_the_model_follow_the_case():

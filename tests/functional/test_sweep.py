@@ -13,10 +13,10 @@ import pytest
 from closed_forms import slide_level, slide_level_of_45_m_dam
 from damjoint.input.case_names import CASES
 from damjoint.input.resolve import load, varied
-from damjoint.post.units import LENGTHS
 from damjoint.statics import gravity
 from damjoint.studies import chart, sweep
 from damjoint.studies.plan import plan_of, plan_with
+from damjoint.units import LENGTHS
 from processes import without_progress
 from scipy import stats
 

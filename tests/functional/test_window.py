@@ -26,9 +26,9 @@ from damjoint.gui.window import ACTION, Session
 from damjoint.gui.worker import EngineProcess
 from damjoint.input.resolve import load
 from damjoint.mesh.mesh import mesh_of
-from damjoint.post.units import LENGTHS
 from damjoint.statics.hints import hints
 from damjoint.studies.check import compare_methods
+from damjoint.units import LENGTHS
 from PIL import Image
 from quakes import DAM, smooth_record
 

@@ -11,7 +11,18 @@ from damjoint_tools import pages
 PACKAGE = Path(damjoint.__file__).parent
 WITNESS = PACKAGE.with_name("damjoint_witness")
 #: Each part uses only those before it.
-PARTS = ["", "csr", "threads", "storage", "progress", "processes", "versions", "laws", "input"]
+PARTS = [
+    "",
+    "units",
+    "csr",
+    "threads",
+    "storage",
+    "progress",
+    "processes",
+    "versions",
+    "laws",
+    "input",
+]
 PARTS += ["mesh", "model", "fem", "joint", "solver", "dynamics", "engines", "statics", "post"]
 PARTS += ["pictures", "accuracy", "session", "runner", "studies", "verification", "library"]
 PARTS += ["gui", "cli", "__main__"]

@@ -17,7 +17,7 @@ from damjoint.model.fields import (
 from damjoint.model.loads import STAGED, Loading
 from damjoint.pictures.outline import JointLine, section_of, skin
 from damjoint.pictures.scene import displaced_faces, fluid_above, fluids
-from damjoint.post.units import FORCES, LENGTHS, unit, with_unit
+from damjoint.units import FORCES, LENGTHS, unit, with_unit
 from numpy.testing import assert_allclose
 
 

@@ -52,7 +52,7 @@ def add(command: Parser) -> None:
         convert=time_span,
         metavar="FIRST:LAST",
         help="write files of displacement and stress at up to 200 times between two times [s] "
-        "(default: none; --fields alone: the whole record)",
+        "(default: at the static states; --fields alone: over the whole record)",
     )
     command.add_argument("--no-picture", action="store_true", help="draw no PNG")
 

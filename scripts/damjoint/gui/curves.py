@@ -10,7 +10,7 @@ import numpy as np
 from ..arrays import Table
 from ..model.fields import along
 from ..pictures.scene import is_extruded
-from ..post.units import FORCES, LENGTHS, STRESSES, Units
+from ..units import FORCES, LENGTHS, STRESSES, Units
 from .gallery import BLUE, DARK, GREEN, GREY, LAKE, ORANGE, RED, Color
 from .graphs import BEFORE, Curve, Graph, Graphs
 from .numbers import ACCELERATIONS, SECONDS

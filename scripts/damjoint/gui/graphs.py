@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import gmsh
 import numpy as np
 
-from ..post.units import Units, unit
+from ..units import Units, unit
 from .gallery import DARK, GREY, Color, Gallery
 from .layout import Layout
 from .shapes import Pieces

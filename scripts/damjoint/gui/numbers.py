@@ -13,12 +13,12 @@ from .. import ROUND_OFF
 from ..arrays import Table as Columns
 from ..model.results import HISTORY, QUAKE, Results, column_of
 from ..post.summary import SHOWN, Table, levels_table, requested_rows, table_of
-from ..post.units import FORCES, LENGTHS, Units, unit, with_unit
 from ..statics import gravity
 from ..statics.hints import hints
 from ..statics.statement import path_statement
 from ..studies.quake_result import QuakeResult
 from ..studies.quake_summary import row_of_peak
+from ..units import FORCES, LENGTHS, Units, unit, with_unit
 
 NUMBER: Units = (("-", 1),)
 #: Safety factors: column, heading, meaning.

@@ -24,7 +24,7 @@ from ..model.fields import (
     row_of_nodes,
     state_of,
 )
-from ..post.units import LENGTHS, STRESSES, unit, with_unit
+from ..units import LENGTHS, STRESSES, unit, with_unit
 from . import layout as places
 from .camera import CLIPPED, undeformed_camera
 from .curves import show_graphs

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..arrays import Array, BoolArray
+from ..units import STRESSES, with_unit
 from .base import Evidence, Law
 
 #: Parameters of a joint that stays elastic under any load.
@@ -196,6 +197,6 @@ class Friction(Law[FrictionVariables]):
             part = "" if np.isnan(share) else f" ({share:.0%} of the overturning moment)"
             yield (
                 f"the joint is open over {evidence.crack_length:.3g} m and transmits tension "
-                f"there, adhesion/mu = {self.open_tension / 1e3:.4g} kPa{part}, at any opening, as "
-                "the friction law is published: law = bond does not"
+                f"there, adhesion/mu = {with_unit(self.open_tension, STRESSES)}{part}, at any "
+                "opening, as the friction law is published: law = bond does not"
             )

@@ -19,8 +19,8 @@ from ..input.scene import BED, DOWN, FLOOR, UP
 from ..model.fields import BROKEN, SOFTENING, along, state_of
 from ..model.loads import Loading
 from ..model.results import Results
-from ..post.units import STRESSES, unit
 from ..statics.gravity import GravityMethod, RigidBlock
+from ..units import STRESSES, unit
 from .drawing import (
     BLUE,
     CONCRETE,

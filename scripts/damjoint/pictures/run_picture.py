@@ -31,11 +31,11 @@ from ..model.loads import Loading
 from ..model.results import Results
 from ..post import validation
 from ..post.summary import Table, joints_table
-from ..post.units import FLUXES, LENGTHS, STRESSES, Units, unit
 from ..post.validation import shown_time
 from ..statics import gravity
 from ..statics.statement import statement
 from ..statics.verdict import decisive_joint, overturning_level, verdict
+from ..units import FLUXES, LENGTHS, STRESSES, Units, unit
 from .drawing import (
     BLUE,
     DARK,

@@ -29,8 +29,8 @@ from ..model.fields import (
 )
 from ..model.loads import COMPLETE, Loading, line_forces, thermal_strains
 from ..model.results import Results
-from ..post.units import FORCES, STRESSES, with_unit
 from ..statics import gravity
+from ..units import FORCES, STRESSES, with_unit
 from .outline import Section, exaggeration, joint_lines, section_of, skin
 
 #: Sides of a section below water: of the reservoir, of water on the crest, of the tailwater.

@@ -12,7 +12,7 @@ import numpy as np
 from .. import ROUND_OFF
 from ..model.results import Results
 from ..statics import gravity
-from .units import FLUXES, FORCES, LENGTHS, MOMENTS, Units, unit
+from ..units import FLUXES, FORCES, LENGTHS, MOMENTS, Units, unit
 
 #: Columns of the summary: name in the history, heading, units.
 SHOWN: tuple[tuple[str, str, Units], ...] = (

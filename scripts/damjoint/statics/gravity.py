@@ -27,6 +27,7 @@ from ..input.parameters import constants
 from ..input.values import flows, freezes_uplift, has_drains
 from ..model.loads import Loading, heads_at_ends, line_forces, zangar_column, zangar_share
 from ..model.network import WaterPath
+from ..units import STRESSES, with_unit
 
 #: Distance from a plane, over the length of a joint, within which a node lies in it.
 PLANE = 1e-6
@@ -619,8 +620,8 @@ class GravityMethod:
         if not self.crack_length and self.tip_stress > 0:
             strength = case.law.tensile_strength
             notes.append(
-                f"gravity method: uncracked, as its {self.tip_stress / 1e3:.4g} kPa at the heel "
-                f"are below the strength of {strength / 1e3:.4g} kPa; without tension: "
+                f"gravity method: uncracked, as its {with_unit(self.tip_stress, STRESSES)} at the "
+                f"heel are below the strength of {with_unit(strength, STRESSES)}; without tension: "
                 f"{alternatives(self.without_tension)}"
             )
         return notes

@@ -8,6 +8,7 @@ from ..input.case import Case
 from ..input.values import has_drains
 from ..laws import Evidence
 from ..model.results import Results
+from ..units import STRESSES, with_unit
 from . import gravity
 from .verdict import STIFF_JOINT, stiffness_ratio, verdict
 
@@ -136,7 +137,7 @@ def hints_on_state(results: Results, last: dict[str, float]) -> list[str]:
         strength = case.law.tensile_strength
         if heel > IN_TENSION * strength > 0:
             messages.append(
-                f"the heel is in tension, {heel / 1e3:.4g} kPa of the tensile strength of "
-                f"{strength / 1e3:.4g} kPa"
+                f"the heel is in tension, {with_unit(heel, STRESSES)} of the tensile strength of "
+                f"{with_unit(strength, STRESSES)}"
             )
     return messages

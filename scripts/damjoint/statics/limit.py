@@ -18,6 +18,7 @@ from ..joint.interface import Interface
 from ..laws import UNBREAKABLE
 from ..model.results import column_of
 from ..solver.load_stepper import LoadStepper
+from ..units import FORCES, MOMENTS, with_unit
 
 #: Parameters on which N, T, M do not depend.
 STRENGTHS = (*UNBREAKABLE, "sigma_max", "G_f", "G_t", "alpha", "pena_rupture", "pena_contact")
@@ -85,19 +86,15 @@ def mechanism_of_joint(case: Case, history: dict[str, np.ndarray]) -> tuple[str,
     """See `mechanism`, of a case with a single joint; history: level, N, T, M at its steps."""
     length = case.section["joint_length"][0]
     shear = case.law.shear_bound(history["N"], length)
-    for name, demand, bound, words in (
-        ("sliding", np.abs(history["T"]), shear, "T = {:.6g} N/m exceeds the strength, {:.6g} N/m"),
-        (
-            "overturning",
-            -history["M"],
-            np.full_like(shear, case.law.tensile_strength * length**2 / 2),
-            "-M = {:.6g} N m/m exceeds the resistance, {:.6g} N m/m",
-        ),
+    tension = np.full_like(shear, case.law.tensile_strength * length**2 / 2)
+    for name, demand, bound, units, words in (
+        ("sliding", np.abs(history["T"]), shear, FORCES, "T = {} exceeds the strength, {}"),
+        ("overturning", -history["M"], tension, MOMENTS, "-M = {} exceeds the resistance, {}"),
     ):
         beyond = np.flatnonzero(demand > bound + MARGIN * np.abs(demand))
         if len(beyond):
             first = beyond[0]
-            reason = words.format(demand[first], bound[first])
+            reason = words.format(*(with_unit(v[first], units, 6) for v in (demand, bound)))
             level = history["level"][first]
             return name, f"{name}: no equilibrium at level {level:.6g} m: {reason}"
     return "", ""

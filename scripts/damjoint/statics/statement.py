@@ -8,6 +8,7 @@ from .. import ROUND_OFF
 from ..input.case import Case
 from ..input.values import has_drains
 from ..model.results import Results
+from ..units import FORCES, STRESSES, with_unit
 from . import gravity
 from .verdict import STIFF_JOINT, Bound, bound, failure, slipped_from, stiffness_ratio, verdict
 
@@ -72,8 +73,8 @@ def words_of_bound(reached: Bound) -> str:
         side = "from" if reached.value >= 0 else "beyond"
         return f"the resultant is {abs(reached.value):.3g} m {side} the toe"
     if reached.mode == "sliding":
-        strength = f"{reached.strength:.5g} N/m"
-        return f"T = {reached.value:.5g} N/m reaches the shear strength, {strength}"
+        force, strength = (with_unit(v, FORCES, 5) for v in (reached.value, reached.strength))
+        return f"T = {force} reaches the shear strength, {strength}"
     return ""
 
 
@@ -121,7 +122,7 @@ def path_statement(results: Results) -> str:
         return "no step has converged"
     driven = (time > case["drive_begin"] - ROUND_OFF) & (time < case["drive_end"] + ROUND_OFF)
     load = case["rho_water"] * case["g"] * level.max()
-    text = f"largest load: level {level.max():.5g} m ({load / 1e3:.5g} kPa)"
+    text = f"largest load: level {level.max():.5g} m ({with_unit(load, STRESSES, 5)})"
     if case["drive_by"] < 0:
         return text + "; the displacement was reversed"
     falls = bool((np.diff(level[driven]) < 0).any())

@@ -19,7 +19,7 @@ from ..pictures.drawing import GREY, panels
 from ..pictures.outline import Section, joint_lines, section_of, skin
 from ..pictures.run_picture import is_own_solid
 from ..post.summary import Table, table_of
-from ..post.units import STRESSES, Units
+from ..units import STRESSES, Units
 from .check import SafetyCheck
 
 #: Distance from the ends of a joint, over its length, within which the stress of elastic bodies is

@@ -20,8 +20,8 @@ from .. import InputError
 from ..input import parameters
 from ..input.case import Case
 from ..pictures.drawing import BLUE, ORANGE, RED, picture_style, widen, write_picture
-from ..post.units import LENGTHS, Units, unit
 from ..statics.gravity import sliding_factor
+from ..units import LENGTHS, Units, unit
 from .plan import Plan, Row, column_of, numbers
 from .report_input import UNITS
 

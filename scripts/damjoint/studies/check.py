@@ -25,7 +25,6 @@ from ..post import folder as folders
 from ..post import stored
 from ..post.summary import fitted
 from ..post.tables import write_csv
-from ..post.units import FORCES, MOMENTS, STRESSES, Units, unit
 from ..processes import in_processes
 from ..runner import run
 from ..session import finished, several
@@ -33,6 +32,7 @@ from ..statics import gravity, verdict
 from ..statics.gravity import GravityMethod
 from ..statics.statement import cracks_and_drains
 from ..statics.statement import statement as statement_of
+from ..units import FORCES, MOMENTS, STRESSES, Units, unit, with_unit
 from .keys import key_of
 
 FINITE_ELEMENTS, GRAVITY = "finite elements", "gravity method"
@@ -137,8 +137,8 @@ class MethodResult:
             if numbers[name] < value and not self.internal
         ]
         if case["f_c"] and -numbers["sigma_n_toe"] > case["f_c"]:
-            compression = f"compression {-numbers['sigma_n_toe']:.4g} Pa at the toe"
-            unmet.append(f"{compression} > f_c = {case['f_c']:g} Pa")
+            compression = f"compression {with_unit(-numbers['sigma_n_toe'], STRESSES)} at the toe"
+            unmet.append(f"{compression} > f_c = {with_unit(case['f_c'], STRESSES)}")
         placed = self.internal or math.isnan(numbers["x_resultant"])
         if not placed and not self.position_allowed:
             unmet.append(f"N {self.position}: must be in {case['required_position']}")
@@ -419,7 +419,7 @@ class SafetyCheck:
             notes.append(
                 "the finite elements' SSF has the cohesion of the open part, which the law "
                 f"{case['law']} keeps with its tension of adhesion/mu = "
-                f"{case.law.open_tension / 1e3:.4g} kPa; the gravity method's has none there"
+                f"{with_unit(case.law.open_tension, STRESSES)}; the gravity method's has none there"
             )
         left, undamaged = (
             self.finite_elements.numbers[name] for name in ("cohesion", "cohesion_undamaged")

@@ -26,6 +26,7 @@ from ..solver.path import PRECISION, ROUGH, SURE, Point
 from ..statics.statement import words_of_bound
 from ..statics.verdict import bound, highest_by_statics
 from ..threads import limited_threads
+from ..units import FORCES, STRESSES, with_unit
 from .critical_gravity import GravityValues
 from .critical_value import CriticalValue
 from .critical_words import (
@@ -488,18 +489,20 @@ class Search:
             doubt = "no equilibrium is found even in the first step"
         elif value is None:
             first = failing.points[0]
-            mode, limit = "", failing.case["f_c"]
+            mode = ""
+            toe, limit = (with_unit(v, STRESSES) for v in (first.compression, failing.case["f_c"]))
             doubt = (
                 f"already at level {first.level:.6g} m, the first equilibrium, the toe's "
-                f"compression, {first.compression:.4g} Pa, exceeds f_c = {limit:g} Pa; --levels "
-                "may begin lower"
+                f"compression, {toe}, exceeds f_c = {limit}; --levels may begin lower"
             )
         elif failing.crushed_at_top:
-            why = f"beyond it the toe's compression passes f_c = {failing.case['f_c']:g} Pa"
+            limit = with_unit(failing.case["f_c"], STRESSES)
+            why = f"beyond it the toe's compression passes f_c = {limit}"
         elif failing.slides:
             last = row_of_joint(failing.points[failing.top].last, failing.failing[0])
             what = failing.joint or "joint"
-            why = f"there the whole {what} slips: T = {last['T']:.5g} N/m is its shear strength"
+            shear = with_unit(last["T"], FORCES, 5)
+            why = f"there the whole {what} slips: T = {shear} is its shear strength"
         elif failing.settled(SURE):
             top, limit_point = failing.points[failing.top], failing.points[failing.limit_point]
             ratio = failing.points[-1].imposed / failing.imposed(limit_point)

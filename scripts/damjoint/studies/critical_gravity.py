@@ -16,6 +16,7 @@ from ..solver.path import PRECISION, Point
 from ..statics import gravity
 from ..statics.limit import elastic_heel_stress
 from ..statics.statement import cracks_and_drains
+from ..units import STRESSES, with_unit
 from .critical_value import CriticalValue
 
 #: Further assumptions of the gravity method: tension, longest crack.
@@ -82,11 +83,13 @@ class GravityValues:
         elastic = elastic_heel_stress(case, interface_of(case))
         if elastic <= strength:
             return ""
-        linear = method.tip_stress / 1e3
+        linear, heel, most = (
+            with_unit(v, STRESSES) for v in (method.tip_stress, elastic, strength)
+        )
         return (
-            f"there the gravity method is uncracked, {linear:.4g} kPa at the heel; "
-            f"the elastic stress of the finite elements (n_joint = {case['n_joint']:g}), "
-            f"{elastic / 1e3:.4g} kPa, exceeds the strength of {strength / 1e3:.4g} kPa"
+            f"there the gravity method is uncracked, {linear} at the heel; the elastic stress of "
+            f"the finite elements (n_joint = {case['n_joint']:g}), {heel}, exceeds the strength of "
+            f"{most}"
         )
 
     def drains(self, value: float, point: Point, points: Sequence[Point]) -> Iterator[str]:

@@ -27,8 +27,8 @@ from ..pictures.drawing import (
     write_picture,
 )
 from ..pictures.scene import loads_label, state_label
-from ..post.units import LENGTHS, unit
 from ..solver.path import Point
+from ..units import LENGTHS, unit
 from .critical_value import CriticalValue
 from .failure_path import FailurePath, Trial
 
@@ -53,11 +53,12 @@ class Content(NamedTuple):
 
     @property
     def facts(self) -> list[str]:
-        """Why the value is confirmed or not; the loads; the joint that fails in its last
-        equilibrium.
+        """Why the value is confirmed, or why not and how the dam would fail; the loads; the joint
+        that fails in its last equilibrium.
         """
         answer, result = self.answer, self.result
-        facts = [answer.why or f"not confirmed: {answer.doubt}"]
+        would = f" ({answer.failure})" if answer.failure else ""
+        facts = [answer.why or f"not confirmed: {answer.doubt}{would}"]
         if result and (last := result.last):
             loading = Loading.at(self.case, self.case.times[-1], last["level"], last["tail_level"])
             facts.append(f"loads: {loads_label(self.case, loading)}")
@@ -126,8 +127,9 @@ def heading(content: Content) -> str:
     if answer.value is None:
         return f"{title}: no critical {content.of} found"
     text = f"{title}: critical {content.of} {answer.value:.5g}{content.unit}"
-    where = f" on {answer.joint}" if answer.joint else ""
-    return text + (f", {answer.mode}{where}" if answer.mode else "")
+    if not answer.confirmed:
+        return text + ", not confirmed"
+    return text + (f", {answer.failure}" if answer.failure else "")
 
 
 def draw_trials(axes: Axes, content: Content) -> None:

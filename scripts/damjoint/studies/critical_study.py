@@ -8,11 +8,15 @@ from typing import Any
 import numpy as np
 
 from ..engines import engine_of
+from ..engines.condensed.recover import recover
 from ..engines.condensed.solve import about
+from ..fem.bodies import Bodies
 from ..input.case import Case
 from ..laws import Evidence
-from ..model.results import row_of_joint
+from ..model.fields import Solution
+from ..model.results import Results, row_of_joint
 from ..post import folder as folders
+from ..post.field_files import write_fields
 from ..post.tables import write_csv
 from ..runner import early_end
 from ..session import Session, end_of, preparation, session
@@ -66,10 +70,12 @@ def printed_lines(answer: CriticalValue, search: Search) -> list[str]:
     if answer.value is None:
         lines = [f"{name}: no critical {of} found: {answer.doubt}"]
     else:
-        where = f" on {answer.joint}" if answer.mode and answer.joint else ""
-        mode = f" ({answer.mode}{where})" if answer.mode else ""
-        lines = [f"{name}: critical {of} {answer.value:.6g}{unit}{mode}"]
-        lines.append(answer.why or f"not confirmed: {answer.doubt}")
+        mode = f" ({answer.failure})" if answer.failure else ""
+        critical = f"{name}: critical {of} {answer.value:.6g}{unit}"
+        if answer.why:
+            lines = [critical + mode, answer.why]
+        else:
+            lines = [f"{critical}, not confirmed: {answer.doubt}{mode}"]
     lines += [*growth_lines(answer), *answer.events]
     if search.of == "strength" and set(search.partial.values()) != {1.0}:
         mu, cohesion = search.partial["mu"], search.partial["adhesion"]
@@ -116,10 +122,25 @@ def save(study: Session, search: Search, answer: CriticalValue) -> None:
     if answer.point and result:
         result.info = about(answer.point.model.equilibrium.bulk) | entries
         study.save(result, *early_end(result, answer.error))
+        if not answer.error:
+            solution = solution_at(answer.point, result)
+            study.add(result, lambda out: write_fields(solution, out / "fields"))
     else:
         study.save_without_results(state or folders.COMPLETE, answer.doubt, entries)
     write_csv(study.out / "critical.csv", table(search))
     picture.draw(content(search, answer), study.out / f"{search.own.name}_critical.png")
+
+
+def solution_at(point: Point, result: Results) -> Solution:
+    """The results of an equilibrium, from `last_state`, with displacement and stress of the bodies
+    at the saved times.
+    """
+    model, history = point.model, point.history.copy()
+    if point.state.time > history.saved_until:
+        history.save(point.state)
+    bodies = Bodies.of(model.case)
+    fields = recover(bodies, [(model.equilibrium, history)])[0]
+    return Solution(result, bodies.mesh.bodies, fields)
 
 
 def content(search: Search, answer: CriticalValue) -> picture.Content:

@@ -46,6 +46,11 @@ class CriticalValue:
         """Whether there is a critical value, and a mechanism or bound of statics beyond it."""
         return self.value is not None and bool(self.why)
 
+    @property
+    def failure(self) -> str:
+        """The failure mode and, of several joints, the one that fails; empty if there is none."""
+        return f"{self.mode} on {self.joint}" if self.mode and self.joint else self.mode
+
     def by_gravity(self, unit: str) -> list[str]:
         """The values of the gravity method, each with its joint or assumption."""
         if self.gravity is None:

@@ -118,13 +118,18 @@ def run(case: Case, out: Path, options: Options = Options(), key: str = "") -> Q
 
 
 def save(study: Session, result: QuakeTables, fields: bool, picture: bool) -> None:
-    """Write the files of an earthquake; fields, picture: also those, of the condensed engine."""
+    """Write the files of an earthquake; of the condensed engine also fields, those of the frames or
+    else of the static states, and with picture the picture.
+    """
     study.save(result.static, result.state, result.statement, partial(write_tables, result))
-    if not isinstance(result, QuakeResult):
+    if not isinstance(result, QuakeResult) or result.error:
         return
     if fields:
         solution = Solution(result.frames, result.mesh.bodies, result.fields())
-        study.add(result.static, lambda out: write_fields(solution, out / "fields"))
+    else:
+        solution = Solution(result.static, result.mesh.bodies, result.static_fields())
+    result.static.info["frames"] = fields
+    study.add(result.static, lambda out: write_fields(solution, out / "fields"))
     if picture:
         from .quake_picture import draw  # matplotlib takes long to load
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -24,11 +24,11 @@ from ..pictures import run_picture
 from ..pictures.drawing import figure_of, picture_style
 from ..post import stored
 from ..post.summary import Table, joints_table, levels_table, table_of
-from ..post.units import FORCES, MOMENTS, Units, unit
 from ..post.validation import shown_time
 from ..statics.gravity import GravityMethod, force, resultant_of
 from ..statics.verdict import stiffness_ratio
 from ..storage import atomic_write
+from ..units import FORCES, MOMENTS, Units, unit
 from . import body_stress, report_input, report_quake
 from .check import (
     NOT_JUDGED,
@@ -110,8 +110,9 @@ class RunSection:
     of_joints: Table | None
     #: of `damjoint quake`; else None
     earthquake: report_quake.Earthquake | None
-    #: level of the last state, as text
+    #: level of the last state, as text; the same with what it is, of an earthquake
     level: str
+    state: str
     #: both methods
     methods: Table
     #: notes on the comparison of both methods
@@ -297,6 +298,7 @@ def run_section(folder: Path, number: int, solution: Solution) -> RunSection:
         else None,
         earthquake=report_quake.read(folder, case, info),
         level=f"{last['level']:.4g} m" if last else "",
+        state=state_of_last(last, info.get("quake")),
         methods=methods_table(case, checks, judged=judged),
         notes=notes_of(checks),
         stress=stress_of(solution, checks),
@@ -308,6 +310,17 @@ def run_section(folder: Path, number: int, solution: Solution) -> RunSection:
         limits=[*report_input.limits(case, earthquake="quake" in info)],
         versions=versions(info),
     )
+
+
+def state_of_last(last: Mapping[str, float], quake: Mapping[str, Any] | None) -> str:
+    """What the last state is, by its row of the history and the summary of an earthquake."""
+    if not last:
+        return ""
+    level = f"at level {last['level']:.4g} m"
+    if not quake:
+        return level
+    after = quake.get("after", {}).get("equilibrium")
+    return f"{level}, static, {'after' if after else 'before'} the earthquake"
 
 
 def joint_section(result: Results, name: str) -> JointSection:
@@ -540,9 +553,8 @@ def critical_value(info: dict[str, Any] | None) -> str:
     if not info or info["value"] is None:
         return ""
     unit = info["unit"]
-    parts = [f"{info['value']:.6g} {unit}".strip(), info["mode"]]
-    if info["doubt"]:
-        parts.append(f"not confirmed: {info['doubt']}")
+    doubt = f"not confirmed: {info['doubt']}" if info["doubt"] else ""
+    parts = [p for p in (f"{info['value']:.6g} {unit}".strip(), doubt, info["mode"]) if p]
     on = f" on {joint}" if (joint := info.get("gravity_method_joint")) else ""
     by_hand = {f"gravity method{on}": info["gravity_method"]}
     by_hand[f"on {info.get('joint')}"] = info.get("gravity_method_there")

@@ -14,7 +14,7 @@ from ..input.parameters import Parameter, constants, declared, parse
 from ..input.resolve import equal_steps
 from ..input.values import flows, has_drains
 from ..post import stored
-from ..post.units import STRESSES, Units, unit
+from ..units import STRESSES, Units, unit
 
 #: Units by the unit in the declarations; other units are printed as they are.
 UNITS: dict[str, Units] = {

@@ -18,7 +18,7 @@ from ..model.results import column_of
 from ..pictures.drawing import BLUE, DARK, ORANGE, figure_of, panels
 from ..post import stored
 from ..post.summary import Table, table_of
-from ..post.units import Units
+from ..units import Units
 from . import quake_result, report_input
 from .report_picture import Picture, bands, embedded
 

@@ -1,4 +1,4 @@
-"""Units that suit the size of a value, for pictures and reports: name, number per SI unit."""
+"""Units that suit the size of a value, for all that is shown: name, number per SI unit."""
 
 from __future__ import annotations
 
