@@ -12,8 +12,11 @@ import meshio
 import numpy as np
 import pytest
 from damjoint import cli
+from damjoint.fem import elements
+from damjoint.mesh.body import Body
 from damjoint.post import summary
-from damjoint.post.field_files import write_vtu
+from damjoint.post.field_files import QUADRATIC, of_order, write_vtu
+from damjoint.post.stored import read_fields
 from damjoint.post.tables import write_csv
 from numpy.testing import assert_allclose
 
@@ -184,6 +187,48 @@ def test_the_points_of_each_joint_move_with_the_body_below_it(command, tmp_path,
             assert away.min(axis=0).max() == 0
             assert_allclose(moved[nodes[away.argmin(axis=0)]], expected, atol=1e-9)
         assert np.abs(at_joint[on]).max() > 1e-4
+
+
+def test_cells_of_order_2_have_their_midpoints(command, tmp_path):
+    """Quadratic cells of VTK, the displacement at their further nodes that of the finite elements:
+    the moment about the toe balances the weight's as curved sides do. Read back, only corners.
+    """
+    small = "--set", "n_joint=10", "--set", "h_dam=20", "--set", "h_found=30"
+    assert command("run", "dam", *small, "--levels", "30", "--no-picture")[0] == 0
+    folder = tmp_path / "out/dam/fields"
+    bulk, lips = (meshio.read(folder / f"{name}_t1.vtu") for name in ("bulk", "joint"))
+    assert [block.type for block in bulk.cells] == ["triangle6"]
+    assert [block.type for block in lips.cells] == ["line3"]
+    joint = read(tmp_path / "out/dam/joint.csv")
+    order = np.argsort(lips.points[:, 0])
+    assert_allclose(lips.points[order, 0], joint["x"], atol=1e-9)
+    assert_allclose(lips.point_data["jump [m]"][order, 1], joint["delta_n"], rtol=1e-9)
+    (table,) = (block.data for block in bulk.cells)
+    corners, moved = bulk.points[table], bulk.point_data["displacement [m]"][table]
+    for k, (a, b) in enumerate(((0, 1), (1, 2), (2, 0)), 3):
+        assert_allclose(corners[:, k], (corners[:, a] + corners[:, b]) / 2, atol=1e-9)
+        bent = moved[:, k] - (moved[:, a] + moved[:, b]) / 2
+        assert 1e-3 < np.abs(bent).max() / np.abs(moved).max() < 0.1
+    bodies, fields = read_fields(folder, np.array([1.0]))
+    assert {shape for body in bodies.values() for shape, _ in body.cells} == {"triangle", "line"}
+    for name, values in fields[1.0].displacement.items():
+        assert len(values) == len(bodies[name].points)
+
+
+@pytest.mark.parametrize("shape", ["line", "triangle", "quad", "tetra", "wedge", "hexahedron"])
+def test_nodes_of_quadratic_cells_are_in_the_order_of_vtk(shape):
+    """Those of VTK's own description: corners, edges, faces, middle."""
+    corners = elements.corners_of(shape)
+    points = np.pad(corners, ((0, 0), (0, 3 - corners.shape[1])))
+    tags = np.arange(len(points))
+    cell = of_order(Body(points, tags, [(shape, tags[None])], np.ones(1, int), [""]), 2)
+    ((name, (table,)),) = cell.cells
+    kind, pairs = QUADRATIC[name]
+    assert meshio._vtk_common.vtk_to_meshio_type[kind] == name
+    pairs = np.array([[*map(int, pair)] for pair in pairs.split()])
+    assert np.array_equal(table[: len(points)], tags)
+    assert_allclose(cell.points[table[len(points) :]], points[pairs].mean(axis=1))
+    assert len(set(table)) == len(table) == meshio._mesh.num_nodes_per_cell[name]
 
 
 def test_fields_of_any_cells_are_read_as_they_were_written(tmp_path):

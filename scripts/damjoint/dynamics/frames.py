@@ -83,18 +83,21 @@ class Frames:
     def fields(self, quake: Earthquake, static: Field) -> dict[float, Field]:
         """Displacement and stress by time, those of the static state included."""
         moved = np.array(self.displacement).T
-        displacement, stresses = {}, {}
+        displacement, stresses, nodes = {}, {}, {}
         material, dim = material_of(quake.case), quake.bodies.mesh.dim
         for name, matrix in quake.system.motion.items():
             space = quake.system.spaces[name]
             u = (matrix @ moved).T.reshape(len(self), -1, dim)
             stresses[name] = static.stress[name] + stress(space, u, material)
-            at_nodes = np.pad(u[:, : len(space.body.points)], ((0, 0), (0, 0), (0, 3 - dim)))
-            displacement[name] = static.displacement[name] + at_nodes
+            nodes[name] = len(space.body.points)
+            parts = [static.displacement[name]]
+            parts += [static.at_midpoints[name]] if space.order == 2 else []
+            displacement[name] = np.concatenate(parts) + space.at_locations(u)
         return {
-            time: Field(
+            time: Field.of(
                 {name: u[i] for name, u in displacement.items()},
                 {name: s[i] for name, s in stresses.items()},
+                nodes,
             )
             for i, time in enumerate(self.history.rows["time"])
         }

@@ -255,6 +255,15 @@ class Space:
         products = np.searchsorted(self.codes, part.codes)
         return np.concatenate([nodes, len(self.body.points) + products])
 
+    def at_locations(self, u: Array) -> Array:
+        """Displacement (..., locations, 3) at the locations, from the factors (..., n, dim) of the
+        functions.
+        """
+        matrix = self.interpolation(self.order)
+        rows = u.reshape(-1, *u.shape[-2:])
+        values = np.array([matrix @ row for row in rows]).reshape(u.shape)
+        return np.pad(values, [(0, 0)] * (u.ndim - 1) + [(0, 3 - u.shape[-1])])
+
     def interpolation(self, order: int) -> CsrMatrix:
         """Values at the locations, from the functions up to an order (locations, functions)."""
         rows, matrices = [], []

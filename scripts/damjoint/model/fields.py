@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -17,11 +17,24 @@ from .results import FLUX, THICKNESS, Results
 @dataclass
 class Field:
     """The bodies at one time: displacement (nodes, 3) [m], stress (elements, 6) [Pa] at the
-    middle of each element: xx, yy, zz, xy, yz, xz.
+    middle of each element: xx, yy, zz, xy, yz, xz; with order 2 of the condensed engine also the
+    displacement at the midpoints of `fem.elements.Space`.
     """
 
     displacement: dict[str, Array]
     stress: dict[str, Array]
+    at_midpoints: dict[str, Array] = field(default_factory=dict)
+
+    @staticmethod
+    def of(
+        displacement: dict[str, Array], stress: dict[str, Array], nodes: dict[str, int]
+    ) -> Field:
+        """From displacements at nodes, and then midpoints; nodes: their numbers."""
+        return Field(
+            {name: u[: nodes[name]] for name, u in displacement.items()},
+            stress,
+            {name: u[nodes[name] :] for name, u in displacement.items() if len(u) > nodes[name]},
+        )
 
 
 @dataclass

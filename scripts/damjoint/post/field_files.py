@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import base64
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from ..arrays import Table
+from ..fem import elements
 from ..input.parameters import constants, start_gmsh
 from ..mesh.body import Body
 from ..model.fields import OF_JOINT, Field, Solution, joint_body, joint_data
@@ -28,6 +30,16 @@ ELEMENTS = {
 VTK_TYPES = {"line": 3, "triangle": 5, "quad": 9, "tetra": 10, "hexahedron": 12, "wedge": 13}
 #: Corners of a wedge in the order of VTK, whose first triangle points outwards.
 VTK_WEDGE = [0, 2, 1, 3, 5, 4]
+#: Cells of order 2: VTK's type, and the pairs of corners in whose middles their further nodes are.
+QUADRATIC = {
+    "line3": (21, "01"),
+    "triangle6": (22, "01 12 20"),
+    "quad9": (28, "01 12 23 30 02"),
+    "tetra10": (24, "01 12 20 03 13 23"),
+    "wedge18": (32, "01 12 20 34 45 53 03 14 25 04 15 23"),
+    "hexahedron27": (29, "01 12 23 30 45 56 67 74 04 15 26 37 07 16 05 36 02 46 06"),
+}
+VTK_TYPES |= {shape: number for shape, (number, _) in QUADRATIC.items()}
 #: Components xx, xy, xz, yx, ... of a Gmsh tensor among those of `Field.stress`.
 TENSOR = [0, 3, 5, 3, 1, 4, 5, 4, 2]
 
@@ -47,16 +59,21 @@ def write_fields(solution: Solution, folder: Path) -> None:
     (Gmsh).
 
     Dam and foundation have their own points on the joint, so that the opening is visible; the
-    points of a joint move with the body below it.
+    points of a joint move with the body below it. For ParaView the cells are quadratic where the
+    fields have displacements at their midpoints.
     """
     folder.mkdir(exist_ok=True)
-    fields, joint = solution.fields, all_joints(solution)
+    fields, order = solution.fields, 2 if next(iter(solution.fields.values())).at_midpoints else 1
     bodies = {n: solution.bodies[n] for n in next(iter(fields.values())).displacement}
-    points = np.concatenate([body.points for body in bodies.values()])
-    cells, regions = bulk_cells(bodies)
+    surfaces = [joint_body(solution.bodies, k) for k in range(len(solution.result.joints))]
+    fine = {name: of_order(body, order) for name, body in bodies.items()}
+    points = np.concatenate([body.points for body in fine.values()])
+    cells, regions = bulk_cells(fine)
     displacement = {t: np.vstack([f.displacement[n] for n in bodies]) for t, f in fields.items()}
     stress = {t: np.vstack([f.stress[n] for n in bodies]) for t, f in fields.items()}
-    on_joint = {time: joints_data(solution, time) for time in fields}
+    fine_surfaces = [of_order(surface, order) for surface in surfaces]
+    joint = joined(fine_surfaces)
+    on_joint = {time: joints_data(solution, fine_surfaces, time) for time in fields}
 
     for time, field in fields.items():
         whole = {LEVEL: solution.result.at(time)["level"][:1]}
@@ -67,10 +84,10 @@ def write_fields(solution: Solution, folder: Path) -> None:
             "smallest principal stress [Pa]": smallest,
             "body": regions,
         }
-        at_nodes = {DISPLACEMENT: displacement[time]}
+        at_nodes = {DISPLACEMENT: np.vstack([everywhere(field, n) for n in bodies])}
         write_vtu(folder / f"bulk_t{time:g}.vtu", points, cells, at_nodes, in_elements, whole)
         on_faces = {
-            DISPLACEMENT: displacement_of_joints(solution, field),
+            DISPLACEMENT: displacement_of_joints(solution, field, order),
             "opening [m]": np.maximum(on_joint[time]["jump"][:, 1], 0),
             **{with_unit(name): values for name, values in on_joint[time].items()},
         }
@@ -81,20 +98,53 @@ def write_fields(solution: Solution, folder: Path) -> None:
         (DISPLACEMENT, "NodeData", displacement),
         (STRESS, "ElementData", {t: s[:, TENSOR] for t, s in stress.items()}),
     ]
+    corners = np.concatenate(
+        [
+            np.arange(len(f.points)) < len(c.points)
+            for f, c in zip(fine_surfaces, surfaces, strict=True)
+        ]
+    )
     joint_views: list[View] = [
-        (with_unit(name), "NodeData", {t: d[name] for t, d in on_joint.items()})
+        (with_unit(name), "NodeData", {t: d[name][corners] for t, d in on_joint.items()})
         for name in OF_JOINT
         if name in next(iter(on_joint.values()))
     ]
     with atomic_write(folder / "bulk.msh") as path:
-        write_views(path, points, cells, bulk_views)
+        of_bodies = np.concatenate([body.points for body in bodies.values()])
+        write_views(path, of_bodies, bulk_cells(bodies)[0], bulk_views)
     with atomic_write(folder / "joint.msh") as path:
-        write_views(path, joint.points, joint.cells, joint_views)
+        linear = joined(surfaces)
+        write_views(path, linear.points, linear.cells, joint_views)
 
 
-def all_joints(solution: Solution) -> Body:
-    """The surfaces of all joints as one."""
-    surfaces = [joint_body(solution.bodies, k) for k in range(len(solution.result.joints))]
+def everywhere(field: Field, body: str) -> np.ndarray:
+    """Displacement (n, 3) [m] of a body at its nodes and, where they are known, its midpoints."""
+    parts = [field.displacement[body], field.at_midpoints.get(body, np.zeros((0, 3)))]
+    return np.concatenate(parts)
+
+
+def of_order(body: Body, order: int) -> Body:
+    """A body with cells of an order; order 2: its points are its nodes and, after them, the
+    midpoints of `elements.Space`.
+    """
+    if order == 1:
+        return body
+    space = elements.Space(body, 2)
+    cells = []
+    for shape, table in space.connectivity:
+        name = f"{shape}{table.shape[1]}"
+        corners = elements.corners_of(shape)
+        middles = elements.locations_of(shape, 2)[len(corners) :]
+        pairs = [tuple(map(int, pair)) for pair in QUADRATIC[name][1].split()]
+        of_pairs = [(corners[a] + corners[b]) / 2 for a, b in pairs]
+        places = [int(np.abs(middles - at).sum(axis=1).argmin()) for at in of_pairs]
+        order_of_vtk = [*range(len(corners)), *(len(corners) + k for k in places)]
+        cells.append((name, table[:, order_of_vtk]))
+    return replace(body, points=space.locations, cells=cells)
+
+
+def joined(surfaces: Sequence[Body]) -> Body:
+    """Surfaces as one."""
     starts = np.cumsum([0, *(len(surface.points) for surface in surfaces)])
     return Body(
         np.concatenate([surface.points for surface in surfaces]),
@@ -108,15 +158,14 @@ def all_joints(solution: Solution) -> Body:
     )
 
 
-def joints_data(solution: Solution, time: float) -> Table:
-    """The tables of all joints at their mesh nodes, see `joint_data`; nan where a joint has no such
-    column.
+def joints_data(solution: Solution, surfaces: Sequence[Body], time: float) -> Table:
+    """The tables of all joints at the points of their surfaces, see `joint_data`; nan where a joint
+    has no such column.
     """
     parts = []
-    for k, joint_result in enumerate(solution.result.joints):
-        surface = joint_body(solution.bodies, k)
+    for k, (joint, surface) in enumerate(zip(solution.result.joints, surfaces, strict=True)):
         number = np.full(len(surface.points), k + 1.0)
-        parts.append(joint_data(joint_result, surface, time) | {"joint": number})
+        parts.append(joint_data(joint, surface, time) | {"joint": number})
     names = [name for name in (*OF_JOINT, "joint") if any(name in part for part in parts)]
     missing = [np.full(len(part["joint"]), np.nan) for part in parts]
     return {
@@ -130,14 +179,14 @@ def with_unit(name: str) -> str:
     return f"{name} [{OF_JOINT[name][0]}]" if name in OF_JOINT else name
 
 
-def displacement_of_joints(solution: Solution, field: Field) -> np.ndarray:
+def displacement_of_joints(solution: Solution, field: Field, order: int) -> np.ndarray:
     """Displacement (n, 3) [m] of the bodies below the joints, at the points of all joints."""
     parts = []
     lower_bodies = [joint.lower for joint in solution.result.case.of_joints] or ["foundation"]
     for k, lower in enumerate(lower_bodies):
-        tags, wanted = solution.bodies[lower].node_tags, joint_body(solution.bodies, k).node_tags
-        order = np.argsort(tags)
-        parts.append(field.displacement[lower][order[np.searchsorted(tags, wanted, sorter=order)]])
+        below, surface = solution.bodies[lower], joint_body(solution.bodies, k)
+        places = elements.Space(below, order).find(elements.Space(surface, order))
+        parts.append(everywhere(field, lower)[places])
     return np.concatenate(parts)
 
 

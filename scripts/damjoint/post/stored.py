@@ -13,6 +13,7 @@ import numpy as np
 
 from .. import InputError
 from ..arrays import Value
+from ..fem.elements import corners_of
 from ..input.case import SECTION, SHARED, Case
 from ..input.case_names import is_name
 from ..input.joints import parsed_by_joint, stacked_joints
@@ -189,7 +190,8 @@ def read_fields(folder: Path, times: np.ndarray) -> tuple[dict[str, Body], dict[
         if path.is_file():
             check_file(folder / f"joint_t{time:g}.vtu")
             # not meshio.read: it exits the process if a file is damaged
-            bulk, joint = (meshio.vtu.read(p) for p in (path, folder / f"joint_t{time:g}.vtu"))
+            paths = path, folder / f"joint_t{time:g}.vtu"
+            bulk, joint = (linear(meshio.vtu.read(p)) for p in paths)
             parts = {name: extract_body(bulk, regions) for name, regions in parts_of(bulk).items()}
             bodies = {name: body for name, (body, _, _) in parts.items()}
             bodies |= extract_joints(joint)
@@ -199,6 +201,14 @@ def read_fields(folder: Path, times: np.ndarray) -> tuple[dict[str, Body], dict[
                 {name: stress for name, (_, _, stress) in parts.items()},
             )
     return bodies, fields
+
+
+def linear(mesh: meshio.Mesh) -> meshio.Mesh:
+    """A mesh with the corners of its cells only."""
+    for block in mesh.cells:
+        block.type = shape = block.type.rstrip("0123456789")
+        block.data = block.data[:, : len(corners_of(shape))]
+    return mesh
 
 
 def parts_of(bulk: meshio.Mesh) -> dict[str, dict[int, str]]:
@@ -218,10 +228,11 @@ def extract_joints(mesh: meshio.Mesh) -> dict[str, Body]:
     """The surfaces of the joints of a mesh, by the numbers of its points' joints."""
     number, joints = mesh.point_data["joint"].astype(int), {}
     for k in np.unique(number).tolist():
-        used = np.flatnonzero(number == k)
+        tables = [block.data[number[block.data[:, 0]] == k] for block in mesh.cells]
+        used = np.unique(np.concatenate([table.ravel() for table in tables]))
         cells = [
-            (block.type, np.searchsorted(used, block.data[number[block.data[:, 0]] == k]))
-            for block in mesh.cells
+            (block.type, np.searchsorted(used, table))
+            for block, table in zip(mesh.cells, tables, strict=True)
         ]
         shown = [(shape, table) for shape, table in cells if len(table)]
         joints[numbered("joint", k - 1)] = body_of(mesh.points[used], shown)

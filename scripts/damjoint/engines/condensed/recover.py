@@ -66,7 +66,7 @@ def recover(bodies: Bodies, scenes: list[tuple[Equilibrium, History]]) -> list[d
     solution = glued.solve(loads)
 
     displacements = {n: solution[glued.numbers[n]].T + jumps[n] for n in bodies.by_name}
-    at_nodes, stresses = {}, {}
+    at_locations, stresses = {}, {}
     material, dim = material_of(states[0][0].case), bodies.mesh.dim
     for name, values in displacements.items():
         body, space = bodies.by_name[name], bodies.by_name[name].space
@@ -75,15 +75,17 @@ def recover(bodies: Bodies, scenes: list[tuple[Equilibrium, History]]) -> list[d
         if body.unit_strains:
             strains = np.array([free_strain(body, *state) for state in states])
         stresses[name] = stress(space, u, material, strains)
-        at_nodes[name] = np.pad(u[:, : len(space.body.points)], ((0, 0), (0, 0), (0, 3 - dim)))
+        at_locations[name] = space.at_locations(u)
+    nodes = {name: len(body.space.body.points) for name, body in bodies.by_name.items()}
 
     def fields_of(first: int, history: History) -> Iterator[tuple[float, Field]]:
         """Times and fields of a scene whose states start at a number."""
         rest = first + len(history.saved)
-        start = {n: u[rest] if history.at_rest else 0 * u[0] for n, u in at_nodes.items()}
+        start = {n: u[rest] if history.at_rest else 0 * u[0] for n, u in at_locations.items()}
         for i, state in enumerate(history.saved, first):
-            moved = {name: u[i] - start[name] for name, u in at_nodes.items()}
-            yield state.time, Field(moved, {name: s[i] for name, s in stresses.items()})
+            moved = {name: u[i] - start[name] for name, u in at_locations.items()}
+            of_time = {name: s[i] for name, s in stresses.items()}
+            yield state.time, Field.of(moved, of_time, nodes)
 
     counts = [len(history.saved) + (history.at_rest is not None) for _, history in scenes]
     firsts = np.cumsum([0, *counts[:-1]])
