@@ -1,4 +1,5 @@
-// window.geo - the mesh of a case in the window of Gmsh: dam.geo, and what the window shows of it.
+// window.geo - the mesh of a case in the window of Gmsh: dam.geo, unless the case has a geometry of
+// its own, and what the window shows of it.
 //
 // Read at the start and after each change of a parameter. The results are then those of other
 // parameters, and the status in the tree says so until a run replaces it (pro/views.pro): also if a
@@ -29,4 +30,6 @@ DefineConstant[
     Highlight "LightGrey"}
 ];
 
-Include "dam.geo";
+If(!Exists(geometry))
+  Include "dam.geo";
+EndIf

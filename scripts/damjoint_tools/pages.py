@@ -167,9 +167,9 @@ def results_page() -> str:
         "`fields.pvd` for ParaView, with the blocks bodies (`bulk_t*.vtu`) and joints "
         "(`joint_t*.vtu`); with order 2 of the condensed engine the cells are quadratic, with the "
         "displacement at their midpoints. Arrays have their unit in their name; `level [m]` is a "
-        "value of each file. Bodies: `displacement [m]`, `stress [Pa]` (xx, yy, zz, xy, yz, xz), `largest "
-        "principal stress [Pa]`, `smallest principal stress [Pa]` (tension > 0), `body` (1 dam, 2 "
-        "foundation, 1001 dam 2, ...). Joints: `displacement [m]` of the body below, so that Warp "
+        "value of each file. Bodies: `displacement [m]`, `stress [Pa]` (xx, yy, zz, xy, yz, xz), "
+        "`largest principal stress [Pa]`, `smallest principal stress [Pa]` (tension > 0), "
+        "`body` (1 dam, 2 foundation, 1001 dam 2, ...). Joints: `displacement [m]` of the body below, so that Warp "
         "By Vector moves both blocks; `opening [m]`, never negative; `jump [m]` and `traction "
         "[Pa]` along x, y, z, the columns of joint.csv, and `joint`, its number.",
     ]

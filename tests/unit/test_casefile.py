@@ -105,6 +105,14 @@ def test_a_case_adds_to_the_blocks_of_an_included_one(tmp_path):
     ]
 
 
+def test_an_included_block_adds_what_is_not_set(tmp_path):
+    """With (Append), as in Gmsh and GetDP, which have no other second block of a joint."""
+    write(tmp_path, LIFTS.replace("25_m [", "25_m (Append) [ adhesion 0,"), "common.case")
+    text = 'Struct Joint::lift_25_m [ mu 0.6 ]; Include "common.case";'
+    joint = load(str(write(tmp_path, text))).joints[2]
+    assert [joint[name] for name in ("mu", "adhesion", "law")] == [0.6, 0, "friction"]
+
+
 def test_a_joint_that_is_moved_keeps_its_block(tmp_path):
     """By --set lift_heights or joint_height, of the same number of joints."""
     path = str(write(tmp_path, LIFTS + "Struct Joint::base [ mu 0.9 ];"))

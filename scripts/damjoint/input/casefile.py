@@ -234,7 +234,12 @@ def add_statement(case: CaseText, statement: list[Token], path: Path, where: str
 def add_block(
     case: CaseText, kinds: tuple[str, ...], tokens: tuple[str, ...], path: Path, where: str
 ) -> None:
-    """Add the values of one joint: Struct Joint::NAME [ parameter value, ... ]."""
+    """Add the values of one joint: Struct Joint::NAME [ parameter value, ... ]; with (Append) after
+    the name only those that it does not have yet.
+    """
+    append = tokens[4:7] == ("(", "Append", ")")
+    if append:
+        kinds, tokens = (*kinds[:4], *kinds[7:]), (*tokens[:4], *tokens[7:])
     if kinds[3:4] != ("name",) or tokens[4:5] != ("[",) or tokens[-1:] != ("]",):
         raise InputError(
             f"{where}: must be Struct Joint::NAME [ parameter value, ... ], such as Struct "
@@ -261,7 +266,8 @@ def add_block(
         case.block_files[name] = path
         note_owner(case, name, path)
     case.block_files[f"{key}::"] = path
-    case.blocks[key] = case.blocks.get(key, {}) | values
+    before = case.blocks.get(key, {})
+    case.blocks[key] = values | before if append else before | values
 
 
 def replace_in_blocks(case: CaseText, name: str, path: Path, where: str) -> None:

@@ -415,7 +415,8 @@ def quoted(value: Value) -> str:
 
 
 def listing(name: str, values: Iterable[float]) -> str:
-    """A list in that language, a number a line: GetDP's parser fails on lines of some thousand
-    characters.
+    """A list in that language, a long one with a number a line: GetDP's parser fails on lines of
+    some thousand characters.
     """
-    return f"{name}() = {{\n" + ",\n".join(repr(float(v)) for v in values) + "};\n"
+    numbers = [repr(float(v)) for v in values]
+    return f"{name}() = {{" + (", " if len(numbers) <= 3 else ",\n").join(numbers) + "};\n"

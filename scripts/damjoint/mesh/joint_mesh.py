@@ -85,6 +85,16 @@ class JointMesh:
         return float(z if z > FLAT * y else y)
 
     @property
+    def heel_line(self) -> tuple[Array, Array]:
+        """The two points (3,) of the heel that are farthest from its middle, on both sides; in the
+        plane both are the same.
+        """
+        points = self.heel.points
+        along = points - points.mean(axis=0)
+        first = int(np.argmax(np.linalg.norm(along, axis=1)))
+        return points[first], points[int(np.argmin(along @ along[first]))]
+
+    @property
     def ends(self) -> dict[str, list[float]]:
         """Heel, toe and length, by the names of pro/section.pro."""
         heel, toe = (line.points[:, :2].mean(axis=0) for line in (self.heel, self.toe))

@@ -150,6 +150,9 @@ class Mesh:
                 self.faces[f"face{len(self.faces)}"] = Face(part, body, *face[2:])
         #: whether a face of a user's own geometry is part of several bodies
         self.divided = len(self.faces) > len(faces)
+        #: elements of joints and faces of a user's own geometry that are numbered the other way
+        #: round than Gmsh did
+        self.turned: list[int] = []
         self._turn_outwards()
         last = max(joint.surface.element_tags.max() for joint in self.joints)
         if last >= MOST_TAGS:
@@ -420,6 +423,7 @@ class Mesh:
                 raise self._bad(f"{name}: its elements must be sides of its body's (conforming)")
             surface.normals, turned = normals
             if self.geometry and turned.any():  # for GetDP, which goes by the elements
+                self.turned.extend(surface.element_tags[turned])
                 gmsh.model.mesh.reverseElements(surface.element_tags[turned])
 
     def bearer(self, line: str) -> str:
@@ -461,7 +465,7 @@ class Mesh:
                     of_face.append(entity)
         return entities
 
-    def _divide_faces(self) -> None:
+    def divide_faces(self) -> None:
         """Give each of `faces` a physical group of its own, numbered as in pro/section.pro."""
         gmsh, first = start_gmsh(), int(constants()["SEGMENT"][0])
         entities, d = self.face_entities(), self.dim - 1
@@ -477,7 +481,7 @@ class Mesh:
         """
         gmsh = start_gmsh()
         if self.divided:
-            self._divide_faces()
+            self.divide_faces()
         gmsh.option.setNumber("Mesh.MshFileVersion", 2.2)
         # else elements are renumbered, shape by shape
         gmsh.option.setNumber("Mesh.PreserveNumberingMsh2", 1)

@@ -33,6 +33,7 @@ def values_of_paths(mesh: Mesh, case: Case) -> list[str]:
                 "closed_conductivity": scale,
                 "late_heel": float(reached_late(mesh.joints[k], paths[k])),
                 "joint_path": float(network.numbers[0] if solid else k),
+                "level_ends": float(not solid or has_level_ends(network.mesh)),
             }
             texts[k] = text_of(paths[k]) + lines(values)
     return texts
@@ -59,6 +60,12 @@ def reached_late(joint: JointMesh, path: WaterPath) -> bool:
     return bool(path.higher_heels) and outer and not path.open_heel
 
 
+def has_level_ends(joint: JointMesh) -> bool:
+    """Whether heel and toe of a joint are level."""
+    size = np.abs(joint.surface.points).max()
+    return all(np.ptp(end.points[:, 1]) < ROUND_OFF * size for end in (joint.heel, joint.toe))
+
+
 def lines(values: dict[str, float]) -> str:
     """Lines of GetDP's language that set values."""
     return "".join(f"{name} = {value!r};\n" for name, value in values.items())
@@ -75,11 +82,14 @@ def refused(network: Network, mesh: Mesh, case: Case, why: str) -> InputError:
 
 
 def side_by_side(network: Network, mesh: Mesh, case: Case) -> dict[int, WaterPath]:
-    """The path through the joints of a network in 3D, which have heel and toe on the surface."""
+    """The path through the joints of a network in 3D, which have heel and toe on the surface; its
+    ends do not count where they are not level.
+    """
     heel, toe = (end.points[:, 1] for end in (network.mesh.heel, network.mesh.toe))
     if network.branched or network.in_series:
         raise refused(network, mesh, case, "as they do not lie side by side")
-    if max(np.ptp(heel), np.ptp(toe)) > ROUND_OFF * case.size:
+    drained = any(case.joints[k]["uplift"] == "drained" for k in network.numbers)
+    if not has_level_ends(network.mesh) and (network.flowing or drained):
         raise refused(network, mesh, case, "as their heels or toes are not level")
     ends = float(heel[0]), float(toe[0])
     path = WaterPath(heel_y=ends[0], toe_y=ends[1], rest_y=min(ends))

@@ -12,8 +12,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
+import numpy as np
+
 from ... import InputError, RunError, data
-from ...arrays import Value
 from ...input.case import Case
 from ...input.parameters import assignments, constants, declared, listing, quoted
 from ...input.scene import LINES, SIDES
@@ -22,7 +23,7 @@ from ...mesh.joint_mesh import heel_normal
 from ...mesh.mesh import Mesh
 from ...mesh.sides import area
 from ...storage import check_end
-from .paths import values_of_paths
+from .paths import has_level_ends, lines, values_of_paths
 
 #: Oldest suitable version of GetDP.
 OLDEST = (3, 2)
@@ -92,6 +93,7 @@ def own_lists(mesh: Mesh) -> dict[str, list[float]]:
     lines = [name for name in LINES if name in bodies]
     shapes = {shape for solid in mesh.solids.values() for shape, _ in solid.cells}
     number, lowest = numbers(mesh), constants()["UNDER"][0]
+    places = np.concatenate([solid.points for solid in mesh.solids.values()])
     return {
         "own_side": [float(SIDES.index(face.side)) for face in faces],
         "own_body": [number[face.body] + lowest for face in faces],
@@ -103,6 +105,7 @@ def own_lists(mesh: Mesh) -> dict[str, list[float]]:
         "own_quadrangles": [float("quad" in shapes)],
         "own_mark_region": [constants()[name.upper()][0] for name in lines],
         "own_mark_body": [number[mesh.bearer(name)] + lowest for name in lines],
+        "own_extent": np.column_stack([places.min(axis=0), places.max(axis=0)]).ravel().tolist(),
     }
 
 
@@ -111,26 +114,41 @@ def numbers(mesh: Mesh) -> dict[str, float]:
     return {name: float(b) for b, name in enumerate(reversed(mesh.solids))}
 
 
-def values_of_joint(case: Case, mesh: Mesh | None, number: int, path: str = "") -> str:
-    """The macro of pro/joints.pro that sets the values of a joint, by its number from 0.
+def own_names(mesh: Mesh) -> str:
+    """The list of pro/joints.pro with the names of the joints of a user's own geometry."""
+    names = ", ".join(quoted(joint.name) for joint in mesh.joints)
+    return f"own_joint_names() = Str[{names}];\n"
 
-    mesh: of a user's own geometry; path: see `values_of_paths`.
-    """
-    own, vectors = case.joints[number], ""
-    values: dict[str, Value] = {n: own[n] for n, known in declared().items() if known.of_joints}
-    if mesh:
-        joint, of_body, chord = mesh.joints[number], numbers(mesh), Chord.of(mesh.joints[number])
-        values |= {name: ends[0] for name, ends in joint.ends.items()}
-        values |= {
-            "toe_z": float(joint.surface.points[joint.toe_nodes, 2].mean()),
-            "width": joint.width,
-            "upper": of_body[joint.upper],
-            "lower": of_body[joint.lower],
-        }
-        vectors += listing("chord", chord.plane.T @ chord.along)
-        vectors += listing("upwards", chord.plane.T @ chord.normal)
-    lines = "".join(f"{name} = {quoted(value)};\n" for name, value in values.items())
-    return f"Macro Joint_{number}\n{lines}{vectors}{path}Return\n"
+
+def position_of_joint(mesh: Mesh, number: int) -> str:
+    """The values of pro/joints.pro for the position of a joint of a user's own geometry."""
+    joint, of_body, chord = mesh.joints[number], numbers(mesh), Chord.of(mesh.joints[number])
+    values = {name: ends[0] for name, ends in joint.ends.items()} | {
+        "toe_z": float(joint.surface.points[joint.toe_nodes, 2].mean()),
+        "width": joint.width,
+        "upper": of_body[joint.upper],
+        "lower": of_body[joint.lower],
+        "level_ends": float(has_level_ends(joint)),
+    }
+    start, end = joint.heel_line
+    vectors = {
+        "chord": chord.plane.T @ chord.along,
+        "upwards": chord.plane.T @ chord.normal,
+        "heel_start": start,
+        "heel_edge": end - start,
+    }
+    return lines(values) + "".join(listing(name, vector) for name, vector in vectors.items())
+
+
+def macro_of_joint(number: int, values: str) -> str:
+    """The macro of pro/joints.pro that sets the values of a joint, by its number from 0."""
+    return f"Macro Joint_{number}\n{values}Return\n"
+
+
+def values_of_joint(case: Case) -> str:
+    """The values of pro/joints.pro that the parameters of a joint set, from its case."""
+    values = {n: case[n] for n, known in declared().items() if known.of_joints}
+    return "".join(f"{name} = {quoted(value)};\n" for name, value in values.items())
 
 
 def write_problem(
@@ -156,10 +174,11 @@ def write_problem(
         lists |= own_lists(mesh)
     lists |= more_lists or {}
     if mesh or case.of_joints:
-        number = len(case.joints)
-        paths = values_of_paths(mesh, case) if mesh else [""] * number
-        macros = (values_of_joint(case, mesh, k, paths[k]) for k in range(number))
-        of_joints = "of_joints = 1;\n" + "".join(macros)
+        paths = values_of_paths(mesh, case) if mesh else [""] * len(case.joints)
+        of_joints = "of_joints = 1;\n" + (own_names(mesh) if mesh else "")
+        for k, joint in enumerate(case.joints):
+            position = position_of_joint(mesh, k) if mesh else ""
+            of_joints += macro_of_joint(k, values_of_joint(joint) + position + paths[k])
     if case.downstream_face:
         lists["downstream_face"] = case.downstream_face
     if case.lift_heights:

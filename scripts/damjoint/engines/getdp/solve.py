@@ -21,7 +21,7 @@ from ...mesh.mesh import Mesh, mesh_of
 from ...model.network import with_paths
 from .. import OnStep, Outcome
 from . import process, tables
-from .paths import values_of_paths
+from .paths import has_level_ends, values_of_paths
 
 #: Mesh patterns in 3D: GetDP has no suitable quadrature for prisms and hexahedra.
 SOLID = ("free", "split")
@@ -59,8 +59,8 @@ def check_joint(own: Case) -> None:
             f"drains = 1: must be 0 with engine = getdp and uplift = {own['uplift']} in 3D and in "
             "a geometry of one's own"
         )
-    if own["uplift"] == "waterstop" and own["dim"] == 3:
-        raise InputError("uplift = waterstop: must be another one with engine = getdp in 3D")
+    if own["uplift"] == "waterstop" and own["dim"] == 3 and own["order"] == 2:
+        raise InputError("order = 2: must be 1 with engine = getdp and uplift = waterstop in 3D")
 
 
 def check_own(mesh: Mesh, case: Case) -> None:
@@ -77,12 +77,17 @@ def check_own(mesh: Mesh, case: Case) -> None:
                 f"geometry = {case.geometry}: joint {joint.name} must lie between two bodies with "
                 "engine = getdp"
             )
-        ends = (joint.heel, joint.toe)
-        level = all(np.ptp(end.points[:, 1]) < ROUND_OFF * case.size for end in ends)
-        if not level and own["uplift"] != "none":
+        if own["uplift"] in ("drained", "cracked", "flow") and not has_level_ends(joint):
             raise InputError(
-                f"uplift = {own['uplift']}: must be none with engine = getdp where heel or toe are "
-                "not level"
+                f"uplift = {own['uplift']}: must be none, imposed or waterstop with engine = getdp "
+                "where heel or toe are not level"
+            )
+        start, end = joint.heel_line
+        to_line = np.linalg.norm(np.cross(joint.heel.points - start, end - start), axis=1)
+        if own["uplift"] == "waterstop" and to_line.max() > ROUND_OFF * case.size**2:
+            raise InputError(
+                f"uplift = waterstop: must be another one in joint {joint.name} with engine = "
+                "getdp, as its heel is not straight"
             )
 
 

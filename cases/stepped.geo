@@ -1,0 +1,21 @@
+// Mesh of stepped.case.
+// Made by python -m damjoint_tools.gmsh_files stepped.case, for dim = 2.
+Include "../pro/units.pro";
+Include "stepped.case";
+Include "../geo/window.geo";
+Include "../geo/stepped.geo";
+If(dim != 2)
+  Error("dim = %g: must be 2, as in stepped.case", dim);
+EndIf
+Mesh.MshFileVersion = 2.2;
+Delete Physicals;
+Physical Point(7) = {1};
+Physical Point(8) = {6};
+Physical Point(9) = {8};
+Physical Curve(3) = {1, 2, 3, 4, 5};
+Physical Curve(6) = {9, 10, 11};
+Physical Curve(100) = {13};
+Physical Curve(101) = {6};
+Physical Curve(102) = {7};
+Physical Surface(1) = {1};
+Physical Surface(2) = {2};

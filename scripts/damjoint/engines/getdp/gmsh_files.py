@@ -1,0 +1,128 @@
+"""The files with which the window of Gmsh runs the reference GetDP model on a user's own geometry,
+without Python: NAME.geo and NAME.pro beside NAME.case.
+
+They have what the Python package finds in the mesh: the numbers of the regions, which of them are
+turned, bodies, ends and paths of the joints. None of these depends on the sizes of the elements,
+but for the means over a curved heel or toe.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TypeAlias
+
+import numpy as np
+
+from ... import InputError
+from ...input.case import Case
+from ...input.parameters import constants, listing, start_gmsh
+from ...mesh.mesh import Mesh, mesh_of
+from .paths import values_of_paths
+from .process import macro_of_joint, own_lists, own_names, position_of_joint
+from .solve import check
+
+#: Gmsh's names of entities by dimension.
+ENTITIES = "Point", "Curve", "Surface", "Volume"
+
+#: Entities of the regions, by dimension and number.
+Regions: TypeAlias = dict[tuple[int, int], list[int]]
+
+MADE = "// Made by python -m damjoint_tools.gmsh_files {name}.case, for dim = {dim}.\n"
+
+
+def write_gmsh_files(case: Case, folder: Path) -> None:
+    """Write NAME.geo and NAME.pro of a case into the folder of its file.
+
+    Raises InputError if its geometry is not a .geo file, or GetDP can not compute it.
+    """
+    geometry = case.geometry
+    if not geometry or geometry.suffix != ".geo":
+        raise InputError(f"geometry = {geometry}: must be a .geo file")
+    check(case)
+    mesh = mesh_of(case)
+    case = case.with_joints([joint.of_case for joint in mesh.joints])
+    (folder / f"{case.name}.geo").write_text(geo_text(case.name, geometry, mesh))
+    (folder / f"{case.name}.pro").write_text(pro_text(case, mesh))
+
+
+def geo_text(name: str, geometry: Path, mesh: Mesh) -> str:
+    """NAME.geo: the geometry, and its regions by the numbers of pro/parameters.pro."""
+    regions, inverse = regions_of(mesh)
+    turned = sorted(inverse.difference(*turned_joints(regions, inverse, mesh).values()))
+    return (
+        f"// Mesh of {name}.case.\n"
+        + MADE.format(name=name, dim=mesh.dim)
+        + 'Include "../pro/units.pro";\n'
+        + f'Include "{name}.case";\n'
+        + 'Include "../geo/window.geo";\n'
+        + f'Include "../geo/{geometry.name}";\n'
+        + f"If(dim != {mesh.dim})\n"
+        + f'  Error("dim = %g: must be {mesh.dim}, as in {name}.case", dim);\n'
+        + "EndIf\n"
+        + "Mesh.MshFileVersion = 2.2;\n"
+        + "Delete Physicals;\n"
+        + "".join(
+            f"Physical {ENTITIES[d]}({tag}) = {{{numbers(of_region)}}};\n"
+            for (d, tag), of_region in regions.items()
+        )
+        + (f"ReverseMesh {ENTITIES[mesh.dim - 1]} {{{numbers(turned)}}};\n" if turned else "")
+    )
+
+
+def pro_text(case: Case, mesh: Mesh) -> str:
+    """NAME.pro: position of the joints, and the problem definition."""
+    inverse = turned_joints(*regions_of(mesh), mesh)
+    lists = "".join(listing(name, values) for name, values in own_lists(mesh).items())
+    joints = "".join(
+        macro_of_joint(
+            k, position_of_joint(mesh, k) + path + "side_of_normal = -1;\n" * (k in inverse)
+        )
+        for k, path in enumerate(values_of_paths(mesh, case))
+    )
+    return (
+        f"// Problem of {case.name}.case.\n"
+        + MADE.format(name=case.name, dim=mesh.dim)
+        + f'out_dir = StrCat[CurrentDirectory, "res/{case.name}/"];\n'
+        + 'Include "../pro/units.pro";\n'
+        + f'Include "{case.name}.case";\n'
+        + rounded(lists)
+        + own_names(mesh)
+        + rounded(joints)
+        + 'Include "../pro/damjoint.pro";\n'
+    )
+
+
+def turned_joints(regions: Regions, turned: set[int], mesh: Mesh) -> dict[int, list[int]]:
+    """Entities of the joints, by number from 0, that are turned as a whole. They stay as they are,
+    as curves along a joint need its elements in their order, and its normals are inverted.
+    """
+    first, layer = (int(constants()[name][0]) for name in ("JOINT", "LAYER"))
+    entities = {k: regions[mesh.dim - 1, first + k * layer] for k in range(len(mesh.joints))}
+    return {k: of_joint for k, of_joint in entities.items() if turned.issuperset(of_joint)}
+
+
+def regions_of(mesh: Mesh) -> tuple[Regions, set[int]]:
+    """Gmsh's entities of the regions, and those that are turned."""
+    gmsh, d = start_gmsh(), mesh.dim - 1
+    if mesh.divided:
+        mesh.divide_faces()
+    regions = {
+        (dim, tag): sorted(map(int, gmsh.model.getEntitiesForPhysicalGroup(dim, tag)))
+        for dim, tag in gmsh.model.getPhysicalGroups()
+    }
+    elements = {
+        entity: np.concatenate(gmsh.model.mesh.getElements(d, entity)[1])
+        for entity in {e for (dim, _), of_region in regions.items() if dim == d for e in of_region}
+    }
+    return regions, {e for e, tags in elements.items() if np.isin(tags, mesh.turned).any()}
+
+
+def rounded(text: str) -> str:
+    """A text with its numbers rounded, which thus are those of other machines, too."""
+    return re.sub(r"-?\d+\.\d+(e[-+]?\d+)?", lambda number: f"{float(number[0]):.10g}", text)
+
+
+def numbers(values: list[int]) -> str:
+    """Numbers with commas."""
+    return ", ".join(map(str, values))
