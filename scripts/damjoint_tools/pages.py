@@ -169,9 +169,10 @@ def results_page() -> str:
         "displacement at their midpoints. Arrays have their unit in their name; `level [m]` is a "
         "value of each file. Bodies: `displacement [m]`, `stress [Pa]` (xx, yy, zz, xy, yz, xz), "
         "`largest principal stress [Pa]`, `smallest principal stress [Pa]` (tension > 0), "
-        "`body` (1 dam, 2 foundation, 1001 dam 2, ...). Joints: `displacement [m]` of the body below, so that Warp "
-        "By Vector moves both blocks; `opening [m]`, never negative; `jump [m]` and `traction "
-        "[Pa]` along x, y, z, the columns of joint.csv, and `joint`, its number.",
+        "`body` (1 dam, 2 foundation, 1001 dam 2, ...). Joints: "
+        "`displacement [m]` of the body below, so that Warp By Vector moves both "
+        "blocks; `opening [m]`, never negative; `jump [m]` and `traction [Pa]` along x, "
+        "y, z, the columns of joint.csv, and `joint`, its number.",
     ]
     return "\n\n".join(parts) + "\n"
 
