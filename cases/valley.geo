@@ -10,10 +10,10 @@ EndIf
 Mesh.MshFileVersion = 2.2;
 Delete Physicals;
 Physical Point(9) = {28};
-Physical Curve(7) = {2, 3};
-Physical Curve(8) = {10, 11};
+Physical Curve(7) = {2 : 3};
+Physical Curve(8) = {10 : 11};
 Physical Surface(3) = {3};
-Physical Surface(6) = {8, 9, 10, 11, 12};
+Physical Surface(6) = {8 : 12};
 Physical Surface(100) = {1};
 Physical Surface(101) = {6};
 Physical Surface(102) = {5};

@@ -65,7 +65,11 @@ OVER_TIME: tuple[tuple[str, Units, tuple[tuple[str, str, Color], ...]], ...] = (
     ("crest movement", LENGTHS, (("", "crest_ux", BLUE),)),
     ("opening", LENGTHS, (("heel", "heel_opening", RED), ("toe", "toe_opening", GREEN))),
     ("slip", LENGTHS, (("", "slip_mean", ORANGE),)),
-    ("shear force T", FORCES, (("T", "T", BLUE), ("strength", "strength", RED))),
+    (
+        "shear force T",
+        FORCES,
+        (("T", "T", BLUE), ("strength", "strength", RED), ("", "strength against", RED)),
+    ),
 )
 
 

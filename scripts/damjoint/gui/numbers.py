@@ -161,7 +161,7 @@ class QuakeNumbers(Numbers):
 
 def shown_rows(found: QuakeResult, joint: int) -> Columns:
     """The rows of quake.csv of a joint, by its number, without round-off, with openings not below 0
-    and the shear strength in the direction of T.
+    and the shear strength in both directions.
     """
     rows = {
         name: np.where(np.abs(column) > ROUND_OFF * np.abs(column).max(), column, 0.0)
@@ -170,7 +170,8 @@ def shown_rows(found: QuakeResult, joint: int) -> Columns:
     }
     rows |= {name: np.maximum(rows[name], 0.0) for name in ("heel_opening", "toe_opening")}
     if "shear_reserve" in rows:
-        rows["strength"] = np.sign(rows["T"]) * (rows["shear_reserve"] + np.abs(rows["T"]))
+        rows["strength"] = np.maximum(rows["shear_reserve"] + np.abs(rows["T"]), 0.0)
+        rows["strength against"] = -rows["strength"]
     return rows
 
 

@@ -124,5 +124,11 @@ def rounded(text: str) -> str:
 
 
 def numbers(values: list[int]) -> str:
-    """Numbers with commas."""
-    return ", ".join(map(str, values))
+    """Ascending numbers in Gmsh's language: 1, 3 : 7, 9."""
+    runs: list[list[int]] = []
+    for value in values:
+        if runs and runs[-1][-1] == value - 1:
+            runs[-1].append(value)
+        else:
+            runs.append([value])
+    return ", ".join(f"{run[0]} : {run[-1]}" if len(run) > 1 else f"{run[0]}" for run in runs)

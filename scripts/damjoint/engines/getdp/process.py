@@ -116,7 +116,7 @@ def numbers(mesh: Mesh) -> dict[str, float]:
 
 def own_names(mesh: Mesh) -> str:
     """The list of pro/joints.pro with the names of the joints of a user's own geometry."""
-    names = ", ".join(quoted(joint.name) for joint in mesh.joints)
+    names = ",\n".join(quoted(joint.name) for joint in mesh.joints)
     return f"own_joint_names() = Str[{names}];\n"
 
 
