@@ -758,6 +758,9 @@ def test_an_earthquake_follows_the_static_loads(open_window, command, tmp_path):
     assert user.run().startswith("done in") and "residual slip" in user.session.status
     before, earthquake = user.session.scenes
     assert before.times.tolist() == [1] and len(earthquake.times) == 101
+    strength, against = (earthquake.quake[name] for name in ("strength", "strength against"))
+    assert strength.min() >= 0 and np.array_equal(against, -strength)
+    assert (np.abs(earthquake.quake["T"]) <= strength * (1 + 1e-6)).all()
     assert user.entry(tree.MOTION)["choices"] == ["static loads", "earthquake"]
     user.session.gallery.set_step(40)
     user.session.turn()
