@@ -507,9 +507,10 @@ def test_the_corners_of_the_downstream_face_can_be_changed(open_window, tmp_path
     assert corner(25, 14) and not corner(12, 30)
     sheet = user.session.tree.sheet
     (tmp_path / "saved.case").write_text(case_text(sheet, sheet.case))
-    assert load(str(tmp_path / "saved.case")).downstream_face == (25, 14)
     user.type(tree.CORNERS, "none")
     assert not corner(25, 14) and not user.session.tree.sheet.case.downstream_face
+    # last: it parses in the database of the window
+    assert load(str(tmp_path / "saved.case")).downstream_face == (25, 14)
 
 
 @pytest.mark.heavy
