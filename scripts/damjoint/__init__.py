@@ -31,7 +31,8 @@ session.py  the life of a study in its output folder
 runner.py   solves a case and writes its results
 studies/    checks, sweeps, critical values, a law along a path, reports
 verification/  published tests, for `damjoint validate`
-library.py  the interface for Python: case, run, check, quake, modes, ...
+library.py  the interface for Python: case, run, check, quake, modes, ...; its words:
+            python_words.py
 gui/        the Gmsh window
 cli/        the command line, a file for each command; __main__.py prepares its process
 

@@ -42,6 +42,7 @@ from .model.results import (
     quake_columns,
 )
 from .progress import track
+from .python_words import all_in_python, in_python, speaks_python
 from .solver.load_stepper import LoadStepper
 from .solver.state import State
 from .statics.hints import hints
@@ -86,6 +87,7 @@ __all__ = [
 ]
 
 
+@speaks_python
 def case(
     source: Case | str | Path = "dam",
     *,
@@ -140,10 +142,13 @@ def as_case(source: Case | str | Path) -> Case:
     return source if isinstance(source, Case) else case(source)
 
 
-def noted(case: Case) -> Case:
-    """The case, after a warning for each note on it: settings without effect, loads in part, ..."""
+def noted(case: Case, frames: int = 4) -> Case:
+    """The case, after a warning for each note on it: settings without effect, loads in part, ...
+
+    frames: from here to the user's call; a function that `speaks_python` is two.
+    """
     for note in notes(case):
-        warnings.warn(f"{case.name}: {note}", stacklevel=3)
+        warnings.warn(f"{case.name}: {in_python(note)}", stacklevel=frames)
     return case
 
 
@@ -250,12 +255,12 @@ class Run:
     @property
     def statement(self) -> str:
         """Why and where the run has stopped; empty if the dam stands."""
-        return statement(self.results)
+        return in_python(statement(self.results))
 
     @property
     def hints(self) -> list[str]:
         """Remarks on the result."""
-        return hints(self.results)
+        return all_in_python(hints(self.results))
 
     def plot(self) -> Figure:
         """The picture of the run, as `damjoint run` writes it."""
@@ -380,6 +385,7 @@ def optional(package: str) -> ModuleType:
         raise ImportError(f"{package} is not installed: pip install {package}") from None
 
 
+@speaks_python
 def run(source: Case | str | Path, *, engine: str = "auto") -> Run:
     """Solve a case; nothing is written. Of a published case with several uplifts: the first.
 
@@ -457,7 +463,7 @@ def fill(source: Case | str | Path) -> Iterator[Step]:
         >>> [step.level for step in fill(case("dam", levels=[30, 40], n_joint=10))]
         [30.0, 40.0]
     """
-    case = noted(as_case(source))
+    case = noted(as_case(source), 3)
     threads = threads_of(case)
     with limited_threads(threads):
         stepper = LoadStepper(case)
@@ -537,6 +543,7 @@ class Checks(Sequence["SafetyCheck"]):
         return "\n".join(map(repr, self))
 
 
+@speaks_python
 def check(cases: Case | str | Path | Sequence[Case | str | Path]) -> Checks:
     """Safety factors of a case or of several, by the finite elements and by the gravity method.
 
@@ -597,7 +604,7 @@ class Critical:
         """The lines that `damjoint critical` prints."""
         from .studies.critical_study import printed_lines
 
-        return printed_lines(self.answer, self.search)
+        return all_in_python(printed_lines(self.answer, self.search))
 
     @property
     def equilibria(self) -> np.recarray:
@@ -628,6 +635,7 @@ class Critical:
         return "\n".join(self.statement)
 
 
+@speaks_python
 def critical(
     source: Case | str | Path = "dam",
     of: str = "level",
@@ -774,6 +782,7 @@ class Quake:
         return f"{self.case.name}: {self.statement}"
 
 
+@speaks_python
 def quake(
     source: Case | str | Path = "dam",
     *,
@@ -863,6 +872,7 @@ class Modes:
         return f"{self.case.name}: {listed} Hz"
 
 
+@speaks_python
 def modes(source: Case | str | Path = "dam", *, number: int = 5) -> Modes:
     """Natural modes of a case, without a record: joints closed and undamaged, with and without the
     mass of the water, on massless and on rigid rock; nothing is written.
@@ -991,6 +1001,7 @@ def by_column(rows: Sequence[Mapping[str, Value]]) -> dict[str, list[Value]]:
     return {name: [row[name] for row in rows] for name in rows[0]}
 
 
+@speaks_python
 def sweep(
     source: Case | str | Path = "dam",
     *,
@@ -1043,7 +1054,7 @@ def sweep(
     tasks = {key: task for key, _, task in rows}
     computed = compute(tasks, jobs)
     for note in notes_on_rows(base, [task.case for task in tasks.values()]):
-        warnings.warn(f"{base.name}: {note}", stacklevel=2)
+        warnings.warn(f"{base.name}: {in_python(note)}", stacklevel=3)
     results = dict(track(computed, "sweep", len(tasks)) if progress else computed)
     cells = [{column_of(n): v for n, v in row.items()} | results[key] for key, row, _ in rows]
     return Sweep(plan, by_column(cells), meshed)

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from damjoint import library
 from damjoint.post import stored
+from damjoint.python_words import in_python
 from damjoint.solver.load_stepper import LoadStepper
 from damjoint.threads import limited_threads
 from matplotlib.text import Text
@@ -44,6 +45,40 @@ def test_the_code_of_the_page_runs(tmp_path, monkeypatch):
     assert len(names["friction"].rows) == 6 and len(names["random"].rows) == 50
     assert names["pushed"].loading.level > 40 and names["run"].verdict == "stands"
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    "call, message",
+    [
+        (lambda: dj.case(levels=[30, 40], tail_levels=[1, 2, 3]), "tail_levels = 1,2,3: must be"),
+        (lambda: dj.critical(dj.case(n_joint=10), of="law"), 'of="law": must be level, strength'),
+        (
+            lambda: dj.sweep(n_joint=10, mu=[0.5], tie={"mu": "2"}),
+            "not by set, vary, sample or tie",
+        ),
+        (lambda: dj.quake("dam"), 'in the case, or record="FILE.csv"'),
+    ],
+)
+def test_messages_name_arguments_not_options(call, message):
+    with pytest.raises(dj.InputError, match=re.escape(message)) as caught:
+        call()
+    assert "--" not in str(caught.value)
+
+
+def test_words_of_commands_in_python():
+    """Options with a value, with name=value, without any."""
+    assert in_python("too coarse: --accuracy 3% chooses the mesh") == (
+        'too coarse: accuracy="3%" chooses the mesh'
+    )
+    assert in_python("--vary mu=1,x: must be numbers") == "mu=1,x: must be numbers"
+    assert in_python("the case's own; set --tail-levels") == "the case's own; set tail_levels"
+    assert in_python("out of memory; --jobs 1 needs least") == "out of memory; jobs=1 needs least"
+    assert 'os.environ["DAMJOINT_RUN_GEO"] = "1"' in in_python("if you trust it, add --run-geo")
+
+
+def test_hints_and_statements_have_arguments():
+    limit = dj.critical(dj.case("dam", f_c=1e5, n_joint=10, levels=[40]))
+    assert limit.statement[0].endswith("exceeds f_c = 100 kPa; levels may begin lower")
 
 
 def test_an_import_loads_nothing_else():

@@ -24,8 +24,8 @@ PARTS = [
     "input",
 ]
 PARTS += ["mesh", "model", "fem", "joint", "solver", "dynamics", "engines", "statics", "post"]
-PARTS += ["pictures", "accuracy", "session", "runner", "studies", "verification", "library"]
-PARTS += ["gui", "cli", "__main__"]
+PARTS += ["pictures", "accuracy", "session", "runner", "studies", "verification"]
+PARTS += ["python_words", "library", "gui", "cli", "__main__"]
 
 
 def part_of(path):
