@@ -812,6 +812,44 @@ def test_a_joint_that_stays_closed_has_no_peak_of_its_opening(command, case_file
     assert 'class="verdict not-judged">not judged<' in page
 
 
+def thrown(tmp_path, **settings):
+    """A block on a ground that falls at 20 m/s2 for 0.05 s and is then stopped: its run, and the
+    heights of its flights [m].
+    """
+    record = tmp_path / "pulse.csv"
+    record.write_text(
+        "time,ax,ay\n0,0,0\n0.001,0,-20\n0.05,0,-20\n0.051,0,20\n0.1,0,20\n0.101,0,0\n"
+    )
+    settings = BLOCK | {"record_rest": 0.2, "dt": 0.001} | settings
+    under_way = QuakeRun(load("dam", settings, "0.001", record=record))
+    for _ in under_way.steps():
+        pass
+    opening = under_way.history.table["heel_opening"]
+    flights = np.split(opening, np.flatnonzero(np.diff(np.sign(opening))) + 1)
+    heights = [flight.max() for flight in flights if flight.max() > 1e-4]
+    return under_way, heights
+
+
+@pytest.mark.heavy
+def test_a_block_that_lands_again_is_noted(tmp_path):
+    """The period of its mass on K_N; with steps that resolve it the block rises after its impact as
+    high as v^2/(2 g), with longer ones not.
+    """
+    fine, (first, second, *_) = thrown(tmp_path, dt=1e-4)
+    table, period = fine.history.table, 2 * np.pi * np.sqrt(2400 * 2 / 1e11)
+    opening = table["heel_opening"]
+    landing = np.flatnonzero((opening[:-1] > 0) & (opening[1:] <= 0))[0]
+    impact = (opening[landing - 1] - opening[landing]) / 1e-4  # m/s
+    assert second == pytest.approx(impact**2 / (2 * 9.81), rel=0.05)
+    coarse, (other, wrong, *_) = thrown(tmp_path)
+    assert other == pytest.approx(first, rel=0.02) and not 0.7 < wrong / second < 1.4
+    resolved, note = fine.summary()["notes"][-1], coarse.summary()["notes"][-1]
+    assert "what is above the joint lifts off and lands again" in resolved
+    assert "steps" not in resolved
+    assert f"(the mass above on K_N), {period:.3g} s, has 1.4 steps, too few" in note
+    assert f"compare with dt = {period / 10:.2g}" in note
+
+
 @pytest.mark.heavy
 @pytest.mark.parametrize("order", [1, 2])
 def test_frames_are_states_of_the_bodies_and_the_joint(command, case_file, tmp_path, order):

@@ -58,7 +58,7 @@ class Content(NamedTuple):
         """
         answer, result = self.answer, self.result
         would = f" ({answer.failure})" if answer.failure else ""
-        facts = [answer.why or f"not confirmed: {answer.doubt}{would}"]
+        facts = [answer.why or f"{answer.doubt}{would}"]
         if result and (last := result.last):
             loading = Loading.at(self.case, self.case.times[-1], last["level"], last["tail_level"])
             facts.append(f"loads: {loads_label(self.case, loading)}")

@@ -117,9 +117,15 @@ def peak_cells(name: str, peak: dict[str, float], unit: str) -> tuple[str, str, 
     """Unit, value and time [s] of a peak; name: its column of quake.csv."""
     if "opening" in name and peak["value"] <= 0:
         return unit, "closed", ""
-    in_mm = name.startswith(DISPLACEMENTS)
-    value = peak["value"] * (1e3 if in_mm else 1)
-    return "mm" if in_mm else unit, f"{value:.4g}", f"{peak['time']:.3f}"
+    time = f"{peak['time']:.3f}"
+    if name.startswith(DISPLACEMENTS):
+        return "mm", quake_summary.in_millimetres(peak["value"], 4), time
+    return unit, f"{peak['value']:.4g}", time
+
+
+def in_unit(value: float, unit: str) -> str:
+    """A length [m] in mm, or a number without unit."""
+    return quake_summary.in_millimetres(value, 4) if unit == "mm" else f"{value:.4g}"
 
 
 def peaks_table(summary: dict[str, Any], case: Case, of_joints: bool = True) -> Table:
@@ -152,10 +158,7 @@ def joints_table(summary: dict[str, Any], case: Case) -> Table:
             for _, unit, name in OF_JOINTS
         ]
         values = [(summary[group].get(column_of(n, k)), unit) for group, n, _, unit in ends]
-        at_end = [
-            "-" if value is None else f"{value * (1e3 if unit == 'mm' else 1):.4g}"
-            for value, unit in values
-        ]
+        at_end = ["-" if value is None else in_unit(value, unit) for value, unit in values]
         rows.append((joint, *peaks, *at_end))
     heads = [(f"peak of {h}" if "," in h else h, unit) for h, unit, _ in OF_JOINTS]
     heads += [(meaning, unit.strip("-")) for _, _, meaning, unit in ends]
@@ -183,7 +186,7 @@ def residual_table(summary: dict[str, Any], case: Case) -> Table:
         of = f" ({case.named((k,))})" if case.of_joints else ""
         for group, name, meaning, unit in AT_REST if summary["at_rest"] else MOVING:
             if (value := summary[group].get(column_of(name, k))) is not None:
-                rows.append((meaning + of, unit, f"{value * (1e3 if unit == 'mm' else 1):.4g}"))
+                rows.append((meaning + of, unit, in_unit(value, unit)))
     head = "at rest" if summary["at_rest"] else "not at rest"
     return Table([head, "unit", "value"], ["", "", ""], rows)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict
 from typing import Any
 
@@ -27,6 +28,9 @@ LEAST_MOTION = 1e-5
 #: Time steps in the first period that resolve a joint which opens and slips.
 STEPS_OF_PERIOD = 30
 
+#: Time steps in the period of a contact that resolve an impact.
+STEPS_OF_IMPACT = 10
+
 #: Broken part of a joint without friction beyond which nothing holds what is above it.
 BROKEN = 0.99
 
@@ -40,6 +44,11 @@ QUAKE_COLUMNS = ("peak_ground_ax", "residual_slip", "residual_tilt", "rigid_bloc
 QUAKE_UNITS = dict(zip(QUAKE_COLUMNS, ("m/s2", "m", "-", "m"), strict=True))
 #: Those by their names in the summary of an earthquake; empty if the dam is not at rest.
 RESIDUAL = dict(zip(("slip", "tilt", "rigid_block"), QUAKE_COLUMNS[1:], strict=True))
+
+#: Normal force over its largest value up to which a joint that is open throughout carries none.
+UNLOADED = 1e-3
+#: Open part of a joint from which on it is open throughout.
+OPEN = 0.999
 
 #: Slip over the length of a joint beyond which displacements are not small.
 LARGE_SLIP = 0.01
@@ -87,7 +96,39 @@ def summary(quake: Earthquake, rows: Table, halvings: int) -> dict[str, Any]:
                 f"the slip reaches {slip:.3g} m{of(quake.case, k)}: equilibrium is that of the "
                 "undeformed dam, and the drains through the joint are taken as intact"
             )
+    result["notes"] += filter(None, (lift_off(quake, rows, k) for k in joints))
     return result | {"peaks": peaks} | values_at_end(quake.case, rows, 1 / quake.frequencies[0])
+
+
+def lift_off(quake: Earthquake, rows: Table, number: int) -> str:
+    """What is said of a joint, by its number, that opens throughout and lands again; else empty."""
+    case, joint = quake.case, quake.problem.model.equilibrium.interface.joints[number]
+    size, own = case.joints[number].joint_along, case.joints[number]
+    normal = np.abs(rows[column_of("N", number)])
+    opened = rows[column_of("open_length", number)] > OPEN * size
+    lifted = opened & (normal < UNLOADED * normal.max())
+    landings = np.count_nonzero(lifted[:-1] & ~lifted[1:])
+    if not landings:
+        return ""
+    above = case.graph.separated([number])
+    across = quake.system.translation(joint, above, joint.chord.normal)
+    mass = float(across @ quake.system.mass @ across) / joint.width
+    period = 2 * math.pi * math.sqrt(mass / (own["K_N"] * size))
+    first, share = rows["time"][lifted][0], rows["dt"][lifted].sum() / rows["dt"].sum()
+    where = case.named((number,)) or "the joint"
+    text = (
+        f"what is above {where} lifts off and lands again, {landings} "
+        f"time{'s' if landings > 1 else ''} from t = {first:.3f} s on, {share:.0%} of the time: "
+        "the contact is elastic, without damping of an impact but by joint_damping_n"
+    )
+    if period < STEPS_OF_IMPACT * quake.dt:
+        text += (
+            f"; the period of the contact (the mass above on K_N), {period:.3g} s, has "
+            f"{period / quake.dt:.2g} steps, too few for its impacts, which may add energy: what "
+            "follows is not reliable, accelerations least; compare with dt = "
+            f"{period / STEPS_OF_IMPACT:.2g}"
+        )
+    return text
 
 
 def notes(quake: Earthquake) -> list[str]:
@@ -181,6 +222,14 @@ def of(case: Case, joint: int) -> str:
     return f" ({name})" if name else ""
 
 
+def in_millimetres(length: float, digits: int) -> str:
+    """A length [m] in mm, without an exponent; 0 below a nanometre."""
+    value = 1e3 * length
+    if abs(value) < 1e-6:
+        return "0"
+    return f"{value:.0f}" if abs(value) >= 10**digits else f"{value:.{digits}g}"
+
+
 def statement(case: Case, summary: dict[str, Any]) -> str:
     """What a summary says of the end of an earthquake."""
     joints = range(len(case.joints))
@@ -191,7 +240,7 @@ def statement(case: Case, summary: dict[str, Any]) -> str:
     ]
 
     def millimetres(values: dict[str, float], name: str, k: int) -> str:
-        return f"{1e3 * values[column_of(name, k)]:.3g} mm"
+        return f"{in_millimetres(values[column_of(name, k)], 3)} mm"
 
     if summary["at_rest"]:
         slips = [millimetres(summary["residual"], "slip", k) + of(case, k) for k in joints]
