@@ -103,6 +103,12 @@ def test_lines_of_a_panel_differ_without_colors(figures, name):
         assert len(styles) == len(lines)
 
 
+def test_a_joint_that_stays_closed_has_no_negative_opening():
+    figure = dj.run(dj.case("dam", **COARSE, levels=[20, 30])).plot()
+    (axes,) = (a for a in figure.findobj(Axes) if a.get_ylabel().startswith("largest opening"))
+    assert axes.get_yticks().tolist() == [0]
+
+
 @pytest.mark.heavy
 def test_a_picture_in_3d(runs):
     """It fits a page upright; without fields there are no view and maps."""

@@ -253,6 +253,15 @@ def page_of_check(checked):
     return page_of(checked)
 
 
+@pytest.mark.parametrize("level, end", [(45.0, "toe"), (5.0, "heel")])
+def test_the_eccentricity_has_its_direction(level, end):
+    """The weight alone is upstream of the middle."""
+    rigid = gravity.at(load("dam", {}, (level,)), 1)
+    line = report.formulas(rigid)[0]
+    assert f"= {rigid.eccentricity:.4g} m, towards the {end}; " in line
+    assert (rigid.eccentricity > 0) == (end == "toe")
+
+
 def test_report_of_load_combinations(checked, page_of_check):
     """The summary has the factors and verdicts of check.csv, in its order."""
     summary = rows_below(page_of_check, "Summary")

@@ -441,6 +441,8 @@ def draw_history(figure: AnyFigure, shown: list[Panel], result: Results) -> None
         axes.set_ylabel(f"{quantity} [{name}]", fontsize=8.5)
         axes.grid(alpha=0.3)
         widen(axes.yaxis)
+        if not any(values.any() for values, *_ in lines):
+            axes.set_yticks([0.0])  # no values below zero beside it
         if name == "%":
             axes.set_ylim(*PERCENT)
         # one legend for all panels of several joints

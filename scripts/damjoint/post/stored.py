@@ -109,7 +109,8 @@ def case_of(info: dict[str, Any]) -> Case:
         raise InputError(f"run.json of damjoint {version} lacks parameters: {', '.join(missing)}")
     values = {n: p.check(info["parameters"][n]) for n, p in declared().items()}
     levels, tail_levels, times = (finite(n, info[n]) for n in ("levels", "tail_levels", "times"))
-    lifts, face = (finite(name, info[name]) for name in GEOMETRY_LISTS)
+    # of a run by an earlier version that had no such list: none
+    lifts, face = (finite(name, info.get(name, [])) for name in GEOMETRY_LISTS)
     of_joints_given = [
         values | {n: declared()[n].check(v) for n, v in joint["values"].items()}
         for joint in info["joints"]

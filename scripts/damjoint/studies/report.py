@@ -482,9 +482,10 @@ def formulas(rigid: GravityMethod) -> list[str]:
     normal, shear, moment = (v / 1e6 for v in (rigid.N, rigid.T, rigid.M))
     toe, tip = rigid.sigma_n_eff_toe / 1e6, rigid.tip_stress / 1e6
     tip = 0.0 if abs(tip) < ROUND_OFF * abs(toe) else tip
+    end = "toe" if rigid.eccentricity >= 0 else "heel"
     lines = [
         f"e = L/2 - M/N' = {length:.4g}/2 - {moment:.4g}/{normal:.4g} = "
-        f"{rigid.eccentricity:.4g} m towards the toe; uncracked B = L - a = {uncracked:.4g} m",
+        f"{rigid.eccentricity:.4g} m, towards the {end}; uncracked B = L - a = {uncracked:.4g} m",
         f"effective stress, tension > 0: upstream (2 N' B - 6 M)/B² = {tip:.4g} MPa, "
         f"toe (6 M - 4 N' B)/B² = {toe:.4g} MPa",
     ]
