@@ -20,6 +20,9 @@ title = "{title}";
 levels() = {{30, 40, 45}};
 tail_levels() = {{0, 0, 3}};
 
+// Corners of the downstream face between base and crest: x and height [m] of each, upwards.
+// downstream_face() = {{20, 20, 8, 38}};
+
 // Lift joints at these heights [m] above the base, and values that one of the joints base,
 // lift_15_m, lift_30_m has for itself; in all others it has the defaults.
 // lift_heights() = {{15, 30}};
