@@ -392,7 +392,7 @@ def test_files_of_a_search(command, tmp_path):
     level = slide_level(0.35, 1000, True)
     assert code == 0 and out.startswith(f"c: critical level {level:.6g} m (sliding)\n")
     folder = tmp_path / "out/c_critical"
-    names = {"run.json", "joint.csv", "history.csv", "critical.csv", "c_critical.png"}
+    names = {"run.json", "joint.csv", "history.csv", "critical.csv", "c_critical.png", "fields"}
     assert {path.name for path in folder.iterdir()} == names
     record = json.loads((folder / "run.json").read_text())
     assert record["critical"]["mode"] == "sliding" and record["critical"]["of"] == "level"
@@ -447,7 +447,7 @@ def test_a_toe_that_is_crushed_at_the_first_equilibrium_is_reported(command, tmp
     assert json.loads((tmp_path / "out" / "run.json").read_text())["state"] == "complete"
     with (tmp_path / "out" / "critical.csv").open() as file:
         (row,) = csv.DictReader(file)
-    assert f"compression, {float(row['compression']):.4g} Pa" in out
+    assert f"compression, {float(row['compression']) / 1e3:.4g} kPa" in out
 
 
 def test_a_trial_that_is_crushed_at_once_fails(command):
