@@ -242,6 +242,17 @@ def test_values_of_joints_are_those_of_python():
     assert set(listed("joint_automatic")) == {n for n, known in own.items() if known.automatic}
 
 
+def test_an_earthquake_of_a_geometry_of_its_own_is_refused(project):
+    """The engine has it for parametric sections."""
+    path = project / "stepped.pro"
+    path.write_text(
+        "record_x() = {0, 0, 0.01, 0.2}; record_y() = {0, 0, 0.01, 0};\n" + path.read_text()
+    )
+    command = [find_getdp(), str(path), "-v", "2"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode and "record_x: must be left out" in done.stdout + done.stderr
+
+
 CHANGES = (
     COARSE | {"uplift": "none"},
     {"E": 3e11},
