@@ -218,15 +218,27 @@ def body_name(region: int) -> str:
     return f"dam {joint + 1}" if joint else "dam"
 
 
+#: Corners of a cell.
+NUMBER_OF_CORNERS = {"line": 2, "triangle": 3, "quad": 4, "tetra": 4, "wedge": 6, "hexahedron": 8}
+
+
+def corners_of(block: Any) -> tuple[str, IntArray]:
+    """Shape and corners of the cells of a block, which may have midpoints: triangle6, ..."""
+    shape = block.type.rstrip("0123456789")
+    return shape, block.data[:, : NUMBER_OF_CORNERS[shape]]
+
+
 def read_solids(path: Path) -> dict[str, Solid]:
     """Read the bodies of a file bulk_t*.vtu by name."""
     mesh: Any = meshio.read(path)
     parts: dict[str, list[tuple[str, IntArray, int]]] = {}
     for block, regions in zip(mesh.cells, mesh.cell_data["body"], strict=True):
-        table = block.data[:, FROM_VTK_WEDGE] if block.type == "wedge" else block.data
+        shape, table = corners_of(block)
+        if shape == "wedge":
+            table = table[:, FROM_VTK_WEDGE]
         for region in np.unique(regions).tolist():
             of_region = table[regions == region]
-            parts.setdefault(body_name(region), []).append((block.type, of_region, region))
+            parts.setdefault(body_name(region), []).append((shape, of_region, region))
     solids = {}
     for name, cells in parts.items():
         used, numbers = np.unique(

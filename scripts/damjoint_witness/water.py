@@ -23,7 +23,7 @@ from scipy.spatial import cKDTree
 
 from .files import Files, Table, rows_where
 from .reader import Asked, Values
-from .solids import SHAPES, Array, IntArray, Sides, functions, rule
+from .solids import SHAPES, Array, IntArray, Sides, corners_of, functions, rule
 
 #: Error of a pressure over the largest one, and of a flux over its scale: they are written with 12
 #: digits. In 3D, of a system of equations.
@@ -170,7 +170,8 @@ def sides_of(files: Files, asked: Asked, number: int, rows: Table) -> tuple[Side
     path = next((files.folder / "fields").glob("joint_t*.vtu"))
     mesh: Any = meshio.read(path)
     own = mesh.point_data["joint"] == number + 1
-    tables = [block.data[own[block.data].all(axis=1)] for block in mesh.cells]
+    blocks = [corners_of(block)[1] for block in mesh.cells]
+    tables = [block[own[block].all(axis=1)] for block in blocks]
     return tuple(Sides(SHAPES[t.shape[1]], mesh.points[t], order) for t in tables if len(t))
 
 
