@@ -70,7 +70,6 @@ if TYPE_CHECKING:
 
 __version__ = "0.2.0"
 
-
 #: Environment variable; 1: Gmsh may run a user's .geo file, a program that can do anything the user
 #: can.
 RUN_GEO = "DAMJOINT_RUN_GEO"

@@ -309,10 +309,7 @@ class Run:
         return data_set(variables).set_coords(["x", "y", "z", "s", "level"])
 
     def table(self, name: str) -> Table:
-        """The table joint or history as {column: array}.
-
-        Raises InputError for another name.
-        """
+        """The table joint or history as {column: array}. Raises InputError for another name."""
         tables = {"joint": self.results.joint, "history": self.results.history}
         if name not in tables:
             raise InputError(f"table = {name}: must be one of {', '.join(tables)}")
@@ -373,10 +370,7 @@ def attributes(column: tuple[str, str]) -> dict[str, str]:
 
 
 def optional(package: str) -> ModuleType:
-    """A package that damjoint does not require.
-
-    Raises ImportError if it is not installed.
-    """
+    """A package that damjoint does not require. Raises ImportError if it is not installed."""
     from importlib import import_module
 
     try:
@@ -531,10 +525,7 @@ class Checks(Sequence["SafetyCheck"]):
         return displayed(figure_of_check(*picture_content(result, checks)))
 
     def to_pandas(self) -> pandas.DataFrame:
-        """The rows as a DataFrame with units in its `attrs`.
-
-        Raises ImportError without pandas.
-        """
+        """The rows as a DataFrame with units in its `attrs`. Raises ImportError without pandas."""
         from .studies.check import CHECK
 
         return frame(self.table, CHECK)
@@ -861,10 +852,7 @@ class Modes:
         return displayed(figure(self.natural))
 
     def to_pandas(self) -> pandas.DataFrame:
-        """The rows as a DataFrame with units in its `attrs`.
-
-        Raises ImportError without pandas.
-        """
+        """The rows as a DataFrame with units in its `attrs`. Raises ImportError without pandas."""
         return frame(self.natural.table, MODES)
 
     def __repr__(self) -> str:
@@ -975,10 +963,7 @@ class Sweep:
         return {n: u for n, u in (QUAKE_UNITS | results | varied).items() if n in self.table}
 
     def to_pandas(self) -> pandas.DataFrame:
-        """The rows as a DataFrame with units in its `attrs`.
-
-        Raises ImportError without pandas.
-        """
+        """The rows as a DataFrame with units in its `attrs`. Raises ImportError without pandas."""
         rows = self.rows
         columns = {name: rows[name] for name in self.table}
         return frame(columns, {name: (unit, "") for name, unit in self.units.items()})

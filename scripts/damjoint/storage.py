@@ -171,10 +171,7 @@ def lock(file: int, path: Path) -> None:
 
 @contextlib.contextmanager
 def locked_folder(folder: Path) -> Iterator[None]:
-    """Hold the exclusive lock on a folder.
-
-    Raises InputError if another process holds it.
-    """
+    """Hold the exclusive lock on a folder. Raises InputError if another process holds it."""
     number = os.open(folder, os.O_RDONLY)
     try:
         lock(number, folder)

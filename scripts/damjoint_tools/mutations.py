@@ -203,8 +203,8 @@ MUTATIONS = (
     Mutation(
         "ice x 1.02",
         "model/loads.py",
-        '"ice": (loads.ice_force, 0.0),',
-        '"ice": (1.02 * loads.ice_force, 0.0),',
+        '"ice": (case["ice_force"], 0.0),',
+        '"ice": (1.02 * case["ice_force"], 0.0),',
         having("ice_force"),
     ),
     Mutation(
@@ -224,8 +224,8 @@ MUTATIONS = (
     Mutation(
         "temperature x 1.1",
         "model/loads.py",
-        "uniform = loads.expansion_dam * loads.temperature_dam",
-        "uniform = 1.1 * loads.expansion_dam * loads.temperature_dam",
+        'uniform = case["expansion_dam"] * case["temperature_dam"]',
+        'uniform = 1.1 * case["expansion_dam"] * case["temperature_dam"]',
         having("temperature_dam"),
         fields=True,
     ),

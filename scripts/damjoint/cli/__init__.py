@@ -13,8 +13,8 @@ from .. import RUN_GEO, InputError, RunError, __version__
 from ..storage import SAVED
 from .options import Parser
 
-#: The commands: names of modules. Each has SUMMARY, the shared options SHARED if there are any,
-#: `add`, which adds its own options, and `call`, which runs it and returns the exit code.
+#: The commands: names of modules. Each has SUMMARY, `add`, which adds its options, and `call`,
+#: which runs it and returns the exit code.
 COMMANDS = (
     *("run", "check", "critical", "quake", "modes", "sweep"),
     *("plot", "report", "tables", "gui", "new", "validate"),
@@ -61,7 +61,6 @@ def add_command(
     summary, listed = module.SUMMARY, name not in DEVELOPERS
     command = commands.add_parser(
         name,
-        parents=[shared() for shared in getattr(module, "SHARED", ())],
         description=f"{summary[0].upper()}{summary[1:]}.",
         **({"help": summary} if listed else {}),
     )

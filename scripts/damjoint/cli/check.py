@@ -6,28 +6,20 @@ import argparse
 from pathlib import Path
 
 from .cases import load_cases
-from .options import (
-    CASE,
-    JOBS,
-    Parser,
-    accuracy_options,
-    settings_options,
-    table_width,
-    water_options,
-    wide_option,
-)
+from .options import CASE, Parser, table_width
 
 SUMMARY = (
     "safety factors by finite elements and by the gravity method; exit code 1 if one is too "
     "low or not judged"
 )
 
-#: Options that it shares with other commands.
-SHARED = settings_options, water_options, accuracy_options, wide_option
-
 
 def add(command: Parser) -> None:
     """Add the options."""
+    command.add_settings()
+    command.add_water()
+    command.add_accuracy()
+    command.add_wide()
     command.add_argument("cases", nargs="+", metavar="CASE", help=f"load combinations, each {CASE}")
     command.add_path(
         "--out",
@@ -36,7 +28,7 @@ def add(command: Parser) -> None:
         help="folder of check.csv, with a folder for each case; cases that are finished there are "
         "not computed again (default: out/check)",
     )
-    command.add_integer("--jobs", 1, help=JOBS)
+    command.add_jobs()
 
 
 def call(arguments: argparse.Namespace) -> int:

@@ -5,20 +5,18 @@ from __future__ import annotations
 import argparse
 
 from .cases import load_case
-from .options import CASE, TAIL_LEVELS, Parser, settings_options
+from .options import Parser
 
 SUMMARY = (
     "find the level, strength factor or parameter beyond which there is no equilibrium; exit "
     "code 1 if there is none, 3 if it is not confirmed"
 )
 
-#: Options that it shares with other commands.
-SHARED = (settings_options,)
-
 
 def add(command: Parser) -> None:
     """Add the options."""
-    command.add_argument("case", metavar="CASE", help=CASE)
+    command.add_settings()
+    command.add_case()
     command.add_argument(
         "--of",
         default="level",
@@ -26,12 +24,10 @@ def add(command: Parser) -> None:
         help="level [m], strength (factor that divides mu, c, f_t and the fracture energies), "
         "uplift (effectiveness of the drains), k_h or any other parameter (default: level)",
     )
-    command.add_levels(
-        "--levels",
-        help="water levels [m above the heel] in this order; a critical value other than the level "
-        "is that at the last level (default: those of the case)",
+    command.add_water(
+        "water levels [m above the heel] in this order; a critical value other than the level is "
+        "that at the last level (default: those of the case)"
     )
-    command.add_levels("--tail-levels", help=TAIL_LEVELS)
     command.add_path("--out", "FOLDER", help="output folder (default: out/CASE_critical)")
 
 

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import argparse
 
-from .options import CASE, Parser, settings_options
+from .options import CASE, Parser
 
 SUMMARY = "open a case in a window"
-
-#: Options that it shares with other commands.
-SHARED = (settings_options,)
 
 
 def add(command: Parser) -> None:
     """Add the options."""
+    command.add_settings()
     command.add_argument(
         "case", nargs="?", default="dam", metavar="CASE", help=f"{CASE} (default: dam)"
     )

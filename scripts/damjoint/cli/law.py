@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import argparse
 
-from .options import Parser, settings_options
+from .options import Parser
 
 SUMMARY = "evaluate a joint law along a path of displacement jumps"
-
-#: Options that it shares with other commands.
-SHARED = (settings_options,)
 
 
 def add(command: Parser) -> None:
     """Add the options."""
+    command.add_settings()
     command.add_argument("law", metavar="LAW", help="rupture, friction, bond or endo")
     command.add_path(
         "--path",

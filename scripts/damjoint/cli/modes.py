@@ -6,23 +6,22 @@ import argparse
 from pathlib import Path
 
 from .cases import load_case
-from .options import CASE, Parser, settings_options, water_options
+from .options import Parser
 
 SUMMARY = (
     "natural frequencies and shapes, without a record: joints closed, with and without water, on "
     "elastic and on rigid rock"
 )
 
-#: Options that it shares with other commands.
-SHARED = settings_options, water_options
-
 
 def add(command: Parser) -> None:
     """Add the options."""
-    command.add_argument("case", metavar="CASE", help=CASE)
+    command.add_settings()
+    command.add_water()
+    command.add_case()
     command.add_integer("--number", 1, default=5, help="number of modes (default: 5)")
     command.add_path("--out", "FOLDER", help="output folder (default: out/CASE_modes)")
-    command.add_argument("--no-picture", action="store_true", help="draw no PNG")
+    command.add_no_picture()
 
 
 def call(arguments: argparse.Namespace) -> int:

@@ -16,8 +16,6 @@ ENGINE = (
     "auto (default), condensed (both bodies condensed onto the joint; fast) or getdp (the "
     "reference GetDP model)"
 )
-TAIL_LEVELS = "tailwater levels [m], one or as many as levels (default: those of the case)"
-JOBS = "number of processes (default: one per core)"
 RESUMED = "CSV of results; rows that are already in it are not computed again"
 
 
@@ -104,11 +102,6 @@ class Parser(argparse.ArgumentParser):
         """Add an argument that is a path."""
         self.add_argument(name, action=Checked, convert=path, metavar=metavar, **options)
 
-    def add_paths(self, name: str, metavar: str, **options: Any) -> None:
-        """Add an option that is a path and may be repeated."""
-        options |= {"action": Checked, "convert": path, "repeats": True}
-        self.add_argument(name, metavar=metavar, **options)
-
     def add_levels(self, name: str, **options: Any) -> None:
         """Add an option that is a list of water levels."""
         self.add_argument(name, action=Checked, convert=levels, metavar="H1,H2,...", **options)
@@ -117,86 +110,85 @@ class Parser(argparse.ArgumentParser):
         """Add an option that may be repeated."""
         self.add_argument(name, action="append", default=[], metavar=metavar, **options)
 
+    # -- options that several commands share
 
-def settings_options() -> Parser:
-    """Options of all commands that load a case."""
-    options = Parser(add_help=False)
-    options.add_list(
-        "--set",
-        "NAME=VALUE",
-        dest="settings",
-        help="value of a parameter, in the unit of reference/parameters.md or with one of its own: "
-        "E_dam=20*GPa; of one joint: 'lift 25 m.mu=0.7' (repeatable; default: that of the case)",
-    )
-    options.add_argument(
-        "--run-geo",
-        action="store_true",
-        help="allow Gmsh to run the .geo file that the case names as its geometry; such a file can "
-        "run any program (default: refused)",
-    )
-    return options
+    def add_case(self) -> None:
+        """Add the case."""
+        self.add_argument("case", metavar="CASE", help=CASE)
 
+    def add_settings(self) -> None:
+        """Add the options of all commands that load a case."""
+        self.add_list(
+            "--set",
+            "NAME=VALUE",
+            dest="settings",
+            help="value of a parameter, in the unit of reference/parameters.md or with one of its "
+            "own: E_dam=20*GPa; of one joint: 'lift 25 m.mu=0.7' (repeatable; default: that of the "
+            "case)",
+        )
+        self.add_argument(
+            "--run-geo",
+            action="store_true",
+            help="allow Gmsh to run the .geo file that the case names as its geometry; such a file "
+            "can run any program (default: refused)",
+        )
 
-def water_options() -> Parser:
-    """Options of the commands that fill the reservoir."""
-    options = Parser(add_help=False)
-    options.add_levels(
-        "--levels",
-        help="water levels [m above the heel] at t = 1, 2, ..., rising or falling: 3,6,8,9 "
+    def add_water(
+        self,
+        help: str = "water levels [m above the heel] at t = 1, 2, ..., rising or falling: 3,6,8,9 "
         "(default: those of the case)",
-    )
-    options.add_levels("--tail-levels", help=TAIL_LEVELS)
-    return options
+    ) -> None:
+        """Add the levels of reservoir and tailwater; help: on the first."""
+        self.add_levels("--levels", help=help)
+        tail = "tailwater levels [m], one or as many as levels (default: those of the case)"
+        self.add_levels("--tail-levels", help=tail)
 
+    def add_loading(self) -> None:
+        """Add the water levels and the load steps."""
+        self.add_water()
+        self.add_integer(
+            "--steps",
+            1,
+            help="number of equal load steps between two levels (default: those of the case, or 1 "
+            "if --levels is set)",
+        )
 
-def option(name: str, **settings: Any) -> Parser:
-    """A parser of one option that several commands share."""
-    options = Parser(add_help=False)
-    options.add_argument(name, **settings)
-    return options
+    def add_accuracy(self) -> None:
+        """Add the option of the commands that choose the mesh."""
+        self.add_argument(
+            "--accuracy",
+            metavar="PERCENT",
+            help="refine the mesh until the estimated errors are smaller: coarse (3 %%), standard "
+            "(1 %%), fine (0.2 %%) or a percentage such as 0.5%% (default: no refinement)",
+        )
 
+    def add_all_steps(self) -> None:
+        """Add the option of a table of all steps."""
+        self.add_argument(
+            "--all-steps",
+            action="store_true",
+            help="also write steps.csv: jumps, tractions and internal variables of every step at "
+            "all nodes and integration points of the joints",
+        )
 
-def wide_option() -> Parser:
-    """The option of the commands that print tables."""
-    return option(
-        "--wide",
-        action="store_true",
-        help="print all columns of the tables (default: those that fit the terminal)",
-    )
+    def add_wide(self) -> None:
+        """Add the option of the commands that print tables, see `table_width`."""
+        wide = "print all columns of the tables (default: those that fit the terminal)"
+        self.add_argument("--wide", action="store_true", help=wide)
+
+    def add_engine(self, note: str = "") -> None:
+        """Add the choice of the engine; note: what it means for this command."""
+        self.add_argument("--engine", default="auto", metavar="NAME", help=ENGINE + note)
+
+    def add_no_picture(self) -> None:
+        """Add the option of a run without pictures."""
+        self.add_argument("--no-picture", action="store_true", help="draw no PNG")
+
+    def add_jobs(self) -> None:
+        """Add the number of processes."""
+        self.add_integer("--jobs", 1, help="number of processes (default: one per core)")
 
 
 def table_width(arguments: argparse.Namespace) -> int | None:
     """The width of printed tables; None with --wide."""
     return None if arguments.wide else shutil.get_terminal_size().columns
-
-
-def all_steps_option() -> Parser:
-    """The option of a table of all steps."""
-    return option(
-        "--all-steps",
-        action="store_true",
-        help="also write steps.csv: jumps, tractions and internal variables of every step at all "
-        "nodes and integration points of the joints",
-    )
-
-
-def accuracy_options() -> Parser:
-    """The option of the commands that choose the mesh."""
-    return option(
-        "--accuracy",
-        metavar="PERCENT",
-        help="refine the mesh until the estimated errors are smaller: coarse (3 %%), standard "
-        "(1 %%), fine (0.2 %%) or a percentage such as 0.5%% (default: no refinement)",
-    )
-
-
-def loading_options() -> Parser:
-    """Options of the water and of the load steps."""
-    options = Parser(add_help=False, parents=[water_options()])
-    options.add_integer(
-        "--steps",
-        1,
-        help="number of equal load steps between two levels (default: those of the case, or 1 if "
-        "--levels is set)",
-    )
-    return options

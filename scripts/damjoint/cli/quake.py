@@ -7,43 +7,34 @@ import sys
 from pathlib import Path
 
 from .cases import load_cases
-from .options import (
-    CASE,
-    ENGINE,
-    JOBS,
-    Checked,
-    Parser,
-    all_steps_option,
-    loading_options,
-    settings_options,
-    table_width,
-    time_span,
-    wide_option,
-)
+from .options import Checked, Parser, path, table_width, time_span
 
 SUMMARY = (
     "the dam through recorded earthquakes, after its static loads; continues if it was "
     "interrupted; exit code 1 if the dam does not stand after one of them"
 )
 
-#: Options that it shares with other commands.
-SHARED = settings_options, loading_options, all_steps_option, wide_option
-
 
 def add(command: Parser) -> None:
     """Add the options."""
-    command.add_argument("case", metavar="CASE", help=CASE)
-    command.add_paths(
+    command.add_settings()
+    command.add_loading()
+    command.add_all_steps()
+    command.add_wide()
+    command.add_case()
+    command.add_argument(
         "--record",
-        "FILE",
+        metavar="FILE",
+        action=Checked,
+        convert=path,
+        repeats=True,
         help="CSV of the ground's acceleration: time [s], horizontal and, if any, vertical, in "
         "record_unit; repeatable: each earthquake has a folder with the name of its record "
         "(default: that of the case)",
     )
     command.add_path("--out", "FOLDER", help="output folder (default: out/CASE_quake)")
-    command.add_integer("--jobs", 1, help=JOBS)
-    help_engine = f"{ENGINE}: tables only, and an interrupted run starts again"
-    command.add_argument("--engine", default="auto", metavar="NAME", help=help_engine)
+    command.add_jobs()
+    command.add_engine(": tables only, and an interrupted run starts again")
     command.add_argument(
         "--fields",
         nargs="?",
@@ -54,7 +45,7 @@ def add(command: Parser) -> None:
         help="write files of displacement and stress at up to 200 times between two times [s] "
         "(default: at the static states; --fields alone: over the whole record)",
     )
-    command.add_argument("--no-picture", action="store_true", help="draw no PNG")
+    command.add_no_picture()
 
 
 def call(arguments: argparse.Namespace) -> int:

@@ -7,17 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .cases import load_case
-from .options import (
-    CASE,
-    ENGINE,
-    Parser,
-    accuracy_options,
-    all_steps_option,
-    loading_options,
-    settings_options,
-    table_width,
-    wide_option,
-)
+from .options import Parser, table_width
 
 if TYPE_CHECKING:
     from ..pictures.drawing_process import DrawingProcess
@@ -25,19 +15,21 @@ if TYPE_CHECKING:
 
 SUMMARY = "fill the reservoir of a case; exit code 1 if the dam fails or the run stops early"
 
-#: Options that it shares with other commands.
-SHARED = settings_options, loading_options, accuracy_options, all_steps_option, wide_option
-
 
 def add(command: Parser) -> None:
     """Add the options."""
-    command.add_argument("case", metavar="CASE", help=CASE)
+    command.add_settings()
+    command.add_loading()
+    command.add_accuracy()
+    command.add_all_steps()
+    command.add_wide()
+    command.add_case()
     command.add_path("--out", "FOLDER", help="output folder (default: out/CASE)")
     command.add_argument(
         "--no-fields", action="store_true", help="write no files of displacement and stress"
     )
-    command.add_argument("--no-picture", action="store_true", help="draw no PNG")
-    command.add_argument("--engine", default="auto", metavar="NAME", help=ENGINE)
+    command.add_no_picture()
+    command.add_engine()
 
 
 def call(arguments: argparse.Namespace) -> int:

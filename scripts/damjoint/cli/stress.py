@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from .options import JOBS, RESUMED, Parser
+from .options import RESUMED, Parser
 from .tools import tool
 
 SUMMARY = "verify the result files of random dams; exit code 1 if there is a defect"
@@ -24,7 +24,7 @@ def add(command: Parser) -> None:
         help="instead put errors into copies of the package, one by one, and look in which random "
         "dam the verification notices them; exit code 1 if more than one is not noticed",
     )
-    command.add_integer("--jobs", 1, help=JOBS)
+    command.add_jobs()
     command.add_path(
         "--out", "FILE", default=Path("stress.csv"), help=f"{RESUMED} (default: stress.csv)"
     )

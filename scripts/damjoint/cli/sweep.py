@@ -10,19 +10,7 @@ from typing import TYPE_CHECKING
 
 from .. import InputError
 from .cases import load_case, print_note
-from .options import (
-    CASE,
-    JOBS,
-    RESUMED,
-    Checked,
-    Parser,
-    accuracy_options,
-    loading_options,
-    settings_options,
-    slip,
-    table_width,
-    wide_option,
-)
+from .options import RESUMED, Checked, Parser, slip, table_width
 
 if TYPE_CHECKING:
     from ..input.case import Case
@@ -31,13 +19,14 @@ if TYPE_CHECKING:
 
 SUMMARY = "run a case with many values of its parameters, listed or random; CSV and chart"
 
-#: Options that it shares with other commands.
-SHARED = settings_options, loading_options, accuracy_options, wide_option
-
 
 def add(command: Parser) -> None:
     """Add the options."""
-    command.add_argument("case", metavar="CASE", help=CASE)
+    command.add_settings()
+    command.add_loading()
+    command.add_accuracy()
+    command.add_wide()
+    command.add_case()
     command.add_list(
         "--vary",
         "NAME=VALUES",
@@ -88,7 +77,7 @@ def add(command: Parser) -> None:
         help="each row is the earthquake of the case's record; it fails if the residual slip "
         "exceeds SLIP [m]: with --vary record_scale=... and --sample a fragility (default: none)",
     )
-    command.add_integer("--jobs", 1, help=JOBS)
+    command.add_jobs()
     command.add_argument(
         "--scheduler",
         metavar="ADDRESS",

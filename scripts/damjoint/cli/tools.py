@@ -9,10 +9,7 @@ from .. import RunError
 
 
 def tool(name: str) -> ModuleType:
-    """Import a module of damjoint_tools.
-
-    Raises RunError if the tools are not installed.
-    """
+    """Import a module of damjoint_tools. Raises RunError if the tools are not installed."""
     try:
         return import_module(f"damjoint_tools.{name}")
     except ModuleNotFoundError as error:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from .options import ENGINE, Parser
+from .options import Parser
 
 SUMMARY = "compare with the published numbers; exit code 1 if a row fails"
 
@@ -26,8 +26,7 @@ def add(command: Parser) -> None:
         default=Path("out"),
         help="folder that gets a folder for each case (default: out)",
     )
-    help_engine = f"{ENGINE}, for cases; tests of a point and of an earthquake: condensed"
-    command.add_argument("--engine", default="auto", metavar="NAME", help=help_engine)
+    command.add_engine(", for cases; tests of a point and of an earthquake: condensed")
 
 
 def call(arguments: argparse.Namespace) -> int:

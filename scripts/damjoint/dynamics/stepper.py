@@ -26,7 +26,6 @@ from .uplift import pressures_in_motion
 #: How often a step can be halved.
 MOST_HALVINGS = 10
 
-
 #: Values of damping_mass.
 WITHOUT, OF_CONCRETE, WITH_WATER = range(3)
 

@@ -22,11 +22,7 @@ PARTS = 300
 #: Curves along the joint, the most important first: title, units, curves (name, column, color).
 ALONG_JOINT: tuple[tuple[str, Units, tuple[tuple[str, str, Color], ...]], ...] = (
     ("opening", LENGTHS, (("", "delta_n", BLUE),)),
-    (
-        "normal stress",
-        STRESSES,
-        (("total", "sigma_n", BLUE), ("effective", "sigma_n_eff", GREEN)),
-    ),
+    ("normal stress", STRESSES, (("total", "sigma_n", BLUE), ("effective", "sigma_n_eff", GREEN))),
     ("shear stress", STRESSES, (("", "tau_1", ORANGE),)),
     ("slip", LENGTHS, (("jump", "delta_t1", ORANGE), ("slip", "slip", DARK))),
     ("water pressure", STRESSES, (("", "p", LAKE),)),

@@ -17,10 +17,7 @@ LEVEL, FRAME, LAST = 0.6, 0.05, 2.0
 
 
 def picture(folder: str) -> Path:
-    """Write the drawing area into a folder as window.png.
-
-    Raises InputError, OSError.
-    """
+    """Write the drawing area into a folder as window.png. Raises InputError, OSError."""
     file = target(folder, "window.png")
     gmsh.graphics.draw()
     gmsh.write(str(file))
@@ -49,10 +46,7 @@ def animation(folder: str, gallery: Gallery, scene: SolvedScene) -> Path:
 
 
 def target(folder: str, name: str) -> Path:
-    """A file in a folder, which is created.
-
-    Raises InputError if there is no folder.
-    """
+    """A file in a folder, which is created. Raises InputError if there is no folder."""
     if not folder.strip():
         raise InputError("out: name a folder")
     Path(folder).mkdir(parents=True, exist_ok=True)

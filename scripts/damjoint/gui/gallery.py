@@ -84,13 +84,7 @@ class Gallery:
         gmsh.view.option.setColor(tag, "Background2D", 255, 255, 255, 0)
 
     def write(
-        self,
-        x: float,
-        y: float,
-        lines: list[str],
-        color: Color,
-        size: int,
-        align: str = "Left",
+        self, x: float, y: float, lines: list[str], color: Color, size: int, align: str = "Left"
     ) -> int:
         """Write text at pixels from the top left (negative: from the right or bottom), a line per
         step. Returns the tag of its view, to which `label` adds more.

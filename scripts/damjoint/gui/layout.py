@@ -21,7 +21,6 @@ BELOW, LINE, WARNINGS = 172, 15, 4
 ENTRY, ENTRIES, LEGEND = 165, 6, -140
 BARS = tuple((30 + ENTRY * i, -76) for i in range(3))
 
-
 #: Width of an average character over the size of its font.
 CHARACTER = 0.55
 
@@ -42,7 +41,6 @@ TWO_COLUMNS, ONE_COLUMN, COLUMN = 1000, 620, 268
 GRAPH_HEIGHT, ROWS = (140, 218), 4
 #: Texts of a graph: left and right of its axes, above and below them.
 BESIDE_AXES, BEYOND_AXES, ABOVE_AXES, BELOW_AXES = 66, 24, 31, 38
-
 
 #: Options with the sizes of Gmsh's window; GraphicsWidth includes the menu.
 WINDOW = "GraphicsWidth", "GraphicsHeight", "MenuWidth"

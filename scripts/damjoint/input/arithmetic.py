@@ -62,10 +62,7 @@ def arithmetic_value(text: str, known: Mapping[str, float] | None = None) -> flo
 
 
 def quantity(text: str) -> float:
-    """The value of a number, also nan or inf, or of arithmetic with units.
-
-    Raises ValueError.
-    """
+    """The value of a number, also nan or inf, or of arithmetic with units. Raises ValueError."""
     try:
         return number(text)
     except ValueError:
@@ -83,10 +80,7 @@ def number(text: str) -> float:
 
 
 def parsed(text: str) -> ast.expr:
-    """The expression of a text, with ^ for powers.
-
-    Raises ValueError.
-    """
+    """The expression of a text, with ^ for powers. Raises ValueError."""
     if re.search(PYTHON_ONLY, text) or not text.isascii():
         raise ValueError(text)
     try:

@@ -26,12 +26,7 @@ from .constraints import (
     highest_level,
 )
 from .joint_graph import ROCK, JointGraph
-from .parameters import (
-    GEOMETRY_LISTS,
-    constants,
-    declared,
-    independent,
-)
+from .parameters import GEOMETRY_LISTS, constants, declared, independent
 from .source import Source
 from .values import ParameterValues, listed
 from .values import flows as flows
@@ -45,10 +40,8 @@ SHARED = (
     *("crack_aperture", "crack_most", "zangar_angle", "zangar_cm"),
 )
 
-
 #: Those of them that the laws use.
 SOLVER = "artificial", "yield_tolerance", "release_length"
-
 
 #: Variables of pro/section.pro: the joint's ends, the segments of the faces, the marks of line
 #: forces.

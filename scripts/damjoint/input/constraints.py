@@ -15,7 +15,7 @@ import numpy as np
 from .. import InputError
 from ..laws import LAWS
 from .parameters import constants, declared
-from .values import Group, ParameterValues, flows, has_drains
+from .values import ParameterValues, flows, has_drains
 
 #: Usual values, from and to, in SI units: a density of 24 kN/m3 or a strength of 0.2 MPa without
 #: its unit is none.
@@ -192,12 +192,12 @@ def check_energies(case: ParameterValues) -> None:
             )
 
 
-def check_softening(joint: Group, twice: bool) -> None:
+def check_softening(case: ParameterValues, twice: bool) -> None:
     """The softening of law = rupture: by G_f or pena_rupture, not both."""
     if twice:
         raise InputError(
-            f"G_f, pena_rupture = {joint.G_f:g}, {joint.pena_rupture:g}: must be one of them, the "
-            "other -1 (G_f = sigma_max^2 (1 + pena_rupture) / (2 K_N))"
+            f"G_f, pena_rupture = {case['G_f']:g}, {case['pena_rupture']:g}: must be one of them, "
+            "the other -1 (G_f = sigma_max^2 (1 + pena_rupture) / (2 K_N))"
         )
 
 
@@ -225,8 +225,7 @@ OF_HEIGHT = f"{LEAST_LENGTH:g} of dam_height"
 def check_section(case: ParameterValues, section: Mapping[str, Sequence[float]]) -> None:
     """Lengths of the dam's section; places of line forces on it."""
     check_lengths(case)
-    dam, loads = case.dimensions, case.loads
-    height = dam.dam_height
+    height, base, batter = case["dam_height"], case["dam_base"], case["batter"]
     for name, sign, holds in (
         ("batter_height", "<=", operator.le),
         ("neck_height", "<", operator.lt),
@@ -235,30 +234,30 @@ def check_section(case: ParameterValues, section: Mapping[str, Sequence[float]])
     ):
         if not holds(case[name], height):
             raise InputError(f"{name} = {case[name]:g}: must be {sign} dam_height ({height:g} m)")
-    if not dam.batter < dam.dam_base:
-        raise InputError(f"batter = {dam.batter:g}: must be < dam_base ({dam.dam_base:g} m)")
-    widest = max(dam.dam_base - dam.batter - dam.dam_crest, 0)
-    if dam.neck_height and dam.neck_batter > widest * (1 + 1e-12):
+    if not batter < base:
+        raise InputError(f"batter = {batter:g}: must be < dam_base ({base:g} m)")
+    widest = max(base - batter - case["dam_crest"], 0)
+    if case["neck_height"] and case["neck_batter"] > widest * (1 + 1e-12):
         raise InputError(
-            f"neck_batter = {dam.neck_batter:g}: must be at most {widest:g} m "
+            f"neck_batter = {case['neck_batter']:g}: must be at most {widest:g} m "
             "(dam_base - batter - dam_crest)"
         )
     if not (section["toe_x"][0] > section["heel_x"][0] and section["toe_y"][0] < height):
         raise InputError(
-            f"joint_slope = {dam.joint_slope:g}: must let the joint leave the dam below its "
+            f"joint_slope = {case['joint_slope']:g}: must let the joint leave the dam below its "
             f"crest ({height:g} m)"
         )
     marks, regions = section["mark_region"], constants()
     for force, name, region, face in (
         ("ice_force", "ice_level", "ICE", "the upstream face"),
-        ("force_x", "force_at", "FORCE", f"the {loads.force_face} face"),
-        ("force_y", "force_at", "FORCE", f"the {loads.force_face} face"),
+        ("force_x", "force_at", "FORCE", f"the {case['force_face']} face"),
+        ("force_y", "force_at", "FORCE", f"the {case['force_face']} face"),
         ("anchor_force", "anchor_at", "ANCHOR", "the crest"),
     ):
         if case[force] and regions[region][0] not in marks:
             raise InputError(f"{name} = {case[name]:g}: must lie on {face} of the dam")
-    simple = not (dam.batter or dam.neck_height or dam.joint_height or marks)
-    if case.mesh.mesh_pattern == "regular" and not simple:
+    simple = not (batter or case["neck_height"] or case["joint_height"] or marks)
+    if case["mesh_pattern"] == "regular" and not simple:
         raise InputError(
             "mesh_pattern = regular: must be free, layers or split for a section with batter, "
             "neck, lift joint or line forces"
@@ -270,13 +269,13 @@ def check_downstream_face(case: ParameterValues, face: Sequence[float]) -> None:
     downstream of the upstream face.
     """
     listed = f"downstream_face = {','.join(f'{v:g}' for v in face)}"
-    dam, height = case.dimensions, case["dam_height"]
+    height, batter = case["dam_height"], case["batter"]
     least = LEAST_LENGTH * height
     if len(face) % 2:
         raise InputError(f"{listed}: must be pairs x,y, for each corner its x and its height")
-    if dam.neck_height:
-        raise InputError(f"neck_height = {dam.neck_height:g}: must be 0 with downstream_face")
-    if case.mesh.mesh_pattern == "regular":
+    if case["neck_height"]:
+        raise InputError(f"neck_height = {case['neck_height']:g}: must be 0 with downstream_face")
+    if case["mesh_pattern"] == "regular":
         raise InputError(
             "mesh_pattern = regular: must be free, layers or split with downstream_face"
         )
@@ -290,8 +289,8 @@ def check_downstream_face(case: ParameterValues, face: Sequence[float]) -> None:
             )
     x, y = zip(*corners, strict=True)
     # the upstream face is straight between these heights, the other one between its corners
-    for at in sorted({*y, dam.batter_height} if dam.batter else y):
-        upstream = dam.batter * min(max(at, 0.0) / dam.batter_height, 1.0)
+    for at in sorted({*y, case["batter_height"]} if batter else y):
+        upstream = batter * min(max(at, 0.0) / case["batter_height"], 1.0)
         if not np.interp(at, y, x) - upstream >= least:
             raise InputError(
                 f"{listed}: must lie downstream of the upstream face, at x > {upstream:g} m at a "
@@ -301,11 +300,10 @@ def check_downstream_face(case: ParameterValues, face: Sequence[float]) -> None:
 
 def downstream_corners(case: ParameterValues, face: Sequence[float]) -> list[tuple[float, float]]:
     """Corners of the downstream face [m] from the base to the crest; face: those between."""
-    dam = case.dimensions
-    slope = 0.0 if dam.joint_height else math.tan(math.radians(dam.joint_slope))
+    base, crest = case["dam_base"], case["batter"] + case["dam_crest"]
+    slope = 0.0 if case["joint_height"] else math.tan(math.radians(case["joint_slope"]))
     between = zip(face[::2], face[1::2], strict=True)
-    ends = (dam.dam_base, dam.dam_base * slope), (dam.batter + dam.dam_crest, dam.dam_height)
-    return [ends[0], *between, ends[1]]
+    return [(base, base * slope), *between, (crest, case["dam_height"])]
 
 
 def check_joints_on_face(
@@ -353,7 +351,7 @@ def check_lifts(
 ) -> None:
     """Heights of the joints above the first one [m]; sections: of each joint, from the lowest."""
     listed = ",".join(f"{h:g}" for h in heights)
-    if case.mesh.mesh_pattern == "regular":
+    if case["mesh_pattern"] == "regular":
         raise InputError("mesh_pattern = regular: must be free, layers or split with lift_heights")
     for lower, upper in itertools.pairwise(sections):
         for end in ("heel", "toe"):
@@ -377,10 +375,10 @@ def check_distances(case: ParameterValues, length: float) -> None:
 
 def check_drains(case: ParameterValues) -> None:
     """Drains: with a prescribed displacement their pressure has to be linear in the level."""
-    water, drive = case.water, case.scene.drive
-    if has_drains(case) and not flows(case) and drive != "level" and water.drain_level > 0:
+    level, drive = case["drain_level"], case["drive"]
+    if has_drains(case) and not flows(case) and drive != "level" and level > 0:
         raise InputError(
-            f"drain_level = {water.drain_level:g}: must be 0 with drive = {drive} "
+            f"drain_level = {level:g}: must be 0 with drive = {drive} "
             "(the pressure has to be linear in the level)"
         )
 

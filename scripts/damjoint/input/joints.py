@@ -12,13 +12,7 @@ from .arithmetic import number
 from .case import SECTION, OfJoint
 from .casefile import joint_name, key_of
 from .geometry_file import joints_in
-from .parameters import (
-    INCLUDE,
-    assignments,
-    declared,
-    listing,
-    parse,
-)
+from .parameters import INCLUDE, assignments, declared, listing, parse
 from .scene import stacked
 from .source import lists_of_joints
 

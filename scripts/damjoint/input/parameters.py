@@ -46,7 +46,6 @@ BELOW_HALF = 0.5 - 1e-9
 #: Limit of ONELAB that means none.
 ANY = 1e200
 
-
 #: Texts that a process caches: those of a run, but not of all rows of a sweep.
 CACHED = 10
 #: Texts of which it keeps the variables: those of one window, search or report.
@@ -352,10 +351,7 @@ def settings(pairs: Iterable[str]) -> dict[str, Setting]:
 
 
 def checked(name: str, value: Any) -> Setting:
-    """The value of a parameter, or the values of each joint, checked.
-
-    Raises InputError.
-    """
+    """The value of a parameter, or the values of each joint, checked. Raises InputError."""
     if name in GEOMETRY_LISTS:
         return levels_of(name, value) if value else ()
     if "." in name:

@@ -57,10 +57,7 @@ def load(
 
 
 def resolve(source: Source) -> Case:
-    """The case of a source, see `load`.
-
-    Raises InputError.
-    """
+    """The case of a source, see `load`. Raises InputError."""
     path, file, overrides = source.path, source.text, source.overrides
     levels, tail_levels = source.levels, source.tail_levels
     steps, accuracy, error = source.steps, source.accuracy, None
@@ -123,7 +120,7 @@ def resolve(source: Source) -> Case:
         of_joints=stacked_joints(variables, of_joints),
     )
     for joint, parsed in zip(result.joints, of_joints or [variables], strict=True):
-        check_softening(joint.joint, bool(parsed["softening_twice"][0]))
+        check_softening(joint, bool(parsed["softening_twice"][0]))
     check_joints(result)
     check_loading(result, tails, of_case=tail_levels is None)
     return with_drive_times(result)

@@ -1,13 +1,11 @@
-"""Values of all parameters, by name and by group: case["mu"], case.joint.mu."""
+"""Values of all parameters by name: case["mu"], case.mu."""
 
 from __future__ import annotations
 
 from collections.abc import ItemsView, Iterator, KeysView
-from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias, overload
+from typing import TYPE_CHECKING, Literal, TypeAlias, overload
 
 from ..arrays import Value, Values
-from .parameters import declared
 
 #: The parameters whose values are texts, for type checkers: all others are numbers.
 TextName: TypeAlias = Literal[
@@ -26,69 +24,6 @@ TextName: TypeAlias = Literal[
     "record_baseline",
     "time_integration",
 ]
-
-
-class Group:
-    """The values of one group of pro/parameters.pro as attributes that can not be set: numbers, but
-    for those that a subclass declares.
-    """
-
-    def __init__(self, values: Values) -> None:
-        vars(self).update(values)
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        raise AttributeError(f"{name}: values of a case can not be set")
-
-    def __repr__(self) -> str:
-        return listed(vars(self))
-
-    if TYPE_CHECKING:
-
-        def __getattr__(self, name: str) -> float: ...
-
-
-class SceneGroup(Group):
-    """Dimension and order, joint law, water, and what is prescribed."""
-
-    law: str
-    uplift: str
-    face_load: str
-    drive: str
-
-
-class MeshGroup(Group):
-    """Pattern and sizes of the mesh."""
-
-    mesh_pattern: str
-    quadrature: str
-
-
-class WaterGroup(Group):
-    """Density and viscosity of the water, aperture of the closed joint, drains."""
-
-    drain_reference: str
-
-
-class LoadGroup(Group):
-    """Loads besides the water."""
-
-    force_face: str
-    quake_uplift: str
-
-
-class CheckGroup(Group):
-    """Safety factors, position of the resultant and strength that are required."""
-
-    required_position: str
-
-
-class EarthquakeGroup(Group):
-    """Record of the ground, time integration, damping."""
-
-    record_unit: str
-    record_component: str
-    record_baseline: str
-    time_integration: str
 
 
 class ParameterValues:
@@ -141,60 +76,6 @@ class ParameterValues:
 
     def _ipython_key_completions_(self) -> list[str]:
         return list(self.values)
-
-    def _group(self, name: str) -> dict[str, Value]:
-        """The values of a group of parameters."""
-        return {n: self.values[n] for n, known in declared().items() if known.group == name}
-
-    @cached_property
-    def scene(self) -> SceneGroup:
-        """Dimension and order, joint law, water, and what is prescribed."""
-        return SceneGroup(self._group("Scene"))
-
-    @cached_property
-    def dimensions(self) -> Group:
-        """Lengths of the dam's section and of its foundation."""
-        return Group(self._group("Geometry"))
-
-    @cached_property
-    def mesh(self) -> MeshGroup:
-        """Pattern and sizes of the mesh."""
-        return MeshGroup(self._group("Mesh"))
-
-    @cached_property
-    def material(self) -> Group:
-        """Elasticity and density of dam and foundation."""
-        return Group(self._group("Bulk"))
-
-    @cached_property
-    def joint(self) -> Group:
-        """Stiffness, strength and fracture energy of the joint."""
-        return Group(self._group("Joint"))
-
-    @cached_property
-    def water(self) -> WaterGroup:
-        """Density and viscosity of the water, aperture of the closed joint, drains."""
-        return WaterGroup(self._group("Water"))
-
-    @cached_property
-    def loads(self) -> LoadGroup:
-        """Loads besides the water, works on the joint."""
-        return LoadGroup(self._group("Loads"))
-
-    @cached_property
-    def earthquake(self) -> EarthquakeGroup:
-        """Record of the ground, time integration, damping."""
-        return EarthquakeGroup(self._group("Earthquake"))
-
-    @cached_property
-    def solver(self) -> Group:
-        """Tolerance and limits of the solver."""
-        return Group(self._group("Solver"))
-
-    @cached_property
-    def checks(self) -> CheckGroup:
-        """Safety factors, position of the resultant and strength that are required."""
-        return CheckGroup(self._group("Checks"))
 
 
 def listed(values: Values) -> str:

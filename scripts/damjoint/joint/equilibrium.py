@@ -147,10 +147,7 @@ class Equilibrium:
         the joints before the earthquake that acts, if the water follows from them.
         """
         return StepWater(
-            joints=self.water,
-            flowing=self.flowing,
-            variables=variables,
-            before_quake=before_quake,
+            joints=self.water, flowing=self.flowing, variables=variables, before_quake=before_quake
         )
 
     def problem(

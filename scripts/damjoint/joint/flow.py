@@ -48,11 +48,7 @@ class JointFields:
     """
 
     def __init__(
-        self,
-        joint: JointMesh,
-        space: elements.Space,
-        rule: dict[str, int],
-        branched: bool = False,
+        self, joint: JointMesh, space: elements.Space, rule: dict[str, int], branched: bool = False
     ) -> None:
         surface, heel, toe = joint.surface, joint.heel_nodes, joint.toe_nodes
         linear, number = elements.Space(surface, 1), len(surface.points)

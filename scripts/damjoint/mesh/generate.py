@@ -18,7 +18,6 @@ GEOMETRY = (
     *("neck_batter", "joint_slope", "joint_height", "found_side", "found_depth", "thickness"),
 )
 
-
 #: Parameters on which it depends only if a line force acts.
 MARKS = {
     "ice_force": ("ice_level",),

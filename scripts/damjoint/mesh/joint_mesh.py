@@ -8,9 +8,7 @@ import numpy as np
 
 from ..arrays import Array, IntArray
 from ..input.case import OfJoint
-from ..input.scene import (
-    TAILWATER,
-)
+from ..input.scene import TAILWATER
 from .body import Body
 from .sides import area
 

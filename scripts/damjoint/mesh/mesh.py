@@ -16,12 +16,7 @@ from ..input.case import Case
 from ..input.constraints import check_levels_on_mesh, check_strain
 from ..input.geometry_file import files_of
 from ..input.parameters import constants, start_gmsh
-from ..input.scene import (
-    SIDES,
-    Joint,
-    numbered,
-    stacked,
-)
+from ..input.scene import SIDES, Joint, numbered, stacked
 from ..storage import check_end
 from .body import Body
 from .cut import cut
@@ -491,10 +486,7 @@ class Mesh:
 
 
 def write_mesh(case: Case, path: Path) -> dict[str, int]:
-    """Mesh the case, write it to path and return its counts.
-
-    Raises RunError.
-    """
+    """Mesh the case, write it to path and return its counts. Raises RunError."""
     mesh = Mesh(case)
     mesh.write(path)
     return mesh.counts

@@ -6,14 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..input.scene import (
-    BED,
-    DOWN,
-    FLOOR,
-    LINES,
-    TOP,
-    UP,
-)
+from ..input.scene import BED, DOWN, FLOOR, LINES, TOP, UP
 
 #: Regions of a user's own geometry by the parameters that need them.
 LOADED = {
@@ -23,7 +16,6 @@ LOADED = {
     "force_x": "force",
     "force_y": "force",
 }
-
 
 #: Codimension of the regions; their numbers are in pro/parameters.pro.
 REGIONS = {
@@ -41,14 +33,11 @@ REGIONS = {
     "anchor": 2,
 }
 
-
 #: Regions of which each joint has its own.
 OF_JOINTS = ("dam", "joint", "heel", "toe")
 
-
 #: Regions that every geometry has.
 NEEDED = ("dam", "foundation", "joint", "fixed", "heel", "toe", "crest")
-
 
 #: Gmsh element types of order 1 by their VTK name.
 SHAPES = {
@@ -60,7 +49,6 @@ SHAPES = {
     5: "hexahedron",
     6: "wedge",
 }
-
 
 #: Names of the physical groups of a user's own geometry: bodies and lines, faces by side and body.
 USER_NAMES = {
@@ -75,7 +63,6 @@ USER_NAMES = {
     "crest": "crest",
     **{name: name for name in LINES},
 }
-
 
 USER_FACES = {
     "upstream": ("dam", UP),

@@ -13,7 +13,6 @@ from .body import SIDES, Body
 #: Shape of a side by its number of corners.
 SHAPE_OF_SIDE = {2: "line", 3: "triangle", 4: "quad"}
 
-
 #: Simplices that make up an element.
 SIMPLICES_OF = {
     "line": ((0, 1),),

@@ -35,32 +35,25 @@ from .topology import (
 #: Regions of concrete.
 CONCRETE = ("dam", "lower")
 
-
 #: Greatest height of a dam [m], that of a section, too; the highest dams reach 335.
 HIGHEST = 1000.0
 #: Least height of a dam that is not named in a note [m].
 LOWEST = 0.5
 
-
 #: Distance from the origin, over the size of the mesh, from which on coordinates lack digits.
 FARTHEST = 1e4
-
 
 #: Part of a normal along an axis from which on a face counts as facing along it [-].
 FACING = 1e-3
 
-
 #: The same from which on it does so mostly [-]: up to 26 degrees from the axis.
 MOSTLY = 0.9
-
 
 #: Relative size below which an extent or size is 0.
 FLAT = 1e-9
 
-
 #: Axis and sign of the normals of a face as a whole, by its side.
 DIRECTIONS = {UP: (0, -1), DOWN: (0, 1), TOP: (1, 1), FLOOR: (1, 1), BED: (1, 1)}
-
 
 #: Faces that water presses on together: what only these bound is a hole in them.
 RESERVOIR, TAILWATER = frozenset({UP, TOP, FLOOR}), frozenset({DOWN, BED})

@@ -80,11 +80,11 @@ def line_forces(case: Case, loading: Loading) -> dict[str, tuple[float, float]]:
     """The line forces of a case at a loading along x and y [N/m], in the order of the section's
     marks.
     """
-    loads, angle = case.loads, math.radians(case.loads.anchor_angle)
+    angle, pull = math.radians(case["anchor_angle"]), case["anchor_force"]
     full = {
-        "ice": (loads.ice_force, 0.0),
-        "force": (loads.force_x, loads.force_y),
-        "anchor": (-loads.anchor_force * math.sin(angle), -loads.anchor_force * math.cos(angle)),
+        "ice": (case["ice_force"], 0.0),
+        "force": (case["force_x"], case["force_y"]),
+        "anchor": (-pull * math.sin(angle), -pull * math.cos(angle)),
     }
     return {
         name: (loading.part(name) * x, loading.part(name) * y)
@@ -97,15 +97,14 @@ def thermal_strains(case: Case, loading: Loading) -> dict[str, float]:
     """Free thermal strains of a case at a loading by region and distribution, if they can occur:
     uniform, and the difference between downstream and upstream face where it is linear.
     """
-    loads = case.loads
-    uniform = loads.expansion_dam * loads.temperature_dam
-    linear = loads.expansion_dam * loads.temperature_linear
+    uniform = case["expansion_dam"] * case["temperature_dam"]
+    linear = case["expansion_dam"] * case["temperature_linear"]
     full = {
         "dam_uniform": uniform,
         "dam_linear": linear,
         "lower_uniform": uniform,
         "lower_linear": linear,
-        "foundation_uniform": loads.expansion_found * loads.temperature_found,
+        "foundation_uniform": case["expansion_found"] * case["temperature_found"],
     }
     return {name: loading.part("temperature") * strain for name, strain in full.items() if strain}
 

@@ -91,7 +91,6 @@ HISTORY_OF_JOINTS = (
     *("N", "T", "M", "flux", "U", "x_resultant", "M_U", "broken_length", "bonded_length", "T_z"),
 )
 
-
 #: Unit and meaning of columns by name.
 Columns: TypeAlias = dict[str, tuple[str, str]]
 

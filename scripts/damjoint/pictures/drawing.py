@@ -70,7 +70,6 @@ STATES = {
 #: Distance of a y label from the left edge of its figure [inches].
 LABEL = 0.2
 
-
 #: Least distances of ticks [inches].
 TICK = 0.5, 0.25
 #: Least range of an axis over the largest value on it.

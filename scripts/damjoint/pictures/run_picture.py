@@ -716,7 +716,6 @@ WIDE, LETTERS = 2.0, 23
 #: Height over width of a map below which it has a single tick.
 NARROW = 0.08
 
-
 #: Triangles of a face by the number of its corners.
 HALVES = {3: ([0, 1, 2],), 4: ([0, 1, 2], [0, 2, 3])}
 

@@ -19,14 +19,7 @@ from ..input.case import Case
 from ..input.parameters import constants
 from ..input.scene import BED, DOWN, FLOOR, SIDES, TOP, UP
 from ..mesh.body import Body
-from ..model.fields import (
-    BROKEN,
-    Field,
-    distance,
-    joint_body,
-    nearest_rows,
-    state_of,
-)
+from ..model.fields import BROKEN, Field, distance, joint_body, nearest_rows, state_of
 from ..model.loads import COMPLETE, Loading, line_forces, thermal_strains
 from ..model.results import Results
 from ..statics import gravity

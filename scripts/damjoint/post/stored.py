@@ -87,13 +87,7 @@ def read_results(info: dict[str, Any], folder: Path) -> Results:
     if case["drive"] != "level":
         heel = read_csv(folder / "curve.csv")["heel_opening"]
     return Results(
-        case,
-        history,
-        joint,
-        {},
-        stopped=info["state"] == "stopped",
-        heel=heel,
-        info=info,
+        case, history, joint, {}, stopped=info["state"] == "stopped", heel=heel, info=info
     )
 
 
@@ -145,10 +139,7 @@ def case_of(info: dict[str, Any]) -> Case:
 
 
 def finite(name: str, values: list[float]) -> tuple[float, ...]:
-    """Convert a list of run.json to floats.
-
-    Raises InputError if a number is not finite.
-    """
+    """Convert a list of run.json to floats. Raises InputError if a number is not finite."""
     numbers = tuple(map(float, values))
     if not np.isfinite(numbers).all():
         raise InputError(f"{name} = {','.join(map(str, numbers))}: must be finite")
@@ -163,10 +154,7 @@ def parser_input(values: dict[str, Value], levels: tuple[float, ...]) -> str:
 
 
 def read_csv(path: Path) -> dict[str, np.ndarray]:
-    """Read a table of numbers by column; they may be nan.
-
-    Raises OSError, ValueError.
-    """
+    """Read a table of numbers by column; they may be nan. Raises OSError, ValueError."""
     check_file(path)
     with path.open(newline="") as file:
         head, *rows = csv.reader(file)

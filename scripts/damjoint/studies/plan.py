@@ -71,10 +71,7 @@ class Sample:
             sampling.correlation(text, [*self.distributions])
 
     def values(self) -> dict[str, list[Value]]:
-        """The values by name.
-
-        Raises InputError.
-        """
+        """The values by name. Raises InputError."""
         from . import sampling
 
         drawn = sampling.draw(
@@ -133,10 +130,7 @@ def listed(name: str, values: Sequence[Value]) -> list[Value]:
 
 
 def values_of(text: str) -> tuple[str, list[Value]]:
-    """('name', [v1, ...]) from 'name=v1,v2,...' or 'name=first:last:step'.
-
-    Raises InputError.
-    """
+    """('name', [v1, ...]) from 'name=v1,v2,...' or 'name=first:last:step'. Raises InputError."""
     name, equals, values = text.partition("=")
     bad = InputError(
         f"--vary {text}: must be NAME=V1,V2,... or NAME=FIRST:LAST:STEP with a step that leads "
@@ -166,10 +160,7 @@ ROUNDING = 1e-9
 def sample_of(
     words: list[str], design: str = "latin", seed: int = 0, correlate: Sequence[str] = ()
 ) -> Sample:
-    """The sample of the words N NAME=DISTRIBUTION ...; the rest as in Sample.
-
-    Raises InputError.
-    """
+    """The sample of the words N NAME=DISTRIBUTION ...; the rest as in Sample. Raises InputError."""
     number, *texts = words
     bad = InputError(
         f"--sample {' '.join(words)}: must be N NAME=DISTRIBUTION ..., such as "
@@ -213,10 +204,7 @@ class Plan:
         return [*self.varied, *self.sampled, *self.tied]
 
     def rows(self) -> Iterator[dict[str, Value]]:
-        """The values of each row by name.
-
-        Raises InputError.
-        """
+        """The values of each row by name. Raises InputError."""
         sample = [
             dict(zip(self.sampled, v, strict=True))
             for v in zip(*self.sampled.values(), strict=True)
@@ -249,10 +237,7 @@ def beside(out: Path, ending: str) -> Path:
 
 
 def tie(name: str, expression: str, row: Values) -> Value:
-    """The value of an expression of a row's values.
-
-    Raises InputError.
-    """
+    """The value of an expression of a row's values. Raises InputError."""
     known = {other: value for other, value in row.items() if not isinstance(value, str)}
     try:
         value = rounded(arithmetic_value(expression, known))

@@ -241,10 +241,7 @@ def single_thread() -> Iterator[None]:
 
 
 def outcome_of(case: Case) -> tuple[LoadStepper, dict[str, Any]]:
-    """The earthquake of a case without files: static loading, summary.
-
-    Raises RunError.
-    """
+    """The earthquake of a case without files: static loading, summary. Raises RunError."""
     with single_thread():
         run = QuakeRun(case)
         for _ in run.steps():

@@ -31,10 +31,7 @@ class ResultFile:
         return line_of(self.columns)
 
     def text(self) -> str:
-        """Its content.
-
-        Raises InputError with the line if it is not text.
-        """
+        """Its content. Raises InputError with the line if it is not text."""
         size = os.fstat(self.number).st_size
         content = os.pread(self.number, size, 0)
         try:

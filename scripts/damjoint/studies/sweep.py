@@ -177,10 +177,7 @@ def critical_value(task: Task) -> dict[str, Value]:
 
 
 def planned(case: Case, plan: Plan) -> Iterator[tuple[str, Values, Task]]:
-    """Key, values and task of each row of a plan.
-
-    Raises InputError.
-    """
+    """Key, values and task of each row of a plan. Raises InputError."""
     for row, varied in cases_of(case, plan):
         search = partial(search_of, varied, plan.critical) if plan.critical else None
         limit = plan.slip_limit
@@ -201,10 +198,7 @@ def notes_on_rows(case: Case, rows: Sequence[Case]) -> list[str]:
 
 
 def source_of(case: Case) -> Source:
-    """Where a case comes from.
-
-    Raises InputError if it was read from the files of a run.
-    """
+    """Where a case comes from. Raises InputError if it was read from the files of a run."""
     if case.source is None:
         raise InputError(f"case {case.name}: must be loaded from a case file")
     return case.source

@@ -33,10 +33,7 @@ class QuakeTest:
 
 
 def follow(test: QuakeTest, duration: float) -> dict[str, Array]:
-    """Columns, as of `columns`, of a test up to a time of its record [s].
-
-    Raises RunError.
-    """
+    """Columns, as of `columns`, of a test up to a time of its record [s]. Raises RunError."""
     under_way = QuakeRun(test.load())
     quake = under_way.quake
     static = under_way.static_fields()[quake.case.times[-1]].displacement["dam"]

@@ -50,10 +50,7 @@ def tests_without_case(family: str) -> dict[str, Callable[[], dict[str, Array]]]
 
 
 def family_of(name: str) -> str:
-    """The family of a case.
-
-    Raises InputError if the case has no published numbers.
-    """
+    """The family of a case. Raises InputError if the case has no published numbers."""
     references = validation.references(load(name))
     if not references:
         cases = [case for family in FAMILIES for case in validation.modelings(family)]

@@ -35,7 +35,6 @@ ROWS_OF_JOINTS = [
 #: Those that count from the static state, the first row.
 FROM_STATIC = "slip_mean", "slip_heel", "slip_toe"
 
-
 #: Values that parameters must have: no others are part of this model.
 NEEDED: dict[str, Value] = {"face_load": "hydrostatic", "face_points": 0.0}
 NEEDED |= {"rock_mass": 0.0, "time_integration": "HHT"}
