@@ -87,7 +87,7 @@ def no_pictures(monkeypatch):
     not look at them.
     """
     monkeypatch.setattr("damjoint.studies.chart.draw", lambda *_: "no chart")
-    monkeypatch.setattr("damjoint.studies.check.draw_check", lambda *_: None)
+    monkeypatch.setattr("damjoint.studies.check_study.draw_check", lambda *_: None)
 
 
 @pytest.fixture

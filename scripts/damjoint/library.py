@@ -515,14 +515,14 @@ class Checks(Sequence["SafetyCheck"]):
         Raises InputError for a user's own geometry, which has none.
         """
         from .pictures.check_picture import figure_of_check
-        from .studies.check import picture_content
+        from .studies.check_study import picture_content
 
         result, checks = self.cases[number]
         if result.case.geometry:
             raise InputError(
                 f"case {result.case.name}: must be a section by parameters to be drawn"
             )
-        return displayed(figure_of_check(*picture_content(result, checks)))
+        return displayed(figure_of_check(picture_content(result, checks)))
 
     def to_pandas(self) -> pandas.DataFrame:
         """The rows as a DataFrame with units in its `attrs`. Raises ImportError without pandas."""

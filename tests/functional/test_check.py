@@ -17,7 +17,7 @@ from damjoint.pictures.check_picture import draw_check, draw_joint
 from damjoint.post import folder as folders
 from damjoint.statics import gravity
 from damjoint.statics.verdict import verdict
-from damjoint.studies import check as check_study
+from damjoint.studies import check_study
 from damjoint.studies.check import (
     SafetyCheck,
     by_finite_elements,
@@ -25,11 +25,9 @@ from damjoint.studies.check import (
     compare_joints,
     compare_methods,
     hand_calculation,
-    joints_table,
-    labelled_notes,
-    picture_table,
-    text_table,
 )
+from damjoint.studies.check_study import picture_content
+from damjoint.studies.check_tables import labelled_notes, picture_table, text_table
 from damjoint.studies.critical import last_state
 from matplotlib.figure import Figure
 from matplotlib.table import Table
@@ -495,10 +493,10 @@ def test_picture_of_each_joint_of_a_dam_that_fails(solve, tmp_path):
     weak = {"law": "bond", "mu": 0.3, "adhesion": 1e5, "lift_heights": (15.0,)}
     (result,) = solve("dam", (45.0,), n_joint=24.0, order=1.0, **weak)
     assert verdict(result) == "sliding on base" and len(result.joints) == 2
-    methods, checks = [hand_calculation(own) for own in result.joints], compare_joints(result)
-    table = joints_table(checks)
+    checks = compare_joints(result)
+    content = picture_content(result, checks)
     for k, check in enumerate(checks):
-        path = draw_check(result, k, methods, picture_table(check), table, check.why, tmp_path)
+        path = draw_check(content._replace(joint=k, cells=picture_table(check)), tmp_path)
         assert matplotlib.image.imread(path).std() > 0.1
         path.unlink()
 
@@ -582,11 +580,10 @@ def test_the_picture_draws_and_judges_every_joint(solve, monkeypatch, tmp_path):
         "mu": (1.0, 2.0),
     }
     (result,) = solve("dam", (30.0, 30.0), n_joint=24.0, order=1.0, law="friction", **joints)
-    methods, checks = [hand_calculation(own) for own in result.joints], compare_joints(result)
-    drawn = []
+    checks, drawn = compare_joints(result), []
     monkeypatch.setattr(check_picture, "write_picture", lambda figure, *_: drawn.append(figure))
-    cells = picture_table(checks[0]), joints_table(checks)
-    draw_check(result, 0, methods, *cells, checks[0].why, tmp_path)
+    content = picture_content(result, checks)
+    draw_check(content._replace(joint=0, cells=picture_table(checks[0])), tmp_path)
     (figure,) = drawn
     texts = [text.get_text() for text in figure.findobj(Text)]
     *_, beside = figure.findobj(Table)

@@ -33,7 +33,9 @@ def add(command: Parser) -> None:
 
 def call(arguments: argparse.Namespace) -> int:
     """Run damjoint check; 1 if a safety factor is too low or not judged."""
-    from ..studies.check import NOT_JUDGED, check_cases, text_table
+    from ..studies.check import NOT_JUDGED
+    from ..studies.check_study import check_cases
+    from ..studies.check_tables import text_table
 
     checks = check_cases(load_cases(arguments, arguments.cases), arguments.out, arguments.jobs)
     errors = [f"{check.case.name}: {check.accuracy}" for check in checks if check.accuracy]

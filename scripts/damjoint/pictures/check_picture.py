@@ -7,12 +7,11 @@ from __future__ import annotations
 import textwrap
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.transforms import Bbox
 
 from ..input.case import Case
 from ..input.scene import BED, DOWN, FLOOR, UP
@@ -30,6 +29,8 @@ from .drawing import (
     RED,
     STATES,
     WATER,
+    arrow_style,
+    draw_cells,
     figure_of,
     picture_style,
     write_picture,
@@ -49,7 +50,7 @@ from .scene import (
 from .section_picture import draw_fluid
 
 ROCK, SILT, EDGE = "#e6dcc8", "#a98d5d", "#5a5a5a"
-LOWER_BODY, LINES = "#dde2e8", "#b0b0b0"
+LOWER_BODY = "#dde2e8"
 #: Over the joint's length: depth of the two diagrams below the joint, height of each, depth of the
 #: lines of cracks by the gravity method, length of a resultant's arrow.
 UPLIFT_AT, STRESS_AT, TALL = 0.14, 0.52, 0.24
@@ -76,40 +77,37 @@ SIGN = "tension > 0"
 ENDS = np.array([0.0, 1.0])
 
 
-def draw_check(
-    result: Results,
-    joint: int,
-    methods: list[GravityMethod],
-    cells: list[tuple[str, ...]],
-    of_joints: list[tuple[str, ...]],
-    why: str,
-    folder: Path,
-) -> Path:
+class Content(NamedTuple):
+    """What the picture of a scene shows at its last saved state."""
+
+    result: Results
+    #: number of the joint with diagrams
+    joint: int
+    #: the gravity method on each joint
+    methods: list[GravityMethod]
+    #: table beside the picture, headings in the first row, quantities in the first column
+    cells: list[tuple[str, ...]]
+    #: a row per joint, its verdict last
+    of_joints: list[tuple[str, ...]]
+    #: the requirements that are not met
+    why: str
+
+
+def draw_check(content: Content, folder: Path) -> Path:
     """Write the picture of `figure_of_check` to folder/<case>_check.png and return its path."""
-    path = folder / f"{result.case.name}_check.png"
-    write_picture(figure_of_check(result, joint, methods, cells, of_joints, why), path, 120)
+    path = folder / f"{content.result.case.name}_check.png"
+    write_picture(figure_of_check(content), path, 120)
     return path
 
 
 @picture_style()
-def figure_of_check(
-    result: Results,
-    joint: int,
-    methods: list[GravityMethod],
-    cells: list[tuple[str, ...]],
-    of_joints: list[tuple[str, ...]],
-    why: str,
-) -> Figure:
-    """Draw the last saved state of a scene.
-
-    joint: number of the joint with diagrams; methods: the gravity method on each joint; cells:
-    table beside the picture, headings in the first row, quantities in the first column; of_joints:
-    a row per joint, its verdict last; why: the requirements that are not met.
-    """
+def figure_of_check(content: Content) -> Figure:
+    """Draw the last saved state of a scene."""
+    result, joint, methods, cells, of_joints, why = content
     figure = figure_of(*SIZE)
-    own, method = result.joints[joint], methods[joint]
+    joint_result, method = result.joints[joint], methods[joint]
     name = result.case.named((joint,))
-    title = textwrap.wrap(heading(own) + (f"; diagrams: {name}" if name else ""), 100)
+    title = textwrap.wrap(heading(joint_result) + (f"; diagrams: {name}" if name else ""), 100)
     loads = textwrap.wrap(f"loads: {loads_label(result.case, loading_of(method))}", 150)
     reasons = textwrap.wrap(why, 150)
     top = 0.97 - TITLE * len(title) - REASON * (len(loads) + len(reasons))
@@ -124,21 +122,17 @@ def figure_of_check(
         y -= REASON * len(lines)
     draw_scene(section, method, result.case)
     draw_joints(section, methods, of_joints)
-    draw_joint(section, own, method)
+    draw_joint(section, joint_result, method)
     section.set_anchor("NW")
     handles, labels = section.get_legend_handles_labels()
-    place: dict[str, Any] = {
-        "loc": "lower left",
-        "bbox_to_anchor": (left - 0.02, 0.005),
-        "ncols": 2,
-    }
-    figure.legend(handles, labels, **place, fontsize=8, frameon=False, handlelength=3)
+    place: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (left - 0.02, 0.005)}
+    figure.legend(handles, labels, **place, ncols=2, fontsize=8, frameon=False, handlelength=3)
     beside.axis("off")
     height = min(ROW * len(cells), TALLEST)
-    draw_cells(beside, cells, 1 - height, height)
+    draw_verdicts(beside, cells, 1 - height, height)
     if len(methods) > 1:
         below = min(ROW * len(of_joints), 0.97 - height)
-        draw_cells(beside, of_joints, 0.97 - height - below, below)
+        draw_verdicts(beside, of_joints, 0.97 - height - below, below)
     return figure
 
 
@@ -147,32 +141,13 @@ def loading_of(method: GravityMethod) -> Loading:
     return Loading.at(method.case, method.time, method.level, method.tail_level)
 
 
-def draw_cells(axes: Axes, cells: list[tuple[str, ...]], bottom: float, height: float) -> None:
-    """Draw a table into axes, from a bottom over a height of them."""
-    letters = np.array(
-        [max(len(cell) for cell in column) + 2 for column in zip(*cells, strict=True)]
-    )
-    widths = (letters / letters.sum()).tolist()
-    table = axes.table(
-        cells,
-        colWidths=widths,
-        cellLoc="right",
-        edges="horizontal",
-        bbox=Bbox.from_bounds(0, bottom, 1, height),
-    )
-    table.auto_set_font_size(False)
-    table.set_fontsize(9)
-    for (row, column), cell in table.get_celld().items():
-        cell.set_edgecolor(LINES)
-        cell.PAD = 0.03
-        text = cell.get_text()
-        text.set_parse_math(False)
-        if column == 0:
-            text.set_horizontalalignment("left")
-        if row == 0:
-            text.set_fontweight("bold")
-        if text.get_text() in ("fail", "not judged"):
-            text.set_color(RED)
+def draw_verdicts(axes: Axes, cells: list[tuple[str, ...]], bottom: float, height: float) -> None:
+    """Draw a table into axes, from a bottom over a height of them; bad verdicts in red."""
+    letters = [max(map(len, column)) + 2 for column in zip(*cells, strict=True)]
+    table = draw_cells(axes, cells, letters, (0, bottom, 1, height), 9, 0.03)
+    for cell in table.get_celld().values():
+        if cell.get_text().get_text() in ("fail", "not judged"):
+            cell.get_text().set_color(RED)
 
 
 def draw_scene(axes: Axes, method: GravityMethod, scene: Case) -> None:
@@ -214,8 +189,7 @@ def draw_scene(axes: Axes, method: GravityMethod, scene: Case) -> None:
             tips[name] = np.array(body.area_and_centroid[1:]) + body.toe + length * along
         tail, tip = arrow(np.array([*tips[name], 0.0]), force, length)[0, :, :2]
         color = RED if name == QUAKE else DARK
-        style = {"arrowstyle": "-|>", "color": color, "linewidth": 1.6, "shrinkA": 0, "shrinkB": 0}
-        axes.annotate("", tip, tail, arrowprops=style, zorder=5)
+        axes.annotate("", tip, tail, arrowprops=arrow_style(color), zorder=5)
         label = force_label(name, force)
         axes.annotate(label, tail, (0, 4), textcoords="offset points", fontsize=8, color=color)
     top = max(height, loading.level) + (length if len(tips) else 0)
@@ -374,16 +348,4 @@ def draw_resultant(
     back = ARROW / size
     height = back * last["N"] * under.length / under.unit_depth
     start, end = under.place(s - back * last["T"], -height), under.place(s, 0)
-    axes.annotate(
-        "",
-        tuple(end),
-        tuple(start),
-        arrowprops={
-            "arrowstyle": "-|>",
-            "color": color,
-            "linestyle": style,
-            "linewidth": 1.6,
-            "shrinkA": 0,
-            "shrinkB": 0,
-        },
-    )
+    axes.annotate("", tuple(end), tuple(start), arrowprops=arrow_style(color, linestyle=style))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -18,6 +18,8 @@ from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.image import imsave
 from matplotlib.patches import Patch
+from matplotlib.table import Table
+from matplotlib.transforms import Bbox
 
 from ..model.fields import BROKEN, SLIPPED, SOFTENING
 from ..storage import atomic_write
@@ -27,6 +29,8 @@ AnyFigure = Figure | SubFigure
 BLUE, ORANGE, WATER, RED, GREEN = "#0b5394", "#cc7a00", "#3d9be0", "#b3261e", "#2e7d32"
 VIOLET = "#8e24aa"
 GREY, DARK, CONCRETE, ROCK, SILT = "#8a8a8a", "#333333", "#c3ccd6", "#d8c9ae", "#a1866f"
+#: Lines of a table.
+LINES = "#b0b0b0"
 
 
 @contextlib.contextmanager
@@ -163,6 +167,47 @@ def polygons(corners: np.ndarray, **style: Any) -> PolyCollection:
     """Polygons of the same number of corners (n, corners, 2); style: of PolyCollection."""
     vertices: Any = corners  # an array is drawn faster than a sequence of arrays
     return PolyCollection(vertices, **style)
+
+
+def arrow_style(color: str, **more: Any) -> dict[str, Any]:
+    """Style of an annotation's arrow; more: what differs."""
+    style = {"arrowstyle": "-|>", "color": color, "linewidth": 1.6, "shrinkA": 0, "shrinkB": 0}
+    return style | more
+
+
+def draw_cells(
+    axes: Axes,
+    cells: Sequence[Sequence[str]],
+    letters: Sequence[int],
+    box: tuple[float, float, float, float],
+    size: float,
+    pad: float,
+    left: Sequence[int] = (0,),
+) -> Table:
+    """Draw a table, its first row bold, into a box of axes: left, bottom, width, height.
+
+    letters: widths of the columns; size: of the font; pad: beside a text, over its cell's width;
+    left: columns that are aligned to the left.
+    """
+    table = axes.table(
+        cells,
+        colWidths=[number / sum(letters) for number in letters],
+        cellLoc="right",
+        edges="horizontal",
+        bbox=Bbox.from_bounds(*box),
+    )
+    table.auto_set_font_size(False)
+    table.set_fontsize(size)
+    for (row, column), cell in table.get_celld().items():
+        cell.set_edgecolor(LINES)
+        cell.PAD = pad
+        text = cell.get_text()
+        text.set_parse_math(False)
+        if column in left:
+            text.set_horizontalalignment("left")
+        if row == 0:
+            text.set_fontweight("bold")
+    return table
 
 
 def legend_above(axes: Axes) -> None:

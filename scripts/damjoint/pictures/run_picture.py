@@ -47,6 +47,7 @@ from .drawing import (
     VIOLET,
     WATER,
     AnyFigure,
+    draw_cells,
     figure_of,
     legend_above,
     panels,
@@ -299,12 +300,9 @@ def mark_states(figure: AnyFigure, results: list[Results], time: float) -> None:
     occurring = [STATES[n].patch() for n in STATES if any((part == n).any() for part in states)]
     if occurring:
         above = ABOVE_EDGE / size_of(figure)[1]
-        place: dict[str, Any] = {
-            "loc": "lower left",
-            "bbox_to_anchor": (0.1, above),
-            "ncols": len(occurring),
-        }
-        figure.legend(handles=occurring, **place, fontsize=7.5, frameon=False, borderpad=0.2)
+        place: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (0.1, above)}
+        style: dict[str, Any] = {"fontsize": 7.5, "frameon": False, "borderpad": 0.2}
+        figure.legend(handles=occurring, ncols=len(occurring), **place, **style)
 
 
 def draw_jumps(axes: Axes, case: Case, curves: dict[str, np.ndarray]) -> None:
@@ -342,8 +340,7 @@ def draw_gravity_stress(axes: Axes, method: gravity.GravityMethod, factor: float
     """Draw the effective stress of the gravity method."""
     if method.stands:
         s, stress = gravity_profile(method)
-        style: dict[str, Any] = {"color": GREY, "linewidth": 1.8, "label": "gravity method"}
-        axes.plot(s, stress * factor, ":", **style)
+        axes.plot(s, stress * factor, ":", color=GREY, linewidth=1.8, label="gravity method")
 
 
 def gravity_profile(method: gravity.GravityMethod) -> tuple[np.ndarray, np.ndarray]:
@@ -353,12 +350,9 @@ def gravity_profile(method: gravity.GravityMethod) -> tuple[np.ndarray, np.ndarr
     crack, length = method.crack_length, method.body.length
     if not method.uncracked:
         return np.array([0.0, length]), np.zeros(2)
-    s, stress = [crack, length], [method.tip_stress, method.sigma_n_eff_toe]
-    return (
-        (np.array([0.0, crack, *s]), np.array([0.0, 0.0, *stress]))
-        if crack
-        else (np.array(s), np.array(stress))
-    )
+    in_crack = [0.0, crack] if crack else []
+    stress = [*(0.0 for _ in in_crack), method.tip_stress, method.sigma_n_eff_toe]
+    return np.array([*in_crack, crack, length]), np.array(stress)
 
 
 def draw_shear(axes: Axes, case: Case, curves: dict[str, np.ndarray]) -> None:
@@ -523,26 +517,13 @@ def draw_table(figure: AnyFigure, table: Table) -> None:
     axes.set_axis_off()
     heads = [f"{n}\n[{u}]" if u else n for n, u in zip(table.names, table.units, strict=True)]
     columns = zip(table.names, *table.rows, strict=True)
-    letters = np.array([max(map(len, column)) for column in columns]) + 2
+    letters = [max(map(len, column)) + 2 for column in columns]
     height = size_of(figure)[1] - 0.2
-    cells = axes.table(
-        [heads, *table.rows],
-        colWidths=list(letters / letters.sum()),
-        cellLoc="right",
-        edges="horizontal",
-        bbox=(0, 0, 1, min(1, (2 + len(table.rows)) * 0.22 / height)),
-    )
-    cells.auto_set_font_size(False)
-    cells.set_fontsize(7)
-    for (row, column), cell in cells.get_celld().items():
-        cell.set_edgecolor("#b0b0b0")
-        cell.PAD = 0.02
-        cell.get_text().set_parse_math(False)
-        if column in (0, len(heads) - 1):
-            cell.get_text().set_horizontalalignment("left")
-        if row == 0:
-            cell.set_height(1.7 * cell.get_height())
-            cell.get_text().set_fontweight("bold")
+    box = (0.0, 0.0, 1.0, min(1.0, (2 + len(table.rows)) * 0.22 / height))
+    left = 0, len(heads) - 1
+    cells = draw_cells(axes, [heads, *table.rows], letters, box, 7, 0.02, left)
+    for column in range(len(heads)):
+        cells[0, column].set_height(1.7 * cells[0, column].get_height())
 
 
 def joint_length(result: Results) -> float:

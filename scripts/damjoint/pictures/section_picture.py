@@ -28,6 +28,7 @@ from .drawing import (
     STATES,
     WATER,
     AnyFigure,
+    arrow_style,
     panels,
     polygons,
     runs_of,
@@ -255,7 +256,7 @@ class SectionDrawing:
         """Draw an arrow that ends at tip, in a direction (2,), with a label at its tail."""
         x, y = np.asarray(along) / math.hypot(*along)
         tail = np.asarray(tip) - longer * ARROW * self.height * np.array([x, y])
-        style = {"arrowstyle": "-|>", "color": color, "linewidth": 1.6, "shrinkB": 0}
+        style = arrow_style(color, shrinkA=2)
         self.axes.annotate("", tuple(tip), tuple(tail), arrowprops=style, zorder=6)
         aligned: dict[str, Any] = {
             "ha": "center" if abs(x) < 0.5 else "right" if x > 0 else "left",

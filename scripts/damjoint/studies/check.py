@@ -4,36 +4,20 @@ required factors. Load combinations are cases that include a common file.
 
 from __future__ import annotations
 
-import contextlib
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from pathlib import Path
 from typing import Any
 
-import numpy as np
-from tabulate import tabulate
-
-from .. import ROUND_OFF, InputError
-from ..engines import engine_of
+from .. import ROUND_OFF
 from ..input.case import Case
 from ..model.fields import along
 from ..model.results import HISTORY, Results
-from ..pictures.check_picture import SIGN, draw_check
-from ..post import folder as folders
-from ..post import stored
-from ..post.summary import fitted
-from ..post.tables import write_csv
-from ..processes import in_processes
-from ..runner import run
-from ..session import finished, several
 from ..statics import gravity, verdict
 from ..statics.gravity import GravityMethod
 from ..statics.statement import cracks_and_drains
 from ..statics.statement import statement as statement_of
-from ..units import FORCES, MOMENTS, STRESSES, Units, unit, with_unit
-from .keys import key_of
+from ..units import STRESSES, with_unit
 
 FINITE_ELEMENTS, GRAVITY = "finite elements", "gravity method"
 LONGER = "gravity method, longer crack"
@@ -85,25 +69,7 @@ NUMBERS = tuple(CHECK)[list(CHECK).index("level") : list(CHECK).index("OSF") + 1
 
 #: A difference is not judged.
 NO_VERDICT = {"position": "", "verdict": "", "why": ""}
-#: Difference over the largest value of a quantity below which the printed table shows 0.
-SHOWN_DIFFERENCE = 1e-5
-
 Row = dict[str, Any]
-#: Result, number of the joint with diagrams, gravity method by joint, both tables, reasons.
-Cells = list[tuple[str, ...]]
-PictureContent = tuple[Results, int, list[GravityMethod], Cells, Cells, str]
-
-#: Columns of the printed table: heading by name, in groups that share a unit.
-SHOWN: tuple[tuple[Units, dict[str, str]], ...] = (
-    ((("m", 1),), {"level": "level"}),
-    (FORCES, {"N": "N'", "T": "T", "U": "U"}),
-    (MOMENTS, {"M": "M"}),
-    ((("m", 1),), {"x_resultant": "N' at x"}),
-    (STRESSES, {"sigma_n_eff_heel": "eff. heel", "sigma_n_eff_toe": "eff. toe"}),
-    ((("m", 1),), {"crack_length": "crack"}),
-    (FORCES, {"cohesion": "c B", "cohesion_undamaged": "c L"}),
-    ((("-", 1),), {"SSF": "SSF", "OSF": "OSF"}),
-)
 
 
 @dataclass(frozen=True)
@@ -468,58 +434,6 @@ def difference(first: float, second: float) -> float:
     return 0.0 if math.isclose(first, second, rel_tol=ROUND_OFF) else first - second
 
 
-#: Columns that a narrow table leaves out, in this order.
-LESS = ("level", "c L", "c B", "eff. toe", "eff. heel", "M", "N' at x", "U", "crack", "T", "N'")
-
-
-def text_table(checks: list[SafetyCheck], width: int | None = None) -> str:
-    """Format the verdicts, below them a table in suitable units, and the notes; width: of the
-    terminal, None: all columns.
-    """
-    rows = [row for check in checks for row in check.printed_rows]
-    is_difference = np.array([row["answer"] == DIFFERENCE for row in rows])
-    columns, heads, names = [], [], ["case", "method"]
-    for units, shown in SHOWN:
-        values = np.array([[row[name] for row in rows] for name in shown], dtype=float)
-        finite = values[np.isfinite(values)]
-        size, factor = units[0] if units in (FORCES, MOMENTS) else unit([finite], units)
-        least = SHOWN_DIFFERENCE * np.abs(finite).max(initial=0)
-        values[is_difference & (np.abs(values) < least)] = 0
-        sign = f"\n{SIGN}" if units is STRESSES else ""
-        names += shown.values()
-        heads += [f"{title}\n[{size}]{sign}" for title in shown.values()]
-        formats = [signed_cell if is_signed else number_cell for is_signed in is_difference]
-        columns += [[f(v * factor) for f, v in zip(formats, line, strict=True)] for line in values]
-    verdicts = ([row[name] for row in rows] for name in ("position", "verdict"))
-    scenes, methods = [scene_label(checks, row) for row in rows], [method_label(r) for r in rows]
-    columns = [scenes, methods, *columns, *verdicts]
-    heads = ["case", "method", *heads, "N' in", "check"]
-    aligned = ["left", "left", *("right" for _ in heads[4:]), "left", "left"]
-
-    def draw(numbers: Sequence[int]) -> str:
-        return str(
-            tabulate(
-                zip(*(columns[k] for k in numbers), strict=True),
-                [heads[k] for k in numbers],
-                disable_numparse=True,
-                colalign=[aligned[k] for k in numbers],
-            )
-        )
-
-    table = fitted([*names, "N' in", "check"], draw, LESS, width)
-    lines = [
-        f"{scene}, {row['answer']}: {'fails, ' * (row['verdict'] == FAIL)}{row['why']}"
-        for scene, row in zip(scenes, rows, strict=True)
-        if row["why"]
-    ]
-    verdict_lines = [
-        f"{scene_label(checks, check.finite_elements.row)}: {verdict_line(check)}"
-        for check in checks
-    ]
-    parts = "\n".join([*verdict_lines, *lines]), table, "\n".join(labelled_notes(checks))
-    return "\n\n".join(filter(None, parts))
-
-
 def verdict_line(check: SafetyCheck) -> str:
     """The verdict on a joint, and whether it is in equilibrium."""
     equilibrium = "no" if check.finite_elements.statement else "yes"
@@ -530,150 +444,3 @@ def worst_verdict(check: SafetyCheck) -> str:
     """The worse verdict of both methods on a joint."""
     verdicts = [result.verdict for result in check.results]
     return min(verdicts, key=(FAIL, NOT_JUDGED, UNCHECKED, PASS).index)
-
-
-def labelled_notes(checks: list[SafetyCheck]) -> list[str]:
-    """Notes with the scene and joint of each; one that all of a case have, once with its name."""
-    lines = dict[str, None]()  # in their order
-    for check in checks:
-        row = check.finite_elements.row
-        same = [other for other in checks if other.case.name == check.case.name]
-        for note in check.notes:
-            common = all(note in other.notes for other in same)
-            lines[f"{row['case'] if common else scene_label(checks, row)}: {note}"] = None
-    return list(lines)
-
-
-def scene_label(checks: list[SafetyCheck], row: Row) -> str:
-    """Name of a row's case, with its uplift if the case has several scenes, and its joint if it has
-    several.
-    """
-    same = [c.finite_elements for c in checks if c.case.name == row["case"]]
-    joints = list(dict.fromkeys(result.joint for result in same))
-    scenes = {result.case["uplift"] for result in same if result.joint == joints[0]}
-    parts = [row["case"]]
-    parts += [row["uplift"]] if len(scenes) > 1 else []
-    parts += [row["joint"]] if len(joints) > 1 else []
-    return ", ".join(parts)
-
-
-def method_label(row: Row) -> str:
-    """Method of a row, and whether it has a part of the loads only."""
-    return row["answer"] + (", partial load" if row.get("load") == "partial" else "")
-
-
-def number_cell(value: float) -> str:
-    """Format a number with five digits; empty if it is nan."""
-    return "" if math.isnan(value) else f"{value:.5g}"
-
-
-def signed_cell(value: float) -> str:
-    """Format a difference with its sign and three digits; empty if it is nan."""
-    return "" if math.isnan(value) else f"{value:+.3g}" if value else "0"
-
-
-def check_cases(cases: list[Case], out: Path, jobs: int | None = None) -> list[SafetyCheck]:
-    """Run cases, each into its folder below out, and check them; jobs: number of processes.
-
-    Writes check.csv into out after each case; gravity.csv and CASE_check.png into each scene's
-    folder, but not for a user's own geometry. Cases that have come to their end are not computed
-    again by the same command. Raises InputError, RunError.
-    """
-    names = [case.name for case in cases]
-    for case in cases:
-        if names.count(case.name) > 1:
-            raise InputError(f"case {case.name}: must be given once, and have its own name")
-        engine_of(case, "auto")
-    tasks, done = [(case, out / case.name) for case in cases], dict[int, list[SafetyCheck]]()
-    by_folder = {folder: case for case, folder in tasks}
-    with folders.claim_study_folder(out), several(by_folder):
-        for number, checks in in_processes(check_case, tasks, jobs, "check"):
-            done[number] = checks
-            rows = [row for k in sorted(done) for check in done[k] for row in check.rows]
-            write_csv(out / folders.CHECK, {name: [row[name] for row in rows] for name in CHECK})
-    return [check for k in sorted(done) for check in done[k]]
-
-
-def check_case(task: tuple[Case, Path], progress: bool) -> list[SafetyCheck]:
-    """Run a case into a folder, or read its results of an earlier command, and check it."""
-    case, out = task
-    key = key_of(case, case.accuracy, case.also_uplift)
-    folder_of = partial(folders.scene_folder, case, out=out)
-    results = list[Results]()
-    with contextlib.suppress(InputError):  # a file is missing or damaged
-        if finished(out, key):
-            results = [stored.read(folder_of(scene)).result for scene in case.scenes()]
-    results = results or run(case, out, progress=progress, key=key)
-    checks = list[SafetyCheck]()
-    for result in results:
-        of_joints = compare_joints(result)
-        checks += of_joints
-        if case.geometry:
-            continue
-        methods = hand_calculations(result)
-        write_csv(folder_of(result.case) / "gravity.csv", loads_table(methods))
-        draw_check(*picture_content(result, of_joints), folder_of(result.case))
-    return checks
-
-
-def hand_calculations(result: Results) -> list[GravityMethod]:
-    """The gravity method on each joint of a section by parameters."""
-    return [method for joint in result.joints if (method := hand_calculation(joint))]
-
-
-def picture_content(result: Results, checks: list[SafetyCheck]) -> PictureContent:
-    """What the picture of a scene shows: the arguments of `figure_of_check`."""
-    methods = hand_calculations(result)
-    k = min(range(len(methods)), key=lambda k: checks[k].margin)
-    cells = picture_table(checks[k]), joints_table(checks)
-    return result, k, methods, *cells, checks[k].why
-
-
-def loads_table(methods: list[GravityMethod]) -> dict[str, list[Any]]:
-    """Loads on the body above each joint; with the name of the joint if there are several."""
-    tables = [method.table() for method in methods]
-    if len(tables) == 1:
-        return tables[0]
-    names = [method.case.joint_names[0] for method in methods]
-    rows = [name for name, table in zip(names, tables, strict=True) for _ in table["load"]]
-    return {"joint": rows} | {n: [v for t in tables for v in t[n]] for n in tables[0]}
-
-
-def picture_table(check: SafetyCheck) -> list[tuple[str, ...]]:
-    """Table beside the picture: a row per quantity."""
-    longer = ["longer"] * len(check.longer)
-    cells = [(f"stress: {SIGN}", "FE", "gravity", *longer, "required")]
-    least = required_by_case(check.case)
-    for units, names in SHOWN:
-        values = [[result.numbers[name] for result in check.results] for name in names]
-        size, factor = unit([np.array(values)[np.isfinite(values)]], units)
-        for (name, title), line in zip(names.items(), values, strict=True):
-            numbers = (number_cell(v * factor) for v in line)
-            head = title if size == "-" else f"{title} [{size}]"
-            cells.append((head, *numbers, number_cell(least.get(name, math.nan))))
-    if where := position_by_case(check.case):
-        cells.append(("N' in", *(result.position for result in check.results), where))
-    if check.finite_elements.partial:
-        cells.insert(1, ("load", "partial", "full", *("full" for _ in longer), ""))
-    return [*cells, ("", *(result.verdict for result in check.results), "")]
-
-
-def joints_table(checks: list[SafetyCheck]) -> list[tuple[str, ...]]:
-    """Table of the joints of a scene: least factors of both methods, place of N by finite elements
-    and the worse verdict.
-    """
-    cells: list[tuple[str, ...]] = [("joint", "SSF", "OSF", "N' in", "verdict")]
-    for check in checks:
-        numbers = [result.numbers for result in check.results]
-        least = [np.nanmin([n[name] for n in numbers] + [np.inf]) for name in ("SSF", "OSF")]
-        position = check.finite_elements.position
-        name = check.finite_elements.joint
-        cells.append(
-            (
-                name,
-                *(f"{f:.3g}" if f < np.inf else "-" for f in least),
-                position,
-                worst_verdict(check),
-            )
-        )
-    return cells

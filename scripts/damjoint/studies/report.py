@@ -33,7 +33,6 @@ from . import body_stress, report_input, report_quake
 from .check import (
     NOT_JUDGED,
     REQUIRED,
-    SHOWN,
     UNCHECKED,
     MethodResult,
     SafetyCheck,
@@ -42,6 +41,7 @@ from .check import (
     required_by_case,
     requirements,
 )
+from .check_tables import SHOWN
 from .report_input import Entry, by_runs, in_table
 from .report_picture import Picture, embedded
 

@@ -1,0 +1,156 @@
+"""The results of a safety check as tables: for the terminal, and for the picture of a scene."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from tabulate import tabulate
+
+from ..pictures.check_picture import SIGN
+from ..post.summary import fitted
+from ..units import FORCES, MOMENTS, STRESSES, Units, unit
+from .check import (
+    DIFFERENCE,
+    FAIL,
+    Row,
+    SafetyCheck,
+    position_by_case,
+    required_by_case,
+    verdict_line,
+    worst_verdict,
+)
+
+#: Difference over the largest value of a quantity below which the printed table shows 0.
+SHOWN_DIFFERENCE = 1e-5
+
+#: Columns of the printed table: heading by name, in groups that share a unit.
+SHOWN: tuple[tuple[Units, dict[str, str]], ...] = (
+    ((("m", 1),), {"level": "level"}),
+    (FORCES, {"N": "N'", "T": "T", "U": "U"}),
+    (MOMENTS, {"M": "M"}),
+    ((("m", 1),), {"x_resultant": "N' at x"}),
+    (STRESSES, {"sigma_n_eff_heel": "eff. heel", "sigma_n_eff_toe": "eff. toe"}),
+    ((("m", 1),), {"crack_length": "crack"}),
+    (FORCES, {"cohesion": "c B", "cohesion_undamaged": "c L"}),
+    ((("-", 1),), {"SSF": "SSF", "OSF": "OSF"}),
+)
+
+
+#: Columns that a narrow table leaves out, in this order.
+LESS = ("level", "c L", "c B", "eff. toe", "eff. heel", "M", "N' at x", "U", "crack", "T", "N'")
+
+
+def text_table(checks: list[SafetyCheck], width: int | None = None) -> str:
+    """Format the verdicts, below them a table in suitable units, and the notes; width: of the
+    terminal, None: all columns.
+    """
+    rows = [row for check in checks for row in check.printed_rows]
+    is_difference = np.array([row["answer"] == DIFFERENCE for row in rows])
+    columns, heads, names = [], [], ["case", "method"]
+    for units, shown in SHOWN:
+        values = np.array([[row[name] for row in rows] for name in shown], dtype=float)
+        finite = values[np.isfinite(values)]
+        size, factor = units[0] if units in (FORCES, MOMENTS) else unit([finite], units)
+        least = SHOWN_DIFFERENCE * np.abs(finite).max(initial=0)
+        values[is_difference & (np.abs(values) < least)] = 0
+        sign = f"\n{SIGN}" if units is STRESSES else ""
+        names += shown.values()
+        heads += [f"{title}\n[{size}]{sign}" for title in shown.values()]
+        columns += [list(map(cell, line * factor, is_difference)) for line in values]
+    verdicts = ([row[name] for row in rows] for name in ("position", "verdict"))
+    scenes = [scene_label(checks, row) for row in rows]
+    partial = (", partial load" * (row.get("load") == "partial") for row in rows)
+    methods = [row["answer"] + part for row, part in zip(rows, partial, strict=True)]
+    columns = [scenes, methods, *columns, *verdicts]
+    heads = ["case", "method", *heads, "N' in", "check"]
+    aligned = ["left", "left", *("right" for _ in heads[4:]), "left", "left"]
+
+    def draw(numbers: Sequence[int]) -> str:
+        return str(
+            tabulate(
+                zip(*(columns[k] for k in numbers), strict=True),
+                [heads[k] for k in numbers],
+                disable_numparse=True,
+                colalign=[aligned[k] for k in numbers],
+            )
+        )
+
+    table = fitted([*names, "N' in", "check"], draw, LESS, width)
+    lines = [
+        f"{scene}, {row['answer']}: {'fails, ' * (row['verdict'] == FAIL)}{row['why']}"
+        for scene, row in zip(scenes, rows, strict=True)
+        if row["why"]
+    ]
+    verdict_lines = [
+        f"{scene_label(checks, check.finite_elements.row)}: {verdict_line(check)}"
+        for check in checks
+    ]
+    parts = "\n".join([*verdict_lines, *lines]), table, "\n".join(labelled_notes(checks))
+    return "\n\n".join(filter(None, parts))
+
+
+def labelled_notes(checks: list[SafetyCheck]) -> list[str]:
+    """Notes with the scene and joint of each; one that all of a case have, once with its name."""
+    lines = dict[str, None]()  # in their order
+    for check in checks:
+        row = check.finite_elements.row
+        same = [other for other in checks if other.case.name == check.case.name]
+        for note in check.notes:
+            common = all(note in other.notes for other in same)
+            lines[f"{row['case'] if common else scene_label(checks, row)}: {note}"] = None
+    return list(lines)
+
+
+def scene_label(checks: list[SafetyCheck], row: Row) -> str:
+    """Name of a row's case, with its uplift if the case has several scenes, and its joint if it has
+    several.
+    """
+    same = [c.finite_elements for c in checks if c.case.name == row["case"]]
+    joints = list(dict.fromkeys(result.joint for result in same))
+    scenes = {result.case["uplift"] for result in same if result.joint == joints[0]}
+    parts = [row["case"]]
+    parts += [row["uplift"]] if len(scenes) > 1 else []
+    parts += [row["joint"]] if len(joints) > 1 else []
+    return ", ".join(parts)
+
+
+def cell(value: float, sign: bool = False) -> str:
+    """Format a number with five digits, a difference with its sign and three; empty if nan."""
+    if math.isnan(value):
+        return ""
+    return f"{value:.5g}" if not sign else f"{value:+.3g}" if value else "0"
+
+
+def picture_table(check: SafetyCheck) -> list[tuple[str, ...]]:
+    """Table beside the picture: a row per quantity."""
+    longer = ["longer"] * len(check.longer)
+    cells = [(f"stress: {SIGN}", "FE", "gravity", *longer, "required")]
+    least = required_by_case(check.case)
+    for units, names in SHOWN:
+        values = [[result.numbers[name] for result in check.results] for name in names]
+        size, factor = unit([np.array(values)[np.isfinite(values)]], units)
+        for (name, title), line in zip(names.items(), values, strict=True):
+            numbers = (cell(v * factor) for v in line)
+            head = title if size == "-" else f"{title} [{size}]"
+            cells.append((head, *numbers, cell(least.get(name, math.nan))))
+    if where := position_by_case(check.case):
+        cells.append(("N' in", *(result.position for result in check.results), where))
+    if check.finite_elements.partial:
+        cells.insert(1, ("load", "partial", "full", *("full" for _ in longer), ""))
+    return [*cells, ("", *(result.verdict for result in check.results), "")]
+
+
+def joints_table(checks: list[SafetyCheck]) -> list[tuple[str, ...]]:
+    """Table of the joints of a scene: least factors of both methods, place of N by finite elements
+    and the worse verdict.
+    """
+    cells: list[tuple[str, ...]] = [("joint", "SSF", "OSF", "N' in", "verdict")]
+    for check in checks:
+        numbers = [result.numbers for result in check.results]
+        least = [np.nanmin([n[name] for n in numbers] + [np.inf]) for name in ("SSF", "OSF")]
+        factors = (f"{f:.3g}" if f < np.inf else "-" for f in least)
+        elements = check.finite_elements
+        cells.append((elements.joint, *factors, elements.position, worst_verdict(check)))
+    return cells
