@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import re
 import time
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 
 from .. import InputError, RunError
-from ..arrays import IntArray
+from ..arrays import IntArray, Setting
 from ..input.case import Case
 from ..input.constraints import check_levels_on_mesh, check_strain
 from ..input.geometry_file import files_of
@@ -34,12 +34,24 @@ from .regions import (
     dimension,
 )
 from .sides import is_inside, outward, part_of, sides
-from .skin import inner_ends
-from .user_files import GeometryFiles
+from .topology import inner_ends
 from .user_geometry import NamedFace, UserGeometry
 
 #: Limit of the joint's element tags: six digits in the keys of GetDP's internal variables.
 MOST_TAGS = 1_000_000
+
+
+@dataclass(frozen=True)
+class GeometryFiles:
+    """The files of a user's own geometry in their present state, and all else its mesh depends
+    on: the parameters of a section's mesh, and those that a .geo file names.
+    """
+
+    #: path, time of the last change, size
+    files: tuple[tuple[Path, int, int], ...]
+    parameters: tuple[tuple[str, Setting], ...]
+    #: for making the mesh
+    case: Case = field(compare=False)
 
 
 @lru_cache(maxsize=1)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -66,7 +66,11 @@ def networks_of(joints: Sequence[JointMesh], cases: Sequence[Case]) -> list[Netw
     if not any(joint.meets for joint in joints):
         return []
     inside = [k for k, case in enumerate(cases) if starts_inside(joints[k], case)]
-    check_waterstops([joints[k] for k in inside])
+    if solid := [joints[k] for k in inside if joints[k].dim == 3]:
+        raise InputError(
+            f"uplift = waterstop: must be another one in joint {solid[0].name}, whose heel is at "
+            "another joint, not on the upstream face"
+        )
     joints = [sealed(joint, k) if k in inside else joint for k, joint in enumerate(joints)]
     passable = [k for k, case in enumerate(cases) if case["uplift"] not in ("none", "waterstop")]
     wet = sorted([*passable, *inside])
@@ -170,18 +174,6 @@ def check(network: Network, joints: Sequence[JointMesh], cases: Sequence[Case]) 
         )
 
 
-def check_waterstops(joints: Sequence[JointMesh]) -> None:
-    """Raise InputError if one of some joints with a waterstop and their heel at another joint is in
-    3D.
-    """
-    for joint in joints:
-        if joint.dim == 3:
-            raise InputError(
-                f"uplift = waterstop: must be another one in joint {joint.name}, whose heel is at "
-                "another joint, not on the upstream face"
-            )
-
-
 # -- paths in the plane
 
 #: Height of an end that a path does not have [m].
@@ -233,19 +225,11 @@ class WaterPath:
             return WaterPath(heel_y=heel, toe_y=toe, rest_y=min(heel, toe))
         if not section["path"]:
             return None
-        heel_y, toe_y, rest_y, begin, end, highest_tail, *flags = section["path"]
-        exits, open_heel, open_toe = map(bool, flags)
+        values: dict[str, Any] = dict(zip(NUMBERS, section["path"], strict=False))
+        values |= zip(FLAGS, map(bool, section["path"][len(NUMBERS) :]), strict=True)
         heels, drains = section["path_higher_heels"], section["path_drains"]
         return WaterPath(
-            heel_y=heel_y,
-            toe_y=toe_y,
-            rest_y=rest_y,
-            begin=begin,
-            end=end,
-            highest_tail=highest_tail,
-            exits=exits,
-            open_heel=open_heel,
-            open_toe=open_toe,
+            **values,
             higher_heels=tuple(HigherHeel(*heels[k : k + 3]) for k in range(0, len(heels), 3)),
             drains=tuple(PathDrains(*drains[k : k + 4]) for k in range(0, len(drains), 4)),
         )
@@ -263,13 +247,16 @@ class WaterPath:
     @property
     def section(self) -> dict[str, list[float]]:
         """The path in the section of a case, from which `of` reads it."""
-        numbers = [self.heel_y, self.toe_y, self.rest_y, self.begin, self.end, self.highest_tail]
-        flags = [float(flag) for flag in (self.exits, self.open_heel, self.open_toe)]
         return {
-            "path": numbers + flags,
+            "path": [float(getattr(self, name)) for name in (*NUMBERS, *FLAGS)],
             "path_higher_heels": [value for heel in self.higher_heels for value in heel],
             "path_drains": [value for drains in self.drains for value in drains],
         }
+
+
+#: Attributes of a path in the section of a case, in their order.
+NUMBERS = ("heel_y", "toe_y", "rest_y", "begin", "end", "highest_tail")
+FLAGS = ("exits", "open_heel", "open_toe")
 
 
 class PathDrains(NamedTuple):
@@ -320,7 +307,7 @@ def plane_paths(network: Network, joints: Sequence[JointMesh], case: Case) -> di
     if len(toes) > 1 or max(case.tail_levels) > highest_tail:
         return {}
     first = np.setdiff1d(heels, higher)
-    levels = distinct_heights(y[higher])
+    levels = sorted(set(y[higher].tolist()))
     alongs = [path_coordinate(mesh.surface, first, toes)]
     alongs += [path_coordinate(mesh.surface, heels[y[heels] <= level], toes) for level in levels]
     rest = y[[*mesh.heel_nodes, *mesh.toe_nodes, *network.closed]].min()
@@ -352,11 +339,6 @@ def plane_paths(network: Network, joints: Sequence[JointMesh], case: Case) -> di
             effect = of_joint["drain_effectiveness"]
             drains.append(PathDrains(float(at), outlet, effect, reference))
     return {k: replace(path, drains=tuple(sorted(drains))) for k, path in paths.items()}
-
-
-def distinct_heights(y: Array) -> list[float]:
-    """Heights in ascending order, each once."""
-    return sorted(set(y.tolist()))
 
 
 def path_coordinate(surface: Body, heel: IntArray, toe: IntArray) -> Array:

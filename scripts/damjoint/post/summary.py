@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from itertools import zip_longest
 from textwrap import wrap
 from typing import NamedTuple
@@ -40,6 +40,11 @@ class Table(NamedTuple):
     units: list[str]
     rows: list[tuple[str, ...]]
 
+    def beside(self, heading: str, names: Iterable[str]) -> Table:
+        """The table with a first column of names."""
+        rows = [(name, *row) for name, row in zip(names, self.rows, strict=True)]
+        return Table([heading, *self.names], ["", *self.units], rows)
+
     @property
     def heads(self) -> list[str]:
         """Names with units."""
@@ -49,7 +54,7 @@ class Table(NamedTuple):
         ]
 
 
-def table_of(columns: list[tuple[str, np.ndarray, Units]], digits: int = 4) -> Table:
+def table_of(columns: Sequence[tuple[str, np.ndarray, Units]], digits: int = 4) -> Table:
     """Format columns (name, values, units) with some digits in units that suit their size; what is
     below ROUND_OFF of a column's largest value is rounding and shown as 0.
     """
@@ -108,24 +113,22 @@ def joints_table(result: Results, time: float) -> Table:
     """Tabulate the joints at a time, a row each: safety factor against sliding, place of N,
     lengths that are open, broken, softening, slipped.
     """
-    joints = [(own, own.state(time)) for own in result.joints]
+    joints = [(joint_result, joint_result.state(time)) for joint_result in result.joints]
     factors = [
-        gravity.sliding_factor(own.case, state["N"], state["T"], state["bonded_length"])
-        if own.case.law.limits_shear
+        gravity.sliding_factor(j.case, state["N"], state["T"], state["bonded_length"])
+        if j.case.law.limits_shear
         else np.inf
-        for own, state in joints
+        for j, state in joints
     ]
     columns: list[tuple[str, np.ndarray, Units]] = [("SSF", np.array(factors), (("", 1.0),))]
     for name, head in OF_JOINTS:
         values = np.array([state[name] for _, state in joints])
         if name != "process_zone" or values.any():
             columns.append((head, values, LENGTHS[:1]))
-    names, sizes, cells = table_of(columns, 3)
-    rows = [
-        (name, *row, gravity.position(state["x_resultant"], own.case.joint_length))
-        for name, row, (own, state) in zip(result.case.joint_names, cells, joints, strict=True)
-    ]
-    return Table(["joint", *names, "N' in"], ["", *sizes, ""], rows)
+    table = table_of(columns, 3).beside("joint", result.case.joint_names)
+    thirds = (gravity.position(s["x_resultant"], j.case.joint_length) for j, s in joints)
+    rows = [(*row, third) for row, third in zip(table.rows, thirds, strict=True)]
+    return Table([*table.names, "N' in"], [*table.units, ""], rows)
 
 
 def differs(broken: np.ndarray, crack: np.ndarray) -> bool:
@@ -165,26 +168,35 @@ def text(result: Results, width: int | None = None) -> str:
 def text_of_joint(result: Results, width: int | None = None) -> str:
     """Format the table of the levels of the only joint of these results."""
     names, sizes, rows = levels_table(result)
+    wrapped = (wrap(name, 10) for name in names)
+    heads = [
+        "\n".join([*words, f"[{size}]" if size else ""])
+        for words, size in zip(wrapped, sizes, strict=True)
+    ]
+    return fitted(names, heads, rows, LESS, width)
 
-    def draw(shown: Sequence[int]) -> str:
-        heads = [
-            "\n".join([*wrap(names[k], 10), f"[{sizes[k]}]" if sizes[k] else ""]) for k in shown
-        ]
-        return aligned([tuple(row[k] for k in shown) for row in rows], heads)
 
-    return fitted(names, draw, LESS, width)
+#: Draws a table of rows and headings.
+Draw = Callable[[list[tuple[str, ...]], list[str]], str]
 
 
 def fitted(
     names: Sequence[str],
-    draw: Callable[[Sequence[int]], str],
+    heads: Sequence[str],
+    rows: Sequence[Sequence[str]],
     less: Sequence[str],
     width: int | None,
+    drawn: Draw | None = None,
 ) -> str:
-    """Draw a table without those of the columns `less`, in their order, that a width has no room
-    for; draw: the table of some of its columns, by number; width = None: all.
+    """Draw a table, its columns by names and headings, without those of the columns `less`, in
+    their order, that a width has no room for; width = None: all; drawn: by default `aligned`.
     """
     shown, hidden = list(range(len(names))), list[str]()
+
+    def draw(shown: Sequence[int]) -> str:
+        picked = [tuple(row[k] for k in shown) for row in rows]
+        return (drawn or aligned)(picked, [heads[k] for k in shown])
+
     table = draw(shown)
     for name in less:
         if width is None or max(map(len, table.splitlines())) <= width:

@@ -99,8 +99,7 @@ def extremes(solution: Solution, time: float) -> Table:
     heads = ("largest", "at x", "y", "smallest", "at x", "y")
     units = (MEGAPASCAL, METRES, METRES) * 2
     table = table_of(list(zip(heads, columns, units, strict=True)), 3)
-    cells = [(name, *row) for name, row in zip(names, table.rows, strict=True)]
-    return Table(["principal stress", *table.names], ["", *table.units], cells)
+    return table.beside("principal stress", names)
 
 
 @dataclass(frozen=True)
@@ -176,7 +175,7 @@ def rock_pressure(solution: Solution, checks: list[SafetyCheck], time: float) ->
     """Tabulate the total pressure of the dam on the rock, of each joint on it by each method: mean,
     at both ends, largest apart from them. None if no joint lies on the rock.
     """
-    case, rows = solution.result.case, list[tuple[str, ...]]()
+    case, names = solution.result.case, list[str]()
     numbers = list[list[float]]()
     for k, (joint, check) in enumerate(zip(solution.result.joints, checks, strict=True)):
         if case.of_joints and case.of_joints[k].lower != ROCK:
@@ -194,16 +193,14 @@ def rock_pressure(solution: Solution, checks: list[SafetyCheck], time: float) ->
             else:
                 row.append(max(row[1:]))
             numbers.append(row)
-            rows.append((f"{case.joint_names[k]}, {method.method}",))
-    if not rows:
+            names.append(f"{case.joint_names[k]}, {method.method}")
+    if not names:
         return None
     heads = ("mean", "at the heel", "at the toe", "largest apart from the ends")
     columns = [
         (head, values, MEGAPASCAL) for head, values in zip(heads, np.array(numbers).T, strict=True)
     ]
-    table = table_of(columns, 3)
-    cells = [(*name, *row) for name, row in zip(rows, table.rows, strict=True)]
-    return Table(["pressure on the rock, total", *table.names], ["", *table.units], cells)
+    return table_of(columns, 3).beside("pressure on the rock, total", names)
 
 
 def draw_principal(figure: Figure, solution: Solution, time: float, section: Section) -> None:

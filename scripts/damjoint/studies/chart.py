@@ -154,15 +154,9 @@ def heading(case: Case, plan: Plan, number: int) -> str:
     return f"{case.title}: {', '.join([f'{number} rows', *facts])}"
 
 
-#: Largest value of a varied name over its smallest from which its axis is logarithmic.
+#: Largest value of a varied name over its smallest from which its axis is logarithmic: the larger
+#: ones would hide the others.
 DECADE = 10
-
-
-def is_logarithmic(values: np.ndarray) -> bool:
-    """Whether values (n,) are shown on a logarithmic axis: their larger ones would hide the
-    others.
-    """
-    return bool(values.min() > 0 and values.max() >= DECADE * values.min())
 
 
 def fails(rows: list[Row]) -> np.ndarray:
@@ -275,7 +269,7 @@ def scale_axis(axis: XAxis, values: np.ndarray) -> None:
     """Scale the axis of varied values (n,): logarithmic over more than a decade; few of them are
     its ticks.
     """
-    if is_logarithmic(values):
+    if values.min() > 0 and values.max() >= DECADE * values.min():
         axis.axes.set_xscale("log")
         axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     if len(set(values)) <= FEW:

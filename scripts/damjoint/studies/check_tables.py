@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 from tabulate import tabulate
@@ -65,19 +64,13 @@ def text_table(checks: list[SafetyCheck], width: int | None = None) -> str:
     methods = [row["answer"] + part for row, part in zip(rows, partial, strict=True)]
     columns = [scenes, methods, *columns, *verdicts]
     heads = ["case", "method", *heads, "N' in", "check"]
-    aligned = ["left", "left", *("right" for _ in heads[4:]), "left", "left"]
 
-    def draw(numbers: Sequence[int]) -> str:
-        return str(
-            tabulate(
-                zip(*(columns[k] for k in numbers), strict=True),
-                [heads[k] for k in numbers],
-                disable_numparse=True,
-                colalign=[aligned[k] for k in numbers],
-            )
-        )
+    def draw(rows: list[tuple[str, ...]], heads: list[str]) -> str:
+        sides = ["left", "left", *("right" for _ in heads[4:]), "left", "left"]
+        return str(tabulate(rows, heads, disable_numparse=True, colalign=sides))
 
-    table = fitted([*names, "N' in", "check"], draw, LESS, width)
+    cells = list(zip(*columns, strict=True))
+    table = fitted([*names, "N' in", "check"], heads, cells, LESS, width, draw)
     lines = [
         f"{scene}, {row['answer']}: {'fails, ' * (row['verdict'] == FAIL)}{row['why']}"
         for scene, row in zip(scenes, rows, strict=True)

@@ -27,6 +27,8 @@ MOST_ROWS = 1_000_000
 #: Designs of a sample: Latin hypercube, independent random rows.
 DESIGNS = ("latin", "monte-carlo")
 
+#: Share of a step by which the last value of FIRST:LAST:STEP may lie beyond LAST.
+ROUNDING = 1e-9
 #: Significant digits of the values, which are those of a result file.
 DIGITS = 12
 
@@ -64,7 +66,8 @@ class Sample:
         from . import sampling  # loads scipy.stats
 
         for name, text in self.distributions.items():
-            if name != "level" and has_no_number(parameters.parameter(name)):
+            known = None if name == "level" else parameters.parameter(name)
+            if known and (known.text or known.choices):
                 raise InputError(f"--sample {name}={text}: must be of a parameter that is a number")
             sampling.distribution(name, text)
         for text in self.correlate:
@@ -87,11 +90,6 @@ class Sample:
                     "uniform or lognorm keep within bounds"
                 ) from None
         return values
-
-
-def has_no_number(parameter: parameters.Parameter) -> bool:
-    """Whether the values of a parameter are texts."""
-    return bool(parameter.text or parameter.choices)
 
 
 def checked(name: str, value: Value) -> Value:
@@ -153,10 +151,6 @@ def values_of(text: str) -> tuple[str, list[Value]]:
     return name, [checked(name, rounded(first + i * step)) for i in range(number)]
 
 
-#: Share of a step by which the last value of FIRST:LAST:STEP may lie beyond LAST.
-ROUNDING = 1e-9
-
-
 def sample_of(
     words: list[str], design: str = "latin", seed: int = 0, correlate: Sequence[str] = ()
 ) -> Sample:
@@ -205,10 +199,8 @@ class Plan:
 
     def rows(self) -> Iterator[dict[str, Value]]:
         """The values of each row by name. Raises InputError."""
-        sample = [
-            dict(zip(self.sampled, v, strict=True))
-            for v in zip(*self.sampled.values(), strict=True)
-        ]
+        draws = zip(*self.sampled.values(), strict=True)
+        sample = [dict(zip(self.sampled, values, strict=True)) for values in draws]
         for values in itertools.product(*self.varied.values()):
             for drawn in sample or [{}]:
                 row = dict(zip(self.varied, values, strict=True)) | drawn

@@ -40,7 +40,9 @@ def compute(case: Case, progress: bool = True) -> QuakeTables:
 
     Raises RunError if nothing was computed.
     """
-    vibrations = earthquake_of(case)
+    with quake.single_thread():  # of the condensed bodies, without any state
+        model = Model(case, interface_of(case))
+        vibrations = Earthquake(model.case, model, model.start(), Bodies.of(case))
     found = solve(vibrations, progress)
     error, static = found.error, found.static
     if static.stopped:
@@ -55,15 +57,6 @@ def compute(case: Case, progress: bool = True) -> QuakeTables:
         summary["after"] = {"equilibrium": bool(found.stands)}
     end = end_of(error)
     return QuakeTables.of(vibrations.case, static, summary, end, error=error, rows=rows)
-
-
-def earthquake_of(case: Case) -> Earthquake:
-    """The record, longest step, natural frequencies and damping of a case, of the condensed bodies;
-    without any state.
-    """
-    with quake.single_thread():
-        model = Model(case, interface_of(case))
-        return Earthquake(model.case, model, model.start(), Bodies.of(case))
 
 
 def solve(vibrations: Earthquake, progress: bool) -> engine.GetdpQuake:

@@ -198,9 +198,5 @@ def records_table(results: Sequence[Ended], width: int | None = None) -> str:
         [v if isinstance(v, str) else f"{v:.4g}" for v in (r.row[name] for name in SHOWN)]
         for r in results
     ]
-
-    def draw(shown: Sequence[int]) -> str:
-        picked = [tuple(row[k] for k in shown) for row in cells]
-        return aligned(picked, [HEADS[k] for k in shown], left=1)
-
-    return fitted(SHOWN, draw, ("rigid_block_slip", "residual_tilt", "peak_ground_ax"), width)
+    less = "rigid_block_slip", "residual_tilt", "peak_ground_ax"
+    return fitted(SHOWN, HEADS, cells, less, width, partial(aligned, left=1))

@@ -466,9 +466,7 @@ def loads_table(rigid: GravityMethod) -> Table:
         ("distance upstream of the toe", distances, METRES),
         ("moment about the toe", np.array([r.moment for r in rows]), MOMENTS),
     ]
-    names, sizes, cells = table_of(columns)
-    table = [(r.name, *row) for r, row in zip(rows, cells, strict=True)]
-    return Table(["load", *names], ["", *sizes], table)
+    return table_of(columns).beside("load", (row.name for row in rows))
 
 
 def arm(moment: float, component: float) -> float:

@@ -111,15 +111,11 @@ def record_table(rows: Columns, period: float) -> Table:
         ("significant duration, 5 to 95 %", "s"),
         (f"spectrum at T1 = {period:.3g} s", "g"),
     )
-    table = table_of(
-        [
-            (name, values, ((size, 1.0),))
-            for (name, size), values in zip(heads, np.array(numbers).T, strict=True)
-        ],
-        3,
-    )
-    cells = [(name, *row) for (name, _), row in zip(of_records, table.rows, strict=True)]
-    return Table(["record", *table.names], ["", *table.units], cells)
+    columns = [
+        (name, values, ((size, 1.0),))
+        for (name, size), values in zip(heads, np.array(numbers).T, strict=True)
+    ]
+    return table_of(columns, 3).beside("record", (name for name, _ in of_records))
 
 
 def draw_spectra(rows: Columns, period: float) -> Figure:

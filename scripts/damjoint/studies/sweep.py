@@ -20,7 +20,7 @@ from ..input.source import Source
 from ..joint.interface import Interface, interface_of
 from ..model.results import column_of as column_of_joint
 from ..model.results import history_columns
-from ..post.summary import aligned, fitted
+from ..post.summary import fitted
 from ..processes import ProcessKilled, as_finished, check_jobs, number_of
 from ..progress import Progress, track
 from ..solver.load_stepper import LoadStepper
@@ -363,14 +363,9 @@ def rows_table(plan: Plan, rows: list[Row], width: int | None = None) -> str:
     names = [n for n in dict.fromkeys([*shown_always, *results]) if rows and n in rows[0]]
     cells = [[short(name, row[name]) for name in names] for row in rows[:PRINTED]]
     heads = [f"{n}\n[{PRINTED_UNITS[n][0]}]" if n in PRINTED_UNITS else n for n in names]
-
-    def draw(shown: Sequence[int]) -> str:
-        picked = [tuple(line[k] for k in shown) for line in cells]
-        return aligned(picked, [heads[k] for k in shown])
-
     if not rows:
         return ""
-    table = fitted(names, draw, results[:0:-1], width)
+    table = fitted(names, heads, cells, results[:0:-1], width)
     more = len(rows) - PRINTED
     return f"{table}\n... and {more} rows more" if more > 0 else table
 
