@@ -32,10 +32,6 @@ def end_of(error: BaseException | None, where: str = "") -> tuple[str, str]:
     return state, f"{state}{where}" + (f": {error}" if str(error) else "")
 
 
-def nothing_more(folder: Path) -> None:
-    """A study without further tables."""
-
-
 class Session:
     """A study of a case that has claimed its folder, see `session`."""
 
@@ -53,7 +49,7 @@ class Session:
         result: Results,
         state: str = "",
         statement: str = "",
-        more: Callable[[Path], None] = nothing_more,
+        more: Callable[[Path], None] = lambda folder: None,
     ) -> None:
         """Write the tables of a scene, and run.json with notes, versions, machine, memory, times.
 

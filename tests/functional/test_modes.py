@@ -7,7 +7,10 @@ import numpy as np
 import pytest
 from damjoint.dynamics import modes
 from damjoint.input.resolve import load
+from damjoint.pictures.drawing import CONCRETE, ROCK
 from damjoint.post import stored
+from damjoint.studies import modes_study
+from matplotlib.colors import to_hex
 from numpy.testing import assert_allclose
 from PIL import Image
 from quakes import BLOCK, DAM, earthquake, smooth_record
@@ -89,6 +92,17 @@ def test_the_command_writes_rows_picture_and_run_json(command, tmp_path):
     # another command in the folder removes them
     assert command("run", "dam", *few[:-2], "--no-picture", "--no-fields", "--out", folder)[0] == 0
     assert not {"modes.csv", "dam_modes.png"} & {path.name for path in folder.iterdir()}
+
+
+def test_the_picture_shows_the_whole_dam_and_the_rock_around_it_in_their_colors():
+    case = load("dam", {"n_joint": 4, "order": 1, "h_found": 40}, "40")
+    axes = modes_study.figure(modes_study.compute(case, 1)).axes[0]
+    (cells,) = axes.collections
+    colors = {to_hex(color) for color in cells.get_facecolor()}
+    assert colors == {ROCK, CONCRETE}
+    # of the rock, which is wider than shown, only what lies around the dam
+    width = case["found_side"] * 2 + case["dam_base"]
+    assert np.ptp(axes.get_xlim()) < 0.5 * width and np.ptp(axes.get_ylim()) > case["dam_height"]
 
 
 @pytest.mark.parametrize("number, message", [("0", "must be an integer >= 1"), ("500000", "< ")])

@@ -535,7 +535,7 @@ def test_each_joint_of_a_case_with_several_is_shown_and_saved(open_window, comma
     for scene in user.session.scenes:
         user.type(tree.JOINT, scene.choices[0])
         assert numbers_shown(user)["Joint"] == scene.choices[0]
-        normal = scene.own.last["N"]
+        normal = scene.joint_result.last["N"]
         assert scene.numbers[0].elements["N"] == normal
         assert scene.numbers[0].rigid["N"] == pytest.approx(normal, rel=1e-8)
     user.save(tmp_path / "window")

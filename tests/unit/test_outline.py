@@ -11,7 +11,7 @@ from damjoint.model.fields import (
     SOFTENING,
     along,
     distance,
-    row_of_nodes,
+    nearest_rows,
     state_of,
 )
 from damjoint.model.loads import STAGED, Loading
@@ -199,7 +199,7 @@ def test_rows_of_a_stepped_joint():
     }
     points = np.column_stack([rows[axis] for axis in "xyz"])[::-1]
     joint = Body(points, np.arange(4), [], np.arange(0))
-    assert row_of_nodes(joint, rows).tolist() == [3, 2, 1, 0]
+    assert nearest_rows(joint.points, rows).tolist() == [3, 2, 1, 0]
     assert_allclose(along(rows)["p"], [3, 2, 1, 0])
     assert_allclose(distance({"x": rows["x"]}), rows["x"])  # flat: no separate column
 

@@ -30,6 +30,6 @@ def call(arguments: argparse.Namespace) -> int:
 
     case = load_case(arguments, arguments.case)
     out = arguments.out or Path("out") / f"{case.name}_modes"
-    found = modes_study.run(case, arguments.number, out, not arguments.no_picture)
-    print(f"{case.name}: {modes_study.about(found)}; {out}\n\n{modes_study.text(found)}")
+    natural = modes_study.run(case, arguments.number, out, not arguments.no_picture)
+    print(f"{case.name}: {modes_study.about(natural)}; {out}\n\n{modes_study.text(natural)}")
     return 0

@@ -108,8 +108,8 @@ def envelope(rows: Table, column: str) -> tuple[np.ndarray, np.ndarray]:
 def graphs_along_joint(scene: SolvedScene, before: Sequence[SolvedScene]) -> list[Graph]:
     """Opening, stresses, slip and pressure along the joint (means over z in 3D)."""
     shown = []
-    rows = [along(scene.own.at(time)) for time in scene.times]
-    earlier = [along(other.own.at()) for other in before]
+    rows = [along(scene.joint_result.at(time)) for time in scene.times]
+    earlier = [along(other.joint_result.at()) for other in before]
     wet = scene.result.case["uplift"] != "none"
     for title, units, parts in ALONG_JOINT:
         curves = [
@@ -137,9 +137,9 @@ def column_of_levels(scene: SolvedScene, column: str) -> np.ndarray:
     else no opening below 0, as in a closed joint.
     """
     if column != "max_opening":
-        return scene.own.history[column]
+        return scene.joint_result.history[column]
     driven = scene.result.case["drive"] != "level"
-    return scene.result.heel if driven else np.maximum(scene.own.history[column], 0.0)
+    return scene.result.heel if driven else np.maximum(scene.joint_result.history[column], 0.0)
 
 
 #: Places of the steps on both axes; None: not marked.
@@ -149,7 +149,7 @@ UNMARKED: Places = None, None
 
 def marks_of_steps(scene: SolvedScene) -> list[Places]:
     """Places of the steps shown on both axes of the graphs of the history."""
-    history = scene.own.history
+    history = scene.joint_result.history
     rows = [int(np.argmin(np.abs(history["time"] - time))) for time in scene.times]
     if not rows:
         return [UNMARKED] * len(OVER_LEVELS)
@@ -164,7 +164,7 @@ def graphs_of_history(scene: SolvedScene, before: Sequence[SolvedScene]) -> list
         title = "heel opening" if driven and column == "max_opening" else title
         curves = []
         for other in (scene, *before):
-            history, x = other.own.history, column_of_levels(other, column)
+            history, x = other.joint_result.history, column_of_levels(other, column)
             if len(x):
                 name, kind = ("", color) if other is scene else (BEFORE, GREY)
                 curves.append(Curve(name, x, history["level"][None], kind, points=other is scene))

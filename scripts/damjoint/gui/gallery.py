@@ -79,10 +79,6 @@ class Gallery:
         for name in ("Text2D", "Text3D"):
             gmsh.view.option.setColor(tag, name, *color[:3])
 
-    def transparent(self, tag: int) -> None:
-        """Make the background of a graph transparent."""
-        gmsh.view.option.setColor(tag, "Background2D", 255, 255, 255, 0)
-
     def write(
         self, x: float, y: float, lines: list[str], color: Color, size: int, align: str = "Left"
     ) -> int:

@@ -117,14 +117,12 @@ class Graphs:
         scales = [Scale.of(values, y_axis[1]) for values in steps]
         self.frame((x, y), (y_axis[0], x_axis[0]), (along_x, x_range), scales)
         if now is not None:
-            tag = self.line("now", (x, y), marks(along_x.intervals(now), x_range), DARK)
-            gmsh.view.option.setNumber(tag, "LineWidth", 1)
+            self.line("now", (x, y), marks(along_x.intervals(now), x_range), DARK, width=1)
         if level is not None:
-            own = [scales[min(step, count - 1)] for step in range(len(level))]
-            at_y = np.array([scale.intervals(y) for scale, y in zip(own, level, strict=True)])
+            of_steps = [scales[min(step, count - 1)] for step in range(len(level))]
+            at_y = np.array([scale.intervals(y) for scale, y in zip(of_steps, level, strict=True)])
             pieces = pieces_of(np.array(x_range), at_y[:, None].repeat(2, axis=1), x_range)
-            tag = self.line("level shown", (x, y), pieces, DARK)
-            gmsh.view.option.setNumber(tag, "LineWidth", 1)
+            self.line("level shown", (x, y), pieces, DARK, width=1)
         named = [curve for curve in curves if curve.name not in ("", BEFORE)]
         for curve in sorted(curves, key=lambda curve: curve.name != BEFORE):  # drawn below others
             name = f"{y_axis[0]}, {curve.name}" if curve.name else y_axis[0]
@@ -134,7 +132,7 @@ class Graphs:
             if not curve.points:
                 at_x, lines = thinned(at_x, lines)
             pieces = pieces_of(at_x, lines, x_range)
-            self.line(name, (x, y), pieces, curve.color, curve.points)
+            self.line(name, (x, y), pieces, curve.color, curve.points, width=2)
             if curve in named and len(named) > 1:
                 place = x + self.layout.graph_size[0], y - 15 + 13 * named.index(curve)
                 self.names.append((curve.name, *place, curve.color))
@@ -146,7 +144,7 @@ class Graphs:
 
     def values_at(self, curves: list[Curve], step: int) -> np.ndarray:
         """Values of all curves that set the scale of a step."""
-        chosen = [c.y if self.common or len(c.y) == 1 else c.y[step : step + 1] for c in curves]
+        chosen = [c.y if self.common or len(c.y) == 1 else c.y[step] for c in curves]
         return np.concatenate([values.ravel() for values in chosen])
 
     def frame(
@@ -196,6 +194,7 @@ class Graphs:
         pieces: Pieces,
         color: Color,
         points: bool = False,
+        width: int = 1,
     ) -> int:
         """Draw pieces in intervals in a graph; returns the tag of its view."""
         low, high = extent(np.array([0.0, INTERVALS]))
@@ -216,10 +215,10 @@ class Graphs:
             AxesTicsX=0,
             ShowScale=0,
             Axes=0,
-            LineWidth=2 if color not in (GRID, GREY) else 1,
+            LineWidth=width if color != GREY else 1,
             IntervalsType=3 if points else 2,
         )
-        self.gallery.transparent(tag)
+        gmsh.view.option.setColor(tag, "Background2D", 255, 255, 255, 0)  # transparent
         return tag
 
 

@@ -120,18 +120,18 @@ class QuakeNumbers(Numbers):
     peaks: list[Row]
 
     @staticmethod
-    def of(found: QuakeResult, joint: int) -> list[QuakeNumbers]:
+    def of(quake: QuakeResult, joint: int) -> list[QuakeNumbers]:
         """The numbers at all frames, of a joint by its number."""
-        frames, rows, peaks = found.frames.joints[joint], shown_rows(found, joint), []
+        frames, rows, peaks = quake.frames.joints[joint], shown_rows(quake, joint), []
         for name, head, units in PEAKS:
             k = row_of_peak(name, rows[name])
             value = with_unit(rows[name][k], units, 3)
             peaks.append((f"largest {head}", f"{value} at {rows['time'][k]:.2f} s", QUAKE[name][1]))
-        peaks += [("Note", note, note) for note in found.summary["notes"]]
-        if not found.summary["at_rest"]:
+        peaks += [("Note", note, note) for note in quake.summary["notes"]]
+        if not quake.summary["at_rest"]:
             peaks.append(("At rest", "no", "at the end: no residual slip"))
         for name, head, units in RESIDUAL:
-            value = found.summary["residual"].get(column_of(name, joint))
+            value = quake.summary["residual"].get(column_of(name, joint))
             if value is not None:
                 peaks.append((head, with_unit(value, units, 3), "mean over the end of the rest"))
         times = frames.history["time"]
@@ -159,13 +159,13 @@ class QuakeNumbers(Numbers):
         return [*rows, *self.peaks]
 
 
-def shown_rows(found: QuakeResult, joint: int) -> Columns:
+def shown_rows(quake: QuakeResult, joint: int) -> Columns:
     """The rows of quake.csv of a joint, by its number, without round-off, with openings not below 0
     and the shear strength in both directions.
     """
     rows = {
         name: np.where(np.abs(column) > ROUND_OFF * np.abs(column).max(), column, 0.0)
-        for name, column in found.rows_of(joint).items()
+        for name, column in quake.rows_of(joint).items()
         if np.isfinite(column).all()  # a law may not limit shear
     }
     rows |= {name: np.maximum(rows[name], 0.0) for name in ("heel_opening", "toe_opening")}

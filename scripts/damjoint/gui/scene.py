@@ -75,44 +75,44 @@ class SolvedScene:
                 statement=message or "the dam stands",
                 failed=bool(state) or failed(result),
                 joint=joint,
-                numbers=[Numbers.at(own, time) for time in times],
-                table=table_of_levels(own),
+                numbers=[Numbers.at(joint_result, time) for time in times],
+                table=table_of_levels(joint_result),
                 warnings=warnings(result),
             )
-            for joint, own in first_of(decisive_joint(result), result)
+            for joint, joint_result in first_of(decisive_joint(result), result)
         ]
 
     @staticmethod
-    def of_earthquake(found: QuakeResult) -> list[SolvedScene]:
+    def of_earthquake(quake: QuakeResult) -> list[SolvedScene]:
         """The scenes of the static loads and of the earthquake after them, one for each joint; of
         the earthquake that of the largest residual slip first.
         """
-        static = Outcome(found.before, lambda: found.mesh, found.static_fields)
-        fields = found.fields()
+        static = Outcome(quake.before, lambda: quake.mesh, quake.static_fields)
+        fields = quake.fields()
         scenes = SolvedScene.of(static)
-        for joint, _ in first_of(found.joint, found.frames):
-            numbers = QuakeNumbers.of(found, joint)
+        for joint, _ in first_of(quake.joint, quake.frames):
+            numbers = QuakeNumbers.of(quake, joint)
             earthquake = SolvedScene(
-                choices=choices_of(found.frames, joint, MOTIONS[1]),
-                result=found.frames,
-                bodies=found.mesh.bodies,
+                choices=choices_of(quake.frames, joint, MOTIONS[1]),
+                result=quake.frames,
+                bodies=quake.mesh.bodies,
                 fields=fields,
-                verdict=found.static.info["verdict"],
-                end_state=found.state,
-                message="" if found.stands else found.statement,
-                statement=found.statement,
-                failed=not found.stands,
+                verdict=quake.static.info["verdict"],
+                end_state=quake.state,
+                message="" if quake.stands else quake.statement,
+                statement=quake.statement,
+                failed=not quake.stands,
                 joint=joint,
                 numbers=list(numbers),
                 table=table_of_frames(numbers),
                 warnings=[],
-                quake=shown_rows(found, joint),
+                quake=shown_rows(quake, joint),
             )
             scenes.append(earthquake)
         return scenes
 
     @property
-    def own(self) -> Results:
+    def joint_result(self) -> Results:
         """The results of the joint that is shown."""
         return self.result.joints[self.joint]
 

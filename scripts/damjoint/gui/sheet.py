@@ -118,12 +118,12 @@ def check_request(request: Request) -> Sheet:
     path = case_file(request.case)
     unchanged = Request(request.case, accuracy=request.accuracy)
     fill_database(unchanged, unchanged.load())
-    own = {name: gmsh_value(declared()[name].label) for name in declared()}
+    case_values = {name: gmsh_value(declared()[name].label) for name in declared()}
     file = casefile.read(path)
     changes = {
         n: v
         for n, v in request.overrides.items()
-        if n in file.of_joints or n in file.in_blocks or v != own.get(n)
+        if n in file.of_joints or n in file.in_blocks or v != case_values.get(n)
     }
     request = replace(request, overrides=changes)
     case = request.load()

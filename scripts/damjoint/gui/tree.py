@@ -276,9 +276,9 @@ class Tree:
 
     def menu(self, sheet: Sheet) -> list[str]:
         """Entries of the menu of cases, in order, with that of an open case file."""
-        own = [self.title(name) for name in self.titles]
+        titles = [self.title(name) for name in self.titles]
         title = self.title(sheet.request.case)
-        return [*own, *([] if title in own else [title]), OPEN]
+        return [*titles, *([] if title in titles else [title]), OPEN]
 
     def entry(self, declared: dict[str, Any]) -> dict[str, Any]:
         """Entry of a declared parameter; one that follows others shows the value that results.
@@ -302,10 +302,10 @@ class Tree:
         entry["help"] = ". ".join(filter(None, [allowed, parameter.meaning, note]))
         unit = f" [{parameter.unit}]" if parameter.unit not in ("", "-") else ""
         entry["label"] = self.short[parameter.name] + unit
-        if own := self.of_joints(parameter):
-            entry["label"] += f" = {own}"
+        if values := self.of_joints(parameter):
+            entry["label"] += f" = {values}"
             names = ", ".join(self.sheet.case.joint_names)
-            entry["help"] += f". Values of {names}: {own}; one typed here is that of all joints"
+            entry["help"] += f". Values of {names}: {values}; one typed here is that of all joints"
         if parameter.text:
             return entry
         choices = declared.get("choices", [])
@@ -380,19 +380,19 @@ class Tree:
         other message as it is.
         """
         self.clear_error()
-        found = re.fullmatch(ON_VALUE, message)
+        match = re.fullmatch(ON_VALUE, message)
         names = FIELDS_OF_NAMES | {name: known.label for name, known in self.known.items()}
-        name = names.get(found["name"], "") if found else ""
-        if not found or name not in self.fields:
+        name = names.get(match["name"], "") if match else ""
+        if not match or name not in self.fields:
             return message
-        self.marked, field, why = name, self.fields[name], found["why"]
-        for words, own in WINDOW_WORDS.items():
-            why = why.replace(words, own)
+        self.marked, field, why = name, self.fields[name], match["why"]
+        for words, of_window in WINDOW_WORDS.items():
+            why = why.replace(words, of_window)
         label = shown_label(field)
         attributes = {**field.get("attributes", {}), "Highlight": BAD}
         changes = {"label": f"{label}: {why}", "help": why, "attributes": attributes}
         put({**field, "values": [value_of(name)], **changes})
-        value = "" if found["value"] is None else f" = {found['value']}"
+        value = "" if match["value"] is None else f" = {match['value']}"
         return f"{label}{value}: {why}"
 
     def clear_error(self) -> None:
@@ -449,7 +449,8 @@ def display_entries(case: Case) -> list[dict[str, Any]]:
         CONTENT: (CONTENTS, "drawing area"),
     }
     entries = [
-        text(name, own[0], choices=list(own), help=note) for name, (own, note) in choices.items()
+        text(name, names[0], choices=list(names), help=note)
+        for name, (names, note) in choices.items()
     ]
     uplifts = [case.of_all_joints("uplift"), *case.also_uplift]
     entries += choosers(list(itertools.product(case.joint_names, uplifts, MOTIONS[:1])), 0)

@@ -21,7 +21,7 @@ from ..model.fields import (
     SOFTENING,
     distance,
     joint_body,
-    row_of_nodes,
+    nearest_rows,
     state_of,
 )
 from ..units import LENGTHS, STRESSES, unit, with_unit
@@ -259,9 +259,9 @@ def show_strips(gallery: Gallery, deformed: Deformed, display: Display) -> None:
     From heel to toe to the right; of a user's own geometry upwards, as seen from upstream.
     """
     scene = deformed.solved
-    case, rows = scene.own.case, deformed.scene.joints[scene.joint].rows
+    case, rows = scene.joint_result.case, deformed.scene.joints[scene.joint].rows
     joint = joint_body(scene.bodies, scene.joint)
-    nearest = row_of_nodes(joint, rows[0])
+    nearest = nearest_rows(joint.points, rows[0])
     s, z = distance(rows[0])[nearest], joint.points[:, 2]
     axes = (z, s) if case.geometry else (s, -z)
     shares = np.column_stack([(v - v.min()) / (np.ptp(v) or 1.0) for v in axes])

@@ -225,11 +225,11 @@ class Case(ParameterValues):
         Raises InputError if the case has drains or a waterstop beyond the end of a joint.
         """
         same = [replace(joint, hardening_asked=self.hardening_asked) for joint in joints]
-        known = self.of_joints or same
         ends = [self.section | joint.section for joint in joints]
+        values = [(joint.values, joint.hardening_asked) for joint in self.of_joints or same]
         of_joints = (
-            replace(joint, values=own.values, section=section, hardening_asked=own.hardening_asked)
-            for own, joint, section in zip(known, joints, ends, strict=True)
+            replace(joint, values=set_values, section=section, hardening_asked=asked)
+            for (set_values, asked), joint, section in zip(values, joints, ends, strict=True)
         )
         several = tuple(of_joints) if len(joints) > 1 else ()
         case = replace(self, section=ends[0], of_joints=several)

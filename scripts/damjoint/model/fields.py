@@ -47,8 +47,8 @@ class Solution:
 
     def of_joint(self, number: int) -> Solution:
         """The same with the results and the surface of a single joint, by its number from 0."""
-        own = numbered("joint", number)
-        surface = {"joint": self.bodies[own]} if own in self.bodies else {}
+        name = numbered("joint", number)
+        surface = {"joint": self.bodies[name]} if name in self.bodies else {}
         result = self.result.joints[number]
         return Solution(result, self.bodies | surface, self.fields)
 
@@ -105,11 +105,6 @@ def nearest_rows(points: Array, rows: Table) -> IntArray:
     return np.array([np.argmin(((places - point) ** 2).sum(axis=1)) for point in points], int)
 
 
-def row_of_nodes(body: Body, rows: Table) -> IntArray:
-    """For each mesh node of the joint (n,) its row in the joint's table at one time."""
-    return nearest_rows(body.points, rows)
-
-
 def joint_body(bodies: dict[str, Body], joint: int) -> Body:
     """The surface of a joint, by its number from 0, in the bodies of a mesh."""
     return bodies[numbered("joint", joint)]
@@ -120,7 +115,7 @@ def joint_data(result: Results, body: Body, time: float) -> Table:
     along x, y, z.
     """
     rows = result.at(time)
-    nearest = row_of_nodes(body, rows)
+    nearest = nearest_rows(body.points, rows)
     return {
         name: np.column_stack([rows[c][nearest] for c in columns]).squeeze()
         for name, (_, columns) in OF_JOINT.items()

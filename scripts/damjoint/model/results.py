@@ -102,8 +102,8 @@ def column_of(name: str, joint: int) -> str:
 
 def row_of_joint(row: dict[str, float], joint: int) -> dict[str, float]:
     """A row of history.csv with the columns of a joint, by its number from 0, without suffix."""
-    own = {n: row[column_of(n, joint)] for n in HISTORY_OF_JOINTS if column_of(n, joint) in row}
-    return row | own
+    names = {name: column_of(name, joint) for name in HISTORY_OF_JOINTS}
+    return row | {name: row[column] for name, column in names.items() if column in row}
 
 
 def with_all_joints(columns: Columns, case: Case) -> Columns:

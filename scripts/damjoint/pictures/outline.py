@@ -118,7 +118,7 @@ def plane_body(body: Body, displacement: np.ndarray, scale: float) -> PlaneBody 
         for name in dict.fromkeys(body.regions):
             selected = front & (region[owners] == name)
             faces.setdefault(name, []).extend([table[selected]] if selected.any() else [])
-    tables = [table for own in faces.values() for table in own]
+    tables = [table for of_region in faces.values() for table in of_region]
     if not tables:
         return None
     moved = points + scale * displacement[:, :2]
@@ -137,11 +137,11 @@ class JointLine:
 
 def joint_lines(case: Case, rows: list[Table]) -> list[JointLine]:
     """The joints of a case, from the rows of each at one time."""
-    bodies = [(own.upper, own.lower) for own in case.of_joints] or [("dam", "foundation")]
+    bodies = [(joint.upper, joint.lower) for joint in case.of_joints] or [("dam", "foundation")]
     lines = []
-    for names, own in zip(bodies, rows, strict=True):
-        s = distance(own)
-        ends = (np.array([own[axis][i] for axis in "xy"]) for i in (s.argmin(), s.argmax()))
+    for names, of_joint in zip(bodies, rows, strict=True):
+        s = distance(of_joint)
+        ends = (np.array([of_joint[axis][i] for axis in "xy"]) for i in (s.argmin(), s.argmax()))
         lines.append(JointLine(*names, *ends))
     return lines
 
@@ -192,7 +192,7 @@ def union(bodies: list[PlaneBody]) -> PlaneBody:
     places = np.round(points / np.ptp(points, axis=0).max(), 9)
     _, first, same = np.unique(places, axis=0, return_index=True, return_inverse=True)
     glued = first[same.ravel()]  # points of the same place as a single one
-    tables = [glued[table] for own in faces.values() for table in own]
+    tables = [glued[table] for of_region in faces.values() for table in of_region]
     return PlaneBody(points, moved, faces, boundary(points, tables))
 
 

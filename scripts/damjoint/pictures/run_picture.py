@@ -26,7 +26,7 @@ from matplotlib.tri import Triangulation
 from .. import ROUND_OFF
 from ..input.case import Case
 from ..mesh.body import Body
-from ..model.fields import Solution, along, distance, joint_body, row_of_nodes, state_of
+from ..model.fields import Solution, along, distance, joint_body, nearest_rows, state_of
 from ..model.loads import Loading
 from ..model.results import Results
 from ..post import validation
@@ -179,9 +179,9 @@ def heading(result: Results) -> str:
         title += f", level {level_label(state['level'])}"
         if state["tail_level"] > 0:
             title += f", tailwater {level_label(state['tail_level'])}"
-    flowing = [own for own in result.joints if own.case["uplift"] == "flow"]
+    flowing = [joint for joint in result.joints if joint.case["uplift"] == "flow"]
     if state and flowing:
-        leakage = sum(own.state(state["time"])["flux"] for own in flowing)
+        leakage = sum(joint.state(state["time"])["flux"] for joint in flowing)
         title += f", leakage {leakage:.3g} kg/(m s)"
     return f"{title}: {verdict(result)}"
 
@@ -195,8 +195,8 @@ def facts_of(result: Results) -> list[str]:
     case, time = result.case, shown_time(result)
     state, number = result.state(time), decisive_joint(result)
     loading = Loading.at(case, time, state["level"], state["tail_level"])
-    own, name = result.joints[number], case.named((number,))
-    on_joint = state_label(own.case, own.state(time))
+    joint_result, name = result.joints[number], case.named((number,))
+    on_joint = state_label(joint_result.case, joint_result.state(time))
     return [f"loads: {loads_label(case, loading)}", f"{name}: {on_joint}" if name else on_joint]
 
 
@@ -235,8 +235,9 @@ def draw_all_joints(figure: AnyFigure, solution: Solution, time: float) -> None:
         grid = panels(
             figure, len(joints), 3, left=0.55, bottom=0.62, top=0.75, across=0.6, down=0.42
         )[::-1]
-        for row, own, name in zip(grid, joints, solution.result.case.joint_names, strict=True):
-            draw_curves(list(row), own, time)
+        names = solution.result.case.joint_names
+        for row, joint, name in zip(grid, joints, names, strict=True):
+            draw_curves(list(row), joint, time)
             for axes in row:
                 axes.set_title(name, fontsize=7.5, loc="left", pad=2)
                 axes.yaxis.label.set_fontsize(7)
@@ -296,7 +297,7 @@ def finish_curves(figure: AnyFigure, axes: list[Axes], results: list[Results], t
 
 def mark_states(figure: AnyFigure, results: list[Results], time: float) -> None:
     """Write the legend of the states that occur at some joints."""
-    states = [state_of(along(own.at(time)), own.case.law) for own in results]
+    states = [state_of(along(joint.at(time)), joint.case.law) for joint in results]
     occurring = [STATES[n].patch() for n in STATES if any((part == n).any() for part in states)]
     if occurring:
         above = ABOVE_EDGE / size_of(figure)[1]
@@ -453,7 +454,7 @@ def changes_at_a_level(result: Results) -> list[tuple[int, str]]:
     """Steps of the history at a level that it had before, at which other loads than the water have
     just changed, and which: of an earthquake its coefficients.
     """
-    case, history, found = result.case, result.history, list[tuple[int, str]]()
+    case, history, steps = result.case, result.history, list[tuple[int, str]]()
     loadings = [
         Loading.at(case, *(history[name][k] for name in ("time", "level", "tail_level")))
         for k in range(len(history["time"]))
@@ -464,9 +465,9 @@ def changes_at_a_level(result: Results) -> list[tuple[int, str]]:
         if changes and not changed[k + 1]:  # the last step of a change
             before = history["level"][: k + 1]
             if np.isclose(before, history["level"][k + 1]).any():
-                found.append((k + 1, grown_label(case, loadings[first], loadings[k + 1])))
+                steps.append((k + 1, grown_label(case, loadings[first], loadings[k + 1])))
         first = first if changes else k + 1
-    return found
+    return steps
 
 
 def history_panels(result: Results) -> list[Panel]:
@@ -502,8 +503,8 @@ def panels_of_joints(result: Results) -> list[Panel]:
     def lines(values: Callable[[Results], np.ndarray]) -> list[tuple[np.ndarray, str, str]]:
         return [(values(joints[k]), c, names[k]) for k, c in zip(order, colors, strict=False)]
 
-    opening = lines(lambda own: np.maximum(own.history["max_opening"], 0))
-    slipped = lines(lambda own: own.history["slip_length"] / own.case.joint_along)
+    opening = lines(lambda joint: np.maximum(joint.history["max_opening"], 0))
+    slipped = lines(lambda joint: joint.history["slip_length"] / joint.case.joint_along)
     return [
         Panel("largest opening", LENGTHS, opening),
         Panel("crest movement", LENGTHS, [(result.history["crest_ux"], BLUE, "")]),
@@ -625,7 +626,7 @@ def draw_openings(figure: AnyFigure, solution: Solution, time: float) -> None:
     """Draw a map of the opening of each joint, in colors of a common scale."""
     joints = solution.result.joints
     across = math.ceil(math.sqrt(len(joints)))
-    rows = [own.at(time) for own in joints]
+    rows = [joint.at(time) for joint in joints]
     length, factor = unit([row["delta_n"] for row in rows], LENGTHS)
     openings = [np.maximum(row["delta_n"], 0.0) * factor for row in rows]
     largest = max(np.percentile(opening, SCALED[1]) for opening in openings) or 1.0
@@ -637,7 +638,7 @@ def draw_openings(figure: AnyFigure, solution: Solution, time: float) -> None:
             continue
         surface = joint_body(solution.bodies, number)
         names, places = projected(surface)
-        values = openings[number][row_of_nodes(surface, rows[number])]
+        values = openings[number][nearest_rows(surface.points, rows[number])]
         colors = axes.tripcolor(
             Triangulation(places[0], places[1], triangles_of(surface)),
             values,
@@ -669,7 +670,7 @@ def draw_maps(figure: AnyFigure, solution: Solution, time: float) -> None:
     each other, or side by side if the joint is not much wider than high.
     """
     rows, joint = solution.result.at(time), solution.bodies["joint"]
-    nearest = row_of_nodes(joint, rows)
+    nearest = nearest_rows(joint.points, rows)
     names, places = projected(joint)
     shape = Triangulation(places[0], places[1], triangles_of(joint))
     shown = (

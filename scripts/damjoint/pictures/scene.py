@@ -257,7 +257,7 @@ class Scene:
         self.scale = exaggeration(self.moved, self.case.size)
         self.skins = {name: skin(bodies[name]) for name in self.moved}
         self.depth = max(bodies[name].points[:, 2].max() for name in self.moved)
-        self.joints = [self.joint_shape(k, own) for k, own in enumerate(result.joints)]
+        self.joints = [self.joint_shape(k, joint) for k, joint in enumerate(result.joints)]
         lines = joint_lines(self.case, [joint.rows[0] for joint in self.joints])
         #: sections, undeformed and by step; None if one section does not represent the geometry
         self.undeformed, *self.sections = (

@@ -12,19 +12,11 @@ import meshio
 import numpy as np
 
 from .. import InputError
-from ..arrays import Value
 from ..fem.elements import corners_of
 from ..input.case import SECTION, SHARED, Case
 from ..input.case_names import is_name
 from ..input.joints import parsed_by_joint, stacked_joints
-from ..input.parameters import (
-    GEOMETRY_LISTS,
-    INCLUDE,
-    assignments,
-    constants,
-    declared,
-    listing,
-)
+from ..input.parameters import GEOMETRY_LISTS, constants, declared, listing
 from ..input.scene import numbered
 from ..mesh.body import Body
 from ..model.fields import Field, Solution
@@ -144,13 +136,6 @@ def finite(name: str, values: list[float]) -> tuple[float, ...]:
     if not np.isfinite(numbers).all():
         raise InputError(f"{name} = {','.join(map(str, numbers))}: must be finite")
     return numbers
-
-
-def parser_input(values: dict[str, Value], levels: tuple[float, ...]) -> str:
-    """Text from which Gmsh's parser computes the quantities that follow from parameters and
-    levels.
-    """
-    return assignments(values) + listing("levels", levels) + INCLUDE
 
 
 def read_csv(path: Path) -> dict[str, np.ndarray]:

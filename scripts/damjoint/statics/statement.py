@@ -15,8 +15,8 @@ from .verdict import STIFF_JOINT, Bound, bound, failure, slipped_from, stiffness
 
 def statement(results: Results) -> str:
     """Why and where a run has stopped, or that the dam slides; empty if it stands."""
-    case, last, found = results.case, results.last, failure(results)
-    mode, joint = found.mode, found.at(case)
+    case, last, why = results.case, results.last, failure(results)
+    mode, joint = why.mode, why.at(case)
     if mode == "no equilibrium":
         return "no equilibrium even at the first step"
     if results.stopped:
@@ -29,8 +29,8 @@ def statement(results: Results) -> str:
         return f"{verdict(results)}: {reason_of_stop(results)}; the last converged state is saved"
     if not mode:
         return ""
-    level = max(slipped_from(results.joints[k]) or 0.0 for k in found.joints)
-    case = case.joints[found.joints[0]]
+    level = max(slipped_from(results.joints[k]) or 0.0 for k in why.joints)
+    case = case.joints[why.joints[0]]
     hardening, where = case.law.hardening_parameter, joint or "joint"
     slides = f"sliding: the whole {where} has slipped or is open from level {level:.6g} m on"
     if not hardening:

@@ -53,9 +53,9 @@ def verdict(results: Results) -> str:
     "no equilibrium": not even at the first step. "sliding" also where the whole joint has slipped
     or opened and only the hardening of the joint resists.
     """
-    found = failure(results)
-    joint = found.at(results.case)
-    return f"{found.mode} on {joint}" if joint else found.mode or "stands"
+    why = failure(results)
+    joint = why.at(results.case)
+    return f"{why.mode} on {joint}" if joint else why.mode or "stands"
 
 
 def failure(results: Results) -> Failure:
@@ -101,8 +101,8 @@ def failing_joints(results: Results) -> tuple[int, ...]:
     """The numbers of the joints at which the dam fails, of a single joint that one; empty if it
     stands, or if it is not known where it fails.
     """
-    found = failure(results)
-    return (0,) if found.mode and not results.case.of_joints else found.joints
+    why = failure(results)
+    return (0,) if why.mode and not results.case.of_joints else why.joints
 
 
 def slipped_joints(results: Results) -> tuple[int, ...]:

@@ -51,14 +51,14 @@ def corners(solution: Solution, time: float) -> list[tuple[Array, float]]:
     """The ends (k, 3) of the joints at a time, and the distance that counts as close to them [m],
     of each joint.
     """
-    found = []
+    of_joints = []
     for joint in solution.result.joints:
         rows = joint.at(time)
         points, s = np.column_stack([rows[axis] for axis in "xyz"]), rows["s"]
         reach = CORNER * float(np.ptp(s))
         ends = (s < s.min() + reach / 10) | (s > s.max() - reach / 10)
-        found.append((points[ends], reach))
-    return found
+        of_joints.append((points[ends], reach))
+    return of_joints
 
 
 def regular(points: Array, ends: list[tuple[Array, float]]) -> BoolArray:
@@ -112,7 +112,7 @@ class FacePoint:
 
 def face_points(face: Array, heights: Array) -> list[FacePoint]:
     """The points of a face (n, 2), from downstream to upstream, at heights (k,)."""
-    found = []
+    points = []
     for height in heights:
         y0, y1 = face[:-1, 1], face[1:, 1]
         crossing = np.flatnonzero((np.minimum(y0, y1) <= height) & (height <= np.maximum(y0, y1)))
@@ -122,8 +122,8 @@ def face_points(face: Array, heights: Array) -> list[FacePoint]:
         start, end = face[crossing[0]], face[crossing[0] + 1]
         part = (height - start[1]) / (end[1] - start[1])
         along_face = (end - start) / np.linalg.norm(end - start)
-        found.append(FacePoint(start + part * (end - start), along_face))
-    return found
+        points.append(FacePoint(start + part * (end - start), along_face))
+    return points
 
 
 def on_face(points: list[FacePoint], middles: Array, stress: Array) -> tuple[Array, Array]:
@@ -161,9 +161,9 @@ def faces(solution: Solution, time: float, section: Section) -> Table:
     for side, face in (("upstream", section.upstream), ("downstream", section.downstream)):
         tangential, normal = np.full((2, len(heights)), np.nan)
         for k, height in enumerate(heights):
-            found = on_face(face_points(face, np.array([height])), middles[:, :2], stress)
-            if len(found[0]):
-                tangential[k], normal[k] = found[0][0], found[1][0]
+            on_point = on_face(face_points(face, np.array([height])), middles[:, :2], stress)
+            if len(on_point[0]):
+                tangential[k], normal[k] = on_point[0][0], on_point[1][0]
         columns += [
             (f"{side}, along the face", tangential, MEGAPASCAL),
             (f"{side}, normal to it", normal, MEGAPASCAL),

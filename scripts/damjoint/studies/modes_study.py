@@ -48,17 +48,17 @@ def run(case: Case, number: int, out: Path, picture: bool = True) -> NaturalMode
     Raises InputError, RunError.
     """
     with session(case, out) as study:
-        found = compute(case, number)
-        columns = {name: column.tolist() for name, column in found.table.items()}
-        tables.write_csv(out / ROWS, found.table)
+        natural = compute(case, number)
+        columns = {name: column.tolist() for name, column in natural.table.items()}
+        tables.write_csv(out / ROWS, natural.table)
         if picture:
-            write_picture(figure(found), out / f"{case.name}_modes.png", 130)
+            write_picture(figure(natural), out / f"{case.name}_modes.png", 130)
         given = {"parameters": case.values, "level": case.levels[-1], "number": number}
         study.save_without_results("complete", "", {"modes": given | columns})
-    return found
+    return natural
 
 
-def text(found: NaturalModes) -> str:
+def text(natural: NaturalModes) -> str:
     """The modes as a printed table."""
     rows: list[tuple[str, ...]] = [
         (
@@ -71,15 +71,15 @@ def text(found: NaturalModes) -> str:
             f"{100 * mode.along_y:.1f}",
             f"{100 * mode.damping:.2g}",
         )
-        for variant in found.variants
+        for variant in natural.variants
         for number, mode in enumerate(variant.modes, start=1)
     ]
     return aligned(rows, HEADS, left=2)
 
 
-def about(found: NaturalModes) -> str:
+def about(natural: NaturalModes) -> str:
     """What the modes are of, in words."""
-    case = found.case
+    case = natural.case
     water = f"added mass after {'Zangar' if case['added_mass'] == ZANGAR else 'Westergaard'}"
     water = water if case["added_mass"] else "added_mass = 0: the reservoir has no mass"
     part = "stiffness and mass parts" if case["damping_mass"] else "stiffness part"
@@ -90,13 +90,13 @@ def about(found: NaturalModes) -> str:
 
 
 @picture_style()
-def figure(found: NaturalModes) -> Figure:
+def figure(natural: NaturalModes) -> Figure:
     """The shapes of the modes with the water on elastic rock, with the frequencies of all."""
-    first = found.variants[0]
+    first = natural.variants[0]
     number = min(len(first.modes), MOST)
-    words = textwrap.wrap(f"{found.case.title}: {about(found)}", 44 * number)
+    words = textwrap.wrap(f"{natural.case.title}: {about(natural)}", 44 * number)
     head = 0.15 + 0.17 * len(words)
-    foot = 0.2 + 0.17 * len(found.variants)
+    foot = 0.2 + 0.17 * len(natural.variants)
     width, height = PANEL * number + 0.2, head + 0.4 + PANEL + foot
     picture = figure_of(width, height)
     y = 1 - 0.1 / height
@@ -104,24 +104,24 @@ def figure(found: NaturalModes) -> Figure:
     for k in range(number):
         place = (0.1 + k * PANEL) / width, foot / height, 0.96 * PANEL / width, PANEL / height
         axes = picture.add_axes(place)
-        draw_shape(axes, found, first, k)
+        draw_shape(axes, natural, first, k)
         mode = first.modes[k]
         title = f"mode {k + 1}: {mode.frequency:.3g} Hz, {1 / mode.frequency:.3g} s\n"
         title += f"{mode.along_x:.0%} of the mass along x, {mode.along_y:.0%} along y"
         axes.set_title(title, fontsize=8)
     lines = []
-    for variant in found.variants:
+    for variant in natural.variants:
         values = ", ".join(f"{mode.frequency:.3g}" for mode in variant.modes)
         lines.append(f"water: {variant.water}; rock: {variant.rock}: {values} Hz")
     picture.text(0.1 / width, 0.1 / height, "\n".join(lines), va="bottom", fontsize=8)
     return picture
 
 
-def draw_shape(axes: Axes, found: NaturalModes, variant: Variant, number: int) -> None:
+def draw_shape(axes: Axes, natural: NaturalModes, variant: Variant, number: int) -> None:
     """Draw dam and rock displaced in a mode, in 3D seen from downstream and above."""
-    mesh, shape = found.mesh, variant.shapes[number]
+    mesh, shape = natural.mesh, variant.shapes[number]
     view = VIEW if mesh.dim == 3 else np.eye(3)
-    scale = DRAWN * found.case.size
+    scale = DRAWN * natural.case.size
     faces, depths, colors, near = [], [], [], []
     for name, moved in shape.items():
         body = mesh.solids[name]
@@ -137,7 +137,7 @@ def draw_shape(axes: Axes, found: NaturalModes, variant: Variant, number: int) -
     cells = PolyCollection([faces[i] for i in order], facecolor=[colors[i] for i in order])
     cells.set(edgecolor=GREY, linewidth=0.15, rasterized=True)
     axes.add_collection(cells, autolim=False)
-    frame(axes, np.concatenate(near)[:, :2], found.case.size)
+    frame(axes, np.concatenate(near)[:, :2], natural.case.size)
 
 
 def frame(axes: Axes, dam: Array, size: float) -> None:

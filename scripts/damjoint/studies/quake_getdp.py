@@ -23,8 +23,8 @@ from .quake_result import QuakeTables
 
 def left_out(out: Path, picture: bool) -> Iterator[str]:
     """Yield what a run into a folder does not do, in words; picture: whether one is wanted."""
-    found = folders.read_info(out)
-    if found and found.get("state") in ("interrupted", "running"):
+    info = folders.read_info(out)
+    if info and info.get("state") in ("interrupted", "running"):
         yield f"out = {out}: --engine getdp starts an interrupted earthquake again"
     if picture:
         yield "--engine getdp draws no picture of an earthquake: its tables only"
@@ -43,18 +43,18 @@ def compute(case: Case, progress: bool = True) -> QuakeTables:
     with quake.single_thread():  # of the condensed bodies, without any state
         model = Model(case, interface_of(case))
         vibrations = Earthquake(model.case, model, model.start(), Bodies.of(case))
-    found = solve(vibrations, progress)
-    error, static = found.error, found.static
+    computed = solve(vibrations, progress)
+    error, static = computed.error, computed.static
     if static.stopped:
         reason = statement(static)
         error = RunError(f"earthquake: the static loads have no equilibrium: {reason}")
-    rows, number = found.rows, len(found.rows["time"])
+    rows, number = computed.rows, len(computed.rows["time"])
     halvings = round(np.log2(vibrations.dt / rows["dt"].min())) if number else 0
     summary = quake_summary.summary(vibrations, rows, halvings)
-    seconds = {name: round(value, 3) for name, value in found.seconds.items()}
+    seconds = {name: round(value, 3) for name, value in computed.seconds.items()}
     summary["seconds"] = seconds | {"steps": number}
     if not error:
-        summary["after"] = {"equilibrium": bool(found.stands)}
+        summary["after"] = {"equilibrium": bool(computed.stands)}
     end = end_of(error)
     return QuakeTables.of(vibrations.case, static, summary, end, error=error, rows=rows)
 

@@ -144,9 +144,9 @@ def facts_of(result: QuakeResult) -> list[str]:
     if last := before.last:
         loading = Loading.at(case, last["time"], last["level"], last["tail_level"])
         texts.append(f"before it: {loads_label(case, loading)}")
-    for name, own in zip(case.joint_names, before.joints, strict=True):
-        if own.last:
-            state = state_label(own.case, own.last)
+    for name, joint_result in zip(case.joint_names, before.joints, strict=True):
+        if joint_result.last:
+            state = state_label(joint_result.case, joint_result.last)
             texts.append(f"{name}: {state}" if case.of_joints else state)
     return texts
 

@@ -10,10 +10,17 @@ import numpy as np
 from .. import ROUND_OFF
 from ..arrays import Value
 from ..input.case import Case
-from ..input.parameters import Parameter, constants, declared, parse
+from ..input.parameters import (
+    INCLUDE,
+    Parameter,
+    assignments,
+    constants,
+    declared,
+    listing,
+    parse,
+)
 from ..input.resolve import equal_steps
 from ..input.values import flows, has_drains
-from ..post import stored
 from ..units import STRESSES, Units, unit
 
 #: Units by the unit in the declarations; other units are printed as they are.
@@ -155,7 +162,10 @@ def parameters(case: Case) -> dict[str, Entry]:
     """
     known, values = declared(), case.values
     fixed = {n: v for n, v in values.items() if not known[n].automatic}
-    automatic, defaults = parse(stored.parser_input(fixed, case.levels)), constants()
+    automatic, defaults = (
+        parse(assignments(fixed) + listing("levels", case.levels) + INCLUDE),
+        constants(),
+    )
     matter = visible(case)
     entries = {}
     for name, parameter in known.items():

@@ -142,13 +142,13 @@ def quake_row(task: Task) -> dict[str, Value]:
     case = task.case
     row: dict[str, Value] = dict.fromkeys([*history_columns(case), *QUAKE_COLUMNS], "")
     try:
-        static, found = quake.outcome_of(case)
+        static, summary = quake.outcome_of(case)
     except Exception as error:
         return row | dict(zip(OUTCOME, (1.0, ERROR, message_of(error)), strict=True))
-    row |= static.results().last | quake_summary.columns(case, found)
-    worst = column_of_joint("slip", quake_summary.largest_slip(case, found))
-    slip = abs(found["residual" if found["at_rest"] else "end"][worst])
-    verdict, words = quake_summary.verdict(case, found), quake_summary.statement(case, found)
+    row |= static.results().last | quake_summary.columns(case, summary)
+    worst = column_of_joint("slip", quake_summary.largest_slip(case, summary))
+    slip = abs(summary["residual" if summary["at_rest"] else "end"][worst])
+    verdict, words = quake_summary.verdict(case, summary), quake_summary.statement(case, summary)
     limit = task.slip_limit or 0.0
     if slip > limit and verdict in (quake_summary.STANDS, NOT_AT_REST):
         verdict = EXCEEDED

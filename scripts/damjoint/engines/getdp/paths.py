@@ -17,7 +17,7 @@ def values_of_paths(mesh: Mesh, case: Case) -> list[str]:
 
     Raises InputError for networks that this engine can not compute.
     """
-    alone = [WaterPath.of(own) for own in case.joints]
+    alone = [WaterPath.of(joint) for joint in case.joints]
     texts = [text_of(path) if path else "" for path in alone]
     for network in networks_of(mesh.joints, case.joints):
         solid = mesh.dim == 3
@@ -50,7 +50,7 @@ def text_of(path: WaterPath) -> str:
         ("higher", HigherHeel, path.higher_heels),
     ):
         columns = zip(kind._fields, zip(*rows, strict=True), strict=False)
-        text += "".join(listing(f"path_{name}_{column}", own) for column, own in columns)
+        text += "".join(listing(f"path_{name}_{column}", values) for column, values in columns)
     return text
 
 

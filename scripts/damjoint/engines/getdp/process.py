@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -82,8 +83,8 @@ def version_of(program: str) -> str:
 def environment(folder: Path, threads: int = 1) -> dict[str, str]:
     """Environment of GetDP in a folder, which also has the temporary files of Open MPI."""
     number = str(threads)
-    own = {"TMPDIR": str(folder), "OPENBLAS_NUM_THREADS": number, "OMP_NUM_THREADS": number}
-    return {**SINGLE_PROCESS, **os.environ, **own}
+    fixed = {"TMPDIR": str(folder), "OPENBLAS_NUM_THREADS": number, "OMP_NUM_THREADS": number}
+    return {**SINGLE_PROCESS, **os.environ, **fixed}
 
 
 def own_lists(mesh: Mesh) -> dict[str, list[float]]:
@@ -204,6 +205,16 @@ class Usage:
     #: wall time [s], peak memory [MB]
     wall: float | None = None
     memory: float | None = None
+
+    def about(self, mesh: Mesh, seconds: dict[str, float | None]) -> dict[str, Any]:
+        """Entries of run.json on the engine, its mesh and its wall seconds."""
+        return {
+            "engine": "getdp",
+            "mesh": mesh.counts,
+            "unknowns": self.unknowns,
+            "wall_seconds": seconds,
+            "getdp": {"version": self.version, "peak_memory_mb": self.memory},
+        }
 
 
 #: Possible last blocks of GetDP's numbering of the unknowns (.pre).

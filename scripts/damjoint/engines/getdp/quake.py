@@ -118,13 +118,7 @@ def solve(
         error = RunError(f"earthquake: after t = {last:.6g} s no equilibrium with any time step")
     ends = (shaking[:1] or [time.perf_counter()])[0], (shaking[-1:] or [time.perf_counter()])[0]
     seconds = {"static": ends[0] - began, "earthquake": ends[1] - ends[0]}
-    info = {
-        "engine": "getdp",
-        "mesh": mesh.counts,
-        "unknowns": usage.unknowns,
-        "wall_seconds": seconds,
-        "getdp": {"version": usage.version, "peak_memory_mb": usage.memory},
-    }
+    info = usage.about(mesh, {**seconds})
     return GetdpQuake(
         static=replace(static, case=case, info=info),
         rows=rows,
@@ -156,11 +150,11 @@ def read_rows(case: Case, folder: Path) -> Table:
     rows = dict(zip(ROWS, steps.T, strict=True))
     rows["crest_ux"] = rows["crest_ux"] - rows["crest_ux"][:1]
     for k, joint in enumerate(case.joints):
-        own = dict(zip(ROWS_OF_JOINTS, of_joints[k::number][: len(steps)].T, strict=True))
+        of_joint = dict(zip(ROWS_OF_JOINTS, of_joints[k::number][: len(steps)].T, strict=True))
         for name in FROM_STATIC:
-            own[name] = own[name] - own[name][:1]
-        own["slip_mean"] /= joint.joint_length
-        strength = own["shear_reserve"] if joint.law.limits_shear else np.inf
-        own["shear_reserve"] = strength - np.abs(own["T"])
-        rows |= {column_of(name, k): values for name, values in own.items()}
+            of_joint[name] = of_joint[name] - of_joint[name][:1]
+        of_joint["slip_mean"] /= joint.joint_length
+        strength = of_joint["shear_reserve"] if joint.law.limits_shear else np.inf
+        of_joint["shear_reserve"] = strength - np.abs(of_joint["T"])
+        rows |= {column_of(name, k): values for name, values in of_joint.items()}
     return {name: rows[name][1:] for name in quake_columns(case) if name in rows}

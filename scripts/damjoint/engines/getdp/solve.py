@@ -39,27 +39,27 @@ def check(case: Case) -> None:
         mesh = mesh_of(case)
         case = case.with_joints([joint.of_case for joint in mesh.joints])
         check_own(mesh, case)
-    for own in case.joints:
-        check_joint(own)
+    for joint in case.joints:
+        check_joint(joint)
 
 
-def check_joint(own: Case) -> None:
+def check_joint(joint: Case) -> None:
     """Raise InputError if this engine cannot run a joint, from its case."""
-    if not (data("pro") / f"law_{own['law']}.pro").is_file():
+    if not (data("pro") / f"law_{joint['law']}.pro").is_file():
         raise InputError(
-            f"law = {own['law']}: must have a file pro/law_{own['law']}.pro with engine = getdp"
+            f"law = {joint['law']}: must have a file pro/law_{joint['law']}.pro with engine = getdp"
         )
-    if freezes_uplift(own):
+    if freezes_uplift(joint):
         raise InputError(
-            f"quake_uplift = {own['quake_uplift']}: must be crack with engine = getdp and "
-            f"uplift = {own['uplift']}"
+            f"quake_uplift = {joint['quake_uplift']}: must be crack with engine = getdp and "
+            f"uplift = {joint['uplift']}"
         )
-    if flows(own) and has_drains(own) and (own["dim"] == 3 or own.geometry):
+    if flows(joint) and has_drains(joint) and (joint["dim"] == 3 or joint.geometry):
         raise InputError(
-            f"drains = 1: must be 0 with engine = getdp and uplift = {own['uplift']} in 3D and in "
-            "a geometry of one's own"
+            f"drains = 1: must be 0 with engine = getdp and uplift = {joint['uplift']} in 3D and "
+            "in a geometry of one's own"
         )
-    if own["uplift"] == "waterstop" and own["dim"] == 3 and own["order"] == 2:
+    if joint["uplift"] == "waterstop" and joint["dim"] == 3 and joint["order"] == 2:
         raise InputError("order = 2: must be 1 with engine = getdp and uplift = waterstop in 3D")
 
 
@@ -71,20 +71,20 @@ def check_own(mesh: Mesh, case: Case) -> None:
     if mesh.divided:
         mesh.face_entities()
     values_of_paths(mesh, case)
-    for joint, own in zip(mesh.joints, case.joints, strict=True):
+    for joint, joint_case in zip(mesh.joints, case.joints, strict=True):
         if joint.upper == joint.lower:
             raise InputError(
                 f"geometry = {case.geometry}: joint {joint.name} must lie between two bodies with "
                 "engine = getdp"
             )
-        if own["uplift"] in ("drained", "cracked", "flow") and not has_level_ends(joint):
+        if joint_case["uplift"] in ("drained", "cracked", "flow") and not has_level_ends(joint):
             raise InputError(
-                f"uplift = {own['uplift']}: must be none, imposed or waterstop with engine = getdp "
-                "where heel or toe are not level"
+                f"uplift = {joint_case['uplift']}: must be none, imposed or waterstop with "
+                "engine = getdp where heel or toe are not level"
             )
         start, end = joint.heel_line
         to_line = np.linalg.norm(np.cross(joint.heel.points - start, end - start), axis=1)
-        if own["uplift"] == "waterstop" and to_line.max() > ROUND_OFF * case.size**2:
+        if joint_case["uplift"] == "waterstop" and to_line.max() > ROUND_OFF * case.size**2:
             raise InputError(
                 f"uplift = waterstop: must be another one in joint {joint.name} with engine = "
                 "getdp, as its heel is not straight"
@@ -146,11 +146,5 @@ def solve(case: Case, on_step: OnStep, fields: bool) -> Iterator[Outcome]:
                 of_bodies = tables.read_fields(folder, saved, mesh) if fields and not error else {}
             except (OSError, ValueError, IndexError) as damage:
                 raise error or RunError(f"GetDP: its tables can not be read: {damage}") from None
-            result.info = {
-                "engine": "getdp",
-                "mesh": mesh.counts,
-                "unknowns": usage.unknowns,
-                "wall_seconds": {"mesh": meshed, "solve": usage.wall},
-                "getdp": {"version": usage.version, "peak_memory_mb": usage.memory},
-            }
+            result.info = usage.about(mesh, {"mesh": meshed, "solve": usage.wall})
             yield Outcome(result, lambda: mesh, partial(dict, of_bodies), error)

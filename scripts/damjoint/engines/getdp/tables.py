@@ -74,9 +74,9 @@ def read_history(case: Case, folder: Path) -> dict[str, np.ndarray]:
     steps = steps[: len(of_joints) // number]
     printed = dict(zip(PRINTED, steps.T, strict=True))
     for k in range(number):
-        own = of_joints[k::number][: len(steps)]
+        rows = of_joints[k::number][: len(steps)]
         names = [column_of(name, k) for name in PRINTED_OF_JOINTS]
-        printed |= dict(zip(names, own.T, strict=True))
+        printed |= dict(zip(names, rows.T, strict=True))
     return printed | {"tail_level": np.array([case.tail_at(time) for time in printed["time"]])}
 
 
@@ -89,30 +89,20 @@ def saved_times(case: Case, history: dict[str, np.ndarray], stopped: bool) -> di
     return saved
 
 
-def read_joints(
-    case: Case, folder: Path, number: int, time: float, level: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Rows of the joints at a requested time, and the same extrapolated from the Gauss points.
-
-    Raises OSError, ValueError if a file is missing or incomplete.
-    """
-    parts = [read_joint(case, k, folder, number, time, level) for k in range(len(case.joints))]
-    averaged, extrapolated = (np.vstack(rows) for rows in zip(*parts, strict=True))
-    return averaged, extrapolated
-
-
 def read_joint(
     case: Case, joint: int, folder: Path, number: int, time: float, level: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """As `read_joints`, of a joint by its number from 0."""
-    own = case.joints[joint]
+    """Rows of a joint, by its number from 0, at a requested time, and the same extrapolated from
+    the Gauss points. Raises OSError, ValueError if a file is missing or incomplete.
+    """
+    joint_case = case.joints[joint]
 
     def table(name: str, components: int = 3) -> tuple[np.ndarray, np.ndarray]:
         return read_simple_table(folder / f"{name}_{joint}_{number}.txt", components)
 
     def more(name: str) -> np.ndarray:
         """A column that not every joint has."""
-        if name not in joint_columns(own):
+        if name not in joint_columns(joint_case):
             return np.full((len(nodes), 1), np.nan)
         file = name if name in FLUX | THICKNESS else "law_scalar"
         return node_means(rows, table(file, 1)[1], len(nodes))
@@ -124,7 +114,7 @@ def read_joint(
     jump, traction, state = (node_means(rows, values, len(nodes)) for values in tables)
     others = [more(name) for name in joint_columns(case) if name not in JOINT]
     when = np.tile([time, level, joint + 1.0], (len(nodes), 1))
-    distance = own.joint_along * node_means(rows, table("path", 1)[1], len(nodes))
+    distance = joint_case.joint_along * node_means(rows, table("path", 1)[1], len(nodes))
     averaged = np.hstack(
         [when, nodes, jump[:, order], traction[:, order], state, distance, *others]
     )
@@ -177,7 +167,9 @@ def read(case: Case, folder: Path) -> tuple[Results, dict[int, float]]:
     for number, time in saved_times(case, history, stopped).items():
         level = history["level"][np.flatnonzero(history["time"] == time)[0]]
         try:
-            blocks.append(read_joints(case, folder, number, time, level))
+            joints = range(len(case.joints))
+            parts = [read_joint(case, k, folder, number, time, level) for k in joints]
+            blocks.append([np.vstack(rows) for rows in zip(*parts, strict=True)])
         except (OSError, ValueError):  # GetDP was stopped while it wrote this table
             if finished:
                 raise
@@ -207,16 +199,14 @@ def pick(numbers: np.ndarray, values: np.ndarray, wanted: np.ndarray) -> np.ndar
     return values[order[np.searchsorted(numbers, wanted, sorter=order)]]
 
 
-def read_rest(path: Path, wanted: np.ndarray) -> np.ndarray | float:
-    """Displacement under the weight alone, the reference of displacements; 0 without it."""
-    return pick(*read_values(path), wanted) if path.exists() else 0.0
-
-
 def read_fields(folder: Path, saved: dict[int, float], mesh: Mesh) -> dict[float, Field]:
     """Fields of the bodies by time; saved: see `read`."""
     result, solids, body = {}, mesh.solids.items(), numbers(mesh)
+    # under the weight alone, the reference of displacements
+    files = {n: folder / f"u_{body[n]:.0f}_0.txt" for n, _ in solids}
     at_rest = {
-        n: read_rest(folder / f"u_{body[n]:.0f}_0.txt", solid.node_tags) for n, solid in solids
+        n: pick(*read_values(files[n]), solid.node_tags) if files[n].exists() else 0.0
+        for n, solid in solids
     }
     for number, time in saved.items():
         elements, stress = read_values(folder / f"stress_{number}.txt")
