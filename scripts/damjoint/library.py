@@ -22,14 +22,15 @@ from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
-from . import ROUND_OFF, InputError, accuracy
+from . import LIBRARY, ROUND_OFF, InputError, accuracy
 from .arrays import Array, Table, Value
 from .engines import Outcome, engine_of
 from .engines.condensed.solve import threads_of
-from .input.case import Case
+from .input.case import Case as Case
 from .input.case_names import is_name
 from .input.resolve import load, varied
-from .laws import LAWS, Law
+from .laws import LAWS as LAWS
+from .laws import Law as Law
 from .model.fields import Solution
 from .model.results import (
     HISTORY,
@@ -49,7 +50,8 @@ from .statics.hints import hints
 from .statics.notes import notes
 from .statics.statement import statement
 from .statics.verdict import verdict
-from .studies.plan import Plan, Sample, cases_of, column_of, in_file, listed, plan_with
+from .studies.plan import Plan, cases_of, column_of, in_file, listed, plan_with
+from .studies.plan import Sample as Sample
 from .threads import limited_threads
 
 if TYPE_CHECKING:  # loaded when they are used, with what they draw with
@@ -63,28 +65,8 @@ if TYPE_CHECKING:  # loaded when they are used, with what they draw with
     from .studies.critical_value import CriticalValue
     from .studies.quake_result import QuakeTables
 
-__all__ = [
-    "LAWS",
-    "Case",
-    "Checks",
-    "Critical",
-    "JointTable",
-    "Law",
-    "Modes",
-    "Quake",
-    "Run",
-    "Sample",
-    "Step",
-    "Sweep",
-    "case",
-    "check",
-    "critical",
-    "fill",
-    "modes",
-    "quake",
-    "run",
-    "sweep",
-]
+#: What `import damjoint` offers.
+__all__ = [*LIBRARY]
 
 
 @speaks_python
@@ -310,10 +292,7 @@ class Run:
 
     def table(self, name: str) -> Table:
         """The table joint or history as {column: array}. Raises InputError for another name."""
-        tables = {"joint": self.results.joint, "history": self.results.history}
-        if name not in tables:
-            raise InputError(f"table = {name}: must be one of {', '.join(tables)}")
-        return tables[name]
+        return one_of({"joint": self.results.joint, "history": self.results.history}, name)
 
     def __repr__(self) -> str:
         last = self.results.last
@@ -335,6 +314,13 @@ def records(table: Mapping[str, Any]) -> np.recarray:
     """A table as a record array."""
     arrays = {name: np.asarray(column) for name, column in table.items()}
     return np.rec.fromarrays(arrays.values(), dtype=[(n, a.dtype) for n, a in arrays.items()])
+
+
+def one_of(tables: Mapping[str, Table], name: str) -> Table:
+    """A table by its name. Raises InputError if there is none."""
+    if name not in tables:
+        raise InputError(f"table = {name}: must be one of {', '.join(tables)}")
+    return tables[name]
 
 
 #: Units and meanings of the columns of a table, by its name.
@@ -763,11 +749,10 @@ class Quake:
         static, frames = self.tables.static, getattr(self.tables, "frames", None)
         tables = {"rows": self.tables.rows, "history": static.history, "joint": static.joint}
         tables |= {"frames": frames.joint} if frames else {}
-        if table not in tables:
-            raise InputError(f"table = {table}: must be one of {', '.join(tables)}")
+        rows = one_of(tables, table)
         columns = {"rows": quake_columns, **UNITS_OF}.get(table, joint_columns)(self.case)
         in_seconds = {"time": ("s", "")} if table == "frames" else {}
-        return frame(tables[table], columns | in_seconds)
+        return frame(rows, columns | in_seconds)
 
     def __repr__(self) -> str:
         return f"{self.case.name}: {self.statement}"

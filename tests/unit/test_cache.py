@@ -13,6 +13,7 @@ import pytest
 from damjoint import storage
 from damjoint.fem import cache
 from damjoint.input.resolve import load
+from damjoint.input.scene import TAILWATER
 
 SMALL = {"n_joint": 6.0, "h_dam": 4.0, "h_found": 4.0}
 
@@ -53,7 +54,7 @@ def test_bodies_in_the_cache_have_all_faces_under_water(tmp_path, monkeypatch):
         load("dam", SMALL | {"neck_height": 10}, (44.0,), (tail,)) for tail in (3.0, 4.0, 42.0)
     )
     downstream = [
-        [face.low for face in cache.cached(case)[0].faces.values() if face.tailwater]
+        [face.low for face in cache.cached(case)[0].faces.values() if face.side in TAILWATER]
         for case in (below, above)
     ]
     assert [sorted(heights) for heights in downstream] == [[0], [0, 35]]

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 from textwrap import shorten, wrap
-from typing import NamedTuple
 
 import gmsh
 
@@ -25,16 +24,8 @@ BARS = tuple((30 + ENTRY * i, -76) for i in range(3))
 CHARACTER = 0.55
 
 
-class Message(NamedTuple):
-    """Place of an error: x, y of its first line; height of a line, size of its font."""
-
-    x: float = LEFT
-    y: float = 128
-    pitch: float = 17
-    size: int = 14
-
-
-MESSAGE = Message()
+#: Place of an error: of its first line; height of a line, size of its font.
+MESSAGE, MESSAGE_PITCH, MESSAGE_SIZE = (LEFT, 128), 17, 14
 #: Least size of the drawing area for two columns of graphs and for one; width of a column; least
 #: and largest height of a graph with its texts; most rows.
 TWO_COLUMNS, ONE_COLUMN, COLUMN = 1000, 620, 268

@@ -22,7 +22,7 @@ from ..mesh.generate import as_text, shares
 from . import export, tree, views
 from .camera import result_camera, undeformed_camera
 from .gallery import RED, Gallery
-from .layout import MESSAGE, Layout, open_window
+from .layout import MESSAGE, MESSAGE_PITCH, MESSAGE_SIZE, Layout, open_window
 from .scene import SolvedScene
 from .sheet import Request, Sheet
 from .worker import EngineProcess
@@ -351,9 +351,9 @@ class Session:
 
     def show_message(self, message: str) -> None:
         """Show an error in the drawing area."""
-        for i, line in enumerate(self.layout.wrapped(message, MESSAGE.size)):
-            y = MESSAGE.y + i * MESSAGE.pitch
-            self.message.write(MESSAGE.x, y, [line], RED, MESSAGE.size)
+        x, y = MESSAGE
+        for i, line in enumerate(self.layout.wrapped(message, MESSAGE_SIZE)):
+            self.message.write(x, y + i * MESSAGE_PITCH, [line], RED, MESSAGE_SIZE)
 
     def update(self) -> None:
         """Redraw the window."""

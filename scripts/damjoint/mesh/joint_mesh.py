@@ -8,7 +8,6 @@ import numpy as np
 
 from ..arrays import Array, IntArray
 from ..input.case import OfJoint
-from ..input.scene import TAILWATER
 from .body import Body
 from .sides import area
 
@@ -27,11 +26,6 @@ class Face:
     side: str
     low: float = np.nan
     high: float = np.nan
-
-    @property
-    def tailwater(self) -> bool:
-        """Whether tailwater, not the reservoir, presses on it."""
-        return self.side in TAILWATER
 
     @property
     def lowest(self) -> float:

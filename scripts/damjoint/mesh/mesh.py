@@ -495,10 +495,3 @@ class Mesh:
         gmsh.option.setNumber("Mesh.Binary", 1)
         gmsh.write(str(path))
         check_end(path, "$EndElements\n")
-
-
-def write_mesh(case: Case, path: Path) -> dict[str, int]:
-    """Mesh the case, write it to path and return its counts. Raises RunError."""
-    mesh = Mesh(case)
-    mesh.write(path)
-    return mesh.counts

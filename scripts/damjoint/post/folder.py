@@ -70,12 +70,9 @@ def claim_output_folder(case: Case, folder: Path, keep: bool = False) -> Iterato
 
     Raises InputError if the folder can not be written or is locked; an earlier run stays then.
     """
-    check_writable(folder)
-    folder.mkdir(parents=True, exist_ok=True)
-    with locked_folder(folder):
+    with claim_study_folder(folder):
         if not keep:
             clear(folder)
-        remove_tables(folder)
         remove_tables(folder.resolve().parent, folder.resolve().name)
         write_state(case, folder, "running")
         yield

@@ -6,6 +6,7 @@ import csv
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import numpy as np
 
@@ -89,23 +90,15 @@ def table(family: str) -> list[Reference]:
 
 def reference(family: str, row: Mapping[str, str]) -> Reference:
     """A row of a table; columns that a family does not have are empty."""
-    number: Callable[[str], float | None] = lambda name: float(row[name]) if row.get(name) else None
+    texts: dict[str, Any] = {n: row[n] for n in ("modeling", "quantity", "unit", "source", "note")}
+    numbers = {n: float(row[n]) if row.get(n) else None for n in (*"xyzt", "code")}
     return Reference(
         family=family,
-        modeling=row["modeling"],
         uplift=row.get("uplift", ""),
-        quantity=row["quantity"],
-        x=number("x"),
-        y=number("y"),
-        z=number("z"),
-        t=number("t"),
         value=float(row["value"]),
-        unit=row["unit"],
         tolerance=float(row["rel_tolerance"]),
-        source=row["source"],
-        note=row["note"],
         read_as=row.get("read_as", NODE),
-        code=number("code"),
+        **texts | numbers,
     )
 
 
@@ -199,20 +192,8 @@ def report(comparisons: list[Comparison], style: str = "simple", notes: bool = F
         for c in comparisons
     ]
     heads = (
-        "case",
-        "uplift",
-        "quantity",
-        *"xyzt",
-        "reference",
-        "published code",
-        "computed",
-        "unit",
-        "difference",
-        "tolerance",
-        "verdict",
-        "source",
-        "evaluation",
-        "note",
+        *("case", "uplift", "quantity", *"xyzt", "reference", "published code", "computed", "unit"),
+        *("difference", "tolerance", "verdict", "source", "evaluation", "note"),
     )
     used = [k for k, head in enumerate(heads) if any(row[k] for row in rows) or head == "verdict"]
     chosen = [[row[k] for k in used] for row in rows]

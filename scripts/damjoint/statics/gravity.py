@@ -338,13 +338,15 @@ class Uplift:
         if path.goes_on:
             positions, heads = self._on_path(case, body, path, tail, crack)
         elif drained and crack <= at < self.length:
+            # that of the gallery or, if higher, the tailwater
             outlet = max(case["drain_level"], tail, body.heel[1] + at * body.along[1])
             self.drains = at, outlet
             undrained = float(np.interp(at, positions[1:], heads[1:]))
             if mode == "drained" and case["drain_reference"] == "reservoir":
                 undrained = first
             positions.insert(2, at)
-            heads.insert(2, drained_head(case, undrained, outlet))
+            effect = case["drain_effectiveness"]  # on the head above the outlet of the drains
+            heads.insert(2, undrained - effect * max(undrained - outlet, 0.0))
         self.s = np.array(positions)
         height = np.interp(self.s, [0.0, self.length], [body.heel[1], body.toe[1]])
         weight = case["rho_water"] * case["g"] if mode != "none" else 0.0
@@ -430,13 +432,6 @@ class Uplift:
         arm, p = self.length - self.s, self.p
         parts = p[:-1] * (2 * arm[:-1] + arm[1:]) + p[1:] * (arm[:-1] + 2 * arm[1:])
         return float(np.sum(np.diff(self.s) * parts) / 6)
-
-
-def drained_head(case: Case, undrained: float, outlet: float) -> float:
-    """Head at the drains [m]: they reduce the head above their outlet (the gallery or, if higher,
-    the tailwater) by their effectiveness.
-    """
-    return undrained - case["drain_effectiveness"] * max(undrained - outlet, 0.0)
 
 
 def cohesion(case: Case, bonded: float) -> float:

@@ -10,7 +10,6 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
-from ..arrays import Array
 from ..dynamics.modes import NaturalModes, Variant, natural_modes
 from ..input.case import Case
 from ..input.constraints import ZANGAR
@@ -62,8 +61,7 @@ def text(natural: NaturalModes) -> str:
     """The modes as a printed table."""
     rows: list[tuple[str, ...]] = [
         (
-            variant.water if number == 1 else "",
-            variant.rock if number == 1 else "",
+            *((variant.water, variant.rock) if number == 1 else ("", "")),
             f"{number}",
             f"{mode.frequency:.4g}",
             f"{1 / mode.frequency:.4g}",
@@ -137,12 +135,7 @@ def draw_shape(axes: Axes, natural: NaturalModes, variant: Variant, number: int)
     cells = PolyCollection([faces[i] for i in order], facecolor=[colors[i] for i in order])
     cells.set(edgecolor=GREY, linewidth=0.15, rasterized=True)
     axes.add_collection(cells, autolim=False)
-    frame(axes, np.concatenate(near)[:, :2], natural.case.size)
-
-
-def frame(axes: Axes, dam: Array, size: float) -> None:
-    """Show the dam, of points (n, 2), with the ground around it."""
-    room = AROUND * size
+    dam, room = np.concatenate(near)[:, :2], AROUND * natural.case.size
     (x0, y0), (x1, y1) = dam.min(axis=0) - room, dam.max(axis=0) + room
     axes.set(xlim=(x0, x1), ylim=(y0, y1), aspect="equal")
     axes.set_axis_off()

@@ -162,10 +162,8 @@ def parameters(case: Case) -> dict[str, Entry]:
     """
     known, values = declared(), case.values
     fixed = {n: v for n, v in values.items() if not known[n].automatic}
-    automatic, defaults = (
-        parse(assignments(fixed) + listing("levels", case.levels) + INCLUDE),
-        constants(),
-    )
+    given = assignments(fixed) + listing("levels", case.levels)
+    automatic, defaults = parse(given + INCLUDE), constants()
     matter = visible(case)
     entries = {}
     for name, parameter in known.items():
