@@ -6,7 +6,7 @@ reference/FAMILY.csv has. Units are those of the published test.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -102,6 +102,23 @@ def ramp(times: Sequence[float], values: Sequence[float]) -> Iterator[tuple[floa
         yield float(t), float(np.interp(t, times, values))
 
 
+#: Steps of a test, see `LawTest`.
+Steps = list[tuple[float, Control, Control, Control]]
+
+
+def pulled(path: Iterable[tuple[float, float]], E: float, pressure: float = 0.0) -> Steps:
+    """Steps of a joint and a cube of 1 m in series, of Young's modulus E [Pa], pulled by
+    displacements at times; pressure: of the water in the joint [Pa].
+    """
+    return [(t, Loaded(E * u + pressure, E), 0.0, 0.0) for t, u in path]
+
+
+def sheared(times: Sequence[float], normal: Sequence[float], along: Sequence[float]) -> Steps:
+    """Steps of prescribed jumps, normal and along the first tangent."""
+    both = zip(ramp(times, normal), ramp(times, along), strict=True)
+    return [(t, n, s, 0.0) for (t, n), (_, s) in both]
+
+
 def ssnp162() -> dict[str, LawTest]:
     """A cube of 1 m and a joint in series, pulled by a displacement; the joint alone in shear.
 
@@ -113,78 +130,63 @@ def ssnp162() -> dict[str, LawTest]:
     rupture |= {"pena_rupture": 0.5, "pena_contact": 3.0}
     E, elastic, broken = 3e12, 1e5 / 1e12 + 1e5 / 3e12, 1.5e-7
     softened = 0.2 * elastic + 0.8 * broken
-    pulled = (0, elastic, softened, -elastic, broken * 0.99999999)
-    steps = [(t, Loaded(E * u, E), 0.0, 0.0) for t, u in ramp(quarters, pulled)]
-    tests["A I"] = LawTest("rupture", rupture, steps)
+    path = (0, elastic, softened, -elastic, broken * 0.99999999)
+    tests["A I"] = LawTest("rupture", rupture, pulled(ramp(quarters, path), E))
     normal = (0, 1.1e-7, 1.1e-7, 2.2e-8, 2.2e-8)
-    sheared = dict(ramp(quarters, (0, 0, broken, broken, 0)))
-    tests["A II"] = LawTest(
-        "rupture", rupture, [(t, n, sheared[t], 0.0) for t, n in ramp(quarters, normal)]
-    )
+    steps = sheared(quarters, normal, (0, 0, broken, broken, 0))
+    tests["A II"] = LawTest("rupture", rupture, steps)
     # in 3D, sheared along z
     normal = (0, 1.1e-7, 1.1e-7, 1.1e-7 / 9, 1.1e-7 / 9)
-    sheared = dict(ramp((0, 30, 60), (0, -broken, broken)))
-    tests["B III"] = LawTest(
-        "rupture", rupture, [(t, n, 0.0, sheared[t]) for t, n in ramp(quarters, normal)]
-    )
+    across = dict(ramp((0, 30, 60), (0, -broken, broken)))
+    steps = [(t, n, 0.0, across[t]) for t, n in ramp(quarters, normal)]
+    tests["B III"] = LawTest("rupture", rupture, steps)
     # with water of 500 Pa in the joint
     p = 500.0
     elastic = 1e5 / 1e12 + (1e5 - p) / E
     softened = 0.2 * elastic + 0.8 * broken
-    pulled = (0, elastic, softened, -elastic, broken * 0.99999999)
-    steps = [(t, Loaded(E * u + p, E), 0.0, 0.0) for t, u in ramp(quarters, pulled)]
-    tests["G"] = LawTest("rupture", rupture, steps, p)
+    path = (0, elastic, softened, -elastic, broken * 0.99999999)
+    tests["G"] = LawTest("rupture", rupture, pulled(ramp(quarters, path), E, p), p)
 
     friction: Values = {"K_N": 1e12, "K_T": 2e12, "mu": 0.5, "adhesion": 1e5, "pena_tang": 2e6}
     E, quarters = 3e10, (0, 5, 10, 15, 20)
     elastic = 2e5 / 1e12 + 2e5 / E
-    pulled = (0, elastic, 2 * elastic, -elastic / 3, 1e-10 * elastic)
-    steps = [(t, Loaded(E * u, E), 0.0, 0.0) for t, u in ramp(quarters, pulled)]
-    tests["D I"] = LawTest("friction", friction, steps)
+    path = (0, elastic, 2 * elastic, -elastic / 3, 1e-10 * elastic)
+    tests["D I"] = LawTest("friction", friction, pulled(ramp(quarters, path), E))
     normal = (0, 0, -elastic / 3, -elastic / 3, -elastic / 3)
-    sheared = dict(ramp(quarters, (0, 3 * elastic, 3 * elastic, -3 * elastic, 3 * elastic)))
-    tests["D II"] = LawTest(
-        "friction", friction, [(t, n, sheared[t], 0.0) for t, n in ramp(quarters, normal)]
-    )
+    steps = sheared(quarters, normal, (0, *(3 * elastic * sign for sign in (1, 1, -1, 1))))
+    tests["D II"] = LawTest("friction", friction, steps)
     # with water of 50 kPa in the joint
     wet: Values = {"K_N": 1e7, "K_T": 2e7, "mu": 0.5, "adhesion": 1e5, "pena_tang": 20.0}
     p = 5e4
     elastic = 2e5 / 1e7 + (2e5 - p) / E
-    wet_pulled = (0, elastic, 2 * elastic, -((2e5 / 3 - p) / 1e7 + 2e5 / 3 / E))
-    steps = [(t, Loaded(E * u + p, E), 0.0, 0.0) for t, u in ramp(quarters[:-1], wet_pulled)]
-    tests["J I"] = LawTest("friction", wet, steps, p)
+    wet_path = (0, elastic, 2 * elastic, -((2e5 / 3 - p) / 1e7 + 2e5 / 3 / E))
+    tests["J I"] = LawTest("friction", wet, pulled(ramp(quarters[:-1], wet_path), E, p), p)
     # in 3D: sheared to and fro while it slips across
     soft: Values = {"K_N": 0.1, "K_T": 0.15, "mu": 0.2, "adhesion": 0.1, "pena_tang": 1e-7}
     turns = (0, 15, 30, 45, 60)
-    sheared = dict(ramp(turns, (0, 0, 20, -20, 20)))
+    along = dict(ramp(turns, (0, 0, 20, -20, 20)))
     across = dict(ramp((0, 30, 60), (0, 50 / 3, 50)))
     closed = dict(ramp(turns, (0, -50, -50, -50, -50)))
-    to_and_fro = [(t, closed[t], sheared[t], across[t] if t > 15 else 0.0) for t in sheared]
-    tests["E"] = LawTest("friction", soft, to_and_fro)
+    steps = [(t, closed[t], along[t], across[t] if t > 15 else 0.0) for t in along]
+    tests["E"] = LawTest("friction", soft, steps)
     return tests
 
 
 def ssnp164() -> dict[str, LawTest]:
     """A cube of 1 m and a joint of law endo in series."""
-    endo: dict[str, Value] = {
-        "K_N": 1e12,
-        "K_T": 2e12,
-        "sigma_max": 9000.0,
-        "adhesion": 1e4,
-        "mu": 1.0,
-    }
-    endo |= {"G_f": 1.0}
+    endo: dict[str, Value] = {"K_N": 1e12, "K_T": 2e12, "sigma_max": 9000.0, "adhesion": 1e4}
+    endo |= {"mu": 1.0, "G_f": 1.0}
     E = 3e12
-    pulled = [*ramp((0, 20, 40, 60, 80), (0, 6e-6, 1e-4, 5e-4, 4.9999e-4))]
-    sheared = ramp((0, 10, 20, 30, 40, 50), (0, 0, 5e-7, 3e-5, 9e-5, 5e-4))
+    path = [*ramp((0, 20, 40, 60, 80), (0, 6e-6, 1e-4, 5e-4, 4.9999e-4))]
+    along = ramp((0, 10, 20, 30, 40, 50), (0, 0, 5e-7, 3e-5, 9e-5, 5e-4))
     pressed = ramp((0, 10, 20, 30, 40), (0, 1e5, 1e6, 1e7, 1e8))
     to_and_fro = (0, 0, 5e-7, 3e-5, 2.9995e-5, 9e-5, 5e-4)
     lifted = ramp((0, 10, 20, 30, 40, 50, 60), to_and_fro)
     return {
-        "A": LawTest("endo", endo, [(t, Loaded(E * u, E), 0.0, 0.0) for t, u in pulled]),
-        "B": LawTest("endo", endo, [(t, Loaded(-1e4), jump, 0.0) for t, jump in sheared]),
+        "A": LawTest("endo", endo, pulled(path, E)),
+        "B": LawTest("endo", endo, [(t, Loaded(-1e4), jump, 0.0) for t, jump in along]),
         # the joint's other face is moved across by 1e-6 m
-        "C": LawTest("endo", endo, [(t, Loaded(E * u, E), 0.0, -1e-6) for t, u in pulled]),
+        "C": LawTest("endo", endo, [(t, Loaded(E * u, E), 0.0, -1e-6) for t, u in path]),
         # water presses the cube against a wall
         "D": LawTest("endo", endo, [(t, Loaded(p, E), 0.0, 0.0) for t, p in pressed]),
         # as B, while water lifts the cube up to two thirds of the pressure on it
