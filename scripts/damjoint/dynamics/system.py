@@ -114,9 +114,8 @@ class System:
         """
         result = np.zeros(self.size)
         moving = sorted(self.motion, key=lambda name: name not in above)
-        for (
-            name
-        ) in moving:  # the others last: shared degrees of freedom are those of the lower body
+        # the others last: shared degrees of freedom are those of the lower body
+        for name in moving:
             value = nodal(self.spaces[name], joint.dim, motion) * (name in above)
             of_body = self.motion[name][:, : self.jumps[0]]
             touched = np.unique(of_body.indices)

@@ -168,11 +168,6 @@ def requirements(case: Case) -> list[str]:
     return [name for name in REQUIREMENTS if case[name] not in NOTHING]
 
 
-def least_sliding_factor(case: Case) -> float:
-    """Required sliding factor; at least 1 with friction: below it there is no equilibrium."""
-    return max(case["required_SSF"], 1.0 if case.law.limits_shear else 0.0)
-
-
 def by_gravity(method: GravityMethod, name: str = GRAVITY, partial: bool = False) -> MethodResult:
     """Result of the gravity method; partial: whether only a part of the case's loads acts."""
     statement = "" if method.stands else "overturning: no part of the joint is under compression"
@@ -237,20 +232,16 @@ def compare_methods(
     and `hand_calculation`.
     """
     method = hand_calculation(result, alone)
+    elements = by_finite_elements(result, statement, unjudged)
+    accuracy = result.info.get("error_estimate", {}).get("statement", "")
+    if not method:
+        return SafetyCheck(elements, None, accuracy)
     partial = bool(result.case.geometry) and result.partial_load
-    return SafetyCheck(
-        by_finite_elements(result, statement, unjudged),
-        by_gravity(method, partial=partial) if method else None,
-        result.info.get("error_estimate", {}).get("statement", ""),
-        [by_gravity(longer, LONGER, partial) for longer in method.further] if method else (),
-        [*method.notes, *beside_drains(result, method)] if method else (),
-    )
-
-
-def beside_drains(result: Results, method: GravityMethod) -> list[str]:
-    """The note on crack and drains by both methods, see `cracks_and_drains`."""
+    longer = [by_gravity(longer, LONGER, partial) for longer in method.further]
     crack = result.last["crack_length"] if result.last else 0.0
-    return list(filter(None, [cracks_and_drains(result.case, crack, method)]))
+    notes = [*method.notes, cracks_and_drains(result.case, crack, method)]
+    shortest = by_gravity(method, partial=partial)
+    return SafetyCheck(elements, shortest, accuracy, longer, list(filter(None, notes)))
 
 
 def compare_joints(result: Results) -> list[SafetyCheck]:
@@ -414,7 +405,8 @@ class SafetyCheck:
 
 def required(case: Case) -> dict[str, float]:
     """Required safety factors, also by the law; nan if there is none."""
-    least = {"SSF": least_sliding_factor(case), "OSF": case["required_OSF"]}
+    by_law = 1.0 if case.law.limits_shear else 0.0  # below it there is no equilibrium
+    least = {"SSF": max(case["required_SSF"], by_law), "OSF": case["required_OSF"]}
     return {name: value or math.nan for name, value in least.items()}
 
 

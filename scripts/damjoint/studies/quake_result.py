@@ -117,14 +117,12 @@ def peak_cells(name: str, peak: dict[str, float], unit: str) -> tuple[str, str, 
     """Unit, value and time [s] of a peak; name: its column of quake.csv."""
     if "opening" in name and peak["value"] <= 0:
         return unit, "closed", ""
-    time = f"{peak['time']:.3f}"
-    if name.startswith(DISPLACEMENTS):
-        return "mm", quake_summary.in_millimetres(peak["value"], 4), time
-    return unit, f"{peak['value']:.4g}", time
+    unit = "mm" if name.startswith(DISPLACEMENTS) else unit
+    return unit, in_unit(peak["value"], unit), f"{peak['time']:.3f}"
 
 
 def in_unit(value: float, unit: str) -> str:
-    """A length [m] in mm, or a number without unit."""
+    """A value in SI units, in a unit: mm or that of SI."""
     return quake_summary.in_millimetres(value, 4) if unit == "mm" else f"{value:.4g}"
 
 
