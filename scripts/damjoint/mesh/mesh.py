@@ -276,7 +276,7 @@ class Mesh:
     def _user_scene(self, names: tuple[str, ...]) -> list[Joint]:
         """The joints of a user's own geometry, each between the two bodies that share it.
 
-        The lower one is the foundation; of two others, that on the right of the way from heel to
+        The lower one is the foundation; of two others, that on the right of the line from heel to
         toe or, of a joint that faces along z, that of the lower z.
         """
         if len(names) == 1 and len(self.solids) == 2:
@@ -299,11 +299,11 @@ class Mesh:
             ends = [self.bodies[part].points.mean(axis=0) for part in parts[1:]]
             if lower not in ("foundation", upper) and normals:
                 mean, (heel, toe) = normals[0].mean(axis=0), ends
-                way = toe - heel
+                chord = toe - heel
                 if np.abs(mean[:2]).max() < abs(mean[2]):
                     upwards = mean[2]
-                else:  # the normal from the lower body is on the left of the way
-                    upwards = way[0] * mean[1] - way[1] * mean[0]
+                else:  # the normal from the lower body is on the left of the line
+                    upwards = chord[0] * mean[1] - chord[1] * mean[0]
                 if upwards < 0:
                     upper, lower = lower, upper
             scene.append(Joint(name, upper, lower, *parts))
@@ -312,8 +312,8 @@ class Mesh:
     def _cut(self, joint: Joint) -> IntArray:
         """Tags of a joint's nodes in the body above it, after a body that it is inside of is cut.
 
-        Above is then the left of the way from heel to toe; in 3D larger y or, of a joint that faces
-        along x or z, larger x or z.
+        Above is then the left of the line from heel to toe; in 3D larger y or, of a joint that
+        faces along x or z, larger x or z.
         """
         surface = self.bodies[joint.region]
         if joint.upper != joint.lower:
@@ -325,8 +325,8 @@ class Mesh:
         normals = surface.unit_normals()
         heel, toe = (self.bodies[name].points.mean(axis=0) for name in (joint.heel, joint.toe))
         if self.dim == 2:
-            way = toe - heel
-            signs = np.sign(normals @ [-way[1], way[0], 0.0])
+            chord = toe - heel
+            signs = np.sign(normals @ [-chord[1], chord[0], 0.0])
         else:
             largest = np.abs(normals.mean(axis=0)).argmax()
             signs = np.sign(normals[:, largest])

@@ -392,8 +392,8 @@ class Uplift:
             before, head = drain, knots[drain]
             distance = (drain - start) * (1 if forwards else -1) + crack
             positions += [distance] if crack < distance < length else []
-        positions, way = sorted(positions), sorted(knots)
-        heads = np.interp([along(s) for s in positions], way, [knots[x] for x in way])
+        positions, at_knots = sorted(positions), sorted(knots)
+        heads = np.interp([along(s) for s in positions], at_knots, [knots[x] for x in at_knots])
         return positions, heads.tolist()
 
     def cut_off_suction(self) -> None:

@@ -378,15 +378,14 @@ class SafetyCheck:
                 f"{case['law']} keeps with its tension of adhesion/mu = "
                 f"{with_unit(case.law.open_tension, STRESSES)}; the gravity method's has none there"
             )
-        left, undamaged = (
-            self.finite_elements.numbers[name] for name in ("cohesion", "cohesion_undamaged")
-        )
-        if self.gravity and left < (1 - DESTROYED) * min(
-            undamaged, self.gravity.numbers["cohesion"]
-        ):
+        names = "cohesion", "cohesion_undamaged"
+        remaining, undamaged = (self.finite_elements.numbers[name] for name in names)
+        uncracked = self.gravity.numbers["cohesion"] if self.gravity else 0.0
+        if remaining < (1 - DESTROYED) * min(undamaged, uncracked):
             notes.append(
-                f"the run has destroyed {1 - left / undamaged:.0%} of the cohesion; the gravity "
-                "method has no history: its c B is that of an undamaged joint beyond the crack"
+                f"the run has destroyed {1 - remaining / undamaged:.0%} of the cohesion; the "
+                "gravity method has no history: its c B is that of an undamaged joint beyond the "
+                "crack"
             )
         if case["f_c"]:
             notes.append("the finite elements' stress at the toe, a corner, depends on the mesh")
