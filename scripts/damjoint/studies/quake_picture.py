@@ -58,10 +58,9 @@ def draw(result: QuakeResult, folder: Path) -> Path:
 @picture_style()
 def figure(result: QuakeResult) -> Figure:
     """The figure."""
-    case, rows, stress = result.case, result.rows, result.stress
     shapes = SHAPES if result.shapes else 0.0
     picture = figure_of(9.0, CURVES + shapes)
-    title = textwrap.wrap(f"{case.title}: {result.statement}", 100)
+    title = textwrap.wrap(f"{result.case.title}: {result.statement}", 100)
     facts = [line for text in facts_of(result) for line in textwrap.wrap(text, 125)]
     picture.text(0.05, 0.992, "\n".join(title), va="top", fontsize=10, parse_math=False)
     below = 0.992 - 0.2 * len(title) / (CURVES + shapes)
@@ -69,7 +68,23 @@ def figure(result: QuakeResult) -> Figure:
     picture.text(0.05, below, "\n".join(facts), **style)
     top = 0.4 + 0.2 * len(title) + 0.14 * len(facts)
     axes = panels(picture, 7, left=0.9, right=1.1, top=top, bottom=0.5 + shapes, down=0.25)[:, 0]
-    time, joints = rows["time"], result.joints
+    draw_curves(axes[:6], result)
+    for ax in axes[:6]:
+        above = {"loc": "lower right", "bbox_to_anchor": (1.01, 0.97), "frameon": False}
+        number = len(ax.get_legend_handles_labels()[0])
+        close = {"handlelength": 1.2, "columnspacing": 0.8, "handletextpad": 0.3}
+        ax.legend(fontsize=7 if number <= IN_ROW else 5.5, ncols=number, **above, **close)
+        ax.tick_params(labelbottom=False, labelsize=8)
+    draw_stress(picture, axes[6], result)
+    draw_shapes(picture, result)
+    return picture
+
+
+def draw_curves(axes: np.ndarray, result: QuakeResult) -> None:
+    """Draw ground, crest along x and its acceleration, openings, slip and forces over time, into
+    axes each.
+    """
+    case, rows = result.case, result.rows
     curves = [
         ("ground [m/s$^2$]", [("along x", rows["ground_ax"], DARK)]),
         ("crest $u_x$ [mm]", [("relative to the ground", 1e3 * rows["crest_ux"], BLUE)]),
@@ -87,47 +102,39 @@ def figure(result: QuakeResult) -> Figure:
             opening = 1e3 * np.maximum(rows[column_of(f"{end}_opening", k)], 0)
             curves[3][1].append((f"{end}{name}", opening, color))
         curves[4][1].append((f"mean{name}", 1e3 * rows[column_of("slip_mean", k)], heel))
-    block = result.summary["residual"].get("rigid_block")
-    for ax, (label, lines) in zip(axes, curves, strict=False):
+    for ax, (label, lines) in zip(axes, curves, strict=True):
         for name, values, color in lines:
-            ax.plot(time, values, color=color, lw=0.8, label=name)
+            ax.plot(rows["time"], values, color=color, lw=0.8, label=name)
         ax.set_ylabel(label, fontsize=8)
         ax.grid(alpha=0.3)
-        ax.set_xlim(0, time[-1])
+        ax.set_xlim(0, rows["time"][-1])
+    block = result.summary["residual"].get("rigid_block")
     if block is not None:
-        words = "rigid block at the end" + (f", {case.joint_names[0]}" if len(joints) > 1 else "")
+        end = f", {case.joint_names[0]}" if len(case.joints) > 1 else ""
+        words = f"rigid block at the end{end}"
         axes[4].axhline(1e3 * block, color=DARK, lw=0.8, ls="--", label=words)
     draw_strength(axes[5], result)
-    for ax in axes[:6]:
-        above = {"loc": "lower right", "bbox_to_anchor": (1.01, 0.97), "frameon": False}
-        number = len(ax.get_legend_handles_labels()[0])
-        close = {"handlelength": 1.2, "columnspacing": 0.8, "handletextpad": 0.3}
-        ax.legend(fontsize=7 if number <= IN_ROW else 5.5, ncols=number, **above, **close)
-        ax.tick_params(labelbottom=False, labelsize=8)
-    step = max(1, len(time) // MOST_ROWS)
+
+
+def draw_stress(picture: Figure, axes: Axes, result: QuakeResult) -> None:
+    """Draw the map of the effective normal stress along the joint over time."""
+    stress, times = result.stress, result.rows["time"]
+    step = max(1, len(times) // MOST_ROWS)
     values = stress["sigma_n_eff"][::step].T / 1e6
     # the stress of the corner elements is singular
     bound = float(np.percentile(np.abs(values), SHOWN)) or 1.0
-    mesh = axes[6].pcolormesh(
-        stress["time"][::step],
-        stress["s"],
-        values,
-        cmap="RdBu_r",
-        vmin=-bound,
-        vmax=bound,
-        shading="nearest",
-        rasterized=True,
+    colors: dict[str, Any] = {"cmap": "RdBu_r", "vmin": -bound, "vmax": bound}
+    mesh = axes.pcolormesh(
+        stress["time"][::step], stress["s"], values, shading="nearest", rasterized=True, **colors
     )
-    axes[6].set_xlim(0, time[-1])
-    axes[6].set_ylabel("s from heel [m]", fontsize=8)
-    axes[6].set_xlabel("t [s]", fontsize=8)
-    axes[6].tick_params(labelsize=8)
-    box = axes[6].get_position()
+    axes.set_xlim(0, times[-1])
+    axes.set_ylabel("s from heel [m]", fontsize=8)
+    axes.set_xlabel("t [s]", fontsize=8)
+    axes.tick_params(labelsize=8)
+    box = axes.get_position()
     bar = picture.add_axes((box.x1 + 0.02, box.y0, 0.015, box.height))
     picture.colorbar(mesh, cax=bar, extend="both").set_label("$\\sigma_n'$ [MPa]", fontsize=8)
     bar.tick_params(labelsize=7)
-    draw_shapes(picture, result)
-    return picture
 
 
 def most_slip(result: QuakeResult) -> list[int]:
