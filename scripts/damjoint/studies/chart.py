@@ -218,12 +218,8 @@ def draw_curves(figure: Figure, table: Table, names: list[str]) -> None:
         for number, (key, members) in enumerate(sorted(curves.items(), key=lambda item: item[1])):
             color, mark = CURVES[number % len(CURVES)]
             good = np.where(bad[members], np.nan, values[members] * factor)
-            style: dict[str, Any] = {
-                "color": color,
-                "markersize": 4.5,
-                "linestyle": "none" if categories else "-",
-            }
-            panel.plot(x[members], good, mark, **style, label=key)
+            line = "none" if categories else "-"
+            panel.plot(x[members], good, mark, color=color, ms=4.5, linestyle=line, label=key)
             if plan.critical and not categories:  # values that are not confirmed are on it, too
                 panel.plot(x[members], values[members] * factor, color=color, lw=0.8, zorder=1)
             failing, cross = [i for i in members if bad[i]], color if others else RED
@@ -239,17 +235,17 @@ def draw_curves(figure: Figure, table: Table, names: list[str]) -> None:
             scale_axis(panel.xaxis, x)
         panel.set(xlabel=x_label, ylabel=f"{words} [{size}]")
         panel.grid(alpha=0.3)
-        if not np.nan_to_num(shown).any():
-            panel.set(yticks=[0] if len(shown) else [], ylim=(-1, 1))
-            text = "zero in all rows" if len(shown) == len(x) else "zero in all rows that stand"
-            text = text if len(shown) else "all rows fail"
-            panel.text(0.5, 0.6, text, ha="center", transform=panel.transAxes)
         if drawn == FACTOR:
             draw_verdicts(panel, table, x, values)
         if drawn == SLIP and plan.slip_limit is not None:
             draw_limit(panel, plan.slip_limit * factor, np.nanmin(values, initial=0.0) < 0)
         if np.nan_to_num(shown).any():
             widen(panel.yaxis)
+        else:
+            panel.set(yticks=[0] if len(shown) else [], ylim=(-1, 1))
+            text = "zero in all rows" if len(shown) == len(x) else "zero in all rows that stand"
+            text = text if len(shown) else "all rows fail"
+            panel.text(0.5, 0.6, text, ha="center", transform=panel.transAxes)
     handles, labels = panel.get_legend_handles_labels()
     named = {text: handle for text, handle in zip(labels, handles, strict=True) if text in curves}
     if bad.any():
@@ -257,12 +253,8 @@ def draw_curves(figure: Figure, table: Table, names: list[str]) -> None:
         (named[meaning],) = panel.plot([], [], "x", color="black" if others else RED)
     named.pop("", None)
     if named:
-        place: dict[str, Any] = {
-            "loc": "outside lower center",
-            "ncols": min(len(named), 4),
-            "fontsize": 8,
-        }
-        figure.legend(list(named.values()), list(named), **place)
+        below: dict[str, Any] = {"loc": "outside lower center", "fontsize": 8}
+        figure.legend(list(named.values()), list(named), ncols=min(len(named), 4), **below)
 
 
 def scale_axis(axis: XAxis, values: np.ndarray) -> None:
