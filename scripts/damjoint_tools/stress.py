@@ -122,8 +122,10 @@ def files_of(words: list[str], folder: Path, *options: str, name: str) -> Files:
         raise RunError(f"not finished after {TIME_LIMIT} s of CPU time")
     files = Files(folder / name, tuple(words), done.returncode)
     try:
-        _ = files.record["verdict"]
-    except (OSError, KeyError):
+        complete = not {"verdict", "critical"}.isdisjoint(files.record)
+    except OSError:
+        complete = False
+    if not complete:
         last = (done.stderr.strip().splitlines() or ["no message"])[-1]
         raise RunError(f"exit code {done.returncode}: {last}") from None
     return files

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from . import stops
-from .files import Files, Table
+from .files import Files, Table, read_table, split_by
 from .reader import Asked
 
 #: Difference of jumps between two numbers of steps, over the largest jump (theory, section 8).
@@ -28,6 +28,10 @@ AT_THE_BOUND = 2e-3
 #: Level from which all searches rise, over the dam's height; over the first critical level that is
 #: found those of the second and third start, and of the states below and above it.
 FIRST_START, STARTS, BELOW, ABOVE = 0.3, (0.6, 0.9), 0.995, 1.005
+
+
+#: The failure that ends a branch only: there may be an equilibrium above it.
+UNSTABLE = "unstable crack growth"
 
 
 # -- load steps
@@ -73,9 +77,28 @@ def jumps(table: Table) -> Any:
     return np.column_stack([table[f"delta_{axis}"] for axis in ("n", "t1", "t2")])
 
 
+def goes_back(steps: Table) -> bool:
+    """Return whether slip or damage of a point of a joint changes in a step of the water and not in
+    the next one, or whether it slips to the other side there. Where none does, each step ends on
+    the law's limit or within it, whatever the steps between.
+    """
+    updates = split_by(steps, "update")  # the first: the weight
+    names = "damage", "slip", "delta_t1", "delta_t2"
+    states = np.array([[update[name] for name in names] for update in updates])
+    if len(states) < 3:
+        return False
+    damage, slip, *shear = np.diff(states, axis=0).swapaxes(0, 1)
+    slips = np.abs(slip) > SAME_STATE * np.abs(states[:, 2:]).max()
+    ends = [changes[:-1] & ~changes[1:] for changes in (damage > SAME_STATE, slips)]
+    turns = slips[:-1] & (sum(x[:-1] * x[1:] for x in shear) < 0)
+    return bool(np.any([*ends, turns]))
+
+
 def other_steps(asked: Asked, one: Files, other: Files) -> Iterator[str]:
-    """Yield how the last state differs between two numbers of load steps."""
+    """Yield how the last state differs between two numbers of load steps; other: with more."""
     if one.stopped or other.stopped or follows_steps(asked, one.record, other.record):
+        return
+    if goes_back(read_table(other.folder / "steps.csv")):
         return
     found = difference(one, other)
     if found > SAME_STATE:
@@ -117,7 +140,7 @@ def above(critical: Critical, files: Files, asked: Asked, steps: Table) -> Itera
     """Yield what statics says against a confirmed critical level; files, asked, steps: those of the
     run to a level just below it.
     """
-    if not critical.confirmed or not asked.sections:
+    if not critical.confirmed or not asked.sections or critical.mode == UNSTABLE:
         return
     beyond = replace(asked, levels=(ABOVE / BELOW * asked.levels[-1],))
     verdict = f"{critical.mode} on {critical.joint}" if critical.joint else critical.mode

@@ -481,6 +481,13 @@ SNAP_BACKS = [
         | {"sigma_max": 99740.0, "alpha": 1.5, "pena_rupture": 0.6042},
         marks=pytest.mark.heavy,
     ),
+    pytest.param(  # whose level falls by 0.17 % from one point to the next, and then rises again
+        {"dam_height": 70.24, "dam_base": 53.72, "dam_crest": 4.939, "n_joint": 20.0}
+        | {"law": "rupture", "E_dam": 1.227e10, "E_found": 4.469e9, "nu_dam": 0.2098}
+        | {"nu_found": 0.213, "K_N": 1.123e11, "K_T": 6.957e10, "uplift": "none"}
+        | {"sigma_max": 47770.0, "alpha": 2.0, "pena_rupture": 6.643},
+        marks=pytest.mark.heavy,
+    ),
 ]
 
 
@@ -495,6 +502,52 @@ def test_the_critical_level_does_not_depend_on_the_increments(settings, monkeypa
     values = [answer.value for answer in answers]
     assert all(answer.confirmed for answer in answers)
     assert max(values) / min(values) - 1 < path.PRECISION
+
+
+@pytest.mark.heavy
+def test_water_that_enters_at_once_is_unstable_growth():
+    """A crack that opens so far that more water flows in than closes it again: no point breaks, but
+    the uplift grows by 6 % without a rise of the level.
+    """
+    dam = {"dam_height": 43.4, "dam_base": 37.5, "dam_crest": 5.14, "n_joint": 10.0, "order": 2.0}
+    joint = {"law": "rupture", "K_N": 1.14e8, "K_T": 1.09e8, "sigma_max": 201e3, "alpha": 1.5}
+    water = {"uplift": "flow", "aperture_min": 4.35e-6, "drains": 1.0, "drain_x": 2.61}
+    drains = {"drain_effectiveness": 0.452, "drain_level": 3.59, "pena_rupture": 0.222}
+    rigid = {"E": 3.59e9, "nu": 0.29, "found_side": 43.4, "found_depth": 43.4}
+    settings = dam | joint | water | drains | rigid | {"weight_first": 0.0}
+    settings["mesh_pattern"] = "regular"
+    starts = "13.02", "13.02,29.1", "13.02,43.7"
+    answers = [search_result("dam", settings=settings, levels=levels)[1] for levels in starts]
+    values = [answer.value for answer in answers]
+    assert max(values) / min(values) - 1 < path.PRECISION
+    for answer in answers:
+        assert answer.confirmed and answer.mode == "unstable crack growth"
+        assert min(answer.after.values()) > 1.2 * answer.value
+
+
+@pytest.mark.heavy
+def test_the_branch_of_a_joint_that_releases_its_shear_ends_in_unstable_growth():
+    """Also where no increment beyond the end is found: by relaxation there are higher levels."""
+    dam = {"dam_height": 19.6, "dam_base": 19.3, "dam_crest": 1.08, "n_joint": 20.0, "order": 2.0}
+    rigid = {"E": 1.68e10, "nu": 0.0653, "found_side": 19.6, "found_depth": 19.6}
+    joints = {"lift_heights": "15.36", "law": ("rupture", "bond"), "K_N": (4.84e14, 3.99e10)}
+    joints |= {"K_T": (9.24e14, 2.11e13), "sigma_max": 0.0, "adhesion": 0.0, "mu": 0.656}
+    laws = {"alpha": 1.5, "pena_rupture": (2.77, -1.0), "G_f": (-1.0, 9.62), "G_t": 14.1}
+    water = {"uplift": "flow", "aperture_min": (3.68e-8, 6.05e-7), "drains": (0.0, 1.0)}
+    settings = dam | rigid | joints | laws | water | {"drain_x": 0.309}
+    _, answer = search_result("dam", settings=settings, levels="5.88,18.9")
+    assert (answer.confirmed, answer.mode) == (True, "unstable crack growth")
+    assert answer.after["by relaxation"] > answer.value > 20
+
+
+def test_a_path_begins_as_a_run_where_single_steps_do_not_lead(monkeypatch):
+    monkeypatch.setattr(FailurePath, "by_level", lambda self, point, length: [])
+    search, answer = search_result("dam", settings=RUPTURE | NO_TENSION, levels="20")
+    first = search.trials[0].path
+    assert first.begun_by_run and first.points[0].level == 20 and answer.value > 20
+    monkeypatch.setattr(FailurePath, "advance", lambda self: setattr(self, "ended", True))
+    _, answer = search_result("dam", settings=RUPTURE | NO_TENSION, levels="20")
+    assert not answer.confirmed and "falls from the first equilibrium on, at 20 m" in answer.doubt
 
 
 def test_a_highest_level_that_depends_on_the_increments_is_not_confirmed(monkeypatch):

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from damjoint import cli
 from damjoint_tools.random_scenes import LOAD_TIMES, random_scene
@@ -50,8 +51,25 @@ def test_states_that_follow_history_or_steps_are_not_compared(words, history, st
     assert again.follows_steps(asked, {"unstable_growth": [20.0]})
 
 
-def critical(value, confirmed="a reason", doubt="", joint=""):
-    found = {"value": value, "mode": "sliding", "joint": joint}
+@pytest.mark.parametrize(
+    "damage, slip, shear, back",
+    [
+        ((0, 0.1, 0.2), (0, 1, 2), (0, 1, 2), False),
+        ((0, 0, 0.2), (0, 0, 1), (0, 1, 2), False),
+        ((0, 0.1, 0.1), (0, 1, 2), (0, 1, 2), True),
+        ((0, 0, 0), (0, 1, 1), (0, 1, 1.5), True),
+        ((0, 0, 0), (0, 1, 2), (0, 1, 0.5), True),
+    ],
+)
+def test_slip_and_damage_that_end_under_rising_water_are_seen(damage, slip, shear, back):
+    """Rows of a single point after the weight and two steps of the water."""
+    columns = {"damage": damage, "slip": slip, "delta_t1": shear, "delta_t2": (0, 0, 0)}
+    steps = {name: np.array(values, float) for name, values in columns.items()}
+    assert again.goes_back({"update": np.array([1.0, 2.0, 3.0])} | steps) == back
+
+
+def critical(value, confirmed="a reason", doubt="", joint="", mode="sliding"):
+    found = {"value": value, "mode": mode, "joint": joint}
     return again.Critical.of({"critical": found | {"confirmed": confirmed, "doubt": doubt}})
 
 
@@ -74,6 +92,7 @@ def test_statics_confirms_a_critical_level_or_not(tmp_path):
     assert "above the critical level 35 m there certainly is an equilibrium" == certain
     assert "sliding at the critical level 35 m, but statics allows" in allowed
     assert not list(again.above(critical(35.0, doubt="not sure"), low, asked, steps))
+    assert not list(again.above(critical(35.0, mode=again.UNSTABLE), low, asked, steps))
 
 
 def test_commands_of_a_scene_for_its_critical_level():

@@ -280,15 +280,38 @@ class Point:
         """Whether tension of more than the part FALL of the water's thrust has been lost since
         another equilibrium by points that soften in a single increment.
         """
-        case, equilibrium = self.model.case, self.model.equilibrium
+        equilibrium = self.model.equilibrium
         growth = self.damage - begin.damage
         lost = equilibrium.interface.weights * np.where(growth > LARGEST_GROWTH, growth, 0)
         if not lost.any():
             return False
         parts = zip(equilibrium.laws.laws, self.state.variables.split(lost), strict=True)
         force = sum(law.tensile_strength * part.sum() for law, part in parts if law.softens)
-        thrust = case["rho_water"] * case["g"] * self.level**2 / 2 * equilibrium.bulk.width
-        return bool(force > FALL * thrust)
+        return bool(force > FALL * self.thrust)
+
+    @property
+    def thrust(self) -> float:
+        """The horizontal force of the reservoir on a vertical face [N]."""
+        case, width = self.model.case, self.model.equilibrium.bulk.width
+        return float(case["rho_water"] * case["g"] * self.level**2 / 2 * width)
+
+    def reaches_joint(self, begin: Point) -> bool:
+        """Whether the level passes an end of a joint since another equilibrium: from there on the
+        reservoir feeds the joint, whatever its opening.
+        """
+        joints = zip(self.model.equilibrium.interface.joints, self.model.case.joints, strict=True)
+        for joint, case in joints:
+            ends = np.vstack([joint.mesh.heel.points, joint.mesh.toe.points])[:, 1]
+            ends = ends - case["joint_head_offset"]
+            if np.any((begin.level < ends) & (ends <= self.level)):
+                return True
+        return False
+
+    @property
+    def uplifts(self) -> Array:
+        """The uplift in each joint [N]."""
+        joints = zip(self.state.pressures, self.model.equilibrium.interface.joints, strict=True)
+        return np.array([joint.points.weights @ pressure.points for pressure, joint in joints])
 
     def unloads(self, begin: Point) -> bool:
         """Whether the level falls in the last step while damage and slip grow by a small part of
@@ -358,7 +381,8 @@ class EquilibriumPath:
     @property
     def ends(self) -> bool:
         """Whether increments have led to its highest level, and none leads on."""
-        return self.ended and not self.exhausted and self.points[self.top].control != "level"
+        stops = self.ended and not self.exhausted and bool(self.points)
+        return stops and self.points[self.top].control != "level"
 
     @property
     def exhausted(self) -> bool:
@@ -592,10 +616,13 @@ class EquilibriumPath:
 
     def agree(self, begin: Point, whole: Point, middle: Point, end: Point) -> bool:
         """Whether one step and two halves lead to the same state; up to unstable growth, also
-        whether no tension is lost at once in one of the halves.
+        whether no tension is lost, and no water enters, at once in one of the halves.
         """
-        leaps = self.to_growth and (middle.leaps(begin) or end.leaps(middle))
-        return not (leaps or whole.differs(end, begin))
+        if self.to_growth and (middle.leaps(begin) or end.leaps(middle)):
+            return False
+        bend = np.abs(middle.uplifts - (begin.uplifts + end.uplifts) / 2).max(initial=0)
+        enters = bend > FALL * middle.thrust and not end.reaches_joint(begin)
+        return not ((self.to_growth and enters) or whole.differs(end, begin))
 
     def straight(self, begin: Point, middle: Point, end: Point) -> bool:
         """Whether no limit point is between three equilibria: the levels are in line, or low."""

@@ -34,6 +34,7 @@ from .critical_words import (
     by_increments,
     end_of_branch,
     events_on,
+    falls_at_once,
     lost_beyond_limit,
     slips_whole,
     withdrawn,
@@ -206,7 +207,8 @@ class Search:
         )
         highest = max(target or 0, *case.levels)  # water may press on the crest
         interface = interface_of(replace(case, levels=(*case.levels[:-1], highest)))
-        path = FailurePath(case, interface, target, report, to_growth)
+        solver = {name: self.own[name] for name in QUICK}
+        path = FailurePath(case, interface, target, report, to_growth, solver=solver)
         self.trials.append(Trial(value, path))
         path.follow(self.factor)
         return path
@@ -239,7 +241,7 @@ class Search:
         for _ in range(MOST_REPEATED):
             path.refine()  # first: a limit point that is known is confirmed sooner
             path.follow(SURE)
-            grows = path.to_growth and path.grows
+            grows = path.to_growth and (path.grows or path.ends)
             if grows and path.starts:
                 path = path.first_branch()
             path.refine()
@@ -272,6 +274,8 @@ class Search:
             result = replace(result, why=lost_beyond_limit(path), doubt="")
         elif not result.why and path.ends:
             result = replace(result, why=end_of_branch(path), doubt="")
+        if path.begun_by_run and point is path.points[0]:
+            result = replace(result, why="", doubt=falls_at_once(point))
         if path.water_withdraws:
             result = replace(result, why="", doubt=withdrawn(path))
         return result if certain else replace(result, why="", doubt=by_increments(other or path))
@@ -292,7 +296,12 @@ class Search:
         is; None if they lead to the same highest level.
         """
         rise, to_growth = SHORTER_RISE * path.rise, path.to_growth
-        other = FailurePath(path.case, path.interface, path.target, to_growth=to_growth, rise=rise)
+        other = FailurePath(
+            *(path.case, path.interface, path.target),
+            to_growth=to_growth,
+            rise=rise,
+            solver=path.solver,
+        )
         other.follow(SURE)
         if to_growth and other.starts:
             other = other.first_branch()

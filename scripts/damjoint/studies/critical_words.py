@@ -13,6 +13,14 @@ def by_increments(path: FailurePath) -> str:
     return f"between {low:.6g} and {high:.6g} m, depending on the increments of displacement"
 
 
+def falls_at_once(point: Point) -> str:
+    """What is said of a path whose level falls from its first point on."""
+    return (
+        f"the level falls from the first equilibrium on, at {point.level:.6g} m, and single steps "
+        "do not lead there; --levels may begin lower"
+    )
+
+
 def beyond_limit(path: FailurePath) -> str:
     """What is said of unstable crack growth at the highest level of a branch."""
     low = min(point.level for point in path.points[path.top :])

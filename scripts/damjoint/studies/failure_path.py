@@ -7,7 +7,7 @@ refined to the precision.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +20,7 @@ from ..model.results import HISTORY, Columns, column_of, with_all_joints
 from ..solver.controls import LevelControl
 from ..solver.history import joint_row
 from ..solver.load_stepper import SAME_TIME, LoadStepper
-from ..solver.path import RISE, EquilibriumPath, Point
+from ..solver.path import FALL, RISE, EquilibriumPath, Point
 
 #: Columns of critical.csv: a row per equilibrium of each dam that was tried. With several joints:
 #: of the first one; see `critical_columns`.
@@ -74,16 +74,21 @@ class FailurePath(EquilibriumPath):
         on_step: Callable[[float], None] = lambda level: None,
         to_growth: bool = False,
         rise: float = RISE,
+        solver: Mapping[str, float] | None = None,
     ) -> None:
         """target: the level [m] to reach, the highest still to come by default; on_step: called
         with the level of each equilibrium; to_growth: whether it is followed, with a law that
         softens in tension or releases its shear, to the first unstable crack growth only; rise: of
         the level that an increment aims at, relative. With a smaller one the levels are prescribed
-        up to a smaller part of a joint.
+        up to a smaller part of a joint; solver: parameters of the solver, for a beginning by all
+        strategies of a run where single steps lead to no equilibrium.
         """
         self.case, self.interface, self.on_step = case, interface, on_step
+        self.solver = solver or {}
         self.points: list[Point] = []
-        stepper = LoadStepper(case, interface, lambda _: self.add(point_of(stepper)))
+        stepper = LoadStepper(case, interface)
+        #: whether it begins where only a run has found an equilibrium
+        self.begun_by_run = False
         #: the part of a joint that may open or soften before a displacement is prescribed
         self.most_softened = SOFTENED * rise / RISE
         #: whether the loads of a time are those of the last one, but for the level
@@ -95,15 +100,25 @@ class FailurePath(EquilibriumPath):
         self.releases_shear = laws.releases_shear
         self.to_growth = to_growth and (self.releases_shear or (brittle and not self.entering))
         # after a step of the weight alone steps can be halved; else the first includes the weight
-        if not (case["weight_first"] and stepper.weigh()):
-            stepper.advance_to(case.times[0])
-        if not stepper.stopped:
+        if case["weight_first"] and stepper.weigh():
             self.fill(point_of(stepper))
+        if not self.points:
+            self.begin_by_run()
         time = self.points[-1].state.time if self.points else 0.0
         ahead = [v for t, v in enumerate(case.levels, 1) if t >= time]
         self.target = max(ahead) if target is None else target
         super().__init__(self.points, len(case.levels), TICK)
         self.rise = rise
+
+    def begin_by_run(self) -> None:
+        """Begin with the equilibria at the first time that a run reaches, by all its strategies."""
+        self.begun_by_run = True
+        model, case = self.stepper.model, self.case.with_values(self.solver)
+        run = LoadStepper(case, self.interface)
+        run.on_step = lambda _: self.add(Point(model, run.state, run.history.copy()))
+        run.advance_to(case.times[0])
+        if not run.stopped:
+            self.fill(self.points[-1])
 
     def fill(self, point: Point) -> None:
         """Prescribe the levels, from a point on, until all other loads act in full and a part
@@ -237,6 +252,8 @@ class FailurePath(EquilibriumPath):
         """
         while not (self.ended or self.decided(factor)):
             self.advance()
+            if self.to_growth and self.top + 1 < len(self.points):
+                self.refine(self.points[-1].level / (1 - FALL))  # how far it falls
         if not self.reached:
             self.refine(self.target)
 
