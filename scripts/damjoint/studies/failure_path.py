@@ -161,6 +161,12 @@ class FailurePath(EquilibriumPath):
             whole, length = middle, length / 2
         return []
 
+    def agree(self, begin: Point, whole: Point, middle: Point, end: Point) -> bool:
+        """See `EquilibriumPath.agree`; unstable growth is sought once all loads act in full."""
+        if not self.on_path(begin):
+            return not whole.differs(end, begin)
+        return super().agree(begin, whole, middle, end)
+
     def add(self, point: Point) -> None:
         """Append an equilibrium, if the toe is not crushed before it."""
         if not self.crushed:
