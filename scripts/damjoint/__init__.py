@@ -18,7 +18,7 @@ laws/       the joint laws, one file each
 input/      parameters, case files, a case and its checks
 mesh/       meshes, by Gmsh or a user's own, with their regions and joints
 model/      loads, water between joints, results
-fem/        finite elements of the bodies, condensed onto the joint
+fem/        finite elements of the bodies, condensed onto the joint or, large in 3D, uncondensed
 joint/      the joint between them: interpolation, water, residual and tangent
 solver/     load stepping, Newton's method, equilibrium path
 dynamics/   time integration of an earthquake

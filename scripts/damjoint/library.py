@@ -373,7 +373,8 @@ def run(source: Case | str | Path, *, engine: str = "auto") -> Run:
 
     Args:
         source: a case, or its name or path, see `case`.
-        engine: condensed (auto), or getdp, the reference model.
+        engine: condensed; iterative, with uncondensed bodies, for large models in 3D; auto, one of
+            these by size and number of steps; or getdp, the reference model.
 
     Raises:
         InputError: the engine can not run the case.

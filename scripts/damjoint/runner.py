@@ -49,7 +49,7 @@ def run(
     """Solve all scenes of a case and write their results below out, replacing an earlier run's.
 
     fields: also write displacement, stress and joint fields for Gmsh and ParaView; picture: also a
-    PNG; engine: condensed (auto) or getdp, the reference model; drawing: draws the pictures, by
+    PNG; engine: see `engine_of`; drawing: draws the pictures, by
     default this process does; key: see `Session`.
     Returns the results in the order of case.scenes(). A run that stops early or is interrupted
     writes its converged steps. Raises InputError, RunError.

@@ -87,7 +87,7 @@ def growth(measurements: Measurements) -> Table:
             else {"n_layers": max(1, n // 5), "h_dam": 20 / n, "h_found": 40 / n}
         )
         words = [word for k, v in settings.items() for word in ("--set", f"{k}={v}")]
-        wall, record = run_cold(["a", *words, "--levels", "9"])
+        wall, record = run_cold(["a", *words, "--levels", "9", "--engine", "condensed"])
         return record["unknowns"], wall, record["peak_memory_mb"]
 
     for size in track(sizes, "growth"):
@@ -95,17 +95,42 @@ def growth(measurements: Measurements) -> Table:
     return table
 
 
-def exponents(table: Table) -> list[str]:
-    """Fit the exponents of time and memory over the three largest sizes, in words."""
+def engines(measurements: Measurements) -> Table:
+    """Measure seconds and memory of the dam across a valley by condensed and by uncondensed bodies
+    against the number of unknowns, each size in a new process.
+    """
+    parts = "mesh", "assembly", "condensation", "solve"
+    table = Table("engines", "engine", "n_joint", "unknowns", "seconds", *parts, "MB")
+    sizes = {"condensed": (10, 16, 27), "iterative": (10, 16, 27, 39, 62)}
+
+    def measure(engine: str, n: int) -> tuple:
+        # uniform refinement of the default mesh
+        settings = {"n_joint": n, "h_dam": 80 / n, "h_found": 250 / n}
+        words = [word for k, v in settings.items() for word in ("--set", f"{k}={v}")]
+        wall, record = run_cold(["valley", *words, "--engine", engine])
+        spent = [record["wall_seconds"].get(part, 0.0) for part in parts]
+        return record["unknowns"], wall, *spent, record["peak_memory_mb"]
+
+    rows = [(engine, n) for engine, of_engine in sizes.items() for n in of_engine]
+    for row in track([r for r in rows if r[1] <= 10 or not measurements.short], "engines"):
+        table.add_measured(measurements, row, partial(measure, *row))
+    return table
+
+
+def exponents(table: Table, column: str = "dim", form: str = "{}D") -> list[str]:
+    """Fit the exponents of time and memory over the three largest sizes, in words, for each value
+    of a column.
+    """
     lines = []
-    for dim in (2, 3):
-        rows = [i for i, d in enumerate(table["dim"]) if d == dim][-3:]
+    for kind in dict.fromkeys(table[column]):
+        rows = [i for i, value in enumerate(table[column]) if value == kind][-3:]
         if len(rows) > 1:
             n = np.log([table["unknowns"][i] for i in rows])
             time, memory = (
                 np.polyfit(n, np.log([table[c][i] for i in rows]), 1)[0] for c in ("seconds", "MB")
             )
-            lines.append(f"{dim}D: time ~ unknowns^{time:.2f}, memory ~ unknowns^{memory:.2f}")
+            powers = f"time ~ unknowns^{time:.2f}, memory ~ unknowns^{memory:.2f}"
+            lines.append(f"{form.format(kind)}: {powers}")
     return lines
 
 

@@ -177,6 +177,7 @@ def page(
         "; ".join(bench_cost.exponents(tables["growth"])) + ". Uniform refinement, cold start. "
         f"A mesh beyond the memory ends with the message: `{beyond}`",
         as_text(tables["growth"]),
+        *of_engines(tables["engines"]),
         *of_orders(tables["orders"]),
         "## Precision on a fine mesh",
         "; ".join(precise) + ".",
@@ -244,6 +245,16 @@ def of_critical(searches: Table) -> list[str]:
         f"{searches['confirmed'].count('yes')} of {len(searches['search'])} values are confirmed. "
         "Case `dam` with the parameters of the first column, in one process.",
         as_text(searches, digits=4),
+    ]
+
+
+def of_engines(table: Table) -> list[str]:
+    """Condensed and uncondensed bodies in 3D."""
+    fitted = bench_cost.exponents(table, "engine", "{}")
+    return [
+        "## Condensed and uncondensed bodies in 3D",
+        ". ".join(["The dam of `valley`, three levels, by either engine", *fitted]) + ".",
+        as_text(table),
     ]
 
 
@@ -390,7 +401,7 @@ def measure(measurements: Measurements) -> tuple[dict[str, Table], list[str]]:
     tables = [cases := bench_cost.cases(measurements)]
     studies = bench_cost.switches, bench_cost.sweeps, bench_cost.growth, bench_cost.stress
     studies += bench_commands.start, bench_commands.pictures, bench_commands.critical
-    studies += bench_commands.orders, bench_cost.joints, bench_commands.quakes
+    studies += bench_commands.orders, bench_cost.engines, bench_cost.joints, bench_commands.quakes
     tables += [study(measurements) for study in studies]
     tables.append(modelings(measurements, cases))
     with threadpool_limits(1):

@@ -13,8 +13,8 @@ from .. import InputError
 
 CASE = "a letter a to k (verification case SSNP142), dam, or the path of a .case file"
 ENGINE = (
-    "auto (default), condensed (both bodies condensed onto the joint; fast) or getdp (the "
-    "reference GetDP model)"
+    "condensed (the bodies condensed onto the joint), iterative (large 3D: uncondensed), auto "
+    "(default: one of these, by size and steps) or getdp (the reference GetDP model)"
 )
 RESUMED = "CSV of results; rows that are already in it are not computed again"
 

@@ -192,4 +192,4 @@ def lift(equilibrium: Equilibrium, pressure: tuple[Pressure, ...]) -> Array:
         water.force(of_joint.water_points)
         for water, of_joint in zip(equilibrium.water, pressure, strict=True)
     )
-    return sum(parts, np.zeros(len(equilibrium.bulk.stiffness)))
+    return sum(parts, np.zeros(equilibrium.bulk.size))

@@ -1,4 +1,4 @@
-"""The two engines that solve a case, with the same interface.
+"""The engines that solve a case, with the same interface.
 
 `check(case)` of engines/condensed/solve.py and of engines/getdp/solve.py raises InputError;
 `solve(case, on_step, fields)` yields an Outcome for each scene (fields: whether the fields of the
@@ -7,10 +7,10 @@ bodies are needed) and raises RunError. Engines write no output folders.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from importlib import import_module
-from types import ModuleType
 from typing import TYPE_CHECKING
 
 from .. import InputError
@@ -21,7 +21,7 @@ from ..model.results import Results
 if TYPE_CHECKING:
     from ..model.fields import Field
 
-ENGINES = ("auto", "condensed", "getdp")
+ENGINES = ("auto", "condensed", "iterative", "getdp")
 
 #: What is called with the number of a scene and the time of each of its converged steps.
 OnStep = Callable[[int, float], None]
@@ -40,13 +40,22 @@ class Outcome:
     error: BaseException | None = None
 
 
-def engine_of(case: Case, name: str) -> ModuleType:
-    """The engine of a name: condensed (auto), or getdp, the reference GetDP model.
+#: What solves a case, see above.
+Solve = Callable[[Case, OnStep, bool], Iterator[Outcome]]
+
+
+def engine_of(case: Case, name: str) -> Solve:
+    """The engine of a name: condensed; iterative, the same with its bodies uncondensed, in 3D;
+    auto, the one of these that suits the size of the case; or getdp, the reference GetDP model.
 
     Raises InputError if there is none, or if it can not run the case.
     """
     if name not in ENGINES:
         raise InputError(f"engine = {name}: must be one of {', '.join(ENGINES)}")
-    engine = import_module(f".{'condensed' if name == 'auto' else name}.solve", __name__)
+    if name == "iterative" and case["dim"] == 2:
+        raise InputError("engine = iterative: must be auto, condensed or getdp with dim = 2")
+    module = "getdp" if name == "getdp" else "condensed"
+    engine = import_module(f".{module}.solve", __name__)
     engine.check(case)
-    return engine
+    solve: Solve = engine.solve if name == "getdp" else partial(engine.solve, engine=name)
+    return solve

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .. import ROUND_OFF
-from ..arrays import Array, IntArray, distinct
+from ..arrays import Array, IntArray, distinct, others
 from ..csr import CsrMatrix
 from ..input.case import Case
 from ..input.scene import LINES, MATERIALS
@@ -54,6 +54,12 @@ class ElasticBody:
     fixed_along_z: IntArray
     joint_dofs: dict[tuple[int, bool], IntArray]
     face_dofs: dict[str, IntArray]
+
+    @property
+    def free_stiffness(self) -> CsrMatrix:
+        """The stiffness of the degrees of freedom that are not fixed."""
+        free = others(self.stiffness.shape[0], self.fixed_dofs)
+        return self.stiffness[free].columns(free)
 
     @staticmethod
     def of(case: Case, mesh: Mesh, name: str) -> ElasticBody:

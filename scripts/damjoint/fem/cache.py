@@ -29,7 +29,7 @@ from ..mesh.mesh import Mesh, mesh_of
 from ..model.loads import COMPLETE, overtopped, thermal_strains, wet_segments
 from ..storage import cache_folder, read_entry, write_entry
 from .condensed import Condensed, CondensedJoint, JointDofs
-from .memory import check_size
+from .memory import check_size, iterates
 
 if TYPE_CHECKING:
     from .bodies import Bodies
@@ -81,19 +81,20 @@ def sources() -> str:
     return f"{zlib.crc32(b''.join(texts)):08x}"
 
 
-def cached(case: Case) -> tuple[Condensed, Bodies | None]:
+def cached(case: Case, engine: str = "condensed") -> tuple[Condensed, Bodies | None]:
     """Condensed bodies of a case, from the cache or computed and added to it; and the bodies they
     were computed from, if they were.
 
-    Raises RunError (mesh, memory).
+    engine: condensed; iterative, uncondensed bodies; auto, what is expected to be faster, or to
+    have enough memory. Raises RunError (mesh, memory).
     """
     header = json.dumps([__version__, sources(), key_of(case)])
     parent = cache_folder()
     path = parent and parent / f"bodies-{zlib.crc32(header.encode()):08x}.bin"
-    stored = read(path, header) if path else None
+    stored = read(path, header) if path and engine != "iterative" else None
     if stored:
         return stored, None
-    if not case.geometry:
+    if not case.geometry and (engine == "condensed" or case["dim"] == 2):
         check_size(case)
     from .bodies import Bodies
     from .condensation import condense
@@ -101,6 +102,10 @@ def cached(case: Case) -> tuple[Condensed, Bodies | None]:
     try:
         with np.errstate(over="raise", invalid="raise"):
             bodies = Bodies.of(case)
+            if engine == "iterative" or (engine == "auto" and iterates(case, bodies)):
+                from .uncondensed import uncondensed
+
+                return uncondensed(case, bodies), bodies
             condensed = condense(case, bodies)
     except (ArithmeticError, RuntimeError, np.linalg.LinAlgError) as error:
         if isinstance(error, RunError):

@@ -5,10 +5,14 @@ from __future__ import annotations
 import re
 import resource
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from .. import RunError
 from ..input.case import Case
 from ..progress import INTERVAL, clock
+
+if TYPE_CHECKING:
+    from .bodies import Bodies
 
 #: Part of a limited address space that buffers of libraries take [bytes].
 BUFFERS = 0.15e9
@@ -22,6 +26,12 @@ ELIMINATION = 2e-10
 FACTORISATION = 1.1e-11
 #: Iterations of a step, usually.
 ITERATIONS = 5.0
+
+#: Number of unknowns in 3D above which a run of few steps is faster with uncondensed bodies; that
+#: of many steps, over this power of their number; measured by `damjoint bench`.
+ITERATED, PER_STEP, STEPS_POWER = 50_000, 3500, 1.33
+#: Memory of uncondensed bodies [bytes per unknown], measured likewise.
+PER_UNKNOWN_ITERATED = 6500
 
 #: Memory of a factorised body [bytes per unknown], measured in 2D by `damjoint bench`.
 PER_UNKNOWN = 2400
@@ -87,6 +97,22 @@ def seconds(case: Case) -> float:
     bodies = base * (max(bulk_size(case), joints) / 1e6) ** power
     iterations = ITERATIONS * len(case.times) * scenes
     return bodies + joints**3 * (ELIMINATION + iterations * FACTORISATION)
+
+
+def iterates(case: Case, bodies: Bodies) -> bool:
+    """Whether a run is expected to be faster with its bodies uncondensed, or has no memory for the
+    condensed ones.
+
+    To condense takes nearly the square of the number of unknowns, but a step less than with
+    uncondensed bodies. In 2D it always pays.
+    """
+    if case["dim"] == 2:
+        return False
+    unknowns = float(sum(body.stiffness.shape[0] for body in bodies.by_name.values()))
+    jumps = 3 * sum(len(joint.upper_tags) for joint in bodies.mesh.joints)
+    needed = dense_memory(jumps) + PER_UNKNOWN * unknowns
+    steps = len(case.times) * len(case.scenes())
+    return unknowns > max(ITERATED, PER_STEP * steps**STEPS_POWER) or needed > available()
 
 
 def check_size(case: Case) -> None:

@@ -125,7 +125,7 @@ def run_case(sheet: Sheet, pipe: Connection, stop: Stop) -> tuple[list[SolvedSce
         stop.after_step()
 
     with stop:
-        for outcome in accuracy.solve(case, engine, on_step, True):
+        for outcome in accuracy.solve(case, engine.solve, on_step, True):
             outcomes.append(outcome)
             if outcome.error:
                 break

@@ -22,7 +22,7 @@ from ..mesh.joint_mesh import heel_normal
 from ..model.network import Network
 from .assembly import Assembly
 from .flow import Flow, JointFields, Wetted
-from .linear_system import WoodburySystem
+from .linear_system import LinearSystem, WoodburySystem
 from .wet_faces import WetFace, points_where
 
 
@@ -55,7 +55,7 @@ class JointInterface:
         self.mesh, self.surface = joint.mesh, joint.mesh.surface
         space = self.space = elements.Space(self.surface, bulk.order)
         #: jump of the space's functions from the unknowns, dim rows each
-        self.unknowns = joint.dofs.matrix(self.dim * len(space.locations), len(bulk.stiffness))
+        self.unknowns = joint.dofs.matrix(self.dim * len(space.locations), bulk.size)
         #: number of Gauss points of the law, by shape
         self.rule = elements.JOINT[quadrature][bulk.order]
         self.points = elements.points_of(space, self.rule)
@@ -257,10 +257,21 @@ class Interface:
         """Names, bodies and ends of the joints."""
         return [replace(joint.mesh.of_case, section=joint.section) for joint in self.joints]
 
-    def system(self, undamaged: Array) -> WoodburySystem:
-        """Linear systems of the joints with the condensed bodies, by the tangent (q, 3, 3) of the
-        undamaged joints; the last one is kept.
+    @cached_property
+    def iterative_system(self) -> LinearSystem:
+        """Linear systems of the joints with uncondensed bodies."""
+        from ..fem.uncondensed import Uncondensed
+        from .iterative_system import IterativeSystem
+
+        assert isinstance(self.bulk, Uncondensed)
+        return IterativeSystem(self.assembly, self.bulk)
+
+    def system(self, undamaged: Array) -> LinearSystem:
+        """Linear systems of the joints with the bodies around them; tangent (q, 3, 3) of the
+        undamaged joints: of the last one, the system is kept.
         """
+        if isinstance(self.bulk.stiffness, CsrMatrix):
+            return self.iterative_system
         if self._system is None or not np.array_equal(undamaged, self._system.undamaged):
             self._system = WoodburySystem(self.assembly, self.bulk.stiffness, undamaged)
         return self._system
@@ -284,7 +295,7 @@ class LastInterface:
         rules = case["quadrature"], case["face_points"]
         key = *key_of(case), *rules
         if key not in self.last:
-            small = [k for k, i in self.last.items() if len(i.bulk.stiffness) <= SMALL]
+            small = [k for k, i in self.last.items() if i.bulk.size <= SMALL]
             self.last = {k: self.last[k] for k in small[-1:]}  # free the memory of others first
             self.last[key] = Interface(cached(case)[0], *rules)
         return self.last[key]

@@ -22,6 +22,7 @@ from typing import Protocol
 import numpy as np
 from numpy.linalg import norm
 
+from .. import RunError
 from ..arrays import Array, distinct, mirror
 from ..csr import CsrMatrix, stacked
 from ..threads import limited_threads, scipy_linalg
@@ -52,6 +53,10 @@ class Border:
     row: Array
     rate: float
     gap: float
+
+
+class Stalled(RunError):
+    """The iterative solution of a linear system has stalled."""
 
 
 class LinearSystem(Protocol):

@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import Array, BoolArray
+from ..csr import CsrMatrix
 from ..model.loads import Loading
 from .interface import Interface
 from .joint_laws import JointLaws, JointVariables
@@ -69,7 +70,7 @@ class JointProblem:
 
     interface: Interface
     #: S (j, j), and what solves the linear systems of S and a tangent
-    stiffness: Array
+    stiffness: Array | CsrMatrix
     system: LinearSystem
     #: of the Gauss points; their internal variables are those of the step's beginning
     laws: JointLaws

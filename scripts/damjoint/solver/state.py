@@ -49,7 +49,7 @@ class State:
         """Before any load."""
         joints, laws = equilibrium.interface.joints, equilibrium.laws
         numbers = [len(j.points.weights) for j in joints], [len(j.rows) for j in joints]
-        jump = np.zeros(len(equilibrium.bulk.stiffness))
+        jump = np.zeros(equilibrium.bulk.size)
         points, nodes = (laws.initial(n) for n in numbers)
         return State(0.0, Loading(0.0, 0.0), jump, points, nodes)
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...arrays import Array
+from ...csr import CsrMatrix
 from ...fem.bodies import Bodies, ElasticBody, material_of
 from ...fem.elasticity import stress
 from ...fem.glued_bodies import GluedBodies
@@ -35,20 +36,14 @@ def free_strain(body: ElasticBody, equilibrium: Equilibrium, state: State) -> Ar
     return np.sum([sizes.get(name, 0) * unit for name, unit in body.unit_strains.items()], axis=0)
 
 
-def recover(bodies: Bodies, scenes: list[tuple[Equilibrium, History]]) -> list[dict[float, Field]]:
-    """Fields of the saved states of scenes on the same bodies, by scene and time. Displacements
-    count from the state under the weight alone, if there is one.
+def eliminated_displacements(
+    bodies: Bodies, states: list[tuple[Equilibrium, State]]
+) -> dict[str, Array]:
+    """Displacements (states, degrees of freedom) of each body in states of its equilibria.
 
     The glued bodies are also loaded by the forces -K_b J_b d of the jumps that a body carries; the
     water pressure in a joint acts on both joint faces and cancels.
     """
-    states = [
-        (equilibrium, state)
-        for equilibrium, history in scenes
-        for state in (*history.saved, *filter(None, [history.at_rest]))
-    ]
-    if not any(history.saved for _, history in scenes):
-        return [{} for _ in scenes]
     gluing = Gluing.of(bodies)
     glued = GluedBodies.of(bodies.by_name, gluing)
     loads = np.zeros((glued.size, len(states)))
@@ -65,7 +60,29 @@ def recover(bodies: Bodies, scenes: list[tuple[Equilibrium, History]]) -> list[d
             loads[:, i] += np.bincount(glued.numbers[name], load, glued.size)
     solution = glued.solve(loads)
 
-    displacements = {n: solution[glued.numbers[n]].T + jumps[n] for n in bodies.by_name}
+    return {n: solution[glued.numbers[n]].T + jumps[n] for n in bodies.by_name}
+
+
+def recover(bodies: Bodies, scenes: list[tuple[Equilibrium, History]]) -> list[dict[float, Field]]:
+    """Fields of the saved states of scenes on the same bodies, by scene and time. Displacements
+    count from the state under the weight alone, if there is one.
+    """
+    states = [
+        (equilibrium, state)
+        for equilibrium, history in scenes
+        for state in (*history.saved, *filter(None, [history.at_rest]))
+    ]
+    if not any(history.saved for _, history in scenes):
+        return [{} for _ in scenes]
+    bulk = states[0][0].bulk
+    if isinstance(bulk.stiffness, CsrMatrix):  # uncondensed bodies
+        from ...fem.uncondensed import Uncondensed
+
+        assert isinstance(bulk, Uncondensed)
+        parts = [bulk.displacements(state.jump) for _, state in states]
+        displacements = {n: np.array([part[n] for part in parts]) for n in bodies.by_name}
+    else:
+        displacements = eliminated_displacements(bodies, states)
     at_locations, stresses = {}, {}
     material, dim = material_of(states[0][0].case), bodies.mesh.dim
     for name, values in displacements.items():

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any
 
+from ... import RunError
+from ...csr import CsrMatrix
 from ...fem.cache import cached
 from ...fem.condensed import Condensed
 from ...fem.memory import joint_size
 from ...input.case import Case
 from ...joint.interface import Interface
+from ...joint.linear_system import Stalled
 from ...mesh.mesh import mesh_of
 from ...model.network import with_paths
 from ...solver.load_stepper import LoadStepper
@@ -36,7 +40,7 @@ def check(case: Case) -> None:
 def about(bulk: Condensed) -> dict[str, Any]:
     """Entries of run.json on the engine and its mesh."""
     return {
-        "engine": "condensed",
+        "engine": "iterative" if isinstance(bulk.stiffness, CsrMatrix) else "condensed",
         "factorisation": bulk.factorisation,
         "mesh": bulk.counts,
         "unknowns": bulk.unknowns,
@@ -48,15 +52,34 @@ def threads_of(case: Case) -> int | None:
     return 1 if case.geometry or joint_size(case) < THREADED_UNKNOWNS else None
 
 
-def solve(case: Case, on_step: OnStep, _fields: bool) -> Iterator[Outcome]:
-    """The scenes of a case on one condensed mesh; see engines/__init__.py."""
+def follow(
+    case: Case, interface: Interface, on_step: Callable[[float], None]
+) -> tuple[LoadStepper, BaseException | None]:
+    """The loading of a scene, followed to its end or to an error: also an interrupt, so that
+    converged steps are saved.
+    """
+    stepper = LoadStepper(case, interface, on_step)
+    try:
+        stepper.run()
+    except BaseException as error:
+        if stepper.history.complete(stepper.state):
+            stepper.save_last()
+        return stepper, error
+    return stepper, None
+
+
+def solve(case: Case, on_step: OnStep, _fields: bool, engine: str = "auto") -> Iterator[Outcome]:
+    """The scenes of a case on one mesh; see engines/__init__.py.
+
+    engine: see `engine_of`; where the iteration of auto stalls, the bodies are condensed.
+    """
     with limited_threads(threads_of(case)):
         start = time.perf_counter()
-        bulk, made = cached(case)
+        bulk, made = cached(case, engine)
         before = bulk.seconds if made else {"cache": time.perf_counter() - start}
         interface = Interface(bulk, case["quadrature"], case["face_points"])
         steppers: list[LoadStepper] = []
-        recovered: list[dict[float, Field]] = []
+        recovered: dict[int, dict[float, Field]] = {}
 
         @lru_cache
         def bodies() -> Bodies:
@@ -66,25 +89,24 @@ def solve(case: Case, on_step: OnStep, _fields: bool) -> Iterator[Outcome]:
 
         def fields(number: int) -> dict[float, Field]:
             """Fields of a scene; recovers those of all scenes with a single factorisation."""
-            if len(recovered) < len(steppers):
+            if number not in recovered:
                 from .recover import recover
 
-                scenes = [(s.model.equilibrium, s.history) for s in steppers]
-                recovered[:] = recover(bodies(), scenes)
+                bulks = [s.model.equilibrium.bulk for s in steppers]
+                numbers = [n for n, bulk in enumerate(bulks) if bulk is bulks[number]]
+                scenes = [(steppers[n].model.equilibrium, steppers[n].history) for n in numbers]
+                recovered.update(zip(numbers, recover(bodies(), scenes), strict=True))
             return recovered[number]
 
         for number, scene in enumerate(case.scenes()):
             begin = time.perf_counter()
-            error: BaseException | None = None
-            stepper = LoadStepper(scene, interface, partial(on_step, number))
+            stepper, error = follow(scene, interface, partial(on_step, number))
+            if engine == "auto" and isinstance(error, Stalled):
+                with suppress(RunError):  # too little memory: the first error remains
+                    interface = Interface(cached(case)[0], case["quadrature"], case["face_points"])
+                    stepper, error = follow(scene, interface, partial(on_step, number))
             steppers.append(stepper)
-            try:
-                stepper.run()
-            except BaseException as caught:  # also an interrupt: converged steps are saved
-                error = caught
-                if stepper.history.complete(stepper.state):
-                    stepper.save_last()
             result = stepper.results()
             seconds = before | {"solve": time.perf_counter() - begin}
-            result.info |= about(bulk) | {"wall_seconds": seconds}
+            result.info |= about(interface.bulk) | {"wall_seconds": seconds}
             yield Outcome(result, lambda: bodies().mesh, partial(fields, number), error)
