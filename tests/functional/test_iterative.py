@@ -88,15 +88,16 @@ def test_a_mechanism_stops_at_the_same_level(both):
 
 @pytest.mark.heavy
 @pytest.mark.parametrize(
-    "name, settings",
+    "name, settings, levels",
     [
-        ("dam", SOLID | WEAK["friction"] | {"order": 2.0, "n_joint": 5.0}),
-        ("dam", SOLID | WEAK["friction"] | {"lift_heights": (20.0,), "hold_z": 1.0}),
-        ("valley_blocks", {"n_joint": 6.0, "h_dam": 12.0, "h_found": 40.0}),
+        ("dam", SOLID | WEAK["friction"] | {"order": 2.0, "n_joint": 5.0}, "30,40"),
+        ("dam", SOLID | WEAK["friction"] | {"lift_heights": (20.0,), "hold_z": 1.0}, "30,40"),
+        # (only up to where sliding on many joints has a single equilibrium)
+        ("valley_blocks", {"n_joint": 6.0, "h_dam": 12.0, "h_found": 40.0}, "20,30"),
     ],
 )
-def test_order_2_lifts_and_joints_that_meet(name, settings):
-    case = load(name, settings, "30,40")
+def test_order_2_lifts_and_joints_that_meet(name, settings, levels):
+    case = load(name, settings, levels)
     bodies = Bodies.of(case)
     one, other = histories([make(case, bodies) for make in (condense, keep)], case)
     assert_same(one, other)
