@@ -30,7 +30,7 @@ ITERATIONS = 5.0
 #: Number of unknowns in 3D above which a run of few steps is faster with uncondensed bodies; that
 #: of many steps, over this power of their number; measured by `damjoint bench`.
 ITERATED, PER_STEP, STEPS_POWER = 50_000, 3500, 1.33
-#: Further memory of uncondensed bodies once they are assembled [bytes per unknown], measured likewise.
+#: Further memory of uncondensed bodies after their assembly [bytes per unknown], measured likewise.
 PER_UNKNOWN_ITERATED = 4000
 
 #: Memory of a factorised body [bytes per unknown], measured in 2D by `damjoint bench`.
