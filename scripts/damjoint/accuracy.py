@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from . import RunError
-from .engines import OnStep, Outcome, Solve
+from .engines import Engine, OnStep, Outcome
 from .input.case import Case
 from .input.refinement import has_plane_fields
 from .model.results import Results
@@ -111,7 +111,7 @@ def percent(part: float) -> str:
     return f"{100 * part:.2g} %"
 
 
-def solve(case: Case, engine: Solve, on_step: OnStep, fields: bool) -> Iterator[Outcome]:
+def solve(case: Case, engine: Engine, on_step: OnStep, fields: bool) -> Iterator[Outcome]:
     """Yield the outcomes of a case's scenes, each on the mesh that the case's accuracy requires; on
     the case's own mesh if it requires none.
 
@@ -123,16 +123,16 @@ def solve(case: Case, engine: Solve, on_step: OnStep, fields: bool) -> Iterator[
         yield outcome
 
 
-def solve_scenes(case: Case, engine: Solve, on_step: OnStep, fields: bool) -> Iterator[Outcome]:
+def solve_scenes(case: Case, engine: Engine, on_step: OnStep, fields: bool) -> Iterator[Outcome]:
     """See `solve`."""
     if not case.accuracy:
-        yield from engine(case, on_step, fields)
+        yield from engine.solve(case, on_step, fields)
         return
     for number, scene in enumerate(case.scenes()):
 
         def solve_mesh(meshed: Case, number: int = number) -> Outcome:
             outcomes: Iterator[Outcome]
-            outcomes = engine(meshed, lambda _, now: on_step(number, now), fields)
+            outcomes = engine.solve(meshed, lambda _, now: on_step(number, now), fields)
             return next(outcomes)
 
         yield refine_until_accurate(replace(scene, also_uplift=()), case.accuracy, solve_mesh)

@@ -40,11 +40,14 @@ class Outcome:
     error: BaseException | None = None
 
 
-#: What solves a case, see above.
-Solve = Callable[[Case, OnStep, bool], Iterator[Outcome]]
+@dataclass(frozen=True)
+class Engine:
+    """What solves a case, see above."""
+
+    solve: Callable[[Case, OnStep, bool], Iterator[Outcome]]
 
 
-def engine_of(case: Case, name: str) -> Solve:
+def engine_of(case: Case, name: str) -> Engine:
     """The engine of a name: condensed; iterative, the same with its bodies uncondensed, in 3D;
     auto, the one of these that suits the size of the case; or getdp, the reference GetDP model.
 
@@ -57,5 +60,4 @@ def engine_of(case: Case, name: str) -> Solve:
     module = "getdp" if name == "getdp" else "condensed"
     engine = import_module(f".{module}.solve", __name__)
     engine.check(case)
-    solve: Solve = engine.solve if name == "getdp" else partial(engine.solve, engine=name)
-    return solve
+    return Engine(engine.solve if name == "getdp" else partial(engine.solve, engine=name))
