@@ -7,7 +7,7 @@ bodies are needed) and raises RunError. Engines write no output folders.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
@@ -47,14 +47,14 @@ class Engine:
     solve: Callable[[Case, OnStep, bool], Iterator[Outcome]]
 
 
-def engine_of(case: Case, name: str) -> Engine:
+def engine_of(case: Case, name: str, allowed: Sequence[str] = ENGINES) -> Engine:
     """The engine of a name: condensed; iterative, the same with its bodies uncondensed, in 3D;
     auto, the one of these that suits the size of the case; or getdp, the reference GetDP model.
 
     Raises InputError if there is none, or if it can not run the case.
     """
-    if name not in ENGINES:
-        raise InputError(f"engine = {name}: must be one of {', '.join(ENGINES)}")
+    if name not in allowed:
+        raise InputError(f"engine = {name}: must be one of {', '.join(allowed)}")
     if name == "iterative" and case["dim"] == 2:
         raise InputError("engine = iterative: must be auto, condensed or getdp with dim = 2")
     module = "getdp" if name == "getdp" else "condensed"

@@ -78,9 +78,7 @@ class Ended:
 
 def check(case: Case, options: Options) -> None:
     """Raise InputError if the earthquake of a case can not be computed so."""
-    engine_of(case, options.engine)
-    if options.engine == "iterative":
-        raise InputError("engine = iterative: must be auto, condensed or getdp for an earthquake")
+    engine_of(case, options.engine, ("auto", "condensed", "getdp"))
     quake.check(case, options.span)
     if options.engine == "getdp":
         if options.fields:
