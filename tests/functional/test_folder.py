@@ -122,7 +122,7 @@ def test_a_search_that_fails_removes_the_value_of_an_earlier_one(command, tmp_pa
     words = "critical", "c", "--set", "n_joint=10", "--out", "out"
     assert command(*words)[0] == 0 and (tmp_path / "out" / "critical.csv").is_file()
 
-    def failing(*_):
+    def failing(*_, **__):
         raise RunError("no")
 
     monkeypatch.setattr("damjoint.studies.critical.FailurePath", failing)
