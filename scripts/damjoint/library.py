@@ -606,7 +606,7 @@ class Critical:
         from .studies.critical_study import table
         from .studies.failure_path import critical_columns
 
-        columns = critical_columns(self.search.own)
+        columns = critical_columns(self.search.case)
         return frame(table(self.search), columns | {"value": (self.search.unit.strip(), "")})
 
     def __repr__(self) -> str:

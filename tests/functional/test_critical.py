@@ -195,7 +195,7 @@ def test_the_value_of_the_gravity_method_names_its_joint():
     search = Search(load("dam", settings | {"adhesion": (1e5, 2e5)}), "level")
     answer = search.run()
     assert (answer.joint, answer.gravity_joint) == ("base", "lift 9 m")
-    base, lift = search.own.joints
+    base, lift = search.case.joints
     for joint, level in ((lift, answer.gravity), (base, answer.gravity_there)):
         assert gravity.at(joint, 1.0, level).SSF == pytest.approx(1, rel=1e-3)
     shown = f"gravity method on lift 9 m: {answer.gravity:.6g} m; on base: "
@@ -207,9 +207,9 @@ def test_the_gravity_method_with_a_crack_past_the_drains():
     drains = {"dam_base": 30.0, "uplift": "cracked", "drains": 1.0, "drain_x": 6.0, "mu": 1.0}
     search = Search(load("dam", DAM | UNBONDED | drains, "40,44", "3"), "level")
     first, longer = (search.gravity.critical(44.4, True, longest) for longest in (False, True))
-    method = gravity.at(search.own, 2.0, first - 1e-5)
+    method = gravity.at(search.case, 2.0, first - 1e-5)
     assert method.SSF > 1 and method.crack_length == pytest.approx(6, abs=1e-3)
-    (other,) = gravity.at(search.own, 2.0, longer).further
+    (other,) = gravity.at(search.case, 2.0, longer).further
     assert other.SSF == pytest.approx(1, abs=1e-4) and longer < first - 0.5
 
 
@@ -363,8 +363,8 @@ def test_the_gravity_method_of_a_trial_has_the_values_of_its_case(of):
     """Without Gmsh's parser, which computes what follows from other parameters."""
     drained = {"law": "bond", "uplift": "drained", "lift_heights": (12.0,), "mu": (0.9, 0.7)}
     search = Search(load("dam", DAM | drained | {"factor_mu": 1.2}), of)
-    value = 1.3 * (1.0 if of == "strength" else search.own[of] or 0.1)
-    by_parser = varied(search.own, search.case_at(value).source.overrides)
+    value = 1.3 * (1.0 if of == "strength" else search.case[of] or 0.1)
+    by_parser = varied(search.case, search.case_at(value).source.overrides)
     blocks = [gravity.at(joint, 3.0) for joint in by_parser.joints]
     assert [b.SSF for b in search.gravity.rigid_blocks(value)] == [b.SSF for b in blocks]
     assert search.case_at(value) == by_parser
@@ -417,7 +417,7 @@ def test_the_table_has_the_resultants_of_each_joint():
     depth = np.maximum(rows["level"] - np.array([[0.0], [12.0], [25.0]]), 0)
     thrust = WATER * depth**2 / 2
     assert np.allclose([rows[n] for n in ("T", "T_2", "T_3")], thrust, rtol=1e-6, atol=1)
-    assert rows["slip_length_3"][-1] == pytest.approx(search.own.joints[2].joint_length)
+    assert rows["slip_length_3"][-1] == pytest.approx(search.case.joints[2].joint_length)
 
 
 def test_an_interrupted_search_writes_its_results_so_far(monkeypatch, tmp_path):

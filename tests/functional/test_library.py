@@ -386,7 +386,7 @@ def test_a_critical_value_of_a_case_with_an_accuracy():
     """On the mesh of the run, which that accuracy requires."""
     case = dj.case("dam", levels=40, law="friction", adhesion=0, accuracy="3%")
     limit = dj.critical(case)
-    assert limit.search.own["n_joint"] == dj.run(case).case["n_joint"] > case["n_joint"]
+    assert limit.search.case["n_joint"] == dj.run(case).case["n_joint"] > case["n_joint"]
     assert limit.confirmed and limit.mode == "sliding"
 
 

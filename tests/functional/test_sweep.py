@@ -279,7 +279,7 @@ def test_the_search_of_a_row_is_that_of_its_case():
         settings = base.source.overrides | row
         own = load("dam", settings, levels=base.levels, tail_levels=base.tail_levels)
         assert search.base == replace(varied(own, search.settings), published=False)
-        assert search.own == replace(own, published=False)
+        assert search.case == replace(own, published=False)
 
 
 @pytest.mark.usefixtures("no_pictures")

@@ -82,28 +82,28 @@ MOST_DOUBLED = 20
 class Search:
     """The search for a critical value."""
 
-    def __init__(self, own: Case, of: str) -> None:
-        """own: the case, of input.resolve.load; of: level, strength, uplift or a parameter.
+    def __init__(self, case: Case, of: str) -> None:
+        """case: of input.resolve.load; of: level, strength, uplift or a parameter.
 
         Raises InputError.
         """
-        assert own.source  # input.resolve.load has it
+        assert case.source  # input.resolve.load has it
         self.of, self.name = of, {"uplift": "drain_effectiveness"}.get(of, of)
         #: partial factors of the case; they are part of the reduced strength, not of a check
-        self.partial = {name: own[factor] for name, factor in PARTIAL.items()}
+        self.partial = {name: case[factor] for name, factor in PARTIAL.items()}
         full = dict.fromkeys(PARTIAL.values(), 1.0)
         self.settings: dict[str, Setting] = {
             **QUICK,
-            **own.source.overrides,
+            **case.source.overrides,
             "drive": "level",
             **full,
         }
-        own = own.with_values(full)
-        defaults = [joint for joint in own.joints if not joint.hardening_asked]
+        case = case.with_values(full)
+        defaults = [joint for joint in case.joints if not joint.hardening_asked]
         for name in {joint.law.hardening_parameter for joint in defaults} - {""}:
-            as_set = [joint[name] if joint.hardening_asked else 0.0 for joint in own.joints]
+            as_set = [joint[name] if joint.hardening_asked else 0.0 for joint in case.joints]
             self.settings[name] = of_each(as_set)
-        self.own = own
+        self.case = case
         #: called with a message on the progress
         self.on_progress: Callable[[str], None] = lambda message: None
         self.trials: list[Trial] = []
@@ -111,17 +111,17 @@ class Search:
         self.factor = ROUGH
         #: values on both sides of the gravity method's critical value
         self.guesses: list[float] = []
-        self.gravity = GravityValues(own, of, self.case_at, self.joints_at)
+        self.gravity = GravityValues(case, of, self.case_at, self.joints_at)
         self.check_quantity()
 
     def check_quantity(self) -> None:
         """Raise InputError if the case has nothing to vary."""
-        own = self.own
-        drained = own["uplift"] == "drained" or (own["uplift"] == "cracked" and own["drains"])
+        case = self.case
+        drained = case["uplift"] == "drained" or (case["uplift"] == "cracked" and case["drains"])
         if self.of == "uplift" and not drained:
             raise InputError(
-                f"--of uplift: needs drains; uplift = {own['uplift']}: must be drained, or cracked "
-                "with drains = 1"
+                f"--of uplift: needs drains; uplift = {case['uplift']}: must be drained, or "
+                "cracked with drains = 1"
             )
         if self.of in ("level", "strength"):
             return
@@ -135,7 +135,7 @@ class Search:
     @property
     def matters(self) -> bool:
         """Whether the parameter has an effect in the case, by its declaration."""
-        joints = (joint.values for joint in self.own.joints)
+        joints = (joint.values for joint in self.case.joints)
         return any(map(parameter(self.name).matters_in, joints))
 
     @property
@@ -154,8 +154,8 @@ class Search:
         """The case with the settings of the search; those that nothing else follows are set after
         Gmsh's parser, which the rows of a sweep then share.
         """
-        assert self.own.source
-        source, alone = self.own.source.with_overrides(self.settings), independent()
+        assert self.case.source
+        source, alone = self.case.source.with_overrides(self.settings), independent()
         overrides = source.overrides.items()
         single = {n: v for n, v in overrides if n in alone and not isinstance(v, tuple)}
         rest = {n: v for n, v in overrides if n not in single}
@@ -171,14 +171,14 @@ class Search:
         Raises InputError.
         """
         if self.of == "strength":
-            reduced = [self.reduced(joint, value) for joint in self.own.joints]
+            reduced = [self.reduced(joint, value) for joint in self.case.joints]
             changed = {n: of_each([values[n] for values in reduced]) for n in STRENGTH}
             changed["pena_rupture"] = -1.0
         elif self.name in independent():
             return self.base.changed({self.name: value})
         else:
             changed = {self.name: value}
-        return varied(self.own, self.settings | changed)
+        return varied(self.case, self.settings | changed)
 
     def reduced(self, joint: Case, factor: float) -> dict[str, float]:
         """The strength of a joint, divided by a factor and the partial factors."""
@@ -190,7 +190,7 @@ class Search:
         Raises InputError.
         """
         if self.of == "level":
-            return self.own.joints
+            return self.case.joints
         if self.of == "strength":  # without Gmsh's parser
             return [joint.with_values(self.reduced(joint, value)) for joint in self.base.joints]
         return self.case_at(value).joints
@@ -207,7 +207,7 @@ class Search:
         )
         highest = max(target or 0, *case.levels)  # water may press on the crest
         interface = interface_of(replace(case, levels=(*case.levels[:-1], highest)))
-        solver = {name: self.own[name] for name in QUICK}
+        solver = {name: self.case[name] for name in QUICK}
         path = FailurePath(case, interface, target, report, to_growth, solver=solver)
         self.trials.append(Trial(value, path))
         path.follow(self.factor)
@@ -233,10 +233,10 @@ class Search:
 
     def level(self) -> CriticalValue:
         """The highest level of the path, beyond the case's highest level."""
-        last = int(np.argmax(self.own.levels)) + 1
-        levels, tails = self.own.levels[:last], self.own.tail_levels[:last]
-        below = last < len(self.own.levels)
-        case = varied(self.own, self.settings, levels, tails) if below else self.base
+        last = int(np.argmax(self.case.levels)) + 1
+        levels, tails = self.case.levels[:last], self.case.tail_levels[:last]
+        below = last < len(self.case.levels)
+        case = varied(self.case, self.settings, levels, tails) if below else self.base
         path = self.path(max(case.levels), case, case.highest_level, to_growth=True)
         for _ in range(MOST_REPEATED):
             path.refine()  # first: a limit point that is known is confirmed sooner
@@ -334,7 +334,7 @@ class Search:
 
     def value(self) -> CriticalValue:
         """Search outwards from the case's own value for a stand and a failure, then bisect."""
-        first = self.trial(1.0 if self.of == "strength" else self.own[self.name])
+        first = self.trial(1.0 if self.of == "strength" else self.case[self.name])
         if self.of != "strength" and not self.matters:
             doubt = f"{result_of(first)} with any value: {self.name} has no effect; it needs "
             return self.no_limit(first, doubt + parameter(self.name).matters)
@@ -521,7 +521,7 @@ class Search:
             )
             reached = bound(last_state(self, top))
             if reached.mode:
-                where = self.own.named(reached.joints)
+                where = self.case.named(reached.joints)
                 why += f"; there {f'on {where} ' if where else ''}{words_of_bound(reached)}"
         else:
             mode, why, joint = self.by_statics(failing)
@@ -588,7 +588,7 @@ def outwards(value: float, end: float) -> Iterator[float]:
 def last_state(search: Search, point: Point) -> Results:
     """The results of an equilibrium and of the steps to it, with the user's own parameters."""
     case, history = point.model.case, point.history.copy()
-    required = {n: search.own[n] for n in (*QUICK, *DRIVE)}
+    required = {n: search.case[n] for n in (*QUICK, *DRIVE)}
     if point.state.time > history.saved_until:
         history.save(point.state)
     return history.results(case.with_values(required), stopped=False)

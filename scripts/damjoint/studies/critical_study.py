@@ -40,8 +40,8 @@ def critical(case: Case, of: str, out: Path | None = None) -> tuple[CriticalValu
     """
     engine_of(case, "auto")
     search = Search(case, of)
-    with session(search.own, out or Path("out") / f"{case.name}_critical") as study:
-        with preparation(search.own) as shown:
+    with session(search.case, out or Path("out") / f"{case.name}_critical") as study:
+        with preparation(search.case) as shown:
             search.on_progress = lambda message: shown.describe(f"{case.name}: {message}")
             try:
                 answer = search.run()
@@ -60,13 +60,13 @@ def table(search: Search) -> dict[str, np.ndarray]:
         {"trial": number, "value": trial.value, "stands": float(trial.stands)} | row(point)
         for number, trial, point in points
     ]
-    case = points[0][-1].model.case if points else search.own
+    case = points[0][-1].model.case if points else search.case
     return {name: np.array([cells[name] for cells in rows]) for name in critical_columns(case)}
 
 
 def printed_lines(answer: CriticalValue, search: Search) -> list[str]:
     """The printed lines."""
-    of, name, unit = search.of, search.own.name, search.unit
+    of, name, unit = search.of, search.case.name, search.unit
     if answer.value is None:
         lines = [f"{name}: no critical {of} found: {answer.doubt}"]
     else:
@@ -82,7 +82,7 @@ def printed_lines(answer: CriticalValue, search: Search) -> list[str]:
         lines.append(f"beyond the partial factors factor_mu = {mu:g}, factor_c = {cohesion:g}")
     if answer.point:
         hardens = any(law.hardens for law in answer.point.model.equilibrium.laws.laws)
-        if hardens and any(joint.hardening_asked for joint in search.own.joints):
+        if hardens and any(joint.hardening_asked for joint in search.case.joints):
             lines += filter(None, [statement(last_state(search, answer.point))])
     lines += filter(None, ["; ".join(answer.by_gravity(unit))])
     lines += answer.notes
@@ -128,7 +128,7 @@ def save(study: Session, search: Search, answer: CriticalValue) -> None:
     else:
         study.save_without_results(state or folders.COMPLETE, answer.doubt, entries)
     write_csv(study.out / "critical.csv", table(search))
-    picture.draw(content(search, answer), study.out / f"{search.own.name}_critical.png")
+    picture.draw(content(search, answer), study.out / f"{search.case.name}_critical.png")
 
 
 def solution_at(point: Point, result: Results) -> Solution:
@@ -146,7 +146,7 @@ def solution_at(point: Point, result: Results) -> Solution:
 def content(search: Search, answer: CriticalValue) -> picture.Content:
     """The content of the picture."""
     result = last_state(search, answer.point) if answer.point else None
-    what = search.own, search.of, search.unit, search.trials
+    what = search.case, search.of, search.unit, search.trials
     return picture.Content(*what, answer, result)
 
 
