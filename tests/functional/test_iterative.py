@@ -179,5 +179,13 @@ def test_bad_input(monkeypatch):
     with pytest.raises(InputError, match="must be one of auto, condensed, getdp"):
         quake_study.check(load("koyna", {"dim": 3.0}), quake_study.Options("iterative"))
     monkeypatch.setattr(memory, "available", lambda: 1e6)
-    with pytest.raises(RunError, match=r"memory: .* unknowns need about"):
+    with pytest.raises(RunError, match=r"memory: .* unknowns, .* on the joint, need about"):
         library.run(load("dam", SOLID), engine="iterative")
+
+
+@pytest.mark.parametrize("engine", ["auto", "iterative", "condensed"])
+def test_a_model_that_is_too_large_is_refused_before_its_mesh(engine):
+    memory.check_size(load("b"), engine)
+    case = load("b", {"n_joint": 1000.0, "n_layers": 1000.0})
+    with pytest.raises(RunError, match=r"memory: .* 3006003 of them on the joint, need about"):
+        memory.check_size(case, engine)

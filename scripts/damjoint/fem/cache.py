@@ -94,8 +94,8 @@ def cached(case: Case, engine: str = "condensed") -> tuple[Condensed, Bodies | N
     stored = read(path, header) if path and engine != "iterative" else None
     if stored:
         return stored, None
-    if not case.geometry and (engine == "condensed" or case["dim"] == 2):
-        check_size(case)
+    if not case.geometry:
+        check_size(case, engine)
     from .bodies import Bodies
     from .condensation import condense
 

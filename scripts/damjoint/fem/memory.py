@@ -115,11 +115,19 @@ def iterates(case: Case, bodies: Bodies) -> bool:
     return unknowns > max(ITERATED, PER_STEP * steps**STEPS_POWER) or needed > available()
 
 
-def check_size(case: Case) -> None:
-    """Raise RunError if the condensation of a case needs more memory than is available."""
+def check_size(case: Case, engine: str = "condensed") -> None:
+    """Raise RunError if a case certainly needs more memory than is available.
+
+    engine: condensed, iterative or auto, see `cached`. Of uncondensed bodies, which are checked
+    again after the mesh, a third of the estimate is counted, at least the unknowns of the joints.
+    """
     joint, bulk = joints_size(case), bulk_size(case)
     what = f"{bulk:.0f} unknowns, {joint} of them on the joint,"
-    check_memory(dense_memory(joint) + PER_UNKNOWN * bulk, what)
+    needed = dense_memory(joint) + PER_UNKNOWN * bulk
+    if case["dim"] == 3 and engine != "condensed":
+        uncondensed = PER_UNKNOWN_ITERATED * max(joint, bulk / 3)
+        needed = uncondensed if engine == "iterative" else min(needed, uncondensed)
+    check_memory(needed, what)
 
 
 def available() -> float:
