@@ -14,7 +14,7 @@ from damjoint_tools.bench_table import Measurements
 def test_the_short_benchmark_writes_consistent_files(command, tmp_path):
     assert command("bench", "--short", "--out", "bench")[0] == 0
     text = (tmp_path / "bench" / "benchmarks.md").read_text()
-    assert text.startswith("# Benchmarks\n") and text.count("\n## ") == 14
+    assert text.startswith("# Benchmarks\n") and text.count("\n## ") == 15
     assert (tmp_path / "bench" / "accuracy.png").read_bytes()[:4] == b"\x89PNG"
     *lines, blank, source = (tmp_path / "bench" / "modelings.md").read_text().splitlines()
     assert len(lines) == 13 and not blank and source in text
@@ -55,6 +55,7 @@ def test_the_short_benchmark_writes_consistent_files(command, tmp_path):
     assert files["case"] == "c" and float(files["both over tables"]) > 1
     assert all(row["confirmed"] == "yes" for row in table("critical"))
     assert all(float(row["difference"]) < 1e-9 for row in table("orders"))
+    assert [row["engine"] for row in table("engines")] == ["condensed", "iterative"]
 
 
 @pytest.mark.heavy
