@@ -55,23 +55,36 @@ def test_sliding_by_the_share_of_the_shear_strength(law, share, slides):
     assert ("reaches the shear strength" in statement_of(result)) == slides
 
 
+def with_joint(law, damage, stress):
+    """A stopped run whose joint has a damage and an effective normal stress [Pa] everywhere."""
+    result = stopped(law)
+    ends = np.array([0, result.case.joint_along])
+    columns = dict.fromkeys(("time", "joint"), np.ones(2)) | dict.fromkeys(("x", "s"), ends)
+    columns |= {n: np.zeros(2) for n in ("slip", "y", "z")}
+    columns |= {"damage": np.full(2, damage), "sigma_n_eff": np.full(2, stress)}
+    result.joint.update(columns)
+    return result
+
+
 def test_sliding_of_a_bond_by_its_undamaged_cohesion():
     """Half of c L at damage 1/2; all of friction."""
     for law, left in (("bond", 0.5), ("friction", 1.0)):
-        result = stopped(law)
-        length = result.case.joint_along
-        half = {
-            "time": np.ones(2),
-            "joint": np.ones(2),
-            "x": np.array([0, length]),
-            "y": np.zeros(2),
-            "s": np.array([0, length]),
-        }
-        result.joint.update(
-            half | {n: np.zeros(2) for n in ("slip", "y", "z")} | {"damage": np.full(2, 0.5)}
-        )
+        result = with_joint(law, 0.5, 0.0)
         assert verdict.shear_resistance(result, 0.0) == pytest.approx(
-            left * result.case["adhesion"] * length
+            left * result.case["adhesion"] * result.case.joint_along
+        )
+
+
+def test_tension_presses_on_the_rest_of_a_bond():
+    """N is the pressure less the tension: the friction of a bond acts on the pressure, that of the
+    law friction, whose tension takes from the cohesion, on N.
+    """
+    tension = 1e5
+    for law, pressed in (("bond", tension), ("friction", 0.0)):
+        result = with_joint(law, 0.0, tension)
+        case, length = result.case, result.case.joint_along
+        assert verdict.shear_resistance(result, N) == pytest.approx(
+            case["mu"] * (N + pressed * length) + case["adhesion"] * length
         )
 
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .. import ROUND_OFF
+from ..arrays import Array
 from ..input.case import Case
 from ..input.values import freezes_uplift
 from ..model.loads import COMPLETE, thermal_strains
@@ -160,10 +161,16 @@ def why_stopped(results: Results) -> Failure:
 
 def shear_resistance(results: Results, normal: float) -> float:
     """Shear force [N/m] that the joint, the only one of these results, transmits at the last saved
-    state under an effective normal force; infinite if its law does not bound the shear.
+    state under an effective normal force: mu N and, point by point, what the law has more than mu
+    times the pressure. Tension presses on the other points. Infinite if its law has no bound.
     """
-    case, damage, slip = results.case, mean(results, "damage"), mean(results, "slip")
-    return case.law.shear_resistance(normal, case.joint_along, damage, slip)
+    law, length = results.case.law, results.case.joint_along
+    if not len(results.joint["time"]):
+        return law.shear_resistance(normal, length, 0.0, 0.0)
+    rows = results.at()
+    stress = rows["sigma_n_eff"]
+    more = law.shear_strength(stress, rows["damage"], rows["slip"]) + law.mu * stress
+    return law.mu * normal + mean_along(rows["s"], more) * length
 
 
 #: Relative distance to a bound of statics within which a state has reached it: the last step of a
@@ -271,16 +278,11 @@ def highest_on_joint(case: Case, last: dict[str, float]) -> tuple[float, str, st
     return min(bounds)
 
 
-def mean(results: Results, column: str) -> float:
-    """The mean of a column along the only joint of these results at the last saved state; 0 if
-    there is none.
-    """
-    if not len(results.joint["time"]):
-        return 0.0
-    rows = results.at()
-    place, inverse = np.unique(rows["s"].round(9), return_inverse=True)
-    values = np.bincount(inverse, rows[column]) / np.bincount(inverse)
-    return float(np.sum((values[1:] + values[:-1]) / 2 * np.diff(place)) / np.ptp(place))
+def mean_along(s: Array, values: Array) -> float:
+    """The mean of values (n,) at positions s (n,) [m] along a joint, some of which may be equal."""
+    position, inverse = np.unique(s.round(9), return_inverse=True)
+    values = np.bincount(inverse, values) / np.bincount(inverse)
+    return float(np.sum((values[1:] + values[:-1]) / 2 * np.diff(position)) / np.ptp(position))
 
 
 #: K_N h/E beyond which a joint is stiff for its mesh: the published points make its node stresses
