@@ -20,7 +20,7 @@ from damjoint.input.parameters import declared
 from damjoint.laws import COLUMNS
 from damjoint.model.results import FLUX, HISTORY, JOINT, LATERAL, MODES, QUAKE, STEPS, THICKNESS
 from damjoint.post.validation import Comparison
-from damjoint.statics.gravity import LOADS
+from damjoint.statics.rigid_block import LOADS
 from damjoint.studies.check import CHECK
 from damjoint.studies.failure_path import CRITICAL
 

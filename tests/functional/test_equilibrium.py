@@ -8,6 +8,8 @@ from closed_forms import BASE, CENTROID, WATER, WEIGHT, integral, resultants, sl
 from damjoint import InputError, runner
 from damjoint.input.resolve import load
 from damjoint.statics import gravity
+from damjoint.statics.rigid_block import RigidBlock
+from damjoint.statics.uplift import Uplift
 from numpy.testing import assert_allclose
 
 
@@ -136,7 +138,7 @@ def test_the_head_at_the_heel_is_above_the_reservoir_by_the_offset(tmp_path, eng
     assert result.last["N"] == pytest.approx(
         resultants(8.9, 0, False)[0] - 9 * WATER * 5 / 2, rel=1e-6
     )
-    uplift = gravity.Uplift(case, gravity.RigidBlock(case), 8.9, 0, 0)
+    uplift = Uplift(case, RigidBlock(case), 8.9, 0, 0)
     assert uplift.force == pytest.approx(9 * WATER * 5 / 2)
 
 

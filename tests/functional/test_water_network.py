@@ -13,6 +13,8 @@ from damjoint.model.loads import Loading
 from damjoint.solver.load_stepper import LoadStepper
 from damjoint.solver.model import Model
 from damjoint.statics import gravity
+from damjoint.statics.rigid_block import RigidBlock
+from damjoint.statics.uplift import Uplift
 from damjoint.studies.report_input import limits
 
 WATER = 9810.0
@@ -328,8 +330,8 @@ def test_the_gravity_method_has_the_same_uplift(model, uplift, settings):
     built = model(uplift, [9.0], [2.0], **settings)
     level, tail = 9.0, 2.0
     for number, own in enumerate(built.case.joints):
-        body = gravity.RigidBlock(own)
-        found = gravity.Uplift(own, body, level, tail, 0.0)
+        body = RigidBlock(own)
+        found = Uplift(own, body, level, tail, 0.0)
         water = built.equilibrium.water[number]
         points, joint = water.wetted.points, water.joint
         pressure = pressures(built, level, tail)[2][number].water_points
@@ -346,15 +348,15 @@ def test_the_gravity_method_of_a_crack_on_a_path(model):
     """A crack of 5 m at the inner heel conducts freely: of 15 m of the path 10 m are left."""
     built = model(("cracked", "cracked", "none"), [9.0], [0.0])
     first, second, _ = built.case.joints
-    found = gravity.Uplift(second, gravity.RigidBlock(second), 9.0, 0.0, 2.5)
+    found = Uplift(second, RigidBlock(second), 9.0, 0.0, 2.5)
     middle = 9 * (1 - 10 / 12.5)
     assert found.p[0] == pytest.approx(WATER * middle)
     assert found.force == pytest.approx(WATER * (middle * 2.5 + middle * 2.5 / 2))
-    found = gravity.Uplift(first, gravity.RigidBlock(first), 9.0, 0.0, 5.0)
+    found = Uplift(first, RigidBlock(first), 9.0, 0.0, 5.0)
     assert found.force == pytest.approx(WATER * (9 * 5 + (9 + 4.5) / 2 * 5))
     drained = model(("cracked",) * 2 + ("none",), drains=(1.0, 0.0, 0.0), drain_x=6.0)
     first, second, _ = drained.case.joints
-    found = gravity.Uplift(first, gravity.RigidBlock(first), 9.0, 0.0, 3.0)
+    found = Uplift(first, RigidBlock(first), 9.0, 0.0, 3.0)
     at = 0.5 * 9 * 9 / 12
     assert found.force == pytest.approx(
         WATER * (9 * 3 + (9 + at) / 2 * 3 + (at + at * 5 / 9) / 2 * 4)
@@ -374,14 +376,14 @@ def test_the_gravity_method_of_several_heels(model):
     for own, length, ends in zip(
         built.case.joints, LENGTHS, ([12, 6], [6, 0], [12, 6]), strict=True
     ):
-        found = gravity.Uplift(own, gravity.RigidBlock(own), 12.0, 0.0, 0.0)
+        found = Uplift(own, RigidBlock(own), 12.0, 0.0, 0.0)
         bottom = 0.5 * 10**2 if length == 10 and own.section["heel_y"][0] else 0.0
         assert found.force == pytest.approx(WATER * (sum(ends) / 2 * length - bottom))
     with pytest.raises(InputError, match="uplift = imposed: has no gravity method where joints"):
-        gravity.Uplift(own, gravity.RigidBlock(own), 12.0, 11.0, 0.0)
+        Uplift(own, RigidBlock(own), 12.0, 11.0, 0.0)
     own = model("imposed", [12.0], joints=BASES | {"contraction": (10, 0, 10, 10)}).case.joints[0]
     with pytest.raises(InputError, match="uplift = imposed: has no gravity method where joints"):
-        gravity.Uplift(own, gravity.RigidBlock(own), 12.0, 0.0, 0.0)
+        Uplift(own, RigidBlock(own), 12.0, 0.0, 0.0)
     assert gravity.of_state(own, {}, {"time": 1.0}) is None
 
 

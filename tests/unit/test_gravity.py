@@ -17,6 +17,8 @@ from closed_forms import (
 )
 from damjoint.input.resolve import load
 from damjoint.statics import gravity
+from damjoint.statics.rigid_block import RigidBlock
+from damjoint.statics.uplift import Uplift
 from numpy.testing import assert_allclose
 from scipy.integrate import quad
 from scipy.optimize import brentq
@@ -298,7 +300,7 @@ def test_zangar(section, angle):
 def test_weight_by_slices(section):
     """Area and first moments of the upper body by integration of its width."""
     case = load("dam", SECTIONS[section])
-    body = gravity.RigidBlock(case)
+    body = RigidBlock(case)
     (x0, y0), bottom = body.toe, min(body.toe[1], body.heel[1])
 
     def ends(y):
@@ -427,7 +429,7 @@ def test_heads_are_measured_from_the_joint():
     """On a lift joint at 8 m: none from a tailwater at 3 m; on a slope from each end."""
     found = gravity.at(large({"joint_height": 8.0}), 1).uplift
     assert_allclose(found.p, np.array([37, 37, 0]) * WATER)
-    length = gravity.RigidBlock(large({"joint_height": 8.0})).length
+    length = RigidBlock(large({"joint_height": 8.0})).length
     assert found.force == pytest.approx(WATER * 37 * length / 2)
     assert found.moment == pytest.approx(WATER * 37 * length**2 / 3)
     case = large({"joint_slope": -5.0})
@@ -453,7 +455,7 @@ DRAINS = {"waterstop": 1.5, "drain_x": 4.0, "drain_effectiveness": 0.5, "drain_l
 )
 def test_uplift_rules(mode, crack, places, heads):
     case = large(DRAINS | {"uplift": mode, "drains": 1.0})
-    found = gravity.Uplift(case, gravity.RigidBlock(case), 45, 3, crack)
+    found = Uplift(case, RigidBlock(case), 45, 3, crack)
     assert_allclose(found.s, places)
     assert_allclose(found.p, np.array(heads) * WATER)
     pressure = lambda s: np.interp(s, found.s, found.p)
@@ -468,8 +470,8 @@ def test_uplift_rules(mode, crack, places, heads):
 def test_head_in_an_inclined_crack(mode, slope):
     """The reservoir's, at each height; beyond the tip linear to the toe's."""
     case = large({"uplift": mode, "joint_slope": slope})
-    body = gravity.RigidBlock(case)
-    found = gravity.Uplift(case, body, 45, 3, 9.0)
+    body = RigidBlock(case)
+    found = Uplift(case, body, 45, 3, 9.0)
     assert_allclose(found.s, [0, 9, body.length])
     heights = 9 * math.sin(math.radians(slope)), 34 * math.tan(math.radians(slope))
     heads = [45, 45 - heights[0], max(3 - heights[1], 0)]
@@ -498,7 +500,7 @@ def test_uplift_between_dry_ends(mode, slope, level, tail):
     """
     settings = {"joint_height": 5.0, "joint_slope": slope, "uplift": mode}
     case = large(settings | {"drain_effectiveness": 0.0})
-    body = gravity.RigidBlock(case)
+    body = RigidBlock(case)
     (_, heel), (_, toe), length = body.heel, body.toe, body.length
     wet = [w for w, y in ((level, heel), (tail, toe)) if w > y]
     if mode in ("imposed", "drained") or not wet:
@@ -508,7 +510,7 @@ def test_uplift_between_dry_ends(mode, slope, level, tail):
         heads = [w if w > y else min(y, *wet) for w, y in ((level, heel), (tail, toe))]
         head = lambda s: heads[0] + (heads[1] - heads[0]) * s / length
         exact = lambda s: max(head(s) - heel - (toe - heel) * s / length, 0)
-    found = gravity.Uplift(case, body, level, tail, 0.0)
+    found = Uplift(case, body, level, tail, 0.0)
     s = np.linspace(0, length, 50)
     assert_allclose(np.interp(s, found.s, found.p) / WATER, [exact(x) for x in s], atol=1e-9)
 
@@ -589,7 +591,7 @@ def test_all_crack_lengths_in_equilibrium_are_found(seed):
     at_tip = case.law.open_tension
 
     def too_much(crack):
-        uplift = gravity.Uplift(case, first.body, first.level, first.tail_level, crack)
+        uplift = Uplift(case, first.body, first.level, first.tail_level, crack)
         state = replace(first, crack_length=crack, uplift=uplift, further=())
         return state.tip_stress > at_tip
 

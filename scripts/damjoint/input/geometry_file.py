@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from pathlib import Path
+from typing import TypeAlias
 
-from .. import RUN_GEO, InputError, data
+from .. import RUN_GEO, InputError, RunError, data
 from ..arrays import Value
 from .parameters import assignments, start_gmsh
 
@@ -43,6 +45,8 @@ def geometry_file(name: str) -> Path:
     )
 
 
+#: Path, time of the last change and size of files.
+FileStates: TypeAlias = tuple[tuple[Path, int, int], ...]
 #: First bytes of a mesh in Gmsh's format.
 MESH = b"$MeshFormat"
 
@@ -74,40 +78,61 @@ def files_of(path: Path, known: dict[Path, str]) -> dict[Path, str]:
     return known
 
 
+def state_of(path: Path) -> tuple[FileStates, set[str]]:
+    """The present state of the files of a user's own geometry, and the words in a .geo file, among
+    them the parameters that it uses.
+    """
+    texts = files_of(path, {}) if path.suffix == ".geo" else {path: ""}
+    files = ((file, file.stat()) for file in texts)
+    words = set(re.findall(r"\w+", " ".join(texts.values())))
+    return tuple((file, state.st_mtime_ns, state.st_size) for file, state in files), words
+
+
+@contextlib.contextmanager
+def opened(geometry: Path | None, settings: str) -> Iterator[None]:
+    """Open a user's own geometry in Gmsh, else the section; a .geo file after settings as text.
+
+    Raises InputError if Gmsh refuses the user's file, also in the block; RunError of the section.
+    """
+    gmsh, source = start_gmsh(), geometry or data("geo") / "dam.geo"
+    gmsh.parser.clear()
+    gmsh.onelab.clear()
+    # in a folder of its own: Gmsh runs a file of options, FILE.opt, beside the file it opens
+    with tempfile.TemporaryDirectory(prefix="damjoint-") as folder:
+        path = Path(folder) / f"scene{source.suffix}"
+        if source.suffix == ".geo":
+            path.write_text(f'{settings}Include "{source}";\n')
+        else:
+            path.symlink_to(source)
+        try:
+            gmsh.open(str(path))
+            yield
+        except Exception as error:  # what gmsh raises
+            if not geometry:
+                raise RunError(f"mesh: {error}") from None
+            gmsh.finalize()  # else Gmsh remains busy with a file that it could not read
+            raise InputError(f"geometry = {geometry}: {error}") from None
+
+
 def joints_in(path: Path, values: Mapping[str, Value]) -> tuple[str, ...]:
     """The names of the joints of a user's own geometry, in the mesh's order, without its mesh.
 
     values: of all parameters, of which a .geo file may use some. Raises InputError if it can not
     be read.
     """
-    texts = files_of(path, {}) if path.suffix == ".geo" else {path: ""}
-    words = set(re.findall(r"\w+", " ".join(texts.values())))
+    files, words = state_of(path)
     used = {n: v for n, v in values.items() if n in words or f"default_{n}" in words}
-    states = tuple((file, file.stat().st_mtime_ns, file.stat().st_size) for file in texts)
-    return joints_by_gmsh(states, assignments(used), assignments(values))
+    return joints_by_gmsh(files, assignments(used), assignments(values))
 
 
 @lru_cache(maxsize=4)
-def joints_by_gmsh(
-    states: tuple[tuple[Path, int, int], ...], used: str, values: str
-) -> tuple[str, ...]:
+def joints_by_gmsh(files: FileStates, used: str, values: str) -> tuple[str, ...]:
     """See `joints_in`; Gmsh's current model remains."""
-    gmsh, (path, _, _) = start_gmsh(), states[0]
+    gmsh, (path, _, _) = start_gmsh(), files[0]
     before = gmsh.model.getCurrent() if gmsh.model.list() else ""
-    gmsh.parser.clear()
-    gmsh.onelab.clear()
-    with tempfile.TemporaryDirectory(prefix="damjoint-") as folder:
-        file = Path(folder) / f"joints{path.suffix}"
-        if path.suffix == ".geo":
-            file.write_text(values + f'Include "{path}";\n')
-        else:
-            file.symlink_to(path)
-        try:
-            gmsh.open(str(file))
-        except Exception as error:  # what gmsh raises
-            gmsh.finalize()  # else Gmsh remains busy with a file that it could not read
-            raise InputError(f"geometry = {path}: {error}") from None
-    names = [gmsh.model.getPhysicalName(*group) for group in gmsh.model.getPhysicalGroups()]
+    with opened(path, values):
+        groups = gmsh.model.getPhysicalGroups()
+        names = [gmsh.model.getPhysicalName(*group) for group in groups]
     gmsh.model.remove()
     if before:
         gmsh.model.setCurrent(before)

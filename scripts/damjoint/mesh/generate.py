@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 
-from .. import InputError, RunError, data
 from ..arrays import Setting
 from ..input.case import Case
+from ..input.geometry_file import opened
 from ..input.parameters import assignments, listing, start_gmsh
 from ..input.values import has_drains
 
@@ -64,33 +63,15 @@ def generate(case: Case) -> None:
 
     Raises RunError, and InputError if a user's own geometry can not be read.
     """
-    import tempfile
-
-    gmsh = start_gmsh()
+    gmsh, geometry = start_gmsh(), case.geometry
     gmsh.clear()
-    gmsh.parser.clear()
-    gmsh.onelab.clear()
     for option in SIZE_OPTIONS:  # of an earlier geometry in this process
         gmsh.option.setNumber(f"Mesh.{option}", 1)
-    geometry = case.geometry
-    # in a folder of its own: Gmsh runs a file of options, FILE.opt, beside the file it opens
-    with tempfile.TemporaryDirectory(prefix="damjoint-") as folder:
-        path = Path(folder) / f"scene{geometry.suffix if geometry else '.geo'}"
-        if not geometry:
-            path.write_text(as_text(shares(case)) + f'Include "{data("geo")}/dam.geo";\n')
-        elif geometry.suffix == ".geo":  # it may take sizes from the case
-            path.write_text(assignments(case.values) + f'Include "{geometry}";\n')
-        else:
-            path.symlink_to(geometry)
-        try:
-            gmsh.open(str(path))
-            if not len(gmsh.model.mesh.getElements(int(case["dim"]))[0]):
-                gmsh.model.mesh.generate(int(case["dim"]))
-        except Exception as error:  # what gmsh raises
-            if geometry:
-                gmsh.finalize()  # else Gmsh remains busy with a file that it could not read
-                raise InputError(f"geometry = {geometry}: {error}") from None
-            raise RunError(f"mesh: {error}") from None
+    # a .geo file of a user may take sizes from the case
+    settings = assignments(case.values) if geometry else as_text(shares(case))
+    with opened(geometry, settings):
+        if not len(gmsh.model.mesh.getElements(int(case["dim"]))[0]):
+            gmsh.model.mesh.generate(int(case["dim"]))
     if geometry:
         # format MSH 2.2 has an element once for each of its groups: a point that is heel and toe
         ends = [e for d in range(int(case["dim"]) - 1) for e in gmsh.model.getEntities(d)]

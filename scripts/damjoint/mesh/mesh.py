@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import time
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
@@ -14,7 +13,7 @@ from .. import InputError, RunError
 from ..arrays import IntArray, Setting
 from ..input.case import Case
 from ..input.constraints import check_levels_on_mesh, check_strain
-from ..input.geometry_file import files_of
+from ..input.geometry_file import FileStates, state_of
 from ..input.parameters import constants, start_gmsh
 from ..input.scene import SIDES, Joint, numbered, stacked
 from ..storage import check_end
@@ -47,8 +46,7 @@ class GeometryFiles:
     on: the parameters of a section's mesh, and those that a .geo file names.
     """
 
-    #: path, time of the last change, size
-    files: tuple[tuple[Path, int, int], ...]
+    files: FileStates
     parameters: tuple[tuple[str, Setting], ...]
     #: for making the mesh
     case: Case = field(compare=False)
@@ -66,10 +64,7 @@ def mesh_of(case: Case) -> Mesh:
     """
     if not case.geometry:
         return Mesh(case)
-    texts = files_of(case.geometry, {}) if case.geometry.suffix == ".geo" else {case.geometry: ""}
-    states = ((path, path.stat()) for path in texts)
-    files = tuple((path, state.st_mtime_ns, state.st_size) for path, state in states)
-    words = set(re.findall(r"\w+", " ".join(texts.values())))
+    files, words = state_of(case.geometry)
     used = shares(case) | {n: v for n, v in case.values.items() if n in words}
     geometry = GeometryFiles(files, tuple(used.items()), case)
     mesh = mesh_of_files(geometry)

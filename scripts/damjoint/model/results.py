@@ -106,13 +106,17 @@ def row_of_joint(row: dict[str, float], joint: int) -> dict[str, float]:
     return row | {name: row[column] for name, column in names.items() if column in row}
 
 
-def with_all_joints(columns: Columns, case: Case) -> Columns:
-    """Columns of the first joint's table, then those of each further joint."""
+def with_all_joints(
+    columns: Columns, case: Case, of_joints: Collection[str] = HISTORY_OF_JOINTS
+) -> Columns:
+    """Columns of the first joint's table, then those of each further joint, which `of_joints`
+    names.
+    """
     others = {
         column_of(name, k): (columns[name][0], f"{joint}: {columns[name][1]}")
         for k, joint in enumerate(case.joint_names)
         if k
-        for name in HISTORY_OF_JOINTS
+        for name in of_joints
         if name in columns
     }
     return columns | others
@@ -168,15 +172,9 @@ MODES = {
 }
 
 
-def quake_columns(case: Case) -> dict[str, tuple[str, str]]:
+def quake_columns(case: Case) -> Columns:
     """The columns of a case's quake.csv: unit and meaning."""
-    others = {
-        column_of(name, k): (QUAKE[name][0], f"{joint}: {QUAKE[name][1]}")
-        for k, joint in enumerate(case.joint_names)
-        if k
-        for name in QUAKE_OF_JOINTS
-    }
-    return QUAKE | others
+    return with_all_joints(QUAKE, case, QUAKE_OF_JOINTS)
 
 
 @dataclass

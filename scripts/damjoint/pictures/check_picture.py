@@ -18,7 +18,8 @@ from ..input.scene import BED, DOWN, FLOOR, UP
 from ..model.fields import BROKEN, SOFTENING, along, state_of
 from ..model.loads import Loading
 from ..model.results import Results
-from ..statics.gravity import GravityMethod, RigidBlock
+from ..statics.gravity import GravityMethod
+from ..statics.rigid_block import RigidBlock
 from ..units import STRESSES, unit
 from .drawing import (
     BLUE,

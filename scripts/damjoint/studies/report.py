@@ -25,7 +25,8 @@ from ..pictures.drawing import figure_of, picture_style
 from ..post import stored
 from ..post.summary import Table, joints_table, levels_table, table_of
 from ..post.validation import shown_time
-from ..statics.gravity import GravityMethod, force, resultant_of
+from ..statics.gravity import GravityMethod
+from ..statics.rigid_block import force, resultant_of
 from ..statics.verdict import stiffness_ratio
 from ..storage import atomic_write
 from ..units import FORCES, MOMENTS, Units, unit
