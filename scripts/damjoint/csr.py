@@ -50,15 +50,15 @@ class CsrMatrix:
     def of_entries(
         values: Array, rows: IntArray, columns: IntArray, shape: tuple[int, int]
     ) -> CsrMatrix:
-        """The matrix of entries; those of the same place are added."""
+        """The matrix of entries; those of the same row and column are added."""
         if len(values) > LARGER:
             from scipy import sparse
 
             return CsrMatrix.of_scipy(sparse.coo_matrix((values, (rows, columns)), shape))
-        places, inverse = np.unique(rows * np.int64(shape[1]) + columns, return_inverse=True)
-        row, column = np.divmod(places, max(shape[1], 1))
+        codes, inverse = np.unique(rows * np.int64(shape[1]) + columns, return_inverse=True)
+        row, column = np.divmod(codes, max(shape[1], 1))
         pointers = np.searchsorted(row, np.arange(shape[0] + 1))
-        summed = np.asarray(np.bincount(inverse, values, len(places)), float)
+        summed = np.asarray(np.bincount(inverse, values, len(codes)), float)
         return CsrMatrix(summed, column, pointers, shape)
 
     @staticmethod
@@ -81,7 +81,7 @@ class CsrMatrix:
 
     @cached_property
     def dense(self) -> Array:
-        """The same, kept for products of a small matrix."""
+        """The same, stored for products of a small matrix."""
         return self.toarray()
 
     def add_to(self, dense: Array) -> None:
@@ -159,10 +159,10 @@ class CsrMatrix:
         number[columns] = np.arange(len(columns))
         return self.where(number[self.indices] >= 0).renumbered(number, len(columns))
 
-    def where(self, kept: np.ndarray) -> CsrMatrix:
+    def where(self, chosen: np.ndarray) -> CsrMatrix:
         """Some of the entries, by a mask."""
-        pointers = np.concatenate([[0], np.cumsum(kept)])[self.indptr]
-        return CsrMatrix(self.data[kept], self.indices[kept], pointers, self.shape)
+        pointers = np.concatenate([[0], np.cumsum(chosen)])[self.indptr]
+        return CsrMatrix(self.data[chosen], self.indices[chosen], pointers, self.shape)
 
     def renumbered(self, number: IntArray, size: int) -> CsrMatrix:
         """The same with the number of each column among `size` columns."""

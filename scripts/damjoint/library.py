@@ -803,8 +803,8 @@ class Modes:
     """The natural modes of a case, made by `modes`.
 
     Example:
-        >>> found = modes(case("dam", levels=40, n_joint=10, order=1), number=2)
-        >>> found.units["frequency"], found.rows.mode.tolist()
+        >>> natural = modes(case("dam", levels=40, n_joint=10, order=1), number=2)
+        >>> natural.units["frequency"], natural.rows.mode.tolist()
         ('Hz', [1, 2, 1, 2, 1, 2, 1, 2])
     """
 
@@ -860,8 +860,8 @@ def modes(source: Case | str | Path = "dam", *, number: int = 5) -> Modes:
         RunError: too little memory.
 
     Example:
-        >>> found = modes(case("dam", levels=40, n_joint=10, order=1), number=2)
-        >>> sorted(set(found.rows.rock.tolist())), len(found.frequencies)
+        >>> natural = modes(case("dam", levels=40, n_joint=10, order=1), number=2)
+        >>> sorted(set(natural.rows.rock.tolist())), len(natural.frequencies)
         (['massless', 'rigid'], 2)
     """
     from .studies import modes_study

@@ -116,7 +116,7 @@ def solve_lower(factor: Array, right: Array) -> Array:
 
 
 def add_at(total: Array, indices: Any, values: Array) -> None:
-    """Add values at places of an array, which may be repeated."""
+    """Add values at positions of an array, which may be repeated."""
     rows = np.ravel(indices[0] if isinstance(indices, tuple) else indices)
     if len(distinct(rows)) == len(rows):
         total[indices] += values  # several times faster

@@ -28,7 +28,7 @@ from .uncondensed import Uncondensed
 
 #: Number of unknowns up to which a level is the coarsest, and solved by a dense inverse.
 COARSEST = 600
-#: Size of the block that couples two places over those of both on the diagonal from which on the
+#: Size of the block that couples two nodes over those of both on the diagonal from which on the
 #: coupling is strong: only along strong ones are aggregates formed, across thin elements.
 STRONG = 0.02
 #: Degree of Chebyshev's polynomial, and largest over smallest eigenvalue that it damps.
@@ -41,8 +41,8 @@ POWER_ITERATIONS, RAISED = 12, 1.1
 
 @dataclass(frozen=True)
 class Level:
-    """A level of n unknowns and the way to the next one, of m unknowns; in single precision, as it
-    preconditions only.
+    """A level of n unknowns and the interpolation from the next one, of m unknowns; in single
+    precision, as it preconditions only.
     """
 
     #: K (n, n), and the inverse of the blocks of its diagonal
@@ -51,12 +51,12 @@ class Level:
     #: P (n, m) and P^T
     prolongation: Sparse
     restriction: Sparse
-    #: unknowns on which the joints act (l,), and all of those places (k,)
+    #: unknowns on which the joints act (l,), and all of those nodes (k,)
     joint: IntArray
     beside: IntArray
-    #: K and the places (k,) of the latter
+    #: K and the nodes (k,) of the latter
     beside_stiffness: Sparse
-    beside_place: IntArray
+    beside_node: IntArray
     #: from the unknowns on which the joints act to those of the next level (l, ...)
     joint_prolongation: Sparse
 
@@ -102,22 +102,22 @@ class Multigrid:
     """The levels of the bodies; `cycle_with` makes a preconditioner of them."""
 
     def __init__(self, bodies: Uncondensed) -> None:
-        matrix, rigid, body, place = bodies.elastic, bodies.rigid, bodies.body, bodies.place
+        matrix, rigid, body, node = bodies.elastic, bodies.rigid, bodies.body, bodies.node
         number, joint = int(body.max()) + 1, bodies.on_joints
         #: the unknowns on which the joints act
         self.joint = joint
         self.levels: list[Level] = []
         while matrix.shape[0] > COARSEST:
-            place = np.unique(place, return_inverse=True)[1]
-            inverse = block_inverse(matrix, place)
-            largest = largest_eigenvalue(inverse.dot, matrix.dot, len(place))
+            node = np.unique(node, return_inverse=True)[1]
+            inverse = block_inverse(matrix, node)
+            largest = largest_eigenvalue(inverse.dot, matrix.dot, len(node))
             parts, part = np.unique(
-                aggregates(graph(matrix, place, rigid))[place] * number + body, return_inverse=True
+                aggregates(graph(matrix, node, rigid))[node] * number + body, return_inverse=True
             )
             tentative, rigid, owner = tentative_prolongation(part, rigid)
             smoothed = tentative - inverse @ (matrix @ tentative) * (4 / 3 / largest)
             restriction = smoothed.T.tocsr()
-            beside = np.flatnonzero(np.isin(place, place[joint]))
+            beside = np.flatnonzero(np.isin(node, node[joint]))
             from_joint = smoothed[joint]
             below = distinct(from_joint.indices)
             level = Level(
@@ -128,12 +128,12 @@ class Multigrid:
                 joint=joint,
                 beside=beside,
                 beside_stiffness=matrix[beside][:, beside],
-                beside_place=np.unique(place[beside], return_inverse=True)[1],
+                beside_node=np.unique(node[beside], return_inverse=True)[1],
                 joint_prolongation=from_joint[:, below],
             )
             self.levels.append(level)
             matrix, joint = (restriction @ (matrix @ smoothed)).tocsr(), below
-            place, body = np.divmod(parts[owner], number)
+            node, body = np.divmod(parts[owner], number)
         #: K of the coarsest level, and the unknowns there on which the joints act
         self.coarsest: Array = matrix.toarray()
         self.coarsest_joint = joint
@@ -150,7 +150,7 @@ class Multigrid:
             added = sparse.csr_matrix(
                 (entries.data, (at[entries.row], at[entries.col])), (size, size)
             )
-            blocks = block_inverse(level.beside_stiffness + added, level.beside_place)
+            blocks = block_inverse(level.beside_stiffness + added, level.beside_node)
             smoother = Smoother(level, single(joints), single(blocks))
             size = level.stiffness.shape[0]
             largest = largest_eigenvalue(smoother.scaled, smoother.product, size)
@@ -177,31 +177,31 @@ def single(values: Any) -> Any:
     return values.astype(np.float32)
 
 
-def graph(matrix: Sparse, place: IntArray, rigid: Array) -> Sparse:
-    """Which places a matrix (n, n) couples strongly, each with itself; without unknowns that have
+def graph(matrix: Sparse, node: IntArray, rigid: Array) -> Sparse:
+    """Which nodes a matrix (n, n) couples strongly, each with itself; without unknowns that have
     no part in rigid motions (n, 6).
     """
     used = np.flatnonzero(rigid.any(axis=1))
-    shape = len(place), int(place.max()) + 1
-    at = sparse.csr_matrix((np.ones(len(used), np.float32), (used, place[used])), shape)
+    shape = len(node), int(node.max()) + 1
+    at = sparse.csr_matrix((np.ones(len(used), np.float32), (used, node[used])), shape)
     squares = at.T @ (single(matrix).power(2) @ at)
     size = np.sqrt(squares.diagonal())
     squares = squares.tocoo()
     strong = squares.data >= STRONG**2 * size[squares.row] * size[squares.col]
-    places = np.arange(shape[1])
-    rows, columns = (np.append(part[strong], places) for part in (squares.row, squares.col))
+    nodes = np.arange(shape[1])
+    rows, columns = (np.append(part[strong], nodes) for part in (squares.row, squares.col))
     return sparse.csr_matrix((np.ones(len(rows), np.int8), (rows, columns)), (shape[1],) * 2)
 
 
 def aggregates(graph: Sparse) -> IntArray:
-    """Number of the aggregate of each place of a graph: what is around roots no two of which have a
+    """Number of the aggregate of each node of a graph: what is around roots no two of which have a
     neighbour in common, the first ones in a random order.
     """
     size = graph.shape[0]
     rank = np.random.default_rng(0).permutation(size)
 
     def highest(values: NDArray[Any]) -> NDArray[Any]:
-        """The highest value of each place and its neighbours."""
+        """The highest value of each node and its neighbours."""
         return np.maximum.reduceat(values[graph.indices], graph.indptr[:-1])
 
     undecided, roots = np.ones(size, bool), np.zeros(size, bool)
@@ -240,32 +240,32 @@ def tentative_prolongation(part: IntArray, rigid: Array) -> tuple[Sparse, Array,
     return tentative, np.concatenate(coarse), np.concatenate(owners)
 
 
-def block_inverse(matrix: Sparse, place: IntArray) -> Sparse:
-    """The inverse of the blocks of a matrix (n, n) that couple unknowns of the same place; unknowns
+def block_inverse(matrix: Sparse, node: IntArray) -> Sparse:
+    """The inverse of the blocks of a matrix (n, n) that couple unknowns of the same node; unknowns
     without stiffness stay without.
     """
-    size, entries = len(place), matrix.tocoo()
-    inside = place[entries.row] == place[entries.col]
+    size, entries = len(node), matrix.tocoo()
+    inside = node[entries.row] == node[entries.col]
     row, column, value = (part[inside] for part in (entries.row, entries.col, entries.data))
-    sizes = np.bincount(place)
-    order, starts = np.argsort(place, kind="stable"), np.cumsum(sizes) - sizes
+    sizes = np.bincount(node)
+    order, starts = np.argsort(node, kind="stable"), np.cumsum(sizes) - sizes
     position = np.empty(size, int)
-    position[order] = np.arange(size) - starts[place[order]]
+    position[order] = np.arange(size) - starts[node[order]]
     rows, columns, values = [], [], []
     for width in distinct(sizes[sizes > 0]):
-        places = np.flatnonzero(sizes == width)
+        nodes = np.flatnonzero(sizes == width)
         number = np.full(len(sizes), -1)
-        number[places] = np.arange(len(places))
-        of_these = np.flatnonzero(number[place[row]] >= 0)
-        blocks = np.zeros((len(places), width, width))
+        number[nodes] = np.arange(len(nodes))
+        of_these = np.flatnonzero(number[node[row]] >= 0)
+        blocks = np.zeros((len(nodes), width, width))
         r, c = row[of_these], column[of_these]
-        blocks[number[place[r]], position[r], position[c]] = value[of_these]
+        blocks[number[node[r]], position[r], position[c]] = value[of_these]
         diagonal = np.einsum("pii->pi", blocks)
         empty = diagonal <= 0
         diagonal[empty] = 1
         inverse = np.linalg.inv(blocks)
         np.einsum("pii->pi", inverse)[empty] = 0
-        unknowns = order[starts[places][:, None] + np.arange(width)]
+        unknowns = order[starts[nodes][:, None] + np.arange(width)]
         rows.append(np.repeat(unknowns, width, axis=1).ravel())
         columns.append(np.tile(unknowns, width).ravel())
         values.append(inverse.ravel())

@@ -18,6 +18,7 @@ from scipy.sparse.csgraph import connected_components
 from ..arrays import Array, IntArray, Sparse, distinct
 from ..csr import CsrMatrix
 from ..input.case import Case
+from ..mesh.joint_mesh import JointMesh
 from .bodies import Bodies, ElasticBody
 from .condensed import Condensed, CondensedJoint, JointDofs
 from .memory import PER_UNKNOWN_ITERATED, check_memory
@@ -29,9 +30,9 @@ class Uncondensed(Condensed):
 
     #: by body: the number of each of its degrees of freedom among the unknowns; -1: fixed
     numbers: dict[str, IntArray]
-    #: of each unknown (n,): its body, and the number of its function where the bodies are glued
+    #: of each unknown (n,): its body, and its node where the bodies are glued
     body: IntArray
-    place: IntArray
+    node: IntArray
     #: rigid motions of each body (n, 6); zero for functions that are zero at all nodes
     rigid: Array
 
@@ -65,80 +66,109 @@ def rigid_motions(body: ElasticBody) -> Array:
     return motions.reshape(-1, 6)
 
 
+class Numbering:
+    """Numbers of the degrees of freedom of all bodies: one after the other, and those that are free
+    among the unknowns.
+    """
+
+    def __init__(self, bodies: Bodies) -> None:
+        self.bodies = bodies.by_name
+        self.sizes = [body.stiffness.shape[0] for body in self.bodies.values()]
+        #: number of the first degree of freedom of each body
+        self.first = dict(zip(self.bodies, np.cumsum([0, *self.sizes[:-1]]).tolist(), strict=True))
+        every = zip(self.sizes, self.bodies.values(), strict=True)
+        self.fixed = np.concatenate([np.isin(np.arange(n), b.fixed_dofs) for n, b in every])
+        self.free = np.flatnonzero(~self.fixed)
+        #: number of each degree of freedom among the unknowns; -1: fixed
+        self.unknown = np.where(self.fixed, -1, np.cumsum(~self.fixed) - 1)
+
+    def of_body(self, name: str) -> slice:
+        """Those of a body."""
+        return slice(self.first[name], self.first[name] + self.bodies[name].stiffness.shape[0])
+
+    def of_joint(self, joint: JointMesh, number: int) -> tuple[IntArray, IntArray]:
+        """Those of a joint, by its number, in the bodies above and below it."""
+        above = self.bodies[joint.upper].joint_dofs[number, True]
+        below = self.bodies[joint.lower].joint_dofs[number, False]
+        return self.first[joint.upper] + above, self.first[joint.lower] + below
+
+    def jumps(self, above: IntArray, below: IntArray) -> JointDofs:
+        """The jumps of a joint: differences of the unknowns above and below it."""
+        sides = above, below
+        rows = [np.flatnonzero((self.unknown[side] >= 0) & (above != below)) for side in sides]
+        return JointDofs(
+            rows=np.concatenate(rows),
+            columns=np.concatenate(
+                [self.unknown[side[r]] for side, r in zip(sides, rows, strict=True)]
+            ),
+            factors=np.repeat([1.0, -1.0], [len(r) for r in rows]),
+        )
+
+    def nodes(self, glued: list[tuple[IntArray, IntArray]]) -> IntArray:
+        """The node of each unknown, the same above and below a joint; glued: see `of_joint`."""
+        dofs = np.concatenate([np.column_stack(sides) for sides in glued])
+        pairs, count = dofs[::3] // 3, sum(self.sizes) // 3  # of functions
+        graph = sparse.coo_matrix((np.ones(len(pairs)), (*pairs.T,)), (count, count))
+        return np.asarray(connected_components(graph, directed=False)[1][self.free // 3])
+
+    def unit_loads(self) -> dict[str, Array]:
+        """Loads on the unknowns by the unit loads of all bodies."""
+        units: dict[str, Array] = {}
+        for name, body in self.bodies.items():
+            unknown = self.unknown[self.of_body(name)]
+            for load, forces in body.unit_loads.items():
+                whole = units.setdefault(load, np.zeros(len(self.free)))
+                whole[unknown[unknown >= 0]] += forces[unknown >= 0]
+        return units
+
+
 def uncondensed(case: Case, bodies: Bodies) -> Uncondensed:
     """The bodies of a case in 3D with nothing eliminated."""
     start, mesh = time.perf_counter(), bodies.mesh
-    size = sum(body.stiffness.shape[0] for body in bodies.by_name.values())
+    by_name, numbering = bodies.by_name, Numbering(bodies)
+    size, count = sum(numbering.sizes), len(numbering.free)
     check_memory(PER_UNKNOWN_ITERATED * size, f"{size} unknowns")
-    by_name = bodies.by_name
-    sizes = [body.stiffness.shape[0] for body in by_name.values()]
-    first = dict(zip(by_name, np.cumsum([0, *sizes[:-1]]).tolist(), strict=True))
-    every = np.concatenate(
-        [np.isin(np.arange(n), b.fixed_dofs) for n, b in zip(sizes, by_name.values(), strict=True)]
-    )
-    number = np.where(every, -1, np.cumsum(~every) - 1)
-    free = np.flatnonzero(~every)
-    count = len(free)
-
-    joints, glued = list[CondensedJoint](), list[IntArray]()
-    for k, joint in enumerate(mesh.joints):
-        sides = [
-            first[name] + by_name[name].joint_dofs[k, above]
-            for name, above in ((joint.upper, True), (joint.lower, False))
-        ]
-        glued.append(np.column_stack(sides))
-        parts = [np.flatnonzero((number[side] >= 0) & (sides[0] != sides[1])) for side in sides]
-        dofs = JointDofs(
-            rows=np.concatenate(parts),
-            columns=np.concatenate([number[s[p]] for s, p in zip(sides, parts, strict=True)]),
-            factors=np.repeat([1.0, -1.0], [len(part) for part in parts]),
-        )
-        joints.append(CondensedJoint(mesh=joint, dofs=dofs))
-    pairs = np.concatenate(glued)[::3] // 3  # of functions
-    functions = sum(sizes) // 3
-    graph = sparse.coo_matrix((np.ones(len(pairs)), (*pairs.T,)), (functions,) * 2)
-    place = connected_components(graph, directed=False)[1]
-
-    units: dict[str, Array] = {}
-    dof_of_face: dict[str, IntArray] = {}
-    loaded = [first[name] + bodies.loaded_dofs(name) for name in by_name]
-    column = np.full(sum(sizes), -1)
-    column[np.concatenate(loaded)] = np.arange(sum(map(len, loaded)))
-    for name, body in by_name.items():
-        of_body = slice(first[name], first[name] + body.stiffness.shape[0])
-        for load, forces in body.unit_loads.items():
-            whole = units.setdefault(load, np.zeros(count))
-            whole[number[of_body][~every[of_body]]] += forces[~every[of_body]]
-        dof_of_face |= {face: column[of_body][dofs] for face, dofs in body.face_dofs.items()}
-    pressed = number[np.concatenate(loaded)]
-    spread = np.ones(len(pressed)), pressed, np.arange(len(pressed))
+    glued = [numbering.of_joint(joint, k) for k, joint in enumerate(mesh.joints)]
+    loaded = np.concatenate([numbering.first[n] + bodies.loaded_dofs(n) for n in by_name])
+    column = np.full(size, -1)
+    column[loaded] = np.arange(len(loaded))
+    dof_of_face = {
+        face: column[numbering.of_body(name)][dofs]
+        for name, body in by_name.items()
+        for face, dofs in body.face_dofs.items()
+    }
+    spread = np.ones(len(loaded)), numbering.unknown[loaded], np.arange(len(loaded))
     crest_body, crest = bodies.crest
-    at_crest = np.zeros(count)
-    at_crest[number[first[crest_body] + crest]] = 1.0
+    at_crest, units = np.zeros(count), numbering.unit_loads()
+    at_crest[numbering.unknown[numbering.first[crest_body] + crest]] = 1.0
+    rigid = np.concatenate([rigid_motions(body) for body in by_name.values()])
     return Uncondensed(
         stiffness=block_diagonal([body.free_stiffness for body in by_name.values()]),
         units=units,
-        pressure=CsrMatrix.of_entries(*spread, (count, len(pressed))),
+        pressure=CsrMatrix.of_entries(*spread, (count, len(loaded))),
         dof_of_face=dof_of_face,
         crest_jump=at_crest,
         crest_units=dict.fromkeys(units, 0.0),
-        crest_pressure=np.zeros(len(pressed)),
+        crest_pressure=np.zeros(len(loaded)),
         dim=mesh.dim,
         order=int(case["order"]),
         width=mesh.joints[0].width,
         counts=mesh.counts,
         unknowns=count,
-        joints=joints,
+        joints=[
+            CondensedJoint(mesh=joint, dofs=numbering.jumps(*sides))
+            for joint, sides in zip(mesh.joints, glued, strict=True)
+        ],
         faces={n: face for n, face in mesh.faces.items() if n in dof_of_face},
         factorisation="none: smoothed aggregation",
         seconds={
             "mesh": mesh.seconds,
             "assembly": bodies.seconds + time.perf_counter() - start,
         },
-        numbers={n: number[f : f + s] for (n, f), s in zip(first.items(), sizes, strict=True)},
-        body=np.repeat(np.arange(len(sizes)), sizes)[free],
-        place=place[free // 3],
-        rigid=np.concatenate([rigid_motions(body) for body in by_name.values()])[free],
+        numbers={name: numbering.unknown[numbering.of_body(name)] for name in by_name},
+        body=np.repeat(np.arange(len(by_name)), numbering.sizes)[numbering.free],
+        node=numbering.nodes(glued),
+        rigid=rigid[numbering.free],
     )
 
 

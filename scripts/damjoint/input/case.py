@@ -228,8 +228,8 @@ class Case(ParameterValues):
         ends = [self.section | joint.section for joint in joints]
         values = [(joint.values, joint.hardening_asked) for joint in self.of_joints or same]
         of_joints = (
-            replace(joint, values=set_values, section=section, hardening_asked=asked)
-            for (set_values, asked), joint, section in zip(values, joints, ends, strict=True)
+            replace(joint, values=set_values, section=section, hardening_asked=hardens)
+            for (set_values, hardens), joint, section in zip(values, joints, ends, strict=True)
         )
         several = tuple(of_joints) if len(joints) > 1 else ()
         case = replace(self, section=ends[0], of_joints=several)

@@ -302,7 +302,7 @@ def note_owner(case: CaseText, name: str, path: Path) -> None:
 
 @contextlib.contextmanager
 def located(where: str) -> Iterator[None]:
-    """Add the place of a statement to the message of an InputError."""
+    """Add file and line of a statement to the message of an InputError."""
     try:
         yield
     except InputError as error:

@@ -223,7 +223,7 @@ OF_HEIGHT = f"{LEAST_LENGTH:g} of dam_height"
 
 
 def check_section(case: ParameterValues, section: Mapping[str, Sequence[float]]) -> None:
-    """Lengths of the dam's section; places of line forces on it."""
+    """Lengths of the dam's section; positions of line forces on it."""
     check_lengths(case)
     height, base, batter = case["dam_height"], case["dam_base"], case["batter"]
     for name, sign, holds in (

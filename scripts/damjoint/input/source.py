@@ -57,8 +57,10 @@ class Source:
                 moved = dict(zip(before, map(casefile.key_of, names), strict=False))
                 gone = before[len(names) :]
                 of_file, given = given, {}
-                kept = [key for key in of_file if key not in gone]
-                for key in sorted(kept, key=lambda key: key not in moved):  # those of overrides win
+                remaining = [key for key in of_file if key not in gone]
+                for key in sorted(
+                    remaining, key=lambda key: key not in moved
+                ):  # those of overrides win
                     given.setdefault(moved.get(key, key), {}).update(of_file[key])
         return {key: values for key, values in given.items() if values}
 

@@ -38,18 +38,18 @@ def cut(body: Body, surface: Body, upwards: Array, new_tag: int) -> tuple[Body, 
             above = [group for group in groups if any(is_above(cell, tag) for cell in group)]
             moved[tag] = [cell for group in above for cell in group]
     new = {tag: new_tag + k for k, tag in enumerate(moved)}
-    place = {tag: i for i, tag in enumerate(body.node_tags.tolist())}
+    index = {tag: i for i, tag in enumerate(body.node_tags.tolist())}
     tables, start = [], 0
     for shape, table in body.cells:
         changed = table.copy()
         for k, (tag, numbers) in enumerate(moved.items()):
             here = np.array([n - start for n in numbers if start <= n < start + len(table)], int)
             rows = changed[here]
-            rows[rows == place[tag]] = len(body.points) + k
+            rows[rows == index[tag]] = len(body.points) + k
             changed[here] = rows
         tables.append((shape, changed))
         start += len(table)
-    old = np.array([place[tag] for tag in moved], int)
+    old = np.array([index[tag] for tag in moved], int)
     divided = replace(
         body,
         points=np.vstack([body.points, body.points[old]]),

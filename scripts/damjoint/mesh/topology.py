@@ -34,7 +34,7 @@ class Part(NamedTuple):
 
 
 def sides_of(body: Body) -> tuple[list[IntArray], list[IntArray]]:
-    """Node tags of the sides of a body's elements, a table for each place on each shape, and the
+    """Node tags of the sides of a body's elements, a table for each side of each shape, and the
     numbers of the elements.
     """
     rows, owners, start = list[IntArray](), list[IntArray](), 0

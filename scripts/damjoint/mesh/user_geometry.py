@@ -125,9 +125,9 @@ class UserGeometry:
     def points(self) -> tuple[IntArray, Array]:
         """Tags of all nodes of the bodies, sorted, and their positions (n, 3)."""
         tags = np.concatenate([solid.node_tags for solid in self.solids.values()]).astype(int)
-        places = np.concatenate([solid.points for solid in self.solids.values()])
+        positions = np.concatenate([solid.points for solid in self.solids.values()])
         tags, first = np.unique(tags, return_index=True)
-        return tags, places[first]
+        return tags, positions[first]
 
     @cached_property
     def is_concrete(self) -> BoolArray:
@@ -240,8 +240,8 @@ class UserGeometry:
 
     @property
     def coincident(self) -> str:
-        """The position of two nodes at the same place, which do not connect what meets there; empty
-        if there are none.
+        """The position that two nodes share, which do not connect what meets there; empty if there
+        are none.
         """
         points = self.points[1]
         whole = np.round(points / (FLAT * np.ptp(points))).astype(int)
@@ -405,8 +405,8 @@ class UserGeometry:
             [rows], *(tags_of(self.regions[e]) for e in (joint.heel, joint.toe))
         )
         outer = np.flatnonzero(np.bincount(sides)[sides] == 1)
-        place = np.searchsorted(surface.node_tags, rows[outer])
-        rim = Body(surface.points, surface.node_tags, [("line", place)], np.zeros(0, int))
+        nodes = np.searchsorted(surface.node_tags, rows[outer])
+        rim = Body(surface.points, surface.node_tags, [("line", nodes)], np.zeros(0, int))
         names = np.full(len(outer), "", dtype="<U4")
         for name, end in zip(("heel", "toe"), ends, strict=True):
             names[np.isin(sides[outer], end)] = name
@@ -463,7 +463,7 @@ class UserGeometry:
             raise self.bad(f"crest: must be one point, not {number}")
 
     def check_directions(self) -> None:
-        """Raise InputError if a face looks the other way than its name says, as a whole, or if the
+        """Raise InputError if a face as a whole looks opposite to what its name says, or if the
         rock lies above the dam.
         """
         normals, sizes = self.surface.normals, sizes_of(self.surface)

@@ -78,9 +78,9 @@ def along(rows: Table) -> Table:
     if np.ptp(rows["z"]) > 0 and len(np.unique(s)) > len(s) / 2:
         part = s.max() / np.sqrt(len(s))
         s = (s // part + 0.5) * part
-    s, place = np.unique(s, return_inverse=True)
-    number = np.bincount(place)
-    return {name: np.bincount(place, column) / number for name, column in rows.items()} | {"s": s}
+    s, node = np.unique(s, return_inverse=True)
+    number = np.bincount(node)
+    return {name: np.bincount(node, column) / number for name, column in rows.items()} | {"s": s}
 
 
 #: States of the joint.
@@ -100,9 +100,9 @@ def state_of(rows: Table, law: Law[Any]) -> IntArray:
 
 def nearest_rows(points: Array, rows: Table) -> IntArray:
     """For each of some points (n, 3) the nearest row of the joint's table at one time (n,)."""
-    places = np.column_stack([rows[axis] for axis in "xyz"])
+    positions = np.column_stack([rows[axis] for axis in "xyz"])
     # point by point: all distances at once need too much memory for a fine joint in 3D
-    return np.array([np.argmin(((places - point) ** 2).sum(axis=1)) for point in points], int)
+    return np.array([np.argmin(((positions - point) ** 2).sum(axis=1)) for point in points], int)
 
 
 def joint_body(bodies: dict[str, Body], joint: int) -> Body:

@@ -120,8 +120,8 @@ def across(case: Case, positions: Array) -> Array:
         ends = [
             (section[f"seg_y{k}"][i], section[f"seg_x{k}"][i]) for i in segments for k in (0, 1)
         ]
-        heights, places = np.array(sorted(ends)).T
-        return np.interp(y, heights, places)
+        heights, x = np.array(sorted(ends)).T
+        return np.interp(y, heights, x)
 
     upstream, downstream = face(UP), face(DOWN)
     share: Array = (positions[:, 0] - upstream) / (downstream - upstream) - 0.5

@@ -192,7 +192,7 @@ class HigherHeel(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class WaterPath:
-    """The way of the water through a joint in 2D, which may go on in other joints; in branches off
+    """The path of the water through a joint in 2D, which may go on in other joints; in branches off
     it the water is at rest.
     """
 
@@ -343,7 +343,7 @@ def plane_paths(network: Network, joints: Sequence[JointMesh], case: Case) -> di
 
 def path_coordinate(surface: Body, heel: IntArray, toe: IntArray) -> Array:
     """Normalised path coordinate at the nodes of lines in the plane: 0 at the heel, 1 at the toe,
-    linear along the way from one to the other, constant on branches; 0 or 1 with one of them only.
+    linear along the path from one to the other, constant on branches; 0 or 1 with one of them only.
     """
     fixed = np.concatenate([heel, toe])
     along = np.zeros(len(surface.points))

@@ -110,7 +110,7 @@ OF_JOINTS = (
 
 
 def joints_table(result: Results, time: float) -> Table:
-    """Tabulate the joints at a time, a row each: safety factor against sliding, place of N,
+    """Tabulate the joints at a time, a row each: safety factor against sliding, position of N,
     lengths that are open, broken, softening, slipped.
     """
     joints = [(joint_result, joint_result.state(time)) for joint_result in result.joints]

@@ -34,7 +34,7 @@ EVALUATIONS = {
     EXTRAPOLATED: "extrapolated from Gauss points",
     SLIP_TWICE: "slip of the last step counted twice",
 }
-#: Distance [m] within which nodes are at the same place: those along z in 3D.
+#: Distance [m] within which nodes have the same position: those along z in 3D.
 SAME_NODE = 1e-6
 
 
@@ -46,7 +46,7 @@ class Reference:
     modeling: str
     uplift: str
     quantity: str
-    #: the place [m], a mean over the coordinates that are None; and t, None: `reference_time`
+    #: the position [m], a mean over the coordinates that are None; and t, None: `reference_time`
     x: float | None
     y: float | None
     z: float | None
@@ -128,7 +128,7 @@ def modelings(family: str) -> list[str]:
 
 
 def compare(result: Results) -> list[Comparison]:
-    """Compare a scene with its published numbers at the nodes of the same place."""
+    """Compare a scene with its published numbers at the nodes of the same position."""
     comparisons = []
     case = result.case
     for reference in references(case):
@@ -137,8 +137,8 @@ def compare(result: Results) -> list[Comparison]:
         values = rows[reference.quantity]
         if reference.read_as == SLIP_TWICE:
             values = values + rows["slip"] - result.at(case.requested[-2])["slip"]
-        place = {c: value for c in "xyz" if (value := getattr(reference, c)) is not None}
-        away = np.sum([np.abs(rows[c] - value) for c, value in place.items()], axis=0)
+        position = {c: value for c in "xyz" if (value := getattr(reference, c)) is not None}
+        away = np.sum([np.abs(rows[c] - value) for c, value in position.items()], axis=0)
         computed = values[away < away.min() + SAME_NODE].mean()
         comparisons.append(Comparison(reference, float(computed)))
     return comparisons

@@ -1,3 +1,3 @@
-"""Methods beside the finite elements: gravity method, limit analysis, verdict of a run; and what is
-said of a case and its run: notes, hints, statement.
+"""Methods beside the finite elements: gravity method, limit analysis, verdict of a run; and
+sentences on a case and its run: notes, hints, statement.
 """

@@ -1,4 +1,4 @@
-"""What is said of the end of a run, and of its path."""
+"""Sentences on the end of a run, and on its path."""
 
 from __future__ import annotations
 

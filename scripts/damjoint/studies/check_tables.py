@@ -136,8 +136,8 @@ def picture_table(check: SafetyCheck) -> list[tuple[str, ...]]:
 
 
 def joints_table(checks: list[SafetyCheck]) -> list[tuple[str, ...]]:
-    """Table of the joints of a scene: least factors of both methods, place of N by finite elements
-    and the worse verdict.
+    """Table of the joints of a scene: least factors of both methods, position of N by finite
+    elements and the worse verdict.
     """
     cells: list[tuple[str, ...]] = [("joint", "SSF", "OSF", "N' in", "verdict")]
     for check in checks:

@@ -1,4 +1,4 @@
-"""Keys by which finished results are found again: hashes of all that decides them."""
+"""Keys that identify finished results: hashes of all that decides them."""
 
 from __future__ import annotations
 

@@ -273,26 +273,26 @@ class Checkpoint:
 
 
 def compute(
-    case: Case, span: Span = None, kept: Checkpoint | None = None, progress: bool = True
+    case: Case, span: Span = None, saved: Checkpoint | None = None, progress: bool = True
 ) -> QuakeResult:
     """The earthquake of a case, up to its end or to an error in its steps.
 
-    span: of the frames [s], by default the whole record; kept: file from which it continues, if it
+    span: of the frames [s], by default the whole record; saved: file from which it continues, if it
     exists, and that is written meanwhile. Raises RunError if the static loads can not be computed.
     """
     with single_thread():
         with preparation(case, progress):
             run = QuakeRun(case, span)
-        if kept and kept.exists:
-            kept.read(run)
+        if saved and saved.exists:
+            saved.read(run)
         try:
-            follow(run, kept, progress)
+            follow(run, saved, progress)
             return run.result()
         except BaseException as error:
             result = run.result_so_far(error)
-            if kept:
+            if saved:
                 with contextlib.suppress(OSError):
-                    kept.write(run)
+                    saved.write(run)
             return result
 
 
@@ -301,15 +301,15 @@ def bar_of(case: Case, record: Record, show: bool) -> Progress:
     return Progress(case.name, record.duration, show, bar_format=BAR, leave=False)
 
 
-def follow(run: QuakeRun, kept: Checkpoint | None, progress: bool) -> None:
-    """Compute the steps to the end of the record; kept: is written meanwhile."""
+def follow(run: QuakeRun, saved: Checkpoint | None, progress: bool) -> None:
+    """Compute the steps to the end of the record; saved: is written meanwhile."""
     written, quake = time.perf_counter(), run.quake
     with bar_of(quake.case, quake.record, progress) as bar:
         bar.update(quake.now.time)
         for step in run.steps():
             bar.update(step)
-            if kept and time.perf_counter() - written > BETWEEN_WRITES:
-                kept.write(run)
+            if saved and time.perf_counter() - written > BETWEEN_WRITES:
+                saved.write(run)
                 written = time.perf_counter()
 
 

@@ -86,14 +86,14 @@ def check(case: Case, options: Options) -> None:
         quake_getdp.check(case)
 
 
-def compute(case: Case, options: Options, kept: Checkpoint | None = None) -> QuakeTables:
-    """The earthquake of a case, up to its end or to an error; nothing is written but `kept`.
+def compute(case: Case, options: Options, saved: Checkpoint | None = None) -> QuakeTables:
+    """The earthquake of a case, up to its end or to an error; nothing is written but `saved`.
 
     Raises InputError, RunError.
     """
     if options.engine == "getdp":
         return quake_getdp.compute(case, options.progress)
-    return quake.compute(case, options.span, kept, options.progress)
+    return quake.compute(case, options.span, saved, options.progress)
 
 
 def run(case: Case, out: Path, options: Options = Options(), key: str = "") -> QuakeTables:
@@ -104,16 +104,16 @@ def run(case: Case, out: Path, options: Options = Options(), key: str = "") -> Q
     """
     check(case, options)
     folders.check_writable(out)
-    kept = Checkpoint(out / CHECKPOINT, fingerprint(case, options.span))
+    saved = Checkpoint(out / CHECKPOINT, fingerprint(case, options.span))
     # a table of all steps is that of a run without interruption
     continues = options.engine != "getdp" and not case.all_steps
-    with session(case, out, continues and kept.exists, key) as study:
-        result = compute(case, options, kept if continues else None)
+    with session(case, out, continues and saved.exists, key) as study:
+        result = compute(case, options, saved if continues else None)
         ended = result.error is None
         save(study, result, options.fields and ended, options.picture and ended)
         if result.error:
             raise result.error
-        kept.path.unlink(missing_ok=True)
+        saved.path.unlink(missing_ok=True)
     return result
 
 

@@ -54,7 +54,7 @@ def distribution(name: str, text: str) -> stats.distributions.rv_frozen:
 
 
 def correlation(text: str, names: list[str]) -> tuple[int, int, float]:
-    """Places and Spearman's rank correlation of two names from 'mu,adhesion=-0.5'.
+    """Numbers and Spearman's rank correlation of two names from 'mu,adhesion=-0.5'.
 
     Raises InputError.
     """

@@ -48,8 +48,8 @@ def columns(quake: Earthquake, static: Array, start: float, duration: float) -> 
     static: displacement of the dam's nodes (n, 3) under the static loads. Raises RunError.
     """
     dim, points = int(quake.case["dim"]), quake.system.spaces["dam"].body.points
-    places = {"crest": np.array([0, quake.case["dam_height"], 0]), "heel": np.zeros(3)}
-    nodes = {name: np.abs(points - at).sum(axis=1).argmin() for name, at in places.items()}
+    positions = {"crest": np.array([0, quake.case["dam_height"], 0]), "heel": np.zeros(3)}
+    nodes = {name: np.abs(points - at).sum(axis=1).argmin() for name, at in positions.items()}
     moved, rows = quake.system.motion["dam"], []
     for step in quake.steps():
         time, motion = step.end.time - start, step.end.motion

@@ -94,7 +94,7 @@ def own_lists(mesh: Mesh) -> dict[str, list[float]]:
     lines = [name for name in LINES if name in bodies]
     shapes = {shape for solid in mesh.solids.values() for shape, _ in solid.cells}
     number, lowest = numbers(mesh), constants()["UNDER"][0]
-    places = np.concatenate([solid.points for solid in mesh.solids.values()])
+    points = np.concatenate([solid.points for solid in mesh.solids.values()])
     return {
         "own_side": [float(SIDES.index(face.side)) for face in faces],
         "own_body": [number[face.body] + lowest for face in faces],
@@ -106,7 +106,7 @@ def own_lists(mesh: Mesh) -> dict[str, list[float]]:
         "own_quadrangles": [float("quad" in shapes)],
         "own_mark_region": [constants()[name.upper()][0] for name in lines],
         "own_mark_body": [number[mesh.bearer(name)] + lowest for name in lines],
-        "own_extent": np.column_stack([places.min(axis=0), places.max(axis=0)]).ravel().tolist(),
+        "own_extent": np.column_stack([points.min(axis=0), points.max(axis=0)]).ravel().tolist(),
     }
 
 
