@@ -195,8 +195,39 @@ class JointTable(np.recarray):
         return rows
 
 
+class WithTables:
+    """A result with tables; the first one is that of `units` and, by default, of `to_pandas`."""
+
+    @property
+    def by_name(self) -> Mapping[str, tuple[Mapping[str, Any], Columns]]:
+        """Each table by its name: values by column; unit and meaning of columns."""
+        raise NotImplementedError
+
+    def named(self, name: str) -> tuple[Mapping[str, Any], Columns]:
+        """A table by its name. Raises InputError if there is none."""
+        if name not in self.by_name:
+            raise InputError(f"table = {name}: must be one of {', '.join(self.by_name)}")
+        return self.by_name[name]
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Units of the columns."""
+        table, columns = next(iter(self.by_name.values()))
+        return {name: columns[name][0] for name in table if name in columns}
+
+    def to_pandas(self, table: str = "") -> pandas.DataFrame:
+        """A table, by default the first one, as a DataFrame with units in its `attrs`.
+
+        Raises ImportError without pandas, InputError if there is no table of this name.
+        """
+        values, columns = self.named(table or next(iter(self.by_name)))
+        data_frame = optional("pandas").DataFrame(dict(values))
+        data_frame.attrs["units"] = {n: columns[n][0] for n in values if n in columns}
+        return data_frame
+
+
 @dataclass(frozen=True, repr=False)
-class Run:
+class Run(WithTables):
     """The results of a case, made by `run`.
 
     Example:
@@ -265,34 +296,34 @@ class Run:
 
         write_outcomes(self.case, [self.outcome], Path(out))
 
-    def to_pandas(self, table: str = "joint") -> pandas.DataFrame:
-        """joint or history as a DataFrame with units in its `attrs`.
-
-        Raises ImportError without pandas, InputError for another table.
-        """
-        return frame(self.table(table), UNITS_OF[table](self.case))
+    @property
+    def by_name(self) -> Mapping[str, tuple[Table, Columns]]:
+        """The tables joint and history."""
+        results, case = self.results, self.case
+        return {
+            "joint": (results.joint, joint_columns(case)),
+            "history": (results.history, history_columns(case)),
+        }
 
     def to_xarray(self, table: str = "joint") -> xarray.Dataset:
         """joint or history as a Dataset with units: dimensions time and node, or time.
 
         Raises ImportError without xarray, InputError for another table.
         """
-        data_set, columns = optional("xarray").Dataset, self.table(table)
+        data_set, (columns, described) = optional("xarray").Dataset, self.named(table)
         if table == "history":
-            units = history_columns(self.case)
-            return data_set({n: ("time", v, attributes(units[n])) for n, v in columns.items()})
+            return data_set({n: ("time", v, attributes(described[n])) for n, v in columns.items()})
         times = len(np.unique(columns["time"]))
         blocks = {name: column.reshape(times, -1) for name, column in columns.items()}
         placed: dict[str, Any] = {name: (("time", "node"), b) for name, b in blocks.items()}
         placed |= {name: ("node", blocks[name][0]) for name in ("x", "y", "z", "s")}
         placed |= {name: ("time", blocks[name][:, 0]) for name in ("time", "level")}
-        described = joint_columns(self.case)
         variables = {name: (*placed[name], attributes(described[name])) for name in placed}
         return data_set(variables).set_coords(["x", "y", "z", "s", "level"])
 
     def table(self, name: str) -> Table:
         """The table joint or history as {column: array}. Raises InputError for another name."""
-        return one_of({"joint": self.results.joint, "history": self.results.history}, name)
+        return {**self.named(name)[0]}
 
     def __repr__(self) -> str:
         last = self.results.last
@@ -314,27 +345,6 @@ def records(table: Mapping[str, Any]) -> np.recarray:
     """A table as a record array."""
     arrays = {name: np.asarray(column) for name, column in table.items()}
     return np.rec.fromarrays(arrays.values(), dtype=[(n, a.dtype) for n, a in arrays.items()])
-
-
-def one_of(tables: Mapping[str, Table], name: str) -> Table:
-    """A table by its name. Raises InputError if there is none."""
-    if name not in tables:
-        raise InputError(f"table = {name}: must be one of {', '.join(tables)}")
-    return tables[name]
-
-
-#: Units and meanings of the columns of a table, by its name.
-UNITS_OF = {"joint": joint_columns, "history": history_columns}
-
-
-def frame(table: Mapping[str, Any], columns: Columns) -> pandas.DataFrame:
-    """A table as a DataFrame; `attrs["units"]` are the units of its columns.
-
-    Raises ImportError without pandas.
-    """
-    data_frame = optional("pandas").DataFrame(dict(table))
-    data_frame.attrs["units"] = {name: columns[name][0] for name in table if name in columns}
-    return data_frame
 
 
 def displayed(figure: Figure) -> Figure:
@@ -458,7 +468,7 @@ def fill(source: Case | str | Path) -> Iterator[Step]:
 
 
 @dataclass(frozen=True, repr=False)
-class Checks(Sequence["SafetyCheck"]):
+class Checks(WithTables, Sequence["SafetyCheck"]):
     """Safety checks, made by `check`: one for each case and joint.
 
     Of each check, `rows` are those of check.csv, `why` is the reason if it fails or is not judged,
@@ -489,12 +499,14 @@ class Checks(Sequence["SafetyCheck"]):
     @property
     def rows(self) -> np.recarray:
         """check.csv: a row per case, joint and method, and one of the methods' difference."""
-        return records(self.table)
+        return records(self.named("rows")[0])
 
     @property
-    def table(self) -> dict[str, list[Any]]:
-        """The rows by column."""
-        return by_column([row for check in self for row in check.rows])
+    def by_name(self) -> Mapping[str, tuple[Mapping[str, Any], Columns]]:
+        """The table rows."""
+        from .studies.check import CHECK
+
+        return {"rows": (by_column([row for check in self for row in check.rows]), CHECK)}
 
     def plot(self, number: int = 0) -> Figure:
         """The picture of a case, by its number from 0, as `damjoint check` writes it.
@@ -510,12 +522,6 @@ class Checks(Sequence["SafetyCheck"]):
                 f"case {result.case.name}: must be a section by parameters to be drawn"
             )
         return displayed(figure_of_check(picture_content(result, checks)))
-
-    def to_pandas(self) -> pandas.DataFrame:
-        """The rows as a DataFrame with units in its `attrs`. Raises ImportError without pandas."""
-        from .studies.check import CHECK
-
-        return frame(self.table, CHECK)
 
     def __repr__(self) -> str:
         return "\n".join(map(repr, self))
@@ -550,7 +556,7 @@ def check(cases: Case | str | Path | Sequence[Case | str | Path]) -> Checks:
 
 
 @dataclass(frozen=True, repr=False)
-class Critical:
+class Critical(WithTables):
     """A critical value, made by `critical`.
 
     Example:
@@ -587,9 +593,7 @@ class Critical:
     @property
     def equilibria(self) -> np.recarray:
         """critical.csv: a row per equilibrium of each trial."""
-        from .studies.critical_study import table
-
-        return records(table(self.search))
+        return records(self.named("equilibria")[0])
 
     def plot(self) -> Figure:
         """The picture of the search, as `damjoint critical` writes it."""
@@ -598,16 +602,14 @@ class Critical:
 
         return displayed(figure_of(content(self.search, self.answer)))
 
-    def to_pandas(self) -> pandas.DataFrame:
-        """The equilibria as a DataFrame with units in its `attrs`.
-
-        Raises ImportError without pandas.
-        """
+    @property
+    def by_name(self) -> Mapping[str, tuple[Mapping[str, Any], Columns]]:
+        """The table equilibria."""
         from .studies.critical_study import table
         from .studies.failure_path import critical_columns
 
-        columns = critical_columns(self.search.case)
-        return frame(table(self.search), columns | {"value": (self.search.unit.strip(), "")})
+        columns = critical_columns(self.search.case) | {"value": (self.search.unit.strip(), "")}
+        return {"equilibria": (table(self.search), columns)}
 
     def __repr__(self) -> str:
         return "\n".join(self.statement)
@@ -657,7 +659,7 @@ def on_fixed_mesh(chosen: Case) -> Case:
 
 
 @dataclass(frozen=True, repr=False)
-class Quake:
+class Quake(WithTables):
     """An earthquake of a case, made by `quake`.
 
     Example:
@@ -711,11 +713,6 @@ class Quake:
         return self.tables.summary
 
     @property
-    def units(self) -> dict[str, str]:
-        """Units of the columns of `rows`."""
-        return {name: unit for name, (unit, _) in quake_columns(self.case).items()}
-
-    @property
     def verdict(self) -> str:
         """stands, no equilibrium, not at rest, broken without friction."""
         return self.tables.verdict
@@ -742,18 +739,18 @@ class Quake:
             raise InputError("engine = getdp: must be condensed for a picture of the earthquake")
         return displayed(figure(self.tables))
 
-    def to_pandas(self, table: str = "rows") -> pandas.DataFrame:
-        """rows, history, joint or frames as a DataFrame with units in its `attrs`.
-
-        Raises ImportError without pandas, InputError for another table.
-        """
-        static, frames = self.tables.static, getattr(self.tables, "frames", None)
-        tables = {"rows": self.tables.rows, "history": static.history, "joint": static.joint}
-        tables |= {"frames": frames.joint} if frames else {}
-        rows = one_of(tables, table)
-        columns = {"rows": quake_columns, **UNITS_OF}.get(table, joint_columns)(self.case)
-        in_seconds = {"time": ("s", "")} if table == "frames" else {}
-        return frame(rows, columns | in_seconds)
+    @property
+    def by_name(self) -> Mapping[str, tuple[Table, Columns]]:
+        """The tables rows, history, joint and, not by GetDP, frames."""
+        static, frames, case = self.tables.static, getattr(self.tables, "frames", None), self.case
+        joint = joint_columns(case)
+        in_time = {"frames": (frames.joint, joint | {"time": ("s", "")})} if frames else {}
+        return {
+            "rows": (self.tables.rows, quake_columns(case)),
+            "history": (static.history, history_columns(case)),
+            "joint": (static.joint, joint),
+            **in_time,
+        }
 
     def __repr__(self) -> str:
         return f"{self.case.name}: {self.statement}"
@@ -799,7 +796,7 @@ def quake(
 
 
 @dataclass(frozen=True, repr=False)
-class Modes:
+class Modes(WithTables):
     """The natural modes of a case, made by `modes`.
 
     Example:
@@ -827,19 +824,15 @@ class Modes:
         return np.array([mode.frequency for mode in self.natural.variants[0].modes])
 
     @property
-    def units(self) -> dict[str, str]:
-        """Units of the columns of `rows`."""
-        return {name: unit for name, (unit, _) in MODES.items()}
+    def by_name(self) -> Mapping[str, tuple[Mapping[str, Any], Columns]]:
+        """The table rows."""
+        return {"rows": (self.natural.table, MODES)}
 
     def plot(self) -> Figure:
         """The picture of the modes, as `damjoint modes` writes it."""
         from .studies.modes_study import figure
 
         return displayed(figure(self.natural))
-
-    def to_pandas(self) -> pandas.DataFrame:
-        """The rows as a DataFrame with units in its `attrs`. Raises ImportError without pandas."""
-        return frame(self.natural.table, MODES)
 
     def __repr__(self) -> str:
         listed = ", ".join(f"{frequency:.4g}" for frequency in self.frequencies)
@@ -872,7 +865,7 @@ def modes(source: Case | str | Path = "dam", *, number: int = 5) -> Modes:
 
 
 @dataclass(frozen=True, repr=False)
-class Sweep:
+class Sweep(WithTables):
     """The rows of a sweep, made by `sweep`.
 
     Example:
@@ -893,7 +886,7 @@ class Sweep:
         """A row per combination: the varied values (a level as level_asked), the last row of
         history.csv, failed, verdict, statement, the critical value; nan without an equilibrium.
         """
-        return records({name: column_array(name, v) for name, v in self.table.items()})
+        return records(self.named("rows")[0])
 
     @property
     def probability(self) -> np.recarray:
@@ -937,22 +930,17 @@ class Sweep:
         return displayed(figure_of(self.plan, self.texts, cases, title))
 
     @property
-    def units(self) -> dict[str, str]:
-        """Units of the columns of `rows`."""
+    def by_name(self) -> Mapping[str, tuple[Mapping[str, Any], Columns]]:
+        """The table rows."""
         from .studies.chart import quantity
         from .studies.quake_summary import QUAKE_UNITS
 
-        varied = {column_of(name): quantity(name)[1] for name in self.plan.names}
-        results = {name: unit for name, (unit, _) in history_columns(self.case).items()}
+        units = QUAKE_UNITS | {name: u for name, (u, _) in history_columns(self.case).items()}
+        units |= {column_of(name): quantity(name)[1] for name in self.plan.names}
         if self.plan.critical:
-            varied[self.plan.critical_columns[0]] = quantity(self.plan.critical)[1]
-        return {n: u for n, u in (QUAKE_UNITS | results | varied).items() if n in self.table}
-
-    def to_pandas(self) -> pandas.DataFrame:
-        """The rows as a DataFrame with units in its `attrs`. Raises ImportError without pandas."""
-        rows = self.rows
-        columns = {name: rows[name] for name in self.table}
-        return frame(columns, {name: (unit, "") for name, unit in self.units.items()})
+            units[self.plan.critical_columns[0]] = quantity(self.plan.critical)[1]
+        rows = {name: column_array(name, values) for name, values in self.table.items()}
+        return {"rows": (rows, {name: (unit, "") for name, unit in units.items()})}
 
     def __repr__(self) -> str:
         fails = sum(map(bool, self.table["failed"]))
