@@ -18,6 +18,7 @@ from ..input.parameters import constants, start_gmsh
 from ..input.scene import SIDES, Joint, numbered, stacked
 from ..storage import check_end
 from .body import Body
+from .completeness import check
 from .cut import cut
 from .generate import generate, shares
 from .joint_mesh import Face, JointMesh
@@ -266,7 +267,9 @@ class Mesh:
             for face, surface in zip(faces, surfaces, strict=True)
         ]
         regions = {name: body for name, body in self.bodies.items() if name not in self.solids}
-        return UserGeometry(file, self.dim, regions, self.solids, scene, named)
+        geometry = UserGeometry(file, self.dim, regions, self.solids, scene, named)
+        check(geometry)
+        return geometry
 
     def _user_scene(self, names: tuple[str, ...]) -> list[Joint]:
         """The joints of a user's own geometry, each between the two bodies that share it.
