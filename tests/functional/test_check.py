@@ -20,10 +20,8 @@ from damjoint.statics.verdict import verdict
 from damjoint.studies import check_study
 from damjoint.studies.check import (
     SafetyCheck,
-    by_finite_elements,
     by_gravity,
     compare_joints,
-    compare_methods,
     hand_calculation,
 )
 from damjoint.studies.check_study import picture_content
@@ -106,7 +104,7 @@ def test_two_load_combinations(command, combinations, tmp_path, texts_drawn):
 )
 def test_a_factor_below_the_required_one_fails(solve, setting, message):
     (result,) = solve("d", "7", dim=2.0, n_joint=20.0)
-    for answer in (by_finite_elements(result), by_gravity(hand_calculation(result))):
+    for answer in (compare_joints(result)[0].finite_elements, by_gravity(hand_calculation(result))):
         assert not answer.failures and answer.row["verdict"] == "not checked"
         met = replace(answer.case, values=answer.case.values | {"required_OSF": 1.01})
         assert replace(answer, case=met).row["verdict"] == "pass"
@@ -182,12 +180,16 @@ def test_a_run_under_a_partial_load_does_not_pass(solve):
     (result,) = solve("d", "7", dim=2.0, n_joint=20.0)
     longer = replace(result, case=replace(result.case, levels=(7.0, 7.0), tail_levels=(0.0,) * 2))
     longer = replace(longer, case=replace(longer.case, times=(1.0, 2.0)))
-    found = SafetyCheck(by_finite_elements(longer), by_gravity(hand_calculation(longer)))
+    found = SafetyCheck(
+        compare_joints(longer)[0].finite_elements, by_gravity(hand_calculation(longer))
+    )
     computed, by_hand = found.rows
     assert computed["verdict"] == "fail" and computed["why"].startswith("ended at t = 1 of 2")
     assert by_hand["verdict"] == "not checked"
     assert ("load", "partial", "full", "") in picture_table(found)
-    full = SafetyCheck(by_finite_elements(result), by_gravity(hand_calculation(result)))
+    full = SafetyCheck(
+        compare_joints(result)[0].finite_elements, by_gravity(hand_calculation(result))
+    )
     assert len(full.rows) == 3
 
 
@@ -219,7 +221,7 @@ def test_a_second_crack_in_equilibrium_has_its_own_row(command, tmp_path):
 
 def test_a_note_gives_the_crack_without_tensile_strength(solve):
     (result,) = solve("dam", "45", law="rupture", sigma_max=2e6, G_f=100.0, n_joint=20.0)
-    (note,) = (note for note in compare_methods(result).notes if "tension" in note)
+    (note,) = (note for note in compare_joints(result)[0].notes if "tension" in note)
     assert "below the strength of 2 MPa; without tension: crack 0." in note
 
 
@@ -282,14 +284,17 @@ def test_bad_input_writes_no_file(command, combinations, tmp_path):
 def test_resultants_of_both_methods_agree(solve, name, levels, tail_levels, settings):
     """Finite elements and gravity method, in any state of the joint."""
     for result in solve(name, levels, tail_levels, **settings):
-        computed, by_hand = by_finite_elements(result), by_gravity(hand_calculation(result))
+        computed, by_hand = (
+            compare_joints(result)[0].finite_elements,
+            by_gravity(hand_calculation(result)),
+        )
         for column in ("level", "tail_level", "N", "T", "M", "U", "x_resultant", "OSF"):
             expected = pytest.approx(by_hand.numbers[column], rel=1e-6, abs=1e-9)
             assert computed.numbers[column] == expected, column
 
 
 def test_differences_below_the_printed_digits_are_shown_as_zero(solve):
-    computed = by_finite_elements(solve("c", None, "1,2,3,4")[0])
+    computed = compare_joints(solve("c", None, "1,2,3,4")[0])[0].finite_elements
     for much, shown in ((1e-7, "0"), (1e-3, "-")):
         more = computed.numbers["N"] * (1 + much)
         other = replace(computed, numbers={**computed.numbers, "N": more})
@@ -305,7 +310,7 @@ def test_tension_is_positive_in_all_tables_and_pictures(solve):
     """
     (result,) = solve("dam", "45", n_joint=20, h_dam=8, h_found=30)
     method = hand_calculation(result)
-    found = SafetyCheck(by_finite_elements(result), by_gravity(method))
+    found = SafetyCheck(compare_joints(result)[0].finite_elements, by_gravity(method))
     heel, toe = (found.rows[1][f"sigma_n_eff_{end}"] for end in ("heel", "toe"))
     assert heel > 0 > toe
     shown = [f"{value / 1e6:.5g}" for value in (heel, toe)]
@@ -382,7 +387,7 @@ def test_partial_factors_on_friction_and_adhesion():
 def test_the_sliding_factor_counts_the_cohesion_that_is_left(solve):
     """After an overload D is above 0.99 on half of the closed joint: c (1 - D) over the length."""
     (result,) = solve("dam", "50,40", law="bond", n_joint=20.0, mu=1.0, adhesion=2e5, G_t=10.0)
-    check, rows, last = compare_methods(result), result.at(), result.last
+    check, rows, last = compare_joints(result)[0], result.at(), result.last
     left = np.trapezoid(2e5 * (1 - rows["damage"]), rows["s"])
     assert last["crack_length"] == 0 and left < 0.8 * 2e5 * 34
     numbers = check.finite_elements.numbers

@@ -27,7 +27,7 @@ from damjoint.gui.worker import EngineProcess
 from damjoint.input.resolve import load
 from damjoint.mesh.mesh import mesh_of
 from damjoint.statics.hints import hints
-from damjoint.studies.check import compare_methods
+from damjoint.studies.check import compare_joints
 from damjoint.units import LENGTHS
 from PIL import Image
 from quakes import DAM, smooth_record
@@ -227,7 +227,7 @@ def test_results_of_the_step_shown_are_in_the_tree_beside_the_gravity_method(ope
     user.run()
     (scene,) = user.session.scenes
     result, shown = scene.result, numbers_shown(user)
-    check = compare_methods(result)
+    check = compare_joints(result)[0]
     both = [method.numbers for method in (check.finite_elements, check.gravity)]
     for label, column, factor in (
         ("N' [kN/m]", "N", 1e-3),

@@ -179,20 +179,16 @@ def by_gravity(method: GravityMethod, name: str = GRAVITY, partial: bool = False
     )
 
 
-def by_finite_elements(
-    result: Results, statement: str | None = None, unjudged: str = ""
-) -> MethodResult:
+def by_finite_elements(result: Results, statement: str, unjudged: str) -> MethodResult:
     """Result of a run for a joint, the only one of `result`, at the last level it reached, with
     safety factors from its resultants.
 
-    statement: why it fails, or empty; by default that of the result; unjudged: why a joint that
-    does not fail can not be judged. Stresses are node values at the ends of the joint; those of an
-    elastic body depend on the mesh.
+    statement: why it fails, or empty; unjudged: why a joint that does not fail can not be judged,
+    or empty. Stresses are node values at the ends of the joint; those of an elastic body depend on
+    the mesh.
     """
     case, last, partial = result.case, result.last, result.partial_load
     (joint,) = case.joint_names
-    if statement is None:
-        statement = statement_of(result) if verdict.failed(result) else ""
     if not last:
         nothing = dict.fromkeys(NUMBERS, math.nan)
         return MethodResult(case, joint, FINITE_ELEMENTS, math.nan, nothing, statement, partial)
@@ -225,9 +221,7 @@ def hand_calculation(result: Results, alone: bool = True) -> GravityMethod | Non
     return gravity.at(case, case.times[-1])
 
 
-def compare_methods(
-    result: Results, statement: str | None = None, unjudged: str = "", alone: bool = True
-) -> SafetyCheck:
+def compare_methods(result: Results, statement: str, unjudged: str, alone: bool) -> SafetyCheck:
     """Apply both methods to a joint, the only one of `result`; arguments as in `by_finite_elements`
     and `hand_calculation`.
     """
