@@ -141,9 +141,10 @@ def uncondensed(case: Case, bodies: Bodies) -> Uncondensed:
     crest_body, crest = bodies.crest
     at_crest, units = np.zeros(count), numbering.unit_loads()
     at_crest[numbering.unknown[numbering.first[crest_body] + crest]] = 1.0
+    stiffness = [body.free_stiffness.scipy() for body in by_name.values()]
     rigid = np.concatenate([rigid_motions(body) for body in by_name.values()])
     return Uncondensed(
-        stiffness=block_diagonal([body.free_stiffness for body in by_name.values()]),
+        stiffness=CsrMatrix.of_scipy(sparse.block_diag(stiffness, format="csr")),
         units=units,
         pressure=CsrMatrix.of_entries(*spread, (count, len(loaded))),
         dof_of_face=dof_of_face,
@@ -170,8 +171,3 @@ def uncondensed(case: Case, bodies: Bodies) -> Uncondensed:
         node=numbering.nodes(glued),
         rigid=rigid[numbering.free],
     )
-
-
-def block_diagonal(matrices: list[CsrMatrix]) -> CsrMatrix:
-    """Matrices along the diagonal."""
-    return CsrMatrix.of_scipy(sparse.block_diag([m.scipy() for m in matrices], format="csr"))

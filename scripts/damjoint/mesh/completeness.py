@@ -17,11 +17,11 @@ from .body import Body
 from .topology import (
     at,
     components,
+    element_node_tags,
+    element_sizes,
     neighbours,
-    numbers_of,
-    sides_of,
-    sizes_of,
-    tags_of,
+    row_numbers,
+    side_tags,
     unnamed_parts,
 )
 from .user_geometry import FACING, FLAT, UserGeometry
@@ -69,7 +69,7 @@ def check_elements(geometry: UserGeometry) -> None:
         raise geometry.bad("it has coordinates that are not finite")
     if geometry.dim == 2 and np.ptp(points[:, 2]) > FLAT * np.ptp(points):
         raise geometry.bad("its z must be the same everywhere with dim = 2 (y points up)")
-    sizes = np.concatenate([sizes_of(solid) for solid in geometry.solids.values()])
+    sizes = np.concatenate([element_sizes(solid) for solid in geometry.solids.values()])
     flat = sizes <= FLAT**2 * np.median(sizes)
     if flat.any():
         raise geometry.bad(f"an element has no size, at {at(geometry.middles[np.argmax(flat)])}")
@@ -80,7 +80,7 @@ def check_doubled(geometry: UserGeometry) -> None:
     joints = [(label(joint), geometry.regions[joint.region]) for joint in geometry.joints]
     faces = [(face.name, face.surface) for face in geometry.faces]
     for group in (list(geometry.solids.items()), joints + faces):
-        numbers = numbers_of(*(tags_of(body) for _, body in group))
+        numbers = row_numbers(*(element_node_tags(body) for _, body in group))
         count = np.bincount(np.concatenate(numbers))
         if (count > 1).any():
             twice = int(np.argmax(count > 1))
@@ -152,9 +152,9 @@ def check_joint(geometry: UserGeometry, joint: Joint) -> None:
     heel and toe bound.
     """
     surface = geometry.regions[joint.region]
-    rows, owners = (list(part) for part in sides_of(surface))
-    heel, toe = (tags_of(geometry.regions[end]) for end in (joint.heel, joint.toe))
-    sides, of_heel, of_toe = numbers_of(rows, heel, toe)
+    rows, owners = (list(part) for part in side_tags(surface))
+    heel, toe = (element_node_tags(geometry.regions[end]) for end in (joint.heel, joint.toe))
+    sides, of_heel, of_toe = row_numbers(rows, heel, toe)
     owner = np.concatenate(owners)
     count = np.bincount(sides, minlength=int(max(of_heel.max(), of_toe.max())) + 1)
     whole = f"{label(joint)}: must be a {CHAIN[geometry.dim]} from heel to toe"
@@ -193,9 +193,9 @@ def check_joint(geometry: UserGeometry, joint: Joint) -> None:
 def check_rim(geometry: UserGeometry, joint: Joint) -> None:
     """Raise InputError if heel or toe of a joint in space have a gap."""
     surface = geometry.regions[joint.region]
-    rows = np.concatenate(sides_of(surface)[0])
-    sides, *ends = numbers_of(
-        [rows], *(tags_of(geometry.regions[e]) for e in (joint.heel, joint.toe))
+    rows = np.concatenate(side_tags(surface)[0])
+    sides, *ends = row_numbers(
+        [rows], *(element_node_tags(geometry.regions[e]) for e in (joint.heel, joint.toe))
     )
     outer = np.flatnonzero(np.bincount(sides)[sides] == 1)
     nodes = np.searchsorted(surface.node_tags, rows[outer])
@@ -262,7 +262,7 @@ def check_directions(geometry: UserGeometry) -> None:
     """Raise InputError if a face as a whole looks opposite to what its name says, or if the
     rock lies above the dam.
     """
-    normals, sizes = geometry.surface.normals, sizes_of(geometry.surface)
+    normals, sizes = geometry.surface.normals, element_sizes(geometry.surface)
     for face, numbers in zip(geometry.faces, geometry.of_faces, strict=True):
         on_face = np.isin(geometry.sides[geometry.skin], numbers)
         axis, sign = DIRECTIONS[face.side]
@@ -275,7 +275,7 @@ def check_directions(geometry: UserGeometry) -> None:
     across, total = np.zeros(3), 0.0
     for joint, numbers in zip(geometry.joints, geometry.of_joints, strict=True):
         if joint.lower == "foundation" != joint.upper:
-            sizes = sizes_of(geometry.regions[joint.region])
+            sizes = element_sizes(geometry.regions[joint.region])
             across += sizes @ normals_from_rock(geometry, joint, numbers)
             total += sizes.sum()
     if across[1] < -FACING * total:

@@ -15,7 +15,7 @@ from ..input.case import Case
 from ..input.constraints import check_levels_on_mesh, check_strain
 from ..input.geometry_file import FileStates, state_of
 from ..input.parameters import constants, start_gmsh
-from ..input.scene import SIDES, Joint, numbered, stacked
+from ..input.scene import Joint, numbered, stacked
 from ..storage import check_end
 from .body import Body
 from .completeness import check
@@ -24,14 +24,13 @@ from .generate import generate, shares
 from .joint_mesh import Face, JointMesh
 from .regions import (
     LOADED,
-    NEEDED,
-    OF_JOINTS,
-    REGIONS,
     SHAPES,
     USER_FACES,
     USER_NAMES,
     FaceRegion,
     dimension,
+    section_regions,
+    user_regions,
 )
 from .sides import is_inside, outward, part_of, sides
 from .topology import inner_ends
@@ -114,9 +113,9 @@ class Mesh:
         #: Gmsh's name of it
         self.model = gmsh.model.getFileName()
         self._read()
-        names, bodies, faces = (
-            self._user_regions() if self.geometry else self._section_regions(case)
-        )
+        geometry = self.geometry
+        regions = user_regions(geometry, self.dim) if geometry else section_regions(case)
+        names, bodies, faces = regions
         # from the highest: a line force at the end of a joint acts on the body above it
         dams = [name for name in bodies if name.split(" ")[0] == "dam"]
         solids = [*reversed(dams), "foundation"]
@@ -170,92 +169,6 @@ class Mesh:
         """Whether it is Gmsh's current mesh, which `write` writes."""
         gmsh = start_gmsh()
         return bool(gmsh.model.getFileName() == self.model)
-
-    def _section_regions(
-        self, case: Case
-    ) -> tuple[tuple[str, ...], dict[str, int], list[FaceRegion]]:
-        """Names of the joints; physical groups by region, and those of the faces."""
-        gmsh = start_gmsh()
-        numbers, scene = constants(), stacked(case.joint_names)
-        present = {group for _, group in gmsh.model.getPhysicalGroups()}
-        tag_of = {name: int(numbers[name.upper()][0]) for name in REGIONS}
-        layer = int(numbers["LAYER"][0])
-        tag_of |= {
-            numbered(name, k): tag_of[name] + k * layer
-            for name in OF_JOINTS
-            for k in range(1, len(scene))
-        }
-        bodies = {
-            n: t for n, t in tag_of.items() if t in present and (n != "sides" or self.dim == 3)
-        }
-        needed = [*NEEDED, *(numbered(n, k) for k in range(1, len(scene)) for n in OF_JOINTS)]
-        if missing := [name for name in needed if name not in bodies]:
-            raise RunError(f"mesh: no {missing[0]}; look at the geometry's proportions")
-        faces, section = [], case.section
-        for i, side in enumerate(section["seg_side"]):
-            ends = section["seg_y0"][i], section["seg_y1"][i]
-            number = int(section["seg_body"][i] - numbers["UPPER"][0])
-            body = scene[number].upper if number >= 0 else scene[0].lower
-            tag = int(numbers["SEGMENT"][0]) + i
-            faces.append(FaceRegion(tag, body, SIDES[int(side)], min(ends), max(ends)))
-        return case.joint_names, bodies, faces
-
-    def _user_regions(self) -> tuple[tuple[str, ...], dict[str, int], list[FaceRegion]]:
-        """As `_section_regions`, by the names of the physical groups, which get the numbers of the
-        package's own geometries.
-        """
-        gmsh = start_gmsh()
-        numbers, named = constants(), {}
-        #: bodies, joints and their ends of each name after the first word, in the mesh's order
-        parts: dict[str, list[str]] = {region: [] for region in OF_JOINTS}
-        for d, tag in gmsh.model.getPhysicalGroups():
-            if name := gmsh.model.getPhysicalName(d, tag).strip().lower():
-                region, _, joint = name.partition(" ")
-                if name in USER_NAMES | USER_FACES and region not in OF_JOINTS:
-                    pass
-                elif region in OF_JOINTS:
-                    parts[region].append(joint)
-                else:
-                    allowed = ", ".join([*USER_NAMES, *USER_FACES])
-                    raise self._bad(
-                        f'region "{name}" is not known; allowed: {allowed}, and with several '
-                        f"joints {', '.join(f'{region} NAME' for region in OF_JOINTS)}"
-                    )
-                named[name] = d, gmsh.model.getEntitiesForPhysicalGroup(d, tag)
-        joints = parts["joint"] or [""]
-        needed = [name for name, region in USER_NAMES.items() if region in NEEDED]
-        needed = [name for name in needed if name not in OF_JOINTS]
-        needed += [f"{n} {joint}".strip() for n in ("joint", "heel", "toe") for joint in joints]
-        needed += [] if parts["dam"] else ["dam"]
-        if missing := [name for name in needed if name not in named]:
-            raise self._bad(f"no region {', '.join(missing)}; the names of physical groups count")
-        gmsh.model.removePhysicalGroups()
-        bodies: dict[str, int] = {}
-        faces: list[FaceRegion] = []
-        order = {"dam": parts["dam"], **dict.fromkeys(("joint", "heel", "toe"), joints)}
-        for name, (d, entities) in named.items():
-            kind, _, joint = name.partition(" ")
-            # a face is as large as the joint
-            region = kind if kind in OF_JOINTS else USER_NAMES.get(name, "joint")
-            if d != dimension(region, self.dim):
-                raise self._bad(
-                    f'region "{name}" has dimension {d}: must be {dimension(region, self.dim)} '
-                    f"with dim = {self.dim}"
-                )
-            tag = int(numbers[region.upper()][0])
-            if kind in OF_JOINTS:
-                if joint not in order[kind]:
-                    raise self._bad(f'region "{name}": there is no joint {joint}')
-                number = order[kind].index(joint)
-                tag += number * int(numbers["LAYER"][0])
-                bodies[numbered(kind, number)] = tag
-            elif name in USER_NAMES:
-                bodies[region] = tag
-            else:
-                tag = int(numbers["SEGMENT"][0]) + len(faces)
-                faces.append(FaceRegion(tag, *USER_FACES[name]))
-            gmsh.model.addPhysicalGroup(d, entities, tag)
-        return tuple(joint or "joint" for joint in joints), bodies, faces
 
     def _checked(
         self, file: Path, scene: list[Joint], faces: list[FaceRegion], surfaces: list[Body]

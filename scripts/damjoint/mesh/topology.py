@@ -33,7 +33,7 @@ class Part(NamedTuple):
     names: frozenset[str]
 
 
-def sides_of(body: Body) -> tuple[list[IntArray], list[IntArray]]:
+def side_tags(body: Body) -> tuple[list[IntArray], list[IntArray]]:
     """Node tags of the sides of a body's elements, a table for each side of each shape, and the
     numbers of the elements.
     """
@@ -46,12 +46,12 @@ def sides_of(body: Body) -> tuple[list[IntArray], list[IntArray]]:
     return rows, owners
 
 
-def tags_of(body: Body) -> list[IntArray]:
+def element_node_tags(body: Body) -> list[IntArray]:
     """Node tags of a body's elements, a table for each block of cells."""
     return [body.node_tags[table].astype(int) for _, table in body.cells]
 
 
-def numbers_of(*groups: list[IntArray]) -> list[IntArray]:
+def row_numbers(*groups: list[IntArray]) -> list[IntArray]:
     """A number for each row of groups of tables of tags, equal for rows of the same tags."""
     width = max([1, *(table.shape[1] for group in groups for table in group)])
     rows = [np.zeros((0, width), int)]
@@ -98,8 +98,8 @@ def unnamed_parts(
     names: of each element of the surface, empty for none; ends: names of some of its edges (in the
     plane: points), by their node tags; a part ends there, too.
     """
-    rows, owners = (np.concatenate(tables) for tables in sides_of(surface))
-    edges, of_ends = numbers_of([rows], [np.array(list(ends), int)] if ends else [])
+    rows, owners = (np.concatenate(tables) for tables in side_tags(surface))
+    edges, of_ends = row_numbers([rows], [np.array(list(ends), int)] if ends else [])
     name_of = dict(zip(of_ends.tolist(), ends.values(), strict=True))
     at_end = np.isin(edges, of_ends)
     name = np.array(names, str)
@@ -129,7 +129,7 @@ def inner_ends(ends: Sequence[Body], surfaces: Sequence[Body], skin: Body) -> li
         np.concatenate([surface.node_tags for surface in surfaces]), return_counts=True
     )
     shared = tags[count > 1]
-    sides = [table[np.isin(table, shared).any(axis=1)] for table in tags_of(skin)]
+    sides = [table[np.isin(table, shared).any(axis=1)] for table in element_node_tags(skin)]
     return [inner_part(end, shared, sides) for end in ends]
 
 
@@ -149,7 +149,7 @@ def inner_part(end: Body, shared: IntArray, skin: list[IntArray]) -> IntArray:
     return np.setdiff1d(elements[inside], elements[~inside])
 
 
-def sizes_of(body: Body) -> Array:
+def element_sizes(body: Body) -> Array:
     """Length, area or volume of each element [m, m2, m3]."""
     sizes = [np.zeros(0)]
     for shape, table in body.cells:
@@ -172,7 +172,7 @@ def size_below(surface: Body, level: float) -> Array:
             simplex = Body(surface.points, surface.node_tags, [], surface.element_tags)
             simplex.cells = [(SHAPE_OF_SIDE[len(corners)], table[:, corners])]
             heights = np.sort(surface.points[table[:, corners]][:, :, 1] - level, axis=1)
-            total += sizes_of(simplex) * part_below(heights)
+            total += element_sizes(simplex) * part_below(heights)
         sizes.append(total)
     return np.concatenate(sizes)
 

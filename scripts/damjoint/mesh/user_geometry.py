@@ -17,11 +17,11 @@ from .topology import (
     SHAPE_OF_SIDE,
     Part,
     at,
-    numbers_of,
-    sides_of,
+    element_node_tags,
+    element_sizes,
+    row_numbers,
+    side_tags,
     size_below,
-    sizes_of,
-    tags_of,
     unnamed_parts,
 )
 
@@ -68,7 +68,7 @@ class UserGeometry:
         surfaces += [face.surface for face in faces]
         self.supports = [name for name in ("fixed", "sides") if name in regions]
         surfaces += [regions[name] for name in self.supports]
-        parts = [sides_of(solid) for solid in solids.values()]
+        parts = [side_tags(solid) for solid in solids.values()]
         counts = [len(solid.element_tags) for solid in solids.values()]
         starts = np.cumsum([0, *counts])[:-1]
         #: node tags of the sides of all elements, by blocks; element and body of each side
@@ -78,7 +78,7 @@ class UserGeometry:
         )
         self.body_of = np.repeat(np.arange(len(counts)), counts)
         #: number of each side; equal for the same side of two elements
-        self.sides, *others = numbers_of(self.rows, *map(tags_of, surfaces))
+        self.sides, *others = row_numbers(self.rows, *map(element_node_tags, surfaces))
         #: the numbers of the elements of joints, faces and supports
         self.of_joints = others[: len(joints)]
         self.of_faces = others[len(joints) : len(joints) + len(faces)]
@@ -135,7 +135,7 @@ class UserGeometry:
     @property
     def volume(self) -> float:
         """Volume of the concrete [m3], in the plane its area [m2]."""
-        sizes = np.concatenate([sizes_of(solid) for solid in self.solids.values()])
+        sizes = np.concatenate([element_sizes(solid) for solid in self.solids.values()])
         return float(sizes[self.is_concrete].sum())
 
     @cached_property
@@ -176,11 +176,11 @@ class UserGeometry:
         """The connected parts of the surface in no face; they end at joints."""
         ends: dict[tuple[int, ...], str] = {}
         for joint in self.joints:
-            tables, _ = sides_of(self.regions[joint.region])
+            tables, _ = side_tags(self.regions[joint.region])
             ends |= dict.fromkeys(sorted_rows(tables), "joint")
         for joint in self.joints:
             for kind, region in (("heel", joint.heel), ("toe", joint.toe)):
-                ends |= dict.fromkeys(sorted_rows(tags_of(self.regions[region])), kind)
+                ends |= dict.fromkeys(sorted_rows(element_node_tags(self.regions[region])), kind)
         return list(unnamed_parts(self.surface, self.name_of_skin, ends))
 
     def open_parts(self, side: str, level: float) -> float:
@@ -209,7 +209,7 @@ class UserGeometry:
     def fixed_concrete(self) -> float:
         """Length or area of the dam's surface that is fixed [m, m2]."""
         is_dam = np.array([name != "foundation" for name in self.solids])
-        sizes, names = sizes_of(self.surface), np.array(self.name_of_skin)
+        sizes, names = element_sizes(self.surface), np.array(self.name_of_skin)
         fixed = is_dam[self.body_of[self.owners[self.skin]]] & (names == "fixed")
         return float(sizes[fixed].sum())
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -102,18 +102,13 @@ def reference(family: str, row: Mapping[str, str]) -> Reference:
     )
 
 
-def all_references() -> Iterable[Reference]:
-    """The published numbers of all families."""
-    for family in FAMILIES:
-        yield from table(family)
-
-
 def references(case: Case) -> list[Reference]:
     """Published numbers of a scene; empty if it differs from the published scene."""
     if not case.published:
         return []
     name, uplift = case.name.upper(), case["uplift"]
-    return [r for r in all_references() if r.modeling == name and r.uplift == uplift]
+    every = (reference for family in FAMILIES for reference in table(family))
+    return [r for r in every if r.modeling == name and r.uplift == uplift]
 
 
 def reference_time(case: Case) -> float:

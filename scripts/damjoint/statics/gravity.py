@@ -179,7 +179,9 @@ class GravityMethod:
         """The same loads on a joint without tensile strength."""
         if isinstance(self.body, RigidBlock):
             return at(self.case, self.time, self.level, tension=False)
-        return cracked(self.case, self.body, self.loads, self.time, self.level, tension=False)
+        return shortest_crack(
+            self.case, self.body, self.loads, self.time, self.level, tension=False
+        )
 
     @property
     def beside_drains(self) -> str:
@@ -263,7 +265,7 @@ def of_state(case: Case, rows: Table, state: Mapping[str, float]) -> GravityMeth
     (tx, ty), normal, shear = joint.along, state["N"] + state["U"], state["T"]
     moment = state["M"] + state["M_U"]
     loads = Load("all loads", tx * shear + ty * normal, ty * shear - tx * normal, 0.0, moment)
-    return cracked(case, joint, (loads,), state["time"], state["level"])
+    return shortest_crack(case, joint, (loads,), state["time"], state["level"])
 
 
 def with_crack(case: Case, time: float, level: float, crack: float) -> GravityMethod:
@@ -284,10 +286,10 @@ def at(case: Case, time: float, level: float | None = None, tension: bool = True
     body = RigidBlock(case)
     loads = loads_on(case, body, time, level, case.tail_at(time))
     before = crack_before_earthquake(case, time, level, tension)
-    return cracked(case, body, loads, time, level, tension, before)
+    return shortest_crack(case, body, loads, time, level, tension, before)
 
 
-def cracked(
+def shortest_crack(
     case: Case,
     body: JointLine,
     loads: tuple[Load, ...],
@@ -314,7 +316,7 @@ def cracked(
         block, uncracked = state(crack), body.length - crack
         return 2 * block.N * uncracked - 6 * block.M - at_tip * uncracked**2
 
-    spans = pieces(case, body, level, tail)
+    spans = uplift_spans(case, body, level, tail)
     if before is not None:
         spans = spans_between(sorted({0.0, before, min(case["drain_x"], body.length), body.length}))
     arrested = [state(crack) for crack in arrest_lengths(excess, spans)]
@@ -341,7 +343,9 @@ def spans_between(ends: list[float]) -> list[tuple[float, float]]:
     return [(np.nextafter(a, b), b) for a, b in itertools.pairwise(ends) if b > a]
 
 
-def pieces(case: Case, body: JointLine, level: float, tail: float) -> list[tuple[float, float]]:
+def uplift_spans(
+    case: Case, body: JointLine, level: float, tail: float
+) -> list[tuple[float, float]]:
     """Crack lengths [m], from and to, between which the uplift follows one formula: the drains'
     effect begins where the crack raises the head above their outlet, and ends behind them.
     """

@@ -30,11 +30,6 @@ def left_out(out: Path, picture: bool) -> Iterator[str]:
         yield "--engine getdp draws no picture of an earthquake: its tables only"
 
 
-def check(case: Case) -> None:
-    """Raise InputError if GetDP can not compute the earthquake of a case."""
-    engine.check(case)
-
-
 def compute(case: Case, progress: bool = True) -> QuakeTables:
     """The earthquake of a case by GetDP, up to its end or to an error.
 

@@ -14,6 +14,7 @@ from .. import InputError
 from ..arrays import Value
 from ..dynamics.checkpoint import fingerprint
 from ..engines import engine_of
+from ..engines.getdp import quake as getdp_quake
 from ..input.case import Case
 from ..model.fields import Solution
 from ..post import folder as folders
@@ -83,7 +84,7 @@ def check(case: Case, options: Options) -> None:
     if options.engine == "getdp":
         if options.fields:
             raise InputError("--fields: must not be given with --engine getdp")
-        quake_getdp.check(case)
+        getdp_quake.check(case)
 
 
 def compute(case: Case, options: Options, saved: Checkpoint | None = None) -> QuakeTables:
