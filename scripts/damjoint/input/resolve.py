@@ -58,23 +58,16 @@ def load(
 
 def resolve(source: Source) -> Case:
     """The case of a source, see `load`. Raises InputError."""
-    path, file, overrides = source.path, source.text, source.overrides
-    levels, tail_levels = source.levels, source.tail_levels
-    steps, accuracy, error = source.steps, source.accuracy, None
+    path, file, accuracy = source.path, source.text, source.accuracy
+    overrides, steps = source.overrides, source.steps
+    error = None if accuracy is None else relative_error(accuracy)
     if accuracy is not None:
-        error, plain = relative_error(accuracy), resolve(Source(path, file, overrides))
+        plain = resolve(Source(path, file, overrides))
         overrides = {**first_mesh(plain), **overrides}
         steps = steps or (1 if plain["drive"] == "level" else None)
     if steps is not None:
         check_steps(steps)
-    lists = {name: tuple(values) for name, values in file.lists.items()}
-    if levels is not None:
-        lists["levels"] = levels_of("levels", levels)
-    if levels is not None or steps is not None:
-        lists.pop("times", None)
-    tails = lists.pop("tail_levels", (0.0,))
-    if tail_levels is not None:
-        tails = levels_of("tail_levels", tail_levels)
+    lists, tails = loading_lists(source, steps)
     overrides = {name: checked(name, value) for name, value in overrides.items()}
     for name in GEOMETRY_LISTS:
         if name in overrides:
@@ -85,18 +78,11 @@ def resolve(source: Source) -> Case:
     settings = {**file.defaults, **file.of_joints, **overrides}
     names = () if geometry else names_of_section(settings, lifts)
     values = settings_of_joints(settings, source.blocks(names), lifts, geometry)
-    if geometry and face:
-        raise InputError(
-            "downstream_face: must not be set for a geometry of one's own, whose mesh has the faces"
-        )
+    if geometry:
+        check_geometry(geometry, face, accuracy)
     lists |= {"downstream_face": face} if face else {}
     listed = "".join(listing(n, v) for n, v in lists.items())
     variables, *of_joints = parsed_by_joint(values, listed, lifts)
-    if accuracy is not None and geometry and geometry.suffix != ".geo":
-        raise InputError(
-            f"accuracy = {accuracy}: must not be set with a mesh as geometry "
-            f"({geometry.name}), which can not be refined"
-        )
     heights = tuple(variables["levels"])
     also = () if "uplift" in overrides else tuple(file.texts.get("also_uplift", "").split())
     result = Case(
@@ -107,7 +93,7 @@ def resolve(source: Source) -> Case:
         tail_levels=tails[:1] * len(heights) if len(set(tails)) == 1 else tails,
         times=tuple(variables["times"]) if steps is None else equal_steps(len(heights), steps),
         also_uplift=also,
-        published=not file.of_user and as_published(path, overrides, levels, tail_levels),
+        published=not file.of_user and as_published(source, overrides),
         hardening_asked=bool(variables["hardening_asked"][0]),
         accuracy=error,
         geometry=geometry,
@@ -122,8 +108,42 @@ def resolve(source: Source) -> Case:
     for joint, parsed in zip(result.joints, of_joints or [variables], strict=True):
         check_softening(joint, bool(parsed["softening_twice"][0]))
     check_joints(result)
-    check_loading(result, tails, of_case=tail_levels is None)
+    check_loading(result, tails, of_case=source.tail_levels is None)
     return with_drive_times(result)
+
+
+def loading_lists(
+    source: Source, steps: int | None
+) -> tuple[dict[str, tuple[float, ...]], tuple[float, ...]]:
+    """The lists of a case file, with the levels of the source; its tailwater levels; steps: between
+    two levels, in place of the file's times.
+
+    Raises InputError.
+    """
+    lists = {name: tuple(values) for name, values in source.text.lists.items()}
+    if source.levels is not None:
+        lists["levels"] = levels_of("levels", source.levels)
+    if source.levels is not None or steps is not None:
+        lists.pop("times", None)
+    tails = lists.pop("tail_levels", (0.0,))
+    if source.tail_levels is not None:
+        tails = levels_of("tail_levels", source.tail_levels)
+    return lists, tails
+
+
+def check_geometry(geometry: Path, face: Sequence[float], accuracy: str | None) -> None:
+    """Raise InputError if a geometry of one's own has a downstream face or an accuracy that it can
+    not have.
+    """
+    if face:
+        raise InputError(
+            "downstream_face: must not be set for a geometry of one's own, whose mesh has the faces"
+        )
+    if accuracy is not None and geometry.suffix != ".geo":
+        raise InputError(
+            f"accuracy = {accuracy}: must not be set with a mesh as geometry "
+            f"({geometry.name}), which can not be refined"
+        )
 
 
 def varied(
@@ -177,12 +197,9 @@ def equal_steps(levels: int, steps: int) -> tuple[float, ...]:
     return tuple(i + (k + 1) / steps for i in range(levels) for k in range(steps))
 
 
-def as_published(path: Path, overrides: Settings, *loading: str | Sequence[float] | None) -> bool:
+def as_published(source: Source, overrides: Settings) -> bool:
     """Whether a case of the package is unchanged but for mesh, solver and uplift."""
     harmless = {n for n, p in declared().items() if p.group in ("Mesh", "Solver")}
-    packaged = path.resolve().parent == CASES.resolve()
-    return (
-        packaged
-        and set(overrides) <= harmless | {"order", "uplift"}
-        and all(levels is None for levels in loading)
-    )
+    packaged = source.path.resolve().parent == CASES.resolve()
+    other_levels = source.levels is not None or source.tail_levels is not None
+    return packaged and set(overrides) <= harmless | {"order", "uplift"} and not other_levels
