@@ -3,7 +3,7 @@
 import numpy as np
 from damjoint.dynamics.stepper import Earthquake
 from damjoint.fem.bodies import Bodies
-from damjoint.fem.cache import cached
+from damjoint.fem.cache import condensed_bodies
 from damjoint.input.resolve import load
 from damjoint.joint.interface import Interface
 from damjoint.solver.load_stepper import LoadStepper
@@ -62,7 +62,7 @@ def smooth_record(path, size, duration=1.0, frequency=3.0, interval=0.01):
 def earthquake(record, settings, levels="0", name="dam"):
     """The earthquake of a case, before its first step."""
     case = load(name, settings, levels, record=record)
-    bulk, bodies = cached(case)
+    bulk, bodies = condensed_bodies(case)
     static = LoadStepper(case, Interface(bulk, case["quadrature"]))
     static.run()
     assert not static.stopped

@@ -54,11 +54,11 @@ def run(
     Returns the results in the order of case.scenes(). A run that stops early or is interrupted
     writes its converged steps. Raises InputError, RunError.
     """
-    chosen, outcomes = engine_of(case, engine), list[Outcome]()
+    solver, outcomes = engine_of(case, engine), list[Outcome]()
     with session(case, out, key=key) as study:
         shown = RunProgress(case, progress)
         with shown:
-            for outcome in accuracy.solve(case, chosen, shown.step, fields or picture):
+            for outcome in accuracy.solve(case, solver, shown.step, fields or picture):
                 save(study, outcome)
                 outcomes.append(outcome)
                 if outcome.error:

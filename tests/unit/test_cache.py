@@ -22,7 +22,7 @@ SMALL = {"n_joint": 6.0, "h_dam": 4.0, "h_found": 4.0}
 def entry(tmp_path, monkeypatch):
     """A cache with one entry: its file and the condensed bodies in it."""
     monkeypatch.setenv("DAMJOINT_CACHE", str(tmp_path))
-    written, bodies = cache.cached(load("a", SMALL))
+    written, bodies = cache.condensed_bodies(load("a", SMALL))
     assert bodies is not None
     (file,) = tmp_path.glob("*.bin")
     return file, written
@@ -35,7 +35,7 @@ def same(first, second):
 def test_all_of_an_entry_is_read_again(entry):
     """Types, names, numbers; arrays, by rows or columns, which decides the order of summation."""
     _, written = entry
-    result, bodies = cache.cached(load("a", SMALL))
+    result, bodies = cache.condensed_bodies(load("a", SMALL))
     assert bodies is None and list(result.faces) == ["face2"]
     arrays = [], []
     trees = [cache.pack(c, a) for c, a in zip((result, written), arrays, strict=True)]
@@ -54,7 +54,11 @@ def test_bodies_in_the_cache_have_all_faces_under_water(tmp_path, monkeypatch):
         load("dam", SMALL | {"neck_height": 10}, (44.0,), (tail,)) for tail in (3.0, 4.0, 42.0)
     )
     downstream = [
-        [face.low for face in cache.cached(case)[0].faces.values() if face.side in TAILWATER]
+        [
+            face.low
+            for face in cache.condensed_bodies(case)[0].faces.values()
+            if face.side in TAILWATER
+        ]
         for case in (below, above)
     ]
     assert [sorted(heights) for heights in downstream] == [[0], [0, 35]]
@@ -86,10 +90,10 @@ def test_a_damaged_entry_is_computed_again(entry, tmp_path, damage):
     else:
         with storage.write_entry(file, "0.0.0") as other:
             other.write(whole.split(b"\n", 2)[2])
-    result, bodies = cache.cached(load("a", SMALL))
+    result, bodies = cache.condensed_bodies(load("a", SMALL))
     assert bodies is not None and same(result, written)
     assert not (tmp_path / "trap").exists()
-    assert cache.cached(load("a", SMALL))[1] is None  # stored again
+    assert cache.condensed_bodies(load("a", SMALL))[1] is None  # stored again
 
 
 def flipped(whole, step=1):
@@ -121,9 +125,9 @@ def test_an_entry_with_a_changed_bit_is_not_read(entry, monkeypatch):
 def test_an_entry_with_a_changed_bit_is_replaced(entry):
     file, written = entry
     file.write_bytes(next(flipped(file.read_bytes()[::-1]))[::-1])
-    result, bodies = cache.cached(load("a", SMALL))
+    result, bodies = cache.condensed_bodies(load("a", SMALL))
     assert bodies is not None and same(result, written)
-    assert cache.cached(load("a", SMALL))[1] is None  # replaced
+    assert cache.condensed_bodies(load("a", SMALL))[1] is None  # replaced
 
 
 def test_a_value_with_a_changed_bit_is_computed_again(tmp_path, monkeypatch):
@@ -177,7 +181,7 @@ def test_a_pipe_in_place_of_an_entry_is_not_read(entry):
     file, written = entry
     file.unlink()
     os.mkfifo(file)
-    result, bodies = cache.cached(load("a", SMALL))
+    result, bodies = cache.condensed_bodies(load("a", SMALL))
     assert bodies is not None and same(result, written)
 
 
@@ -187,9 +191,9 @@ def test_nothing_is_written_through_links(entry, tmp_path_factory):
     mine.write_text("mine")
     file.with_name(storage.PART + file.name).symlink_to(mine)
     file.write_bytes(b"")
-    assert cache.cached(load("a", SMALL))[1] is not None
+    assert cache.condensed_bodies(load("a", SMALL))[1] is not None
     assert mine.read_text() == "mine"
-    assert cache.cached(load("a", SMALL))[1] is None
+    assert cache.condensed_bodies(load("a", SMALL))[1] is None
 
 
 def test_an_array_of_objects_is_not_loaded(entry, tmp_path):
@@ -199,7 +203,7 @@ def test_an_array_of_objects_is_not_loaded(entry, tmp_path):
     with storage.write_entry(file, header) as damaged:
         damaged.write(b'{"arrays": 1, "tree": {"array": 0}}\n')
         np.save(damaged, np.array([Trap(tmp_path / "trap")]), allow_pickle=True)
-    result, bodies = cache.cached(load("a", SMALL))
+    result, bodies = cache.condensed_bodies(load("a", SMALL))
     assert bodies is not None and same(result, written)
     assert not (tmp_path / "trap").exists()
 
@@ -207,13 +211,13 @@ def test_an_array_of_objects_is_not_loaded(entry, tmp_path):
 def test_a_cache_that_can_not_be_written_is_ignored(tmp_path, monkeypatch):
     (tmp_path / "file").write_text("in the way")
     monkeypatch.setenv("DAMJOINT_CACHE", str(tmp_path / "file" / "below"))
-    assert cache.cached(load("a", SMALL))[1] is not None
+    assert cache.condensed_bodies(load("a", SMALL))[1] is not None
 
 
 def test_an_entry_of_other_meshing_code_is_not_read(entry, monkeypatch):
     """After a change of geo/ or of the elements."""
     monkeypatch.setattr(cache, "sources", lambda: "changed")
-    assert cache.cached(load("a", SMALL))[1] is not None
+    assert cache.condensed_bodies(load("a", SMALL))[1] is not None
 
 
 def test_the_least_recently_used_files_are_removed(tmp_path, monkeypatch):

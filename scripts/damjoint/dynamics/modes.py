@@ -13,7 +13,7 @@ import numpy as np
 from .. import InputError
 from ..arrays import Array, Table
 from ..fem.bodies import Bodies
-from ..fem.cache import cached
+from ..fem.cache import condensed_bodies
 from ..input.case import Case
 from ..joint.interface import Interface
 from ..mesh.mesh import Mesh
@@ -81,8 +81,8 @@ def natural_modes(case: Case, number: int) -> NaturalModes:
 
     The water's mass is that of the last level. Raises InputError if there are not so many.
     """
-    bulk, made = cached(case)
-    bodies = made or Bodies.of(case)
+    bulk, assembled = condensed_bodies(case)
+    bodies = assembled or Bodies.of(case)
     interface = Interface(bulk, case["quadrature"], case["face_points"])
     stepper = LoadStepper(case, interface)  # with the joints of a user's own geometry
     undamaged = interface.assembly.whole(stepper.model.equilibrium.undamaged)

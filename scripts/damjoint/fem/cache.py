@@ -81,7 +81,7 @@ def sources() -> str:
     return f"{zlib.crc32(b''.join(texts)):08x}"
 
 
-def cached(case: Case, engine: str = "condensed") -> tuple[Condensed, Bodies | None]:
+def condensed_bodies(case: Case, engine: str = "condensed") -> tuple[Condensed, Bodies | None]:
     """Condensed bodies of a case, from the cache or computed and added to it; and the bodies they
     were computed from, if they were.
 

@@ -118,8 +118,9 @@ def iterates(case: Case, bodies: Bodies) -> bool:
 def check_size(case: Case, engine: str = "condensed") -> None:
     """Raise RunError if a case certainly needs more memory than is available.
 
-    engine: condensed, iterative or auto, see `cached`. Of uncondensed bodies, which are checked
-    again after the mesh, a third of the estimate is counted, at least the unknowns of the joints.
+    engine: condensed, iterative or auto, see `condensed_bodies`. Of uncondensed bodies, which are
+    checked again after the mesh, a third of the estimate is counted, at least the unknowns of the
+    joints.
     """
     joint, bulk = joints_size(case), bulk_size(case)
     what = f"{bulk:.0f} unknowns, {joint} of them on the joint,"

@@ -216,19 +216,23 @@ def add_statement(case: CaseText, statement: list[Token], path: Path, where: str
         case.of_joints[name] = values
         note_owner(case, name, path)
     else:
-        import difflib
+        raise InputError(f"{where}: not a statement of a case; allowed: {allowed_like(tokens)}")
 
-        allowed = [*(f"{n}()" for n in LISTS), *TEXTS, "Include", "default_<parameter>"]
-        near = difflib.get_close_matches("".join(tokens[:3]).partition("=")[0], allowed, 1)
-        near = [f"default_{name}"] if name in declared() else near
-        raise InputError(
-            f"{where}: not a statement of a case; allowed: "
-            + (f"{near[0]} (did you mean that?), " if near else "")
-            + 'Include "file.case", title, also_uplift, geometry, record, '
-            + "default_<parameter> = value, "
-            + ", ".join(f"{n}() = {{...}}" for n in LISTS)
-            + ", Struct Joint::<joint> [ <parameter> value, ... ]"
-        )
+
+def allowed_like(tokens: tuple[str, ...]) -> str:
+    """The statements of a case, first the one that is probably meant by another one."""
+    import difflib
+
+    allowed = [*(f"{n}()" for n in LISTS), *TEXTS, "Include", "default_<parameter>"]
+    near = difflib.get_close_matches("".join(tokens[:3]).partition("=")[0], allowed, 1)
+    near = [f"default_{tokens[0]}"] if tokens[:1] and tokens[0] in declared() else near
+    return (
+        (f"{near[0]} (did you mean that?), " if near else "")
+        + 'Include "file.case", title, also_uplift, geometry, record, '
+        + "default_<parameter> = value, "
+        + ", ".join(f"{n}() = {{...}}" for n in LISTS)
+        + ", Struct Joint::<joint> [ <parameter> value, ... ]"
+    )
 
 
 def add_block(

@@ -13,7 +13,7 @@ from .. import ROUND_OFF
 from ..arrays import Array, IntArray, distinct
 from ..csr import CsrMatrix, added, stacked
 from ..fem import elements
-from ..fem.cache import cached, key_of
+from ..fem.cache import condensed_bodies, key_of
 from ..fem.condensed import Condensed, CondensedJoint
 from ..input.case import Case, OfJoint
 from ..input.scene import UP
@@ -297,7 +297,7 @@ class LastInterface:
         if key not in self.last:
             small = [k for k, i in self.last.items() if i.bulk.size <= SMALL]
             self.last = {k: self.last[k] for k in small[-1:]}  # free the memory of others first
-            self.last[key] = Interface(cached(case)[0], *rules)
+            self.last[key] = Interface(condensed_bodies(case)[0], *rules)
         return self.last[key]
 
 

@@ -71,6 +71,14 @@ class Table(NamedTuple):
         ]
         return np.where(np.isfinite(factors), factors, np.nan)
 
+    def curves(self, order: np.ndarray, names: list[str]) -> dict[str, list[int]]:
+        """The numbers of the rows, in an order, by the values of some names, as text."""
+        curves: dict[str, list[int]] = {}
+        for i in order:
+            key = ", ".join(f"{name} {self.rows[i][column_of(name)]}" for name in names)
+            curves.setdefault(key, []).append(i)
+        return curves
+
 
 def draw(plan: Plan, rows: list[Row], cases: list[Case], title: str, path: Path) -> str:
     """Draw the rows of a sweep, each with its case, to path.
@@ -202,10 +210,7 @@ def draw_curves(figure: Figure, table: Table, names: list[str]) -> None:
     x = np.array([categories.index(t) if categories else float(t) for t in texts])
     x_label, x_factor = (name, 1.0) if categories else axis_of(name, x)
     x = x * x_factor
-    curves: dict[str, list[int]] = {}
-    for i in np.argsort(x, kind="stable"):
-        key = ", ".join(f"{o} {table.rows[i][column_of(o)]}" for o in others)
-        curves.setdefault(key, []).append(i)
+    curves = table.curves(np.argsort(x, kind="stable"), others)
     bad = is_marked(plan, table.rows)
     # of a static row that fails the last state is at another level: it would set the scale
     valued = bool(plan.critical) or plan.slip_limit is not None
@@ -242,10 +247,7 @@ def draw_curves(figure: Figure, table: Table, names: list[str]) -> None:
         if np.nan_to_num(shown).any():
             widen(panel.yaxis)
         else:
-            panel.set(yticks=[0] if len(shown) else [], ylim=(-1, 1))
-            text = "zero in all rows" if len(shown) == len(x) else "zero in all rows that stand"
-            text = text if len(shown) else "all rows fail"
-            panel.text(0.5, 0.6, text, ha="center", transform=panel.transAxes)
+            note_zero(panel, len(shown), len(x))
     handles, labels = panel.get_legend_handles_labels()
     named = {text: handle for text, handle in zip(labels, handles, strict=True) if text in curves}
     if bad.any():
@@ -255,6 +257,14 @@ def draw_curves(figure: Figure, table: Table, names: list[str]) -> None:
     if named:
         below: dict[str, Any] = {"loc": "outside lower center", "fontsize": 8}
         figure.legend(list(named.values()), list(named), ncols=min(len(named), 4), **below)
+
+
+def note_zero(panel: Axes, number: int, rows: int) -> None:
+    """Say in a panel that all of the shown values, of so many of the rows, are zero."""
+    panel.set(yticks=[0] if number else [], ylim=(-1, 1))
+    text = "zero in all rows" if number == rows else "zero in all rows that stand"
+    text = text if number else "all rows fail"
+    panel.text(0.5, 0.6, text, ha="center", transform=panel.transAxes)
 
 
 def scale_axis(axis: XAxis, values: np.ndarray) -> None:

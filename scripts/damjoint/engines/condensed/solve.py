@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from ... import RunError
 from ...csr import CsrMatrix
-from ...fem.cache import cached
+from ...fem.cache import condensed_bodies
 from ...fem.condensed import Condensed
 from ...fem.memory import joint_size
 from ...input.case import Case
@@ -75,8 +75,8 @@ def solve(case: Case, on_step: OnStep, _fields: bool, engine: str = "auto") -> I
     """
     with limited_threads(threads_of(case)):
         start = time.perf_counter()
-        bulk, made = cached(case, engine)
-        before = bulk.seconds if made else {"cache": time.perf_counter() - start}
+        bulk, assembled = condensed_bodies(case, engine)
+        before = bulk.seconds if assembled else {"cache": time.perf_counter() - start}
         interface = Interface(bulk, case["quadrature"], case["face_points"])
         steppers: list[LoadStepper] = []
         recovered: dict[int, dict[float, Field]] = {}
@@ -85,7 +85,7 @@ def solve(case: Case, on_step: OnStep, _fields: bool, engine: str = "auto") -> I
         def bodies() -> Bodies:
             from ...fem.bodies import Bodies
 
-            return made or Bodies.of(case)
+            return assembled or Bodies.of(case)
 
         def fields(number: int) -> dict[float, Field]:
             """Fields of a scene; recovers those of all scenes with a single factorisation."""
@@ -103,7 +103,9 @@ def solve(case: Case, on_step: OnStep, _fields: bool, engine: str = "auto") -> I
             stepper, error = follow(scene, interface, partial(on_step, number))
             if engine == "auto" and isinstance(error, Stalled):
                 with suppress(RunError):  # too little memory: the first error remains
-                    interface = Interface(cached(case)[0], case["quadrature"], case["face_points"])
+                    interface = Interface(
+                        condensed_bodies(case)[0], case["quadrature"], case["face_points"]
+                    )
                     stepper, error = follow(scene, interface, partial(on_step, number))
             steppers.append(stepper)
             result = stepper.results()
