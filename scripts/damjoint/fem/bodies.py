@@ -153,10 +153,7 @@ class Bodies:
 
     @staticmethod
     def of(case: Case) -> Bodies:
-        """Mesh a case and assemble its bodies.
-
-        Raises RunError (mesh).
-        """
+        """Mesh a case and assemble its bodies. Raises RunError (mesh)."""
         mesh = mesh_of(case)
         start = time.perf_counter()
         by_name = {name: ElasticBody.of(case, mesh, name) for name in mesh.solids}

@@ -168,10 +168,7 @@ def pack(value: Any, arrays: list[Array]) -> object:
 
 
 def unpack(tree: Any, arrays: list[Array]) -> Any:
-    """The value of a tree.
-
-    Raises KeyError, IndexError, TypeError if something is missing.
-    """
+    """The value of a tree. Raises KeyError, IndexError, TypeError if something is missing."""
     if isinstance(tree, list):
         return [unpack(item, arrays) for item in tree]
     if not isinstance(tree, dict):

@@ -147,10 +147,7 @@ def available() -> float:
 
 
 def kilobytes(path: str, name: str) -> float:
-    """An entry "name: number kB" of a file of the system [bytes].
-
-    Raises OSError, ValueError.
-    """
+    """An entry "name: number kB" of a file of the system [bytes]. Raises OSError, ValueError."""
     match = re.search(rf"{name}:\s+(\d+)", Path(path).read_text())
     if match is None:
         raise ValueError(f"{path}: no {name}")

@@ -5,7 +5,7 @@ required factors. Load combinations are cases that include a common file.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -417,6 +417,13 @@ def position_by_case(case: Case) -> str:
 def difference(first: float, second: float) -> float:
     """Subtract; 0 if the numbers agree to nine digits, or are both infinite."""
     return 0.0 if math.isclose(first, second, rel_tol=ROUND_OFF) else first - second
+
+
+def common_notes(checks: Sequence[SafetyCheck]) -> Iterator[tuple[SafetyCheck, str, bool]]:
+    """Yield the notes on joints, each with its check, and whether all of the checks have it."""
+    for check in checks:
+        for note in check.notes:
+            yield check, note, all(note in other.notes for other in checks)
 
 
 def verdict_line(check: SafetyCheck) -> str:

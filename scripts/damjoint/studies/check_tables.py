@@ -15,6 +15,7 @@ from .check import (
     FAIL,
     Row,
     SafetyCheck,
+    common_notes,
     position_by_case,
     required_by_case,
     verdict_line,
@@ -87,12 +88,11 @@ def text_table(checks: list[SafetyCheck], width: int | None = None) -> str:
 def labelled_notes(checks: list[SafetyCheck]) -> list[str]:
     """Notes with the scene and joint of each; one that all of a case have, once with its name."""
     lines = dict[str, None]()  # in their order
-    for check in checks:
-        row = check.finite_elements.row
-        same = [other for other in checks if other.case.name == check.case.name]
-        for note in check.notes:
-            common = all(note in other.notes for other in same)
-            lines[f"{row['case'] if common else scene_label(checks, row)}: {note}"] = None
+    for name in dict.fromkeys(check.case.name for check in checks):
+        of_case = [check for check in checks if check.case.name == name]
+        for check, note, common in common_notes(of_case):
+            label = name if common else scene_label(checks, check.finite_elements.row)
+            lines[f"{label}: {note}"] = None
     return list(lines)
 
 

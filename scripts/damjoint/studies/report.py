@@ -37,6 +37,7 @@ from .check import (
     UNCHECKED,
     MethodResult,
     SafetyCheck,
+    common_notes,
     compare_joints,
     hand_calculation,
     required_by_case,
@@ -378,12 +379,11 @@ def worst_verdict(result: Results, checks: list[SafetyCheck]) -> str:
 
 def notes_of(checks: list[SafetyCheck]) -> list[str]:
     """Notes on the methods: those of all joints once, others with the name of their joint."""
-    lines = dict[str, None]()  # in their order
-    for check in checks:
-        for note in check.notes:
-            common = all(note in other.notes for other in checks)
-            lines[note if common else f"{check.finite_elements.joint}: {note}"] = None
-    return list(lines)
+    lines = (
+        note if common else f"{check.finite_elements.joint}: {note}"
+        for check, note, common in common_notes(checks)
+    )
+    return list(dict.fromkeys(lines))  # in their order
 
 
 def describe_scene(case: Case) -> str:

@@ -108,10 +108,7 @@ def check_size(case: Case, unknowns: float) -> None:
 
 
 def solve(case: Case, on_step: OnStep, fields: bool) -> Iterator[Outcome]:
-    """The scenes of a case; GetDP works in a temporary folder.
-
-    See engines/__init__.py.
-    """
+    """The scenes of a case; GetDP works in a temporary folder. See engines/__init__.py."""
     start = time.perf_counter()
     if not case.geometry:
         check_size(case, bulk_size(case))
