@@ -39,8 +39,10 @@ RUPTURE = DAM | {"law": "rupture"}
 UNBONDED = {"law": "bond", "sigma_max": 0.0, "adhesion": 0.0}
 
 
-def search_result(case, of="level", settings=None, levels=None, tail_levels=None):
+def search_result(case, of="level", settings=None, levels=None, tail_levels=None, rise=1.0):
+    """rise: of the level that an increment aims at, over the usual one."""
     search = Search(load(case, settings, levels, tail_levels), of)
+    search.rise *= rise
     return search, search.run()
 
 
@@ -333,27 +335,25 @@ def test_a_parameter_without_effect_is_not_varied(case, of, message):
 
 
 @pytest.mark.heavy
-def test_a_step_does_not_pass_over_the_highest_level(monkeypatch):
+def test_a_step_does_not_pass_over_the_highest_level():
     """A brittle bond, whose crack grows unstably and whose level then rises again: the same levels
     with steps of any length, before and after.
     """
     brittle = {"law": "bond", "sigma_max": 2e5, "adhesion": 3e5, "G_f": 20.0, "G_t": 50.0}
     _, usual = search_result("dam", settings={"n_joint": 40.0} | brittle)
-    monkeypatch.setattr(path, "RISE", path.RISE / 2)
-    _, short = search_result("dam", settings={"n_joint": 40.0} | brittle)
+    _, short = search_result("dam", settings={"n_joint": 40.0} | brittle, rise=1 / 2)
     assert usual.value == pytest.approx(short.value, rel=path.PRECISION)
     assert usual.confirmed and usual.mode == short.mode == "unstable crack growth"
     after, other = (answer.after["by displacement"] for answer in (usual, short))
     assert after > usual.value and other == pytest.approx(after, rel=path.PRECISION)
 
 
-def test_the_limit_of_a_joint_that_softens_and_slips_whole_is_between_the_steps(monkeypatch):
+def test_the_limit_of_a_joint_that_softens_and_slips_whole_is_between_the_steps():
     """The whole joint slips at the first point beyond the limit point, 0.1 % below it."""
     weak = {"law": "bond", "uplift": "none", "sigma_max": 54e3, "adhesion": 29e3, "mu": 0.61}
     settings = {"n_joint": 20.0, "G_f": 83.3, "G_t": 33.4} | weak
     _, usual = search_result("dam", settings=settings)
-    monkeypatch.setattr(path, "RISE", path.RISE / 5)
-    _, short = search_result("dam", settings=settings)
+    _, short = search_result("dam", settings=settings, rise=1 / 5)
     assert usual.value == pytest.approx(short.value, rel=path.PRECISION / 2)
     assert usual.confirmed and usual.mode == short.mode == "sliding"
 
@@ -492,13 +492,12 @@ SNAP_BACKS = [
 
 
 @pytest.mark.parametrize("settings", SNAP_BACKS)
-def test_the_critical_level_does_not_depend_on_the_increments(settings, monkeypatch):
+def test_the_critical_level_does_not_depend_on_the_increments(settings):
     """With levels that begin elsewhere, and a third of the usual increments."""
     height = settings.get("dam_height", 45.0)
     answers = [search_result("dam", settings=settings, levels=f"{height}")[1]]
     answers.append(search_result("dam", settings=settings, levels=f"{0.45 * height}")[1])
-    monkeypatch.setattr(path, "RISE", path.RISE / 3)
-    answers.append(search_result("dam", settings=settings, levels=f"{height}")[1])
+    answers.append(search_result("dam", settings=settings, levels=f"{height}", rise=1 / 3)[1])
     values = [answer.value for answer in answers]
     assert all(answer.confirmed for answer in answers)
     assert max(values) / min(values) - 1 < path.PRECISION

@@ -22,7 +22,7 @@ from ..input.parameters import independent, parameter
 from ..input.resolve import resolve, varied
 from ..joint.interface import interface_of
 from ..model.results import Results, row_of_joint
-from ..solver.path import PRECISION, ROUGH, SURE, Point
+from ..solver.path import PRECISION, RISE, ROUGH, SURE, Point
 from ..statics.statement import words_of_bound
 from ..statics.verdict import bound, highest_by_statics
 from ..threads import limited_threads
@@ -109,6 +109,8 @@ class Search:
         self.trials: list[Trial] = []
         #: how far paths are followed, see `FailurePath.follow`
         self.factor = ROUGH
+        #: relative rise of the level that an increment of them aims at
+        self.rise = RISE
         #: values on both sides of the gravity method's critical value
         self.guesses: list[float] = []
         self.gravity = GravityValues(case, of, self.case_at, self.joints_at)
@@ -208,7 +210,7 @@ class Search:
         highest = max(target or 0, *case.levels)  # water may press on the crest
         interface = interface_of(replace(case, levels=(*case.levels[:-1], highest)))
         solver = {name: self.case[name] for name in QUICK}
-        path = FailurePath(case, interface, target, report, to_growth, solver=solver)
+        path = FailurePath(case, interface, target, report, to_growth, self.rise, solver)
         self.trials.append(Trial(value, path))
         path.follow(self.factor)
         return path
