@@ -671,7 +671,7 @@ class EquilibriumPath:
         halves lead to the same state.
         """
         top = self.points[self.top] if self.points else None
-        if top is None or top.slides:
+        if top is None or (top.slides and not top.model.equilibrium.path_dependent):
             return None
         for verified in (False, True):
             again = self.by_shorter(verified)
@@ -743,7 +743,8 @@ class EquilibriumPath:
         rise, length, ends = b.level - a.level, self.length(left), max(a.level, b.level)
         chord = rise / (length or 1.0)
         if before is None or beyond is None:
-            return ends + abs(rise)
+            steepest = max(abs(chord), 0.0 if before is None else before)
+            return max(ends + abs(rise), a.level + steepest * length)
         if before > chord > beyond:  # where the lines through the neighbours meet
             return a.level + before * (rise - beyond * length) / (before - beyond)
         if before > chord:  # it may fall anywhere in between
