@@ -3,6 +3,7 @@
 import csv
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -537,6 +538,21 @@ def test_the_branch_of_a_joint_that_releases_its_shear_ends_in_unstable_growth()
     _, answer = search_result("dam", settings=settings, levels="5.88,18.9")
     assert (answer.confirmed, answer.mode) == (True, "unstable crack growth")
     assert answer.after["by relaxation"] > answer.value > 20
+
+
+def test_the_level_may_rise_in_the_last_interval_as_steeply_as_before_it():
+    """A path whose last increment has hopped over the maximum: the chord of its last interval is
+    flat, but the interval before it is steep.
+    """
+    levels, moved = (140.68, 140.78, 140.785), (0.0, 9.0, 15.0)
+    points = [
+        SimpleNamespace(level=level, control="zone", state=SimpleNamespace(jump=np.array([x])))
+        for level, x in zip(levels, moved, strict=True)
+    ]
+    curve = path.EquilibriumPath.__new__(path.EquilibriumPath)
+    curve.points, curve.starts, curve.closed = points, [], []
+    assert curve.bound(1) == pytest.approx(140.78 + 6 * 0.1 / 9)
+    assert curve.bound(0) == pytest.approx(140.88)  # its chord is the steepest slope known
 
 
 def test_a_path_begins_as_a_run_where_single_steps_do_not_lead(monkeypatch):
