@@ -404,7 +404,7 @@ def test_a_memory_error_is_one_line(command, monkeypatch):
     def full(*_):
         raise MemoryError("no 3 GB")
 
-    monkeypatch.setattr("damjoint.engines.condensed.solve.cached", full)
+    monkeypatch.setattr("damjoint.engines.condensed.solve.condensed_bodies", full)
     code, out, err = command(*RUN)
     assert (code, out) == (1, "") and "memory" in err and "no 3 GB" in err
     assert len(err.splitlines()) == 1
