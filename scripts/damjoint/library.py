@@ -883,7 +883,7 @@ class Sweep(WithTables):
 
     @property
     def rows(self) -> np.recarray:
-        """A row per combination: the varied values (a level as level_asked), the last row of
+        """A row per combination: the varied values (a level as level_requested), the last row of
         history.csv, failed, verdict, statement, the critical value; nan without an equilibrium.
         """
         return records(self.named("rows")[0])

@@ -148,7 +148,7 @@ def results_page() -> str:
         "Written by `damjoint sweep`, a row per combination, in the order of computation: `key`, "
         "of all that decides the row (values, loading, mesh, record, code), by which an "
         "interrupted sweep continues; the varied, sampled and tied values (a level as "
-        "`level_asked`); the last row of "
+        "`level_requested`); the last row of "
         "history.csv; `failed` (1 where `damjoint run` ends with exit code 1), `verdict`, "
         "`statement`; with `--critical` the critical value, its `mode`, whether it is `confirmed` "
         "and by what; with `--quake` `peak_ground_ax` [m/s2], `residual_slip` [m], "

@@ -162,7 +162,7 @@ def has_constant_strength(joint: stops.Joint) -> bool:
     """
     v = joint.values
     dry = v["uplift"] not in ("flow", "cracked")
-    plastic = v["law"] == "friction" and not (v["hardening_asked"] and v["pena_tang"])
+    plastic = v["law"] == "friction" and not (v["hardening_requested"] and v["pena_tang"])
     return bool(
         dry and (plastic or (v["law"] == "bond" and not v["sigma_max"] and not v["adhesion"]))
     )

@@ -251,7 +251,7 @@ def at_points(joint: Shaken, steps: Table) -> tuple[list[Table], Table]:
 
 def forces_of(joint: Shaken, steps: Table) -> tuple[Array, Array]:
     """T, N and M (n, 3) of the law by the written tractions of each time step, and those of the
-    dashpots: c times the velocity of the jump where a point was closed at the begin of the step.
+    dashpots: c times the velocity of the jump where a point was closed at the start of the step.
     """
     moving, before = at_points(joint, steps)
     v, section = joint.values, joint.section

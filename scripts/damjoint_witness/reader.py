@@ -360,7 +360,7 @@ def asked(
     resolved = [resolve(joint, levels) for joint in joints]
     for joint, own in zip(resolved, joints, strict=True):
         joint["downstream_face"] = face
-        joint["hardening_asked"] = float(own.get("pena_tang", AUTOMATIC) != AUTOMATIC)
+        joint["hardening_requested"] = float(own.get("pena_tang", AUTOMATIC) != AUTOMATIC)
         if lifts:  # the sizes of the mesh are those of the first joint
             joint |= {name: resolved[0][name] for name in ("h_dam", "h_found")}
     if lifts:

@@ -95,7 +95,7 @@ def strengths(rows: Table, v: Values) -> tuple[Array, Array]:
     if v["law"] == "rupture":
         return np.where(damage < 1, f, 0.0), np.full(len(damage), np.inf)
     if v["law"] == "friction":  # the apex of the cone, and what slip has added
-        endless = np.inf if v["hardening_asked"] and v["pena_tang"] else 0.0
+        endless = np.inf if v["hardening_requested"] and v["pena_tang"] else 0.0
         return np.full(len(damage), c / mu), v["pena_tang"] * rows["lambda"] + endless
     left = endo_strength(np.maximum(damage, PEAK_OF_ENDO)) / endo_strength(PEAK_OF_ENDO)
     return f * left, (c - mu * f) * left

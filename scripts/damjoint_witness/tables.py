@@ -49,7 +49,7 @@ def bookkeeping(files: Files, asked: Asked) -> Iterator[str]:
         for v, name in zip(asked.joints, names, strict=True)
         if not named or name in named.split(" and ")
     ]
-    hardens = all(v["law"] == "friction" and v["hardening_asked"] for v in failing)
+    hardens = all(v["law"] == "friction" and v["hardening_requested"] for v in failing)
     failed = files.stopped or (mode == "sliding" and not hardens)
     if files.exit_code != int(failed):
         state = f"state {files.record['state']}, verdict {files.record['verdict']}"

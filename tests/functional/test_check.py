@@ -142,7 +142,7 @@ def test_without_required_factors_the_verdict_is_not_checked(command, combinatio
 def test_a_dam_that_slides_below_its_last_level_fails(command, combinations, tmp_path):
     """The gravity method has the last level, the finite elements stop below it."""
     weak = "mu=0.25", "adhesion=1000", "pena_tang=0", "n_joint=8"
-    short = "smallest_step=0.004", "burst_iterations=30"
+    short = "smallest_step=0.004", "relaxation_iterations=30"
     settings = "required_SSF=0", "required_OSF=0", *weak, *short
     words = [word for setting in settings for word in ("--set", setting)]
     code, out, _ = command("check", "flood.case", *words, "--out", "here")
@@ -160,7 +160,7 @@ def test_a_dam_that_slides_below_its_last_level_fails(command, combinations, tmp
 def test_a_dam_that_stops_under_a_part_of_the_earthquake_fails(command, tmp_path):
     """At constant level T grows with the earthquake."""
     weak = "law=bond", "sigma_max=0", "adhesion=0", "mu=0.8", "k_h=0.3", "n_joint=12"
-    short = "smallest_step=0.02", "burst_iterations=30"
+    short = "smallest_step=0.02", "relaxation_iterations=30"
     words = [word for setting in (*weak, *short) for word in ("--set", setting)]
     code, out, _ = command("check", "dam", *words, "--levels", "40,40")
     assert code == 1

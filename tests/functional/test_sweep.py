@@ -42,14 +42,14 @@ def test_rows_are_equal_to_single_runs(solve, command, tmp_path):
     )
     assert command(*words)[0] == 0
     table = rows(tmp_path / "sweep.csv")
-    assert [(row["mu"], row["level_asked"]) for row in table] == [
+    assert [(row["mu"], row["level_requested"]) for row in table] == [
         ("0.35", "8"),
         ("0.35", "9"),
         ("0.4", "8"),
         ("0.4", "9"),
     ]
     for row in table:
-        levels = "3,6,8" if row["level_asked"] == "8" else "3,6,8,9"
+        levels = "3,6,8" if row["level_requested"] == "8" else "3,6,8,9"
         history = solve("c", levels, uplift="imposed", mu=float(row["mu"]))[0].history
         for name in ("level", "max_opening", "crest_ux", "N", "T", "M"):
             assert float(row[name]) == pytest.approx(history[name][-1], rel=1e-6), name

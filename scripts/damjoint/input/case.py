@@ -64,7 +64,7 @@ class OfJoint:
     values: dict[str, Value]
     section: dict[str, list[float]] = field(compare=False, repr=False)
     #: as in Case
-    hardening_asked: bool = False
+    hardening_requested: bool = False
 
     @property
     def joint_values(self) -> dict[str, Value]:
@@ -92,7 +92,7 @@ class Case(ParameterValues):
     #: whether it is a published case of the package, but for mesh, solver and uplift
     published: bool = False
     #: whether pena_tang has been set: then a dam stands though its whole joint slips
-    hardening_asked: bool = False
+    hardening_requested: bool = False
     #: the required relative error; None: the mesh is not refined
     accuracy: float | None = None
     #: whether every update of the internal variables is written
@@ -150,7 +150,7 @@ class Case(ParameterValues):
                 self,
                 values=self.values | joint.values,
                 section=joint.section,
-                hardening_asked=joint.hardening_asked,
+                hardening_requested=joint.hardening_requested,
                 lift_heights=(),
                 of_joints=(),
             )
@@ -224,11 +224,11 @@ class Case(ParameterValues):
 
         Raises InputError if the case has drains or a waterstop beyond the end of a joint.
         """
-        same = [replace(joint, hardening_asked=self.hardening_asked) for joint in joints]
+        same = [replace(joint, hardening_requested=self.hardening_requested) for joint in joints]
         ends = [self.section | joint.section for joint in joints]
-        values = [(joint.values, joint.hardening_asked) for joint in self.of_joints or same]
+        values = [(joint.values, joint.hardening_requested) for joint in self.of_joints or same]
         of_joints = (
-            replace(joint, values=set_values, section=section, hardening_asked=hardens)
+            replace(joint, values=set_values, section=section, hardening_requested=hardens)
             for (set_values, hardens), joint, section in zip(values, joints, ends, strict=True)
         )
         several = tuple(of_joints) if len(joints) > 1 else ()

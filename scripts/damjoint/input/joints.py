@@ -122,7 +122,7 @@ def stacked_joints(
             lower=joint.lower,
             values={n: parsed[n][0] for n in declared() if parsed[n] != variables[n]},
             section={n: parsed[n] for n in SECTION},
-            hardening_asked=bool(parsed["hardening_asked"][0]),
+            hardening_requested=bool(parsed["hardening_requested"][0]),
         )
         for joint, parsed in zip(stacked(names), of_joints, strict=True)
     )

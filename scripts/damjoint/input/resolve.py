@@ -94,7 +94,7 @@ def resolve(source: Source) -> Case:
         times=tuple(variables["times"]) if steps is None else equal_steps(len(heights), steps),
         also_uplift=also,
         published=not file.of_user and as_published(source, overrides),
-        hardening_asked=bool(variables["hardening_asked"][0]),
+        hardening_requested=bool(variables["hardening_requested"][0]),
         accuracy=error,
         geometry=geometry,
         record=Path(file.texts["record"]) if "record" in file.texts else None,

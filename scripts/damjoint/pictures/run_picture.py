@@ -205,7 +205,7 @@ def shear_limit(case: Case, rows: dict[str, np.ndarray]) -> tuple[str, np.ndarra
     law = case.law
     if not law.limits_shear:
         return None
-    hardening = " + H slip" if law.hardening_parameter and case.hardening_asked else ""
+    hardening = " + H slip" if law.hardening_parameter and case.hardening_requested else ""
     strength = law.shear_strength(rows["sigma_n_eff"], rows["damage"], rows["slip"])
     return f"limit: {law.shear_strength_formula}{hardening}", strength
 

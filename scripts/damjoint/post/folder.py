@@ -207,7 +207,7 @@ def write_info(results: Results, folder: Path, state: str = "", why: str = "") -
             if case.geometry
             else {},  # a section by parameters is computed again
             "published": case.published,
-            "hardening_asked": case.hardening_asked,
+            "hardening_requested": case.hardening_requested,
             **results.info,
             "units": {
                 n: unit for n, (unit, _) in (joint_columns(case) | history_columns(case)).items()

@@ -109,7 +109,7 @@ def case_of(info: dict[str, Any]) -> Case:
     # a section by parameters is computed again
     ends = ("name", "upper", "lower", "section") if info["geometry"] else ()
     joints = tuple(
-        replace(joint, **{name: stored[name] for name in ("hardening_asked", *ends)})
+        replace(joint, **{name: stored[name] for name in ("hardening_requested", *ends)})
         for joint, stored in zip(stacked_joints(parsed, of_joints), info["joints"], strict=True)
     )
     return Case(
@@ -120,7 +120,7 @@ def case_of(info: dict[str, Any]) -> Case:
         tail_levels=tail_levels,
         times=times,
         published=bool(info["published"]),
-        hardening_asked=bool(info["hardening_asked"]),
+        hardening_requested=bool(info["hardening_requested"]),
         shared={n: parsed[n] for n in SHARED},
         geometry=Path(info["geometry"]) if info["geometry"] else None,
         section={n: parsed[n] for n in SECTION} | info["section"],

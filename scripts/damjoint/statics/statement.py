@@ -38,7 +38,7 @@ def statement(results: Results) -> str:
     default = ", a numerical default; set it if your joint hardens"
     return (
         f"{slides}; the dam stands on the hardening {hardening} = {case[hardening]:.4g} Pa/m"
-        f"{'' if case.hardening_asked else default}"
+        f"{'' if case.hardening_requested else default}"
     )
 
 

@@ -77,7 +77,7 @@ def failed(results: Results) -> bool:
         return True
     slipped = slipped_joints(results)
     joints = [results.case.joints[k] for k in slipped]
-    hardening_set = all(j.law.hardening_parameter and j.hardening_asked for j in joints)
+    hardening_set = all(j.law.hardening_parameter and j.hardening_requested for j in joints)
     return bool(slipped) and not hardening_set
 
 
@@ -191,7 +191,7 @@ def bound(results: Results) -> Bound:
 
     def has_reserve(joint: tuple[int, Results]) -> tuple[bool, bool]:
         last = joint[1].last
-        return joint[1].case.hardening_asked, not last["crack_length"] + last["process_zone"]
+        return joint[1].case.hardening_requested, not last["crack_length"] + last["process_zone"]
 
     for k, joint_result in sorted(enumerate(results.joints), key=has_reserve):
         reached = bound_on_joint(joint_result)

@@ -49,7 +49,7 @@ STRENGTH = ("sigma_max", "adhesion", "mu", "G_f", "G_t")
 PARTIAL = {"mu": "factor_mu", "adhesion": "factor_c", "G_t": "factor_c"}
 
 #: Few iterations for a step of the level: if it fails a displacement is prescribed.
-QUICK = {"smallest_step": 1.0, "max_iterations": 15.0, "burst_iterations": 15.0}
+QUICK = {"smallest_step": 1.0, "max_iterations": 15.0, "relaxation_iterations": 15.0}
 
 #: Parameters of a prescribed displacement.
 DRIVE = ("drive", "drive_begin", "drive_end", "drive_by")
@@ -99,9 +99,9 @@ class Search:
             **full,
         }
         case = case.with_values(full)
-        defaults = [joint for joint in case.joints if not joint.hardening_asked]
+        defaults = [joint for joint in case.joints if not joint.hardening_requested]
         for name in {joint.law.hardening_parameter for joint in defaults} - {""}:
-            as_set = [joint[name] if joint.hardening_asked else 0.0 for joint in case.joints]
+            as_set = [joint[name] if joint.hardening_requested else 0.0 for joint in case.joints]
             self.settings[name] = of_each(as_set)
         self.case = case
         #: called with a message on the progress

@@ -82,7 +82,7 @@ def printed_lines(answer: CriticalValue, search: Search) -> list[str]:
         lines.append(f"beyond the partial factors factor_mu = {mu:g}, factor_c = {cohesion:g}")
     if answer.point:
         hardens = any(law.hardens for law in answer.point.model.equilibrium.laws.laws)
-        if hardens and any(joint.hardening_asked for joint in search.case.joints):
+        if hardens and any(joint.hardening_requested for joint in search.case.joints):
             lines += filter(None, [statement(last_state(search, answer.point))])
     lines += filter(None, ["; ".join(answer.by_gravity(unit))])
     lines += answer.notes

@@ -21,9 +21,9 @@ def key_of(case: Case, *others: Any) -> str:
 def identity_of(case: Case) -> Iterator[Any]:
     """All that decides the results of a scene, also the content of a mesh and the code."""
     yield sorted(case.values.items())
-    yield from (case.levels, case.tail_levels, case.times, case.hardening_asked)
+    yield from (case.levels, case.tail_levels, case.times, case.hardening_requested)
     for joint in case.of_joints:
-        yield joint.name, joint.hardening_asked, sorted(joint.values.items())
+        yield joint.name, joint.hardening_requested, sorted(joint.values.items())
     yield __version__
     yield code_fingerprint()
     if case.geometry:

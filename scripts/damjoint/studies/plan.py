@@ -211,7 +211,7 @@ class Plan:
 
 def column_of(name: str) -> str:
     """The column of a plan's name; `level` is a column of the history."""
-    return f"{name}_asked" if name == "level" else name
+    return f"{name}_requested" if name == "level" else name
 
 
 def numbers(rows: list[Row], column: str) -> Array:

@@ -79,7 +79,7 @@ SUMMARY: tuple[tuple[str, str, Units], ...] = (
 class JointSection:
     """A joint in the report."""
 
-    #: its name, as the begin of a heading; empty if there is only one
+    #: its name, as the start of a heading; empty if there is only one
     name: str
     #: at the requested levels, by finite elements
     levels: Table

@@ -312,8 +312,8 @@ def sweep(
     rows before.
 
     Returns their number, and all rows of the plan. Columns: key, the plan's names (level as
-    level_asked), the columns of history.csv, of an earthquake, OUTCOME, the critical value. Each
-    finished row is written at once, so that an interrupted sweep can be continued. Raises
+    level_requested), the columns of history.csv, of an earthquake, OUTCOME, the critical value.
+    Each finished row is written at once, so that an interrupted sweep can be continued. Raises
     InputError, RunError.
     """
     check_jobs(jobs)
