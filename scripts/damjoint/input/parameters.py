@@ -330,8 +330,11 @@ def parameter(name: str) -> Parameter:
     if name not in known:
         import difflib
 
-        near = difflib.get_close_matches(name, known, 3) or sorted(known)
-        raise InputError(f"{name}: unknown parameter; allowed: {', '.join(near)}")
+        near = difflib.get_close_matches(name, known, 3)
+        hint = (
+            f"did you mean {' or '.join(near)}?" if near else f"allowed: {', '.join(sorted(known))}"
+        )
+        raise InputError(f"{name}: unknown parameter; {hint}")
     return known[name]
 
 
