@@ -14,6 +14,8 @@ from damjoint.pictures.drawing import picture_style, write_picture
 
 #: Strengths at which all laws have the same tensile strength, cohesion and fracture energies.
 MATERIAL = {"sigma_max": 2e5, "adhesion": 2e5, "mu": 0.8, "G_f": 100.0, "G_t": 100.0}
+#: A law, and its softening curve if it is not linear.
+EXPONENTIAL = "bond, exponential"
 #: Compression of the sheared joint [Pa]; steps along a path.
 PRESSURE, STEPS = 2e5, 400
 #: Largest displacement jump of the picture [m].
@@ -55,8 +57,10 @@ def draw(path: Path) -> None:
     figure = Figure(figsize=(11, 3.8), layout="constrained")
     FigureCanvasAgg(figure)
     tension, shear, both = figure.subplots(1, 3)
-    for name in sorted(LAWS):
-        law = load("dam", {**MATERIAL, "law": name}).law
+    for name in (*sorted(LAWS), EXPONENTIAL):
+        law_name, _, softening = name.partition(", ")
+        curve = {"softening": softening} if softening else {}
+        law = load("dam", {**MATERIAL, **curve, "law": law_name}).law
         opened = stresses(law, lambda size, _: (size, 0.0))
         sheared = stresses(law, lambda size, before, law=law: pressed(law, size, before))
         mixed = stresses(law, lambda size, _: (size, size))

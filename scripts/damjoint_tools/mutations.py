@@ -146,8 +146,8 @@ MUTATIONS = (
     Mutation(
         "G_t x 1.1",
         "laws/bond.py",
-        'self.damage_per_slip = self.cohesion / (2 * p["G_t"])',
-        'self.damage_per_slip = self.cohesion / (2.2 * p["G_t"])',
+        'self.progress_per_slip = self.cohesion / (2 * p["G_t"])',
+        'self.progress_per_slip = self.cohesion / (2.2 * p["G_t"])',
         both(having("law", "bond"), having("adhesion")),
     ),
     Mutation(
@@ -161,8 +161,8 @@ MUTATIONS = (
     Mutation(
         "maximum of the damage dropped",
         "laws/bond.py",
-        "return np.maximum(damage, np.clip(share, 0, 1))",
-        "return np.clip(share, 0, 1)",
+        "return np.maximum(progress, np.clip(share, 0, self.curve.end))",
+        "return np.clip(share, 0, self.curve.end)",
         having("law", "bond"),
     ),
     Mutation(

@@ -9,7 +9,15 @@ import numpy as np
 from damjoint.arrays import Setting
 from damjoint.input.case import Case
 
-from .random_scenes import RandomNumbers, RandomScene, joint, mesh, of_joints
+from .random_scenes import (
+    CURVE_DRAWS,
+    RandomNumbers,
+    RandomScene,
+    joint,
+    mesh,
+    of_joints,
+    with_curve,
+)
 
 #: Third number of the seed of earthquakes, which are drawn apart.
 QUAKE_DRAWS = 2
@@ -105,7 +113,9 @@ def random_quake(seed: int, number: int, folder: Path) -> RandomQuake:
     kind = rng.choice(*6 * [DAM], ELASTIC, BLOCK)
     scene = RandomQuake(settings, level, "0", 1, record, file, kind)
     draw = {DAM: dam, ELASTIC: elastic, BLOCK: block}[kind]
-    return draw(rng, scene, solid)
+    drawn_scene = draw(rng, scene, solid)
+    settings = with_curve(drawn_scene.settings, RandomNumbers(seed, number, CURVE_DRAWS))
+    return replace(drawn_scene, settings=settings)
 
 
 def quake_joint(rng: RandomNumbers) -> dict[str, float | str]:

@@ -12,9 +12,9 @@ from damjoint.input.parameters import declared
 from damjoint.input.resolve import load
 from damjoint.input.values import has_drains
 
-#: Third number of the seed of the lift joints, and of temperature, works on the joint, waterstop,
-#: law = endo and variants of loads, and of joints that meet, which are drawn apart.
-LIFT_DRAWS, WORKS_DRAWS, NETWORK_DRAWS = 1, 3, 4
+#: Third number of the seed of the lift joints, of temperature, works on the joint, waterstop, law =
+#: endo and variants of loads, of joints that meet, and of softening curves, which are drawn apart.
+LIFT_DRAWS, WORKS_DRAWS, NETWORK_DRAWS, CURVE_DRAWS = 1, 3, 4, 5
 #: Parameters that are drawn for each joint, but for the place of its drains.
 OF_JOINTS = (
     *("law", "K_N", "K_T", "sigma_max", "adhesion", "mu", "pena_rupture", "alpha", "pena_tang"),
@@ -117,7 +117,23 @@ def random_scene(seed: int, number: int) -> RandomScene:
     scene = with_lifts(scene, rng) if rng.event(0.4) else scene
     scene = with_works(scene, RandomNumbers(seed, number, WORKS_DRAWS))
     rng = RandomNumbers(seed, number, NETWORK_DRAWS)
-    return network(rng) if rng.event(0.06) else scene
+    scene = network(rng) if rng.event(0.06) else scene
+    settings = with_curve(scene.settings, RandomNumbers(seed, number, CURVE_DRAWS))
+    return replace(scene, settings=settings)
+
+
+def with_curve(settings: dict[str, Setting], rng: RandomNumbers) -> dict[str, Setting]:
+    """Settings, in some with exponential softening, which needs twice the fracture energy in shear;
+    the curve is drawn from its own numbers, so that all else is what it was.
+    """
+    if not rng.event(0.4) or not {"bond", "rupture"} & set(np.ravel(settings["law"])):
+        return settings
+    energies = {}
+    if "G_t" in settings:
+        drawn = settings["G_t"]
+        doubled = [2 * float(energy) for energy in np.ravel(drawn)]
+        energies["G_t"] = tuple(doubled) if isinstance(drawn, tuple) else doubled[0]
+    return settings | {"softening": "exponential"} | energies
 
 
 def network(rng: RandomNumbers) -> RandomNetwork:

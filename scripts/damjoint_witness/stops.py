@@ -93,7 +93,8 @@ def strengths(rows: Table, v: Values) -> tuple[Array, Array]:
     if v["law"] == "bond":
         return f * (1 - damage), c * (1 - damage)
     if v["law"] == "rupture":
-        return np.where(damage < 1, f, 0.0), np.full(len(damage), np.inf)
+        left = 1 - damage if v["softening"] == "exponential" else np.where(damage < 1, 1.0, 0.0)
+        return f * left, np.full(len(damage), np.inf)
     if v["law"] == "friction":  # the apex of the cone, and what slip has added
         endless = np.inf if v["hardening_requested"] and v["pena_tang"] else 0.0
         return np.full(len(damage), c / mu), v["pena_tang"] * rows["lambda"] + endless

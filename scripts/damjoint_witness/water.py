@@ -138,7 +138,8 @@ class JointState:
             softened = (1 + values["pena_rupture"]) * f_t / values["K_N"]
         if values["law"] == "endo":
             return np.full(number, softened)
-        return np.where(damage >= 1, 0.0, softened)
+        cracked = 1 - np.exp(-2) if values["softening"] == "exponential" else 1.0
+        return np.where(damage >= cracked, 0.0, softened)
 
 
 @cache

@@ -43,6 +43,9 @@ WORKS = {
 }
 
 
+EXPONENTIAL = {"softening": "exponential"}
+
+
 @pytest.mark.parametrize("works", WORKS)
 def test_grouted_and_sawn_laws_agree_point_by_point(works):
     """The laws of both engines along one path."""
@@ -59,6 +62,12 @@ def test_a_sawn_friction_law_agrees_point_by_point(seed):
 def test_laws_agree_point_by_point(law_name, seed):
     """The laws of pro/ and of the condensed engine along one path."""
     laws_agree(law_name, seed, {})
+
+
+@pytest.mark.parametrize("law_name", ["bond", "rupture"])
+@pytest.mark.parametrize("seed", [1, *(pytest.param(s, marks=pytest.mark.heavy) for s in (0, 2))])
+def test_laws_of_exponential_softening_agree_point_by_point(law_name, seed):
+    laws_agree(law_name, seed, EXPONENTIAL)
 
 
 def laws_agree(law_name, seed, works):
@@ -104,6 +113,8 @@ def laws_agree(law_name, seed, works):
         *((name, {}) for name in LAWS),
         *(("rupture", works) for works in WORKS.values() if works),
         ("friction", WORKS["sawn"]),
+        ("bond", EXPONENTIAL),
+        ("rupture", EXPONENTIAL | WORKS["grouted, sawn"]),
     ],
 )
 def test_the_tangent_is_the_derivative(law_name, works):
@@ -160,6 +171,8 @@ SCENES = {
     "d published face": THICK | {"face_points": 4.0},
     "e bond": BOND,
     "f bond": COARSE | BOND,
+    "e exponential": BOND | EXPONENTIAL,
+    "c exponential": EXPONENTIAL | {"law": "rupture", "sigma_max": 3e3, "alpha": 1.5},
     # the crack grouted and the level lowered; the bond removed by sawing
     "a grouted": {"grout_pressure": 1e4, "grout_t": 3.5, "levels": "3,6,9,9,2"},
     "a sawn": {"saw_thickness": 1e-6, "saw_t": 2.0, "levels": "3,6,6,8"},

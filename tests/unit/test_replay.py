@@ -6,9 +6,12 @@ from damjoint.input.resolve import load
 from damjoint_witness.reader import read
 from damjoint_witness.replay import laws
 
+EXPONENTIAL = {"softening": "exponential"}
 SETTINGS = {
     "bond": {"sigma_max": 2e5, "adhesion": 3e5, "G_f": 5.0, "G_t": 8.0},
     "brittle": {"law": "bond", "sigma_max": 0.0, "adhesion": 1e6, "G_f": 2.0, "G_t": 60.0},
+    "exponential": {"law": "bond", "adhesion": 3e5, "G_f": 5.0, "G_t": 8.0} | EXPONENTIAL,
+    "exponential rupture": {"law": "rupture", "G_f": 2.0} | EXPONENTIAL,
     "friction": {"adhesion": 1e5, "pena_tang": 1e9},
     "rupture": {"sigma_max": 2e5, "G_f": 2.0, "alpha": 1.0},
     "endo": {"sigma_max": 2e5, "adhesion": 2e5, "G_f": 5.0},

@@ -17,6 +17,7 @@ TextName: TypeAlias = Literal[
     "quadrature",
     "force_face",
     "drain_reference",
+    "softening",
     "quake_uplift",
     "required_position",
     "record_unit",

@@ -45,7 +45,9 @@ class Laws(MutableMapping[str, type[Law[Any]]]):
 
 
 #: By the value of the parameter `law`.
-LAWS = Laws(sorted(f.stem for f in Path(__file__).parent.glob("[a-z]*.py") if f.stem != "base"))
+LAWS = Laws(
+    sorted({f.stem for f in Path(__file__).parent.glob("[a-z]*.py")} - {"base", "softening"})
+)
 
 
 def __getattr__(name: str) -> Any:

@@ -1,7 +1,8 @@
 """Coupled cohesive-frictional law, after Alfano and Sacco (Int. J. Numer. Meth. Eng. 68, 2006).
 
 Tension and cohesion soften together with one damage D, the larger of what the opening and what the
-slip has done; friction acts on the pressed joint from the beginning. Internal variables: D and the
+slip has done; friction acts on the pressed joint from the beginning. D follows from the progress xi
+of the softening by the curve of softening.py; linear: D = xi. Internal variables: xi and the
 plastic slip.
 """
 
@@ -15,14 +16,15 @@ import numpy as np
 
 from ..arrays import Array, BoolArray
 from .base import SofteningLaw
+from .softening import CURVES
 
 
 @dataclass(frozen=True)
 class BondVariables:
     """Internal variables at q points."""
 
-    #: (q,), 0 to 1
-    damage: Array
+    #: (q,), 0 to the end of the curve
+    progress: Array
     #: (q, 2) [m]
     plastic: Array
 
@@ -33,9 +35,9 @@ class SlipAndDamage(NamedTuple):
     #: size of the elastic shear stress [Pa] and its direction (q, 2)
     size: Array
     direction: Array
-    #: slip of the step [m], damage after it
+    #: slip of the step [m], progress of the softening after it
     slip: Array
-    damage: Array
+    progress: Array
     #: whether the damage is that by the opening; whether the slip has used up the cohesion
     opening_governs: BoolArray
     broken_by_slip: BoolArray
@@ -44,28 +46,29 @@ class SlipAndDamage(NamedTuple):
 class Bond(SofteningLaw[BondVariables]):
     """Strengths in tension and in shear that soften together, then friction."""
 
-    variable_names = ("D", "slip_1", "slip_2")
     softens = stands_slipped = True
 
     def __init__(self, parameters: Mapping[str, Any]) -> None:
         p = parameters
+        self.curve = CURVES[p["softening"]]
+        self.variable_names = ("D" if self.curve.name == "linear" else "xi", "slip_1", "slip_2")
+        self.broken_damage = float(self.curve.damage(np.float64(1)))
         self.K_N, self.K_T = p["K_N"], p["K_T"]
         self.artificial, self.yield_tolerance = p["artificial"], p["yield_tolerance"]
         self.tensile_strength, self.cohesion, self.mu = p["sigma_max"], p["adhesion"], p["mu"]
         self.delta_e = self.tensile_strength / self.K_N
         self.delta_c = 2 * p["G_f"] / (self.tensile_strength or self.cohesion or 1.0)
         #: 1/lambda_c
-        self.damage_per_slip = self.cohesion / (2 * p["G_t"])
-        #: stiffness in slip: cohesion is lost while the point slips
-        self.K_soft = self.K_T - self.cohesion * self.damage_per_slip
+        self.progress_per_slip = self.cohesion / (2 * p["G_t"])
 
     @classmethod
     def least_energies(cls, parameters: Mapping[str, Any]) -> dict[str, tuple[float, str]]:
         """See `Law`."""
-        p = parameters
+        p, steepest = parameters, CURVES[parameters["softening"]].steepest
+        shear = p["adhesion"] * p["adhesion"] / (2 * p["K_T"]) * steepest
         return {
             "G_f": (p["sigma_max"] * p["sigma_max"] / (2 * p["K_N"]), "sigma_max^2/(2 K_N)"),
-            "G_t": (p["adhesion"] * p["adhesion"] / (2 * p["K_T"]), "adhesion^2/(2 K_T)"),
+            "G_t": (shear, "adhesion^2/(2 K_T)" if steepest == 1 else "adhesion^2/K_T"),
         }
 
     # -- internal variables
@@ -79,83 +82,86 @@ class Bond(SofteningLaw[BondVariables]):
     ) -> BondVariables:
         """See `Law`; the damage that opening and slip do to a frozen bond is known after them."""
         step = self.slip_and_damage(jump, variables, frozen)
-        damage = step.damage
+        progress = step.progress
         if frozen is not None:
-            by_slip = np.minimum(variables.damage + self.damage_per_slip * step.slip, 1)
-            damage = np.maximum(self.damage_by_opening(jump[:, 0], variables.damage), by_slip)
-        return BondVariables(damage, variables.plastic + step.slip[:, None] * step.direction)
+            by_slip = variables.progress + self.progress_per_slip * step.slip
+            by_slip = np.minimum(by_slip, self.curve.end)
+            progress = np.maximum(self.progress_by_opening(jump[:, 0], variables.progress), by_slip)
+        return BondVariables(progress, variables.plastic + step.slip[:, None] * step.direction)
 
     def frozen_damage(self, jump: Array, variables: BondVariables) -> Array:
-        """See `SofteningLaw`: that by the opening."""
-        return self.damage_by_opening(jump[:, 0], variables.damage)
+        """See `SofteningLaw`: the progress by the opening."""
+        return self.progress_by_opening(jump[:, 0], variables.progress)
 
     # -- slip and damage of a step, as in pro/law_bond.pro
 
-    def damage_by_opening(self, opening: Array, damage: Array) -> Array:
-        """The damage after an opening (q,) [m]."""
+    def progress_by_opening(self, opening: Array, progress: Array) -> Array:
+        """The progress after an opening (q,) [m]."""
         share = (opening - self.delta_e) / (self.delta_c - self.delta_e)
-        return np.maximum(damage, np.clip(share, 0, 1))
+        return np.maximum(progress, np.clip(share, 0, self.curve.end))
 
     def slip_opening(self, excess: Array, size: Array, opened: Array) -> Array:
         """The slip (q,) [m] if the damage by opening governs."""
-        beyond_yield = excess - self.cohesion * (1 - opened)
+        beyond_yield = excess - self.cohesion * self.curve.left(opened)
         return np.where(beyond_yield > self.yield_tolerance * size, beyond_yield / self.K_T, 0)
 
     def slip_and_damage(
         self, jump: Array, variables: BondVariables, frozen: Array | None = None
     ) -> SlipAndDamage:
-        """Slip and damage that return the elastic trial to the yield surface; the damage is the
-        larger of the opening's and the slip's, D + slip/lambda_c; frozen: see `SofteningLaw`.
+        """Slip and damage that return the elastic trial to the yield surface; the progress is the
+        larger of the opening's and the slip's, xi + slip/lambda_c; frozen: see `SofteningLaw`.
         """
-        before, K_soft, per_slip = variables.damage, self.K_soft, self.damage_per_slip
-        if frozen is not None:
-            K_soft, per_slip = self.K_T, 0.0
+        before, curve = variables.progress, self.curve
+        per_slip = self.progress_per_slip if frozen is None else 0.0
         shear = self.K_T * (jump[:, 1:] - variables.plastic)
         size = np.linalg.norm(shear, axis=1)
         excess = size + self.mu * self.K_N * np.minimum(jump[:, 0], 0)  # over friction
-        opened = self.damage_by_opening(jump[:, 0], before) if frozen is None else frozen
+        opened = self.progress_by_opening(jump[:, 0], before) if frozen is None else frozen
         slip_opening = self.slip_opening(excess, size, opened)
-        slip_softening = (excess - self.cohesion * (1 - before)) / K_soft
+        slip_softening = curve.slip(excess, self.K_T, self.cohesion, before, per_slip)
         softened = before + per_slip * slip_softening
         opening_governs = before + per_slip * slip_opening <= opened
-        broken_by_slip = ~opening_governs & (softened >= 1)
+        broken_by_slip = ~opening_governs & (softened >= curve.end)
         by_slip = np.where(broken_by_slip, excess / self.K_T, slip_softening)
         return SlipAndDamage(
             size=size,
             direction=shear / np.maximum(size, 1e-300)[:, None],
             slip=np.where(opening_governs, slip_opening, by_slip),
-            damage=np.where(opening_governs, opened, np.where(broken_by_slip, 1.0, softened)),
+            progress=np.where(
+                opening_governs, opened, np.where(broken_by_slip, curve.end, softened)
+            ),
             opening_governs=opening_governs,
             broken_by_slip=broken_by_slip,
         )
 
     # -- response
 
-    def unloading_stiffness(self, damage: Array) -> tuple[Array, Array]:
-        """Slope of the line to the origin in tension, and its derivative with the damage (q,)."""
+    def unloading_stiffness(self, progress: Array) -> tuple[Array, Array]:
+        """Slope of the line to the origin in tension, and its derivative with the progress (q,)."""
         if not self.tensile_strength:
-            return np.zeros_like(damage), np.zeros_like(damage)
-        kappa = self.delta_e + damage * (self.delta_c - self.delta_e)
-        strength = self.tensile_strength
-        return strength * (1 - damage) / kappa, -strength * self.delta_c / kappa**2
+            return np.zeros_like(progress), np.zeros_like(progress)
+        strength, begin, end = self.tensile_strength, self.delta_e, self.delta_c
+        return self.curve.unloading(progress, strength, begin, end)
 
     def remaining(self, step: SlipAndDamage) -> Array:
         """What the slip leaves of the elastic shear stress (q,), 1 to 0."""
         return 1 - self.K_T * step.slip / np.maximum(step.size, 1e-300)
 
     def slip_rates(
-        self, opening: Array, before: Array, step: SlipAndDamage, per_slip: float, K_soft: float
+        self, opening: Array, before: Array, step: SlipAndDamage, per_slip: float
     ) -> tuple[Array, Array, Array, Array]:
         """Derivatives of the slip with the norm of the elastic jump and with the opening, of the
-        damage with the slip and with the opening (q,); per_slip, K_soft: see `slip_and_damage`.
+        progress with the slip and with the opening (q,); per_slip: see `slip_and_damage`.
         """
-        growing = step.opening_governs & (step.damage > before) & (step.damage < 1)
+        loss = self.cohesion * self.curve.rate(step.progress)  # of cohesion with the progress
+        K_soft = self.K_T - loss * per_slip
+        growing = step.opening_governs & (step.progress > before) & (step.progress < self.curve.end)
         opened_rate = np.where(growing, 1 / (self.delta_c - self.delta_e), 0)
         softens = ~(step.opening_governs | step.broken_by_slip)  # the slip does the damage
         stiffness, slides = np.where(softens, K_soft, self.K_T), step.slip > 0
         by_norm = self.K_T / stiffness * slides
         friction_rate = self.mu * self.K_N * (opening < 0)
-        by_opening = (friction_rate + self.cohesion * opened_rate) / stiffness * slides
+        by_opening = (friction_rate + loss * opened_rate) / stiffness * slides
         damaging = np.asarray(per_slip * softens, float)
         return by_norm, by_opening, damaging, opened_rate + damaging * by_opening
 
@@ -164,21 +170,21 @@ class Bond(SofteningLaw[BondVariables]):
     ) -> tuple[Array, Array]:
         """See `Law`; the tangent is not symmetric."""
         step, opening = self.slip_and_damage(jump, variables, frozen), jump[:, 0]
-        soft = (self.damage_per_slip, self.K_soft) if frozen is None else (0.0, self.K_T)
-        by_norm, by_opening, damage_by_slip, damage_by_opening = self.slip_rates(
-            opening, variables.damage, step, *soft
+        per_slip = self.progress_per_slip if frozen is None else 0.0
+        by_norm, by_opening, progress_by_slip, progress_by_opening = self.slip_rates(
+            opening, variables.progress, step, per_slip
         )
-        unloading, unloading_rate = self.unloading_stiffness(step.damage)
+        unloading, unloading_rate = self.unloading_stiffness(step.progress)
         closed, n = opening <= 0, step.direction
-        broken = (step.damage >= 1) | (self.tensile_strength == 0)
+        broken = (step.progress >= self.curve.end) | (self.tensile_strength == 0)
         normal = np.where(closed, self.K_N, unloading) * opening
         traction = np.column_stack([normal, (step.size - self.K_T * step.slip)[:, None] * n])
 
         tangent = np.zeros((len(jump), 3, 3))
-        bonded = unloading + opening * unloading_rate * damage_by_opening
+        bonded = unloading + opening * unloading_rate * progress_by_opening
         open_stiffness = np.where(broken, self.artificial * self.K_N, bonded)
         tangent[:, 0, 0] = np.where(closed, self.K_N, open_stiffness)
-        by_slip = opening * unloading_rate * damage_by_slip * by_norm
+        by_slip = opening * unloading_rate * progress_by_slip * by_norm
         tangent[:, 0, 1:] = np.where(closed | broken, 0, by_slip)[:, None] * n
         tangent[:, 1:, 0] = (-self.K_T * by_opening)[:, None] * n
         outer, eye = n[:, :, None] * n[:, None, :], np.eye(2)
@@ -194,7 +200,7 @@ class Bond(SofteningLaw[BondVariables]):
     ) -> Array:
         """See `Law`."""
         step = self.slip_and_damage(jump, variables, frozen)
-        weak, unloading = self.artificial * self.K_N, self.unloading_stiffness(step.damage)[0]
+        weak, unloading = self.artificial * self.K_N, self.unloading_stiffness(step.progress)[0]
         matrix = np.zeros((len(jump), 3, 3))
         matrix[:, 0, 0] = np.where(jump[:, 0] <= 0, self.K_N, np.maximum(unloading, weak))
         shear = self.K_T * np.maximum(self.remaining(step), self.artificial)
@@ -205,19 +211,19 @@ class Bond(SofteningLaw[BondVariables]):
 
     def damage(self, jump: Array, variables: BondVariables) -> Array:
         """See `Law`."""
-        return variables.damage
+        return self.curve.damage(variables.progress)
 
     def is_open(self, jump: Array, variables: BondVariables) -> BoolArray:
         """See `Law`: open, and broken."""
-        return (jump[:, 0] > 0) & ((variables.damage >= 1) | (self.tensile_strength == 0))
+        return (jump[:, 0] > 0) & ((variables.progress >= 1) | (self.tensile_strength == 0))
 
     def cohesion_left(self, jump: Array, variables: BondVariables) -> Array:
         """See `Law`."""
-        return 1 - variables.damage
+        return self.curve.left(variables.progress)
 
     def opening_of_crack(self, variables: BondVariables, points: int) -> Array:
         """See `Law`."""
-        bonded = (variables.damage < 1) & (self.tensile_strength > 0)
+        bonded = (variables.progress < 1) & (self.tensile_strength > 0)
         return np.where(bonded, self.delta_c, 0.0)
 
     def slip(self, variables: BondVariables, points: int) -> Array:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Array, BoolArray
 from .base import Evidence, SofteningLaw
+from .softening import CURVES
 
 
 @dataclass(frozen=True)
@@ -44,12 +45,18 @@ class Rupture(SofteningLaw[RuptureVariables]):
 
     def __init__(self, parameters: Mapping[str, Any]) -> None:
         p, penalty = parameters, parameters["pena_rupture"]
+        self.curve = CURVES[p["softening"]]
+        self.broken_damage = float(self.curve.damage(np.float64(1)))
         self.K_N, self.K_T, self.K_contact = p["K_N"], p["K_T"], p["pena_contact"] * p["K_N"]
         self.alpha, self.artificial = p["alpha"], p["artificial"]
         self.tensile_strength = p["sigma_max"]
         self.delta_e = p["sigma_max"] / self.K_N
         self.L_C = (1 + penalty) * self.delta_e
-        self.sigma_c = p["sigma_max"] * (1 + penalty) / penalty
+        self.sigma_c = p["sigma_max"] * (1 + penalty) / penalty  # the line at no opening
+        #: opening at which nothing is left [m]
+        self.L_end = self.L_C
+        if self.curve.end > 1:
+            self.L_end = self.delta_e + self.curve.end * (self.L_C - self.delta_e)
         self.L_CT = (
             np.inf
             if self.alpha >= 2
@@ -120,11 +127,11 @@ class Rupture(SofteningLaw[RuptureVariables]):
 
     def is_broken_at(self, opening: Array, variables: RuptureVariables) -> BoolArray:
         """Whether a point has lost its tensile strength at an opening (q,) of the step."""
-        return self.was_broken(variables) | (opening >= self.L_C)
+        return self.was_broken(variables) | (opening >= self.L_end)
 
     def was_broken(self, variables: RuptureVariables) -> BoolArray:
         """Whether it had at the beginning of the step."""
-        return (variables.kappa >= self.L_C) | (variables.sawn > 0)
+        return (variables.kappa >= self.L_end) | (variables.sawn > 0)
 
     def shear_share(self, opening: Array) -> Array:
         """Remaining part of the shear stiffness (q,): 1 to 0."""
@@ -134,13 +141,26 @@ class Rupture(SofteningLaw[RuptureVariables]):
         """Derivative of the shear stiffness with the opening (q,) [Pa/m2]."""
         return np.where((opening > 0) & (opening < self.L_CT), -self.K_T / self.L_CT, 0)
 
-    def unloading_stiffness(self, kappa: Array) -> Array:
-        """Slope of the line from the origin to the softening at the largest opening (q,)."""
-        return np.asarray(self.sigma_c * (1 - kappa / self.L_C) / kappa)
+    def progress(self, kappa: Array) -> Array:
+        """Progress of the softening at the largest opening (q,) [-]."""
+        if self.delta_e < self.L_C:
+            return np.asarray((kappa - self.delta_e) / (self.L_C - self.delta_e))
+        return 0 * kappa
 
     def softening_stress(self, opening: Array) -> Array:
         """Normal stress of an opening that is the largest so far (q,)."""
-        return np.asarray(self.sigma_c * (1 - opening / self.L_C))
+        if self.curve.name == "linear":  # as published
+            return np.asarray(self.sigma_c * (1 - opening / self.L_C))
+        return self.tensile_strength * self.curve.left(self.progress(opening))
+
+    def softening_slope(self, opening: Array) -> Array | float:
+        """Its derivative with the opening (q,)."""
+        if not self.L_C:
+            return 0.0
+        if self.curve.name == "linear":
+            return -self.sigma_c / self.L_C
+        rate = self.curve.rate(self.progress(opening))
+        return -self.tensile_strength / (self.L_C - self.delta_e) * rate
 
     def normal_response(
         self,
@@ -157,11 +177,10 @@ class Rupture(SofteningLaw[RuptureVariables]):
         if frozen is None:
             broken, unloads = self.is_broken_at(opening, v), opening <= v.kappa
         with np.errstate(divide="ignore", invalid="ignore"):  # without tensile strength
-            unloading = self.unloading_stiffness(v.kappa)
+            unloading = self.softening_stress(v.kappa) / v.kappa
             stress = np.where(unloads, unloading * opening, self.softening_stress(opening))
             normal = np.where(closed, self.K_contact * opening, np.where(broken, 0, stress))
-            softening: Array | float = -self.sigma_c / self.L_C if self.L_C else 0.0
-            softening = normal / opening if secant else softening
+            softening = normal / opening if secant else self.softening_slope(opening)
         free = (opening >= v.largest) | broken & ~closed
         bonded = np.where(closed, self.K_contact, np.where(unloads, unloading, softening))
         stiffness = np.where(free, weak, bonded)
@@ -214,16 +233,14 @@ class Rupture(SofteningLaw[RuptureVariables]):
 
     def damage(self, jump: Array, variables: RuptureVariables) -> Array:
         """See `Law`: the used part of the softening."""
-        kappa = variables.kappa
-        used = 0 * kappa
-        if self.delta_e < self.L_C:
-            used = (kappa - self.delta_e) / (self.L_C - self.delta_e)
-        return np.where(self.is_open(jump, variables), 1.0, used)
+        used = self.curve.damage(self.progress(variables.kappa))
+        broken = self.is_broken_at(self.opening(jump, variables), variables)
+        return np.where(broken & (variables.kappa > 0), 1.0, used)
 
     def is_open(self, jump: Array, variables: RuptureVariables) -> BoolArray:
-        """See `Law`: whether it is broken."""
-        broken = self.is_broken_at(self.opening(jump, variables), variables)
-        return broken & (variables.kappa > 0)
+        """See `Law`: whether it has softened by L_C, or has been sawn."""
+        opening = np.maximum(self.opening(jump, variables), variables.kappa)
+        return ((opening >= self.L_C) | (variables.sawn > 0)) & (variables.kappa > 0)
 
     def opening_of_crack(self, variables: RuptureVariables, points: int) -> Array:
         """See `Law`."""

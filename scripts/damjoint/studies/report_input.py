@@ -237,6 +237,8 @@ def limits_of_joint(joint: Case) -> Iterator[str]:
     """Yield what the model of a joint includes: its law, its water, its drains."""
     law = LAWS.get(joint["law"], "a law of the user")
     yield f"Joint law {joint['law']}: {law}."
+    if joint["law"] in ("bond", "rupture") and joint["softening"] != "linear":
+        yield f"Softening by the {joint['softening']} curve, of the same strengths and energies."
     yield f"Water in the joint, uplift = {joint['uplift']}: {UPLIFTS[joint['uplift']]}."
     if has_drains(joint):
         yield (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import exp
 from typing import Any
 
 #: Values of a joint's parameters.
@@ -49,6 +50,11 @@ class Point:
     def jumping(self, jump: Jump) -> float:
         """Distance in opening [m] to where the damage has a discontinuity."""
         return float("inf")
+
+
+def damage_after(xi: float, curve: str) -> float:
+    """The damage after a progress xi of the softening: the area below the rest is 1/2."""
+    return 1 - exp(-2 * xi) if curve == "exponential" else min(xi, 1.0)
 
 
 def ramp(time: float, complete: float) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import hypot, inf, pi, tan
 
-from .point import Jump, Point, Values, ramp
+from .point import Jump, Point, Values, damage_after, ramp
 
 #: Regularisation length of the shear release [m].
 RELEASE = 1e-12
@@ -24,6 +24,7 @@ class Rupture(Point):
         self.L_CT = inf if alpha == 2 else max(self.L_C * tan(alpha * pi / 4), RELEASE)
         self.p_g, self.grout_t = values["grout_pressure"], values["grout_t"]
         self.saw, self.saw_t = values["saw_thickness"], values["saw_t"]
+        self.curve = values["softening"]
         self.kappa, self.released = self.delta_e, (0.0, 0.0)
         #: thickness of the grout; the opening before sawing; of the saw [m]
         self.grout, self.before, self.sawn = 0.0, 0.0, 0.0
@@ -59,7 +60,19 @@ class Rupture(Point):
 
     def broken(self, opening: float) -> bool:
         """Whether the tensile strength is lost."""
-        return opening >= self.L_C or self.kappa >= self.L_C or self.sawn > 0
+        ends = self.curve == "linear" or not self.f_t
+        ended = ends and max(opening, self.kappa) >= self.L_C
+        return ended or self.sawn > 0
+
+    def stress(self, kappa: float) -> float:
+        """The stress on the softening curve [Pa]."""
+        if self.curve == "linear":
+            return self.sigma_c * (1 - kappa / self.L_C)
+        return self.f_t * (1 - self.lost(kappa))
+
+    def lost(self, kappa: float) -> float:
+        """The part of the strength that is lost on it."""
+        return damage_after((kappa - self.delta_e) / (self.L_C - self.delta_e), self.curve)
 
     def traction(self, jump: Jump) -> Jump:
         """See `Point`."""
@@ -69,9 +82,9 @@ class Rupture(Point):
         elif self.broken(opening):
             normal = 0.0
         elif opening <= self.kappa:
-            normal = self.sigma_c * (1 - self.kappa / self.L_C) * opening / self.kappa
+            normal = self.stress(self.kappa) * opening / self.kappa
         else:
-            normal = self.sigma_c * (1 - opening / self.L_C)
+            normal = self.stress(opening)
         K_t = self.K_T * self.shear_share(opening)
         return (normal, K_t * (jump[1] - self.released[0]), K_t * (jump[2] - self.released[1]))
 
@@ -79,7 +92,7 @@ class Rupture(Point):
         """See `Point`."""
         if self.broken(self.opening(jump)) and self.kappa > 0:
             return 1.0
-        return (self.kappa - self.delta_e) / (self.L_C - self.delta_e) if self.L_C else 0.0
+        return self.lost(self.kappa) if self.L_C else 0.0
 
     def slip(self) -> float:
         """See `Point`."""
