@@ -34,6 +34,7 @@ from .laws import Law as Law
 from .model.fields import Solution
 from .model.results import (
     HISTORY,
+    IN_TIME,
     LATERAL,
     MODES,
     Columns,
@@ -951,7 +952,7 @@ def column_array(name: str, values: list[Value]) -> np.ndarray:
     """A column of a sweep; an empty cell of a result that is a number becomes nan."""
     from .studies.quake_summary import QUAKE_UNITS
 
-    numeric = name in HISTORY | LATERAL | QUAKE_UNITS or name.startswith("critical_")
+    numeric = name in HISTORY | LATERAL | IN_TIME | QUAKE_UNITS or name.startswith("critical_")
     return np.array([np.nan if numeric and value == "" else value for value in values])
 
 

@@ -18,7 +18,17 @@ from pathlib import Path
 from damjoint.dynamics.frames import MOST_FRAMES
 from damjoint.input.parameters import declared
 from damjoint.laws import COLUMNS
-from damjoint.model.results import FLUX, HISTORY, JOINT, LATERAL, MODES, QUAKE, STEPS, THICKNESS
+from damjoint.model.results import (
+    FLUX,
+    HISTORY,
+    IN_TIME,
+    JOINT,
+    LATERAL,
+    MODES,
+    QUAKE,
+    STEPS,
+    THICKNESS,
+)
 from damjoint.post.validation import Comparison
 from damjoint.statics.rigid_block import LOADS
 from damjoint.studies.check import CHECK
@@ -83,7 +93,7 @@ def results_page() -> str:
         markdown([(f"`{n}`", u, m) for n, (u, m) in columns.items()], ("column", "unit", "meaning"))
         for columns in (
             JOINT | COLUMNS | FLUX | THICKNESS,
-            HISTORY | LATERAL,
+            HISTORY | LATERAL | IN_TIME,
             STEPS,
             CHECK,
             LOADS,
@@ -106,7 +116,8 @@ def results_page() -> str:
         "## history.csv",
         "A row per converged step. Forces are per metre of thickness, in 3D too. Of several "
         "joints, the columns of lengths, openings and resultants are those of joint 1; those of "
-        "joint 2, 3, ... follow with its number: `N_2`, `T_2`, ...",
+        "joint 2, 3, ... follow with its number: `N_2`, `T_2`, ... `water` and the columns after "
+        "it are written with `time_unit` > 0 only.",
         history,
         "## steps.csv",
         "Written with `--all-steps`, also by `damjoint quake`: for every update of the internal "

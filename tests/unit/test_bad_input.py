@@ -51,6 +51,10 @@ LIFTS = "--set", "lift_heights=15,30", "--set", "uplift=drained"
         ("E_dam=0", "> 0, or -1: E"),
         ("tolerance=1", "<= 0.001"),
         ("visc=0", "> 0"),
+        ("time_unit=-1", ">= 0"),
+        ("storage=-1e-9", ">= 0"),
+        ("pressure_min=-2e5", ">= -100000"),
+        ("pressure_min=1", "<= 0"),
         ("aperture_min=0", "> 0"),
         ("dim=4", "2, 3"),
         ("order=3", "1, 2"),
@@ -124,6 +128,22 @@ def test_a_parameter_out_of_range_is_refused(command, tmp_path, setting, allowed
         (
             (*RUN, "--set", "saw_thickness=1e-3", "--set", "uplift=flow"),
             ("saw_thickness = 0.001", "uplift = flow", "must be 0"),
+        ),
+        (
+            (*RUN, "--set", "time_unit=60", "--set", "uplift=cracked"),
+            ("time_unit = 60", "must be 0", "uplift = cracked"),
+        ),
+        (
+            ("run", "dam", "--set", "time_unit=60", "--set", "uplift=flow", "--set", "k_h=0.1"),
+            ("time_unit = 60", "must be 0", "k_h"),
+        ),
+        (
+            ("critical", "dam", "--set", "time_unit=60", "--set", "uplift=flow"),
+            ("time_unit = 60", "must be 0", "critical value"),
+        ),
+        (
+            ("run", "e", "--set", "time_unit=60", "--engine", "getdp"),
+            ("time_unit = 60", "must be 0", "engine = getdp"),
         ),
         ((*RUN, "--out", "o\udcff"), (r"'o\udcff'", "must be text", "LANG=C.UTF-8")),
         ((*RUN, "--steps", "0"), ("steps = 0", "integer >= 1")),

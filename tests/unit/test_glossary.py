@@ -11,7 +11,7 @@ import pytest
 from damjoint import cli
 from damjoint.input.parameters import declared
 from damjoint.laws import COLUMNS, LAWS
-from damjoint.model.results import FLUX, HISTORY, JOINT, LATERAL, QUAKE
+from damjoint.model.results import FLUX, HISTORY, IN_TIME, JOINT, LATERAL, QUAKE
 from damjoint.studies.check import CHECK
 from damjoint.studies.failure_path import CRITICAL
 
@@ -59,7 +59,7 @@ def names_in(*pages):
 @pytest.mark.parametrize(
     "names, pages",
     [
-        (JOINT | COLUMNS | FLUX | HISTORY | LATERAL, ["glossary"]),
+        (JOINT | COLUMNS | FLUX | HISTORY | LATERAL | IN_TIME, ["glossary"]),
         (CHECK | CRITICAL | QUAKE, ["glossary", "results"]),
         (LAWS, ["glossary"]),
         (declared()["uplift"].choices, ["glossary"]),

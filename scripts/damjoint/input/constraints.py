@@ -15,7 +15,7 @@ import numpy as np
 from .. import InputError
 from ..laws import LAWS
 from .parameters import constants, declared
-from .values import ParameterValues, flows, has_drains
+from .values import ParameterValues, flows, flows_in_time, has_drains
 
 #: Usual values, from and to, in SI units: a density of 24 kN/m3 or a strength of 0.2 MPa without
 #: its unit is none.
@@ -100,6 +100,7 @@ def check_values(
             "one's own (it is linear between the faces of the section)"
         )
     check_drains(case)
+    check_time(case)
     check_works(case)
     if not by_parameters and case["added_mass"] == ZANGAR:
         raise InputError(
@@ -381,6 +382,17 @@ def check_drains(case: ParameterValues) -> None:
             f"drain_level = {level:g}: must be 0 with drive = {drive} "
             "(the pressure has to be linear in the level)"
         )
+
+
+def check_time(case: ParameterValues) -> None:
+    """Flow in time: of uplift = flow, without a pseudo-static earthquake."""
+    if not flows_in_time(case):
+        return
+    unit = f"time_unit = {case['time_unit']:g}: must be 0"
+    if case["uplift"] == "cracked":
+        raise InputError(f"{unit} with uplift = cracked (its water does not need time)")
+    if case["k_h"] or case["k_v"]:
+        raise InputError(f"{unit} with k_h or k_v (a pseudo-static earthquake has no time)")
 
 
 def check_works(case: ParameterValues) -> None:

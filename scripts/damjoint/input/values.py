@@ -92,6 +92,11 @@ def flows(values: Values | ParameterValues) -> bool:
     return values["uplift"] in ("cracked", "flow")
 
 
+def flows_in_time(values: Values | ParameterValues) -> bool:
+    """Whether water flows in the joint, needs time for it, and is stored there."""
+    return bool(flows(values) and values["time_unit"])
+
+
 def has_drains(values: Values | ParameterValues) -> bool:
     """Whether drains lower the water pressure in the joint."""
     return values["uplift"] == "drained" or bool(flows(values) and values["drains"])

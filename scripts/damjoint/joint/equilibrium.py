@@ -12,6 +12,7 @@ from ..arrays import Array
 from ..input.case import Case
 from ..input.scene import BED, DOWN
 from ..model.loads import AddedPressure, Loading, line_forces, thermal_strains, water_column
+from .flow_in_time import TimeStep
 from .interface import Interface
 from .joint_laws import JointLaws, JointVariables
 from .problem import JointProblem, rate
@@ -141,13 +142,21 @@ class Equilibrium:
     # ---------------------------------------------------------------------------------------------
 
     def water_in_step(
-        self, variables: JointVariables, before_quake: BeforeQuake | None = None
+        self,
+        variables: JointVariables,
+        before_quake: BeforeQuake | None = None,
+        steps: tuple[TimeStep, ...] = (),
     ) -> StepWater:
         """The water in the joints for the internal variables of a step's beginning; before_quake:
-        the joints before the earthquake that acts, if the water follows from them.
+        the joints before the earthquake that acts, if the water follows from them; steps: see
+        `StepWater`.
         """
         return StepWater(
-            joints=self.water, flowing=self.flowing, variables=variables, before_quake=before_quake
+            joints=self.water,
+            flowing=self.flowing,
+            variables=variables,
+            before_quake=before_quake,
+            steps=steps,
         )
 
     def problem(
@@ -155,6 +164,7 @@ class Equilibrium:
         variables: JointVariables,
         before_quake: BeforeQuake | None = None,
         laws: JointLaws | None = None,
+        steps: tuple[TimeStep, ...] = (),
     ) -> JointProblem:
         """The equilibrium at the end of a step, see `water_in_step`; laws: with frozen damage."""
         return JointProblem(
@@ -165,7 +175,7 @@ class Equilibrium:
             variables=variables,
             loads=self.loads,
             size=self.case.size,
-            water=self.water_in_step(variables, before_quake),
+            water=self.water_in_step(variables, before_quake, steps),
         )
 
     # -- the crest

@@ -393,12 +393,8 @@ class Flow:
         shapes = shapes[:, free]
         return np.asarray(shapes @ np.linalg.solve(laplace[np.ix_(free, free)], shapes.T))
 
-    def _on_surface(
-        self, conductivity: Array, imposed: Array, heads: Array, known: BoolArray
-    ) -> tuple[FlowSolution, Array]:
-        """3D: one symmetric positive definite system; nan if the ratio of the conductivities is too
-        large for it. The solution, and what enters at the nodes.
-        """
+    def matrix(self, conductivity: Array) -> Array:
+        """3D: the matrix of the flow (n, n) for conductivities times weights (q,)."""
         number = self.fields.nodes
         values = np.concatenate(
             [
@@ -406,7 +402,17 @@ class Flow:
                 for rows, product in self.products
             ]
         )
-        matrix = np.bincount(self.entries, values, number**2).reshape(number, number)
+        matrix = np.bincount(self.entries, values, number**2)
+        return np.asarray(matrix.reshape(number, number), float)
+
+    def _on_surface(
+        self, conductivity: Array, imposed: Array, heads: Array, known: BoolArray
+    ) -> tuple[FlowSolution, Array]:
+        """3D: one symmetric positive definite system; nan if the ratio of the conductivities is too
+        large for it. The solution, and what enters at the nodes.
+        """
+        number = self.fields.nodes
+        matrix = self.matrix(conductivity)
         free = np.flatnonzero(~known[self.inside])
         nodes = self.inside[free]
         total = np.where(known, heads, imposed)
@@ -430,14 +436,20 @@ class Flow:
         )
         return solution, np.asarray(matrix @ total, float)
 
-    def derivative(self, solution: FlowSolution, rate: Array) -> FlowDerivative:
+    def derivative(
+        self, solution: FlowSolution, rate: Array, stored: Array | None = None
+    ) -> FlowDerivative:
         """Derivative of a pressure that is a number.
 
-        rate (q,): derivatives of the conductivities times weights with the opening.
+        rate (q,): derivatives of the conductivities times weights with the opening; stored (q,):
+        those of what is stored in a time step, over its length, None if nothing is.
         """
         points = np.flatnonzero(rate)
         opening = self.opening[points]
-        columns = distinct(opening.indices)
+        columns, storing = distinct(opening.indices), list[CsrMatrix]()
+        if stored is not None:
+            at_nodes = self.fields.at_points.columns(self.inside)[points].T
+            storing.append(at_nodes @ opening.scaled(stored[points]))
 
         def of(system: FlowSystem) -> Array:
             coupling = added(
@@ -445,6 +457,7 @@ class Flow:
                     g[points].T @ opening.scaled(rate[points] * d[points])
                     for g, d in zip(self.inner_slopes, system.gradients, strict=True)
                 ]
+                + storing
             )
             return -system.inverse(coupling.columns(columns).toarray())
 

@@ -9,6 +9,7 @@ import numpy as np
 from ..arrays import Array
 from ..model.loads import Loading
 from .flow import FlowDerivative, FlowSolution
+from .flow_in_time import FlowInTime, StoredWater, TimeStep
 from .joint_laws import JointVariables
 from .linear_system import Tangent
 from .water import BeforeQuake, JointWater, Pressure, WaterSystem
@@ -26,12 +27,19 @@ class StepWater:
     flowing: tuple[WaterSystem, ...]
     variables: JointVariables
     before_quake: BeforeQuake | None = None
+    #: in which each of `flowing` stores water; empty: the flow is steady
+    steps: tuple[TimeStep, ...] = ()
+
+    @property
+    def flowing_in_steps(self) -> list[tuple[WaterSystem, TimeStep | None]]:
+        """Where water flows, each with its step, None if the flow is steady."""
+        return list(zip(self.flowing, self.steps or (None,) * len(self.flowing), strict=True))
 
     def flow(self, jump: Array, loading: Loading) -> StepFlow:
         """The water that flows, at a jump (j,)."""
         solutions = [
-            system.solve(jump, self.variables, loading, self.before_quake)
-            for system in self.flowing
+            system.solve(jump, self.variables, loading, self.before_quake, step)
+            for system, step in self.flowing_in_steps
         ]
         lift = np.zeros(len(jump))
         for system, solution in zip(self.flowing, solutions, strict=True):
@@ -62,10 +70,25 @@ class StepWater:
 
     def pressures(self, jump: Array, loading: Loading) -> tuple[Pressure, ...]:
         """The water pressure in each joint at a jump (j,)."""
+        steps = dict(zip(self.flowing, self.steps, strict=False))
         return tuple(
-            water.pressure(jump, self.variables, loading, self.before_quake)
+            water.pressure(
+                jump, self.variables, loading, self.before_quake, steps.get(water.system)
+            )
             for water in self.joints
         )
+
+    def stored(self, jump: Array, loading: Loading, time: float) -> tuple[StoredWater, ...]:
+        """What each of `flowing` stores at the end of the step, at a time and a jump (j,)."""
+        ends = list[StoredWater]()
+        for system, step in self.flowing_in_steps:
+            if step is None:
+                ends.append(system.stored_at(jump, self.variables, loading, time))
+                continue
+            solution = system.solve(jump, self.variables, loading, self.before_quake, step)
+            assert isinstance(solution, FlowInTime)
+            ends.append(solution.stored(time, step.begin))
+        return tuple(ends)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,10 +107,10 @@ class StepFlow:
         water = self.water
         following = [
             (system.flow, derivative)
-            for system, solution in zip(water.flowing, self.solutions, strict=True)
+            for (system, step), solution in zip(water.flowing_in_steps, self.solutions, strict=True)
             if (
                 derivative := system.derivative(
-                    self.jump, water.variables, solution, water.before_quake
+                    self.jump, water.variables, solution, water.before_quake, step
                 )
             )
         ]

@@ -13,11 +13,12 @@ from .. import ROUND_OFF
 from ..arrays import Array, IntArray
 from ..csr import CsrMatrix
 from ..input.case import Case
-from ..input.values import flows, freezes_uplift, has_drains
+from ..input.values import flows, flows_in_time, freezes_uplift, has_drains
 from ..laws import Law
 from ..model.loads import Loading, heads_at_ends
 from ..model.network import Network, WaterPath, networks_of
 from .flow import NO_NODES, Flow, FlowDerivative, FlowSolution, JointFields
+from .flow_in_time import FlowInTime, StoredWater, TimeStep, WaterBalance, stored_at_rest
 from .interface import Interface, JointInterface
 from .joint_laws import JointVariables
 
@@ -72,6 +73,8 @@ class JointWater:
         drained = self.flowing and has_drains(case)
         self.drains = joint.drains(case["drain_x"]) if drained else None
         self.unit_weight = case["rho_water"] * case["g"]
+        #: least pressure [Pa]: of flow in time that of cavitation
+        self.lowest = case["pressure_min"] if flows_in_time(case) else 0.0
         #: the part of the joint on which water may press
         self.wetted = joint.wetted_within(self.waterstop) if self.waterstop else joint.wetted
         self.law: Law[Any] = case.law
@@ -128,10 +131,11 @@ class JointWater:
         return values
 
     def uplift(self, loading: Loading, matrix: CsrMatrix, y: Array, beyond: Array | float) -> Array:
-        """Pressure [Pa], not below zero, at points of height y that an interpolation matrix of
+        """Pressure [Pa], not below `lowest`, at points of height y that an interpolation matrix of
         `JointFields` leads to; beyond: pressure of flowing water beyond the imposed one.
         """
-        pressure = np.maximum(self.unit_weight * (self.head(loading, matrix) - y) + beyond, 0)
+        pressure = self.unit_weight * (self.head(loading, matrix) - y) + beyond
+        pressure = np.maximum(pressure, self.lowest)
         if self.waterstop is None:
             return pressure
         from_heel = matrix @ self.joint.fields.from_heel
@@ -154,8 +158,8 @@ class JointWater:
         return self.case["aperture_min"] if flow else self.case.shared["crack_aperture"][0]
 
     def aperture(self, jump: Array, variables: Any) -> tuple[Array, Array]:
-        """Conductivity at the law's points over that of the closed joint, and its derivative with
-        the opening.
+        """Aperture at the law's points over that of the closed joint, and its derivative with the
+        opening.
 
         flow: cubic law. cracked: the same, but of the opening beyond that of a crack, and bounded
         where an open point has practically the full head. Others: closed, whatever the opening.
@@ -170,7 +174,14 @@ class JointWater:
         wider = np.maximum(opening, 0) / narrowest
         factor = 1 + np.minimum(wider, most)
         growing = (wider > 0) & (wider < most)
-        return factor**3, np.where(growing, 3 / narrowest * factor**2, 0)
+        return factor, np.where(growing, 1 / narrowest, 0)
+
+    def conductivity(self, jump: Array, variables: Any) -> tuple[Array, Array]:
+        """Conductivity at the law's points over that of the closed joint, and its derivative with
+        the opening, by the `aperture`.
+        """
+        factor, growth = self.aperture(jump, variables)
+        return factor**3, np.where(growth > 0, 3 / self.narrowest * factor**2, 0)
 
     def outlets(self, loading: Loading) -> tuple[IntArray, Array]:
         """Nodes of the drains of flowing water, by their numbers in `system`, and heads of their
@@ -183,7 +194,7 @@ class JointWater:
         return self.nodes[nodes], outlet
 
     def cracked_to_drains(self, factor: Array) -> bool:
-        """Whether a crack has reached the drains, by the `aperture` (q,)."""
+        """Whether a crack has reached the drains, by the `conductivity` (q,)."""
         assert self.drains
         return self.case["uplift"] == "cracked" and bool((factor[self.drains[1]] > 1).any())
 
@@ -225,20 +236,33 @@ class JointWater:
         rate[:, 0, 0] = np.where((wider > 0) & (K_N * wider < full), K_N, 0)
         return traction, rate
 
+    def in_time(self, stored: StoredWater, pressure: Pressure) -> dict[str, float]:
+        """The columns IN_TIME of history.csv, from what is stored in `system`: at a node of several
+        joints, by the part of it that is this joint's.
+        """
+        size = self.joint.fields.at_points.T @ self.joint.points.weights
+        flow = self.system.flow
+        share = size / (flow.fields.at_points.T @ flow.points.weights)[self.nodes]
+        parts = {"water": stored.volume, "water_in": stored.inflow, "void": stored.void}
+        volumes = {n: share @ part[self.nodes] / self.joint.width for n, part in parts.items()}
+        nodes = pressure.nodes
+        return volumes | {"p_max": nodes.max(), "p_min": nodes.min()}
+
     def pressure(
         self,
         jump: Array,
         variables: JointVariables,
         loading: Loading,
         before_quake: BeforeQuake | None = None,
+        step: TimeStep | None = None,
     ) -> Pressure:
         """The water pressure in the joint at a jump, for the internal variables of all joints;
-        before_quake: see `Equilibrium.residual`.
+        before_quake: see `Equilibrium.residual`; step: see `WaterSystem.solve`.
         """
         joint, fields = self.joint, self.joint.fields
         beyond = np.zeros(fields.nodes)
         if self.flowing:
-            solution = self.system.solve(jump, variables, loading, before_quake)
+            solution = self.system.solve(jump, variables, loading, before_quake, step)
             beyond = self.system.expand_to_nodes(solution)[self.nodes]
 
         def at(matrix: CsrMatrix, positions: Array) -> Array:
@@ -248,10 +272,10 @@ class JointWater:
 
         flux, leakage = None, 0.0
         if self.case["uplift"] == "flow":
-            factor, _ = self.aperture(*self.opened(jump, variables, before_quake))
+            factor, _ = self.conductivity(*self.opened(jump, variables, before_quake))
             closed = self.case["rho_water"] * self.narrowest**3
             conductivity = closed * factor / (12 * self.case["visc"])
-            if self.system.network:
+            if self.system.network or step:
                 gradients = self.system.gradients(solution, self)
                 flux, leakage = joint.flow.flux_by(gradients, conductivity, joint.width)
             else:
@@ -290,6 +314,9 @@ class WaterSystem:
         #: whether the path through a joint goes on in another one
         self.in_series = network is not None and network.in_series
         self.unit_weight = members[0].case["rho_water"] * members[0].case["g"]
+        #: voids of the last flow in time, by the number of drained nodes: where the next search
+        #: for them begins, whose result does not depend on it
+        self.last_voids: dict[int, Array] = {}
         #: of the last loadings, see `_heads`
         self.heads = lru_cache(maxsize=4)(self._heads)
 
@@ -347,9 +374,11 @@ class WaterSystem:
         variables: JointVariables,
         loading: Loading,
         before_quake: BeforeQuake | None = None,
+        step: TimeStep | None = None,
     ) -> FlowSolution:
         """Pressure of flowing water beyond the imposed one at the inner nodes, for the internal
-        variables of all joints; before_quake: see `Equilibrium.residual`.
+        variables of all joints; before_quake: see `Equilibrium.residual`; step: in which water is
+        stored, the solution is a `FlowInTime`; None: the flow is steady.
 
         Drains reduce the head above their outlet, the tailwater or their own height, by their
         effectiveness e: the pressure is e times that with the outlet's head at the drains, plus
@@ -357,7 +386,9 @@ class WaterSystem:
         (EM 1110-2-2200).
         """
         opened = [water.opened(jump, variables, before_quake) for water in self.members]
-        factors = [water.aperture(*at)[0] for water, at in zip(self.members, opened, strict=True)]
+        factors = [
+            water.conductivity(*at)[0] for water, at in zip(self.members, opened, strict=True)
+        ]
         conductivity = np.concatenate(
             [
                 water.scale * factor * water.joint.points.weights
@@ -371,6 +402,12 @@ class WaterSystem:
             at_ends = weight * ends
 
         def solved(nodes: IntArray, outlet: Array) -> FlowSolution:
+            if step:
+                return self.solve_in_time(
+                    step, jump, conductivity, imposed, at_ends, nodes, weight * outlet
+                )
+            if not len(self.fields.ends):  # at rest
+                return FlowSolution(pressure=0 * at_ends[self.fields.inside], systems=[])
             solution = self.flow.solve(conductivity, at_ends, nodes, weight * outlet, exits)
             if self.branched:
                 beyond = solution.pressure + (at_ends - imposed)[self.fields.inside]
@@ -393,6 +430,67 @@ class WaterSystem:
             return free
         return free.mixed(effect, solved(nodes, outlet))
 
+    def solve_in_time(
+        self,
+        step: TimeStep,
+        jump: Array,
+        conductivity: Array,
+        imposed: Array,
+        at_ends: Array,
+        drains: IntArray,
+        drained: Array,
+    ) -> FlowInTime:
+        """As `Flow.solve` of a conductivity over that of the closed first joint, at the end of a
+        time step, see flow_in_time.py. The pressure at a dry end is zero.
+        """
+        flow, case, ends = self.flow, self.members[0].case, self.fields.ends
+        elevation = self.unit_weight * self.fields.joint.surface.points[:, 1]
+        heads, (known, dry) = at_ends.copy(), np.zeros((2, len(at_ends)), bool)
+        dry[ends] = at_ends[ends] <= elevation[ends]
+        heads[dry] = elevation[dry]
+        heads[drains] = drained
+        known[ends] = known[drains] = True
+        balance = WaterBalance(
+            flow=flow,
+            step=step,
+            volume=self.volume(jump),
+            storage=self.storage,
+            elevation=elevation,
+            lowest=case["pressure_min"],
+            guess=self.last_voids.get(len(drains), step.begin.void) > 0,
+        )
+        closed = case["aperture_min"] ** 3 / (12 * case["visc"])
+        solution = balance.solve(closed * conductivity, imposed, heads, known, dry)
+        self.last_voids[len(drains)] = solution.void
+        return solution
+
+    @property
+    def storage(self) -> Array:
+        """What the nodes store by the water's compressibility (n,) [m3/Pa]."""
+        flow = self.flow
+        stored = self.members[0].case["storage"] * flow.points.weights
+        return np.asarray(flow.fields.at_points.T @ stored)
+
+    def volume(self, jump: Array) -> Array:
+        """Volume of the joint that each node stands for (n,) [m3; 2D: per metre]."""
+        apertures = [
+            water.case["aperture_min"] * water.aperture(jump, None)[0] for water in self.members
+        ]
+        flow = self.flow
+        return np.asarray(
+            flow.fields.at_points.T @ (flow.points.weights * np.concatenate(apertures))
+        )
+
+    def stored_at(
+        self, jump: Array, variables: JointVariables, loading: Loading, time: float
+    ) -> StoredWater:
+        """What is stored by steady flow at a jump, at a time; suction stores nothing."""
+        beyond = self.expand_to_nodes(self.solve(jump, variables, loading))
+        elevation = self.unit_weight * self.fields.joint.surface.points[:, 1]
+        head = self.unit_weight * self.heads(loading) + beyond
+        pressure = np.maximum(head - elevation, 0)
+        return stored_at_rest(self.volume(jump), self.storage, pressure, time)
+
     def gradients(self, solution: FlowSolution, water: JointWater) -> list[Array]:
         """Gradient of the total head times the water's weight at the Gauss points of one of the
         joints, along the axes of its `JointFields`.
@@ -412,20 +510,28 @@ class WaterSystem:
         variables: JointVariables,
         solution: FlowSolution,
         before_quake: BeforeQuake | None,
+        step: TimeStep | None = None,
     ) -> FlowDerivative | None:
         """Derivative of the pressure of flowing water with the unknowns; None if it follows from
-        the joints before an earthquake.
+        the joints before an earthquake; step: see `solve`.
         """
         frozen = [bool(before_quake and water.freezes_uplift) for water in self.members]
-        if all(frozen):
+        if all(frozen) or not solution.systems:
             return None
         rates = [
             (0 if unchanged else water.scale)
-            * water.aperture(*water.opened(jump, variables, before_quake))[1]
+            * water.conductivity(*water.opened(jump, variables, before_quake))[1]
             * water.joint.points.weights
             for water, unchanged in zip(self.members, frozen, strict=True)
         ]
-        return self.flow.derivative(solution, np.concatenate(rates))
+        if step is None:
+            return self.flow.derivative(solution, np.concatenate(rates))
+        closed = self.members[0].case["aperture_min"] ** 3 / (12 * self.members[0].case["visc"])
+        growth = [
+            water.case["aperture_min"] * water.aperture(jump, None)[1] for water in self.members
+        ]
+        stored = self.flow.points.weights * np.concatenate(growth) / step.seconds
+        return self.flow.derivative(solution, closed * np.concatenate(rates), stored)
 
 
 def water_systems(waters: Sequence[JointWater], interface: Interface) -> list[WaterSystem]:

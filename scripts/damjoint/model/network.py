@@ -12,7 +12,7 @@ import numpy as np
 from .. import InputError
 from ..arrays import Array, IntArray, distinct
 from ..input.case import Case
-from ..input.values import flows, has_drains
+from ..input.values import flows, flows_in_time, has_drains
 from ..mesh.body import Body
 from ..mesh.joint_mesh import JointMesh
 
@@ -160,6 +160,12 @@ def check(network: Network, joints: Sequence[JointMesh], cases: Sequence[Case]) 
         raise InputError(
             f"uplift = {', '.join(modes)}: must not be drained in one of the joints that meet "
             f"({names}) and flow or cracked in another; there drains = 1"
+        )
+    no_ends = not len(network.mesh.heel_nodes) and not len(network.mesh.toe_nodes)
+    if no_ends and any(map(flows_in_time, cases)) and not cases[0]["storage"]:
+        raise InputError(
+            f"storage = 0: must be > 0 in joints without an end at the water ({names}), whose "
+            "volume could not change (no equilibrium)"
         )
     effects = dict.fromkeys(c["drain_effectiveness"] for c in cases if flows(c) and has_drains(c))
     if len(effects) > 1:

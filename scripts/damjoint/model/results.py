@@ -13,6 +13,7 @@ import numpy as np
 from .. import ROUND_OFF
 from ..arrays import Array, Table
 from ..input.case import Case
+from ..input.values import flows_in_time
 
 #: Columns of joint.csv: a row per joint node and requested level.
 JOINT = {
@@ -85,10 +86,19 @@ HISTORY = {
 }
 #: Additional column in 3D.
 LATERAL = {"T_z": ("N/m", "force on the joint along z, of the effective stress, 3D")}
+#: Additional columns of flow in time. Volumes are per metre of thickness, in 3D too.
+IN_TIME = {
+    "water": ("m2", "water stored in the joint, per metre of thickness, with its compression"),
+    "water_in": ("m2", "water that has come in by heel, toe and drains since the flow has a time"),
+    "void": ("m2", "part of the joint's aperture that is not filled with water"),
+    "p_max": ("Pa", "highest water pressure at a node of the joint"),
+    "p_min": ("Pa", "lowest water pressure at a node of the joint"),
+}
 #: Those of a joint. With several joints: of the first one; of joint 2, 3, ... by `column_of`.
 HISTORY_OF_JOINTS = (
     *("crack_length", "process_zone", "slip_length", "max_opening"),
     *("N", "T", "M", "flux", "U", "x_resultant", "M_U", "broken_length", "bonded_length", "T_z"),
+    *IN_TIME,
 )
 
 #: Unit and meaning of columns by name.
@@ -124,7 +134,9 @@ def with_all_joints(
 
 def history_columns(case: Case) -> Columns:
     """The columns of a case's history.csv: unit and meaning."""
-    return with_all_joints(HISTORY | LATERAL if case["dim"] == 3 else HISTORY, case)
+    further = LATERAL if case["dim"] == 3 else {}
+    in_time = IN_TIME if any(map(flows_in_time, case.joints)) else {}
+    return with_all_joints(HISTORY | further | in_time, case)
 
 
 #: Columns of quake.csv: unit and meaning. Displacements are relative to the ground.

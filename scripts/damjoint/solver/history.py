@@ -14,9 +14,11 @@ from ..joint.equilibrium import Equilibrium
 from ..joint.interface import JointInterface
 from ..model.results import (
     HISTORY_OF_JOINTS,
+    IN_TIME,
     THICKNESS,
     Results,
     column_of,
+    history_columns,
     history_table,
     joint_columns,
     joint_table,
@@ -28,16 +30,20 @@ from .state import State
 #: What is recorded of each step, and of each joint; the other columns of HISTORY are made from
 #: these.
 RECORDED = ("time", "level", "tail_level", "iterations", "cuts", "residual", "crest_ux")
-RECORDED_OF_JOINTS = (*(n for n in HISTORY_OF_JOINTS if n != "x_resultant"), "heel")
+RECORDED_OF_JOINTS = (
+    *(n for n in HISTORY_OF_JOINTS if n not in {"x_resultant", *IN_TIME}),
+    "heel",
+)
 
 
-def recorded(joints: int) -> list[str]:
-    """Names of what is recorded of a number of joints."""
-    return [column_of(name, k) for k in range(joints) for name in RECORDED_OF_JOINTS]
+def recorded(case: Case) -> list[str]:
+    """Names of what is recorded of the joints of a case."""
+    of_joints = [*RECORDED_OF_JOINTS, *(n for n in history_columns(case) if n in IN_TIME)]
+    return [column_of(name, k) for k in range(len(case.joints)) for name in of_joints]
 
 
 def joint_row(equilibrium: Equilibrium, state: State, number: int) -> dict[str, float]:
-    """RECORDED_OF_JOINTS of a joint, by its number, at a state."""
+    """RECORDED_OF_JOINTS of a joint, by its number, at a state; with flow in time IN_TIME, too."""
     joint, law = equilibrium.interface.joints[number], equilibrium.laws.laws[number]
     variables, pressure = state.variables.joints[number], state.pressures[number]
     at_points = joint.jumps(joint.at_points, state.jump)
@@ -46,7 +52,13 @@ def joint_row(equilibrium: Equilibrium, state: State, number: int) -> dict[str, 
     frames = joint.frames[joint.points.elements]
     along_axes = np.einsum("qk,qkc->qc", traction, frames)
     N, T, M = joint.chord.resultants(weights, joint.points.positions, along_axes)
-    wetted = equilibrium.water[number].wetted.points
+    own_water = equilibrium.water[number]
+    wetted, in_time = own_water.wetted.points, dict[str, float]()
+    if state.stored:
+        in_time = dict.fromkeys(IN_TIME, 0.0)
+        if own_water.system in equilibrium.flowing:
+            stored = state.stored[equilibrium.flowing.index(own_water.system)]
+            in_time = own_water.in_time(stored, pressure)
     normals = joint.surface.normals[wetted.elements]
     water = -pressure.water_points[:, None] * normals
     U, _, M_U = joint.chord.resultants(wetted.weights / joint.width, wetted.positions, water)
@@ -65,6 +77,7 @@ def joint_row(equilibrium: Equilibrium, state: State, number: int) -> dict[str, 
         "M_U": M_U,
         "flux": pressure.leakage,
         "heel": joint.heel @ state.jump,
+        **in_time,
     }
 
 
@@ -85,8 +98,8 @@ class History:
     by_round_off: list[float] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        joints = len(self.equilibrium.interface.joints)
-        self.rows = self.rows or {name: [] for name in (*RECORDED, *recorded(joints))}
+        names = *RECORDED, *recorded(self.equilibrium.case)
+        self.rows = self.rows or {name: [] for name in names}
 
     def copy(self) -> History:
         """Another one, that can be continued independently."""

@@ -14,8 +14,9 @@ import numpy as np
 from .. import RunError
 from ..arrays import Array
 from ..input.case import Case
-from ..input.values import freezes_uplift
+from ..input.values import flows_in_time, freezes_uplift
 from ..joint.equilibrium import Equilibrium
+from ..joint.flow_in_time import TimeStep
 from ..joint.interface import Interface, interface_of
 from ..joint.water import BeforeQuake
 from ..model.loads import COMPLETE, Loading
@@ -121,6 +122,33 @@ class Model:
         """The loads of a time, at a level [m]."""
         return Loading.at(self.case, time, level, self.case.tail_at(time))
 
+    @property
+    def in_time(self) -> bool:
+        """Whether water that flows is stored in the joints."""
+        return bool(self.equilibrium.flowing) and flows_in_time(self.case)
+
+    def water_steps(self, state: State, time: float) -> tuple[TimeStep, ...]:
+        """The steps of what is stored in the joints from a state to a time; empty if the flow is
+        steady: always, or as long as no time passes. A further step to the time of a state, on a
+        path, repeats the step that has led to that state.
+        """
+        if not self.in_time:
+            return ()
+        steps = list[TimeStep]()
+        for number, system in enumerate(self.equilibrium.flowing):
+            if state.stored:
+                begin = state.stored[number]
+            else:
+                begin = system.stored_at(state.jump, state.variables, state.loading, state.time)
+            if time <= begin.time and begin.begin:
+                begin = begin.begin
+            start = max(begin.time, self.case["time_start"])
+            seconds = (time - start) * self.case["time_unit"]
+            if seconds <= 0:
+                return ()
+            steps.append(TimeStep(seconds=seconds, begin=begin))
+        return tuple(steps)
+
     def before_quake(self, state: State, time: float) -> BeforeQuake | None:
         """The joints before the earthquake, for a step from a state to a time, if the water in one
         of them follows from that.
@@ -154,8 +182,9 @@ class Model:
         equilibrium, laws = self.equilibrium, self.equilibrium.laws
         start, before_quake = state.begin_step(laws, time), self.before_quake(state, time)
         step_laws = frozen or StepLaws(laws, laws)
-        problem = equilibrium.problem(start.variables, before_quake, step_laws.points)
-        water = equilibrium.water_in_step(start.variables, before_quake)
+        steps = self.water_steps(state, time)
+        problem = equilibrium.problem(start.variables, before_quake, step_laws.points, steps)
+        water = equilibrium.water_in_step(start.variables, before_quake, steps)
         if constant_lift is not None:
             problem = problem.with_constant_lift(constant_lift)
         starts = [
@@ -179,6 +208,7 @@ class Model:
             loading=reached,
             pressures=water.pressures(solution.jump, reached),
             before_quake=before_quake,
+            stored=water.stored(solution.jump, reached, time) if self.in_time else (),
         )
         residual = solution.size / (self.reference or 1.0)
         new = new.after(state).traced(state, frozen is not None)

@@ -35,6 +35,7 @@ def relax(
     relaxed: StepResult | None = None
     before_quake = model.before_quake(begin, time)
     strategies = [strategy for strategy in model.strategies[:-1] if not strategy.release]
+    steps = model.water_steps(begin, time)
     for _ in range(ROUNDS):
         start = state.begin_step(laws, time)
         frozen = start.freeze(equilibrium)
@@ -43,7 +44,7 @@ def relax(
         if step is None and equilibrium.flowing:
             level = control.level if isinstance(control, LevelControl) else start.loading.level
             opened = before_quake or start
-            water = equilibrium.water_in_step(opened.variables)
+            water = equilibrium.water_in_step(opened.variables, steps=steps)
             step = model.advance(
                 start,
                 time,
@@ -56,12 +57,12 @@ def relax(
         if step is None:
             return None
         iterations += step.iterations
-        state = replace(step.state, time=begin.time)
+        state = replace(step.state, time=begin.time, stored=begin.stored)
         jump, variables = state.jump, state.begin_step(laws, time).variables
-        problem = equilibrium.problem(variables, before_quake)
+        problem = equilibrium.problem(variables, before_quake, steps=steps)
         size = float(np.linalg.norm(problem.residual(jump, state.loading).value))
         if size <= model.convergence.tolerance:
-            water = equilibrium.water_in_step(variables, before_quake)
+            water = equilibrium.water_in_step(variables, before_quake, steps)
             pressures = water.pressures(jump, state.loading)
             balanced = replace(step.state, pressures=pressures).after(begin)
             return StepResult(balanced, iterations, size / (model.reference or 1.0)), True

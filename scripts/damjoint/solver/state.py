@@ -8,6 +8,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..joint.equilibrium import Equilibrium
+from ..joint.flow_in_time import StoredWater
 from ..joint.interface import Interface
 from ..joint.joint_laws import JointLaws, JointVariables
 from ..joint.water import BeforeQuake, Pressure
@@ -37,6 +38,8 @@ class State:
     node_variables: JointVariables
     #: of the water in each joint; the aperture of what had broken before the step lets it in
     pressures: tuple[Pressure, ...] = ()
+    #: what is stored where water flows in time
+    stored: tuple[StoredWater, ...] = ()
     #: the joints before the earthquake that acts, if the water follows from them
     before_quake: BeforeQuake | None = None
     #: the state before, without its own

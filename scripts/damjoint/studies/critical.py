@@ -20,6 +20,7 @@ from ..arrays import Setting
 from ..input.case import Case
 from ..input.parameters import independent, parameter
 from ..input.resolve import resolve, varied
+from ..input.values import flows_in_time
 from ..joint.interface import interface_of
 from ..model.results import Results, row_of_joint
 from ..solver.path import PRECISION, RISE, ROUGH, SURE, Point
@@ -119,6 +120,11 @@ class Search:
     def check_quantity(self) -> None:
         """Raise InputError if the case has nothing to vary."""
         case = self.case
+        if any(map(flows_in_time, case.joints)):
+            raise InputError(
+                f"time_unit = {case['time_unit']:g}: must be 0 in the search of a critical value, "
+                "whose levels have no time"
+            )
         drained = case["uplift"] == "drained" or (case["uplift"] == "cracked" and case["drains"])
         if self.of == "uplift" and not drained:
             raise InputError(

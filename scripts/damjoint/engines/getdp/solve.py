@@ -16,7 +16,7 @@ import numpy as np
 from ... import ROUND_OFF, InputError, RunError, data
 from ...fem.memory import bulk_size, check_memory
 from ...input.case import Case
-from ...input.values import flows, freezes_uplift, has_drains
+from ...input.values import flows, flows_in_time, freezes_uplift, has_drains
 from ...mesh.mesh import Mesh, mesh_of
 from ...model.network import with_paths
 from .. import OnStep, Outcome
@@ -48,6 +48,10 @@ def check_joint(joint: Case) -> None:
     if not (data("pro") / f"law_{joint['law']}.pro").is_file():
         raise InputError(
             f"law = {joint['law']}: must have a file pro/law_{joint['law']}.pro with engine = getdp"
+        )
+    if flows_in_time(joint):
+        raise InputError(
+            f"time_unit = {joint['time_unit']:g}: must be 0 with engine = getdp (steady flow)"
         )
     if freezes_uplift(joint):
         raise InputError(

@@ -1,0 +1,238 @@
+"""Flow in time: closed forms, mass balance, cavitation, steady limit."""
+
+from math import erfc
+
+import numpy as np
+import pytest
+from blocks import write_blocks
+from damjoint import InputError
+from damjoint.engines.condensed.solve import check
+from damjoint.input.resolve import load
+from damjoint.joint.flow_in_time import TimeStep
+from damjoint.model.loads import Loading
+from damjoint.solver.load_stepper import LoadStepper
+from damjoint.solver.model import Model
+
+WATER, VISC = 9810.0, 1e-3
+#: Dam of 28 m on a joint without tension, that opens under 40 m of water.
+OPENS = {"law": "friction", "adhesion": 0.0, "mu": 1.5, "dam_base": 28.0, "n_joint": 20.0}
+#: Two blocks on bases of 10 and 5 m; the joint between them and, if it is dry, the second base end
+#: the water's path.
+BLOCKS = {"left": (0, 0, 10, 10), "right": (10, 0, 15, 10)}
+JOINTS = {
+    "left base": (0, 0, 10, 0),
+    "right base": (10, 0, 15, 0),
+    "contraction": (10, 10, 10, 0),
+}
+STIFF = {"law": "friction", "adhesion": 1e30, "pena_tang": 0.0, "E": 2e10, "order": 1.0}
+
+
+@pytest.fixture
+def blocks(tmp_path):
+    """blocks(uplift, **settings): the blocks as a Model, with a mesh of 1 m."""
+
+    def build(uplift, levels=(5.0,), blocks=BLOCKS, joints=JOINTS, **settings):
+        write_blocks(tmp_path / "own.msh", blocks, joints)
+        (tmp_path / "own.case").write_text('geometry = "own.msh";')
+        settings = STIFF | {"uplift": uplift, "time_unit": 1.0} | settings
+        case = load(str(tmp_path / "own.case"), settings, levels, (0.0,))
+        check(case)
+        return Model(case)
+
+    return build
+
+
+def dam(levels=(30.0, 44.0), steps=5, **settings):
+    """A loading of the dam that opens."""
+    case = load("dam", OPENS | {"uplift": "flow"} | settings, levels, None, steps)
+    return LoadStepper(case)
+
+
+def opened(model, sizes):
+    """Unknowns for which each joint is open by a length [m], or by a function of the place."""
+    jump = np.zeros(len(model.start().jump))
+    for joint, size in zip(model.equilibrium.interface.joints, sizes, strict=True):
+        size = size(joint.space.locations) if callable(size) else size
+        wanted = np.outer(
+            np.broadcast_to(size, len(joint.space.locations)),
+            joint.surface.normals[0][: joint.dim],
+        )
+        jump += np.linalg.lstsq(joint.unknowns.toarray(), wanted.ravel(), rcond=None)[0]
+    return jump
+
+
+class Slot:
+    """The water of a model's joints under prescribed openings, from water at rest on."""
+
+    def __init__(self, model, jump, loading=None):
+        (self.system,) = model.equilibrium.flowing
+        self.loading = loading or Loading(0.0, 0.0)
+        self.variables, self.time = model.start().variables, 0.0
+        self.stored = self.system.stored_at(jump, self.variables, Loading(0.0, 0.0), 0.0)
+
+    def solve(self, jump, seconds):
+        step = TimeStep(seconds=seconds, begin=self.stored)
+        return self.system.solve(jump, self.variables, self.loading, None, step)
+
+    def step(self, jump, seconds):
+        """The pressure at the nodes after a step to an opening."""
+        solution = self.solve(jump, seconds)
+        self.time += seconds
+        self.stored = solution.stored(self.time, self.stored)
+        head = WATER * self.system.heads(self.loading) + self.system.expand_to_nodes(solution)
+        return head - WATER * self.system.fields.joint.surface.points[:, 1]
+
+    @property
+    def x(self):
+        return self.system.fields.joint.surface.points[:, 0]
+
+
+@pytest.mark.parametrize("gap", [1e-4, 2e-3])
+def test_squeeze_film_with_a_sealed_tip(blocks, gap):
+    """p = 6 eta V (L^2 - (L - x)^2) / w^3, thrust 4 eta V L^3 / w^3 [Reynolds 1886]."""
+    model = blocks(("flow", "none", "none"), aperture_min=1e-6)
+    first, then = opened(model, [gap, 0, 0]), opened(model, [0.9 * gap, 0, 0])
+    slot, seconds = Slot(model, first), 0.25
+    pressure = slot.step(then, seconds)
+    speed, width, L = 0.1 * gap / seconds, 1e-6 + 0.9 * gap, 10.0
+    expected = 6 * VISC * speed * (L**2 - (L - slot.x) ** 2) / width**3
+    assert pressure == pytest.approx(expected, rel=1e-9, abs=1e-9 * expected.max())
+    assert slot.stored.void.max() == 0
+    assert slot.stored.inflow.sum() == pytest.approx(-0.1 * gap * L, rel=1e-9)
+    water = model.equilibrium.water[0]
+    lift = water.force(water.wetted.fields @ pressure[water.nodes])
+    force = opened(model, [1.0, 0, 0]) @ lift
+    assert force == pytest.approx(4 * VISC * speed * L**3 / width**3, rel=5e-3)  # elements of 1 m
+
+
+def test_slot_that_stores_water():
+    """p0 erfc(x / (2 sqrt(D t))), D = w^3 N / (12 eta), after a sudden rise at the mouth."""
+    storage, width = 1e-12, 1e-4
+    settings = {"time_unit": 1.0, "storage": storage, "aperture_min": width, "n_joint": 200.0}
+    model = Model(load("dam", OPENS | {"uplift": "flow"} | settings, (30.0,)))
+    closed = model.start().jump
+    diffusivity = width**3 / (12 * VISC * storage)
+    end = 4.0 / diffusivity  # s; sqrt(4 D t) = 4 m, the joint has 28 m
+    errors = []
+    for number in (50, 100, 200):
+        slot = Slot(model, closed, Loading(30.0, 0.0))
+        for _ in range(number):
+            pressure = slot.step(closed, end / number)
+        expected = 30 * WATER * np.array([erfc(x / 4.0) for x in slot.x])
+        errors.append(np.abs(pressure - expected).max() / (30 * WATER))
+        entered = slot.stored.inflow.sum()
+    assert errors[-1] < 5e-3
+    assert errors[0] / errors[1] == pytest.approx(2, abs=0.3)  # order 1 in time
+    by_hand = 2 * 30 * WATER * storage * np.sqrt(diffusivity * end / np.pi)
+    assert entered == pytest.approx(by_hand, rel=1e-2)
+
+
+def test_the_steady_limit():
+    steady, slow = dam(), dam(time_unit=1e18)
+    (first, second) = (stepper.run() for stepper in (steady, slow))
+    for name in ("p", "delta_n", "sigma_n"):
+        scale = np.abs(first.joint[name]).max()
+        assert second.joint[name] == pytest.approx(first.joint[name], abs=1e-12 * scale)
+    assert first.history["max_opening"][-1] > 1e-4
+
+
+@pytest.mark.parametrize("lowest", [0.0, -1e5])
+@pytest.mark.parametrize("unit", [1.0, 600.0, 1e5])
+def test_mass_is_kept_in_every_step(unit, lowest):
+    """Water in = water stored, to rounding; no pressure is below the least one."""
+    result = dam(time_unit=unit, pressure_min=lowest).run()
+    history = result.history
+    assert not result.stopped and history["max_opening"][-1] > 1e-5
+    start = 28 * result.case["aperture_min"]
+    balance = history["water"] - history["water_in"]
+    assert balance == pytest.approx(start, abs=1e-11 * history["water"].max())
+    assert history["p_min"].min() >= lowest - 1e-6
+    assert (history["void"] >= 0).all()
+    if unit == 1:
+        assert history["void"].max() > 1e-7 and history["p_min"].min() == pytest.approx(lowest)
+
+
+def test_faster_floods_leave_the_crack_behind():
+    cracks = [dam(time_unit=unit).run().last["crack_length"] for unit in (1.0, 600.0, 1e5)]
+    assert cracks == sorted(cracks) and cracks[0] < cracks[-1]
+
+
+def test_voids_are_filled_before_pressure_returns(blocks):
+    """Opened faster than water follows, closed by less than the void: no pressure; then by more."""
+    model = blocks(("flow", "none", "none"), aperture_min=1e-5, pressure_min=-5e4)
+    slot = Slot(model, opened(model, [0, 0, 0]))
+    pressure = slot.step(opened(model, [1e-3, 0, 0]), 1e-5)
+    assert pressure[slot.x > 9] == pytest.approx(-5e4)
+    void = slot.stored.void.sum()
+    assert void + slot.stored.inflow.sum() == pytest.approx(1e-3 * 10, rel=1e-9)
+    pressure = slot.step(opened(model, [2e-4, 0, 0]), 1e-5)
+    assert pressure[slot.x > 9] == pytest.approx(-5e4)
+    pressure = slot.step(opened(model, [0.0, 0, 0]), 1e-5)
+    assert slot.stored.void.max() == 0 and pressure.max() > 1e5
+    assert slot.stored.volume.sum() - slot.stored.inflow.sum() == pytest.approx(1e-4, rel=1e-9)
+
+
+@pytest.mark.parametrize("uplift", [("flow", "flow", "none"), ("flow",) * 3])
+@pytest.mark.parametrize("storage", [0.0, 1e-12])
+def test_joints_that_meet_exchange_water(blocks, uplift, storage):
+    """The water of the network is kept, and its derivative is that of finite differences."""
+    model = blocks(uplift, (12.0,), aperture_min=(1e-4, 2e-4, 3e-4), storage=storage)
+    wave = lambda size: lambda x: size * (1 + 0.5 * np.sin(x @ [1.0, 0.7, 0.3]))
+    slot = Slot(model, opened(model, [0, 0, 0]), Loading(12.0, 1.0))
+    start = slot.stored.volume.sum()
+    jump = opened(model, [wave(s) for s in (2e-3, 3e-3, 4e-3)])
+    for seconds in (1e-4, 1e-2, 100.0):
+        slot.step(jump, seconds)
+        stored = slot.stored
+        assert stored.volume.sum() - stored.inflow.sum() == pytest.approx(
+            start, abs=1e-11 * (stored.volume.sum() + np.abs(stored.inflow).sum())
+        )
+        step = TimeStep(seconds=seconds, begin=stored)
+        solution = slot.solve(0.999 * jump, seconds)
+        derivative = slot.system.derivative(0.999 * jump, slot.variables, solution, None, step)
+        way = np.random.default_rng(1).normal(size=len(jump)) * 1e-9
+        above, below = (slot.solve(0.999 * jump + s * way, seconds).pressure for s in (1, -1))
+        expected = derivative.pressure @ way[derivative.columns]
+        assert (above - below) / 2 == pytest.approx(expected, rel=1e-3, abs=1e-4 * np.ptp(expected))
+
+
+def test_drains_take_water():
+    drained, free = (
+        dam(time_unit=600.0, drain_x=4.0, drains=on, drain_effectiveness=0.8).run() for on in (1, 0)
+    )
+    history = drained.history
+    assert history["U"][-1] < free.history["U"][-1]
+    assert history["water"] - history["water_in"] == pytest.approx(2.8e-4, rel=1e-9)
+
+
+def test_in_three_dimensions():
+    """A slice has the pressures of the section, and keeps its water."""
+    settings = {"n_joint": 10.0, "order": 1.0, "mesh_pattern": "layers", "time_unit": 600.0}
+    flat, solid = (dam(dim=dim, thickness=2.0, hold_z=1.0, **settings).run() for dim in (2.0, 3.0))
+    assert solid.history["water"] - solid.history["water_in"] == pytest.approx(2.8e-4, rel=1e-9)
+    for name in ("water", "p_max", "max_opening"):
+        assert solid.history[name][-1] == pytest.approx(flat.history[name][-1], rel=2e-2)
+
+
+def test_steady_before_the_start():
+    """As steady flow up to the level of `time_start`, then slower than it."""
+    steady, late = dam(), dam(time_unit=60.0, time_start=1.0)
+    first, second = steady.run(), late.run()
+    assert np.array_equal(first.at(1)["p"], second.at(1)["p"])
+    assert second.history["crack_length"][-1] < first.history["crack_length"][-1]
+
+
+def test_a_sealed_joint_must_store_water(blocks):
+    """The base of the middle one of three blocks, between dry joints: its volume is given."""
+    bounds = {"left": (0, 5), "middle": (5, 10), "right": (10, 15)}
+    three = {name: (a, 0, b, 10) for name, (a, b) in bounds.items()}
+    joints = {f"{name} base": (a, 0, b, 0) for name, (a, b) in bounds.items()}
+    joints |= {"first": (5, 10, 5, 0), "second": (10, 10, 10, 0)}
+    uplift = "none", "flow", "none", "none", "none"
+    with pytest.raises(InputError, match="storage = 0: must be > 0"):
+        blocks(uplift, (5.0,), three, joints)
+    model = blocks(uplift, (5.0,), three, joints, storage=1e-9)
+    slot = Slot(model, opened(model, [0.0] * 5))
+    pressure = slot.step(opened(model, [0, 1e-4, 0, 0, 0]), 1.0)
+    assert pressure == pytest.approx(0, abs=1e-9)  # the opening is a void
+    assert slot.stored.void.sum() == pytest.approx(5e-4, rel=1e-9)
