@@ -230,7 +230,8 @@ def test_an_independent_parameter_changes_nothing_else():
     for name in independent():
         known, own = parameters.parameter(name), base[name]
         other = 1.0 if own == parameters.AUTOMATIC else own
-        values = known.choices or ([own + 1] if known.integer else [other / 2, (other + 1) / 2, other - 1])
+        near = [own + 1] if known.integer else [other / 2, (other + 1) / 2, other - 1]
+        values = known.choices or near
         value = next(v for v in values if v != own and known.allows(v))
         if name in ("grout_pressure", "saw_thickness"):  # not with law = bond: refused in both ways
             for way in (lambda v: load("dam", common | v), base.changed):
