@@ -356,6 +356,24 @@ def test_water_in_the_joint_during_an_earthquake(tmp_path, mode, uplift):
         assert uplifts("crack")[0][:, 0].max() > 1.05 * static["U"]
 
 
+def test_water_returns_to_a_crack_that_closes(tmp_path):
+    """zero: the static uplift in each step that begins with a closed joint, broken or not; of
+    law = rupture a broken point belongs to the crack for good.
+    """
+    settings = DAM | {"law": "rupture", "sigma_max": 2e5, "quake_uplift": "zero"}
+    quake = earthquake(smooth_record(tmp_path / "r.csv", 5.0, duration=0.6), settings, "30")
+    equilibrium, joint, begin = quake.problem.model.equilibrium, joint_of(quake), quake.now.state
+    static, closed_again = joint_row(equilibrium, begin, 0)["U"], 0
+    for step in quake.steps():
+        row = joint_row(equilibrium, step.end.state, 0)
+        opening = joint.jumps(joint.at_points, begin.jump)[:, 0].max()
+        if opening <= 0:
+            assert row["U"] == pytest.approx(static)
+            closed_again += row["crack_length"] == pytest.approx(34)
+        begin = step.end.state
+    assert closed_again > 10
+
+
 # -- condensation, three dimensions, several joints
 
 

@@ -39,6 +39,7 @@ MORE = {
     "flow, unchanged": {"uplift": "flow", "quake_uplift": "unchanged"},
     "no uplift in the crack": {"quake_uplift": "zero"},
     "flow, none in the crack": {"uplift": "flow", "quake_uplift": "zero"},
+    "rupture, none in the crack": {"law": "rupture", "sigma_max": 2e5, "quake_uplift": "zero"},
     "drains, none in the crack": {"uplift": "cracked", "quake_uplift": "zero"} | DRAINS | BOND,
     "drains, flow": {"uplift": "flow"} | DRAINS,
     "waterstop": {"uplift": "waterstop", "waterstop": 5.2},

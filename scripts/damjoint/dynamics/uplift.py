@@ -29,7 +29,7 @@ def pressures_in_motion(case: Case, problem: Problem, state: State) -> tuple[Pre
             strict=True,
         )
         return tuple(
-            without(pressure, water, water.law.is_open(jump, variables))
+            without(pressure, water, water.law.gapes(jump, variables))
             for water, pressure, jump, variables in parts
         )
     if mode == "crack" and equilibrium.flowing:
@@ -37,11 +37,11 @@ def pressures_in_motion(case: Case, problem: Problem, state: State) -> tuple[Pre
     return static
 
 
-def without(pressure: Pressure, water: JointWater, is_open: BoolArray) -> Pressure:
-    """A pressure, and none in the elements whose points (q,) are open, nor at their nodes."""
+def without(pressure: Pressure, water: JointWater, gapes: BoolArray) -> Pressure:
+    """A pressure, and none in the elements whose points (q,) all gape, nor at their nodes."""
     joint, starts = water.joint, 0
     points = joint.points.elements
-    elements = np.bincount(points, is_open) == np.bincount(points)
+    elements = np.bincount(points, gapes) == np.bincount(points)
     nodes = np.zeros(len(joint.space.locations), bool)
     for _, table in joint.space.connectivity:
         nodes[table[elements[starts : starts + len(table)]]] = True

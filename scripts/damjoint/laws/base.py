@@ -152,6 +152,12 @@ class Law(Generic[V]):
         """Whether a point belongs to the crack."""
         return jump[:, 0] > 0
 
+    def gapes(self, jump: Array, variables: V) -> BoolArray:
+        """Whether a point of the crack is not closed: beyond what grout and saw leave."""
+        return self.is_open(jump, variables) & (
+            jump[:, 0] > self.added_thickness(variables, len(jump))
+        )
+
     def is_broken(self, jump: Array, variables: V) -> BoolArray:
         """Whether the damage of a point is `broken_damage` or more, whether it is open or not."""
         return self.damage(jump, variables) >= self.broken_damage
