@@ -29,7 +29,7 @@ pictures/   shapes of a scene; pictures of section, joint, history and check
 accuracy.py mesh refinement to a required accuracy, error estimate
 session.py  the life of a study in its output folder
 runner.py   solves a case and writes its results
-studies/    checks, sweeps, critical values, a law along a path, reports
+studies/    checks, sweeps, critical values, reliability, a law along a path, reports
 verification/  published tests, for `damjoint validate`
 library.py  the interface for Python: case, run, check, quake, modes, ...; its words:
             python_words.py
@@ -55,6 +55,7 @@ if TYPE_CHECKING:
     from .library import Law as Law
     from .library import Modes as Modes
     from .library import Quake as Quake
+    from .library import Reliability as Reliability
     from .library import Run as Run
     from .library import Sample as Sample
     from .library import Step as Step
@@ -65,6 +66,7 @@ if TYPE_CHECKING:
     from .library import fill as fill
     from .library import modes as modes
     from .library import quake as quake
+    from .library import reliability as reliability
     from .library import run as run
     from .library import sweep as sweep
 
@@ -104,9 +106,9 @@ def data(folder: str) -> Path:
 
 #: What `import damjoint` offers, see library.py; imported when it is used.
 LIBRARY = (
-    *("case", "run", "fill", "check", "critical", "quake", "modes", "sweep"),
+    *("case", "run", "fill", "check", "critical", "quake", "modes", "sweep", "reliability"),
     *("Case", "Run", "JointTable", "Step", "Checks", "Critical", "Quake", "Modes", "Sample"),
-    "Sweep",
+    *("Sweep", "Reliability"),
     *("Law", "LAWS"),
 )
 __all__ = [*LIBRARY, "InputError", "RunError"]

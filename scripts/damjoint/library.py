@@ -65,6 +65,8 @@ if TYPE_CHECKING:  # loaded when they are used, with what they draw with
     from .studies.critical import Search
     from .studies.critical_value import CriticalValue
     from .studies.quake_result import QuakeTables
+    from .studies.reliability import CriticalLevels
+    from .studies.reliability import Reliability as OfJoint
 
 #: What `import damjoint` offers.
 __all__ = [*LIBRARY]
@@ -1018,3 +1020,119 @@ def sweep(
     results = dict(track(computed, "sweep", len(tasks)) if progress else computed)
     cells = [{column_of(n): v for n, v in row.items()} | results[key] for key, row, _ in rows]
     return Sweep(plan, by_column(cells), meshed)
+
+
+@dataclass(frozen=True, repr=False)
+class Reliability(WithTables):
+    """The probability that the water rises beyond the critical level, made by `reliability`.
+
+    Example:
+        >>> dry = case("dam", levels=[30, 36], n_joint=10, order=1, law="friction", adhesion=0.0)
+        >>> likely = {"mu": "lognorm(0.12,scale=0.74)", "level": "gumbel_r(38.5,0.6)"}
+        >>> result = reliability(dry, **likely, samples=50, jobs=1)
+        >>> round(result.beta, 2), result.words
+        (2.71, ['FORM agrees with the samples'])
+        >>> critical(result.design_case).mode
+        'sliding'
+    """
+
+    #: of each of several joints if no other could fail, then that of all
+    results: Sequence[OfJoint]
+    levels: CriticalLevels
+
+    @property
+    def case(self) -> Case:
+        """The case with the values that are not uncertain."""
+        return self.levels.case
+
+    @property
+    def beta(self) -> float:
+        """Reliability index by FORM [-]."""
+        return self.results[-1].beta
+
+    @property
+    def rows(self) -> np.recarray:
+        """A row per joint if no other could fail, and one of all: joint (empty: all), beta,
+        probabilities form, breitung, tvedt (SORM), sampled with the limits low, high of its 95 %
+        interval; nan where a method has none.
+        """
+        return records(self.named("rows")[0])
+
+    @property
+    def design(self) -> Mapping[str, float]:
+        """The design point: the most probable values with which the dam fails, by name."""
+        return self.results[-1].design
+
+    @property
+    def importance(self) -> Mapping[str, float]:
+        """Importance factors by name; their sum is 1."""
+        return self.results[-1].importance
+
+    @property
+    def design_case(self) -> Case:
+        """The case of the design point, filled to its level."""
+        from .studies.reliability import design_case
+
+        return design_case(self.levels, self.results[-1])
+
+    @property
+    def words(self) -> list[str]:
+        """Whether the methods agree, of each row."""
+        return [one.words() for one in self.results]
+
+    @property
+    def by_name(self) -> Mapping[str, tuple[Mapping[str, Any], Columns]]:
+        """The table rows."""
+        names = "joint", "beta", "form", "breitung", "tvedt", "sampled", "low", "high"
+        cells = {n: [getattr(one, n) for one in self.results] for n in names}
+        table = {n: np.array([np.nan if v is None else v for v in cells[n]]) for n in names}
+        return {"rows": (table, dict.fromkeys(names[1:], ("-", "")))}
+
+    def __repr__(self) -> str:
+        whole = self.results[-1]
+        share = whole.sampled if whole.samples else whole.form
+        return f"{self.case.name}: probability of failure {share:.3g}, beta by FORM {self.beta:.4g}"
+
+
+@speaks_python
+def reliability(
+    source: Case | str | Path = "dam",
+    *,
+    correlate: Sequence[str] = (),
+    tie: Mapping[str, str] | None = None,
+    samples: int = 500,
+    seed: int = 0,
+    jobs: int | None = None,
+    **distributions: str,
+) -> Reliability:
+    """The probability that the water rises beyond the critical level, by FORM, SORM and importance
+    sampling; needs openturns. Nothing is written.
+
+    Args:
+        source: a case, or its name or path, see `case`; its last level counts unless `level` is
+            uncertain.
+        correlate: rank correlations, "A,B=R" each.
+        tie: parameters computed from the others, such as `{"adhesion": "2e5*mu"}`.
+        samples: critical levels of the importance sampling, in whole blocks of 50; 0: none.
+        seed: of the random numbers.
+        jobs: number of processes (default: one per core).
+        distributions: of scipy.stats by parameter, as texts, "normal(0.8,0.1)"; `level` [m]; of one
+            joint by `**{"lift 25 m.mu": "normal(0.7,0.1)"}`.
+
+    Raises:
+        InputError: bad input, a value that a parameter does not allow, or no openturns.
+        RunError: a process was killed.
+
+    Example:
+        >>> dry = case("dam", levels=[30, 36], n_joint=10, order=1, law="friction", adhesion=0.0)
+        >>> result = reliability(dry, mu="normal(0.8,0.06)", level="normal(38,1)", samples=0)
+        >>> result.rows.joint.tolist(), sorted(result.importance)
+        ([''], ['level', 'mu'])
+    """
+    from .processes import check_jobs
+    from .studies.reliability import CriticalLevels, Variables, analysed
+
+    check_jobs(jobs)
+    variables = Variables(distributions, correlate, tie or {})
+    levels = CriticalLevels(on_fixed_mesh(noted(as_case(source))), variables, jobs)
+    return Reliability(list(analysed(levels, samples, seed, lambda message: None)), levels)

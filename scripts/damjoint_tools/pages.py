@@ -173,6 +173,12 @@ def results_page() -> str:
         "and, over the rows that stand, with `crack_length`, `max_opening` and `crest_ux`; of "
         "earthquakes, over the rows at rest, with `residual_slip` and `residual_tilt`.\n"
         "- `.png`: a chart of one or two varied parameters, or of the sample.",
+        "## reliability.csv",
+        "Written by `damjoint reliability`, a row per critical level: `key`, by which an "
+        "interrupted study continues; `of_joint`, the only joint that can fail (empty: all); the "
+        "varied values; the critical level [m], its `mode`, the `joint` that fails, whether it is "
+        "`confirmed` and by what. `run.json` has the results under `reliability`; "
+        "`design_point.case` is the case of the design point.",
         "## fields/",
         "`bulk.msh` and `joint.msh` for Gmsh (a view per field with all levels as its steps); "
         "`fields.pvd` for ParaView, with the blocks bodies (`bulk_t*.vtu`) and joints "

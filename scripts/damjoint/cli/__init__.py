@@ -16,7 +16,7 @@ from .options import Parser
 #: The commands: names of modules. Each has SUMMARY, `add`, which adds its options, and `call`,
 #: which runs it and returns the exit code.
 COMMANDS = (
-    *("run", "check", "critical", "quake", "modes", "sweep"),
+    *("run", "check", "critical", "quake", "modes", "sweep", "reliability"),
     *("plot", "report", "tables", "gui", "new", "validate"),
 )
 DEVELOPERS = ("stress", "bench", "law")
@@ -35,7 +35,7 @@ def parser(word: str = "") -> Parser:
     """
     chosen = [name for name in (*COMMANDS, *DEVELOPERS) if name == word] or [*COMMANDS, *DEVELOPERS]
     modules = {name: import_module(f".{name}", __name__) for name in chosen}
-    of_developers = (f"  {n:<10}  {modules[n].SUMMARY}" for n in DEVELOPERS if n in modules)
+    of_developers = (f"  {n:<11}  {modules[n].SUMMARY}" for n in DEVELOPERS if n in modules)
     top = Parser(
         formatter_class=argparse.RawDescriptionHelpFormatter,
         prog="damjoint",

@@ -188,6 +188,14 @@ class Parser(argparse.ArgumentParser):
         """Add the number of processes."""
         self.add_integer("--jobs", 1, help="number of processes (default: one per core)")
 
+    def add_scheduler(self) -> None:
+        """Add the address of a dask scheduler."""
+        self.add_argument(
+            "--scheduler",
+            metavar="ADDRESS",
+            help="run on the dask.distributed scheduler at this address (default: this machine)",
+        )
+
 
 def table_width(arguments: argparse.Namespace) -> int | None:
     """The width of printed tables; None with --wide."""

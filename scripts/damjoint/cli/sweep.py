@@ -78,11 +78,7 @@ def add(command: Parser) -> None:
         "exceeds SLIP [m]: with --vary record_scale=... and --sample a fragility (default: none)",
     )
     command.add_jobs()
-    command.add_argument(
-        "--scheduler",
-        metavar="ADDRESS",
-        help="run on the dask.distributed scheduler at this address (default: this machine)",
-    )
+    command.add_scheduler()
     command.add_path("--out", "FILE", help=f"{RESUMED} (default: CASE_sweep.csv)")
 
 

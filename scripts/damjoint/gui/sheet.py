@@ -29,6 +29,7 @@ from ..input.parameters import (
 )
 from ..input.refinement import first_mesh
 from ..input.resolve import load
+from ..input.written_case import add_settings, text_with_loading
 from ..studies import quake
 from ..studies.quake import Span
 
@@ -182,35 +183,6 @@ def case_text(sheet: Sheet, run: Case) -> str:
     case, request = sheet.case, sheet.request
     file = casefile.read(case_file(request.case))
     file.defaults |= first_mesh(case) if request.accuracy else {}
-    for name, value in request.overrides.items():
-        setting = checked(name, value)
-        if name in declared():
-            file.defaults.pop(name, None)
-            file.of_joints.pop(name, None)
-            for values in file.blocks.values():
-                values.pop(name, None)
-            if isinstance(setting, tuple):
-                file.of_joints[name] = setting
-            else:
-                file.defaults[name] = setting
+    add_settings(file, request.overrides)
     file.defaults |= {name: run[name] for name in REFINED} if request.accuracy else {}
-    file.texts = {"title": case.title}
-    if case.record:
-        file.texts["record"] = str(case.record.resolve())
-    if case.geometry:
-        file.texts["geometry"] = str(case.geometry.resolve())
-    if case.also_uplift:
-        file.texts["also_uplift"] = " ".join(case.also_uplift)
-    file.lists = {
-        "levels": list(case.levels),
-        "tail_levels": list(case.tail_levels),
-        "times": list(case.times),
-    }
-    file.lists |= {n: list(values) for n in GEOMETRY_LISTS if (values := getattr(case, n))}
-    names = run.joint_names
-    if file.of_joints and len(set(names)) == len(next(iter(file.of_joints.values()))):
-        for k, name in enumerate(names):
-            block = file.blocks.setdefault(casefile.key_of(name), {})
-            block |= {n: values[k] for n, values in file.of_joints.items()}
-        file.of_joints = {}
-    return casefile.written(file)
+    return text_with_loading(file, case, run.joint_names)

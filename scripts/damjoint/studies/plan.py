@@ -66,7 +66,7 @@ class Sample:
         from . import sampling  # loads scipy.stats
 
         for name, text in self.distributions.items():
-            known = None if name == "level" else parameters.parameter(name)
+            known = None if name == "level" else parameters.parameter(name.rpartition(".")[2])
             if known and (known.text or known.choices):
                 raise InputError(f"--sample {name}={text}: must be of a parameter that is a number")
             sampling.distribution(name, text)
@@ -93,11 +93,14 @@ class Sample:
 
 
 def checked(name: str, value: Value) -> Value:
-    """The value of a row, from a text or a number; name: a parameter or level.
+    """The value of a row, from a text or a number; name: a parameter, one of a single
+    joint or level.
 
     Raises InputError.
     """
     if name != "level":
+        if "." in name:
+            return parameters.of_one_joint(name, value)[2]
         return parameters.parameter(name).check(value)
     message = f"level = {value}: must be a level in metres"
     try:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 from .. import InputError, RunError, accuracy
 from ..arrays import Value, Values
@@ -110,9 +110,11 @@ def last_rows(tasks: list[Task]) -> list[dict[str, Value]]:
         ]
 
 
-def rows_of_bundles(bundles: list[list[Task]]) -> list[dict[str, Value]]:
-    """The rows of several bundles, see `last_rows`."""
-    return [row for tasks in bundles for row in last_rows(tasks)]
+def rows_of_bundles(
+    rows_of: Callable[[list[Any]], list[dict[str, Value]]], bundles: list[list[Any]]
+) -> list[dict[str, Value]]:
+    """The rows of several bundles; rows_of: those of one."""
+    return [row for tasks in bundles for row in rows_of(tasks)]
 
 
 def last_row(task: Task, solved: Solved) -> dict[str, Value]:
@@ -229,8 +231,22 @@ def bundles(tasks: dict[str, Task]) -> list[list[str]]:
 def spread(
     tasks: dict[str, Task], jobs: int, scheduler: str | None
 ) -> Iterator[tuple[str, dict[str, Value]]]:
-    """(key, row) of each finished task: in this process, in `jobs` processes, or by a scheduler."""
-    work = bundles(tasks)
+    """(key, row) of each finished task of a sweep, see `spread_bundles`."""
+    return spread_bundles(last_rows, bundles(tasks), tasks, jobs, scheduler)
+
+
+def spread_bundles(
+    rows_of: Callable[[list[Any]], list[dict[str, Value]]],
+    work: list[list[str]],
+    tasks: Mapping[str, Any],
+    jobs: int,
+    scheduler: str | None,
+) -> Iterator[tuple[str, dict[str, Value]]]:
+    """(key, row) of each finished task: in this process, in `jobs` processes, or by a scheduler.
+
+    rows_of: the rows of the tasks of a bundle; work: the keys of each bundle. Raises InputError,
+    RunError.
+    """
     chosen = [[tasks[key] for key in keys] for keys in work]
     if scheduler:
         try:
@@ -252,14 +268,16 @@ def spread(
             for i in range(0, len(work), size):
                 keys = list(chain.from_iterable(work[i : i + size]))
                 name = f"damjoint-{hashlib.sha256(' '.join(keys).encode()).hexdigest()[:32]}"
-                futures[client.submit(rows_of_bundles, chosen[i : i + size], key=name)] = keys
+                futures[client.submit(rows_of_bundles, rows_of, chosen[i : i + size], key=name)] = (
+                    keys
+                )
             for future in as_completed(futures):
                 yield from zip(futures[future], future.result(), strict=True)
     elif jobs == 1 or len(work) == 1:
         for keys, some in zip(work, chosen, strict=True):
-            yield from zip(keys, last_rows(some), strict=True)
+            yield from zip(keys, rows_of(some), strict=True)
     else:
-        for number, rows in as_finished(last_rows, chosen, jobs):
+        for number, rows in as_finished(rows_of, chosen, jobs):
             yield from zip(work[number], rows, strict=True)
 
 

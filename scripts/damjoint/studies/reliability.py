@@ -1,0 +1,490 @@
+"""Reliability: the probability that the water rises beyond the critical level.
+
+The limit state is g = critical level - level [m]; the dam fails where g < 0. Its variables are
+standard normal ones z, which follow from the uncertain parameters and have the correlation of a
+Gaussian copula, as in a sample. The algorithms are those of OpenTURNS: FORM by the design point,
+the nearest one of failure [Hasofer and Lind 1974; Abdo and Rackwitz 1990], SORM [Breitung 1984;
+Tvedt 1990], importance sampling around the design points [Melchers 1989]. Derivatives are central
+differences of critical levels.
+"""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from scipy import stats
+
+from .. import InputError, RunError
+from ..arrays import Value, Values
+from ..input.case import Case
+from ..input.resolve import varied
+from ..joint.interface import interface_of
+from ..processes import number_of
+from ..solver.path import PRECISION
+from ..threads import limited_threads
+from . import keys, sampling
+from .critical import Search
+from .plan import Plan, Sample, cases_of, checked, in_file, rounded, up_to
+from .sweep import ERROR, message_of, search_of, spread_bundles
+
+#: Step of the central differences, in standard deviations of the normal variables [-].
+STEP = 0.1
+
+#: Tolerance of the design point, in standard deviations and relative [-], and of its limit state
+#: [m]; if that is not reached, the precision of a critical level is the tolerance.
+TOLERANCE = 1e-4
+
+#: Iterations after which the search for a design point ends without one.
+MOST_ITERATIONS = 20
+
+#: Samples that are evaluated together.
+BLOCK = 50
+
+#: Standard errors of the samples beyond which another probability disagrees with them [-].
+DISAGREES = 3.0
+
+#: Level over the first one, from which a path begins that finds no equilibrium at that [-].
+LOWER = 0.25
+
+#: Adhesion [Pa] of the joints that cannot fail in the limit state of another one.
+UNBREAKABLE = 1e12
+
+#: Columns of a critical level in reliability.csv, after key, of_joint and the variables.
+RESULTS = ("critical_level", "mode", "joint", "confirmed", "confirmed_by")
+
+
+def openturns() -> ModuleType:
+    """The library. Raises InputError if it is not installed."""
+    try:
+        import openturns
+    except ImportError:
+        raise InputError(
+            "reliability: needs openturns; pip install 'damjoint[reliability]'"
+        ) from None
+    openturns.Log.Show(openturns.Log.NONE)  # its warnings would be mixed with ours
+    return openturns
+
+
+@dataclass(frozen=True)
+class Variables:
+    """Uncertain parameters: distributions of scipy.stats by name, as texts, rank correlations
+    "A,B=R", parameters that are computed from them by expressions.
+
+    Raises InputError.
+    """
+
+    distributions: Mapping[str, str]
+    correlate: Sequence[str] = ()
+    tied: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        try:
+            if not self.distributions:
+                raise InputError("--vary: must have a distribution, such as mu=normal(1.0,0.15)")
+            Sample(1, dict(self.distributions), correlate=self.correlate)
+        except InputError as error:
+            raise InputError(str(error).replace("--sample", "--vary")) from None
+        for name in self.tied:
+            if name in self.distributions or name == "level":
+                raise InputError(f"--tie {name}: must not be varied, and not be the level")
+            checked_name(name)
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the uncertain parameters."""
+        return [*self.distributions]
+
+    @cached_property
+    def marginals(self) -> list[Any]:
+        """Their distributions."""
+        return [sampling.distribution(n, text) for n, text in self.distributions.items()]
+
+    def values(self, z: Sequence[float]) -> dict[str, float]:
+        """The values by name at a point of the normal variables, also in far tails.
+
+        Raises InputError if a parameter does not allow its value.
+        """
+        result = {}
+        for name, kind, number in zip(self.names, self.marginals, z, strict=True):
+            tail = stats.norm.cdf(-abs(number))
+            value = rounded(float(kind.isf(tail) if number > 0 else kind.ppf(tail)))
+            try:
+                result[name] = float(checked(name, value))
+            except InputError as error:
+                raise InputError(
+                    f"--vary {name}={self.distributions[name]}: has {error}; truncnorm, uniform "
+                    "or lognorm keep within bounds"
+                ) from None
+        return result
+
+    def normal(self) -> Any:
+        """The joint distribution of the normal variables, of OpenTURNS.
+
+        Raises InputError if the correlations are not those of any distribution.
+        """
+        ot, number = openturns(), len(self.names)
+        ranks = ot.CorrelationMatrix(number)
+        for text in self.correlate:
+            i, j, rank = sampling.correlation(text, self.names)
+            ranks[i, j] = rank
+        try:
+            matrix = ot.NormalCopula.GetCorrelationFromSpearmanCorrelation(ranks)
+            return ot.Normal([0.0] * number, [1.0] * number, matrix)
+        except (TypeError, RuntimeError):
+            raise InputError(
+                "--correlate: must form a positive definite matrix of correlations"
+            ) from None
+
+
+def checked_name(name: str) -> None:
+    """Raise InputError if a name is not of a parameter that is a number."""
+    from ..input.parameters import parameter
+
+    known = parameter(name.rpartition(".")[2])
+    if known.text or known.choices:
+        raise InputError(f"--tie {name}: must be a parameter that is a number")
+
+
+# -- critical levels
+# --------------------------------------------------------------------------------------------------
+
+
+def rows_of(cases: list[Case]) -> list[dict[str, Value]]:
+    """The columns RESULTS of cases, each a critical level; a failed search has an empty one."""
+    with limited_threads(1):
+        return [row_of(case) for case in cases]
+
+
+def row_of(case: Case) -> dict[str, Value]:
+    """The columns of a critical level: that of the highest path that was followed where there is
+    no limit, 0 where there is no equilibrium at any level.
+    """
+    try:
+        search = search_of(case, "level")
+        answer = search.find()
+        if answer.value is None and answer.point is None:
+            search = lower(case)
+            answer = search.find()
+    except Exception as error:
+        return dict(zip(RESULTS, ("", ERROR, "", 0.0, message_of(error)), strict=True))
+    level = answer.value
+    if level is None:
+        level = answer.point.level if answer.point else 0.0
+    cells = level, answer.mode, answer.joint, float(answer.confirmed), answer.why or answer.doubt
+    return dict(zip(RESULTS, cells, strict=True))
+
+
+def lower(case: Case) -> Search:
+    """The search of a critical level that begins below the first level of the case."""
+    levels = LOWER * case.levels[0], *case.levels
+    tails = case.tail_levels[0], *case.tail_levels
+    return search_of(varied(case, {}, levels, tails), "level")
+
+
+class CriticalLevels:
+    """Critical levels by the values of the variables, each computed once."""
+
+    def __init__(
+        self,
+        case: Case,
+        variables: Variables,
+        jobs: int | None = 1,
+        scheduler: str | None = None,
+        known: Mapping[str, Mapping[str, Value]] | None = None,
+    ) -> None:
+        """jobs, scheduler: as in a sweep; known: rows by key, of an earlier study."""
+        self.case, self.variables, self.jobs, self.scheduler = case, variables, jobs, scheduler
+        self.known = {**(known or {})}
+        #: number of levels that were computed; rows that this study has used, by key
+        self.computed, self.used = 0, dict[str, Mapping[str, Value]]()
+        #: called with key, joint, values and results of each that is computed
+        self.on_row: Callable[[str, str, Values, Mapping[str, Value]], None] = lambda *_: None
+
+    def case_of(self, joint: str, values: Values) -> Case:
+        """The case of values; joint: the only one that can fail, empty for all of them.
+
+        Raises InputError.
+        """
+        plan = Plan({}, {n: [v] for n, v in values.items()}, dict(self.variables.tied))
+        if not joint:
+            return next(case for _, case in cases_of(self.case, plan)) if values else self.case
+        settings = dict(next(plan.rows())) if values else {}
+        for other in self.case.joint_names:
+            if other != joint:
+                mine = [name for name in settings if name.startswith(f"{other}.")]
+                for name in mine:
+                    del settings[name]
+                settings |= {f"{other}.law": "friction", f"{other}.adhesion": UNBREAKABLE}
+        return varied(self.case, settings)
+
+    def matters(self, joint: str, name: str) -> bool:
+        """Whether a variable acts on the critical level of a joint: no level, and of no other."""
+        of_joint = name.rpartition(".")[0]
+        return name != "level" and (not joint or of_joint in ("", joint))
+
+    def of(self, joint: str, rows: Sequence[Values]) -> list[Mapping[str, Value]]:
+        """The results for rows of values. Raises InputError, RunError."""
+        chosen = [{n: v for n, v in row.items() if self.matters(joint, n)} for row in rows]
+        cases = [self.case_of(joint, values) for values in chosen]
+        names = [keys.key_of(case, "reliability") for case in cases]
+        tasks = {k: c for k, c in zip(names, cases, strict=True) if k not in self.known}
+        values_of = dict(zip(names, chosen, strict=True))
+        if tasks:
+            interface_of(next(iter(tasks.values())))  # condensed before the processes start
+            jobs, work = number_of(self.jobs, len(tasks)), [[key] for key in tasks]
+            for key, result in spread_bundles(rows_of, work, tasks, jobs, self.scheduler):
+                self.computed += 1
+                self.on_row(key, joint, values_of[key], result)
+                # as the file has it: a study that continues takes the same points
+                level = result["critical_level"]
+                rest = {} if level == "" else {"critical_level": rounded(float(level))}
+                self.known[key] = {**result, **rest}
+        results = [self.known[key] for key in names]
+        self.used |= dict(zip(names, results, strict=True))
+        return results
+
+    @property
+    def undecided(self) -> int:
+        """How many of the levels used have no result."""
+        return sum(row["mode"] == ERROR for row in self.used.values())
+
+    @property
+    def unconfirmed(self) -> int:
+        """How many of them are not confirmed by a mechanism or a limit point."""
+        return sum(float(row["confirmed"]) == 0 for row in self.used.values()) - self.undecided
+
+
+class LimitState:
+    """g [m] of normal variables: the critical level of all joints, or of one, minus the level."""
+
+    def __init__(self, levels: CriticalLevels, joint: str = "") -> None:
+        self.levels, self.joint = levels, joint
+        #: what has ended an evaluation, which OpenTURNS would replace
+        self.error: BaseException | None = None
+        ot, number = openturns(), len(levels.variables.names)
+        self.function = ot.Function(ot.PythonFunction(number, 1, func_sample=self.evaluated))
+        steps, evaluation = ot.Point([STEP] * number), self.function.getEvaluation()
+        self.function.setGradient(ot.CenteredFiniteDifferenceGradient(steps, evaluation))
+        self.function.setHessian(ot.CenteredFiniteDifferenceHessian(steps, evaluation))
+
+    def evaluated(self, points: Any) -> list[list[float]]:
+        """g at points; where its level is not known, the dam counts as failed."""
+        if threading.current_thread() is threading.main_thread():
+            # OpenTURNS has set its own while it runs, which ends a pool by a segmentation fault
+            signal.signal(signal.SIGINT, signal.getsignal(signal.SIGINT))
+        try:
+            rows = [self.levels.variables.values(z) for z in np.asarray(points)]
+            results = self.levels.of(self.joint, rows)
+        except BaseException as error:
+            self.error = error
+            raise
+        top = self.levels.case.levels[-1]
+        return [
+            [float(result["critical_level"] or 0.0) - row.get("level", top)]
+            for row, result in zip(rows, results, strict=True)
+        ]
+
+    def run(self, algorithm: Any) -> Any:
+        """The result of an algorithm. Raises what an evaluation has raised."""
+        try:
+            algorithm.run()
+        except BaseException as error:
+            if self.error:
+                raise self.error from None
+            if "Interruption" in str(error):  # between two evaluations
+                raise KeyboardInterrupt from None
+            raise
+        return algorithm.getResult()
+
+
+# -- methods
+# --------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Reliability:
+    """The reliability of all joints, or of one."""
+
+    joint: str
+    #: by FORM: reliability index (negative where the medians fail), design point as normal
+    #: variables and as values, importance factors by name (their sum is 1); whether it is found
+    beta: float
+    point: tuple[float, ...]
+    design: Mapping[str, float]
+    importance: Mapping[str, float]
+    found: bool
+    #: probabilities of failure; None without a design point, or where a curvature does not allow
+    #: them
+    form: float | None
+    breitung: float | None
+    tvedt: float | None
+    #: by importance sampling: share, limits of its interval, number of samples
+    sampled: float = float("nan")
+    low: float = float("nan")
+    high: float = float("nan")
+    samples: int = 0
+
+    def words(self) -> str:
+        """Whether the methods agree."""
+        if not self.samples:
+            return ""
+        if self.form is None:
+            return "no design point is found: the samples are plain Monte Carlo"
+        if not self.sampled > 0:
+            return "no sample has failed: the design point is doubtful"
+        if self.agrees(self.form):
+            return "FORM agrees with the samples"
+        below, ratio = self.form < self.sampled, self.form / self.sampled
+        side = "below the samples, on the unsafe side" if below else "above them, on the safe side"
+        head = f"FORM is {100 * abs(1 - ratio):.0f} % {side}"
+        second = [p for p in (self.breitung, self.tvedt) if p is not None]
+        if any(map(self.agrees, second)):
+            return f"{head}: the limit state is curved; SORM agrees with the samples"
+        return (
+            f"{head}, and SORM disagrees, too: the limit state has a kink or further design "
+            "points; take the samples"
+        )
+
+    def agrees(self, probability: float) -> bool:
+        """Whether a probability is so near to the sampled one that chance may be the reason."""
+        half = max(self.high - self.sampled, self.sampled - self.low)
+        error = half / stats.norm.isf((1 - sampling.CONFIDENCE) / 2)
+        return abs(probability - self.sampled) <= DISAGREES * error
+
+
+def design_point(limit: LimitState, normal: Any, start: Sequence[float]) -> Reliability:
+    """FORM and SORM of a limit state; start: normal variables where the search begins.
+
+    Raises InputError, RunError.
+    """
+    ot, variables = openturns(), limit.levels.variables
+    event = ot.ThresholdEvent(
+        ot.CompositeRandomVector(limit.function, ot.RandomVector(normal)), ot.Less(), 0.0
+    )
+    solver = ot.AbdoRackwitz()
+    solver.setStartingPoint(list(start))
+    solver.setMaximumIterationNumber(MOST_ITERATIONS)
+    solver.setMaximumAbsoluteError(TOLERANCE)
+    solver.setMaximumRelativeError(TOLERANCE)
+    solver.setMaximumResidualError(TOLERANCE)
+    precision = PRECISION * limit.levels.case.levels[-1]
+    for tolerance in (TOLERANCE, precision):
+        solver.setMaximumConstraintError(tolerance)
+        try:
+            result = limit.run(ot.FORM(solver, event))
+            break
+        except RuntimeError as error:  # no point of the limit state is found
+            if limit.error or isinstance(error, RunError):
+                raise
+    else:
+        origin = dict.fromkeys(variables.names, float("nan"))
+        nothing = (0.0,) * len(start), origin, origin
+        return Reliability(limit.joint, float("nan"), *nothing, False, None, None, None)
+    point = tuple(result.getPhysicalSpaceDesignPoint())
+    shares = result.getImportanceFactors()
+    index = result.getHasoferReliabilityIndex()
+    fails = result.getIsStandardPointOriginInFailureSpace()
+    status = result.getOptimizationResult().getStatus()
+    second = limit.run(ot.SORM(solver, event))
+    return Reliability(
+        joint=limit.joint,
+        beta=-index if fails else index,
+        point=point,
+        design=variables.values(point),
+        importance={n: float(s) for n, s in zip(variables.names, shares, strict=True)},
+        found=status == ot.OptimizationResult.SUCCESS,
+        form=float(result.getEventProbability()),
+        breitung=probability_of(second.getEventProbabilityBreitung),
+        tvedt=probability_of(second.getEventProbabilityTvedt),
+    )
+
+
+def probability_of(method: Callable[[], float]) -> float | None:
+    """A probability by a method of OpenTURNS, None if a curvature does not allow it."""
+    try:
+        value = float(method())
+    except Exception:
+        return None
+    return value if 0 < value < 1 else None
+
+
+def sampled(
+    limit: LimitState, normal: Any, around: Sequence[Reliability], number: int, seed: int
+) -> tuple[float, float, float]:
+    """Probability of failure by importance sampling around design points, and the limits of its
+    interval. Raises InputError, RunError.
+    """
+    ot = openturns()
+    deviations, matrix = normal.getStandardDeviation(), normal.getCorrelation()
+    parts = [ot.Normal(list(one.point), deviations, matrix) for one in around]
+    density = parts[0] if len(parts) == 1 else ot.Mixture(parts)
+    vector = ot.CompositeRandomVector(limit.function, ot.RandomVector(normal))
+    event = ot.ThresholdEvent(vector, ot.Less(), 0.0)
+    ot.RandomGenerator.SetSeed(seed)
+    block = min(BLOCK, number)
+    experiment = ot.ImportanceSamplingExperiment(normal, density, block)
+    algorithm = ot.ProbabilitySimulationAlgorithm(event, experiment)
+    algorithm.setBlockSize(block)
+    algorithm.setMaximumOuterSampling(-(-number // block))
+    algorithm.setMaximumCoefficientOfVariation(0.0)
+    result = limit.run(algorithm)
+    share, width = result.getProbabilityEstimate(), result.getConfidenceLength(sampling.CONFIDENCE)
+    return share, max(share - width / 2, 0.0), min(share + width / 2, 1.0)
+
+
+def analysed(
+    levels: CriticalLevels, samples: int, seed: int, on_progress: Callable[[str], None]
+) -> Iterator[Reliability]:
+    """The reliability of each of several joints alone, if no other could fail, then that of all.
+
+    Raises InputError, RunError.
+    """
+    normal, several = levels.variables.normal(), levels.case.joint_names
+    joints = list(several) if len(several) > 1 else []
+    single: list[Reliability] = []
+    origin = [0.0] * len(levels.variables.names)
+    for joint in [*joints, ""]:
+        limit = LimitState(levels, joint)
+        where = f"{joint}: " if joint else ""
+        on_progress(f"{where}design point")
+        nearest = min((s for s in single if s.form), key=lambda s: s.beta, default=None)
+        result = design_point(limit, normal, nearest.point if nearest else origin)
+        if samples:
+            on_progress(f"{where}{samples} samples")
+            around = [s for s in (*([] if joint else single), result) if s.form] or [result]
+            share = sampled(limit, normal, around, samples, seed)
+            number = -(-samples // min(BLOCK, samples)) * min(BLOCK, samples)
+            result = replace(result, sampled=share[0], low=share[1], high=share[2], samples=number)
+        single.append(result)
+        yield result
+
+
+def design_case(levels: CriticalLevels, result: Reliability) -> Case:
+    """The case of a design point, filled to its level. Raises InputError."""
+    values = {n: v for n, v in result.design.items() if n != "level"}
+    case = levels.case_of("", values)
+    level = result.design.get("level")
+    if level is not None:
+        case = varied(case, {}, **up_to(case, level))
+    return replace(case, title=f"{case.title}: design point")
+
+
+def columns_of(variables: Variables) -> list[str]:
+    """The columns of reliability.csv."""
+    return ["key", "of_joint", *(n for n in variables.names if n != "level"), *RESULTS]
+
+
+def cells_of(
+    variables: Variables, key: str, joint: str, values: Values, result: Mapping[str, Value]
+) -> list[str]:
+    """A row of reliability.csv."""
+    names = [n for n in variables.names if n != "level"]
+    given = [in_file(values[n]) if n in values else "" for n in names]
+    return [key, joint, *given, *(in_file(result[n]) for n in RESULTS)]

@@ -1,0 +1,184 @@
+"""`damjoint reliability`: its files and its printed lines."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from scipy import stats
+from tabulate import tabulate
+
+from ..input.case import Case
+from ..input.parameters import parameter
+from ..input.written_case import case_text
+from ..processes import check_jobs
+from ..progress import Progress
+from ..session import session
+from ..storage import atomic_write
+from . import sampling
+from .reliability import (
+    CriticalLevels,
+    Reliability,
+    Variables,
+    analysed,
+    cells_of,
+    columns_of,
+    design_case,
+    openturns,
+)
+from .result_file import result_file
+
+#: Files of the study: the critical levels, and the case of the design point.
+ROWS, DESIGN = "reliability.csv", "design_point.case"
+
+
+def reliability(
+    case: Case,
+    variables: Variables,
+    samples: int,
+    seed: int,
+    out: Path,
+    jobs: int | None = None,
+    scheduler: str | None = None,
+) -> tuple[list[Reliability], list[str]]:
+    """Compute the reliability of a case and write its files below out; critical levels that an
+    earlier study of the same variables has left there are not computed again.
+
+    Returns that of each of several joints, then that of all; and the printed lines. Raises
+    InputError, RunError.
+    """
+    openturns()
+    check_jobs(jobs)
+    variables.normal()
+    path, columns = out / ROWS, columns_of(variables)
+    with session(case, out, keep=of_same_columns(path, columns)) as study:
+        numeric = [c for c in columns if c in ("critical_level", "confirmed")]
+        with result_file(path, columns, numeric) as (file, known):
+            levels = CriticalLevels(case, variables, jobs, scheduler, known)
+            with Progress(case.name, bar_format="{desc} {elapsed}", leave=False) as shown:
+                doing = ""
+
+                def report(message: str = "") -> None:
+                    nonlocal doing
+                    doing = message or doing
+                    shown.describe(f"{case.name}: {doing}, {levels.computed} critical levels")
+
+                def save(*row: Any) -> None:
+                    file.add(cells_of(variables, *row))
+                    report()
+
+                levels.on_row = save
+                results = list(analysed(levels, samples, seed, report))
+            file.check_exists()
+        if results[-1].form:
+            design = design_case(levels, results[-1])
+            with atomic_write(out / DESIGN) as part:
+                part.write_text(case_text(design), encoding="utf-8")
+        entries = {"reliability": as_json(levels, results), "parameters": case.values}
+        study.save_without_results("complete", "", entries)
+    return results, printed_lines(levels, results, out)
+
+
+def of_same_columns(path: Path, columns: Sequence[str]) -> bool:
+    """Whether a file is of a study of the same variables."""
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            return next(csv.reader(file), []) == list(columns)
+    except (OSError, ValueError, csv.Error):
+        return False
+
+
+def as_json(levels: CriticalLevels, results: Sequence[Reliability]) -> dict[str, Any]:
+    """The entry `reliability` of run.json."""
+    variables = levels.variables
+
+    def entry(one: Reliability) -> dict[str, Any]:
+        numbers = {
+            "beta": one.beta,
+            "form": one.form,
+            "sorm_breitung": one.breitung,
+            "sorm_tvedt": one.tvedt,
+            "sampled": one.sampled if one.samples else None,
+            "interval": [one.low, one.high] if one.samples else None,
+        }
+        return {
+            "joint": one.joint,
+            **numbers,
+            "samples": one.samples,
+            "converged": one.found,
+            "design_point": dict(one.design),
+            "importance": dict(one.importance),
+            "agreement": one.words(),
+        }
+
+    return {
+        "distributions": dict(variables.distributions),
+        "correlate": list(variables.correlate),
+        "tied": dict(variables.tied),
+        "openturns": openturns().__version__,
+        "critical_levels": len(levels.used),
+        "not_confirmed": levels.unconfirmed,
+        "undecided": levels.undecided,
+        "of": [entry(one) for one in results],
+    }
+
+
+def index_of(probability: float) -> float:
+    """Reliability index of a probability."""
+    return float(-stats.norm.ppf(probability))
+
+
+def methods(one: Reliability) -> list[tuple[str, str, str]]:
+    """Method, probability and reliability index of a reliability."""
+    named = [("FORM", one.form), ("SORM (Breitung)", one.breitung), ("SORM (Tvedt)", one.tvedt)]
+    rows = [
+        (name, "-" if p is None else f"{p:.4g}", "-" if p is None else f"{index_of(p):.4g}")
+        for name, p in named
+    ]
+    if one.samples:
+        share = f"{one.sampled:.4g} ({one.low:.4g} to {one.high:.4g})"
+        betas = [f"{index_of(p):.4g}" for p in (one.sampled, one.high, one.low)]
+        between = "{} ({} to {})".format(*betas) if one.sampled else "-"
+        rows.append((f"{one.samples} samples", share, between))
+    return rows
+
+
+def printed_lines(levels: CriticalLevels, results: Sequence[Reliability], out: Path) -> list[str]:
+    """The printed lines."""
+    *single, whole = results
+    case, fixed = levels.case, "level" not in levels.variables.names
+    what = f"level {case.levels[-1]:g} m" if fixed else "the level"
+    lines = [f"{case.name}: probability that {what} exceeds the critical level; {out}", ""]
+    interval = f"{sampling.CONFIDENCE:.0%} interval"
+    heads = ["method", f"probability ({interval})", f"beta ({interval})"]
+    lines += [tabulate(methods(whole), heads, disable_numparse=True), ""]
+    verdicts = [(f"{one.joint}: " if one.joint else "", one.words()) for one in results]
+    lines += [joint + words for joint, words in verdicts if words]
+    if whole.form and not whole.found:
+        lines.append("the search for the design point has not converged: FORM is doubtful")
+    count = len(levels.used)
+    if levels.undecided:
+        lines.append(f"{levels.undecided} of {count} critical levels failed: counted as failures")
+    if levels.unconfirmed:
+        lines.append(f"{levels.unconfirmed} of {count} critical levels are not confirmed")
+    design = [
+        (name, f"{value:.6g}", unit_of(name), f"{100 * whole.importance[name]:.3g}")
+        for name, value in whole.design.items()
+    ]
+    heads = ["design point", "value", "unit", "importance [%]"]
+    if whole.form:
+        table = tabulate(design, heads, disable_numparse=True)
+        lines += ["", table, f"as a case: {out / DESIGN}"]
+    if single:
+        rows = [(one.joint, *(cell for cell in (m[1] for m in methods(one)))) for one in single]
+        heads = ["joint alone", *(m[0] for m in methods(whole))]
+        lines += ["", tabulate(rows, heads, disable_numparse=True)]
+    lines += ["", f"{count} critical levels, {levels.computed} of them computed now"]
+    return lines
+
+
+def unit_of(name: str) -> str:
+    """Unit of a variable."""
+    return "m" if name == "level" else parameter(name.rpartition(".")[2]).unit

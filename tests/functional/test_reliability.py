@@ -1,0 +1,251 @@
+"""Reliability: probabilities against the closed form of sliding; files, interruptions."""
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import damjoint as dj
+import numpy as np
+import pytest
+from closed_forms import WATER
+from damjoint.input.resolve import load
+from damjoint.studies import reliability
+from damjoint.studies.critical import Search
+from processes import without_progress
+from scipy import stats
+
+SLIDES = {"law": "friction", "adhesion": 0.0, "pena_tang": 0.0, "n_joint": 40, "order": 1}
+#: mean 0.75, standard deviation 0.09
+MU = "lognorm(0.119571287,scale=0.744657629)"
+VARIED = {"mu": MU, "rho_dam": "normal(2400,50)", "level": "gumbel_r(38.5,0.6)"}
+SETTINGS = [word for n, v in SLIDES.items() for word in ("--set", f"{n}={v}")]
+WORDS = ("reliability", "dam", *SETTINGS, "--levels", "30,36")
+WORDS += tuple(word for n, v in VARIED.items() for word in ("--vary", f"{n}={v}"))
+
+
+def slide_level(mu, rho, foot):
+    """Levels at which T = mu N at the joint of the 45 m dam at a height [m], below the crest."""
+    base = 34 - (34 - 5) * foot / 45
+    weight = rho * 9.81 * (45 - foot) * (base + 5) / 2
+    half = mu * base / 2
+    return foot - half + np.sqrt(half**2 + 2 * mu * weight / WATER)
+
+
+def drawn(count, *texts):
+    """Independent random values of distributions."""
+    generator = np.random.default_rng(1)
+    kinds = [reliability.sampling.distribution("x", text) for text in texts]
+    return [kind.ppf(generator.random(count)) for kind in kinds]
+
+
+@pytest.fixture(scope="module")
+def trial():
+    """The 45 m dam without bond, its friction, density and level uncertain; 500 samples."""
+    return dj.reliability(dj.case("dam", levels=[30, 36], **SLIDES), **VARIED, jobs=1)
+
+
+def test_form_and_sorm_of_a_dam_that_slides(trial):
+    """Beta of the closed form: least distance of its limit state; the probability of it by 2e7
+    samples, 4.459e-3 +- 0.029e-3, of which FORM misses a fifth.
+    """
+    (row,) = trial.rows
+    assert row.beta == pytest.approx(2.6919, abs=3e-4)
+    assert row.form == pytest.approx(stats.norm.cdf(-row.beta), rel=1e-6)
+    assert row.breitung == pytest.approx(4.459e-3, rel=0.02)
+    assert row.low < 4.459e-3 < row.high and row.high - row.low < 0.4 * 4.459e-3
+    assert row.form < row.low and "20 % below" not in trial.words[0]
+    assert "on the unsafe side" in trial.words[0] and "SORM agrees" in trial.words[0]
+    design = trial.design
+    level = slide_level(design["mu"], design["rho_dam"], 0)
+    assert design["level"] == pytest.approx(level, rel=1e-4)
+    assert sum(trial.importance.values()) == pytest.approx(1)
+    assert trial.importance["mu"] == pytest.approx(0.707, abs=0.01)
+
+
+def test_form_and_sorm_need_few_critical_levels():
+    case = dj.case("dam", levels=[30, 36], **SLIDES)
+    result = dj.reliability(case, **VARIED, samples=0, jobs=1)
+    assert result.levels.computed <= 60
+    assert np.isnan(result.rows.sampled).all() and result.words == [""]
+
+
+def test_probability_of_a_normal_margin_is_exact():
+    """A level alone is uncertain: g is linear in it, and FORM exact, also far in the tail."""
+    case = dj.case("dam", levels=[30, 36], mu=0.6, **SLIDES)
+    level = slide_level(0.6, 2400.0, 0)
+    for mean in (39.0, 36.0, 42.0):
+        result = dj.reliability(case, level=f"normal({mean},0.6)", samples=0, jobs=1)
+        beta = (level - mean) / 0.6
+        assert result.beta == pytest.approx(beta, rel=1e-4)
+        assert result.rows.form[0] == pytest.approx(stats.norm.cdf(-beta), rel=5e-3)
+
+
+def test_rank_correlation_is_that_of_the_copula():
+    """Spearman's correlation of level and density, both normal; the exact beta where the critical
+    level is linear in the density.
+    """
+    case = dj.case("dam", levels=[30, 36], mu=0.6, **SLIDES)
+    varied = {"rho_dam": "normal(2400,20)", "level": "normal(39,0.5)"}
+    level, slope = slide_level(0.6, 2400.0, 0), slide_level(0.6, 2401.0, 0)
+    slope -= level
+    for rank in (0.0, 0.6):
+        given = [f"rho_dam,level={rank}"] if rank else []
+        result = dj.reliability(case, **varied, correlate=given, samples=0, jobs=1)
+        pearson = 2 * np.sin(np.pi * rank / 6)
+        variance = (slope * 20) ** 2 + 0.5**2 - 2 * pearson * slope * 20 * 0.5
+        assert result.beta == pytest.approx((level - 39) / variance**0.5, rel=5e-3)
+
+
+#: Friction of three joints, of which each is about as probable to slide, or less.
+OF_JOINTS = {
+    "base.mu": MU,
+    "lift 12 m.mu": "lognorm(0.128499,scale=0.614902)",
+    "lift 25 m.mu": "lognorm(0.139321,scale=0.495171)",
+    "rho_dam": "normal(2400,50)",
+    "level": "gumbel_r(38.5,0.6)",
+}
+
+
+@pytest.mark.heavy
+def test_three_joints_against_closed_form_samples():
+    """Of each joint alone and of the dam, whose limit state has a kink: FORM has less than half."""
+    lifts = {**SLIDES, "n_joint": 20, "lift_heights": (12.0, 25.0)}
+    case = dj.case("dam", levels=[25, 30], **lifts)
+    result = dj.reliability(case, **OF_JOINTS, samples=150, jobs=1)
+    *mu, rho, level = drawn(100_000, *OF_JOINTS.values())
+    fails = [slide_level(m, rho, y) < level for m, y in zip(mu, (0, 12, 25), strict=True)]
+    counts = [int(f.sum()) for f in (*fails, np.any(fails, axis=0))]
+    for row, count in zip(result.rows, counts, strict=True):
+        exact = stats.binomtest(count, 100_000).proportion_ci(0.95)
+        assert row.low < exact.high and row.high > exact.low, row.joint
+        if row.joint:  # smooth
+            assert exact.low * 0.9 < row.breitung < exact.high * 1.1, row.joint
+    whole = result.rows[-1]
+    assert result.rows.joint.tolist() == [*case.joint_names, ""]
+    assert whole.form < 0.5 * counts[-1] / 100_000 and whole.breitung < whole.low
+    assert "kink" in result.words[-1]
+    assert result.design["lift 12 m.mu"] == pytest.approx(0.614902, rel=1e-6)
+
+
+def rows(path):
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_files_and_continuation(command, tmp_path):
+    """A second call computes nothing and prints the same; the design point is a case that runs, and
+    its critical level is its level.
+    """
+    words = *WORDS, "--samples", "50", "--out", "out"
+    code, out, _ = command(*words, "--jobs", "2")
+    assert code == 0
+    *head, last = out.splitlines()
+    levels = rows(tmp_path / "out/reliability.csv")
+    assert last == f"{len(levels)} critical levels, {len(levels)} of them computed now"
+    assert head == command(*words, "--jobs", "1")[1].splitlines()[:-1]
+    assert levels == rows(tmp_path / "out/reliability.csv")
+    info = json.loads((tmp_path / "out/run.json").read_text())
+    (entry,) = info["reliability"]["of"]
+    assert info["state"] == "complete" and info["reliability"]["critical_levels"] == len(levels)
+    assert entry["agreement"] in out and f"{entry['form']:.4g}" in out
+    case = load(str(tmp_path / "out/design_point.case"))
+    assert case["mu"] == entry["design_point"]["mu"] and case["law"] == "friction"
+    assert Search(case, "level").find().value == pytest.approx(case.levels[-1], rel=1e-4)
+    (first,) = (row for row in levels if row["rho_dam"] == "2400" and row["mu"] == "0.744657629")
+    expected = slide_level(float(first["mu"]), 2400.0, 0)
+    assert float(first["critical_level"]) == pytest.approx(expected, rel=1e-4)
+
+
+def test_other_variables_replace_the_file(command, tmp_path):
+    words = "reliability", "dam", *SETTINGS, "--samples", "0", "--jobs", "1", "--out", "out"
+    assert command(*words, "--vary", f"mu={MU}", "--vary", "level=normal(38,1)")[0] == 0
+    assert command(*words, "--vary", "level=normal(38,1)")[0] == 0
+    assert [list(row) for row in rows(tmp_path / "out/reliability.csv")] == [
+        ["key", "of_joint", *reliability.RESULTS]
+    ]
+
+
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_an_interrupted_study_ends_at_once_and_keeps_its_levels(tmp_path, jobs):
+    """OpenTURNS handles interrupts itself while it runs."""
+    path = tmp_path / "out/dam_reliability/reliability.csv"
+    with subprocess.Popen(
+        [sys.executable, "-m", "damjoint", *WORDS, "--jobs", jobs],
+        cwd=tmp_path,
+        start_new_session=True,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        while not path.exists() or len(path.read_text().splitlines()) < 30:
+            assert process.poll() is None
+            time.sleep(0.05)
+        os.killpg(process.pid, signal.SIGINT)
+        _, error = process.communicate(timeout=120)
+    assert process.returncode == 130
+    assert without_progress(error).splitlines() == [
+        "damjoint: interrupted; results finished so far are saved"
+    ]
+    assert 29 <= len(rows(path)) < 500
+    assert json.loads((path.parent / "run.json").read_text())["state"] == "interrupted"
+
+
+@pytest.mark.heavy
+def test_a_scheduler_computes_the_same(command, tmp_path):
+    from distributed import LocalCluster
+
+    words = *WORDS, "--samples", "50"
+    with LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+    ) as cluster:
+        far = command(*words, "--scheduler", cluster.scheduler_address, "--out", "far")
+    near = command(*words, "--jobs", "1", "--out", "near")
+    assert far[0] == near[0] == 0
+    assert far[1].replace("far", "near") == near[1]
+    by_key = lambda name: {r["key"]: r for r in rows(tmp_path / name / "reliability.csv")}
+    assert by_key("far") == by_key("near")
+
+
+def test_a_level_that_is_not_computed_counts_as_a_failure(command, monkeypatch):
+    """And is printed."""
+    find = Search.find
+
+    def broken(search):
+        if search.case["mu"] < 0.7:
+            raise RuntimeError("no room")
+        return find(search)
+
+    monkeypatch.setattr(Search, "find", broken)
+    varied = "--vary", "mu=uniform(0.65,0.1)", "--vary", "level=normal(30,0.5)"
+    words = "reliability", "dam", *SETTINGS, *varied, "--jobs", "1", "--samples", "50"
+    code, out, _ = command(*words)
+    assert code == 0 and "critical levels failed: counted as failures" in out
+
+
+@pytest.mark.parametrize(
+    "words, message",
+    [
+        ([], "--vary: must have a distribution, such as mu=normal(1.0,0.15)"),
+        (["--vary", "mu"], "--vary mu: must be NAME=..., such as mu=normal(1.0,0.15)"),
+        (["--vary", "law=normal(0,1)"], "--vary law=normal(0,1): must be of a parameter that is"),
+        (["--vary", "mu=norma(0,1)"], "--vary mu=norma(0,1): must be a distribution of scipy"),
+        (["--vary", "mu=normal(0.5,0.3)"], "truncnorm, uniform or lognorm keep within bounds"),
+        (["--vary", f"mu={MU}", "--vary", f"mu={MU}"], "--vary mu: must be given once"),
+        (["--vary", f"mu={MU}", "--tie", "mu=1"], "--tie mu: must not be varied, and not be"),
+        (["--vary", f"mu={MU}", "--correlate", "mu,level=0.5"], "two of the sampled names (mu)"),
+        (["--vary", f"mu={MU}", "--scheduler", "nowhere"], "--scheduler nowhere: no scheduler"),
+    ],
+)
+def test_bad_input_is_one_line(command, words, message):
+    code, out, error = command("reliability", "dam", *SETTINGS, *words)
+    assert code == 2 and not out and message in error and len(error.splitlines()) == 1
+
+
+def test_without_openturns_a_message_names_the_extra(command, monkeypatch, tmp_path):
+    monkeypatch.setitem(sys.modules, "openturns", None)
+    code, _, error = command(*WORDS)
+    assert code == 2 and not list(tmp_path.iterdir())
+    assert error == "damjoint: reliability: needs openturns; pip install 'damjoint[reliability]'\n"
