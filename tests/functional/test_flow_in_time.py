@@ -222,6 +222,16 @@ def test_steady_before_the_start():
     assert second.history["crack_length"][-1] < first.history["crack_length"][-1]
 
 
+def test_steps_are_halved_where_pressure_moves_too_far():
+    """Then no step changes it by more; the history counts the halvings."""
+    most = 2e4
+    result = dam(steps=2, time_unit=3600.0, pressure_step=most).run()
+    free = dam(steps=2, time_unit=3600.0).run()
+    history = result.history
+    assert history["cuts"].max() > 2 and len(history["time"]) > 2 * len(free.history["time"])
+    assert np.abs(np.diff(history["p_max"])).max() <= most
+
+
 def test_a_sealed_joint_must_store_water(blocks):
     """The base of the middle one of three blocks, between dry joints: its volume is given."""
     bounds = {"left": (0, 5), "middle": (5, 10), "right": (10, 15)}

@@ -177,6 +177,7 @@ class LoadStepper:
             weigh first, if the case says so
             while the time is before the target:
                 step = direct step to the time (the strategies in turn)
+                if it moves the pressure too far:    halve it, and try again
                 if none and the weight is in it:     weigh, and try again
                 if none:                             over the limit point, along the equilibrium
                                                      path or by relaxation
@@ -198,6 +199,10 @@ class LoadStepper:
             time = target if target - time < SAME_TIME else time
             smallest = time - self.state.time < case["smallest_step"] * (1 + SAME_TIME)
             step = self.direct_step(time, smallest)
+            if step and not smallest and self.moves_pressure(step):
+                cuts += 1
+                dt = max((time - self.state.time) / 2, case["smallest_step"])
+                continue
             if step is None and not weighed:
                 weighed = True
                 if self.weigh():
@@ -229,6 +234,14 @@ class LoadStepper:
             extrapolate=True,
             persist=smallest,
         )
+
+    def moves_pressure(self, step: StepResult) -> bool:
+        """Whether the pressure of water that flows in time changes by more than `pressure_step`."""
+        most, before = self.case["pressure_step"], self.state.pressures
+        if not (most and step.state.stored and before):
+            return False
+        pairs = zip(step.state.pressures, before, strict=True)
+        return any(np.abs(new.nodes - old.nodes).max() > most for new, old in pairs)
 
     def beyond_path(self, smallest: bool) -> bool:
         """Whether an equilibrium path has ended and is not followed again: the dam has failed, or
