@@ -8,6 +8,7 @@ A case is a list of statements, in any layout, with // and /* */ comments:
     also_uplift = "none";            further uplift modes the case is published with
     geometry = "own.msh";            your own mesh or .geo, beside this file
     record = "quake.csv";            accelerations of the ground, beside this file
+    hydrograph = "flood.csv";        water levels against time, beside this file
     default_<parameter> = value;     a text; arithmetic with + - * / ^ ( ), Pi, the units of
                                      pro/units.pro and defaults set before
     levels() = {value, ...};         tail_levels(), times(), lift_heights() and, with x, y of each
@@ -193,7 +194,7 @@ def add_statement(case: CaseText, statement: list[Token], path: Path, where: str
         if kinds[2:] != ("text",):
             raise InputError(f'{where}: must be {name} = "words"')
         words = tokens[2][1:-1]
-        if name in ("geometry", "record"):  # a path beside this file
+        if name in ("geometry", "record", "hydrograph"):  # a path beside this file
             words = str((path.parent / words).absolute())
         case.texts[name] = words
     elif name.startswith("default_") and tokens[1:2] == ("=",):
@@ -228,7 +229,7 @@ def allowed_like(tokens: tuple[str, ...]) -> str:
     near = [f"default_{tokens[0]}"] if tokens[:1] and tokens[0] in declared() else near
     return (
         (f"{near[0]} (did you mean that?), " if near else "")
-        + 'Include "file.case", title, also_uplift, geometry, record, '
+        + 'Include "file.case", title, also_uplift, geometry, record, hydrograph, '
         + "default_<parameter> = value, "
         + ", ".join(f"{n}() = {{...}}" for n in LISTS)
         + ", Struct Joint::<joint> [ <parameter> value, ... ]"

@@ -36,7 +36,10 @@ OF_JOINTS = (
     *("grout_pressure", "grout_t", "saw_thickness", "saw_t"),
 )
 #: Texts of a case that are no parameters, and options of commands that set them, too.
-TEXTS = {"title": "", "also_uplift": "", "geometry": "", "record": " or by --record FILE.csv"}
+TEXTS = {
+    **dict.fromkeys(("title", "also_uplift", "geometry", "hydrograph"), ""),
+    "record": " or by --record FILE.csv",
+}
 #: Lists of a section's geometry, which are settings like parameters: empty by default.
 GEOMETRY_LISTS = "lift_heights", "downstream_face"
 #: Limit that means > 0 in the declarations.

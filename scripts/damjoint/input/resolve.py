@@ -9,7 +9,7 @@ from typing import Any
 
 from .. import InputError
 from ..arrays import Settings
-from . import casefile
+from . import casefile, hydrograph
 from .case import SECTION, SHARED, Case, check_joints
 from .case_names import CASES, case_file
 from .constraints import (
@@ -68,6 +68,13 @@ def resolve(source: Source) -> Case:
     if steps is not None:
         check_steps(steps)
     lists, tails = loading_lists(source, steps)
+    of_flood: dict[str, Any] = {}
+    if "hydrograph" in file.texts:
+        if source.levels is not None or "levels" in file.lists:
+            raise InputError("levels: must not be set with a hydrograph, which has them")
+        flood = hydrograph.read(Path(file.texts["hydrograph"]))
+        of_flood, lists["levels"] = flood.settings, flood.levels
+        tails = flood.tail_levels or tails
     overrides = {name: checked(name, value) for name, value in overrides.items()}
     for name in GEOMETRY_LISTS:
         if name in overrides:
@@ -75,7 +82,7 @@ def resolve(source: Source) -> Case:
             lists[name] = levels_of(name, given) if given else ()
     lifts, face = (lists.pop(name, ()) for name in GEOMETRY_LISTS)
     geometry = geometry_file(file.texts["geometry"]) if "geometry" in file.texts else None
-    settings = {**file.defaults, **file.of_joints, **overrides}
+    settings = {**of_flood, **file.defaults, **file.of_joints, **overrides}
     names = () if geometry else names_of_section(settings, lifts)
     values = settings_of_joints(settings, source.blocks(names), lifts, geometry)
     if geometry:

@@ -63,7 +63,10 @@ HISTORY = {
     "level": ("m", "reservoir level above the base (y = 0)"),
     "load_factor": ("-", "ratio of the level to that scheduled for this t"),
     "iterations": ("-", "Newton iterations of the step"),
-    "cuts": ("-", "how often the step was shortened: it did not converge, or pressure moved too far"),
+    "cuts": (
+        "-",
+        "how often the step was shortened: not converged, or pressure moved too far",
+    ),
     "residual": (
         "-",
         "norm of the out-of-balance forces over that of the loads at the highest water",

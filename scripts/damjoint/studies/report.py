@@ -45,7 +45,7 @@ from .check import (
 )
 from .check_tables import SHOWN
 from .report_input import Entry, by_runs, in_table
-from .report_picture import Picture, embedded
+from .report_picture import Picture, bands, embedded
 
 #: Sizes of the pictures [inches]: half of the page's width; its width; its width, in 3D.
 HALF, WIDE, SOLID = (5.2, 4.9), (10.6, 2.1), (10.6, 4.4)
@@ -112,6 +112,8 @@ class RunSection:
     of_joints: Table | None
     #: of `damjoint quake`; else None
     earthquake: report_quake.Earthquake | None
+    #: flow in time, if it was drawn
+    water: list[Picture]
     #: level of the last state, as text; the same with what it is, of an earthquake
     level: str
     state: str
@@ -299,6 +301,7 @@ def run_section(folder: Path, number: int, solution: Solution) -> RunSection:
         if case.of_joints and result.last
         else None,
         earthquake=report_quake.read(folder, case, info),
+        water=water_in_time(folder, result),
         level=f"{last['level']:.4g} m" if last else "",
         state=state_of_last(last, info.get("quake")),
         methods=methods_table(case, checks, judged=judged),
@@ -312,6 +315,18 @@ def run_section(folder: Path, number: int, solution: Solution) -> RunSection:
         limits=[*report_input.limits(case, earthquake="quake" in info)],
         versions=versions(info),
     )
+
+
+def water_in_time(folder: Path, result: Results) -> list[Picture]:
+    """The picture of flow in time, with its balance; empty without one."""
+    path, last = folder / f"{result.case.name}_water.png", result.last
+    if not path.is_file() or "water_in" not in last:
+        return []
+    caption = (
+        f"Water in the joint at the end: {1e3 * last['water']:.4g} l/m, of which "
+        f"{1e3 * last['water_in']:.4g} l/m have come in; void {1e3 * last['void']:.3g} l/m."
+    )
+    return [Picture("bands", caption, bands(path))]
 
 
 def state_of_last(last: Mapping[str, float], quake: Mapping[str, Any] | None) -> str:

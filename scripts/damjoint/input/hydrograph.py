@@ -1,0 +1,78 @@
+"""Hydrographs: water levels against time from a CSV file, as the levels of a case.
+
+The columns are time (named hours, seconds or days), level [m] and, if any, tail_level [m]; rows in
+the order of time. The first level has stood for long: it is reached at t = 1, from there a unit of
+t is the shortest interval of the file, and levels are linear in between.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from .. import ROUND_OFF, InputError
+from ..storage import text_of
+
+#: Units of the time [s], by the name of the first column.
+SECONDS = {"seconds": 1.0, "hours": 3600.0, "days": 86400.0}
+HEADS = ["level"], ["level", "tail_level"]
+#: Most levels of a hydrograph, each of which has its table.
+MOST_LEVELS = 2000
+#: Bytes of its file.
+LONGEST = 10_000_000
+
+
+@dataclass(frozen=True)
+class Hydrograph:
+    """Water levels [m] at t = 1, 2, ...; tail_levels: None if the file has none."""
+
+    #: seconds of a unit of t
+    unit: float
+    levels: tuple[float, ...]
+    tail_levels: tuple[float, ...] | None
+
+    @property
+    def settings(self) -> dict[str, float]:
+        """Parameters of a case that follow from it."""
+        return {"time_unit": self.unit, "time_start": 1.0}
+
+
+def read(path: Path) -> Hydrograph:
+    """Read a hydrograph. Raises InputError."""
+    name = f"hydrograph = {path}"
+    lines = [line for line in csv.reader(text_of(path, name, LONGEST).splitlines()) if line]
+    head = [cell.strip() for cell in lines[0]] if lines else []
+    if not head or head[0] not in SECONDS or head[1:] not in HEADS:
+        raise InputError(
+            f"{name}: its first row must be hours,level or hours,level,tail_level (or seconds, "
+            "days; levels in m)"
+        )
+    try:
+        rows = np.array([[float(cell) for cell in line] for line in lines[1:]])
+    except ValueError:
+        raise InputError(f"{name}: must have numbers in each row, as many as columns") from None
+    if rows.shape[:1] < (2,) or rows.shape[1:] != (len(head),) or not np.isfinite(rows).all():
+        raise InputError(
+            f"{name}: must have finite numbers in two rows or more, as many as columns"
+        )
+    times = (rows[:, 0] - rows[0, 0]) * SECONDS[head[0]]
+    for row, (before, after) in enumerate(pairwise(times), 3):
+        if not after > before:
+            raise InputError(
+                f"{name}, row {row}: {head[0]} = {rows[row - 2, 0]:g}: must be later than the row "
+                "before"
+            )
+    unit = float(np.diff(times).min())
+    number = math.ceil(times[-1] / unit * (1 - ROUND_OFF)) + 1
+    if number > MOST_LEVELS:
+        raise InputError(
+            f"{name}: must be at most {MOST_LEVELS} times as long as its shortest interval"
+        )
+    at = np.minimum(unit * np.arange(number), times[-1])
+    columns = [tuple(np.interp(at, times, column).tolist()) for column in rows[:, 1:].T]
+    return Hydrograph(unit, columns[0], columns[1] if len(columns) > 1 else None)
