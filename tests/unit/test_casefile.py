@@ -40,8 +40,8 @@ def test_damjoint_and_gmsh_read_a_case_alike(path):
     expected |= ours.lists
     assert {n: v for n, v in numbers.items() if v} == expected
     expected = {f"default_{n}": [v] for n, v in ours.defaults.items() if isinstance(v, str)}
-    if "geometry" in texts:  # damjoint: relative to the case file
-        texts["geometry"] = [str(path.parent / texts["geometry"][0])]
+    for name in {"geometry", "hydrograph"} & texts.keys():  # damjoint: relative to the case file
+        texts[name] = [str(path.parent / texts[name][0])]
     assert texts == expected | {n: [v] for n, v in ours.texts.items()}
 
 
