@@ -139,8 +139,8 @@ MUTATIONS = (
     Mutation(
         "square law for the cubic law of flow",
         "joint/water.py",
-        "return factor**3, np.where(growing, 3 / narrowest * factor**2, 0)",
-        "return factor**2, np.where(growing, 2 / narrowest * factor, 0)",
+        "return factor**3, np.where(growth > 0, 3 / self.narrowest * factor**2, 0)",
+        "return factor**2, np.where(growth > 0, 2 / self.narrowest * factor, 0)",
         having("uplift", "flow"),
     ),
     Mutation(
@@ -258,6 +258,14 @@ MUTATIONS = (
         'a0 = a1 * w1 * w2 if case["damping_mass"] != WITHOUT else 0.0',
         'a0 = 1.1 * a1 * w1 * w2 if case["damping_mass"] != WITHOUT else 0.0',
         having("damping_mass"),
+        quake=True,
+    ),
+    Mutation(
+        "no water in a crack that has closed",
+        "dynamics/uplift.py",
+        "water.law.gapes(jump, variables)",
+        "water.law.is_open(jump, variables)",
+        both(having("quake_uplift", "zero"), having("law", "rupture")),
         quake=True,
     ),
 )
