@@ -437,3 +437,23 @@ def test_the_picture_of_a_critical_level_names_the_joint_and_all_values():
     axes = pictures.figure_of(4, 3).subplots()
     critical_picture.draw_levels(axes, content)
     assert [line.get_label() for line in axes.get_lines()] == ["crest 45 m"]
+
+
+def test_the_crest_of_a_geometry_of_ones_own_is_in_the_picture_of_its_critical_level():
+    case = load("monoliths", COARSE, [40.0])
+    answer = CriticalValue(50.0, "", "", "", None)
+    axes = pictures.figure_of(4, 3).subplots()
+    content = critical_picture.Content(case, "level", " m", [], answer, None)
+    critical_picture.draw_levels(axes, content)
+    assert [line.get_label() for line in axes.get_lines()] == ["crest 45 m"]
+
+
+def test_bases_speak_for_the_dam_and_all_curves_have_a_name():
+    """A contraction joint slips whole while the dam stands; without water it has no curve of it."""
+    run = dj.run(dj.case("monoliths", **COARSE, levels=[45.0]))
+    contraction = run.solution.result.joints[2]
+    assert contraction.last["slip_length"] == pytest.approx(contraction.case.joint_along)
+    figure = run.plot()
+    assert "base: N' " in texts_of(figure)[1] and "contraction: N' " not in texts_of(figure)[1]
+    labels = {text.get_text() for legend in figure.findobj(Legend) for text in legend.get_texts()}
+    assert {"total, tension > 0", "effective", "uplift"} <= labels

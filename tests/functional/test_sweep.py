@@ -384,7 +384,9 @@ def test_rows_are_printed_in_a_table_that_fits_the_terminal():
     table = sweep.rows_table(plan, [row] * 23)
     lines = table.splitlines()
     assert lines[0].split() == [*list(row)[:4], "slip_length", "max_opening", "crest_ux", "N", "T"]
-    assert lines[1].split() == ["[mm]", "[mm]", "[MN/m]", "[MN/m]"]
+    assert lines[1].split() == ["[m]", "[m]", "[m]", "[mm]", "[mm]", "[MN/m]", "[MN/m]"]
+    modulus = sweep.rows_table(plan_of(["E=2e10,3e10"], [], None, {}, ""), [{"E": "2e10"}])
+    assert modulus.split()[:2] == ["E", "[Pa]"]
     assert lines[3].split() == ["0.5", "stands", "45", "0", "0", "0", "4.3", "20.66", "-1.235"]
     assert len(lines) == 3 + 20 + 1 and lines[-1] == "... and 3 rows more"
     assert max(map(len, sweep.rows_table(plan, [row] * 2, 60).splitlines()[:-1])) <= 60

@@ -17,3 +17,7 @@ def test_joints_whose_failure_detaches_a_body():
     assert BLOCKS.separating((2, 3)) == (3,)
     assert BLOCKS.separating((0, 1, 2)) == (0, 1)
     assert BLOCKS.separating((0, 2)) == ()
+
+
+def test_joints_between_bodies_that_other_joints_hold():
+    assert [BLOCKS.is_internal(k) for k in range(4)] == [False, False, True, False]

@@ -24,6 +24,12 @@ class JointGraph:
             reached |= {body for pair in rest if reached & set(pair) for body in pair}
         return {body for pair in self.joints for body in pair} - reached
 
+    def is_internal(self, number: int) -> bool:
+        """Whether this joint lies between bodies that other joints hold, too, such as a contraction
+        joint: its resultant is not limited.
+        """
+        return self.joints[number][0] != ROCK and not self.separated((number,))
+
     def separating(self, numbers: Sequence[int]) -> tuple[int, ...]:
         """Joints whose failure detaches a body: the first of `numbers` that does so alone, or else
         all joints on the rock if they are among them; else none.

@@ -243,8 +243,12 @@ def draw_all_joints(figure: AnyFigure, solution: Solution, time: float) -> None:
                 axes.yaxis.label.set_fontsize(7)
                 axes.tick_params(labelsize=7)
                 axes.yaxis.set_label_coords(-0.4 / (axes.bbox.width / axes.figure.dpi), 0.5)
-        for axes in grid[-1]:
-            axes.legend(
+        for column in grid.T:  # a curve may be missing in the uppermost row
+            drawn = [axes.get_legend_handles_labels() for axes in column[::-1]]
+            curves = {name: line for lines in drawn for line, name in zip(*lines, strict=True)}
+            column[-1].legend(
+                [*curves.values()],
+                [*curves],
                 loc="lower left",
                 bbox_to_anchor=(-0.2, 1.12),
                 ncols=1,
@@ -498,7 +502,8 @@ def panels_of_joints(result: Results) -> list[Panel]:
         first = decisive_joint(result)
         order.sort(key=lambda k: (k != first, k))
         colors = [BLUE] + [GREY] * (len(joints) - 1)
-        names = tuple(n if k in order[:1] else "_" for k, n in enumerate(names))
+        others = {first: names[first], order[1]: "the other joints"}
+        names = tuple(others.get(k, "_") for k in range(len(joints)))
 
     def lines(values: Callable[[Results], np.ndarray]) -> list[tuple[np.ndarray, str, str]]:
         return [(values(joints[k]), c, names[k]) for k, c in zip(order, colors, strict=False)]
@@ -525,6 +530,8 @@ def draw_table(figure: AnyFigure, table: Table) -> None:
     cells = draw_cells(axes, [heads, *table.rows], letters, box, 7, 0.02, left)
     for column in range(len(heads)):
         cells[0, column].set_height(1.7 * cells[0, column].get_height())
+    for row in range(len(table.rows) + 1):  # apart from the numbers before it
+        cells[row, len(heads) - 1].PAD = 0.12
 
 
 def joint_length(result: Results) -> float:

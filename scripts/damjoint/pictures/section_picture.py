@@ -172,8 +172,11 @@ class SectionDrawing:
     def surface(self, x: float, level: float) -> None:
         """Mark a water surface with its level."""
         self.axes.plot(x, level, "v", color=WATER, markersize=6, zorder=5)
-        offset: dict[str, Any] = {"xytext": (0, 6), "textcoords": "offset points"}
-        self.axes.annotate(level_label(level), (x, level), **offset, ha="center", fontsize=8)
+        left, right = self.axes.get_xlim()
+        side = "left" if x - left < right - x else "right"  # not beyond the frame
+        at: dict[str, Any] = {"xytext": (-5 if side == "left" else 5, 6), "ha": side}
+        at |= {"textcoords": "offset points", "fontsize": 8}
+        self.axes.annotate(level_label(level), (x, level), **at)
 
     def bodies(self) -> None:
         """Draw the deformed mesh, and the undeformed outlines."""

@@ -83,19 +83,20 @@ def failed(results: Results) -> bool:
 
 def decisive_joint(results: Results) -> int:
     """The number of the joint at which the dam fails; of a dam that stands, of the one that is
-    cracked or has slipped over the largest part of its length.
+    cracked or has slipped over the largest part of its length, but for joints between bodies that
+    other joints hold.
     """
     if len(results.case.joint_names) == 1:
         return 0
     if failing := failing_joints(results):
         return failing[0]
-    parts = [
-        max(joint_result.last[n] for n in ("crack_length", "slip_length"))
-        / joint_result.case.joint_along
-        for joint_result in results.joints
-        if results.last
-    ]
-    return int(np.argmax(parts)) if parts else 0
+    if not results.last:
+        return 0
+    graph, parts = results.case.graph, list[float]()
+    for k, joint_result in enumerate(results.joints):
+        lengths = (joint_result.last[n] for n in ("crack_length", "slip_length"))
+        parts += [-1 if graph.is_internal(k) else max(lengths) / joint_result.case.joint_along]
+    return int(np.argmax(parts))
 
 
 def failing_joints(results: Results) -> tuple[int, ...]:

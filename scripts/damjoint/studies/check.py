@@ -254,7 +254,7 @@ def compare_joints(result: Results) -> list[SafetyCheck]:
             end = f"t = {last['time']:.6g} of {case.times[-1]:g}"
             ended = f"{NOT_JUDGED} beyond {end}, where the run ended: {verdict.verdict(result)}"
         alone = case.separates((k,))
-        internal = not alone and case.of_joints[k].lower != "foundation"
+        internal = case.graph.is_internal(k)
         check = compare_methods(joint_result, why if fails else "", ended, alone)
         checks.append(check.at_joint(case.joint_names[k], internal))
     return checks

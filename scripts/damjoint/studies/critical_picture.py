@@ -13,6 +13,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from ..input.case import Case
+from ..mesh.mesh import mesh_of
 from ..model.loads import Loading
 from ..model.results import Results
 from ..pictures.drawing import (
@@ -111,14 +112,15 @@ def figure_of(content: Content) -> Figure:
 
 
 def draw_levels(axes: Axes, content: Content) -> None:
-    """Draw the required level, and the crest of a section by parameters."""
+    """Draw the required level and the crest."""
     if content.of != "level":
         level = max(content.case.levels)
         label = f"required level {level:.5g} m"
         axes.axhline(level, color=WATER, linewidth=0.9, label=label)
-    if not content.case.geometry:
-        crest = content.case["dam_height"]
-        axes.axhline(crest, color=GREY, linestyle="-.", lw=0.9, label=f"crest {crest:.5g} m")
+    crest = content.case["dam_height"]
+    if geometry := content.case.geometry and mesh_of(content.case).user_geometry:
+        crest = geometry.concrete[:, 1].max()
+    axes.axhline(crest, color=GREY, linestyle="-.", lw=0.9, label=f"crest {crest:.5g} m")
 
 
 def heading(content: Content) -> str:

@@ -13,6 +13,7 @@ from typing import Any, TypeAlias
 from .. import InputError, RunError, accuracy
 from ..arrays import Value, Values
 from ..engines import engine_of
+from ..input import parameters
 from ..input.case import Case
 from ..input.refinement import first_mesh
 from ..input.resolve import equal_steps, resolve, with_drive_times
@@ -366,9 +367,15 @@ def sweep(
 #: static runs and of earthquakes, the last ones left out first where the terminal is narrow.
 PRINTED = 20
 RESULTS = ("verdict", "level", "crack_length", "slip_length", "max_opening", "crest_ux", "N", "T")
-#: Their units in the printed table where it is not that of the CSV file.
-PRINTED_UNITS = dict.fromkeys(("max_opening", "crest_ux", "residual_slip"), ("mm", 1000.0))
-PRINTED_UNITS |= {"rigid_block_slip": ("mm", 1e3), "N": ("MN/m", 1e-6), "T": ("MN/m", 1e-6)}
+#: Units in the printed table: of forces, openings and movements not that of the CSV file.
+PRINTED_UNITS = dict.fromkeys(("level", "crack_length", "slip_length"), ("m", 1.0))
+PRINTED_UNITS |= dict.fromkeys(("max_opening", "crest_ux", "residual_slip"), ("mm", 1000.0))
+PRINTED_UNITS |= {
+    "residual_tilt": ("rad", 1.0),
+    "rigid_block_slip": ("mm", 1e3),
+    "N": ("MN/m", 1e-6),
+    "T": ("MN/m", 1e-6),
+}
 RESULTS_OF_QUAKES = ("verdict", "residual_slip", "residual_tilt", "rigid_block_slip")
 
 
@@ -380,12 +387,23 @@ def rows_table(plan: Plan, rows: list[Row], width: int | None = None) -> str:
     shown_always = [*map(column_of, plan.names), *plan.critical_columns[:3]]
     names = [n for n in dict.fromkeys([*shown_always, *results]) if rows and n in rows[0]]
     cells = [[short(name, row[name]) for name in names] for row in rows[:PRINTED]]
-    heads = [f"{n}\n[{PRINTED_UNITS[n][0]}]" if n in PRINTED_UNITS else n for n in names]
+    units = {column_of(n): unit_of(n) for n in plan.names}
+    units |= {f"critical_{plan.critical}": unit_of(plan.critical)} if plan.critical else {}
+    units |= {name: unit for name, (unit, _) in PRINTED_UNITS.items()}
+    heads = [f"{n}\n[{units[n]}]" if units.get(n, "-") != "-" else n for n in names]
     if not rows:
         return ""
     table = fitted(names, heads, cells, results[:0:-1], width)
     more = len(rows) - PRINTED
     return f"{table}\n... and {more} rows more" if more > 0 else table
+
+
+def unit_of(name: str) -> str:
+    """The unit of a varied or critical quantity."""
+    try:
+        return "m" if name == "level" else parameters.parameter(name).unit
+    except InputError:
+        return ""  # strength, the efficiency of drains
 
 
 def short(name: str, cell: str) -> str:
