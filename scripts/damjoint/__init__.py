@@ -60,6 +60,7 @@ if TYPE_CHECKING:
     from .library import Sample as Sample
     from .library import Step as Step
     from .library import Sweep as Sweep
+    from .library import calibrate as calibrate
     from .library import case as case
     from .library import check as check
     from .library import critical as critical
@@ -106,7 +107,8 @@ def data(folder: str) -> Path:
 
 #: What `import damjoint` offers, see library.py; imported when it is used.
 LIBRARY = (
-    *("case", "run", "fill", "check", "critical", "quake", "modes", "sweep", "reliability"),
+    *("case", "run", "fill", "check", "critical", "quake", "modes", "sweep"),
+    *("reliability", "calibrate"),
     *("Case", "Run", "JointTable", "Step", "Checks", "Critical", "Quake", "Modes", "Sample"),
     *("Sweep", "Reliability"),
     *("Law", "LAWS"),

@@ -61,6 +61,7 @@ if TYPE_CHECKING:  # loaded when they are used, with what they draw with
     from matplotlib.figure import Figure
 
     from .dynamics.modes import NaturalModes
+    from .studies.calibrate import Calibration
     from .studies.check import SafetyCheck
     from .studies.critical import Search
     from .studies.critical_value import CriticalValue
@@ -1136,3 +1137,51 @@ def reliability(
     variables = Variables(distributions, correlate, tie or {})
     levels = CriticalLevels(on_fixed_mesh(noted(as_case(source))), variables, jobs)
     return Reliability(list(analysed(levels, samples, seed, lambda message: None)), levels)
+
+
+@speaks_python
+def calibrate(
+    source: Case | str | Path,
+    measured: str | Path,
+    free: Sequence[str],
+    *,
+    jobs: int | None = None,
+    progress: bool = False,
+) -> Calibration:
+    """Find the values of parameters with which a case computes what was measured.
+
+    Nothing is written. The result has `estimates`, `intervals` of 95 % (parameters, 2),
+    `correlation`, `residuals` over the standard deviations (series, readings), `undetermined` and
+    `findings`, what the residuals show against the model; `case` is the calibrated one.
+
+    Args:
+        source: a case, or its name or path, see `case`.
+        measured: CSV with a row per reading: level [m], if wanted tail_level and date, and of each
+            instrument a column of history.csv, or head_S, the piezometric head [m] S m from the
+            heel, with its standard deviations in NAME_sd; SI units.
+        free: parameters, each as "K_N", with limits "K_N=1e9:1e12" or with a prior
+            "mu=normal(0.8,0.1)"; they start at the values of the case.
+        jobs: number of processes (default: one per core).
+        progress: show a bar, or where there is no terminal a line every ten seconds.
+
+    Raises:
+        InputError: bad input.
+        RunError: the dam has no equilibrium at a reading with the start values.
+
+    Example:
+        >>> from tempfile import NamedTemporaryFile
+        >>> file = NamedTemporaryFile("w", suffix=".csv")
+        >>> file.write("level,head_14,head_14_sd\\n20,9,0.5\\n30,13,0.5\\n").__class__
+        <class 'int'>
+        >>> file.flush()
+        >>> dam = case("dam", n_joint=10, uplift="drained", drain_x=14)
+        >>> calibrate(dam, file.name, ["drain_effectiveness"], jobs=1).free[0].name
+        'drain_effectiveness'
+    """
+    from .studies.calibrate import free_of
+    from .studies.calibrate_study import compute
+    from .studies.measurements import read
+
+    chosen = noted(as_case(source))
+    measurements = read(Path(measured), chosen)
+    return compute(chosen, free_of(chosen, list(free)), measurements, jobs, progress)

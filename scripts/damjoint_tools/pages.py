@@ -179,6 +179,12 @@ def results_page() -> str:
         "varied values; the critical level [m], its `mode`, the `joint` that fails, whether it is "
         "`confirmed` and by what. `run.json` has the results under `reliability`; "
         "`design_point.case` is the case of the design point.",
+        "## calibration.csv, residuals.csv",
+        "Written by `damjoint calibrate`. A row per free parameter: `parameter`, `unit`, `start`, "
+        "`estimate`, `low` and `high` of its 95 % interval, `determined` (1, 0), and "
+        "`correlation_NAME` with each other one. A row per measured value: `reading`, `date`, "
+        "`level` [m], `series`, `measured`, `computed` and `standard_deviation` in the unit of "
+        "the series, `residual`: their difference over the standard deviation.",
         "## fields/",
         "`bulk.msh` and `joint.msh` for Gmsh (a view per field with all levels as its steps); "
         "`fields.pvd` for ParaView, with the blocks bodies (`bulk_t*.vtu`) and joints "

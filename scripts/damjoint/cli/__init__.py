@@ -16,7 +16,7 @@ from .options import Parser
 #: The commands: names of modules. Each has SUMMARY, `add`, which adds its options, and `call`,
 #: which runs it and returns the exit code.
 COMMANDS = (
-    *("run", "check", "critical", "quake", "modes", "sweep", "reliability"),
+    *("run", "check", "critical", "quake", "modes", "sweep", "reliability", "calibrate"),
     *("plot", "report", "tables", "gui", "new", "validate"),
 )
 DEVELOPERS = ("stress", "bench", "law")
@@ -25,7 +25,7 @@ EXIT_CODES = """exit codes:
   0    done, and the dam stands
   1    the dam fails, a requirement is not met or not judged, or the computation has failed
   2    bad input; nothing was computed or removed
-  3    critical: the value is not confirmed
+  3    critical: the value is not confirmed; calibrate: a parameter is not determined
   130  interrupted; what is finished is saved"""
 
 

@@ -27,12 +27,13 @@ MOST_ITERATIONS = 30
 TOLERANCE = 1e-4
 
 
-def distribution(name: str, text: str) -> stats.distributions.rv_frozen:
+def distribution(name: str, text: str, option: str = "--sample") -> stats.distributions.rv_frozen:
     """The distribution of 'normal(1.0, 0.15)': a name of scipy.stats with its shapes, loc, scale.
+    option: that has it, for messages.
 
     Raises InputError.
     """
-    message = f"--sample {name}={text}: must be a distribution of scipy.stats with numbers"
+    message = f"{option} {name}={text}: must be a distribution of scipy.stats with numbers"
     try:
         kind, numbers, named = call_of(text)
     except ValueError as error:
