@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..engines.condensed.solve import about
 from ..input import parameters
 from ..input.case import Case
 from ..input.written_case import case_text
@@ -68,7 +69,8 @@ def save(study: Session, answer: Calibration, picture: bool) -> None:
     stepper = LoadStepper(answer.case, interface_of(answer.case))
     stepper.run()
     result = stepper.results()
-    result.info["calibration"] = as_json(answer)
+    entries = {"calibration": as_json(answer), "wall_seconds": {"search": study.seconds}}
+    result.info |= about(stepper.model.equilibrium.bulk) | entries
     study.save(result, more=partial(write_tables, answer))
     file = study.out / f"{name}_calibrated.case"
     with atomic_write(file) as part:
@@ -140,6 +142,7 @@ def as_json(answer: Calibration) -> dict[str, Any]:
         "measured_values": answer.measurements.number,
         "chi2": answer.squares,
         "degrees_of_freedom": answer.freedom,
+        "verdict": verdict(answer),
         "findings": answer.findings,
         "converged": answer.converged,
         "runs": answer.runs,

@@ -112,8 +112,8 @@ class RunSection:
     of_joints: Table | None
     #: of `damjoint quake`; else None
     earthquake: report_quake.Earthquake | None
-    #: flow in time, if it was drawn
-    water: list[Picture]
+    #: by their headings: flow in time, calibration, if they were drawn
+    further: dict[str, Picture]
     #: level of the last state, as text; the same with what it is, of an earthquake
     level: str
     state: str
@@ -301,7 +301,7 @@ def run_section(folder: Path, number: int, solution: Solution) -> RunSection:
         if case.of_joints and result.last
         else None,
         earthquake=report_quake.read(folder, case, info),
-        water=water_in_time(folder, result),
+        further=further_pictures(folder, result),
         level=f"{last['level']:.4g} m" if last else "",
         state=state_of_last(last, info.get("quake")),
         methods=methods_table(case, checks, judged=judged),
@@ -317,16 +317,20 @@ def run_section(folder: Path, number: int, solution: Solution) -> RunSection:
     )
 
 
-def water_in_time(folder: Path, result: Results) -> list[Picture]:
-    """The picture of flow in time, with its balance; empty without one."""
-    path, last = folder / f"{result.case.name}_water.png", result.last
-    if not path.is_file() or "water_in" not in last:
-        return []
-    caption = (
-        f"Water in the joint at the end: {1e3 * last['water']:.4g} l/m, of which "
-        f"{1e3 * last['water_in']:.4g} l/m have come in; void {1e3 * last['void']:.3g} l/m."
-    )
-    return [Picture("bands", caption, bands(path))]
+def further_pictures(folder: Path, result: Results) -> dict[str, Picture]:
+    """The pictures of flow in time, with its balance, and of a calibration, by their headings."""
+    found, last = dict[str, Picture](), result.last
+    water, fit = (folder / f"{result.case.name}_{n}.png" for n in ("water", "calibration"))
+    if water.is_file() and "water_in" in last:
+        caption = (
+            f"Water in the joint at the end: {1e3 * last['water']:.4g} l/m, of which "
+            f"{1e3 * last['water_in']:.4g} l/m have come in; void {1e3 * last['void']:.3g} l/m."
+        )
+        found["Flow in time"] = Picture("bands", caption, bands(water))
+    calibration = result.info.get("calibration")
+    if fit.is_file() and calibration:
+        found["Calibration"] = Picture("bands", calibration["verdict"], bands(fit))
+    return found
 
 
 def state_of_last(last: Mapping[str, float], quake: Mapping[str, Any] | None) -> str:
