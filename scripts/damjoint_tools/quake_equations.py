@@ -12,8 +12,9 @@ from damjoint.dynamics.published import with_corner_dashpots
 from damjoint.dynamics.step import Moving, lift
 from damjoint.dynamics.stepper import Earthquake
 from damjoint.dynamics.uplift import pressures_in_motion
+from damjoint.fem.factor import single_thread
 from damjoint.input.case import Case
-from damjoint.studies.quake import QuakeRun, single_thread
+from damjoint.studies.quake import QuakeRun
 
 #: Tolerance of the residual, relative to the static loads: a step has 1e-9.
 RESIDUAL_TOLERANCE = 1e-8

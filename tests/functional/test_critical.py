@@ -18,7 +18,7 @@ from closed_forms import (
     slide_level,
     slide_level_of_45_m_dam,
 )
-from damjoint import runner
+from damjoint import RunError, runner
 from damjoint.input.resolve import load, varied
 from damjoint.solver import path
 from damjoint.statics import gravity
@@ -421,21 +421,20 @@ def test_the_table_has_the_resultants_of_each_joint():
     assert rows["slip_length_3"][-1] == pytest.approx(search.case.joints[2].joint_length)
 
 
-def test_an_interrupted_search_writes_its_results_so_far(monkeypatch, tmp_path):
-    advance, calls = FailurePath.advance, []
+@pytest.mark.parametrize(
+    "error, state",
+    [(KeyboardInterrupt, "interrupted"), (MemoryError, "failed"), (RunError, "failed")],
+)
+def test_a_search_that_ends_early_writes_its_results_so_far(monkeypatch, tmp_path, error, state):
+    def ended(self):
+        raise error
 
-    def interrupted(self):
-        calls.append(self)
-        if calls:
-            raise KeyboardInterrupt
-        advance(self)
-
-    monkeypatch.setattr(FailurePath, "advance", interrupted)
-    with pytest.raises(KeyboardInterrupt):
+    monkeypatch.setattr(FailurePath, "advance", ended)
+    with pytest.raises(error):
         critical(load("c", {"pena_tang": 0.0}), "level", tmp_path / "out")
     assert (tmp_path / "out/critical.csv").read_text().count("\n") > 4
     record = json.loads((tmp_path / "out/run.json").read_text())
-    assert record["state"] == "interrupted" in record["statement"]
+    assert record["state"] == state in record["statement"]
 
 
 @pytest.mark.parametrize("case", ["dam", "lifts"])

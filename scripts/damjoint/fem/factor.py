@@ -15,6 +15,7 @@ import sys
 import tempfile
 import weakref
 import zlib
+from collections.abc import Iterator
 from contextlib import AbstractContextManager
 from functools import cache
 from io import BytesIO
@@ -28,6 +29,7 @@ from threadpoolctl import ThreadpoolController
 from ..arrays import Array, IntArray, Sparse, mirror, others
 from ..csr import CsrMatrix
 from ..storage import MARK, cache_folder, checksum
+from ..threads import limited_threads
 from ..versions import installed
 from .memory import available, check_memory, dense_memory
 
@@ -58,6 +60,14 @@ def library() -> ctypes.CDLL | None:
             if folder is INSTALLED or is_whole(folder / file_name()):
                 return ctypes.CDLL(str(folder / file_name()))
     return compile_into(parent)
+
+
+@contextlib.contextmanager
+def single_thread() -> Iterator[None]:
+    """Compute with a single thread, also in MUMPS: the matrices of a step are small."""
+    library()  # a limit reaches only libraries that are loaded
+    with limited_threads(1):
+        yield
 
 
 def is_whole(path: Path) -> bool:

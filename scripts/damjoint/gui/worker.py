@@ -21,6 +21,7 @@ from typing import Any, TypeAlias
 from .. import InputError, accuracy
 from ..engines import Engine
 from ..engines.condensed import solve as engine
+from ..fem.factor import single_thread
 from ..input.case import Case
 from ..input.parameters import declared
 from ..runner import write_outcomes
@@ -146,7 +147,7 @@ def run_quake(sheet: Sheet, pipe: Connection, stop: Stop) -> tuple[list[SolvedSc
         pipe.send(("step", level_reached(case, time)))
         stop.after_step()
 
-    with quake.single_thread():
+    with single_thread():
         with stop:
             under_way = quake.QuakeRun(case, sheet.request.span, on_step)
             live = Live(pipe)

@@ -257,7 +257,7 @@ class JointWater:
         step: TimeStep | None = None,
     ) -> Pressure:
         """The water pressure in the joint at a jump, for the internal variables of all joints;
-        before_quake: see `Equilibrium.residual`; step: see `WaterSystem.solve`.
+        before_quake: see `StepWater`; step: see `WaterSystem.solve`.
         """
         joint, fields = self.joint, self.joint.fields
         beyond = np.zeros(fields.nodes)
@@ -377,7 +377,7 @@ class WaterSystem:
         step: TimeStep | None = None,
     ) -> FlowSolution:
         """Pressure of flowing water beyond the imposed one at the inner nodes, for the internal
-        variables of all joints; before_quake: see `Equilibrium.residual`; step: in which water is
+        variables of all joints; before_quake: see `StepWater`; step: in which water is
         stored, the solution is a `FlowInTime`; None: the flow is steady.
 
         Drains reduce the head above their outlet, the tailwater or their own height, by their

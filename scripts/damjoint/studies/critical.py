@@ -23,6 +23,7 @@ from ..input.resolve import resolve, varied
 from ..input.values import flows_in_time
 from ..joint.interface import interface_of
 from ..model.results import Results, row_of_joint
+from ..session import end_of
 from ..solver.path import PRECISION, RISE, ROUGH, SURE, Point
 from ..statics.statement import words_of_bound
 from ..statics.verdict import bound, highest_by_statics
@@ -488,11 +489,12 @@ class Search:
         low, high = sorted((stands.value, fails.value))
         return next((v for v in (root - shift, root + shift) if low < v < high), None)
 
-    def interrupted(self, error: BaseException) -> CriticalValue:
-        """The result of an interrupted search: its last trials."""
+    def ended_early(self, error: BaseException) -> CriticalValue:
+        """The result of a search that an error or an interrupt has ended: its last trials."""
         standing = [t for t in self.trials if t.stands]
         ends = [f"{t.value:.6g} {result_of(t)}" for t in self.trials[-2:]]
-        doubt = f"interrupted: {', '.join(ends)}" if ends else "interrupted"
+        state, _ = end_of(error)
+        doubt = f"{state}: {', '.join(ends)}" if ends else state
         point = point_at_target(standing[-1]) if standing else None
         return CriticalValue(None, "", "", doubt, point, error=error)
 

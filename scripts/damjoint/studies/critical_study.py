@@ -35,7 +35,8 @@ AFTER_GROWTH = 1e-3
 def critical(case: Case, of: str, out: Path | None = None) -> tuple[CriticalValue, list[str]]:
     """Find a critical value of a case and write its files below out (default out/CASE_critical).
 
-    Returns the result, and its lines of text. An interrupted search writes its trials.
+    Returns the result, and its lines of text. A search that is interrupted or fails writes its
+    trials.
     Raises InputError, RunError.
     """
     engine_of(case, "auto")
@@ -45,8 +46,8 @@ def critical(case: Case, of: str, out: Path | None = None) -> tuple[CriticalValu
             search.on_progress = lambda message: shown.describe(f"{case.name}: {message}")
             try:
                 answer = search.run()
-            except KeyboardInterrupt as caught:
-                answer = search.interrupted(caught)
+            except BaseException as caught:
+                answer = search.ended_early(caught)
         save(study, search, answer)
         if answer.error:
             raise answer.error

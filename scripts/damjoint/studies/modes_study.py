@@ -11,6 +11,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
 from ..dynamics.modes import NaturalModes, Variant, natural_modes
+from ..fem.factor import single_thread
 from ..input.case import Case
 from ..input.constraints import ZANGAR
 from ..pictures.drawing import CONCRETE, GREY, ROCK, figure_of, picture_style, write_picture
@@ -35,8 +36,6 @@ PANEL, MOST = 2.6, 5
 
 def compute(case: Case, number: int, progress: bool = True) -> NaturalModes:
     """The lowest modes of a case. Raises InputError, RunError."""
-    from .quake import single_thread
-
     with single_thread(), preparation(case, progress):
         return natural_modes(case, number)
 

@@ -21,8 +21,8 @@ from ..dynamics.rigid_block import RigidBlock
 from ..dynamics.stepper import Earthquake
 from ..engines.condensed.recover import recover
 from ..engines.condensed.solve import about
-from ..fem import factor
 from ..fem.bodies import Bodies
+from ..fem.factor import single_thread
 from ..input.case import Case
 from ..joint.interface import interface_of
 from ..model.fields import Field
@@ -36,7 +36,6 @@ from ..solver.model import Model, StepResult
 from ..solver.state import State
 from ..solver.trace_table import trace_table
 from ..statics.statement import statement
-from ..threads import limited_threads
 from . import quake_summary
 from .quake_result import QuakeResult
 
@@ -230,14 +229,6 @@ class QuakeRun:
 def static_step(model: Model, end: State) -> StepResult | None:
     """The step from the end of an earthquake to the static equilibrium under the last loads."""
     return model.advance(end, end.time, LevelControl(end.loading.level))
-
-
-@contextlib.contextmanager
-def single_thread() -> Iterator[None]:
-    """Compute with a single thread, also in MUMPS: the matrices of a step are small."""
-    factor.library()  # a limit reaches only libraries that are loaded
-    with limited_threads(1):
-        yield
 
 
 def outcome_of(case: Case) -> tuple[LoadStepper, dict[str, Any]]:

@@ -11,6 +11,7 @@ from .. import RunError
 from ..dynamics.stepper import Earthquake
 from ..engines.getdp import quake as engine
 from ..fem.bodies import Bodies
+from ..fem.factor import single_thread
 from ..input.case import Case
 from ..joint.interface import interface_of
 from ..post import folder as folders
@@ -35,7 +36,7 @@ def compute(case: Case, progress: bool = True) -> QuakeTables:
 
     Raises RunError if nothing was computed.
     """
-    with quake.single_thread():  # of the condensed bodies, without any state
+    with single_thread():  # of the condensed bodies, without any state
         model = Model(case, interface_of(case))
         vibrations = Earthquake(model.case, model, model.start(), Bodies.of(case))
     computed = solve(vibrations, progress)
