@@ -27,9 +27,9 @@ from .tables import DIGITS, rows_of_nodes, updates_of
 MOMENTUM_TOLERANCE = 1e-6
 #: Tolerance of motions relative to their largest value: twelve digits, summed over the steps.
 MOTION_TOLERANCE = 1e-6
-#: A dam at rest stays within this share of its largest slip, or this slip [m]; a joint without
-#: friction is broken beyond this share of its length.
-AT_REST, LEAST_MOTION, BROKEN = 0.01, 1e-5, 0.99
+#: A dam at rest stays within this share of its largest slip, or this slip over its height; a joint
+#: without friction is broken beyond this share of its length.
+AT_REST, LEAST_MOTION, BROKEN = 0.01, 2.2e-7, 0.99
 #: Value of damping_mass: of the concrete, not of the water that moves with it.
 OF_CONCRETE = 1
 #: Standard gravity [m/s2], of records in g.
@@ -374,7 +374,8 @@ def summary(joint: Shaken) -> Iterator[str]:
         if abs(found["residual"][f"slip{suffix}"] - slip) > room:
             yield "run.json: the residual slip is not the mean of the last rows"
         moved = abs(rows["slip_mean"][-1] - slip)
-        if moved > AT_REST * largest + LEAST_MOTION + elastic:
+        least = LEAST_MOTION * joint.values["dam_height"]
+        if moved > AT_REST * largest + least + elastic:
             yield f"run.json: at rest, but {moved:.3g} m off its residual slip at the end"
     if abs(abs(found["peaks"][f"slip_mean{suffix}"]["value"]) - largest) > room:
         yield "run.json: the peak of the slip is not that of the rows"

@@ -33,7 +33,7 @@ SAME_PLACE = 1e-7
 #: Times that differ by less are the same.
 SAME_TIME = 1e-9
 #: Aperture of the closed joint [m] with uplift = cracked, and the largest growth over it.
-CRACK_APERTURE, CRACK_MOST = 1e-8, 100.0
+CRACK_APERTURE, CRACK_MOST = 1 / 4.5e9, 100.0
 #: Digits of the elimination in a network: conductances of open and closed joints differ by 1e18.
 PRECISION = 60
 #: Modes whose water flows, and those that water does not pass.
@@ -118,7 +118,8 @@ class JointState:
             elif self.values["uplift"] == "cracked":
                 crack = self.crack_opening(start, opening.size).reshape(opening.shape)
                 beyond = np.maximum(opening - crack, 0)
-                found.append(1 + np.minimum(beyond / CRACK_APERTURE, CRACK_MOST))
+                aperture = CRACK_APERTURE * self.values["dam_height"]
+                found.append(1 + np.minimum(beyond / aperture, CRACK_MOST))
             else:
                 found.append(np.ones_like(opening))
             start += opening.size

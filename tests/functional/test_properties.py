@@ -6,13 +6,15 @@ import re
 from dataclasses import replace
 from functools import partial
 
+import damjoint as dj
 import numpy as np
 import pytest
 from damjoint import InputError, runner
 from damjoint.input.parameters import AUTOMATIC, declared
 from damjoint.input.resolve import load
 from damjoint.laws import COLUMNS
-from damjoint.model.results import FLUX, HISTORY, JOINT
+from damjoint.model.results import FLUX, HISTORY, JOINT, THICKNESS
+from damjoint.studies.critical import Search
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from own_mesh import OwnMesh, Shuffled
@@ -119,14 +121,13 @@ def in_units(case, units):
         if p.text or (p.automatic and case[name] == AUTOMATIC)
         else case[name] * factor(re.search(r"\[(.*)\]$", p.label)[1])
         for name, p in declared().items()
-        if name != "pena_rupture"  # follows G_f
+        if name not in ("pena_rupture", "pena_tang")  # follow G_f, K_N and K_T
     }
     text = lambda heights: ",".join(repr(height * factor("m")) for height in heights)
     case = load("dam", values, text(case.levels), text(case.tail_levels))
-    lengths = {n: [case.shared[n][0] * factor("m")] for n in ("release_length", "crack_aperture")}
-    columns = (JOINT | COLUMNS | FLUX | HISTORY).items()
+    columns = (JOINT | COLUMNS | FLUX | THICKNESS | HISTORY).items()
     scaled = {name: partial(np.multiply, factor(unit)) for name, (unit, _) in columns}
-    return replace(case, shared=case.shared | lengths), scaled
+    return case, scaled
 
 
 @few
@@ -136,6 +137,72 @@ def test_results_do_not_depend_on_units(solve, joint, level, drive, powers):
     case = load("dam", SECTION | LOADS | joint | {"drive": drive}, f"30,{level!r}", "3")
     other, scaled = in_units(case, 10 ** np.array(powers))
     same(solve(case), solve(other), scaled)
+
+
+#: Factors of length, stress and acceleration from SI units.
+SYSTEMS = {"mm, t, s": (1e3, 1e-6, 1e3), "m, t, s": (1.0, 1e-3, 1.0)}
+RUPTURE, BOND = (LAWS[law] | {"law": law} for law in ("rupture", "bond"))
+ENDO = {"law": "endo", "sigma_max": 1e5, "adhesion": 1e5}
+#: Scenes in which rounding grows little: settings, engine.
+CONSISTENT = {
+    "rupture, drained": (RUPTURE | {"uplift": "drained"}, "auto"),
+    "friction, imposed": (LAWS["friction"] | {"law": "friction"}, "auto"),
+    "bond, cracked": (BOND | {"uplift": "cracked"}, "auto"),
+    "bond, flow": (BOND | {"uplift": "flow", "softening": "exponential"}, "auto"),
+    "endo, waterstop": (ENDO | {"uplift": "waterstop", "waterstop": 5.0}, "auto"),
+    "controlled": (BOND | {"drive": "crest"}, "auto"),
+    "grouted": (RUPTURE | {"grout_pressure": 5e4}, "auto"),
+    "getdp, rupture": (RUPTURE | {"uplift": "cracked"}, "getdp"),
+    "getdp, bond": (BOND | {"uplift": "flow"}, "getdp"),
+}
+
+
+@pytest.mark.parametrize("system", SYSTEMS)
+@pytest.mark.parametrize("scene", CONSISTENT)
+def test_a_scene_in_other_consistent_units_has_the_same_results(tmp_path, scene, system):
+    """To ten digits."""
+    changed, engine = CONSISTENT[scene]
+    case = load("dam", SECTION | LOADS | changed, "30,43", "3")
+    other, scaled = in_units(case, SYSTEMS[system])
+    one, two = (
+        runner.run(c, tmp_path, fields=False, picture=False, progress=False, engine=engine)[0]
+        for c in (case, other)
+    )
+    assert one.last["slip_length"] > 0 or one.last["process_zone"] > 0
+    for a, b in ((one.joint, two.joint), (one.history, two.history)):
+        wanted = {n: scaled.get(n, lambda v: v)(v) for n, v in a.items() if n not in COUNTS}
+        assert not {n: off for n, off in differences(wanted, b).items() if off > 1e-10}
+
+
+@pytest.mark.parametrize("system", ["m, t, s", pytest.param("mm, t, s", marks=pytest.mark.heavy)])
+def test_studies_in_other_consistent_units_have_the_same_results(tmp_path, system):
+    """Critical level, safety factors, natural frequencies, an earthquake; on a regular mesh, as
+    Gmsh places a node of a free one otherwise in other units.
+    """
+    length, _, acceleration = SYSTEMS[system]
+    settings = BOND | {"uplift": "cracked", "mesh_pattern": "regular", "n_joint": 10.0}
+    case = load("dam", settings, "45", "3")
+    other, _ = in_units(case, SYSTEMS[system])
+    one, two = (Search(c, "level").run() for c in (case, other))
+    assert one.mode == two.mode
+    assert two.value == pytest.approx(length * one.value, rel=1e-10)
+    assert two.gravity == pytest.approx(length * one.gravity, rel=1e-10)
+    one, two = (dj.check(c).rows for c in (case, other))
+    for name in ("SSF", "OSF"):
+        np.testing.assert_allclose(two[name], one[name], rtol=1e-10, atol=1e-10)
+    one, two = (dj.modes(c).rows["frequency"] for c in (case, other))
+    np.testing.assert_allclose(two, one * np.sqrt(acceleration / length), rtol=1e-10)
+    times = np.arange(0, 1, 0.02)
+    wave = np.column_stack([times, 6 * np.sin(12 * times) * np.exp(-times)])
+    record = tmp_path / "wave.csv"
+    np.savetxt(record, wave, "%.6g", ",", header="time,horizontal", comments="")
+    shaken = {"record_unit": "m/s2", "record_rest": 0.5, "tolerance": 1e-12}
+    one = dj.quake(dj.case(case, **shaken), record=record).rows
+    two = dj.quake(dj.case(other, **shaken, record_scale=acceleration), record=record).rows
+    assert np.abs(one["slip_mean"]).max() > 1e-4
+    for name in ("crest_ux", "heel_opening", "slip_mean"):
+        largest = np.abs(one[name]).max()  # [m]; each time the joint closes, rounding grows
+        np.testing.assert_allclose(two[name] / length, one[name], rtol=0, atol=1e-8 * largest)
 
 
 # -- meshes

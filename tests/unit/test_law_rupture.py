@@ -26,8 +26,8 @@ def closed_form(jumps, sigma_max=S, alpha=1.0, pena_contact=1.0):
     d_e = sigma_max / K_N
     l_c = (1 + P) * d_e
     l_ct = max(
-        {0: 0.0, 2: np.inf}.get(alpha, l_c * np.tan(alpha * np.pi / 4)), 1e-12
-    )  # regularisation length 1e-12 m
+        {0: 0.0, 2: np.inf}.get(alpha, l_c * np.tan(alpha * np.pi / 4)), 1e-13 * 45
+    )  # regularisation length under a dam of 45 m
     kappa, free, rows = d_e, np.zeros(2), []
     for d_n, *d_t in jumps:
         peak = sigma_max * (1 + P) / P

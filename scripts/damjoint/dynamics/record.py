@@ -23,8 +23,8 @@ STANDARD_GRAVITY = 9.80665
 MOST_ROWS = 1_000_000
 #: Bytes of its file.
 LONGEST = 200_000_000
-#: Acceleration [m/s2]; the strongest that were recorded reach 40.
-LARGEST = 1e4
+#: Acceleration over gravity; the strongest that were recorded reach 4.
+LARGEST = 1e3
 #: Time [s], with room for times since an epoch.
 LATEST = 1e10
 #: Interval [s]; usually 5e-3 to 2e-2.
@@ -74,10 +74,10 @@ class Record:
         scale = unit * case["record_scale"] * np.array(parts[case["record_component"]])
         start, rest = case["record_start"], case["record_rest"]
         times, acceleration = rows[:, 0], rows[:, 1:] * scale
-        large = np.flatnonzero(np.abs(acceleration).max(axis=1) > LARGEST)
+        large = np.flatnonzero(np.abs(acceleration).max(axis=1) > LARGEST * case["g"])
         if len(large):
             raise InputError(
-                f"record = {case.record}, row {lines[large[0]]}: must be at most {LARGEST:g} m/s2 "
+                f"record = {case.record}, row {lines[large[0]]}: must be at most {LARGEST:g} g "
                 f"(record_unit = {case['record_unit']}, record_scale = {case['record_scale']:g})"
             )
         if not times[0] <= start < times[-1]:

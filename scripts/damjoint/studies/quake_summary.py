@@ -22,8 +22,8 @@ MEAN_OVER = 1.0
 REST_OF_SLIP = 0.01
 #: The same of its openings, which still vibrate after the slip has ended.
 REST_OF_OPENING = 0.1
-#: Changes below this one count as none [m].
-LEAST_MOTION = 1e-5
+#: Changes below this part of the dam's size count as none [-]: 0.01 mm of 45 m.
+LEAST_MOTION = 2.2e-7
 
 #: Time steps in the first period that resolve a joint which opens and slips.
 STEPS_OF_PERIOD = 30
@@ -161,7 +161,7 @@ def values_at_end(case: Case, rows: Table, period: float) -> dict[str, Any]:
         openings = [np.maximum(column[n], 0.0) for n in ("heel_opening", "toe_opening")]
         rooms = REST_OF_SLIP * np.abs(slip).max(), REST_OF_OPENING * np.max(openings)
         moved = [float(np.ptp(values[last])) if length else 0.0 for values in (plastic, *openings)]
-        limits = np.maximum([rooms[0], rooms[1], rooms[1]], LEAST_MOTION)
+        limits = np.maximum([rooms[0], rooms[1], rooms[1]], LEAST_MOTION * case.size)
         at_rest &= bool((moved <= limits).all())
         end[column_of("slip", k)] = float(slip[-1])
         end[column_of("change", k)] = moved[0]

@@ -6,8 +6,8 @@ from math import hypot, inf, pi, tan
 
 from .point import Jump, Point, Values, damage_after, ramp
 
-#: Regularisation length of the shear release [m].
-RELEASE = 1e-12
+#: Regularisation length of the shear release, over the height of the dam.
+RELEASE = 1e-13
 
 
 class Rupture(Point):
@@ -20,8 +20,8 @@ class Rupture(Point):
         self.delta_e = self.f_t / self.K_N
         self.L_C = (1 + P) * self.delta_e
         self.sigma_c = self.f_t * (1 + P) / P
-        alpha = values["alpha"]
-        self.L_CT = inf if alpha == 2 else max(self.L_C * tan(alpha * pi / 4), RELEASE)
+        alpha, shortest = values["alpha"], RELEASE * values["dam_height"]
+        self.L_CT = inf if alpha == 2 else max(self.L_C * tan(alpha * pi / 4), shortest)
         self.p_g, self.grout_t = values["grout_pressure"], values["grout_t"]
         self.saw, self.saw_t = values["saw_thickness"], values["saw_t"]
         self.curve = values["softening"]
