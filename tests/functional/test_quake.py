@@ -25,9 +25,10 @@ from damjoint.joint import linear_system
 from damjoint.post import stored
 from damjoint.post.field_files import everywhere
 from damjoint.solver.history import joint_row
-from damjoint.studies import chart, outcome, quake_study, quake_summary, sweep
+from damjoint.studies import chart, outcome, quake_picture, quake_study, quake_summary, sweep
 from damjoint.studies.plan import Plan
 from damjoint.studies.quake import QuakeRun
+from matplotlib.text import Text
 from quakes import BLOCK, DAM, earthquake, joint_of, mean_slip, smooth_record, write_record
 from scipy.integrate import solve_ivp
 from scipy.linalg import eigh
@@ -1130,3 +1131,21 @@ def test_a_dam_without_static_equilibrium_is_a_failed_run(command, case_file):
     code, _, err = command("quake", case_file, "--set", "mu=0.2")
     assert code == 1 and "static loads have no equilibrium" in err
     assert json.loads(Path("out/my_quake/run.json").read_text())["state"] == "failed"
+
+
+def test_bases_speak_for_the_dam_and_the_map_names_its_joint(tmp_path):
+    """A contraction joint has no rigid block, its forces are not drawn; the notes are."""
+    smooth_record(tmp_path / "r.csv", 2.0, duration=0.4)
+    settings = {"record_unit": "m/s2", "record_rest": 0.1, "n_joint": 6.0, "h_dam": 20.0}
+    case = dj.case("monoliths", **settings)
+    result = dj.quake(case, record=tmp_path / "r.csv").tables
+    contraction = len(result.joints)
+    assert f"rigid_block_{contraction}" not in result.summary["residual"]
+    assert "rigid_block" in result.summary["residual"]
+    slips = [abs(result.summary["end"][quake_summary.column_of("slip", k)]) for k in result.joints]
+    assert result.joint == np.argmax(slips[:-1])
+    result.summary["notes"].append("what follows is not reliable")
+    texts = [text.get_text() for text in quake_picture.figure(result).findobj(Text)]
+    assert not [text for text in texts if re.match("N', contraction|T, contraction", text)]
+    assert "s from heel [m],\nupstream base" in texts
+    assert any(text.endswith("note: what follows is not reliable") for text in texts)

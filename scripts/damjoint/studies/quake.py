@@ -142,12 +142,15 @@ class QuakeRun:
         return self._result_of(self.summary(), end, error)
 
     def summary(self) -> dict[str, Any]:
-        """See `quake_summary`, of the rows so far; with the slip of the rigid blocks."""
+        """See `quake_summary`, of the rows so far; with the slip of the rigid blocks, but
+        for joints between bodies that other joints hold.
+        """
         quake = self.quake
         summary = quake_summary.summary(quake, self.history.table, quake.halvings)
         for k, joint in enumerate(quake.case.joints if len(self.history) else ()):
-            block = rigid_block(quake, k).slip(quake.record) if joint.law.limits_shear else None
-            if block is not None:
+            if not joint.law.limits_shear or quake.case.graph.is_internal(k):
+                continue
+            if (block := rigid_block(quake, k).slip(quake.record)) is not None:
                 summary["residual"][column_of("rigid_block", k)] = block
         return summary
 

@@ -128,7 +128,8 @@ def draw_stress(picture: Figure, axes: Axes, result: QuakeResult) -> None:
         stress["time"][::step], stress["s"], values, shading="nearest", rasterized=True, **colors
     )
     axes.set_xlim(0, times[-1])
-    axes.set_ylabel("s from heel [m]", fontsize=8)
+    of_first = f",\n{result.case.named((0,))}" if result.case.of_joints else ""
+    axes.set_ylabel(f"s from heel [m]{of_first}", fontsize=8)
     axes.set_xlabel("t [s]", fontsize=8)
     axes.tick_params(labelsize=8)
     box = axes.get_position()
@@ -144,7 +145,7 @@ def most_slip(result: QuakeResult) -> list[int]:
 
 
 def facts_of(result: QuakeResult) -> list[str]:
-    """The record with its largest acceleration; loads and state of each joint before it."""
+    """The record with its largest acceleration; loads and state of each joint before it; notes."""
     case, before = result.case, result.before
     peak = np.abs(result.rows["ground_ax"]).max() / GRAVITY
     texts = [f"record {Path(result.summary['record']).name}, largest acceleration {peak:.3g} g"]
@@ -155,7 +156,7 @@ def facts_of(result: QuakeResult) -> list[str]:
         if joint_result.last:
             state = state_label(joint_result.case, joint_result.last)
             texts.append(f"{name}: {state}" if case.of_joints else state)
-    return texts
+    return [*texts, *(f"note: {note}" for note in result.summary["notes"])]
 
 
 def forces(result: QuakeResult) -> list[tuple[str, np.ndarray, str]]:

@@ -201,8 +201,13 @@ def columns(case: Case, summary: dict[str, Any]) -> dict[str, Value]:
 
 
 def largest_slip(case: Case, summary: dict[str, Any]) -> int:
-    """The number of the joint with the largest slip at the end."""
-    slips = [abs(summary["end"][column_of("slip", k)]) for k in range(len(case.joints))]
+    """The number of the joint with the largest slip at the end, but for joints between bodies that
+    other joints hold.
+    """
+    slips = [
+        -1 if case.graph.is_internal(k) else abs(summary["end"][column_of("slip", k)])
+        for k in range(len(case.joints))
+    ]
     return int(np.argmax(slips))
 
 
