@@ -69,6 +69,7 @@ if TYPE_CHECKING:
     from .library import quake as quake
     from .library import reliability as reliability
     from .library import run as run
+    from .library import sensitivity as sensitivity
     from .library import sweep as sweep
 
 __version__ = "0.2.0"
@@ -110,7 +111,7 @@ LIBRARY = (
     *("case", "run", "fill", "check", "critical", "quake", "modes", "sweep"),
     *("reliability", "calibrate"),
     *("Case", "Run", "JointTable", "Step", "Checks", "Critical", "Quake", "Modes", "Sample"),
-    *("Sweep", "Reliability"),
+    *("Sweep", "Reliability", "sensitivity"),
     *("Law", "LAWS"),
 )
 __all__ = [*LIBRARY, "InputError", "RunError"]

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
-from . import LIBRARY, ROUND_OFF, InputError, accuracy
+from . import LIBRARY, ROUND_OFF, InputError, RunError, accuracy
 from .arrays import Array, Table, Value
 from .engines import Outcome, engine_of
 from .engines.condensed.solve import threads_of
@@ -1185,3 +1185,39 @@ def calibrate(
     chosen = noted(as_case(source))
     measurements = read(Path(measured), chosen)
     return compute(chosen, free_of(chosen, list(free)), measurements, jobs, progress)
+
+
+@speaks_python
+def sensitivity(source: Case | str | Path, *names: str, critical: bool = False) -> np.recarray:
+    """Derivatives with parameters, by direct differentiation of the steps; nothing is written.
+
+    A row per parameter and level: parameter, unit, value, level [m], kink (1: they are one-sided),
+    and the derivatives, in SI units per unit of the parameter, of columns of history.csv or of
+    critical_level.
+
+    Args:
+        source: a case, or its name or path, see `case`.
+        names: parameters, or one of a joint, "lift 25 m.mu"; none: all that have an effect.
+        critical: of the critical level instead of the results of a run.
+
+    Raises:
+        InputError: a parameter that has no derivative.
+        RunError: a state after unstable crack growth, or no critical level.
+
+    Example:
+        >>> dry = case("dam", levels=[30, 36], n_joint=10, order=1, law="friction", adhesion=0.0)
+        >>> rates = sensitivity(dry, "mu", critical=True)
+        >>> rates.parameter.tolist(), bool(rates.critical_level > 0)
+        (['mu'], True)
+    """
+    from .studies.critical import Search
+    from .studies.sensitivity import ALL, names_of, of_point, of_run, table
+
+    chosen = on_fixed_mesh(noted(as_case(source)))
+    listed_names = names_of(chosen, ",".join(names) or ALL)
+    if not critical:
+        return records(table(of_run(chosen, listed_names)))
+    answer = Search(replace(chosen, all_steps=True), "level").find()
+    if answer.value is None or answer.point is None:
+        raise RunError(f"no critical level: {answer.doubt}")
+    return records(table(of_point(answer.point, listed_names)))

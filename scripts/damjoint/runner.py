@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -45,12 +46,14 @@ def run(
     engine: str = "auto",
     drawing: DrawingProcess | None = None,
     key: str = "",
+    further: Callable[[Results, Path], None] = lambda result, folder: None,
 ) -> list[Results]:
     """Solve all scenes of a case and write their results below out, replacing an earlier run's.
 
     fields: also write displacement, stress and joint fields for Gmsh and ParaView; picture: also a
     PNG; engine: see `engine_of`; drawing: draws the pictures, by
-    default this process does; key: see `Session`.
+    default this process does; key: see `Session`; further: writes further tables of a scene into
+    its folder.
     Returns the results in the order of case.scenes(). A run that stops early or is interrupted
     writes its converged steps. Raises InputError, RunError.
     """
@@ -59,7 +62,7 @@ def run(
         shown = RunProgress(case, progress)
         with shown:
             for outcome in accuracy.solve(case, solver, shown.step, fields or picture):
-                save(study, outcome)
+                save(study, outcome, further)
                 outcomes.append(outcome)
                 if outcome.error:
                     raise outcome.error
@@ -79,9 +82,14 @@ def write_outcomes(case: Case, outcomes: list[Outcome], out: Path) -> None:
         write_fields_and_pictures(study, outcomes, fields=True, picture=True)
 
 
-def save(study: Session, outcome: Outcome) -> None:
+def save(
+    study: Session,
+    outcome: Outcome,
+    further: Callable[[Results, Path], None] = lambda result, folder: None,
+) -> None:
     """Write the tables of a scene and its run.json."""
-    study.save(outcome.result, *early_end(outcome.result, outcome.error))
+    ended = early_end(outcome.result, outcome.error)
+    study.save(outcome.result, *ended, more=partial(further, outcome.result))
 
 
 def early_end(result: Results, error: BaseException | None) -> tuple[str, str]:

@@ -173,6 +173,12 @@ def results_page() -> str:
         "and, over the rows that stand, with `crack_length`, `max_opening` and `crest_ux`; of "
         "earthquakes, over the rows at rest, with `residual_slip` and `residual_tilt`.\n"
         "- `.png`: a chart of one or two varied parameters, or of the sample.",
+        "## sensitivity.csv",
+        "Written by `damjoint run --sensitivity` and `damjoint critical --sensitivity`, a row per "
+        "parameter and level: `parameter`, its `unit` and `value`, the level [m], `kink` (1: a "
+        "point of the joint is about to open, to slip or to break, and the derivative towards the "
+        "other side differs), and the derivatives, in SI units per unit of the parameter, of the "
+        "columns of history.csv or of `critical_level`.",
         "## reliability.csv",
         "Written by `damjoint reliability`, a row per critical level: `key`, by which an "
         "interrupted study continues; `of_joint`, the only joint that can fail (empty: all); the "

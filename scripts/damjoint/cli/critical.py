@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 
+from .. import InputError
 from .cases import load_case
 from .options import Parser
 
@@ -28,6 +29,7 @@ def add(command: Parser) -> None:
         "water levels [m above the heel] in this order; a critical value other than the level is "
         "that at the last level (default: those of the case)"
     )
+    command.add_sensitivity("the critical level, sensitivity.csv,")
     command.add_path("--out", "FOLDER", help="output folder (default: out/CASE_critical)")
 
 
@@ -40,7 +42,14 @@ def call(arguments: argparse.Namespace) -> int:
     from ..studies.critical_study import critical
 
     case = load_case(arguments, arguments.case)
-    answer, lines = critical(case, arguments.of, arguments.out)
+    names = list[str]()
+    if arguments.sensitivity:
+        from ..studies.sensitivity import names_of
+
+        if arguments.of != "level":
+            raise InputError(f"--sensitivity: needs --of level, not --of {arguments.of}")
+        names = names_of(case, arguments.sensitivity)
+    answer, lines = critical(case, arguments.of, arguments.out, names)
     print("\n".join(lines))
     if answer.value is None:
         return NONE

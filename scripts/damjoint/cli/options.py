@@ -171,6 +171,15 @@ class Parser(argparse.ArgumentParser):
             "all nodes and integration points of the joints",
         )
 
+    def add_sensitivity(self, what: str) -> None:
+        """Add the option of derivatives; what: of which result."""
+        self.add_argument(
+            "--sensitivity",
+            metavar="NAME,NAME,...",
+            help=f"derivatives of {what} with these parameters, in the unit of each; of one joint: "
+            "'lift 25 m.mu'; all: of all that have an effect (default: none)",
+        )
+
     def add_wide(self) -> None:
         """Add the option of the commands that print tables, see `table_width`."""
         wide = "print all columns of the tables (default: those that fit the terminal)"

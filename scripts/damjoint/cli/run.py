@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from .cases import load_case
 from .options import Parser, table_width
@@ -22,6 +23,7 @@ def add(command: Parser) -> None:
     command.add_loading()
     command.add_accuracy()
     command.add_all_steps()
+    command.add_sensitivity("the results at each level, sensitivity.csv,")
     command.add_wide()
     command.add_case()
     command.add_path("--out", "FOLDER", help="output folder (default: out/CASE)")
@@ -53,8 +55,14 @@ def run_and_print(arguments: argparse.Namespace, drawing: DrawingProcess | None)
     case = load_case(arguments, arguments.case)
     out = arguments.out or Path("out") / case.name
     fields, picture = not arguments.no_fields, drawing is not None
-    code = 0
-    for result in run(case, out, fields, picture, engine=arguments.engine, drawing=drawing):
+    code, options = 0, dict[str, Any]()
+    if arguments.sensitivity:
+        from ..studies import sensitivity
+
+        names = sensitivity.names_of(case, arguments.sensitivity)
+        options["further"] = partial(sensitivity.write, names)
+    options |= {"engine": arguments.engine, "drawing": drawing}
+    for result in run(case, out, fields, picture, **options):
         history = result.history
         print(
             f"{case.name}, uplift {result.case['uplift']}: {verdict(result)}; "
@@ -67,6 +75,8 @@ def run_and_print(arguments: argparse.Namespace, drawing: DrawingProcess | None)
             print(*reasons, sep="\n")
         if result.last:
             print(f"\n{summary.text(result, table_width(arguments))}")
+        if derived := result.info.get("sensitivity"):
+            print("", derived["statement"] or sensitivity.text(derived["changes"]), sep="\n")
         lines = [*hints(result), result.info.get("error_estimate", {}).get("statement", "")]
         if any(lines):
             print("", *filter(None, lines), sep="\n")

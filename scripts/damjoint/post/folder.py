@@ -29,7 +29,7 @@ from ..storage import PART, atomic_write, locked_folder
 TABLES = (
     *("joint.csv", "history.csv", "curve.csv", "steps.csv", "gravity.csv", "critical.csv"),
     *("quake.csv", "quake_joint.csv", "quake_stress.npz", "quake_state.npz"),
-    *("modes.csv", "reliability.csv", "design_point.case", "run.json"),
+    *("modes.csv", "reliability.csv", "design_point.case", "sensitivity.csv", "run.json"),
 )
 PICTURES = ("", "_curve", "_check", "_critical", "_quake", "_modes", "_water")
 FIELDS = r"(bulk|joint)(_t[\w.+-]+\.vtu|\.msh)|fields\.pvd"

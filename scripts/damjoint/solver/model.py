@@ -18,6 +18,7 @@ from ..input.values import flows_in_time, freezes_uplift
 from ..joint.equilibrium import Equilibrium
 from ..joint.flow_in_time import TimeStep
 from ..joint.interface import Interface, interface_of
+from ..joint.problem import JointProblem
 from ..joint.water import BeforeQuake
 from ..model.loads import COMPLETE, Loading
 from ..model.network import with_paths
@@ -48,6 +49,40 @@ class StepResult:
     residual: float
     #: of convergence, see `Convergence`
     criterion: str = BY_TOLERANCE
+
+
+@dataclass(frozen=True)
+class Begun:
+    """A step of a model from a state to a time, before it is solved."""
+
+    model: Model
+    #: with the internal variables of the step's beginning
+    start: State
+    time: float
+    laws: StepLaws
+    before_quake: BeforeQuake | None
+    #: of what is stored in the joints, see `Model.water_steps`
+    steps: tuple[TimeStep, ...]
+
+    @property
+    def problem(self) -> JointProblem:
+        """Its equation."""
+        given = self.start.variables, self.before_quake, self.laws.points, self.steps
+        return self.model.equilibrium.problem(*given)
+
+    def end(self, jump: Array, loading: Loading) -> State:
+        """The state at its end, with a jump (j,)."""
+        model, equilibrium = self.model, self.model.equilibrium
+        given = self.start.variables, self.before_quake, self.steps
+        water = equilibrium.water_in_step(*given)
+        return replace(
+            self.start.update(equilibrium.interface, self.laws, jump),
+            time=self.time,
+            loading=loading,
+            pressures=water.pressures(jump, loading),
+            before_quake=self.before_quake,
+            stored=water.stored(jump, loading, self.time) if model.in_time else (),
+        )
 
 
 class Model:
@@ -159,6 +194,18 @@ class Model:
             return None
         return state.before_quake or BeforeQuake(state.jump, state.variables)
 
+    def begin(self, state: State, time: float, frozen: StepLaws | None = None) -> Begun:
+        """A step from a state to a time; frozen: the laws with frozen damage."""
+        laws = self.equilibrium.laws
+        return Begun(
+            model=self,
+            start=state.begin_step(laws, time),
+            time=time,
+            laws=frozen or StepLaws(laws, laws),
+            before_quake=self.before_quake(state, time),
+            steps=self.water_steps(state, time),
+        )
+
     def advance(
         self,
         state: State,
@@ -179,12 +226,8 @@ class Model:
         and level to start from; frozen: the laws with frozen damage; constant_lift (j,): see
         `JointProblem.with_constant_lift`.
         """
-        equilibrium, laws = self.equilibrium, self.equilibrium.laws
-        start, before_quake = state.begin_step(laws, time), self.before_quake(state, time)
-        step_laws = frozen or StepLaws(laws, laws)
-        steps = self.water_steps(state, time)
-        problem = equilibrium.problem(start.variables, before_quake, step_laws.points, steps)
-        water = equilibrium.water_in_step(start.variables, before_quake, steps)
+        step = self.begin(state, time, frozen)
+        problem = step.problem
         if constant_lift is not None:
             problem = problem.with_constant_lift(constant_lift)
         starts = [
@@ -194,24 +237,16 @@ class Model:
         plan = Plan(starts, self.convergence, persist)
         constraint = None
         if isinstance(control, DisplacementControl):
-            constraint = Prescribed(control, equilibrium)
+            constraint = Prescribed(control, self.equilibrium)
         loading = self.loading(time, state.loading.level)
         try:
             solution = solve(problem, loading, plan, constraint)
         except NotConverged as error:
             self.end_of_solution = str(error)
             return None
-        reached = replace(loading, level=solution.level)
-        new = replace(
-            start.update(equilibrium.interface, step_laws, solution.jump),
-            time=time,
-            loading=reached,
-            pressures=water.pressures(solution.jump, reached),
-            before_quake=before_quake,
-            stored=water.stored(solution.jump, reached, time) if self.in_time else (),
-        )
+        new = step.end(solution.jump, replace(loading, level=solution.level))
         residual = solution.size / (self.reference or 1.0)
-        new = new.after(state).traced(state, frozen is not None)
+        new = new.after(state).traced(state, frozen is not None, control)
         return StepResult(new, solution.iterations, residual, solution.criterion)
 
     def advance_by_first(self, state: State, time: float, control: Control) -> StepResult | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -56,14 +57,14 @@ class State:
         points, nodes = (laws.initial(n) for n in numbers)
         return State(0.0, Loading(0.0, 0.0), jump, points, nodes)
 
-    def traced(self, begin: State, frozen: bool) -> State:
+    def traced(self, begin: State, frozen: bool, control: Any = None) -> State:
         """This state with the update that has led to it from another one; frozen: whether by the
-        laws with frozen damage.
+        laws with frozen damage; control: what was prescribed.
         """
         if begin.trace is None:
             return self
         update = replace(self, previous=None, trace=None)
-        return replace(self, trace=Trace(update, begin.time, frozen, begin.trace))
+        return replace(self, trace=Trace(update, begin.time, frozen, begin.trace, control))
 
     def after(self, previous: State) -> State:
         """This state, as the one that follows another."""
@@ -110,6 +111,8 @@ class Trace:
     frozen: bool = False
     #: None: of the undamaged joints
     before: Trace | None = None
+    #: of `solver.controls`; None: of an earthquake
+    control: Any = None
 
     @staticmethod
     def start(state: State) -> State:

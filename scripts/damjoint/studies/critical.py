@@ -94,6 +94,8 @@ class Search:
         #: partial factors of the case; they are part of the reduced strength, not of a check
         self.partial = {name: case[factor] for name, factor in PARTIAL.items()}
         full = dict.fromkeys(PARTIAL.values(), 1.0)
+        #: whether the updates are recorded that lead to each equilibrium
+        self.all_steps = case.all_steps
         self.settings: dict[str, Setting] = {
             **QUICK,
             **case.source.overrides,
@@ -217,6 +219,7 @@ class Search:
         highest = max(target or 0, *case.levels)  # water may press on the crest
         interface = interface_of(replace(case, levels=(*case.levels[:-1], highest)))
         solver = {name: self.case[name] for name in QUICK}
+        case = replace(case, all_steps=self.all_steps)
         path = FailurePath(case, interface, target, report, to_growth, self.rise, solver)
         self.trials.append(Trial(value, path))
         path.follow(self.factor)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from .. import RunError
 from ..engines import engine_of
 from ..engines.condensed.recover import recover
 from ..engines.condensed.solve import about
@@ -24,6 +27,7 @@ from ..solver.path import Point
 from ..statics.hints import tension_share
 from ..statics.statement import statement
 from . import critical_picture as picture
+from . import sensitivity as sensitivities
 from .critical import Search, last_state
 from .critical_value import CriticalValue
 from .failure_path import critical_columns, row
@@ -32,15 +36,18 @@ from .failure_path import critical_columns, row
 AFTER_GROWTH = 1e-3
 
 
-def critical(case: Case, of: str, out: Path | None = None) -> tuple[CriticalValue, list[str]]:
-    """Find a critical value of a case and write its files below out (default out/CASE_critical).
+def critical(
+    case: Case, of: str, out: Path | None = None, sensitivity: Sequence[str] = ()
+) -> tuple[CriticalValue, list[str]]:
+    """Find a critical value of a case and write its files below out (default out/CASE_critical);
+    sensitivity: parameters by which a critical level is differentiated.
 
     Returns the result, and its lines of text. A search that is interrupted or fails writes its
     trials.
     Raises InputError, RunError.
     """
     engine_of(case, "auto")
-    search = Search(case, of)
+    search = Search(replace(case, all_steps=bool(sensitivity)), of)
     with session(search.case, out or Path("out") / f"{case.name}_critical") as study:
         with preparation(search.case) as shown:
             search.on_progress = lambda message: shown.describe(f"{case.name}: {message}")
@@ -51,7 +58,23 @@ def critical(case: Case, of: str, out: Path | None = None) -> tuple[CriticalValu
         save(study, search, answer)
         if answer.error:
             raise answer.error
-    return answer, printed_lines(answer, search)
+        lines = printed_lines(answer, search)
+        if sensitivity and answer.point and answer.value is not None:
+            lines += ["", *derivative_lines(study.out, answer.point, sensitivity)]
+    return answer, lines
+
+
+def derivative_lines(out: Path, point: Point, names: Sequence[str]) -> list[str]:
+    """Write the derivatives of a critical level, and what is printed of them."""
+    try:
+        rows = sensitivities.of_point(point, names)
+    except RunError as error:
+        return [str(error)]
+    write_csv(
+        out / sensitivities.FILE, {n: np.array(v) for n, v in sensitivities.table(rows).items()}
+    )
+    changes = sensitivities.changes(rows, (("critical_level", "m", 1.0),))
+    return [sensitivities.text(changes)]
 
 
 def table(search: Search) -> dict[str, np.ndarray]:

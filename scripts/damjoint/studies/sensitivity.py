@@ -1,0 +1,194 @@
+"""Derivatives of results with parameters: of a run at its levels, of a critical level."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from tabulate import tabulate
+
+from .. import InputError, RunError
+from ..arrays import Value
+from ..input.case import Case
+from ..input.parameters import declared, parameter
+from ..model.results import Results, with_all_joints
+from ..post.tables import write_csv
+from ..solver.derivatives import NOT_CONTINUOUS, Differentiation, half_difference
+from ..solver.load_stepper import LoadStepper
+from ..solver.path import Point
+from ..threads import limited_threads
+
+#: The file of the derivatives of a run.
+FILE = "sensitivity.csv"
+
+#: Columns of history.csv that follow the parameters continuously: not lengths that count points.
+CONTINUOUS = ("crest_ux", "max_opening", "bonded_length", "N", "T", "M", "U", "x_resultant", "flux")
+
+#: Those that are printed, as changes by one percent of a parameter: name, unit, factor.
+PRINTED = (
+    *(("crest_ux", "mm", 1e3), ("max_opening", "mm", 1e3)),
+    *(("N", "MN/m", 1e-6), ("T", "MN/m", 1e-6)),
+)
+
+#: Part of the largest change of a result below which another one is round-off.
+ROUNDING = 1e-9
+
+#: All parameters that have a derivative and an effect, as the text of --sensitivity.
+ALL = "all"
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """Derivatives with a parameter, per its unit, by column; kink: whether they are one of several,
+    as a point of the joint is about to open, to slip or to break.
+    """
+
+    name: str
+    value: float
+    level: float
+    derivatives: Mapping[str, float]
+    kink: bool
+
+    @property
+    def unit(self) -> str:
+        """Of the parameter."""
+        return parameter(self.name.rpartition(".")[2]).unit
+
+
+def names_of(case: Case, text: str) -> list[str]:
+    """Parameters from a text NAME,NAME,..., or all of a case.
+
+    Raises InputError if one of them has no derivative.
+    """
+    if text.strip() == ALL:
+        return all_of(case)
+    names = [name.strip() for name in text.split(",")]
+    for name in names:
+        if not name or names.count(name) > 1:
+            raise InputError(f"--sensitivity {text}: must be NAME,NAME,... or {ALL}, each once")
+        half_difference(case, name)
+    return names
+
+
+def all_of(case: Case) -> list[str]:
+    """The parameters of a case with a derivative and an effect; of each joint where they differ."""
+    names = []
+    for name, known in declared().items():
+        if known.text or known.choices or known.integer or known.group in NOT_CONTINUOUS:
+            continue
+        if not any(known.matters_in(joint.values) for joint in case.joints):
+            continue
+        differs = known.of_joints and len({joint[name] for joint in case.joints}) > 1
+        for one in [f"{j}.{name}" for j in case.joint_names] if differs else [name]:
+            with contextlib.suppress(InputError):  # it follows from others
+                half_difference(case, one)
+                names.append(one)
+    return names
+
+
+def of_run(case: Case, names: Sequence[str]) -> list[Sensitivity]:
+    """Derivatives at the levels of a case, each with all parameters, up to the last equilibrium.
+
+    Raises InputError, RunError.
+    """
+    with limited_threads(1):
+        stepper = LoadStepper(replace(case, all_steps=True))
+        stepper.run()
+        assert stepper.state.trace
+        updates = stepper.state.trace.updates
+        saved = [state.time for state in stepper.history.saved]
+        columns = list(with_all_joints(dict.fromkeys(CONTINUOUS, ("", "")), stepper.case))
+        rows = []
+        for name in names:
+            value, *_ = half_difference(stepper.case, name)
+            states = Differentiation(stepper.model, name).along(updates)
+            for time in saved:
+                last = max(i for i, u in enumerate(updates) if u.state.time == time)
+                row, level = states[last].row(), updates[last].state.loading.level
+                given = {c: row[c] for c in columns if c in row}
+                rows.append(Sensitivity(name, value, float(level), given, states[last].kink))
+    return rows
+
+
+def of_point(point: Point, names: Sequence[str]) -> list[Sensitivity]:
+    """Derivatives of the level of a point at which a path is highest: there the level does not
+    change with the displacement that was prescribed, so that its derivative is that of the highest
+    level, the one that a left null vector of the tangent gives.
+
+    Raises InputError, RunError.
+    """
+    trace = point.state.trace
+    if trace is None:
+        raise RunError("sensitivity: the path was followed without its updates")
+    rows = []
+    with limited_threads(1):
+        for name in names:
+            value, *_ = half_difference(point.model.case, name)
+            end = Differentiation(point.model, name).along(trace.updates)[-1]
+            given = {"critical_level": end.level}
+            rows.append(Sensitivity(name, value, float(point.level), given, end.kink))
+    return rows
+
+
+def table(rows: Sequence[Sensitivity]) -> dict[str, list[Value]]:
+    """sensitivity.csv: a row per parameter and level."""
+    names = list(rows[0].derivatives) if rows else []
+    return {
+        "parameter": [row.name for row in rows],
+        "unit": [row.unit for row in rows],
+        "value": [row.value for row in rows],
+        "level": [row.level for row in rows],
+        "kink": [float(row.kink) for row in rows],
+        **{name: [row.derivatives[name] for row in rows] for name in names},
+    }
+
+
+def write(names: Sequence[str], results: Results, folder: Path) -> None:
+    """Write the derivatives of a run into its folder; what is printed of them is added to its
+    info.
+    """
+    try:
+        rows = of_run(results.case, names)
+    except RunError as error:
+        results.info["sensitivity"] = {"statement": str(error), "changes": []}
+        return
+    write_csv(folder / FILE, {n: np.array(v) for n, v in table(rows).items()})
+    results.info["sensitivity"] = {"statement": "", "changes": changes(rows, PRINTED)}
+
+
+def changes(
+    rows: Sequence[Sensitivity], printed: Sequence[tuple[str, str, float]]
+) -> list[dict[str, Value]]:
+    """What one percent more of each parameter changes at the last level, the largest change first;
+    of a parameter that is zero, its unit, after the others. Those without an effect are left out.
+    """
+    last = [row for row in rows if row.level == rows[-1].level]
+    heads = [f"{name} [{unit}]" for name, unit, _ in printed]
+    sizes = np.array(
+        [
+            [row.derivatives[n] * by * (0.01 * row.value or 1.0) for n, _, by in printed]
+            for row in last
+        ]
+    )
+    sizes[np.abs(sizes) < ROUNDING * np.abs(sizes).max(axis=0)] = 0.0
+    listed: list[dict[str, Value]] = []
+    for k in sorted(range(len(last)), key=lambda k: (last[k].value == 0, -abs(sizes[k, 0]))):
+        row = last[k]
+        if not sizes[k].any():
+            continue
+        cells: dict[str, Value] = {"parameter": row.name, "value": row.value, "unit": row.unit}
+        cells |= dict(zip(heads, sizes[k].tolist(), strict=True))
+        listed.append(cells | {"at a kink": "yes" if row.kink else ""})
+    return listed
+
+
+def text(listed: Sequence[Mapping[str, Value]]) -> str:
+    """Changes as a printed table."""
+    cells = [
+        {n: f"{v:.4g}" if isinstance(v, float) else v for n, v in row.items()} for row in listed
+    ]
+    title = "Change by one percent more of a parameter (by its unit, if it is 0)"
+    return f"{title}\n{tabulate(cells, 'keys', disable_numparse=True)}"

@@ -1,0 +1,167 @@
+"""Derivatives with parameters: closed forms, central differences of runs, messages."""
+
+import csv
+from dataclasses import replace
+
+import damjoint as dj
+import numpy as np
+import pytest
+from closed_forms import WATER
+from damjoint.solver.load_stepper import LoadStepper
+from damjoint.studies import sensitivity
+from damjoint.studies.critical import Search
+
+SLIDES = {"law": "friction", "adhesion": 0.0, "pena_tang": 0.0, "n_joint": 40, "order": 1}
+
+
+def slopes(mu, rho=2400.0, foot=0.0):
+    """Level at which T = mu N at the joint of the 45 m dam at a height [m], and its derivatives
+    with mu and the density of the dam: N'/(T' - mu N') and mu N_rho / (T' - mu N').
+    """
+    base = 34 - (34 - 5) * foot / 45
+    area = (45 - foot) * (base + 5) / 2
+    half = mu * base / 2
+    depth = np.sqrt(half**2 + 2 * mu * rho * 9.81 * area / WATER) - half
+    normal = rho * 9.81 * area - WATER * base * depth / 2
+    denominator = WATER * depth + mu * WATER * base / 2
+    return foot + depth, normal / denominator, mu * 9.81 * area / denominator
+
+
+def of_critical(case, *names):
+    """Derivatives of the critical level by name, and the level."""
+    answer = Search(replace(case, all_steps=True), "level").find()
+    rows = sensitivity.of_point(answer.point, names)
+    assert not any(row.kink for row in rows if row.name in ("mu", "rho_dam"))
+    return answer.value, {row.name: row.derivatives["critical_level"] for row in rows}
+
+
+def test_the_critical_level_of_a_dam_that_slides():
+    """In closed form; elastic values do not matter."""
+    case = dj.case("dam", levels=[30, 36], mu=0.6, **SLIDES)
+    level, rates = of_critical(case, "mu", "rho_dam", "rho_water", "E_dam", "K_N")
+    exact, by_mu, by_rho = slopes(0.6)
+    assert level == pytest.approx(exact, rel=1e-7)
+    assert rates["mu"] == pytest.approx(by_mu, rel=1e-6)
+    assert rates["rho_dam"] == pytest.approx(by_rho, rel=1e-6)
+    assert rates["rho_water"] == pytest.approx(-by_rho * 2.4, rel=1e-6)  # only their ratio matters
+    assert abs(rates["E_dam"]) * 2.5e10 < 1e-6 and abs(rates["K_N"]) * 1e11 < 1e-6
+
+
+def test_the_critical_level_of_the_joint_that_fails():
+    """The friction of another one has no effect."""
+    lifts = {**SLIDES, "n_joint": 20, "lift_heights": (12.0,), "mu": 0.8, "lift 12 m.mu": 0.5}
+    names = "lift 12 m.mu", "base.mu"
+    level, rates = of_critical(dj.case("dam", levels=[25, 30], **lifts), *names)
+    exact, by_mu, _ = slopes(0.5, foot=12.0)
+    assert level == pytest.approx(exact, rel=1e-6)
+    assert rates["lift 12 m.mu"] == pytest.approx(by_mu, rel=1e-5)
+    assert abs(rates["base.mu"]) < 1e-6
+
+
+def history(case):
+    """The last row of history.csv of a run."""
+    return {n: column[-1] for n, column in LoadStepper(case).run().history.items()}
+
+
+OF_LAWS = {
+    "rupture": ("K_N", "K_T", "sigma_max"),
+    "friction": ("mu", "adhesion", "K_T", "pena_tang"),
+    "bond": ("mu", "adhesion", "G_t", "sigma_max"),
+    "endo": ("mu", "adhesion", "K_N"),
+}
+OF_UPLIFTS = {
+    "none": {},
+    "imposed": {},
+    "drained": {"drain_x": 4.0, "drain_effectiveness": 0.5, "drain_level": 3.0},
+    "cracked": {},
+    "flow": {"aperture_min": 1e-4},
+}
+#: Columns that are compared, and their size [m], [N/m], [N]; a derivative is exact to 1e-6, or to
+#: 1e-9 of the size for a relative change of one.
+SIZES = {"crest_ux": 1e-2, "max_opening": 1e-3, "N": 1e7, "T": 1e7, "M": 1e8, "U": 1e7}
+EXACT, OF_SIZE = 1e-6, 1e-8
+
+
+@pytest.mark.parametrize(
+    "uplift",
+    [
+        uplift if uplift in ("imposed", "flow") else pytest.param(uplift, marks=pytest.mark.heavy)
+        for uplift in OF_UPLIFTS
+    ],
+)
+@pytest.mark.parametrize("law", OF_LAWS)
+def test_the_results_of_a_run_against_central_differences(law, uplift):
+    """Of fourth order, of runs that are converged to round-off; joint cracked and slipping."""
+    weak = {"mu": 0.95, "adhesion": 5e4, "sigma_max": 5e4, "dam_base": 28, "tolerance": 1e-13}
+    given = {"n_joint": 12, "order": 1, **weak, **OF_UPLIFTS[uplift]}
+    case = dj.case("dam", levels=[20, 30, 38, 42], steps=2, law=law, uplift=uplift, **given)
+    names = [*OF_LAWS[law], "rho_dam", "E_dam", *list(OF_UPLIFTS[uplift])[-2:-1]]
+    rows = [row for row in sensitivity.of_run(case, names) if row.level == 42]
+    assert [row.name for row in rows] == names
+    for row in rows:
+        step = 2e-5 * row.value
+        at = {k: history(dj.case(case, **{row.name: row.value + k * step})) for k in (-2, -1, 1, 2)}
+        for column, size in SIZES.items():
+            wide, narrow = (at[k][column] - at[-k][column] for k in (2, 1))
+            expected = (8 * narrow - wide) / (12 * step)
+            allowed = OF_SIZE * size / row.value
+            got = row.derivatives[column]
+            assert got == pytest.approx(expected, rel=EXACT, abs=allowed), (row.name, column)
+
+
+def test_a_load_that_is_zero_has_a_derivative_on_its_side():
+    """The vertical acceleration takes weight off, the line force of ice is not negative."""
+    case = dj.case("dam", levels=[20], n_joint=10)
+    rows = {row.name: row for row in sensitivity.of_run(case, ["k_v", "ice_force"])}
+    weight = 2400 * 9.81 * 45 * (34 + 5) / 2
+    assert rows["k_v"].derivatives["N"] == pytest.approx(-weight, rel=1e-6)
+    assert rows["ice_force"].derivatives["T"] == pytest.approx(1, rel=1e-4)
+
+
+def rows_of(path):
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_the_table_of_a_run(command, tmp_path):
+    words = "run", "dam", "--set", "n_joint=10", "--levels", "20,30", "--no-picture", "--no-fields"
+    code, out, _ = command(*words, "--out", "one", "--sensitivity", "rho_dam,E_dam,f_c")
+    assert code == 0 and "Change by one percent more of a parameter" in out
+    table = rows_of(tmp_path / "one/sensitivity.csv")
+    assert [(r["parameter"], r["level"]) for r in table] == [
+        (name, level) for name in ("rho_dam", "E_dam", "f_c") for level in ("20", "30")
+    ]
+    assert float(table[0]["N"]) == pytest.approx(9.81 * 45 * (34 + 5) / 2, rel=1e-6)
+    lines = out.splitlines()
+    assert any(line.startswith("E_dam") for line in lines)
+    assert not any(line.startswith("f_c") for line in lines)  # has no effect
+    assert command(*words, "--out", "one")[0] == 0
+    assert not (tmp_path / "one/sensitivity.csv").exists()
+
+
+def test_the_table_of_a_critical_level(command, tmp_path):
+    settings = [w for n, v in SLIDES.items() for w in ("--set", f"{n}={v}")]
+    words = "critical", "dam", *settings, "--set", "mu=0.6", "--levels", "30,36", "--out", "out"
+    code, out, _ = command(*words, "--sensitivity", "all")
+    table = {r["parameter"]: r for r in rows_of(tmp_path / "out/sensitivity.csv")}
+    assert code == 0 and float(table["mu"]["critical_level"]) == pytest.approx(27.437, rel=2e-5)
+    assert {"rho_dam", "g", "K_N", "E_found"} <= table.keys()
+    assert out.index("rho_dam") < out.index("mu  ")
+
+
+@pytest.mark.parametrize(
+    "words, message",
+    [
+        (["run", "dam", "--sensitivity", "mux"], "mux: unknown parameter"),
+        (["run", "dam", "--sensitivity", "law"], "--sensitivity law: must be a parameter that is"),
+        (["run", "dam", "--sensitivity", "dam_height"], "neither of geometry, mesh nor solver"),
+        (["run", "dam", "--sensitivity", "mu,mu"], "must be NAME,NAME,... or all, each once"),
+        (["run", "lifts", "--sensitivity", "mu"], "differs between the joints; must be of one"),
+        (["run", "dam", "--sensitivity", "no.mu"], "--sensitivity no.mu: must be of a joint: base"),
+        (["critical", "dam", "--of", "strength", "--sensitivity", "mu"], "needs --of level"),
+    ],
+)
+def test_bad_input_is_one_line_and_writes_nothing(command, tmp_path, words, message):
+    code, out, error = command(*words)
+    assert code == 2 and not out and not list(tmp_path.iterdir())
+    assert message in error and len(error.splitlines()) == 1
