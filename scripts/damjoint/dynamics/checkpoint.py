@@ -80,6 +80,7 @@ def write(path: Path, key: str, quake: Earthquake, history: QuakeHistory) -> Non
         "peak_states": np.array([peak.displacement for peak in history.peaks.values()]),
     }
     content |= {f"variable_{i}": leaf for i, leaf in enumerate(leaves(variables))}
+    content |= {f"stored_{i}": leaf for i, leaf in enumerate(leaves(now.state.stored))}
     with write_entry(path, key) as file:
         np.savez(file, **content)
 
@@ -105,6 +106,7 @@ def read(path: Path, key: str, quake: Earthquake, history: QuakeHistory) -> None
         jump=stored["jump"],
         variables=replace(static.variables, joints=points),
         node_variables=replace(static.node_variables, joints=nodes),
+        stored=with_leaves(static.stored, (stored[f"stored_{i}"] for i in itertools.count())),
     )
     rows = dict(zip(stored["columns"].tolist(), stored["rows"].tolist(), strict=True))
     frame_rows = zip(history.frames.history.rows, stored["frame_rows"].tolist(), strict=True)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..arrays import Array, Table
-from ..model.results import column_of, quake_columns
+from ..model.results import IN_TIME, column_of, quake_columns
 from ..solver.history import joint_row
 from ..solver.state import State
 from .frames import Frames
@@ -45,6 +45,7 @@ def row_of_joint(quake: Earthquake, state: State, number: int) -> dict[str, floa
         "shear_reserve": strength - abs(row["T"]),
         "open_length": row["crack_length"],
         "broken_length": row["broken_length"],
+        **{name: row[name] for name in IN_TIME if name in row},
     }
 
 
@@ -138,8 +139,8 @@ class QuakeHistory:
             of_joint |= dict(zip(("T_inertia", "N_inertia", "M_inertia"), forces, strict=True))
             row |= {column_of(name, k): value for name, value in of_joint.items()}
         stress = stress_at_nodes(quake, state)
-        for name, value in row.items():
-            self.rows[name].append(float(value))
+        for name, values in self.rows.items():
+            values.append(float(row[name]))
         self.stress.append(stress)
         for name, (column, sign) in PEAK_STATES.items():
             value = sign * float(row[column])

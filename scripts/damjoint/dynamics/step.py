@@ -18,9 +18,11 @@ import numpy as np
 from ..arrays import Array, Sparse
 from ..fem.factor import partial_factors
 from ..joint.equilibrium import Equilibrium
+from ..joint.flow_in_time import TimeStep as WaterStep
 from ..joint.joint_laws import JointVariables
 from ..joint.linear_system import many_systems
 from ..joint.problem import Dashpots, JointProblem
+from ..joint.step_water import StepWater
 from ..joint.water import Pressure
 from ..solver.model import Model, StepResult
 from ..solver.newton import NotConverged
@@ -52,6 +54,8 @@ class Problem:
     damping: Sparse
     #: of the joints' dashpots, normal and tangential (3,) [Pa s/m]
     dashpots: Array
+    #: whether the water in the joints flows in the steps: quake_uplift = transient
+    transient: bool = False
 
     @property
     def at_rest(self) -> Moving:
@@ -111,8 +115,10 @@ class TimeStep:
         equilibrium, model = self.equilibrium, self.problem.model
         now, loading = begin.state, begin.state.loading
         start = now.begin_step(equilibrium.laws, now.time)
-        lifted = lift(equilibrium, pressure)
+        water = self.water_in_time(now, start.variables) if self.problem.transient else None
+        lifted = lift(equilibrium, pressure, water)
         joints = self.joint_problem(begin, start.variables, self.on_jumps(begin, loads, lifted))
+        joints = replace(joints, water=water)
         ahead = now.jump + self.dt * begin.motion.velocity[self.problem.system.jumps]
         size = lambda jump: float(np.linalg.norm(joints.residual(jump, loading).value))
         guess = min(now.jump, ahead, key=size)
@@ -127,10 +133,21 @@ class TimeStep:
             return None
         laws = StepLaws(equilibrium.laws, equilibrium.laws)
         state = start.update(equilibrium.interface, laws, solution.jump)
+        if water:
+            time = begin.time + self.dt
+            pressure = water.pressures(solution.jump, loading)
+            stored = water.stored(solution.jump, loading, time)
+            state = replace(state, stored=tuple(replace(s, begin=None) for s in stored))
+            lifted = lift(equilibrium, pressure)
         state = replace(state, pressures=pressure).after(now).traced(now, False)
         residual = solution.size / (model.reference or 1.0)
         step = StepResult(state, solution.iterations, residual, solution.criterion)
         return self.moved(begin, state, joints, lifted), step
+
+    def water_in_time(self, begin: State, variables: JointVariables) -> StepWater:
+        """The water that flows in the step and is solved together with the jumps."""
+        steps = (WaterStep(seconds=self.dt, begin=stored) for stored in begin.stored)
+        return self.equilibrium.water_in_step(variables, steps=tuple(steps))
 
     def on_jumps(self, begin: Moving, loads: tuple[Array, Array], lifted: Array) -> Array:
         """The loads (j,) of a step, see `advance`; lifted: of the water in the joints."""
@@ -186,10 +203,13 @@ class TimeStep:
         )
 
 
-def lift(equilibrium: Equilibrium, pressure: tuple[Pressure, ...]) -> Array:
-    """Nodal forces (j,) of the water pressure in the joints."""
+def lift(
+    equilibrium: Equilibrium, pressure: tuple[Pressure, ...], without: StepWater | None = None
+) -> Array:
+    """Nodal forces (j,) of the water pressure in the joints; without: those where it flows."""
     parts = (
         water.force(of_joint.water_points)
         for water, of_joint in zip(equilibrium.water, pressure, strict=True)
+        if not (without and water.system in without.flowing)
     )
     return sum(parts, np.zeros(equilibrium.bulk.size))

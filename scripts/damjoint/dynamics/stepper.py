@@ -96,6 +96,15 @@ class Converged:
     residual: float
 
 
+def with_stored_water(model: Model, static: State) -> State:
+    """A static state with what is stored in its joints, from where time counts anew."""
+    flowing = model.equilibrium.flowing
+    stored = static.stored or tuple(
+        system.stored_at(static.jump, static.variables, static.loading, 0.0) for system in flowing
+    )
+    return replace(static, stored=tuple(replace(s, time=0.0, begin=None) for s in stored))
+
+
 #: Number of natural frequencies that are computed.
 FREQUENCIES = 3
 
@@ -135,7 +144,11 @@ class Earthquake:
                 stiffness=system.stiffness - rock.stiffness,
             )
             damping = self.damping.matrix(of_dam) + rock.dashpots
+        transient = case["quake_uplift"] == "transient"
+        if transient:
+            static = with_stored_water(model, static)
         self.problem = Problem(
+            transient=transient,
             model=model,
             static=static,
             system=system,

@@ -32,6 +32,8 @@ def pressures_in_motion(case: Case, problem: Problem, state: State) -> tuple[Pre
             without(pressure, water, water.law.gapes(jump, variables))
             for water, pressure, jump, variables in parts
         )
+    if mode == "transient":  # where it flows solved with the jumps
+        return state.pressures
     if mode == "crack" and equilibrium.flowing:
         return equilibrium.water_in_step(state.variables).pressures(state.jump, state.loading)
     return static

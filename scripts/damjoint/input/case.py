@@ -179,6 +179,7 @@ class Case(ParameterValues):
             name
             for name, value in self.given.items()
             if not any(known[name].matters_in(values) for values in of_joints)
+            and not (self.record and name in ("added_mass", "quake_uplift"))
             and value != constants()[name][0]
         )
 

@@ -374,6 +374,14 @@ def check_drains(case: ParameterValues) -> None:
 
 def check_time(case: ParameterValues) -> None:
     """Flow in time: of uplift = flow, without a pseudo-static earthquake."""
+    if case["quake_uplift"] == "transient":
+        if case["k_h"] or case["k_v"]:
+            raise InputError(
+                "quake_uplift = transient: must be crack, unchanged or zero with k_h or k_v (a "
+                "pseudo-static earthquake has no time)"
+            )
+        if case["uplift"] == "cracked":
+            raise InputError("quake_uplift = transient: must be another with uplift = cracked")
     if not flows_in_time(case):
         return
     unit = f"time_unit = {case['time_unit']:g}: must be 0"

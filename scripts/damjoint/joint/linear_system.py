@@ -73,7 +73,7 @@ class LinearSystem(Protocol):
 
 
 class DenseSystem:
-    """Assembled and factorised anew for each tangent; neither border nor flow."""
+    """Assembled and factorised anew for each tangent; no border."""
 
     def __init__(self, assembly: Assembly, stiffness: Array) -> None:
         """stiffness: S (j, j)."""
@@ -83,7 +83,11 @@ class DenseSystem:
         self, tangent: Tangent, right: Array, border: Border | None = None
     ) -> tuple[Array, float]:
         """See `LinearSystem`."""
-        return lu_solve(self.stiffness + self.assembly.dense(tangent.law), right), 0.0
+        matrix = self.stiffness + self.assembly.dense(tangent.law)
+        if flow := tangent.flow:
+            lift = stacked([part.lift.T for part in tangent.flowing]).T
+            matrix[:, flow.columns] -= lift @ flow.pressure
+        return lu_solve(matrix, right), 0.0
 
 
 class WoodburySystem:
@@ -180,7 +184,7 @@ class WoodburySystem:
 
 
 def many_systems(assembly: Assembly, stiffness: Array, undamaged: Array) -> LinearSystem:
-    """What solves the systems of thousands of time steps, few for each, without border and flow;
+    """What solves the systems of thousands of time steps, few for each, without border;
     see `WoodburySystem`.
     """
     if len(stiffness) <= MOST_DENSE:

@@ -6,8 +6,8 @@ S: stiffness of what is around the joints; N: interpolation of the jump at the G
 their weights; t: tractions of the laws; k, d_0: dashpots, in a time step springs from where they
 are at rest; f: loads; p: forces of the water that flows in the joints, which is solved at the same
 jump, so that its derivative is part of the tangent; l: what the water loses in a crack that a
-pseudo-static earthquake opens. The equilibrium at rest has no dashpots, a time step has neither
-water that follows the jumps nor loads that follow the level.
+pseudo-static earthquake opens. The equilibrium at rest has no dashpots, a time step has no loads
+that follow the level, and water that follows the jumps with quake_uplift = transient only.
 """
 
 from __future__ import annotations

@@ -42,10 +42,11 @@ class StepWater:
             for system, step in self.flowing_in_steps
         ]
         lift = np.zeros(len(jump))
-        for system, solution in zip(self.flowing, solutions, strict=True):
+        for (system, step), solution in zip(self.flowing_in_steps, solutions, strict=True):
             nodal = system.expand_to_nodes(solution)
             for water in system.members:
-                lift += water.lift(loading, water.wetted.fields @ nodal[water.nodes])
+                beyond = water.wetted.fields @ nodal[water.nodes]
+                lift += water.lift(loading, beyond, water.lowest(step))
         return StepFlow(water=self, jump=jump, lift=lift, solutions=solutions)
 
     @property

@@ -13,7 +13,7 @@ from .. import ROUND_OFF
 from ..arrays import Array, IntArray
 from ..csr import CsrMatrix
 from ..input.case import Case
-from ..input.values import flows, flows_in_time, freezes_uplift, has_drains
+from ..input.values import flows, freezes_uplift, has_drains
 from ..laws import Law
 from ..model.loads import Loading, heads_at_ends
 from ..model.network import Network, WaterPath, networks_of
@@ -73,8 +73,6 @@ class JointWater:
         drained = self.flowing and has_drains(case)
         self.drains = joint.drains(case["drain_x"]) if drained else None
         self.unit_weight = case["rho_water"] * case["g"]
-        #: least pressure [Pa]: of flow in time that of cavitation
-        self.lowest = case["pressure_min"] if flows_in_time(case) else 0.0
         #: the part of the joint on which water may press
         self.wetted = joint.wetted_within(self.waterstop) if self.waterstop else joint.wetted
         self.law: Law[Any] = case.law
@@ -130,21 +128,32 @@ class JointWater:
             start, head = end, following
         return values
 
-    def uplift(self, loading: Loading, matrix: CsrMatrix, y: Array, beyond: Array | float) -> Array:
-        """Pressure [Pa], not below `lowest`, at points of height y that an interpolation matrix of
-        `JointFields` leads to; beyond: pressure of flowing water beyond the imposed one.
+    def lowest(self, step: TimeStep | None) -> float:
+        """The least pressure [Pa]: zero, of flow in time that at which voids form."""
+        return self.case["pressure_min"] if step and flows(self.case) else 0.0
+
+    def uplift(
+        self,
+        loading: Loading,
+        matrix: CsrMatrix,
+        y: Array,
+        beyond: Array | float,
+        lowest: float = 0.0,
+    ) -> Array:
+        """Pressure [Pa], not below the lowest, at points of height y that an interpolation matrix
+        of `JointFields` leads to; beyond: pressure of flowing water beyond the imposed one.
         """
         pressure = self.unit_weight * (self.head(loading, matrix) - y) + beyond
-        pressure = np.maximum(pressure, self.lowest)
+        pressure = np.maximum(pressure, lowest)
         if self.waterstop is None:
             return pressure
         from_heel = matrix @ self.joint.fields.from_heel
         return pressure * (from_heel <= self.waterstop + ROUND_OFF * self.joint.length)
 
-    def lift(self, loading: Loading, beyond: Array | float = 0.0) -> Array:
-        """Forces of the water in the joint on its two faces (j,)."""
+    def lift(self, loading: Loading, beyond: Array | float = 0.0, lowest: float = 0.0) -> Array:
+        """Forces of the water in the joint on its two faces (j,), see `uplift`."""
         y = self.wetted.points.positions[:, 1]
-        return self.force(self.uplift(loading, self.wetted.fields, y, beyond))
+        return self.force(self.uplift(loading, self.wetted.fields, y, beyond, lowest))
 
     def force(self, pressure: Array) -> Array:
         """Forces on the two faces (j,) of pressures at the points of `wetted` [Pa]."""
@@ -268,7 +277,8 @@ class JointWater:
         def at(matrix: CsrMatrix, positions: Array) -> Array:
             if not self.wet:
                 return np.zeros(len(positions))
-            return self.uplift(loading, matrix, positions[:, 1], matrix @ beyond)
+            below = self.lowest(step)
+            return self.uplift(loading, matrix, positions[:, 1], matrix @ beyond, below)
 
         flux, leakage = None, 0.0
         if self.case["uplift"] == "flow":

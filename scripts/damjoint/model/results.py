@@ -173,6 +173,7 @@ QUAKE_OF_JOINTS = (
     *("heel_opening", "toe_opening", "slip_mean", "slip_heel", "slip_toe"),
     *("N", "T", "M", "U", "T_inertia", "N_inertia", "M_inertia", "shear_reserve"),
     *("open_length", "broken_length"),
+    *IN_TIME,
 )
 #: Columns of modes.csv: a row per natural mode, with each water on each rock.
 MODES = {
@@ -189,7 +190,8 @@ MODES = {
 
 def quake_columns(case: Case) -> Columns:
     """The columns of a case's quake.csv: unit and meaning."""
-    return with_all_joints(QUAKE, case, QUAKE_OF_JOINTS)
+    in_time = IN_TIME if case["quake_uplift"] == "transient" else {}
+    return with_all_joints(QUAKE | in_time, case, QUAKE_OF_JOINTS)
 
 
 @dataclass

@@ -52,13 +52,7 @@ def joint_row(equilibrium: Equilibrium, state: State, number: int) -> dict[str, 
     frames = joint.frames[joint.points.elements]
     along_axes = np.einsum("qk,qkc->qc", traction, frames)
     N, T, M = joint.chord.resultants(weights, joint.points.positions, along_axes)
-    own_water = equilibrium.water[number]
-    wetted, in_time = own_water.wetted.points, dict[str, float]()
-    if state.stored:
-        in_time = dict.fromkeys(IN_TIME, 0.0)
-        if own_water.system in equilibrium.flowing:
-            stored = state.stored[equilibrium.flowing.index(own_water.system)]
-            in_time = own_water.in_time(stored, pressure)
+    wetted = equilibrium.water[number].wetted.points
     normals = joint.surface.normals[wetted.elements]
     water = -pressure.water_points[:, None] * normals
     U, _, M_U = joint.chord.resultants(wetted.weights / joint.width, wetted.positions, water)
@@ -77,8 +71,17 @@ def joint_row(equilibrium: Equilibrium, state: State, number: int) -> dict[str, 
         "M_U": M_U,
         "flux": pressure.leakage,
         "heel": joint.heel @ state.jump,
-        **in_time,
+        **(in_time(equilibrium, state, number) if state.stored else {}),
     }
+
+
+def in_time(equilibrium: Equilibrium, state: State, number: int) -> dict[str, float]:
+    """The columns IN_TIME of a joint, by its number, at a state; zero without flowing water."""
+    water = equilibrium.water[number]
+    if water.system not in equilibrium.flowing:
+        return dict.fromkeys(IN_TIME, 0.0)
+    stored = state.stored[equilibrium.flowing.index(water.system)]
+    return water.in_time(stored, state.pressures[number])
 
 
 @dataclass
@@ -149,8 +152,8 @@ class History:
         for k in range(len(equilibrium.interface.joints)):
             of_joint = joint_row(equilibrium, state, k)
             row |= {column_of(name, k): value for name, value in of_joint.items()}
-        for name, value in row.items():
-            self.rows[name].append(float(value))
+        for name, values in self.rows.items():
+            values.append(float(row[name]))
         if step.criterion == BY_ROUND_OFF:
             self.by_round_off.append(state.time)
 

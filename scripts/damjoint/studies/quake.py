@@ -24,6 +24,7 @@ from ..engines.condensed.solve import about
 from ..fem.bodies import Bodies
 from ..fem.factor import single_thread
 from ..input.case import Case
+from ..input.values import flows_in_time
 from ..joint.interface import interface_of
 from ..model.fields import Field
 from ..model.results import column_of
@@ -68,6 +69,21 @@ def check(case: Case, span: Span = None) -> None:
                 f"{name} = {case[name]:g}: must be 0 for damjoint quake: the record replaces the "
                 "seismic coefficients"
             )
+    mode = case["quake_uplift"]
+    if mode == "transient" and not any(joint["uplift"] == "flow" for joint in case.joints):
+        raise InputError(
+            "quake_uplift = transient: must be crack, unchanged or zero without uplift = flow"
+        )
+    if mode == "transient" and not case["storage"]:
+        raise InputError(
+            "storage = 0: must be > 0 with quake_uplift = transient, else the pressure would leap "
+            "as a point opens (water alone: aperture / 2.2 GPa; 1e-12 m/Pa with a little air)"
+        )
+    if mode == "crack" and any(map(flows_in_time, case.joints)):
+        raise InputError(
+            f"quake_uplift = crack: must be transient, unchanged or zero with time_unit = "
+            f"{case['time_unit']:g} (its flow is steady)"
+        )
     absorbing.check(case)
     duration = Record.of(case).duration
     if span and span[0] >= duration:
@@ -231,7 +247,7 @@ class QuakeRun:
 
 def static_step(model: Model, end: State) -> StepResult | None:
     """The step from the end of an earthquake to the static equilibrium under the last loads."""
-    return model.advance(end, end.time, LevelControl(end.loading.level))
+    return model.advance(replace(end, stored=()), end.time, LevelControl(end.loading.level))
 
 
 def outcome_of(case: Case) -> tuple[LoadStepper, dict[str, Any]]:

@@ -63,6 +63,7 @@ QUAKE_UPLIFTS = {
     "crack": "that of the crack at each moment",
     "unchanged": "as before the earthquake",
     "zero": "none in the crack that the earthquake opens",
+    "transient": "flow in time, solved together with the motion",
 }
 #: Loads by the parameters that are 0 without them.
 LOADS = {

@@ -58,6 +58,10 @@ class GetdpQuake:
 def check(case: Case) -> None:
     """Raise InputError if GetDP can not compute the earthquake of a case."""
     check_static(case)
+    if case["quake_uplift"] == "transient":
+        raise InputError(
+            "quake_uplift = transient: must be crack, unchanged or zero with engine = getdp"
+        )
     if case.geometry:
         raise InputError(
             f"geometry = {case.geometry}: must be a section by parameters for an earthquake with "
