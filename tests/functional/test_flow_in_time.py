@@ -12,6 +12,7 @@ from damjoint.joint.flow_in_time import TimeStep
 from damjoint.model.loads import Loading
 from damjoint.solver.load_stepper import LoadStepper
 from damjoint.solver.model import Model
+from damjoint.statics.hints import hints
 
 WATER, VISC = 9810.0, 1e-3
 #: Dam of 28 m on a joint without tension, that opens under 40 m of water.
@@ -212,6 +213,16 @@ def test_in_three_dimensions():
     assert solid.history["water"] - solid.history["water_in"] == pytest.approx(2.8e-4, rel=1e-9)
     for name in ("water", "p_max", "max_opening"):
         assert solid.history[name][-1] == pytest.approx(flat.history[name][-1], rel=2e-2)
+
+
+def test_flow_beyond_laminar_is_said():
+    """2 rho q / eta over 2000: of the steady run by the leakage, in time by the largest flow."""
+    for settings in ({}, {"time_unit": 600.0}):
+        calm, wild = (dam(**settings, aperture_min=w).run() for w in (1e-5, 2e-3))
+        said = [any("Reynolds" in hint for hint in hints(run)) for run in (calm, wild)]
+        assert said == [False, True]
+    steady = 2 * 1000 * 9810 * 44 * 2e-3**3 / (12e-3 * 28) / VISC  # closed
+    assert wild.history["Re"][-1] > 0.5 * steady > 2000
 
 
 def test_steady_before_the_start():

@@ -253,9 +253,11 @@ class JointWater:
         flow = self.system.flow
         share = size / (flow.fields.at_points.T @ flow.points.weights)[self.nodes]
         parts = {"water": stored.volume, "water_in": stored.inflow, "void": stored.void}
-        volumes = {n: share @ part[self.nodes] / self.joint.width for n, part in parts.items()}
-        nodes = pressure.nodes
-        return volumes | {"p_max": nodes.max(), "p_min": nodes.min()}
+        width, nodes, flux = self.joint.width, pressure.nodes, pressure.flux
+        number = 0.0 if flux is None else 2 * np.abs(flux).max() / self.case["visc"]
+        row: dict[str, Any] = {n: share @ v[self.nodes] / width for n, v in parts.items()}
+        row |= {"p_max": nodes.max(), "p_min": nodes.min(), "Re": number}
+        return {name: float(value) for name, value in row.items()}
 
     def pressure(
         self,

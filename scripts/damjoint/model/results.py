@@ -96,6 +96,7 @@ IN_TIME = {
     "void": ("m2", "part of the joint's aperture that is not filled with water"),
     "p_max": ("Pa", "highest water pressure at a node of the joint"),
     "p_min": ("Pa", "lowest water pressure at a node of the joint"),
+    "Re": ("-", "largest Reynolds number of the flow, 2 flux / visc; laminar up to about 2000"),
 }
 #: Those of a joint. With several joints: of the first one; of joint 2, 3, ... by `column_of`.
 HISTORY_OF_JOINTS = (

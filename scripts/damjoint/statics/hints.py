@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..arrays import Table
 from ..input.case import Case
 from ..input.values import has_drains
 from ..laws import Evidence
@@ -50,6 +51,24 @@ def hints_on_joint(results: Results) -> list[str]:
     return messages
 
 
+#: Reynolds number up to which flow between parallel plates is laminar [-].
+TURBULENT = 2000
+
+
+def turbulence(case: Case, rows: Table) -> str:
+    """What is said of flow that is not laminar, by rows of one joint; else empty."""
+    if case["uplift"] != "flow" or not len(rows["U"]):
+        return ""
+    steady = 2 * np.abs(rows.get("flux", 0.0)) / case["visc"]
+    number = float(np.max(rows.get("Re", steady)))
+    if number <= TURBULENT:
+        return ""
+    return (
+        f"the Reynolds number of the flow reaches {number:.3g}: beyond {TURBULENT} it is "
+        "turbulent, and resists more than the laminar film of the model"
+    )
+
+
 def hints_on_run(results: Results) -> list[str]:
     """Hints on the model as a whole, and on the last state of each joint."""
     case, last, messages = results.case, results.last, list[str]()
@@ -85,6 +104,7 @@ def hints_on_run(results: Results) -> list[str]:
         share = tension_share(joint_result.case, last)
         evidence = Evidence(last["crack_length"], unstable, share)
         of_joint = [*joint_result.case.law.hints(evidence), *hints_on_state(joint_result, last)]
+        of_joint += filter(None, [turbulence(joint_result.case, joint_result.history)])
         messages += (f"{name}: {hint}" if name else hint for hint in of_joint)
     return messages
 

@@ -13,6 +13,7 @@ from ..arrays import Array, Table, Value
 from ..dynamics.stepper import Earthquake
 from ..input.case import Case
 from ..model.results import column_of
+from ..statics.hints import turbulence
 
 #: Time over which the residual values are a mean [s]: the last half of the rest, at most this.
 MEAN_OVER = 1.0
@@ -97,6 +98,10 @@ def summary(quake: Earthquake, rows: Table, halvings: int) -> dict[str, Any]:
                 "undeformed dam, and the drains through the joint are taken as intact"
             )
     result["notes"] += filter(None, (lift_off(quake, rows, k) for k in joints))
+    if "Re" in rows:
+        of_joints = ({n: rows[column_of(n, k)] for n in ("U", "Re")} for k in joints)
+        words = map(turbulence, quake.case.joints, of_joints)
+        result["notes"] += [f"{text}{of(quake.case, k)}" for k, text in enumerate(words) if text]
     return result | {"peaks": peaks} | values_at_end(quake.case, rows, 1 / quake.frequencies[0])
 
 
