@@ -121,10 +121,11 @@ def write_fields_and_pictures(
             from .pictures.run_picture import draw
 
             draw(solution, folder)
-        if picture and "void" in outcome.result.history and outcome.result.joint["time"].any():
+        if picture:
             from .pictures import water_picture
 
-            water_picture.draw(outcome.result, folder)
+            if water_picture.has(outcome.result):
+                water_picture.draw(outcome.result, folder)
 
     for outcome in outcomes:
         study.add(outcome.result, partial(write, outcome))

@@ -69,6 +69,9 @@ def test_a_flood_with_picture_and_report(command, tmp_path, monkeypatch):
     reservoir = 9810 * rows["level"]
     assert np.all(rows["p_max"] >= reservoir * (1 - 1e-9))
     assert rows["p_max"][-1] > 1.1 * reservoir[-1]
+    (tmp_path / "flood" / "flood_water.png").unlink()
+    assert cli.main(["plot", "flood"]) == 0
+    assert (tmp_path / "flood" / "flood_water.png").exists()
     assert cli.main(["report", "flood", "--to", "page.html"]) == 0
     page = (tmp_path / "page.html").read_text()
     assert "Flow in time" in page and "Water in the joint at the end" in page

@@ -21,6 +21,12 @@ UNITS = {"d": 86400.0, "h": 3600.0, "min": 60.0, "s": 1.0}
 LEAST = 4.0
 
 
+def has(results: Results) -> bool:
+    """Whether there is flow in time to draw."""
+    timed = any(joint["uplift"] == "flow" and joint["time_unit"] for joint in results.case.joints)
+    return bool(timed and results.joint["time"].any())
+
+
 def draw(results: Results, folder: Path) -> Path:
     """Draw the picture of a run into its folder; its path."""
     path = folder / f"{results.case.name}_water.png"
