@@ -257,3 +257,32 @@ def test_a_sealed_joint_must_store_water(blocks):
     pressure = slot.step(opened(model, [0, 1e-4, 0, 0, 0]), 1.0)
     assert pressure == pytest.approx(0, abs=1e-9)  # the opening is a void
     assert slot.stored.void.sum() == pytest.approx(5e-4, rel=1e-9)
+
+
+@pytest.mark.heavy
+def test_a_fracture_that_its_pressure_widens():
+    """OpenGeoSys, LIE single_fracture, after Wijesinghe (1986): w = 10 um + (p - 11 MPa)/1e11 Pa/m,
+    11.9 MPa at the inlet of 25 m; the reference is its own 1D solution at 100 s.
+    """
+    width, stiffness, steps = 1e-5, 1e11, 500
+    settings = {"time_unit": 1.0, "storage": 1 / stiffness, "aperture_min": width}
+    settings |= {"dam_base": 25.0, "n_joint": 500.0, "order": 1.0}
+    model = Model(load("dam", OPENS | {"uplift": "flow"} | settings, (30.0,)))
+    closed = model.start().jump
+    slot = Slot(model, closed, Loading(0.9e6 / WATER, 0.0))
+    system, fields = slot.system, slot.system.fields
+    heads = WATER * system.heads(slot.loading)
+    pressure, none = np.zeros(fields.nodes), np.zeros(0)
+    for _ in range(steps):
+        step = TimeStep(seconds=100 / steps, begin=slot.stored)
+        for _ in range(3):  # the conductivity follows the pressure
+            wider = (1 + fields.at_points @ pressure / stiffness / width) ** 3
+            conductivity = wider * system.flow.points.weights
+            solution = system.solve_in_time(
+                step, closed, conductivity, heads, heads, none.astype(int), none
+            )
+            pressure = heads + system.expand_to_nodes(solution)
+        slot.stored = solution.stored(0.0, slot.stored)
+    order = np.argsort(slot.x)
+    found = 11 + np.interp([2.5, 5.0, 7.5], slot.x[order], pressure[order]) / 1e6
+    assert found == pytest.approx([11.34009, 11.00209, 11.0], rel=1e-4)
