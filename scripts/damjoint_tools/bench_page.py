@@ -18,7 +18,7 @@ from damjoint.storage import locked_folder
 from tabulate import tabulate
 from threadpoolctl import threadpool_limits
 
-from . import bench_accuracy, bench_commands, bench_cost
+from . import bench_accuracy, bench_commands, bench_cost, bench_hard
 from .bench_scenes import PARTS, QUANTITIES, SCENES
 from .bench_table import Measurements, Table
 from .provenance import provenance, source_line
@@ -184,6 +184,7 @@ def page(
         *of_joints(tables["joints"]),
         *of_quakes(tables["quakes"]),
         *of_stress(tables["stress"]),
+        *of_hard(tables["hard"]),
     ]
     return "\n\n".join(parts) + "\n"
 
@@ -373,6 +374,21 @@ def of_stress(grid: Table) -> list[str]:
     ]
 
 
+def of_hard(table: Table) -> list[str]:
+    """Scenes that are hard to solve in 2D."""
+    number, seconds = len(bench_hard.NAMED), np.array(table["seconds"])
+    others = seconds[number:]
+    return [
+        "## Hard scenes in 2D",
+        f"CPU seconds of the load steps, one thread: of {len(others)} random dams half take at "
+        f"most {np.median(others):.2g} s, nine of ten {np.percentile(others, 90):.2g} s, the "
+        f"slowest one {others.max():.2g} s. Two further scenes and the slowest ones, with parts of "
+        "the time: in solutions that were given up, in linear systems and in the water "
+        "(`hard.csv`):",
+        as_text(bench_hard.slowest(table)),
+    ]
+
+
 def bench(out: Path, short: bool) -> None:
     """Run the benchmark; write tables (CSV), benchmarks.md, modelings.md, accuracy.png and the
     provenance of all (provenance.json) into out; print the page.
@@ -402,6 +418,7 @@ def measure(measurements: Measurements) -> tuple[dict[str, Table], list[str]]:
     studies = bench_cost.switches, bench_cost.sweeps, bench_cost.growth, bench_cost.stress
     studies += bench_commands.start, bench_commands.pictures, bench_commands.critical
     studies += bench_commands.orders, bench_cost.engines, bench_cost.joints, bench_commands.quakes
+    studies += (bench_hard.hard,)
     tables += [study(measurements) for study in studies]
     tables.append(modelings(measurements, cases))
     with threadpool_limits(1):

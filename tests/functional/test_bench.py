@@ -6,7 +6,7 @@ import csv
 import json
 
 import pytest
-from damjoint_tools import bench_commands, bench_cost, bench_page
+from damjoint_tools import bench_commands, bench_cost, bench_hard, bench_page
 from damjoint_tools.bench_table import Measurements
 
 
@@ -14,7 +14,7 @@ from damjoint_tools.bench_table import Measurements
 def test_the_short_benchmark_writes_consistent_files(command, tmp_path):
     assert command("bench", "--short", "--out", "bench")[0] == 0
     text = (tmp_path / "bench" / "benchmarks.md").read_text()
-    assert text.startswith("# Benchmarks\n") and text.count("\n## ") == 15
+    assert text.startswith("# Benchmarks\n") and text.count("\n## ") == 16
     assert (tmp_path / "bench" / "accuracy.png").read_bytes()[:4] == b"\x89PNG"
     *lines, blank, source = (tmp_path / "bench" / "modelings.md").read_text().splitlines()
     assert len(lines) == 13 and not blank and source in text
@@ -82,3 +82,27 @@ def test_milliseconds_of_time_steps(tmp_path):
     assert 0 < measured["difference"][0] < 1e-5
     title, text, rows = bench_page.of_quakes(measured)
     assert title == "## Earthquake" and "ms a step" in text and rows.count("\n") == 2
+
+
+@pytest.mark.heavy
+def test_what_hard_scenes_wait_for(tmp_path, monkeypatch):
+    """The parts of the time are of its whole; afterwards nothing is measured any more."""
+    monkeypatch.setattr(bench_hard, "NAMED", {"e": ("e", {"E_dam": 60e9})})
+    monkeypatch.setattr(bench_hard, "FEW", 2)
+    solve = bench_hard.step.solve_from
+    table = bench_hard.hard(Measurements(tmp_path / "log", short=True))
+    assert bench_hard.step.solve_from is solve
+    assert table["scene"] == ["e", "random 1-0", "random 1-1"]
+    for solutions, given_up, iterations in zip(
+        table["solutions"], table["given up"], table["iterations"], strict=True
+    ):
+        assert 0 <= given_up <= solutions <= iterations
+    assert table["given up"][0] < table["solutions"][0]
+    for part in ("given up [%]", "linear systems [%]", "water [%]"):
+        assert all(0 <= share <= 100 for share in table[part])
+    assert table["water [%]"][0] > 0
+    seconds = table["seconds"]
+    chosen = bench_hard.slowest(table)["seconds"]
+    assert chosen == [seconds[0], *sorted(seconds[1:], reverse=True)]
+    title, text, rows = bench_page.of_hard(table)
+    assert title == "## Hard scenes in 2D" and "of 2 random dams" in text and rows.count("\n") == 4

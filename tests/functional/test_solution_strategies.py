@@ -196,6 +196,33 @@ def test_how_a_solution_ends_that_does_not_converge(factor, message):
         newton(evaluate, start, convergence, Strategy(1e30, 0, 0, 20, 4))
 
 
+@pytest.mark.parametrize(
+    ("residuals", "message"),
+    [
+        # a cycle of two iterations, up to less than a thousandth
+        ([9, 3, 2, 4, 2.001, 4.001, 1, 0], "the iterates repeat, with a residual of 4 of"),
+        # nothing smaller than the 2 for five iterations
+        ([9, 3, 2, 4, 3.5, 5, 8, 7, 1, 0], "5 iterations have not reduced the residual, 7 of the"),
+        ([9, 3, 2, 4, 3.5, 5, 8, 1, 0], ""),
+    ],
+)
+def test_a_solution_that_does_not_come_nearer_is_given_up(residuals, message):
+    """Residuals in the order of the iterations, over the loads."""
+    sizes = iter(map(float, residuals))
+
+    def evaluate(jump, level, last):
+        size = next(sizes)
+        return Iterate(jump, level, np.array([size]), size, lambda _: (np.ones(1), 0.0))
+
+    start = evaluate(np.zeros(1), 0.0, None)
+    convergence, strategy = Convergence(1.0, 1e-9, 0.0, 5.0, 1e3), Strategy(1e30, 0, 0, 20, 4, 5)
+    if not message:
+        assert newton(evaluate, start, convergence, strategy)[1] == len(residuals) - 1
+        return
+    with pytest.raises(NotConverged, match=message):
+        newton(evaluate, start, convergence, strategy)
+
+
 def test_a_run_that_stops_says_how_its_last_solution_ended(solve):
     """A dam that overturns, on a joint whose equilibrium path is not followed."""
     overturns = {"uplift": "none", "rho_dam": 1200, "K_N": 1e13, "K_T": 1e13}

@@ -57,13 +57,18 @@ def test_two_small_interfaces_are_kept(monkeypatch):
     assert of(cases[1]) is not crest and of(cases[2]) is not first
 
 
-@pytest.mark.parametrize("few", [0, linear_system.FEW], ids=["reduced", "whole"])
+@pytest.mark.parametrize(
+    ("few", "by_columns"),
+    [(0, 0), (linear_system.FEW, 0), (linear_system.FEW, 1)],
+    ids=["by rows", "whole", "by columns"],
+)
 @pytest.mark.parametrize("flowing", [False, True])
 @pytest.mark.parametrize("bordered", [False, True])
-def test_solution_of_the_linear_system(interface, flowing, bordered, few, monkeypatch):
+def test_solution_of_the_linear_system(interface, flowing, bordered, few, by_columns, monkeypatch):
     """A third of the points with another, unsymmetric tangent; pressures that depend on some of the
     unknowns."""
     monkeypatch.setattr(linear_system, "FEW", few)
+    monkeypatch.setattr(linear_system, "BY_COLUMNS", by_columns)
     rng = np.random.default_rng(142)
     number, size = len(interface.weights), len(interface.bulk.stiffness)
     undamaged = np.broadcast_to(UNDAMAGED, (number, 3, 3))

@@ -11,7 +11,7 @@ import numpy as np
 
 from .. import ROUND_OFF
 from ..arrays import Array, BoolArray, IntArray, distinct, others
-from ..csr import CsrMatrix, added
+from ..csr import CsrMatrix, added, ranges
 from ..fem import elements
 from ..mesh.joint_mesh import JointMesh
 from ..threads import scipy_linalg
@@ -141,6 +141,29 @@ class FlowSolution:
                 *(replace(s, share=rest * s.share) for s in self.systems),
                 *(replace(s, share=share * s.share) for s in other.systems),
             ],
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Coupling:
+    """The terms of G^T D O, point by point, with a diagonal D: the pattern is that of the slopes G
+    (q, inner nodes) and of the openings O (q, j), and is computed once.
+    """
+
+    #: of each term: value in G, its inner node, and its entry in O
+    slope: Array
+    node: IntArray
+    opening: IntArray
+
+    @staticmethod
+    def of(slopes: CsrMatrix, opening: CsrMatrix) -> Coupling:
+        """The terms of two matrices."""
+        entry = np.repeat(np.arange(len(slopes.data)), opening.counts[slopes.rows])
+        starts, counts = opening.indptr[slopes.rows], opening.counts[slopes.rows]
+        return Coupling(
+            slope=slopes.data[entry],
+            node=slopes.indices[entry],
+            opening=ranges(starts, counts),
         )
 
 
@@ -436,6 +459,16 @@ class Flow:
         )
         return solution, np.asarray(matrix @ total, float)
 
+    @cached_property
+    def couplings(self) -> list[Coupling]:
+        """The terms of the coupling of pressure and opening, for each of JointFields.slopes."""
+        return [Coupling.of(slope, self.opening) for slope in self.inner_slopes]
+
+    @cached_property
+    def storing(self) -> Coupling:
+        """The terms of the coupling by what is stored."""
+        return Coupling.of(self.fields.at_points.columns(self.inside), self.opening)
+
     def derivative(
         self, solution: FlowSolution, rate: Array, stored: Array | None = None
     ) -> FlowDerivative:
@@ -444,22 +477,29 @@ class Flow:
         rate (q,): derivatives of the conductivities times weights with the opening; stored (q,):
         those of what is stored in a time step, over its length, None if nothing is.
         """
-        points = np.flatnonzero(rate)
-        opening = self.opening[points]
-        columns, storing = distinct(opening.indices), list[CsrMatrix]()
-        if stored is not None:
-            at_nodes = self.fields.at_points.columns(self.inside)[points].T
-            storing.append(at_nodes @ opening.scaled(stored[points]))
+        opening = self.opening
+        columns = distinct(opening.indices[rate[opening.rows] != 0])
+        place = np.zeros(opening.shape[1], int)
+        place[columns] = np.arange(len(columns))
+        shape = len(self.inside), len(columns)
+
+        def coupling(terms: Coupling, factor: Array) -> Array:
+            grown = opening.data * factor[opening.rows]
+            entries = np.flatnonzero(grown[terms.opening])
+            node, unknown = terms.node[entries], terms.opening[entries]
+            number = node * shape[1] + place[opening.indices[unknown]]
+            values = terms.slope[entries] * grown[unknown]
+            sums = np.bincount(number, values, shape[0] * shape[1])
+            return np.asarray(sums, float).reshape(shape)
 
         def of(system: FlowSystem) -> Array:
-            coupling = added(
-                [
-                    g[points].T @ opening.scaled(rate[points] * d[points])
-                    for g, d in zip(self.inner_slopes, system.gradients, strict=True)
-                ]
-                + storing
-            )
-            return -system.inverse(coupling.columns(columns).toarray())
+            parts = [
+                coupling(terms, rate * gradient)
+                for terms, gradient in zip(self.couplings, system.gradients, strict=True)
+            ]
+            if stored is not None:
+                parts.append(coupling(self.storing, np.where(rate != 0, stored, 0)))
+            return -system.inverse(np.asarray(sum(parts)))
 
         parts = (system.share * of(system) for system in solution.systems)
         return FlowDerivative(pressure=np.asarray(sum(parts)), columns=columns)

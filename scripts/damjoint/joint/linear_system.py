@@ -23,7 +23,7 @@ import numpy as np
 from numpy.linalg import norm
 
 from .. import RunError
-from ..arrays import Array, distinct, mirror
+from ..arrays import Array, IntArray, distinct, mirror
 from ..csr import CsrMatrix, stacked
 from ..threads import limited_threads, scipy_linalg
 from .assembly import Assembly
@@ -142,6 +142,9 @@ class WoodburySystem:
         m = len(rows)
         size = m + (len(flow.pressure) if flow else 0)
         if self.small_matrix is not None and size > len(right) / 2:
+            columns = distinct(np.concatenate([law.indices, flow.columns if flow else NO_COLUMNS]))
+            if len(columns) <= BY_COLUMNS * len(right):
+                return self.solve_columns(law, rows, columns, tangent, right, border)
             whole = np.empty((len(right) + (border is not None),) * 2)
             matrix = whole[: len(right), : len(right)]
             matrix[:] = self.small_matrix
@@ -181,6 +184,51 @@ class WoodburySystem:
         s = solution[size]
         x -= s * by_slope
         return x, s
+
+    def solve_columns(
+        self,
+        law: CsrMatrix,
+        rows: IntArray,
+        columns: IntArray,
+        tangent: Tangent,
+        right: Array,
+        border: Border | None,
+    ) -> tuple[Array, float]:
+        """Solve by a system of the unknowns x_c alone on which the change M = L - B P of the matrix
+        acts; law: L without its zero rows; columns: those of M that are not zero.
+
+            x = C (r - slope s - M_c x_c)
+        """
+        compliance, flow, number = self.compliance, tangent.flow, len(columns)
+        start = compliance @ right
+        small = np.zeros((number + (border is not None),) * 2)
+        law = law.columns(columns)
+        small[:number, :number] = compliance[np.ix_(columns, rows)] @ law.dense
+        if flow:
+            lift = self.lift(tangent.flowing)
+            by_pressure, place = self.by_pressure(lift), np.searchsorted(columns, flow.columns)
+            small[:number, place] -= by_pressure[columns] @ flow.pressure
+        small[np.arange(number), np.arange(number)] += 1
+        small_right = start[columns]
+        if border:
+            by_slope, by_row = compliance @ border.slope, compliance @ border.row
+            small[:number, number] = by_slope[columns]
+            small[number, :number] = -(law.T @ by_row[rows])
+            if flow:
+                small[number, place] += (border.row @ by_pressure) @ flow.pressure
+            small[number, number] = border.rate - border.row @ by_slope
+            small_right = np.append(small_right, border.gap - border.row @ start)
+        solution = lu_solve(small, small_right)
+        changed = solution[:number]
+        force = np.zeros(len(right))
+        force[rows] = law @ changed
+        x = start - compliance @ force
+        if flow:
+            x += by_pressure @ (flow.pressure @ changed[place])
+        if border is None:
+            return x, 0.0
+        s = float(solution[number])
+        return x - s * by_slope, s
 
 
 def many_systems(assembly: Assembly, stiffness: Array, undamaged: Array) -> LinearSystem:
@@ -232,6 +280,13 @@ ONE_THREAD = 10000
 #: Number of unknowns up to which numpy inverts a matrix (by LU, three times the operations, but
 #: scipy takes longer to load), and A is factorised where more than half of its rows change.
 FEW = 600
+
+#: Part of the columns of a small A that change, up to which a system of their unknowns takes less
+#: time than the factorisation of A.
+BY_COLUMNS = 0.6
+
+#: No columns.
+NO_COLUMNS = np.zeros(0, int)
 
 #: Number of unknowns from which on single precision pays: fewer save less than it takes to load
 #: scipy.

@@ -38,6 +38,13 @@ LONGEST_EXTRAPOLATION = 4
 #: The same of a step of a displacement, along which the path is smoother.
 LONGEST_ALONG_PATH = 16
 
+#: Iterations after the smallest residual, over the most of a strategy [-], after which it is given
+#: up. Of 6000 solutions of random scenes that converged, 17 had waited longer for a smaller one;
+#: those that did not converge spent half of their time so.
+PATIENCE = 0.4
+#: The same of strategies that place points inside the release of their shear: they soon converge.
+PATIENCE_OF_RELEASE = 0.25
+
 
 @dataclass(frozen=True)
 class StepResult:
@@ -132,7 +139,14 @@ class Model:
         halvings = int(self.case["max_halvings"])
         most = 2 if self.equilibrium.laws.releases_shear else 1
         return tuple(
-            Strategy(growth, int(secant), int(release), int(iterations), halvings)
+            Strategy(
+                growth,
+                int(secant),
+                int(release),
+                int(iterations),
+                halvings,
+                (PATIENCE_OF_RELEASE if release else PATIENCE) * iterations,
+            )
             for growth, secant, release, iterations in table
             if release <= most
         )

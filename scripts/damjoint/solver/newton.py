@@ -32,6 +32,8 @@ class Strategy:
     release: int
     iterations: int
     halvings: int
+    #: number of iterations after the smallest residual, after which the solution is given up
+    patience: float = np.inf
 
 
 @dataclass(frozen=True)
@@ -102,6 +104,11 @@ STAGNATING_ITERATIONS = 4
 #: has come back to one of them: above the rounding of a norm, far below any progress.
 SAME = 1e-10
 
+#: Numbers of iterations of the cycles into which Newton's method may run, and the relative
+#: difference of the residuals of one cycle and the next below which it stays there [-]: of 6000
+#: solutions of random scenes that converged, two had come so near to a cycle before.
+CYCLES, CYCLE = range(2, 7), 1e-3
+
 #: x rounded to 43 of its 53 bits is x (2^10 + 1) - (x (2^10 + 1) - x): Veltkamp's splitting.
 SPLITTER = 2.0**10
 
@@ -130,7 +137,7 @@ def newton(
         criterion = convergence.reached(now, sizes[-1] if sizes else np.inf, evaluate)
         if criterion:
             return now, iterations, criterion
-        if end := end_of(now, sizes, strategy.iterations):
+        if end := end_of(now, sizes, strategy):
             raise NotConverged(end.format(now.size / (convergence.reference or 1.0)))
         if np.abs(now.jump).max() > convergence.largest_jump:
             raise Diverged(f"a displacement jump exceeds {convergence.largest_jump:.3g} m")
@@ -148,22 +155,37 @@ def newton(
         now = new
 
 
-def end_of(now: Iterate, sizes: list[float], most: int) -> str:
+def end_of(now: Iterate, sizes: list[float], strategy: Strategy) -> str:
     """Why an iterate that has not converged is the last one; empty if it is not.
 
-    sizes: norms of the residual before it; most: iterations.
+    sizes: norms of the residual before it.
     """
     if not np.isfinite(now.size):
         return "the residual is not a finite number"
-    if repeats(now.size, sizes, SAME):
+    if repeats(now.size, sizes, SAME) or cycles([*sizes, now.size]):
         return "the iterates repeat, with a residual of {:.2g} of the loads"
     if len(sizes) >= STAGNATING_ITERATIONS and all(
         repeats(now.size, [size], STAGNATION) for size in sizes[-STAGNATING_ITERATIONS:]
     ):
         return "the residual stagnates at {:.2g} of the loads"
-    if len(sizes) == most:
-        return f"after {most} iterations the residual is {{:.2g}} of the loads"
+    since = len(sizes) - int(np.argmin([*sizes, now.size]))
+    if since >= strategy.patience:
+        return f"{since} iterations have not reduced the residual, {{:.2g}} of the loads"
+    if len(sizes) == strategy.iterations:
+        return f"after {len(sizes)} iterations the residual is {{:.2g}} of the loads"
     return ""
+
+
+def cycles(sizes: list[float]) -> bool:
+    """Whether the last residuals are those of a cycle before them, see CYCLES; some of a cycle
+    differ, else they stagnate.
+    """
+    return any(
+        len(sizes) >= 2 * n
+        and all(abs(sizes[-k] - sizes[-k - n]) <= CYCLE * sizes[-k] for k in range(1, n + 1))
+        and max(sizes[-n:]) > (1 + 2 * CYCLE) * min(sizes[-n:])
+        for n in CYCLES
+    )
 
 
 def repeats(size: float, sizes: list[float], tolerance: float) -> bool:

@@ -1,0 +1,131 @@
+"""Benchmark of scenes that are hard to solve in 2D: what they wait for."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from functools import partial
+from typing import Any
+from unittest.mock import patch
+
+from damjoint.input.case import Case
+from damjoint.input.resolve import load
+from damjoint.joint.interface import interface_of
+from damjoint.joint.linear_system import WoodburySystem
+from damjoint.joint.step_water import StepFlow, StepWater
+from damjoint.progress import track
+from damjoint.solver import step
+from damjoint.solver.load_stepper import LoadStepper
+from damjoint.solver.newton import NotConverged
+from damjoint.statics.verdict import verdict
+from threadpoolctl import threadpool_limits
+
+from .bench_table import Measurements, Table
+from .random_scenes import random_scene
+
+#: Scenes that are always measured: case, values.
+NAMED: dict[str, tuple[str, dict[str, Any]]] = {
+    "e, E_dam = 21 GPa": ("e", {"E_dam": 21e9}),
+    "80 m, cracked, drains, no tension": (
+        "dam",
+        {"dam_height": 80, "uplift": "cracked", "drains": 1, "drain_x": 6}
+        | {"drain_effectiveness": 2 / 3, "sigma_max": 0},
+    ),
+}
+#: Seed and number of the random dams of which the slowest in 2D are listed, and how many are.
+SEED, RANDOM, SLOWEST = 1, 200, 10
+#: The same of the short benchmark.
+FEW = 8
+
+
+class Clock:
+    """CPU seconds of the parts of a solution, and its numbers of solutions and iterations."""
+
+    def __init__(self) -> None:
+        self.seconds = dict.fromkeys(("given up", "linear systems", "water"), 0.0)
+        self.solutions = self.given_up = self.iterations = 0
+
+    def timed(self, part: str, function: Callable[..., Any]) -> Callable[..., Any]:
+        """A function whose seconds are added to a part."""
+
+        def call(*arguments: Any, **options: Any) -> Any:
+            start = time.process_time()
+            try:
+                return function(*arguments, **options)
+            finally:
+                self.seconds[part] += time.process_time() - start
+
+        return call
+
+    def solve_from(self, function: Callable[..., Any], *arguments: Any) -> Any:
+        """A solution by one strategy."""
+        start, self.solutions = time.process_time(), self.solutions + 1
+        try:
+            return function(*arguments)
+        except NotConverged:
+            self.given_up += 1
+            self.seconds["given up"] += time.process_time() - start
+            raise
+
+    def solve_system(self, function: Callable[..., Any], *arguments: Any) -> Any:
+        """An iteration."""
+        self.iterations += 1
+        return self.timed("linear systems", function)(*arguments)
+
+
+@contextmanager
+def clock() -> Iterator[Clock]:
+    """Measure the solutions of this process."""
+    measured, system = Clock(), WoodburySystem.solve
+    solve_from = partial(measured.solve_from, step.solve_from)
+    with ExitStack() as stack:
+        for owner, name, function in (
+            (step, "solve_from", solve_from),
+            (WoodburySystem, "solve", lambda *arguments: measured.solve_system(system, *arguments)),
+            (StepWater, "flow", measured.timed("water", StepWater.flow)),
+            (StepFlow, "tangent", measured.timed("water", StepFlow.tangent)),
+        ):
+            stack.enter_context(patch.object(owner, name, function))
+        yield measured
+
+
+def hard(measurements: Measurements) -> Table:
+    """Solve hard scenes and random dams in 2D: CPU seconds of the load steps, and the parts of it
+    [%] in solutions that were given up, in linear systems and in the water.
+    """
+    parts = "given up [%]", "linear systems [%]", "water [%]"
+    numbers = "unknowns", "seconds", "solutions", "given up", "iterations"
+    table = Table("hard", "scene", *numbers, *parts, "end")
+    scenes = {name: partial(load, *case) for name, case in NAMED.items()}
+    for number in range(FEW if measurements.short else RANDOM):
+        scene = random_scene(SEED, number)
+        if scene.case["dim"] == 2:
+            scenes[f"random {SEED}-{number}"] = partial(getattr, scene, "case")
+    for name, of in track(scenes.items(), "hard scenes"):
+        table.add_measured(measurements, (name,), lambda of=of: measure(of()))
+    return table
+
+
+def measure(case: Case) -> tuple:
+    """Measure a scene; returns the columns of `hard` but for the first."""
+    with threadpool_limits(1), clock() as measured:
+        stepper = LoadStepper(case, interface_of(case))
+        start = time.process_time()
+        result = stepper.run()
+        spent = time.process_time() - start
+    shares = (100 * seconds / spent for seconds in measured.seconds.values())
+    counts = measured.solutions, measured.given_up, measured.iterations
+    unknowns = stepper.model.equilibrium.bulk.size
+    return unknowns, spent, *counts, *shares, verdict(result)
+
+
+def slowest(table: Table) -> Table:
+    """The rows of the named scenes and of the slowest others."""
+    rows = list(zip(*table.values(), strict=True))
+    seconds = list(table).index("seconds")
+    others = sorted(rows[len(NAMED) :], key=lambda row: -row[seconds])
+    chosen = Table(table.name, *table)
+    for row in rows[: len(NAMED)] + others[:SLOWEST]:
+        chosen.add(*row)
+    return chosen
