@@ -171,13 +171,13 @@ class Parser(argparse.ArgumentParser):
             "all nodes and integration points of the joints",
         )
 
-    def add_sensitivity(self, what: str) -> None:
-        """Add the option of derivatives; what: of which result."""
+    def add_sensitivity(self, what: str, note: str = "") -> None:
+        """Add the option of derivatives; what: of which result; note: what else a name does."""
         self.add_argument(
             "--sensitivity",
             metavar="NAME,NAME,...",
             help=f"derivatives of {what} with these parameters, in the unit of each; of one joint: "
-            "'lift 25 m.mu'; all: of all that have an effect (default: none)",
+            f"'lift 25 m.mu'; all: of all that have an effect{note} (default: none)",
         )
 
     def add_wide(self) -> None:

@@ -23,7 +23,8 @@ def add(command: Parser) -> None:
     command.add_loading()
     command.add_accuracy()
     command.add_all_steps()
-    command.add_sensitivity("the results at each level, sensitivity.csv,")
+    repeated = "; K_N, K_T: the run at a tenth and ten times of it, too"
+    command.add_sensitivity("the results at each level, sensitivity.csv,", repeated)
     command.add_wide()
     command.add_case()
     command.add_path("--out", "FOLDER", help="output folder (default: out/CASE)")
@@ -80,5 +81,11 @@ def run_and_print(arguments: argparse.Namespace, drawing: DrawingProcess | None)
         lines = [*hints(result), result.info.get("error_estimate", {}).get("statement", "")]
         if any(lines):
             print("", *filter(None, lines), sep="\n")
+        if arguments.sensitivity and result.last:
+            from ..studies import stiffness
+
+            if repeated := stiffness.named_in(arguments.sensitivity):
+                runs = stiffness.repetitions(result.case, result, repeated, arguments.engine)
+                print("", stiffness.meaning(result.case), *stiffness.lines(list(runs)), sep="\n")
         code = max(code, int(failed(result)))
     return code

@@ -1,0 +1,134 @@
+"""What of a run's results moves with the stiffnesses of the joint, by repeating it.
+
+K_N and K_T are hardly ever measured: a result that depends on them is as uncertain as they are,
+over decades, for which a derivative does not stand.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from .. import InputError, RunError, accuracy
+from ..engines import engine_of
+from ..input.case import Case
+from ..input.resolve import varied
+from ..model.results import Results
+from ..post.summary import Table, aligned, table_of
+from ..statics import gravity
+from ..statics.verdict import verdict
+from ..units import LENGTHS, with_unit
+
+#: Parameters by which a run can be repeated; factors of their values.
+NAMES = "K_N", "K_T"
+FACTORS = {" / 10": 0.1, " x 10": 10.0}
+
+
+def named_in(text: str) -> list[str]:
+    """The stiffnesses in a list of names, as of the option --sensitivity."""
+    return [name for name in NAMES if name in map(str.strip, text.split(","))]
+
+
+def meaning(case: Case) -> str:
+    """What the stiffnesses of a case's first joint mean: its closure under the dam's weight, if the
+    section is that of the parameters, and their ratios to the stiffness of the softer body.
+    """
+    joint = case.joints[0]
+    young, length = min(joint["E_dam"], joint["E_found"]), joint.joint_length
+    closure = ""
+    if not case.geometry:
+        weight = gravity.with_crack(joint, 0.0, 0.0, 0.0).N
+        closed = with_unit(weight / (joint["K_N"] * length), LENGTHS)
+        closure = f"the weight of the dam closes the joint by {closed} in the mean; "
+    h = length / joint["n_joint"]
+    return (
+        f"K_N = {joint['K_N']:.4g}, K_T = {joint['K_T']:.4g} Pa/m: {closure}K_N L/E = "
+        f"{joint['K_N'] * length / young:.3g}, K_N h/E = {joint['K_N'] * h / young:.3g}, K_T/K_N = "
+        f"{joint['K_T'] / joint['K_N']:.3g} (L: length of the joint, h: of an element)"
+    )
+
+
+def repetitions(
+    case: Case, result: Results, names: Sequence[str], engine: str
+) -> Iterator[tuple[str, Results | str]]:
+    """The run and its repetitions, with what was changed; a message in place of results where the
+    values are refused or the run has none.
+    """
+    yield "as set", result
+    for name in names:
+        for label, factor in FACTORS.items():
+            values = tuple(factor * joint[name] for joint in case.joints)
+            try:
+                changed = varied(case, {name: values if len(values) > 1 else values[0]})
+                yield f"{name}{label}", solved(changed, engine)
+            except (InputError, RunError) as error:
+                yield f"{name}{label}", str(error)
+
+
+def solved(case: Case, engine: str) -> Results:
+    """The results of a case with one uplift.
+
+    Raises InputError, RunError.
+    """
+    single = replace(case, also_uplift=())
+    outcome = next(accuracy.solve(single, engine_of(single, engine), lambda _, __: None, False))
+    if outcome.error:
+        raise outcome.error
+    return outcome.result
+
+
+#: Columns of the table: name in `state_of`, heading, units.
+SHOWN = (
+    ("level", "level", LENGTHS[:1]),
+    ("crack_length", "crack", LENGTHS[:1]),
+    ("slip_length", "slipped", LENGTHS[:1]),
+    ("max_opening", "largest opening", LENGTHS),
+    ("slip", "tangential jump", LENGTHS),
+    ("crest_ux", "crest movement", LENGTHS),
+)
+
+
+def table(runs: Sequence[tuple[str, Results | str]]) -> tuple[Table, list[str]]:
+    """The last state of each run and of each of its joints, and the messages of those without."""
+    labels, rows, messages = [], [], []
+    for label, result in runs:
+        if isinstance(result, str):
+            messages.append(f"{label}: {result}")
+            continue
+        for k, joint in enumerate(result.joints):
+            labels.append((label, result.case.named((k,)), verdict(result)))
+            rows.append(state_of(joint))
+    columns = [(head, np.array([row[name] for row in rows]), units) for name, head, units in SHOWN]
+    columns.append(("SSF", np.array([row["SSF"] for row in rows]), (("", 1.0),)))
+    cells = table_of(columns)
+    several = any(joint for _, joint, _ in labels)
+    heads = ["run", *(["joint"] if several else [])]
+    cells = Table(
+        [*heads, *cells.names, "verdict"],
+        [*[""] * len(heads), *cells.units, ""],
+        [
+            (label, *((joint,) if several else ()), *row, word)
+            for (label, joint, word), row in zip(labels, cells.rows, strict=True)
+        ],
+    )
+    return cells, messages
+
+
+def lines(runs: Sequence[tuple[str, Results | str]]) -> list[str]:
+    """The table as text, and the messages."""
+    cells, messages = table(runs)
+    heads = [f"{n}\n[{u}]" if u else n for n, u in zip(cells.names, cells.units, strict=True)]
+    return [aligned(cells.rows, heads, left=1), *messages]
+
+
+def state_of(result: Results) -> dict[str, float]:
+    """The last row of a joint's history, its mean tangential jump [m] and its sliding factor."""
+    last, case = result.last, result.case
+    factor = np.inf
+    if case.law.limits_shear:
+        factor = gravity.sliding_factor(case, last["N"], last["T"], last["bonded_length"])
+    rows = result.at(last["time"]) if len(result.joint["time"]) else {}
+    slip = float(np.mean(rows["delta_t1"])) if rows else np.nan
+    return {**last, "SSF": factor, "slip": slip, "max_opening": max(last["max_opening"], 0.0)}
