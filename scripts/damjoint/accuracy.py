@@ -21,6 +21,7 @@ from .engines import Engine, OnStep, Outcome
 from .input.case import Case
 from .input.refinement import has_plane_fields
 from .model.results import Results
+from .statics import process_zone
 from .statics.notes import remarks
 from .statics.verdict import stiffness_ratio
 
@@ -150,6 +151,7 @@ def refine_until_accurate(
     begin = time.perf_counter()
     case, outcome, step_errors = refine_steps(case, accuracy, solve_mesh)
     (_, *finer), why = mesh_sequence(case), "no finer mesh is tried"
+    finest = finer[-1]["n_joint"] if finer else 0.0
     tried, estimates = [outcome.result], list[Estimate]()
     for meshed in finer:
         if outcome.error:
@@ -176,9 +178,21 @@ def refine_until_accurate(
         estimates = estimate_errors(tried[-3:], accuracy, step_errors)
         if all(estimate.within(accuracy) for estimate in estimates):
             why = ""
-            break
+            if not can_resolve(outcome.result, finest):
+                break
     outcome.result.info["error_estimate"] = as_json(accuracy, tried, estimates, why)
     return outcome
+
+
+def can_resolve(result: Results, finest: float) -> bool:
+    """Whether the fracture process zone of a joint has too few elements, but enough of them with
+    the most elements along the joint.
+    """
+    return any(
+        process_zone.elements(joint) < process_zone.LEAST
+        and process_zone.least(joint.case) <= finest
+        for joint in result.joints
+    )
 
 
 def refine_steps(

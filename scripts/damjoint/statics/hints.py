@@ -10,7 +10,7 @@ from ..input.values import has_drains
 from ..laws import Evidence
 from ..model.results import Results
 from ..units import STRESSES, with_unit
-from . import gravity
+from . import gravity, process_zone
 from .verdict import STIFF_JOINT, stiffness_ratio, verdict
 
 #: Depth and width of the foundation over the dam's height below which the crack is too long: a 45 m
@@ -138,6 +138,12 @@ def hints_on_state(results: Results, last: dict[str, float]) -> list[str]:
         messages.append(
             f"the crack ({crack:.3g} m) ends somewhere in an element of {element:.2g} m; "
             "--accuracy 3% chooses the mesh and estimates the error"
+        )
+    if process_zone.elements(results) < process_zone.LEAST:
+        messages.append(
+            f"the fracture process zone is {process_zone.length(case):.2g} m long (9 pi/32 E' "
+            f"G_f/f_t^2), less than {process_zone.LEAST} elements of {element:.2g} m: the crack "
+            f"depends on the mesh; n_joint = {process_zone.least(case)} or --accuracy resolves it"
         )
     if has_drains(case) and len(results.joint["time"]):  # a section's mesh has a node there
         away = np.abs(results.at()["s"] - case["drain_x"]).min()
