@@ -63,7 +63,8 @@ CONTENTS = {
     "Use": (
         *("reference/usage", "reference/studies", "reference/cluster", "reference/choosing"),
         *("reference/tour", "reference/window"),
-        *("reference/python", "reference/notebooks/tour", "reference/notebooks/law"),
+        *("reference/python", "reference/notebooks/tour", "reference/notebooks/reliability"),
+        "reference/notebooks/law",
     ),
     "Reference": (
         *("reference/theory", "reference/parameters", "reference/results"),
